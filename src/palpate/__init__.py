@@ -1,0 +1,1 @@
+"""palpate: turn a nonlinear finite-element model into something you can touch."""

@@ -1,0 +1,118 @@
+"""Names, SI units and ranges of the quantities that travel between palpate's parts.
+
+Everything inside palpate is in SI units: m, N, Pa, kg/m³, s, rad. Other units exist only at the door: a study
+file may say ``"110 GPa"``, and `to_si` turns it into 1.1e11.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import UsageError
+
+__all__ = ["Quantity", "Range", "to_si"]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A named scalar output.
+
+    Attributes
+    ----------
+    name : str
+        For example ``"u_y at 1.0 m"``.
+    unit : str
+        SI unit, for example ``"m"``; ``""`` for a pure number.
+    """
+
+    name: str
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class Range:
+    """A named input and the interval of values it may take.
+
+    Attributes
+    ----------
+    name : str
+    low, high : float
+        Ends of the interval in `unit`, ``low < high``.
+    unit : str
+        SI unit.
+
+    Raises
+    ------
+    UsageError
+        If the ends are not finite or not in order.
+    """
+
+    name: str
+    low: float
+    high: float
+    unit: str = ""
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
+            raise UsageError(
+                f"The range of {self.name!r} is empty: {self.low} … {self.high} {self.unit}.",
+                why="A range needs two finite ends, the lower one first.",
+                fix="Swap the ends, or give the input a fixed value instead of a range.",
+            )
+
+    def __str__(self) -> str:
+        return f"{self.name} {self.low:g} … {self.high:g} {self.unit}".rstrip()
+
+
+def bounds(ranges: Sequence[Range]) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper ends of n ranges, each of shape (n,)."""
+    return np.array([r.low for r in ranges]), np.array([r.high for r in ranges])
+
+
+@functools.cache
+def _registry() -> Any:
+    import pint  # costs about 0.3 s: only those who parse units pay
+
+    return pint.UnitRegistry()
+
+
+def to_si(value: str | float, unit: str) -> float:
+    """Turn a quantity such as ``"110 GPa"`` into a number in `unit`.
+
+    Parameters
+    ----------
+    value : str or float
+        A number is taken to be in `unit` already.
+    unit : str
+        The SI unit wanted, for example ``"Pa"``.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    UsageError
+        If the text is no quantity, or of another dimension than `unit`.
+    """
+    if not isinstance(value, str):
+        return float(value)
+    import pint
+
+    try:
+        quantity = _registry().Quantity(value)
+        if quantity.unitless and unit and not any(c.isalpha() for c in value.replace("e", "")):
+            return float(quantity.magnitude)  # "5" alone: already in the wanted unit
+        return float(quantity.to(unit or "dimensionless").magnitude)
+    except (pint.errors.PintError, ValueError, TypeError, AttributeError, AssertionError) as error:
+        raise UsageError(
+            f"{value!r} is not a quantity in {unit or 'pure numbers'}.",
+            why=str(error),
+            fix=f'Write a number in {unit or "no unit"}, or a quantity such as "1 {unit}".',
+        ) from error

@@ -1,0 +1,25 @@
+"""Fixtures shared by all tests."""
+
+from __future__ import annotations
+
+import os
+import shutil
+
+import pytest
+
+
+def require_program(*names: str) -> str:
+    """Path of the first system program found; skips by name where none is, fails where CI promised it."""
+    for name in names:
+        if path := shutil.which(name):
+            return path
+    message = f"needs the system program {' or '.join(names)}"
+    if os.environ.get("PALPATE_CI"):
+        pytest.fail(message + ", which .ci/run installs")
+    pytest.skip(message)
+
+
+@pytest.fixture(scope="session")
+def chromium() -> str:
+    """Path of a Chromium executable."""
+    return require_program("chromium", "chromium-browser", "google-chrome")

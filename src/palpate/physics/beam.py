@@ -1,0 +1,113 @@
+"""The cantilever: a plane beam, clamped at x = 0, that point loads bend."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.physics.loads import PointLoad, as_loads
+from palpate.physics.material import LinearElastic
+from palpate.physics.problem import BeamProblem
+from palpate.physics.section import CrossSection
+
+__all__ = ["Cantilever"]
+
+Kinematics = Literal["large", "small"]
+
+
+@dataclass(frozen=True)
+class Cantilever:
+    """A straight cantilever along x, clamped at x = 0, that moves in the x-y plane.
+
+    Attributes
+    ----------
+    length : float
+        In m.
+    section : CrossSection
+        For example ``Circle(radius=0.005)``.
+    material : LinearElastic
+    elements : int
+        About how many finite elements; every load and node of interest gets a vertex of its own.
+    order : int
+        Polynomial order of the elements, 2 or more: linear ones lock in shear.
+    kinematics : "large" or "small"
+        Geometrically exact (Reissner 1972), or the small displacements of Timoshenko 1921.
+    self_weight : bool
+        Whether gravity, 9.80665 m/s² along -y, acts.
+    nodes : tuple of float
+        Positions of interest in m; by default six, evenly spaced from clamp to tip.
+    strain_limit : float
+        Largest fibre strain for which the linear elastic law is believed; beyond it a solve says so and fails.
+
+    Raises
+    ------
+    UsageError
+        For a value out of its bounds.
+    """
+
+    length: float
+    section: CrossSection
+    material: LinearElastic
+    elements: int = 20
+    order: int = 3
+    kinematics: Kinematics = "large"
+    self_weight: bool = False
+    nodes: tuple[float, ...] = field(default=())
+    strain_limit: float = 0.5
+
+    def __post_init__(self) -> None:
+        _check(math.isfinite(self.length) and self.length > 0, "length", self.length, "positive, in m")
+        _check(self.elements >= 1, "elements", self.elements, "at least 1")
+        _check(2 <= self.order <= 8, "order", self.order, "between 2 and 8: linear elements lock in shear")
+        _check(self.kinematics in {"large", "small"}, "kinematics", self.kinematics, "'large' or 'small'")
+        _check(self.strain_limit > 0, "strain_limit", self.strain_limit, "positive")
+        nodes = self.nodes or tuple(float(x) for x in np.linspace(0, self.length, 6))
+        for x in nodes:
+            _check(0 <= x <= self.length, "node of interest", x, f"on the beam, 0 … {self.length} m")
+        object.__setattr__(self, "nodes", tuple(sorted({float(x) for x in nodes})))
+
+    def problem(self, loads: PointLoad | Sequence[PointLoad]) -> BeamProblem:
+        """This beam under the given loads, ready to be solved.
+
+        Raises
+        ------
+        UsageError
+            If a load is off the beam, or two loads share a name.
+        """
+        several = as_loads(loads)
+        for load in several:
+            on_beam = 1e-6 * self.length < self.position(load) <= self.length
+            _check(on_beam, f"load {load.name!r}", load.at, "beyond the clamp, on the beam")
+        return BeamProblem(self, several)
+
+    def position(self, load: PointLoad) -> float:
+        """Where a load acts, in m along the beam."""
+        return self.length if load.at is None else float(load.at)
+
+    def vertices(self, loads: Sequence[PointLoad] = ()) -> np.ndarray:
+        """Positions of the mesh's vertices in m, shape (node,): among them all loads and nodes of interest."""
+        wanted = np.array([0.0, self.length, *self.nodes, *(self.position(load) for load in loads)])
+        # positions closer than a billionth of the length are one
+        fixed = np.unique(np.round(wanted / self.length, 9)) * self.length
+        pieces = [
+            np.linspace(left, right, self._cuts(right - left), endpoint=False)
+            for left, right in zip(fixed[:-1], fixed[1:], strict=True)
+        ]
+        return np.concatenate([*pieces, fixed[-1:]])
+
+    def _cuts(self, span: float) -> int:
+        return max(1, round(self.elements * span / self.length))
+
+
+def _check(holds: bool, what: str, value: object, rule: str) -> None:
+    if not holds:
+        raise UsageError(
+            f"The cantilever's {what} is {value!r}.",
+            why=f"It must be {rule}.",
+            fix="Correct the value.",
+        )

@@ -1,0 +1,88 @@
+"""Point loads: the inputs of a sweep that are forces."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from palpate.errors import UsageError
+from palpate.units import Range
+
+__all__ = ["PointLoad", "TipLoad"]
+
+
+@dataclass(frozen=True)
+class PointLoad:
+    """A dead force at one point of a beam; its size is an input, its direction stays.
+
+    Attributes
+    ----------
+    name : str
+        Name of the input.
+    at : float or None
+        Where it acts, in m along the undeformed beam; ``None`` is the tip.
+    low, high : float
+        Range of its size in N; a negative size reverses the direction.
+    direction : tuple of two floats
+        Direction in the plane (x, y), normalised to length 1; the default pushes down.
+
+    Raises
+    ------
+    UsageError
+        For an empty range or a direction without length.
+    """
+
+    name: str
+    at: float | None
+    low: float
+    high: float
+    direction: tuple[float, float] = (0.0, -1.0)
+
+    def __post_init__(self) -> None:
+        Range(self.name, self.low, self.high, "N")  # raises for an empty range
+        x, y = (float(part) for part in self.direction)
+        length = math.hypot(x, y)
+        if not (math.isfinite(length) and length > 0):
+            raise UsageError(
+                f"The load {self.name!r} has no direction: {self.direction}.",
+                why="A direction needs a finite length above zero.",
+                fix="Give (x, y), for example (0, -1) for downwards.",
+            )
+        # adding zero turns -0.0 into 0.0, so that equal directions are written alike
+        object.__setattr__(self, "direction", (x / length + 0.0, y / length + 0.0))
+
+    @property
+    def range(self) -> Range:
+        """The input's name, range and unit."""
+        return Range(self.name, self.low, self.high, "N")
+
+
+def TipLoad(
+    low: float,
+    high: float,
+    *,
+    direction: tuple[float, float] = (0.0, -1.0),
+    name: str = "P",
+) -> PointLoad:
+    """A load at the tip of a beam, between `low` and `high` N; by default it pushes down."""
+    return PointLoad(name, None, low, high, direction)
+
+
+def as_loads(loads: PointLoad | Sequence[PointLoad]) -> tuple[PointLoad, ...]:
+    """One load or several, as a tuple with distinct names.
+
+    Raises
+    ------
+    UsageError
+        Without loads, or if two share a name.
+    """
+    several = (loads,) if isinstance(loads, PointLoad) else tuple(loads)
+    names = [load.name for load in several]
+    if not names or len(set(names)) < len(names):
+        raise UsageError(
+            "A sweep needs at least one load, each with a name of its own.",
+            why=f"The names given are: {', '.join(names) or 'none'}.",
+            fix="Name the loads apart, for example 'P_x' and 'P_y'.",
+        )
+    return several

@@ -1,0 +1,160 @@
+"""Cross-sections of beams: areas, second moments and shear factors.
+
+The shear factors are those of Cowper 1966 (The shear coefficient in Timoshenko's beam theory, J. Appl. Mech.
+33, 335-340, table 1).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+from palpate.errors import UsageError
+
+__all__ = ["Circle", "CrossSection", "Rectangle", "Section"]
+
+
+class CrossSection(Protocol):
+    """What a beam asks of its cross-section."""
+
+    @property
+    def area(self) -> float:
+        """Area A in m²."""
+
+    @property
+    def second_moment(self) -> float:
+        """Second moment of area I about the bending axis z, in m⁴."""
+
+    @property
+    def half_height(self) -> float:
+        """Distance in m from the centre line to the outermost fibre: bending strain, and the drawn radius."""
+
+    def shear_factor(self, poisson: float) -> float:
+        """Share k of the area that carries shear, a pure number."""
+
+
+@dataclass(frozen=True)
+class Circle:
+    """A solid circle.
+
+    Attributes
+    ----------
+    radius : float
+        In m.
+    """
+
+    radius: float
+
+    def __post_init__(self) -> None:
+        _check_positive("radius", self.radius)
+
+    @property
+    def area(self) -> float:
+        """πr² in m²."""
+        return math.pi * self.radius**2
+
+    @property
+    def second_moment(self) -> float:
+        """πr⁴/4 in m⁴."""
+        return math.pi * self.radius**4 / 4
+
+    @property
+    def half_height(self) -> float:
+        """The radius, in m."""
+        return self.radius
+
+    def shear_factor(self, poisson: float) -> float:
+        """6(1 + ν)/(7 + 6ν), Cowper 1966."""
+        return 6 * (1 + poisson) / (7 + 6 * poisson)
+
+
+@dataclass(frozen=True)
+class Rectangle:
+    """A solid rectangle, bent in the plane of its height.
+
+    Attributes
+    ----------
+    width, height : float
+        In m, along z and y.
+    """
+
+    width: float
+    height: float
+
+    def __post_init__(self) -> None:
+        _check_positive("width", self.width)
+        _check_positive("height", self.height)
+
+    @property
+    def area(self) -> float:
+        """Width times height, in m²."""
+        return self.width * self.height
+
+    @property
+    def second_moment(self) -> float:
+        """b h³/12 in m⁴."""
+        return self.width * self.height**3 / 12
+
+    @property
+    def half_height(self) -> float:
+        """Half of the height, in m."""
+        return self.height / 2
+
+    def shear_factor(self, poisson: float) -> float:
+        """10(1 + ν)/(12 + 11ν), Cowper 1966."""
+        return 10 * (1 + poisson) / (12 + 11 * poisson)
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section given by its numbers, for shapes that have no class of their own.
+
+    Attributes
+    ----------
+    area : float
+        In m².
+    second_moment : float
+        About the bending axis, in m⁴.
+    shear : float
+        Shear factor k, a pure number in (0, 1].
+    height : float, optional
+        In m; by default that of a circle with the same radius of gyration.
+    """
+
+    area: float
+    second_moment: float
+    shear: float
+    height: float | None = None
+
+    def __post_init__(self) -> None:
+        _check_positive("area", self.area)
+        _check_positive("second_moment", self.second_moment)
+        _check_positive("shear", self.shear)
+        if self.shear > 1:
+            raise UsageError(
+                f"A shear factor of {self.shear} is above 1.",
+                why="It is the share of the area that carries the shear force.",
+                fix="Take it from a table such as Cowper 1966; a solid circle has about 0.9.",
+            )
+        if self.height is not None:
+            _check_positive("height", self.height)
+
+    @property
+    def half_height(self) -> float:
+        """Half of the height, in m."""
+        # a circle has I/A = r²/4
+        return self.height / 2 if self.height else 2 * math.sqrt(self.second_moment / self.area)
+
+    def shear_factor(self, poisson: float) -> float:
+        """The factor that was given; Poisson's ratio has no say."""
+        return self.shear
+
+
+def _check_positive(name: str, value: float) -> None:
+    if not (math.isfinite(value) and value > 0):
+        raise UsageError(
+            f"The section's {name} is {value}.",
+            why="Areas, lengths and moments of a section are positive and finite.",
+            fix=f"Give a positive {name} in SI units.",
+        )

@@ -1,0 +1,69 @@
+"""What a solve returns: always a value, also where it failed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+
+__all__ = ["Solution", "Stop"]
+
+
+class Stop(StrEnum):
+    """Why a solver stopped."""
+
+    CONVERGED = "converged"
+    ITERATION_LIMIT = "the iteration limit was reached before equilibrium"
+    STEP_TOO_SMALL = "no step along the load path, however small, led to an equilibrium"
+    NOT_FINITE = "the energy or its derivatives are not finite"
+    UNSTABLE = "the equilibrium is unstable (the beam buckles): the tangent has a negative direction"
+    STRAIN_LIMIT = "the strain is beyond the reach of the material law"
+    COARSE_MESH = "one element bends by more than a radian: the load is beyond the reach of this mesh"
+    BAD_INPUT = "the loads are not finite numbers"
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Equilibrium of a beam, or the reason why there is none.
+
+    Attributes
+    ----------
+    stop : Stop
+        Why the solver stopped.
+    iterations : int
+        Newton iterations spent, over all load steps.
+    residual : float
+        √(Newton decrement / energy): about the relative error left, in the energy norm.
+    displacement : (node, 3) array
+        u_x and u_y in m and the rotation in rad, counter-clockwise, at the mesh's vertices. NaN unless
+        converged, as are all the fields below.
+    root_reaction : (3,) array
+        Force (x, y) in N and moment in N·m that the clamp exerts on the beam.
+    strain_energy, potential_energy : float
+        In J; the potential energy is the strain energy less the work potential of loads and weight.
+    detail : str
+        Figures that belong to the reason.
+    state : (dof,) array
+        All unknowns, for a warm start.
+    """
+
+    stop: Stop
+    iterations: int
+    residual: float
+    displacement: np.ndarray
+    root_reaction: np.ndarray
+    strain_energy: float
+    potential_energy: float
+    detail: str = ""
+    state: np.ndarray = field(default_factory=lambda: np.empty(0), repr=False)
+
+    @property
+    def converged(self) -> bool:
+        """Whether this is a stable equilibrium within the model's reach."""
+        return self.stop is Stop.CONVERGED
+
+    @property
+    def message(self) -> str:
+        """The reason in words, with its figures."""
+        return f"{self.stop} ({self.detail})" if self.detail else str(self.stop)

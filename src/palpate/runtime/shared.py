@@ -28,13 +28,13 @@ from typing import Any, Self
 import numpy as np
 
 from palpate.errors import DeviceError, UsageError
+from palpate.runtime.histogram import BINS, percentile
 
-__all__ = ["BINS", "COMMAND", "MAX_INPUTS", "STATE", "Block", "Shared", "State", "now"]
+__all__ = ["COMMAND", "MAX_INPUTS", "STATE", "Block", "Shared", "State", "now"]
 
 now = time.perf_counter  # s; monotonic and the same for every process of the machine
 
 MAX_INPUTS = 8
-BINS = 64
 FAULT_KINDS = 16
 
 STATE = np.dtype(
@@ -57,13 +57,8 @@ STATE = np.dtype(
         ("fault_counts", "i8", FAULT_KINDS),  # the same by kind
         ("clamped_ticks", "i8"),
         ("lateness", "f8"),  # s, this tick's start behind its schedule
-        ("lateness_p50", "f8"),
-        ("lateness_p99", "f8"),
-        ("lateness_p999", "f8"),
         ("lateness_max", "f8"),
         ("work", "f8"),  # s, CPU time of the tick before
-        ("work_p50", "f8"),
-        ("work_p99", "f8"),
         ("rate", "f8"),  # Hz, achieved
         ("scale", "f8"),  # metres of body per metre of hand
         ("radius", "f8"),  # m, the hand's workspace
@@ -91,7 +86,10 @@ COMMAND = np.dtype(
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """One published tick, copied out of the shared memory. Fields and units as in `STATE`."""
+    """One published tick, copied out of the shared memory. Fields and units as in `STATE`.
+
+    Percentiles are taken here, by the reader, and not in the loop.
+    """
 
     tick: int
     time: float
@@ -111,19 +109,39 @@ class State:
     fault_counts: np.ndarray
     clamped_ticks: int
     lateness: float
-    lateness_p50: float
-    lateness_p99: float
-    lateness_p999: float
     lateness_max: float
     work: float
-    work_p50: float
-    work_p99: float
     rate: float
     scale: float
     radius: float
     max_force: float
     histogram: np.ndarray
     work_histogram: np.ndarray
+
+    @property
+    def lateness_p50(self) -> float:
+        """Median lateness since the start, s."""
+        return percentile(self.histogram, 0.5)
+
+    @property
+    def lateness_p99(self) -> float:
+        """Lateness that one tick in a hundred exceeds, s."""
+        return percentile(self.histogram, 0.99)
+
+    @property
+    def lateness_p999(self) -> float:
+        """Lateness that one tick in a thousand exceeds, s."""
+        return percentile(self.histogram, 0.999)
+
+    @property
+    def work_p50(self) -> float:
+        """Median CPU time of a tick, s."""
+        return percentile(self.work_histogram, 0.5)
+
+    @property
+    def work_p99(self) -> float:
+        """CPU time that one tick in a hundred exceeds, s."""
+        return percentile(self.work_histogram, 0.99)
 
     @classmethod
     def of(cls, record: np.ndarray) -> State:
@@ -151,6 +169,7 @@ class Block:
         self._shared = np.ndarray(dtype.itemsize, np.uint8, memory, self.HEADER)
         self._private = np.zeros(dtype.itemsize, np.uint8)
         self._scratch = np.zeros(dtype.itemsize, np.uint8)
+        self._fetched = -1
         self.record = self._private.view(dtype).reshape(())
 
     def publish(self) -> None:
@@ -166,10 +185,13 @@ class Block:
         sequence = int(self._sequence)
         if sequence & 1:
             return False
+        if sequence == self._fetched:
+            return True
         self._scratch[:] = self._shared
         if int(self._sequence) != sequence or zlib.crc32(self._scratch.data) != int(self._checksum):
             return False
         self._private[:] = self._scratch
+        self._fetched = sequence
         return True
 
     def release(self) -> None:

@@ -1,0 +1,95 @@
+"""The real-time process: ``python -m palpate.runtime MODEL --state NAME --device page``.
+
+Started by `LoopProcess`, which holds this process's standard input: its end of file means that the parent is
+gone, whatever the operating system and however it went. Standard output carries two lines of JSON, one when
+the loop is about to run and one when it has.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Sequence
+
+from palpate.errors import PalpateError
+from palpate.runtime.devices import device_named
+from palpate.runtime.loop import Loop
+from palpate.runtime.priority import obtain
+from palpate.runtime.safety import Limits
+from palpate.runtime.shared import Shared
+from palpate.runtime.workspace import Workspace
+from palpate.surrogates import TouchModel
+
+__all__ = ["FOREIGN", "main"]
+
+FOREIGN = ("scipy", "ngsolve", "matplotlib", "xarray", "dask", "distributed", "sklearn", "typer", "rich",
+           "pydantic", "pint", "zarr", "starlette")  # fmt: skip
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the loop; the exit code is that of the error, 0 without one."""
+    options = _parser().parse_args(arguments)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole terminal: the parent decides
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))  # unwinds through the loop's own clean-up
+    try:
+        return _run(options)
+    except PalpateError as error:
+        sys.stderr.write(f"{error}\n")
+        return error.exit_code
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser("python -m palpate.runtime", description="The 1 kHz loop of palpate.")
+    parser.add_argument("model", help="touch model, a .palpate file")
+    parser.add_argument("--state", required=True, help="name of the shared memory")
+    parser.add_argument("--device", default="page", help="name, or name:key=value,key=value")
+    parser.add_argument("--rate", type=float, default=1000.0, help="Hz")
+    parser.add_argument("--radius", type=float, required=True, help="workspace, m")
+    parser.add_argument("--max-force", type=float, required=True, help="N")
+    parser.add_argument("--slew", type=float, default=0.0, help="N/s; 0: full force in 20 ms")
+    return parser
+
+
+def _run(options: argparse.Namespace) -> int:
+    shared = Shared.attach(options.state)
+    orphaned = _watch_parent()
+    try:
+        model = TouchModel.load(options.model)
+        device = device_named(options.device, shared.command)
+        workspace = Workspace.for_reach(options.radius, model.reach)
+        limits = Limits(options.max_force, options.slew)
+        loop = Loop(model, device, shared, workspace, limits, rate=options.rate, orphaned=orphaned)
+        _say({"obtained": obtain()})
+        loop.run()
+        _say({"foreign": [name for name in FOREIGN if sys.modules.get(name)]})
+    finally:
+        if orphaned():
+            shared.unlink()  # nobody else is left to do it
+    return 0
+
+
+def _watch_parent() -> Callable[[], bool]:
+    gone = threading.Event()
+
+    def wait() -> None:
+        try:
+            while os.read(0, 4096):
+                pass
+        except OSError:
+            pass
+        gone.set()
+
+    threading.Thread(target=wait, daemon=True).start()  # sleeps in the system: costs the loop nothing
+    return gone.is_set
+
+
+def _say(message: dict[str, object]) -> None:
+    try:
+        sys.stdout.write(json.dumps(message) + "\n")
+        sys.stdout.flush()
+    except OSError:
+        pass  # the parent is gone; the watch sees to it

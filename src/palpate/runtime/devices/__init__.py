@@ -1,0 +1,70 @@
+"""Haptic devices, one file each, chosen by name: ``page`` or ``stroke:amplitude=0.02,frequency=1``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from palpate.errors import UsageError
+from palpate.runtime.devices.device import Device, Sample, Traits
+from palpate.runtime.devices.page import PageDevice
+from palpate.runtime.devices.stroke import StrokeDevice
+from palpate.runtime.shared import Block
+
+__all__ = ["Device", "Sample", "Traits", "device_named", "device_names", "device_traits"]
+
+
+class _Kind(Protocol):
+    @property
+    def traits(self) -> Traits: ...
+    def open(self, commands: Block, options: Mapping[str, str]) -> Device: ...
+
+
+_KINDS: dict[str, _Kind] = {"page": PageDevice, "stroke": StrokeDevice}
+
+
+def device_names() -> tuple[str, ...]:
+    """The kinds of device there are."""
+    return tuple(_KINDS)
+
+
+def device_traits(device: str) -> Traits:
+    """What is known of a device before it is opened, by ``name`` or ``name:options``.
+
+    Raises
+    ------
+    UsageError
+        If there is no device of that name.
+    """
+    return _kind(device.partition(":")[0]).traits
+
+
+def device_named(device: str, commands: Block) -> Device:
+    """Open a device by ``name`` or ``name:key=value,key=value``.
+
+    Parameters
+    ----------
+    device : str
+    commands : Block
+        The loop's command block, which the page steers.
+
+    Raises
+    ------
+    UsageError
+        If the name or an option is unknown, or a value out of range.
+    DeviceError
+        If the hardware doesn't answer.
+    """
+    name, _, text = device.partition(":")
+    kind = _kind(name)
+    pairs = [part.partition("=") for part in text.split(",") if part]
+    return kind.open(commands, {key.strip(): value.strip() for key, _, value in pairs})
+
+
+def _kind(name: str) -> _Kind:
+    if name not in _KINDS:
+        raise UsageError(
+            f"There is no device {name!r}.",
+            fix=f"Choose one of {', '.join(_KINDS)}; options follow a colon, as in stroke:frequency=1.",
+        )
+    return _KINDS[name]

@@ -1,0 +1,122 @@
+"""What a haptic device is to the loop: `read`, `write`, `close`.
+
+To add one, copy the nearest file of this folder and enter it in the table of ``devices/__init__.py``; the
+checklist in ``tests/runtime/test_device_checklist.py`` then holds it to this contract.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.runtime.safety import HARDWARE_PATIENCE
+
+__all__ = ["Device", "Sample", "Traits", "settings_from"]
+
+
+@dataclass(frozen=True)
+class Traits:
+    """What is known of a kind of device before one is opened.
+
+    Attributes
+    ----------
+    radius : float
+        Workspace, m.
+    max_force : float
+        N.
+    damping : float or None
+        Its own, b, N·s/m, for the stability bounds; None where no motor pushes.
+    source : str
+        Where the figures come from.
+    """
+
+    radius: float
+    max_force: float
+    damping: float | None
+    source: str
+
+
+class Sample:
+    """The latest reading, one object for the life of a device: `read` overwrites it and allocates nothing.
+
+    Attributes
+    ----------
+    position : (3,)
+        Hand, m from the centre of the workspace: x right, y up, z towards the user.
+    time : float
+        Last sign of life, s of the loop's clock: a fresh sample of hardware, a heartbeat of a page.
+    patience : float
+        Age from which on the input counts as stalled, s.
+    holding : bool
+        Whether a hand holds the body.
+    asleep : bool
+        The device itself says that nobody is looking or steering: counts as stalled at any age.
+    """
+
+    __slots__ = ("asleep", "holding", "patience", "position", "time")
+
+    def __init__(self, patience: float = HARDWARE_PATIENCE) -> None:
+        self.position = np.zeros(3)
+        self.time = -np.inf
+        self.patience = patience
+        self.holding = False
+        self.asleep = False
+
+
+class Device(Protocol):
+    """A haptic device, real or virtual.
+
+    `read` and `write` are called once a tick. They must not block for longer than a fraction of it and must
+    not allocate; what they can't do they raise as `DeviceError` or `OSError`, which the loop turns into a
+    fault and zero force.
+    """
+
+    @property
+    def traits(self) -> Traits:
+        """What this kind of device can do."""
+        ...
+
+    def read(self, now: float) -> Sample:
+        """The latest reading at the tick that began at `now`, s."""
+        ...
+
+    def write(self, force: np.ndarray) -> None:
+        """Push on the hand with `force` (3,), N, until the next call."""
+        ...
+
+    def close(self) -> None:
+        """Zero force, then let go. Harmless when repeated."""
+        ...
+
+
+_Settings = TypeVar("_Settings")
+
+
+def settings_from(kind: type[_Settings], options: Mapping[str, str]) -> _Settings:
+    """Build a device's settings dataclass, whose fields are numbers or words, from texts.
+
+    Raises
+    ------
+    UsageError
+        If an option is unknown or not a number.
+    """
+    defaults = {f.name: f.default for f in fields(kind)}  # type: ignore[arg-type]
+    values: dict[str, Any] = {}
+    for name, text in options.items():
+        if name not in defaults:
+            raise UsageError(
+                f"The device has no option {name!r}.",
+                fix=f"Its options are {', '.join(defaults) or 'none'}.",
+            )
+        try:
+            values[name] = text if isinstance(defaults[name], str) else float(text)
+        except ValueError as error:
+            raise UsageError(
+                f"The device option {name}={text} is not a number.",
+                fix=f"For example {name}={defaults[name]}.",
+            ) from error
+    return kind(**values)

@@ -1,0 +1,113 @@
+"""A scripted hand: strokes of a sine or a triangle, the same on every run.
+
+For `palpate run` without hardware, for measuring the loop, and, since it can be told to stall, to lose its
+mind or to fail at a given second, for testing what the loop makes of a bad device.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from palpate.errors import DeviceError, UsageError
+from palpate.runtime.devices.device import Sample, Traits, settings_from
+from palpate.runtime.shared import Block
+
+__all__ = ["StrokeDevice", "StrokeSettings"]
+
+
+@dataclass(frozen=True)
+class StrokeSettings:
+    """The script.
+
+    Attributes
+    ----------
+    amplitude : float
+        m.
+    frequency : float
+        Hz.
+    x, y, z : float
+        Direction, normalised.
+    shape : {"sine", "ramp"}
+        A sin 2πft, or the triangle through the same zeros and peaks.
+    stall_at, nan_at, fail_at : float
+        Seconds after the first reading at which the samples stop, turn into NaN, or reading raises.
+    lasting : float
+        Seconds that each of these lasts.
+    """
+
+    amplitude: float = 0.03
+    frequency: float = 0.5
+    x: float = 0.0
+    y: float = -1.0
+    z: float = 0.0
+    shape: str = "sine"
+    stall_at: float = math.inf
+    nan_at: float = math.inf
+    fail_at: float = math.inf
+    lasting: float = math.inf
+
+    def __post_init__(self) -> None:
+        if self.shape not in {"sine", "ramp"}:
+            raise UsageError(f"There is no stroke of shape {self.shape!r}.", fix="Choose sine or ramp.")
+        numbers = (self.amplitude, self.frequency, self.x, self.y, self.z)
+        if not (all(map(math.isfinite, numbers)) and math.hypot(self.x, self.y, self.z) > 0.0):
+            raise UsageError(
+                "A stroke needs a finite amplitude and frequency and a direction that is not zero.",
+                fix="For example stroke:amplitude=0.03,frequency=0.5,y=-1.",
+            )
+
+
+class StrokeDevice:
+    """Holds the body and moves it by the script. `sent` keeps the latest force, N."""
+
+    traits: ClassVar[Traits] = Traits(0.075, 20.0, None, "a script; the force limit is delta.3's")
+
+    def __init__(self, settings: StrokeSettings | None = None) -> None:
+        s = settings or StrokeSettings()
+        self._settings = s
+        self._reach = s.amplitude * np.array([s.x, s.y, s.z]) / math.hypot(s.x, s.y, s.z)
+        self._began: float | None = None
+        self.sent = np.zeros(3)
+        self.sample = Sample()
+        self.sample.holding = True
+
+    @classmethod
+    def open(cls, commands: Block, options: Mapping[str, str]) -> StrokeDevice:
+        """Open from texts such as ``{"amplitude": "0.02"}``."""
+        return cls(settings_from(StrokeSettings, options))
+
+    def read(self, now: float) -> Sample:
+        """The script's position, m, at `now`, s."""
+        if self._began is None:
+            self._began = now
+        t = now - self._began
+        s, sample = self._settings, self.sample
+        if s.fail_at <= t < s.fail_at + s.lasting:
+            raise DeviceError("The scripted device failed, as it was told to.")
+        if s.stall_at <= t < s.stall_at + s.lasting:
+            return sample
+        sample.time = now
+        np.multiply(self._reach, self._wave(t), out=sample.position)
+        if s.nan_at <= t < s.nan_at + s.lasting:
+            sample.position[1] = math.nan
+        return sample
+
+    def _wave(self, t: float) -> float:
+        phase = self._settings.frequency * t
+        if self._settings.shape == "sine":
+            return math.sin(2.0 * math.pi * phase)
+        return 4.0 * abs((phase - 0.25) % 1.0 - 0.5) - 1.0
+
+    def write(self, force: np.ndarray) -> None:
+        """Remember the force (3,), N."""
+        self.sent[:] = force
+
+    def close(self) -> None:
+        """Let go."""
+        self.sent[:] = 0.0
+        self.sample.holding = False

@@ -1,0 +1,245 @@
+"""One tick of touch, as a list of stages: read → map → evaluate → limit → write → publish.
+
+    device position → workspace → force of the learnt body → limits → device → shared memory
+
+All stages work in arrays made beforehand, most of them views of the record that is published, so that a tick
+allocates next to nothing. Nothing raises: the first thing that goes wrong in a tick is its fault, and a tick
+with a fault sends zero force. What is published is always finite: where a number is not, its last good value
+stays.
+
+A force computed from a sample is held for a tick and so trails the hand by half a tick on average, which is
+what makes a sampled spring active (Colgate & Schenkel 1997, see `stability`): no stage may hold one back.
+"""
+
+from __future__ import annotations
+
+import gc
+import math
+import time
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+
+from palpate.errors import DeviceError, UsageError
+from palpate.runtime.clock import Metronome
+from palpate.runtime.devices import Device
+from palpate.runtime.faults import Fault
+from palpate.runtime.publisher import Publisher
+from palpate.runtime.safety import Limits, Safety, stalled
+from palpate.runtime.shared import MAX_INPUTS, Shared
+from palpate.runtime.workspace import Workspace
+from palpate.units import Range
+
+__all__ = ["Evaluator", "Loop", "Model"]
+
+
+class Evaluator(Protocol):
+    """What answers the hand; `palpate.surrogates.TouchEvaluator` does.
+
+    Attributes
+    ----------
+    force : (3,)
+        On the hand, N.
+    contact : (3,)
+        Where the touched node is, offset from its rest position, m.
+    loads : (n,)
+        The loads that hold the body there, N.
+    inside : bool
+        Within the trained range.
+    mirrored : bool
+        Answered by symmetry.
+    """
+
+    force: np.ndarray
+    contact: np.ndarray
+    loads: np.ndarray
+    inside: bool
+    mirrored: bool
+
+    def __call__(self, position: np.ndarray, parameters: np.ndarray) -> None:
+        """Renew the attributes for a hand at `position` (3,), m, and the untouched inputs (p,)."""
+        ...
+
+
+class Model(Protocol):
+    """What the loop asks of a learnt body."""
+
+    @property
+    def reach(self) -> float:
+        """Largest trained displacement of the touched node, m."""
+        ...
+
+    @property
+    def parameters(self) -> tuple[Range, ...]:
+        """The inputs that the hand doesn't supply."""
+        ...
+
+    def evaluator(self) -> Evaluator:
+        """The allocation-free evaluator."""
+        ...
+
+
+class Loop:
+    """The real-time loop around one device and one learnt body.
+
+    Parameters
+    ----------
+    model : Model
+    device : Device
+    shared : Shared
+        State out, commands in.
+    workspace : Workspace
+    limits : Limits
+    rate : float
+        Hz.
+    orphaned : callable
+        Whether the process that wanted the loop has ended.
+
+    Raises
+    ------
+    UsageError
+        If the model has more inputs than the shared memory carries, or the rate is out of range.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        device: Device,
+        shared: Shared,
+        workspace: Workspace,
+        limits: Limits,
+        *,
+        rate: float = 1000.0,
+        orphaned: Callable[[], bool] = lambda: False,
+    ) -> None:
+        if not 10.0 <= rate <= 10_000.0:
+            raise UsageError(
+                f"The loop can't run at {rate:g} Hz.", fix="Choose 10 … 10000 Hz; 1000 is usual."
+            )
+        self.evaluator, self.device, self.workspace = model.evaluator(), device, workspace
+        if max(len(self.evaluator.loads), len(model.parameters)) > MAX_INPUTS:
+            raise UsageError(
+                f"The model has {len(self.evaluator.loads)} inputs; the runtime carries {MAX_INPUTS}.",
+                fix="Learn it with fewer inputs.",
+            )
+        self.period = 1.0 / rate
+        self.out = Publisher(shared.state, len(self.evaluator.loads))
+        self.safety = Safety(limits, self.period, self.out.force)
+        self.out.describe(workspace, limits)
+        self.parameters = np.array([(r.low + r.high) / 2.0 for r in model.parameters])
+        self.fault, self.now, self.holding = Fault.NONE, 0.0, False
+        self._commands, self._quit = shared.command, shared.command.record["quit"]
+        self._wished = shared.command.record["parameters"]
+        self._orphaned = orphaned
+        self._sample = np.zeros(3)
+        self.stages = (self.read, self.map, self.evaluate, self.limit, self.write)
+
+    def run(self) -> None:
+        """Tick until told to quit, or until nobody is there to tell; leaves the device at zero force."""
+        metronome = Metronome(self.period)
+        gc.collect()
+        gc.freeze()
+        gc.disable()  # nothing in the loop makes cycles, and a collection would take milliseconds
+        try:
+            metronome.start()
+            while not self._quit and self.fault is not Fault.PARENT_GONE:
+                self.tick(metronome.wait(), metronome.lateness, jumped=metronome.jumped)
+        finally:
+            gc.enable()
+            self.end()
+
+    def tick(self, now: float, lateness: float = 0.0, *, jumped: bool = False) -> None:
+        """One pass through the stages.
+
+        Parameters
+        ----------
+        now : float
+            When the tick began, s.
+        lateness : float
+            How far behind its schedule that was, s.
+        jumped : bool
+            Whether the clock jumped since the last tick.
+        """
+        began = time.thread_time()
+        self.now, self.fault = now, Fault.NONE
+        if jumped:
+            self.fault = Fault.CLOCK_JUMP
+        elif self._orphaned():
+            self.fault = Fault.PARENT_GONE
+        for stage in self.stages:
+            stage()
+        self.out.tick(now, lateness, self.fault)
+        self.out.worked(time.thread_time() - began)
+
+    def fail(self, fault: Fault) -> None:
+        """Record what went wrong; the first fault of a tick stands."""
+        if self.fault is Fault.NONE:
+            self.fault = fault
+
+    def read(self) -> None:
+        """Device and commands: where the hand is, and whether that can be believed."""
+        self._commands.fetch()  # an unfinished write leaves the last commands standing
+        try:
+            sample = self.device.read(self.now)
+        except (DeviceError, OSError):
+            self.holding = False
+            self.fail(Fault.DEVICE_ERROR)
+            return
+        self.holding = sample.holding
+        late = sample.asleep or stalled(self.now, sample.time, sample.patience)
+        self.out.input(holding=sample.holding, late=late)
+        if late and sample.holding:  # nothing held, nothing at fault: a page may be hidden
+            self.fail(Fault.INPUT_STALLED)
+        x, y, z = sample.position.tolist()
+        if not math.isfinite(x + y + z):
+            self.fail(Fault.INPUT_NOT_FINITE)
+        if self.fault is Fault.NONE:
+            self.out.hand[:] = sample.position
+
+    def map(self) -> None:
+        """Hand metres to body metres; parameters that were set to those the model takes."""
+        self.workspace.to_body(self.out.hand, self.out.position)
+        for i in range(len(self.parameters)):
+            wish = float(self._wished[i])
+            if math.isfinite(wish):
+                self.parameters[i] = wish
+
+    def evaluate(self) -> None:
+        """Ask the learnt body."""
+        if self.fault is not Fault.NONE:
+            return
+        answer = self.evaluator
+        try:
+            answer(self.out.position, self.parameters)
+        except (ArithmeticError, ValueError, TypeError, IndexError):
+            self.fail(Fault.EVALUATOR_ERROR)
+            return
+        if math.isfinite(
+            sum(answer.force.tolist()) + sum(answer.contact.tolist()) + sum(answer.loads.tolist())
+        ):
+            self.out.answer(answer.contact, answer.loads, inside=answer.inside, mirrored=answer.mirrored)
+        else:
+            self.fail(Fault.OUTPUT_NOT_FINITE)
+
+    def limit(self) -> None:
+        """Force, slew and ramp; zero after a fault and for a hand that doesn't hold."""
+        self.safety.apply(self.evaluator.force, gate=self.holding and self.fault is Fault.NONE)
+        self.out.clamped(self.safety.clamped)
+
+    def write(self) -> None:
+        """Push on the hand."""
+        try:
+            self.device.write(self.safety.force)
+        except (DeviceError, OSError):
+            self.safety.stop()  # nobody knows what was sent: don't claim it, and ramp in again
+            self.fail(Fault.DEVICE_ERROR)
+
+    def end(self) -> None:
+        """Zero force, on the device and in the record, whatever happened before."""
+        self.safety.stop()
+        self.out.end()
+        try:
+            self.device.write(self.safety.force)
+        finally:
+            self.device.close()

@@ -1,0 +1,240 @@
+"""The parent's handle on the real-time process.
+
+The loop runs as ``python -m palpate.runtime`` and not through `multiprocessing`: that would import the user's
+main module again, which fails for scripts without a guard, notebooks and standard input.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from types import TracebackType
+from typing import Any, Self
+
+from palpate.errors import DeviceError, UsageError
+from palpate.runtime.devices import device_traits
+from palpate.runtime.report import LoopReport
+from palpate.runtime.shared import Shared, State, now
+
+__all__ = ["LoopProcess"]
+
+_START = 60.0  # s: the first start on a machine compiles the kernels
+_STOP = 2.0  # s
+
+
+class LoopProcess:
+    """Starts, watches and stops the loop; a context manager.
+
+    Parameters
+    ----------
+    model : path
+        A touch model's file.
+    device : str
+        ``page``, or ``stroke:amplitude=0.02``; see `palpate.runtime.devices`.
+    rate : float
+        Hz.
+    workspace : float, optional
+        Radius, m; the device's own by default.
+    max_force : float, optional
+        N; the device's own by default.
+    slew : float
+        N/s; 0 chooses full force in 20 ms.
+    parameters : (p,) floats
+        Values of the inputs that the hand doesn't supply; the middle of their ranges by default.
+
+    Raises
+    ------
+    UsageError
+        On an unknown device, a bad option or a bad model file.
+    DeviceError
+        If the process doesn't start.
+    """
+
+    def __init__(
+        self,
+        model: str | os.PathLike[str],
+        *,
+        device: str = "page",
+        rate: float = 1000.0,
+        workspace: float | None = None,
+        max_force: float | None = None,
+        slew: float = 0.0,
+        parameters: Sequence[float] = (),
+    ) -> None:
+        traits = device_traits(device)
+        self.device, self.rate = device, rate
+        settings = {
+            "--device": device,
+            "--rate": rate,
+            "--radius": traits.radius if workspace is None else workspace,
+            "--max-force": traits.max_force if max_force is None else max_force,
+            "--slew": slew,
+        }
+        self._arguments = [os.fspath(model), *(f"{key}={value}" for key, value in settings.items())]
+        self._parameters = parameters
+        self._process: subprocess.Popen[str] | None = None
+        self._shared: Shared | None = None
+        self._errors = ""
+        self._last: State | None = None
+        self._said: dict[str, Any] = {}
+
+    def start(self) -> Self:
+        """Start the process and wait for its first ticks.
+
+        Raises
+        ------
+        UsageError
+            If the process rejects the model or an option.
+        DeviceError
+            If it doesn't start, with what it said.
+        """
+        self._shared = Shared.create()
+        if len(self._parameters):
+            self.shared.write_command(parameters=self._parameters)
+        self._stderr = tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace")  # noqa: SIM115
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "palpate.runtime", *self._arguments, f"--state={self.shared.name}"],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=self._stderr,
+                text=True,
+                env=_environment(),
+            )
+            self._await_first_tick()
+        except BaseException:
+            self.stop()
+            raise
+        return self
+
+    def _await_first_tick(self) -> None:
+        until = now() + _START
+        while self.shared.read_state().tick < 3:
+            if not self.alive:
+                raise self._failure("The real-time process ended before its first tick.")
+            if now() > until:
+                raise self._failure(f"The real-time process did not tick within {_START:.0f} s.")
+            time.sleep(0.005)
+
+    @property
+    def shared(self) -> Shared:
+        """The shared memory: `write_command` steers the loop."""
+        if self._shared is None:
+            raise UsageError(
+                "The real-time process was not started.", fix="Use LoopProcess in a with statement."
+            )
+        return self._shared
+
+    @property
+    def pid(self) -> int:
+        """Of the real-time process."""
+        return self._running.pid
+
+    @property
+    def _running(self) -> subprocess.Popen[str]:
+        if self._process is None:
+            raise UsageError(
+                "The real-time process was not started.", fix="Use LoopProcess in a with statement."
+            )
+        return self._process
+
+    @property
+    def alive(self) -> bool:
+        """Whether the process runs."""
+        return self._process is not None and self._process.poll() is None
+
+    @property
+    def scale(self) -> float:
+        """Metres of body per metre of hand."""
+        return self._state().scale
+
+    def read(self) -> State:
+        """The newest tick.
+
+        Raises
+        ------
+        DeviceError
+            If the process has ended: what it last published is no longer the force on the hand.
+        """
+        if not self.alive:
+            raise self._failure("The real-time process has ended.")
+        return self.shared.read_state()
+
+    def stop(self) -> None:
+        """Ask the loop to end, insist if it doesn't, and remove the shared memory. Harmless when repeated."""
+        process = self._process
+        if process is not None and process.stdin is not None and not process.stdin.closed:
+            self.shared.write_command(quit=True)
+            self._end(process)
+            self._listen(process)
+        if self._shared is not None and self._last is None:
+            self._last = self._state()
+            self._errors = self._complaint()
+            self._stderr.close()
+            self._shared.close()
+            self._shared.unlink()
+
+    def _end(self, process: subprocess.Popen[str]) -> None:
+        for insist in (process.terminate, process.kill):
+            try:
+                process.wait(_STOP)
+            except subprocess.TimeoutExpired:
+                insist()
+        process.wait()
+
+    def _listen(self, process: subprocess.Popen[str]) -> None:
+        assert process.stdout is not None
+        assert process.stdin is not None
+        for line in process.stdout:
+            try:
+                self._said |= json.loads(line)
+            except ValueError:
+                continue  # cut off by a kill
+        process.stdout.close()
+        process.stdin.close()
+
+    def _state(self) -> State:
+        if self._last is not None:
+            return self._last
+        try:
+            return self.shared.read_state()
+        except DeviceError:  # killed while publishing
+            return State.of(self.shared.state.record)
+
+    def report(self) -> LoopReport:
+        """How the loop did, so far or in all; what the system granted is known once it has stopped."""
+        return LoopReport.of(self._state(), self._said.get("obtained"), tuple(self._said.get("foreign", ())))
+
+    def _failure(self, what: str) -> DeviceError | UsageError:
+        why, code = self._complaint(), self._running.poll()
+        if code == UsageError.exit_code:
+            return UsageError(why or what)
+        return DeviceError(
+            what,
+            why=why or f"It said nothing; its exit code is {code}.",
+            fix="See `palpate doctor`, then start it again.",
+        )
+
+    def _complaint(self) -> str:
+        if self._stderr.closed:
+            return self._errors
+        self._stderr.seek(0)
+        return self._stderr.read().strip()[-2000:]
+
+    def __enter__(self) -> Self:
+        return self.start()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+
+
+def _environment() -> dict[str, str]:
+    # idle BLAS threads would cost the process memory and its scheduler attention
+    return os.environ | dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")

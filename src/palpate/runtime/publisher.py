@@ -1,0 +1,94 @@
+"""The loop's side of the state block: the record is filled through views made once, then published."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from palpate.runtime.faults import Fault
+from palpate.runtime.histogram import Histogram
+from palpate.runtime.safety import Limits
+from palpate.runtime.shared import Block
+from palpate.runtime.workspace import Workspace
+
+__all__ = ["Publisher"]
+
+_EVERY = 100  # ticks between two updates of rate and worst lateness: 10 Hz is what an eye can read
+
+
+class Publisher:
+    """Fills and publishes the state; the stages write to its views `hand`, `position` and `force` (3,)."""
+
+    def __init__(self, block: Block, inputs: int) -> None:
+        self._block, record = block, block.record
+        self._record = record
+        self.hand, self.position, self.force = record["hand"], record["position"], record["force"]
+        self._contact, self._loads = record["contact"], record["loads"][:inputs]
+        self._tick, self._time = record["tick"], record["time"]
+        self._inside, self._mirrored = record["inside"], record["mirrored"]
+        self._grabbed, self._stalled, self._clamped = record["grabbed"], record["stalled"], record["clamped"]
+        self._fault, self._lateness, self._work = record["fault"], record["lateness"], record["work"]
+        self._late, self._worked = Histogram(record["histogram"]), Histogram(record["work_histogram"])
+        self._count, self._before = 0, Fault.NONE
+        self._counted, self._since = 1, math.inf  # when the rate was last taken
+
+    def describe(self, workspace: Workspace, limits: Limits) -> None:
+        """What does not change while the loop runs."""
+        self._record["scale"], self._record["radius"] = workspace.scale, workspace.radius
+        self._record["max_force"] = limits.max_force
+        self._inside[()] = True
+
+    def input(self, *, holding: bool, late: bool) -> None:
+        """Whether a hand holds the body, and whether its input is too old."""
+        self._grabbed[()], self._stalled[()] = holding, late
+
+    def answer(self, contact: np.ndarray, loads: np.ndarray, *, inside: bool, mirrored: bool) -> None:
+        """The learnt body's answer: contact (3,) m and loads (n,) N."""
+        self._contact[:] = contact
+        self._loads[:] = loads
+        self._inside[()], self._mirrored[()] = inside, mirrored
+
+    def clamped(self, acted: bool) -> None:
+        """Whether the force limit acted."""
+        self._clamped[()] = acted
+        if acted:
+            self._record["clamped_ticks"] += 1
+
+    def tick(self, now: float, lateness: float, fault: Fault) -> None:
+        """Close the tick that began at `now` (s), `lateness` (s) behind its schedule, and publish it."""
+        self._count += 1
+        self._tick[()], self._time[()], self._lateness[()] = self._count, now, lateness
+        self._late.add(lateness)
+        if self._count == 1:
+            self._since = now
+        if fault is not self._before:
+            self._changed(fault)
+        if self._count % _EVERY == 0:
+            self._digest(now)
+        self._block.publish()
+
+    def worked(self, duration: float) -> None:
+        """CPU time, s, of the tick just published; it appears with the next."""
+        self._work[()] = duration
+        self._worked.add(duration)
+
+    def end(self) -> None:
+        """Publish a last record: nothing held, nothing pushed."""
+        self._grabbed[()] = False
+        self._digest(float(self._time))
+        self._block.publish()
+
+    def _changed(self, fault: Fault) -> None:
+        self._before = fault
+        self._fault[()] = fault
+        if fault is not Fault.NONE:
+            self._record["last_fault"] = fault
+            self._record["faults"] += 1
+            self._record["fault_counts"][fault] += 1
+
+    def _digest(self, now: float) -> None:
+        self._record["lateness_max"] = self._late.maximum
+        if now > self._since:
+            self._record["rate"] = (self._count - self._counted) / (now - self._since)
+            self._counted, self._since = self._count, now

@@ -1,0 +1,115 @@
+"""The last word on every force: how large, how sudden, and whether at all.
+
+Three laws hold on every tick, whatever the model says:
+
+- *limit*: ‖F‖ ≤ F_max; a larger force is shortened, never turned;
+- *slew*: while the gate is open, ‖F_k − F_{k−1}‖ ≤ s T, T being the tick;
+- *ramp-in*: after the gate opens (a grab, a start, the end of a fault) the force grows from zero over at
+  least 50 ms, counted in ticks, so that a late tick can't shorten it.
+
+A closed gate means zero at once: letting go of the motors is the safe direction.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.errors import UsageError
+
+__all__ = ["HARDWARE_PATIENCE", "Limits", "Safety", "stalled"]
+
+HARDWARE_PATIENCE = 0.020  # s without a fresh sample after which a motorised device gets zero force
+_SHORTEST_RAMP = 0.050  # s
+_RISE = 0.020  # s from zero to full force where no slew is given: a tenth of a reaction time
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a device and its user may be asked to bear.
+
+    Attributes
+    ----------
+    max_force : float
+        N.
+    slew : float
+        N/s; 0 chooses full force in 20 ms.
+    ramp : float
+        s, at least 0.05.
+
+    Raises
+    ------
+    UsageError
+        If a limit is not a positive number, or the ramp too short.
+    """
+
+    max_force: float
+    slew: float = 0.0
+    ramp: float = _SHORTEST_RAMP
+
+    def __post_init__(self) -> None:
+        if not (0.0 < self.max_force < math.inf and 0.0 <= self.slew < math.inf):
+            raise UsageError(
+                f"A force limit of {self.max_force:g} N and a slew of {self.slew:g} N/s protect nobody.",
+                fix="Give positive, finite limits.",
+            )
+        if not _SHORTEST_RAMP <= self.ramp < math.inf:
+            raise UsageError(
+                f"A ramp-in of {self.ramp:g} s is too short.",
+                why="A force that starts at once jerks the hand.",
+                fix=f"Give at least {_SHORTEST_RAMP:g} s.",
+            )
+        if self.slew == 0.0:
+            object.__setattr__(self, "slew", self.max_force / _RISE)
+
+
+class Safety:
+    """Applies the three laws, one tick at a time.
+
+    Attributes
+    ----------
+    force : (3,)
+        What may be sent, N; the array given, overwritten by each `apply`.
+    clamped : bool
+        Whether the force limit acted on the latest tick.
+    """
+
+    def __init__(self, limits: Limits, period: float, force: np.ndarray) -> None:
+        self.force = force
+        self.clamped = False
+        self._max, self._step = limits.max_force, limits.slew * period
+        self._rise = period / limits.ramp
+        self._gain = 0.0
+        self._was = (0.0, 0.0, 0.0)
+
+    def apply(self, wanted: np.ndarray, *, gate: bool) -> None:
+        """Turn the wanted force (3,), finite, N, into the one that may be sent; a closed gate sends zero."""
+        if not gate:
+            self.stop()
+            return
+        x, y, z = wanted.tolist()
+        norm = math.hypot(x, y, z)
+        self.clamped = norm > self._max
+        share = self._gain * (self._max / norm if self.clamped else 1.0)
+        self._gain = min(1.0, self._gain + self._rise)
+        u, v, w = self._was
+        dx, dy, dz = share * x - u, share * y - v, share * z - w
+        change = math.hypot(dx, dy, dz)
+        part = self._step / change if change > self._step else 1.0
+        # both ends lie in the ball of radius F_max, and so does every point between them
+        self._was = (u + part * dx, v + part * dy, w + part * dz)
+        self.force[0], self.force[1], self.force[2] = self._was
+
+    def stop(self) -> None:
+        """Zero force now; the next open gate ramps in again."""
+        self.force[:] = 0.0
+        self.clamped = False
+        self._gain = 0.0
+        self._was = (0.0, 0.0, 0.0)
+
+
+def stalled(now: float, seen: float, patience: float) -> bool:
+    """Whether an input last heard of at `seen` (s) is older than `patience` (s); also if a time is NaN."""
+    return not now - seen <= patience

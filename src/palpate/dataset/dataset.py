@@ -1,0 +1,238 @@
+"""The dataset: inputs and answers of many solves, as one frozen value."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.units import Range
+
+if TYPE_CHECKING:
+    import xarray
+
+__all__ = ["FORMAT", "FORMAT_VERSION", "Dataset"]
+
+FORMAT = "palpate dataset"
+FORMAT_VERSION = 1
+TIMINGS = frozenset({"solve_seconds"})  # differ from run to run: no part of a dataset's identity
+
+
+@dataclass(frozen=True, eq=False)
+class Dataset:
+    """Inputs and answers of many solves of one body.
+
+    Attributes
+    ----------
+    data : xarray.Dataset
+        Variables ``inputs`` (sample, input), ``displacement`` (sample, node, component), ``root_reaction``
+        (sample, reaction), ``strain_energy``, ``potential_energy``, ``converged``, ``iterations``, ``residual``,
+        ``message`` and ``solve_seconds`` (sample); units stand in each variable's attributes. Rows that did not
+        converge hold NaN and a message.
+    """
+
+    data: xarray.Dataset
+
+    @classmethod
+    def open(cls, path: str | os.PathLike[str]) -> Dataset:
+        """Read a dataset that `save` wrote.
+
+        Raises
+        ------
+        FileFormatError
+            If there is none at `path`, or it is corrupt, foreign or from a later version of palpate.
+        """
+        from palpate.dataset.store import read
+
+        return cls(read(Path(path)))
+
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+        """Write a Zarr store (a folder, by custom ``NAME.zarr``) and return its path.
+
+        The store appears whole or not at all. Saving the same dataset again changes nothing.
+
+        Raises
+        ------
+        UsageError
+            If something else is at `path` and `overwrite` is false.
+        """
+        from palpate.dataset.store import write
+
+        return write(self, Path(path), overwrite=overwrite)
+
+    def __len__(self) -> int:
+        return int(self.data.sizes["sample"])
+
+    @property
+    def ranges(self) -> tuple[Range, ...]:
+        """Name, range and unit of each of the n inputs."""
+        columns = (self.data[name].values for name in ("input", "input_low", "input_high", "input_unit"))
+        return tuple(
+            Range(str(name), float(low), float(high), str(unit))
+            for name, low, high, unit in zip(*columns, strict=True)
+        )
+
+    @property
+    def X(self) -> np.ndarray:
+        """Inputs, shape (sample, n), in the units of `ranges`."""
+        return self._values("inputs")
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """Displacement (u_x, u_y) in m and rotation in rad of each node, shape (sample, node, 3)."""
+        return self._values("displacement")
+
+    @property
+    def root_reaction(self) -> np.ndarray:
+        """Force (x, y) in N and moment in N·m of the clamp on the body, shape (sample, 3)."""
+        return self._values("root_reaction")
+
+    @property
+    def strain_energy(self) -> np.ndarray:
+        """Energy stored in the body in J, shape (sample,)."""
+        return self._values("strain_energy")
+
+    @property
+    def potential_energy(self) -> np.ndarray:
+        """Strain energy less the potential of the loads in J, shape (sample,)."""
+        return self._values("potential_energy")
+
+    @property
+    def converged(self) -> np.ndarray:
+        """Which rows are equilibria, bool of shape (sample,)."""
+        return self._values("converged")
+
+    @property
+    def rest(self) -> np.ndarray:
+        """Positions of the nodes at rest in m, shape (node, 2)."""
+        return self._values("rest")
+
+    @property
+    def nodes_of_interest(self) -> np.ndarray:
+        """Indices of the nodes of interest."""
+        return np.flatnonzero(self._values("of_interest"))
+
+    @property
+    def load_nodes(self) -> np.ndarray:
+        """Index of the node that each input acts on, shape (n,)."""
+        return self._values("input_node")
+
+    @property
+    def load_directions(self) -> np.ndarray:
+        """Direction (x, y) of each input, shape (n, 2)."""
+        return self._values("input_direction")
+
+    @functools.cached_property
+    def provenance(self) -> dict[str, Any]:
+        """Where the answers come from: versions, seed, design, body, hash of the configuration, time, machine."""
+        loaded: dict[str, Any] = json.loads(self.data.attrs["provenance"])
+        return loaded
+
+    @functools.cached_property
+    def hash(self) -> str:
+        """SHA-256 of inputs and answers, timings apart, as hexadecimal digits."""
+        return self.fingerprint(exclude=TIMINGS)
+
+    def fingerprint(self, exclude: Iterable[str] = ()) -> str:
+        """SHA-256 of all variables and coordinates but `exclude`, as hexadecimal digits."""
+        digest = hashlib.sha256()
+        for name in sorted(set(map(str, self.data.variables)) - set(exclude)):
+            values = self.data[name].values
+            digest.update(f"{name} {self.data[name].dims} {values.shape}".encode())
+            if values.dtype.kind in "TOU":
+                digest.update("\0".join(map(str, values.ravel())).encode())
+            else:
+                digest.update(np.ascontiguousarray(values).tobytes())
+        return digest.hexdigest()
+
+    @property
+    def ok(self) -> Dataset:
+        """The rows that converged."""
+        return self.take(np.flatnonzero(self.converged))
+
+    def take(self, indices: Any) -> Dataset:
+        """The rows at `indices`, in that order.
+
+        Raises
+        ------
+        UsageError
+            If an index is out of range.
+        """
+        rows = np.asarray(indices, dtype=np.int64).ravel()
+        if rows.size and not (-len(self) <= rows.min() and rows.max() < len(self)):
+            raise UsageError(
+                f"Row {int(rows[np.argmax(np.abs(rows))])} is not in this dataset.",
+                why=f"It has {len(self)} rows, counted from 0.",
+                fix="Take rows within it.",
+            )
+        return Dataset(self.data.isel(sample=rows))
+
+    def every(self, k: int, start: int = 0) -> Dataset:
+        """Each k-th row, from `start` on."""
+        if k < 1 or start < 0:
+            raise UsageError(
+                f"Rows cannot be taken every {k} from {start}.",
+                why="The stride is at least 1 and the start at least 0.",
+                fix="For every other row: every(2).",
+            )
+        return self.take(np.arange(start, len(self), k))
+
+    def split(self, test: float = 0.25, seed: int = 1) -> tuple[Dataset, Dataset]:
+        """Part the rows that converged at random into a training and a test set.
+
+        Parameters
+        ----------
+        test : float
+            Share of the rows for the test set, in (0, 1); either set gets one row at least.
+        seed : int
+            The same seed gives the same parts.
+
+        Returns
+        -------
+        train, test : Dataset
+            Each keeps the order of the rows.
+
+        Raises
+        ------
+        UsageError
+            If `test` is no share, or fewer than two rows converged.
+        """
+        rows = np.flatnonzero(self.converged)
+        if not 0 < test < 1 or rows.size < 2:
+            raise UsageError(
+                f"{rows.size} converged rows can't be split with {test} of them for the test.",
+                why="The share is between 0 and 1, and each part needs at least one row.",
+                fix="Choose a share such as 0.25, or sweep more samples.",
+            )
+        count = int(np.clip(round(test * rows.size), 1, rows.size - 1))
+        shuffled = np.random.default_rng(seed).permutation(rows)
+        return self.take(np.sort(shuffled[count:])), self.take(np.sort(shuffled[:count]))
+
+    def __str__(self) -> str:
+        failed = len(self) - int(self.converged.sum())
+        tail = f"{failed} did not converge" if failed else "all converged"
+        body = self.provenance.get("problem", {}).get("body", {}).get("type", "a body")
+        return "\n".join(
+            [
+                f"Dataset of {len(self)} solves of {body}, {tail}",
+                *(f"  input   {r}" for r in self.ranges),
+                f"  answers displacement of {len(self.rest)} nodes ({self.nodes_of_interest.size} of interest), "
+                "root reaction, energies",
+                f"  hash    {self.hash[:12]}",
+            ]
+        )
+
+    __repr__ = __str__
+
+    def _values(self, name: str) -> np.ndarray:
+        values: np.ndarray = self.data[name].values.view()
+        values.flags.writeable = False
+        return values

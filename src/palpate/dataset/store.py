@@ -1,0 +1,127 @@
+"""Datasets on disk: one Zarr store (format 3) each, checked by a sum over everything in it."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import uuid
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from palpate.dataset.dataset import FORMAT, FORMAT_VERSION, Dataset
+from palpate.errors import FileFormatError, UsageError
+
+if TYPE_CHECKING:
+    import xarray
+
+__all__ = ["read", "write"]
+
+
+def write(dataset: Dataset, path: Path, *, overwrite: bool) -> Path:
+    """Write `dataset` to `path`; the store appears whole or not at all."""
+    if path.exists() and not overwrite:
+        if _holds(path, dataset):
+            return path
+        raise UsageError(
+            f"{path} exists already.",
+            why="It holds something else than the dataset to be saved.",
+            fix="Save under another name, delete it, or pass overwrite=True.",
+        )
+    path.parent.mkdir(parents=True, exist_ok=True)
+    staging = path.with_name(f".{path.name}.{uuid.uuid4().hex[:8]}")
+    try:
+        data = dataset.data.assign_attrs(checksum=dataset.fingerprint())
+        # consolidated metadata is no part of Zarr's format 3
+        data.to_zarr(staging, mode="w-", zarr_format=3, consolidated=False)
+        if path.exists():
+            _remove(path)
+        os.replace(staging, path)
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+    return path
+
+
+def read(path: Path) -> xarray.Dataset:
+    """Read and check the store at `path`."""
+    attrs = _attributes(path)
+    if attrs.get("format") != FORMAT:
+        raise FileFormatError(
+            f"{path} is no dataset of palpate.",
+            why="It is a Zarr store, but its attribute 'format' doesn't say so.",
+            fix="Open a store that palpate wrote.",
+        )
+    version = attrs.get("format_version")
+    if not isinstance(version, int) or version > FORMAT_VERSION:
+        raise FileFormatError(
+            f"{path} has format version {version}.",
+            why=f"This palpate reads versions up to {FORMAT_VERSION}.",
+            fix="Open it with a newer palpate.",
+        )
+    return _load(path)
+
+
+def _attributes(path: Path) -> dict[str, Any]:
+    """Attributes of the store's root, from its metadata file."""
+    if not path.exists():
+        raise FileFormatError(
+            f"There is no dataset at {path}.",
+            why="Nothing is there.",
+            fix="Check the path, or run a sweep that writes it.",
+        )
+    metadata = path / "zarr.json"
+    try:
+        attrs = json.loads(metadata.read_text(encoding="utf-8"))["attributes"]
+    except FileNotFoundError as error:
+        raise FileFormatError(
+            f"{path} is no dataset of palpate.",
+            why="It isn't a folder with a file zarr.json.",
+            fix="Open a store that palpate wrote, a folder NAME.zarr.",
+        ) from error
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise _corrupt(path, f"zarr.json can't be read: {error!r}.") from error
+    if not isinstance(attrs, dict):
+        raise _corrupt(path, "the attributes in zarr.json are no table.")
+    return attrs
+
+
+def _load(path: Path) -> xarray.Dataset:
+    import xarray
+
+    try:
+        data = xarray.open_zarr(path, consolidated=False, chunks=None).load()
+        wanted = data.attrs.pop("checksum", "none")
+        found = Dataset(data).fingerprint()
+    # the kinds of errors that Zarr, its codecs and xarray raise on broken bytes
+    except (OSError, ValueError, KeyError, TypeError, RuntimeError, AttributeError) as error:
+        raise _corrupt(path, f"it can't be decoded: {error!r}.") from error
+    if found != wanted:
+        raise _corrupt(path, f"its contents don't match its checksum ({found[:12]} against {wanted[:12]}).")
+    return data
+
+
+def _corrupt(path: Path, why: str) -> FileFormatError:
+    return FileFormatError(
+        f"The dataset {path} is corrupt.",
+        why=f"Probably a copy was cut short or a file changed: {why}",
+        fix="Copy it again, or run the sweep again.",
+    )
+
+
+def _holds(path: Path, dataset: Dataset) -> bool:
+    try:
+        there = Dataset(read(path))
+    except FileFormatError:
+        return False
+    return there.hash == dataset.hash and there.provenance == dataset.provenance
+
+
+def _remove(path: Path) -> None:
+    """Remove a store, never anything else."""
+    if not (path / "zarr.json").is_file():
+        raise UsageError(
+            f"{path} won't be overwritten.",
+            why="It is no Zarr store.",
+            fix="Save under another name, or delete it yourself.",
+        )
+    shutil.rmtree(path)

@@ -1,0 +1,22 @@
+"""Asking a body many questions: spaces of inputs, designs of samples, and the parallel sweep."""
+
+from palpate.sweeps.cluster import LocalCluster, local_cluster
+from palpate.sweeps.designs import DESIGNS, Design, grid, random, sobol
+from palpate.sweeps.problem import Answer, Problem, Solver
+from palpate.sweeps.space import Space
+from palpate.sweeps.sweep import sweep
+
+__all__ = [
+    "DESIGNS",
+    "Answer",
+    "Design",
+    "LocalCluster",
+    "Problem",
+    "Solver",
+    "Space",
+    "grid",
+    "local_cluster",
+    "random",
+    "sobol",
+    "sweep",
+]

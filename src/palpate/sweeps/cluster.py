@@ -1,0 +1,195 @@
+"""A Dask cluster on this machine whose workers are plain subprocesses.
+
+Dask's own local cluster starts workers by multiprocessing, which imports the user's script anew and so needs an
+``if __name__ == "__main__"`` guard in it. These workers are started as ``python -m palpate.sweeps.worker`` and need
+none: a sweep works in a file without a guard, in a notebook and on standard input.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from palpate.errors import SolverError, UsageError
+
+__all__ = ["LocalCluster", "local_cluster"]
+
+# Workers are as many as cores: threads of linear algebra within them would only fight
+_ONE_THREAD = dict.fromkeys(
+    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
+)
+_SPARE_LIVES = 12  # workers started again after a crash, per cluster
+
+
+class LocalCluster:
+    """A scheduler in this process and workers in subprocesses, all on 127.0.0.1.
+
+    A context manager; closing it ends every process it started.
+
+    Parameters
+    ----------
+    workers : int
+        How many.
+    """
+
+    def __init__(self, workers: int) -> None:
+        self._folder = tempfile.TemporaryDirectory(prefix="palpate-")
+        self._lives = workers + _SPARE_LIVES
+        self._scheduler: Any = None
+        self._workers: list[subprocess.Popen[bytes]] = []
+        try:
+            # they import Dask while the scheduler starts here
+            self._workers = [self._start_worker() for _ in range(workers)]
+            self._scheduler = _start_scheduler()
+            for worker in self._workers:
+                self._tell_address(worker)
+        except BaseException:
+            self.close()
+            raise
+
+    @property
+    def address(self) -> str:
+        """The scheduler's address, for a Dask client."""
+        return str(self._scheduler.scheduler_address)
+
+    @property
+    def process_ids(self) -> tuple[int, ...]:
+        """Process ids of the workers."""
+        return tuple(worker.pid for worker in self._workers)
+
+    def __len__(self) -> int:
+        return len(self._workers)
+
+    def __str__(self) -> str:
+        return f"LocalCluster of {len(self)} workers at {self.address}"
+
+    def __enter__(self) -> LocalCluster:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def revive(self) -> None:
+        """Start a new worker for each one that died.
+
+        Raises
+        ------
+        SolverError
+            If they die again and again.
+        """
+        for place, worker in enumerate(self._workers):
+            if worker.poll() is not None:
+                self._workers[place] = self._start_worker()
+                self._tell_address(self._workers[place])
+
+    def close(self) -> None:
+        """End the scheduler and all workers; closing again does nothing."""
+        for worker in self._workers:
+            if worker.stdin:
+                worker.stdin.close()  # the sign for it to end
+        if self._scheduler is not None:
+            self._scheduler.close()
+        for worker in self._workers:
+            _end(worker)
+        self._folder.cleanup()
+
+    def _start_worker(self) -> subprocess.Popen[bytes]:
+        self._lives -= 1
+        if self._lives < 0:
+            raise SolverError("The workers of the sweep die again and again.", why=self._last_words())
+        name = f"worker-{self._lives}"
+        with (Path(self._folder.name) / f"{name}.log").open("wb") as log:
+            return subprocess.Popen(
+                [sys.executable, "-m", "palpate.sweeps.worker", self._folder.name, name],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.DEVNULL,
+                stderr=log,
+                env=_environment(),
+                # Ctrl-C in the terminal is for this process, which then ends its workers
+                start_new_session=True,
+            )
+
+    def _tell_address(self, worker: subprocess.Popen[bytes]) -> None:
+        if worker.stdin:
+            try:
+                worker.stdin.write(self.address.encode() + b"\n")
+                worker.stdin.flush()
+            except BrokenPipeError:
+                pass  # it died already: `revive` sees to it
+
+    def _last_words(self) -> str:
+        logs = sorted(Path(self._folder.name).glob("*.log"), key=lambda log: log.stat().st_mtime)
+        return "\n".join(log.read_text(errors="replace")[-2000:] for log in logs[-1:])
+
+
+def local_cluster(workers: int | None = None) -> LocalCluster:
+    """Start workers on this machine; one cluster serves any number of sweeps.
+
+    Parameters
+    ----------
+    workers : int, optional
+        By default one for each core.
+
+    Returns
+    -------
+    LocalCluster
+        For a ``with`` statement.
+
+    Raises
+    ------
+    UsageError
+        If `workers` is below 1.
+
+    Examples
+    --------
+    >>> with local_cluster() as cluster:  # doctest: +SKIP
+    ...     copper = sweep(body, loads, cluster=cluster)
+    """
+    count = available_cores() if workers is None else workers
+    if count < 1:
+        raise UsageError(f"A sweep can't run on {count} workers.", why="It needs one at least.", fix="Ask for more.")
+    return LocalCluster(count)
+
+
+def available_cores() -> int:
+    """Number of cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _start_scheduler() -> Any:
+    import distributed
+
+    return distributed.LocalCluster(
+        n_workers=0,
+        processes=False,
+        protocol="tcp://",
+        host="127.0.0.1",
+        dashboard_address=None,
+        silence_logs=logging.CRITICAL,
+        # a task that kills its worker is not tried on the others, one after the other
+        scheduler_kwargs={"allowed_failures": 0},
+    )
+
+
+def _environment() -> dict[str, str]:
+    """Environment of a worker: it finds the modules that this process finds."""
+    path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
+    return {**os.environ, **_ONE_THREAD, "PYTHONPATH": path}
+
+
+def _end(worker: subprocess.Popen[bytes]) -> None:
+    try:
+        worker.wait(timeout=2)
+    except subprocess.TimeoutExpired:
+        worker.kill()
+        worker.wait()

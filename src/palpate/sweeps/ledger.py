@@ -1,0 +1,93 @@
+"""What an interrupted sweep has done so far, on disk.
+
+While a sweep to ``NAME.zarr`` runs, each finished chunk is a small dataset of its own in ``NAME.zarr.parts``, written
+whole or not at all. A sweep of the same configuration takes them up; the last step joins them into ``NAME.zarr``.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from palpate.dataset import Dataset
+from palpate.errors import FileFormatError, UsageError
+
+__all__ = ["Ledger"]
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """The parts of one sweep.
+
+    Attributes
+    ----------
+    path : Path
+        Where the dataset goes.
+    config : str
+        Hash of the sweep's configuration.
+    """
+
+    path: Path
+    config: str
+
+    @property
+    def parts(self) -> Path:
+        """Folder of the parts."""
+        return self.path.with_name(self.path.name + ".parts")
+
+    def complete(self) -> Dataset | None:
+        """The finished dataset, if there is one.
+
+        Raises
+        ------
+        UsageError
+            If something else is at the path.
+        """
+        if not self.path.exists():
+            return None
+        there = Dataset.open(self.path)
+        self._check(self.path, there.provenance.get("config_hash"))
+        return there
+
+    def begin(self) -> None:
+        """Open the ledger.
+
+        Raises
+        ------
+        UsageError
+            If it belongs to another sweep.
+        """
+        plan = self.parts / "plan.json"
+        if plan.exists():
+            self._check(self.parts, json.loads(plan.read_text(encoding="utf-8")).get("config_hash"))
+            return
+        self.parts.mkdir(parents=True, exist_ok=True)
+        plan.write_text(json.dumps({"config_hash": self.config}), encoding="utf-8")
+
+    def read(self) -> Iterator[Dataset]:
+        """Parts that earlier runs finished."""
+        for part in sorted(self.parts.glob("part-*.zarr")):
+            try:
+                yield Dataset.open(part)
+            except FileFormatError:
+                shutil.rmtree(part, ignore_errors=True)  # to be solved again
+
+    def add(self, part: Dataset) -> None:
+        """Keep a finished part."""
+        part.save(self.parts / f"part-{int(part.data['sample'][0]):06d}.zarr", overwrite=True)
+
+    def finish(self, dataset: Dataset) -> None:
+        """Write the whole dataset and drop the parts."""
+        dataset.save(self.path)
+        shutil.rmtree(self.parts)
+
+    def _check(self, place: Path, found: object) -> None:
+        if found != self.config:
+            raise UsageError(
+                f"{place} belongs to another sweep.",
+                why="Its body, loads or samples are not those asked for now.",
+                fix="Write to another path, or delete it first.",
+            )

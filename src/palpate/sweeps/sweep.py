@@ -1,0 +1,204 @@
+"""The sweep: solve at many points in parallel, and keep every answer."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate.dataset import Dataset, Layout, assemble
+from palpate.errors import SolverError, UsageError
+from palpate.sweeps.answers import Columns, empty, put
+from palpate.sweeps.chunks import chunks
+from palpate.sweeps.designs import Design, design_points
+from palpate.sweeps.ledger import Ledger
+from palpate.sweeps.problem import Problem
+from palpate.sweeps.progress import Report, reporter
+from palpate.sweeps.provenance import config_hash, provenance
+from palpate.sweeps.runner import connect, run
+from palpate.sweeps.space import Space
+
+__all__ = ["sweep"]
+
+
+def sweep(
+    body: Any,
+    loads: Any = None,
+    *,
+    samples: int | None = None,
+    seed: int = 0,
+    design: str | Design = "sobol",
+    points: Any = None,
+    workers: int | None = None,
+    cluster: Any = None,
+    progress: bool | Report = True,
+    path: str | os.PathLike[str] | None = None,
+    max_failed: float = 0.5,
+) -> Dataset:
+    """Solve a body under many loads, in parallel.
+
+    Samples are solved in chunks of neighbours, each solve starting from the last one's answer. A sample that fails
+    becomes a row with NaN and a message, and the sweep goes on.
+
+    Parameters
+    ----------
+    body : body or Problem
+        Anything with a method ``problem(loads)``, such as a `Cantilever`; or a `Problem`, then without `loads`.
+    loads : load or sequence of loads
+        The n inputs.
+    samples : int, optional
+        How many points the design gets; needed unless `points` are given.
+    seed : int
+        Decides the design; the same seed gives the same dataset.
+    design : str or Design
+        ``"sobol"``, ``"grid"``, ``"random"``, or a function (space, samples, seed) -> points.
+    points : (N, n) array, optional
+        The points themselves, in place of a design; (N,) will do for one input.
+    workers : int, optional
+        Processes on this machine, by default one for each core.
+    cluster : optional
+        What to run on instead: a `local_cluster`, a Dask scheduler's address, or a cluster or client of Dask's.
+    progress : bool or callable
+        A bar on standard error if that is a terminal; or a function (done, total).
+    path : path, optional
+        A Zarr store to write. An interrupted sweep takes up its finished samples there, and a finished one is read.
+    max_failed : float
+        Largest share of failed samples that is put up with.
+
+    Returns
+    -------
+    Dataset
+        Rows in the order of the design.
+
+    Raises
+    ------
+    UsageError
+        For a wrong argument, or if `path` holds another sweep.
+    SolverError
+        If more than `max_failed` of the samples failed.
+    """
+    plan = _plan(body, loads, samples, seed, design, points)
+    ledger = Ledger(Path(path), plan.config) if path is not None else None
+    data = ledger.complete() if ledger else None
+    if data is None:
+        data = _solve(plan, ledger, workers, cluster, progress)
+    _check_failures(data, max_failed)
+    return data
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """What is to be solved, and the labels of the answers."""
+
+    problem: Problem
+    space: Space
+    points: np.ndarray
+    design: str
+    seed: int
+
+    @property
+    def config(self) -> str:
+        return config_hash(self.problem, self.points)
+
+    def label(self, columns: Columns, rows: np.ndarray) -> Dataset:
+        """Dataset of some rows."""
+        problem = self.problem
+        layout = Layout(problem.rest, problem.of_interest, problem.load_nodes, problem.load_directions)
+        origin = provenance(problem, self.points, self.design, self.seed)
+        return assemble(self.space.ranges, layout, self.points[rows], columns, origin, rows)
+
+
+def _plan(
+    body: Any, loads: Any, samples: int | None, seed: int, design: str | Design, points: Any
+) -> _Plan:
+    problem = _problem(body, loads)
+    space = Space(problem.ranges)
+    if (samples is None) == (points is None):
+        raise UsageError(
+            "A sweep needs either samples or points.",
+            why=f"Given were samples={samples} and points={'None' if points is None else 'an array'}.",
+            fix="For example sweep(body, loads, samples=256).",
+        )
+    if points is not None:
+        return _Plan(problem, space, _some(space.points(points)), "points", seed)
+    name = design if isinstance(design, str) else getattr(design, "__name__", type(design).__name__)
+    return _Plan(problem, space, _some(design_points(design, space, samples or 0, seed)), name, seed)
+
+
+def _problem(body: Any, loads: Any) -> Problem:
+    if loads is None and isinstance(body, Problem):
+        return body
+    if loads is None or not hasattr(body, "problem"):
+        raise UsageError(
+            "A sweep needs a body and its loads.",
+            why=f"Given were {type(body).__name__} and {type(loads).__name__}.",
+            fix="For example sweep(Cantilever(...), TipLoad(0, 5), samples=256).",
+        )
+    problem: Problem = body.problem(loads)
+    return problem
+
+
+def _some(points: np.ndarray) -> np.ndarray:
+    if not len(points):
+        raise UsageError("A sweep needs at least one point.", why="There is none.", fix="Give some.")
+    return points
+
+
+def _solve(
+    plan: _Plan, ledger: Ledger | None, workers: int | None, cluster: Any, progress: bool | Report
+) -> Dataset:
+    columns = empty(len(plan.points), len(plan.problem.rest))
+    done = _take_up(ledger, columns)
+    parts = _chunks(plan, done)
+    with reporter(progress) as report:
+        report(int(done.sum()), done.size)
+        if parts:
+            with connect(cluster, workers) as (client, revive):
+                for rows, answers in run(client, revive, plan.problem, plan.points, parts):
+                    put(columns, rows, answers)
+                    done[rows] = True
+                    if ledger:
+                        ledger.add(plan.label(answers, rows))
+                    report(int(done.sum()), done.size)
+    data = plan.label(columns, np.arange(len(plan.points)))
+    if ledger:
+        ledger.finish(data)
+    return data
+
+
+def _take_up(ledger: Ledger | None, columns: Columns) -> np.ndarray:
+    """Fill in what an earlier run finished; which rows these are, bool of shape (N,)."""
+    done = np.zeros(len(columns["converged"]), dtype=bool)
+    if ledger:
+        ledger.begin()
+        for part in ledger.read():
+            rows = part.data["sample"].values
+            put(columns, rows, {name: part.data[name].values for name in columns})
+            done[rows] = True
+    return done
+
+
+def _chunks(plan: _Plan, done: np.ndarray) -> list[np.ndarray]:
+    """Chunks with something left to do, less what is done."""
+    rest = plan.space.to_unit(np.clip(0.0, plan.space.low, plan.space.high))
+    parts = chunks(plan.space.to_unit(plan.points), rest)
+    return [rows[~done[rows]] for rows in parts if not done[rows].all()]
+
+
+def _check_failures(data: Dataset, max_failed: float) -> None:
+    failed = np.flatnonzero(~data.converged)
+    if failed.size == 0 or failed.size <= max_failed * len(data):
+        return
+    shown = [f"{_inputs(data, row)}: {data.data['message'].values[row]}" for row in failed[:3]]
+    raise SolverError(
+        f"{failed.size} of {len(data)} solves failed.",
+        why="\n".join(["The first of them:", *(f"  {line}" for line in shown)]),
+        fix="Narrow the ranges of the loads, refine the mesh, or allow more failures by max_failed.",
+    )
+
+
+def _inputs(data: Dataset, row: int) -> str:
+    return ", ".join(f"{r.name} = {value:g} {r.unit}" for r, value in zip(data.ranges, data.X[row], strict=True))

@@ -1,4 +1,4 @@
-"""Entry of the real-time process, ``python -m palpate.runtime``; `palpate.runtime.child` says what it does."""
+"""Entry of the real-time process, ``python -m palpate.runtime``; see `palpate.runtime.child`."""
 
 from __future__ import annotations
 

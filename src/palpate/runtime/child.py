@@ -19,6 +19,7 @@ from palpate.errors import PalpateError
 from palpate.runtime.devices import device_named
 from palpate.runtime.loop import Loop
 from palpate.runtime.priority import obtain
+from palpate.runtime.rehearsal import rehearsal
 from palpate.runtime.safety import Limits
 from palpate.runtime.shared import Shared
 from palpate.runtime.workspace import Workspace
@@ -64,7 +65,7 @@ def _run(options: argparse.Namespace) -> int:
         limits = Limits(options.max_force, options.slew)
         loop = Loop(model, device, shared, workspace, limits, rate=options.rate, orphaned=orphaned)
         _say({"obtained": obtain()})
-        loop.run()
+        loop.run(rehearsal(model, workspace, limits, options.rate))
         _say({"foreign": [name for name in FOREIGN if sys.modules.get(name)]})
     finally:
         if orphaned():

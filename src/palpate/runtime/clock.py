@@ -55,12 +55,13 @@ class Metronome:
         self._last = self._clock()
         self._due = self._last + self.period
 
-    def wait(self) -> float:
-        """Return at the next beat, with the time, s."""
+    def wait(self, rehearse: Callable[[], None] = lambda: None) -> float:
+        """Return at the next beat, with the time, s; `rehearse` is called once when the sleep is over."""
         clock, due, last = self._clock, self._due, self._last
         rest = due - clock() - self._spin
         if rest > 0.0:
             self._sleep(min(rest, self.period))  # a clock that ran backwards must not put the loop to sleep
+            rehearse()
         while last <= (time := clock()) < due:
             pass
         self.lateness = max(0.0, time - due)

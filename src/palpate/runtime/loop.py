@@ -135,8 +135,14 @@ class Loop:
         self._sample = np.zeros(3)
         self.stages = (self.read, self.map, self.evaluate, self.limit, self.write)
 
-    def run(self) -> None:
-        """Tick until told to quit, or until nobody is there to tell; leaves the device at zero force."""
+    def run(self, rehearse: Callable[[], None] = lambda: None) -> None:
+        """Tick until told to quit, or until nobody is there to tell; leaves the device at zero force.
+
+        Parameters
+        ----------
+        rehearse : callable
+            Called before each tick while there is time; see `palpate.runtime.rehearsal`.
+        """
         metronome = Metronome(self.period)
         gc.collect()
         gc.freeze()
@@ -144,7 +150,7 @@ class Loop:
         try:
             metronome.start()
             while not self._quit and self.fault is not Fault.PARENT_GONE:
-                self.tick(metronome.wait(), metronome.lateness, jumped=metronome.jumped)
+                self.tick(metronome.wait(rehearse), metronome.lateness, jumped=metronome.jumped)
         finally:
             gc.enable()
             self.end()

@@ -277,6 +277,11 @@ class Shared:
             )
         return cls(name, memory)
 
+    @classmethod
+    def private(cls) -> Shared:
+        """Blocks without a name, which no other process sees."""
+        return cls("", mmap.mmap(-1, _SIZE))
+
     def read_state(self) -> State:
         """The newest published tick.
 
@@ -352,7 +357,8 @@ class Shared:
 
     def unlink(self) -> None:
         """Remove the name. Harmless when repeated."""
-        Path(self.name).unlink(missing_ok=True)
+        if self.name:
+            Path(self.name).unlink(missing_ok=True)
 
     def __enter__(self) -> Self:
         return self

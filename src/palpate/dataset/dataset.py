@@ -34,9 +34,9 @@ class Dataset:
     ----------
     data : xarray.Dataset
         Variables ``inputs`` (sample, input), ``displacement`` (sample, node, component), ``root_reaction``
-        (sample, reaction), ``strain_energy``, ``potential_energy``, ``converged``, ``iterations``, ``residual``,
-        ``message`` and ``solve_seconds`` (sample); units stand in each variable's attributes. Rows that did not
-        converge hold NaN and a message.
+        (sample, reaction), ``strain_energy``, ``potential_energy``, ``converged``, ``iterations``,
+        ``residual``, ``message`` and ``solve_seconds`` (sample); units stand in each variable's attributes.
+        Rows that did not converge hold NaN and a message.
     """
 
     data: xarray.Dataset
@@ -132,7 +132,7 @@ class Dataset:
 
     @functools.cached_property
     def provenance(self) -> dict[str, Any]:
-        """Where the answers come from: versions, seed, design, body, hash of the configuration, time, machine."""
+        """Where the answers come from: body, design, seed, versions, machine, time, configuration's hash."""
         loaded: dict[str, Any] = json.loads(self.data.attrs["provenance"])
         return loaded
 
@@ -220,12 +220,12 @@ class Dataset:
         failed = len(self) - int(self.converged.sum())
         tail = f"{failed} did not converge" if failed else "all converged"
         body = self.provenance.get("problem", {}).get("body", {}).get("type", "a body")
+        nodes, of_interest = len(self.rest), self.nodes_of_interest.size
         return "\n".join(
             [
                 f"Dataset of {len(self)} solves of {body}, {tail}",
                 *(f"  input   {r}" for r in self.ranges),
-                f"  answers displacement of {len(self.rest)} nodes ({self.nodes_of_interest.size} of interest), "
-                "root reaction, energies",
+                f"  answers displacement of {nodes} nodes ({of_interest} of interest), reaction, energies",
                 f"  hash    {self.hash[:12]}",
             ]
         )

@@ -89,7 +89,7 @@ def _load(path: Path) -> xarray.Dataset:
     import xarray
 
     try:
-        data = xarray.open_zarr(path, consolidated=False, chunks=None).load()
+        data: xarray.Dataset = xarray.open_zarr(path, consolidated=False, chunks=None).load()
         wanted = data.attrs.pop("checksum", "none")
         found = Dataset(data).fingerprint()
     # the kinds of errors that Zarr, its codecs and xarray raise on broken bytes
@@ -113,7 +113,7 @@ def _holds(path: Path, dataset: Dataset) -> bool:
         there = Dataset(read(path))
     except FileFormatError:
         return False
-    return there.hash == dataset.hash and there.provenance == dataset.provenance
+    return bool(there.hash == dataset.hash and there.provenance == dataset.provenance)
 
 
 def _remove(path: Path) -> None:

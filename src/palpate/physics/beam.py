@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -42,7 +43,7 @@ class Cantilever:
     nodes : tuple of float
         Positions of interest in m; by default six, evenly spaced from clamp to tip.
     strain_limit : float
-        Largest fibre strain for which the linear elastic law is believed; beyond it a solve says so and fails.
+        Largest fibre strain for which the linear elastic law is believed; beyond it a solve fails.
 
     Raises
     ------
@@ -72,7 +73,7 @@ class Cantilever:
         object.__setattr__(self, "nodes", tuple(sorted({float(x) for x in nodes})))
 
     def problem(self, loads: PointLoad | Sequence[PointLoad]) -> BeamProblem:
-        """This beam under the given loads, ready to be solved.
+        """Put loads on the beam: what comes back can be solved.
 
         Raises
         ------
@@ -90,13 +91,13 @@ class Cantilever:
         return self.length if load.at is None else float(load.at)
 
     def vertices(self, loads: Sequence[PointLoad] = ()) -> np.ndarray:
-        """Positions of the mesh's vertices in m, shape (node,): among them all loads and nodes of interest."""
+        """Positions of the mesh's vertices in m, shape (node,), those of loads and of interest among them."""
         wanted = np.array([0.0, self.length, *self.nodes, *(self.position(load) for load in loads)])
         # positions closer than a billionth of the length are one
         fixed = np.unique(np.round(wanted / self.length, 9)) * self.length
         pieces = [
             np.linspace(left, right, self._cuts(right - left), endpoint=False)
-            for left, right in zip(fixed[:-1], fixed[1:], strict=True)
+            for left, right in itertools.pairwise(fixed)
         ]
         return np.concatenate([*pieces, fixed[-1:]])
 

@@ -28,7 +28,8 @@ class LoadPath:
 
     def at(self, position: float) -> np.ndarray:
         """Load at a position between 0 and 1."""
-        return self.start + position * (self.end - self.start)
+        load: np.ndarray = self.start + position * (self.end - self.start)
+        return load
 
 
 def follow(
@@ -45,7 +46,8 @@ def follow(
     predictor : (dof,) array
         Guess of the state at the path's end; where it lowers the energy it replaces the start.
     admit : callable
-        Says of an equilibrium's unknowns `Stop.CONVERGED`, or why the model has no say there: that ends the path.
+        Says of an equilibrium's unknowns `Stop.CONVERGED`, or why the model has no say there, which ends the
+        path.
 
     Returns
     -------

@@ -1,9 +1,9 @@
 """Newton's method as an energy minimisation.
 
-Finds a minimum of Π(z) = W(z) - f·z. Near the minimum the Newton decrement λ² = rᵀK⁻¹r is twice the energy still
-to be gained, so √(λ²/energy) is the relative error in the energy norm. It is the criterion here because it weighs
-each residual by its compliance: the round-off of a stiff direction (stretching a beam) cannot hide or feign the
-convergence of a soft one (bending it), as a norm of the residual would.
+Finds a minimum of Π(z) = W(z) - f·z. Near the minimum the Newton decrement λ² = rᵀK⁻¹r is twice the energy
+still to be gained, so √(λ²/energy) is the relative error in the energy norm. It is the criterion here because
+it weighs each residual by its compliance: the round-off of a stiff direction (stretching a beam) can neither hide
+nor feign that of a soft one (bending it), as a norm of the residual would.
 """
 
 from __future__ import annotations

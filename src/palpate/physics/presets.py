@@ -45,10 +45,10 @@ class Preset:
 
 
 def founding_beam(material: str) -> Cantilever:
-    """The cantilever of Narayanan, Singla, Garimella, Waz & Krovi 2011: L = 1 m, r = 5 mm, six nodes of interest.
+    """The cantilever of Narayanan, Singla, Garimella, Waz & Krovi 2011: L = 1 m, r = 5 mm, six nodes.
 
-    The founding text is ambiguous. It gives the length as 0.1 m and its node table as 1 m; 1 m is taken here. It
-    gives the loads as 0 … 10 N by 0.05 and as 0 … 5 N by 0.01; both are presets.
+    The founding text is ambiguous. It gives the length as 0.1 m and its node table as 1 m; 1 m is taken here.
+    It gives the loads as 0 … 10 N by 0.05 and as 0 … 5 N by 0.01; both are presets.
 
     Parameters
     ----------
@@ -75,8 +75,8 @@ def _tip(material: str, newton: int, samples: int) -> Callable[[], Preset]:
 def beam_plane() -> Preset:
     """Nylon cantilever whose tip is pushed in the plane.
 
-    The beam buckles under an axial load of π²EI/4L² = 2.42 N (Euler 1744); 1.5 N stays well below it. Up to 5 N
-    across, no second equilibrium exists: it would need |P| L²/EI above 8 or so.
+    The beam buckles under an axial load of π²EI/4L² = 2.42 N (Euler 1744); 1.5 N stays well below it. With at
+    most 5 N across no second equilibrium exists: the shooting of the inextensible elastica finds none.
     """
     loads = (
         TipLoad(-1.5, 1.5, direction=(1.0, 0.0), name="P_x"),
@@ -87,7 +87,7 @@ def beam_plane() -> Preset:
 
 
 def beam_three_loads() -> Preset:
-    """Nylon cantilever pushed down at three nodes of interest: the n-dimensional case the founding study planned."""
+    """Nylon cantilever pushed down at three nodes: the n-dimensional case that the founding study planned."""
     loads = tuple(PointLoad(f"P_{x:g}m", x, 0.0, 2.0) for x in (0.4, 0.6, 1.0))
     summary = "nylon cantilever pushed down at 0.4, 0.6 and 1.0 m by 0 … 2 N each, 512 solves"
     return Preset("beam-three-loads", summary, founding_beam("nylon"), loads, "sobol", 512)

@@ -1,8 +1,8 @@
 """The strain energy of a plane beam on NGSolve finite elements.
 
-Geometrically exact (Reissner 1972, J. Appl. Math. Phys. 23, 795-804, eqs. 12-15; Simo 1985, Comput. Methods Appl.
-Mech. Eng. 49, 55-70): with the centre line's displacement (u, v) and the section's rotation t over the arc length
-x of the undeformed beam,
+Geometrically exact (Reissner 1972, J. Appl. Math. Phys. 23, 795-804; Simo 1985, Comput. Methods Appl. Mech.
+Eng. 49, 55-70): with the centre line's displacement (u, v) and the section's rotation t over the arc length x
+of the undeformed beam,
 
     axial strain  ε = (1 + u') cos t + v' sin t - 1
     shear strain  γ = v' cos t - (1 + u') sin t
@@ -14,6 +14,7 @@ The small-displacement beam (Timoshenko 1921) has ε = u', γ = v' - t and κ = 
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,8 +36,8 @@ class Stiffness:
 class ReissnerBeam:
     """Strain energy, internal forces and tangent of a clamped plane beam (a `newton.Model`).
 
-    Unknowns z (dof,) are nodal and interior values of u, v, t ordered along the beam, the clamped ones left out,
-    so that the tangent has a narrow band.
+    Unknowns z (dof,) are nodal and interior values of u, v, t, ordered along the beam so that the tangent has
+    a narrow band; the clamped ones are left out.
 
     Parameters
     ----------
@@ -106,11 +107,13 @@ class ReissnerBeam:
 
     def force(self, z: np.ndarray) -> np.ndarray:
         """∂W/∂z, shape (dof,)."""
-        return self._forces(z)[self._free]
+        forces: np.ndarray = self._forces(z)[self._free]
+        return forces
 
     def clamp_force(self, z: np.ndarray) -> np.ndarray:
         """∂W/∂(u, v, t) at the clamped vertex, shape (3,)."""
-        return self._forces(z)[self.root]
+        forces: np.ndarray = self._forces(z)[self.root]
+        return forces
 
     def tangent(self, z: np.ndarray) -> BandedTangent:
         """∂²W/∂z²."""
@@ -153,7 +156,7 @@ class BandedTangent:
         self._banded = banded
 
     def solve(self, rhs: np.ndarray, shift: float) -> np.ndarray | None:
-        """(K + shift·|diag K|)⁻¹ rhs by Cholesky's method, or None if that matrix is not positive definite."""
+        """(K + shift·|diag K|)⁻¹ rhs by Cholesky's method, or None if that is not positive definite."""
         banded = self._banded
         if shift:
             banded = banded.copy()
@@ -175,7 +178,7 @@ def _mesh(vertices: np.ndarray) -> Any:
     mesh = NetgenMesh(dim=1)
     points = [mesh.Add(MeshPoint(Pnt(float(x), 0, 0))) for x in vertices]
     mesh.SetMaterial(1, "beam")
-    for left, right in zip(points[:-1], points[1:], strict=True):
+    for left, right in itertools.pairwise(points):
         mesh.Add(Element1D([left, right], index=1))
     mesh.Add(Element0D(points[0], index=1))
     mesh.Add(Element0D(points[-1], index=2))

@@ -93,7 +93,7 @@ class Rectangle:
 
     @property
     def second_moment(self) -> float:
-        """b h³/12 in m⁴."""
+        """Width times height cubed over 12, in m⁴."""
         return self.width * self.height**3 / 12
 
     @property

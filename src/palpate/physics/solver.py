@@ -71,7 +71,7 @@ class BeamSolver:
         Returns
         -------
         Solution
-            `Solution.converged` tells whether there is one, `Solution.message` why not; nothing is raised for it.
+            `Solution.converged` tells whether there is one, `Solution.message` why not.
 
         Raises
         ------
@@ -105,7 +105,10 @@ class BeamSolver:
         taken, ahead = self._last.load - self._before.load, load - self._last.load
         length = float(taken @ taken)
         ratio = float(taken @ ahead) / length if length else 0.0
-        return self._last.state + np.clip(ratio, -2.0, 2.0) * (self._last.state - self._before.state)
+        guess: np.ndarray = self._last.state + np.clip(ratio, -2.0, 2.0) * (
+            self._last.state - self._before.state
+        )
+        return guess
 
     def _admit(self, state: np.ndarray) -> Stop:
         """Whether the model has a say at this state."""
@@ -146,10 +149,6 @@ class BeamSolver:
         )
 
     def _failure(self, found: Equilibrium) -> Solution:
-        limits = {
-            Stop.STRAIN_LIMIT: f"{self._fibre_strain(found.z):.2g} against {self._problem.body.strain_limit:g}",
-            Stop.COARSE_MESH: f"{self._bend(found.z):.2g} rad",
-        }
         return Solution(
             stop=found.stop,
             iterations=found.iterations,
@@ -158,5 +157,11 @@ class BeamSolver:
             root_reaction=np.full(3, np.nan),
             strain_energy=np.nan,
             potential_energy=np.nan,
-            detail=limits.get(found.stop, ""),
+            detail=self._detail(found),
         )
+
+    def _detail(self, found: Equilibrium) -> str:
+        """Figures that belong to the reason."""
+        if found.stop is Stop.STRAIN_LIMIT:
+            return f"{self._fibre_strain(found.z):.2g} against {self._problem.body.strain_limit:g}"
+        return f"{self._bend(found.z):.2g} rad" if found.stop is Stop.COARSE_MESH else ""

@@ -12,9 +12,9 @@ LARGEST, SMALLEST = 32, 4
 def chunks(unit: np.ndarray, rest: np.ndarray) -> list[np.ndarray]:
     """Row indices in chunks, each in an order that makes warm starts pay.
 
-    The points are halved across their widest side until a chunk is small (a k-d tree); within a chunk the order
-    goes from the point next to `rest` to its nearest neighbour and so on. The chunks depend on the points alone,
-    not on the number of workers, so that the same sweep gives the same bits on any machine of a kind.
+    The points are halved across their widest side until a chunk is small (a k-d tree); within a chunk the
+    order goes from the point next to `rest` to its nearest neighbour and so on. The chunks depend on the
+    points alone, not on the number of workers: the same sweep gives the same bits with any number of them.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """A Dask cluster on this machine whose workers are plain subprocesses.
 
-Dask's own local cluster starts workers by multiprocessing, which imports the user's script anew and so needs an
-``if __name__ == "__main__"`` guard in it. These workers are started as ``python -m palpate.sweeps.worker`` and need
-none: a sweep works in a file without a guard, in a notebook and on standard input.
+Dask's own local cluster starts workers by multiprocessing, which imports the user's script anew and so needs
+an ``if __name__ == "__main__"`` guard in it. These workers are started as ``python -m palpate.sweeps.worker``
+and need none: a sweep works in a file without a guard, in a notebook and on standard input.
 """
 
 from __future__ import annotations
@@ -155,7 +155,9 @@ def local_cluster(workers: int | None = None) -> LocalCluster:
     """
     count = available_cores() if workers is None else workers
     if count < 1:
-        raise UsageError(f"A sweep can't run on {count} workers.", why="It needs one at least.", fix="Ask for more.")
+        raise UsageError(
+            f"A sweep can't run on {count} workers.", why="It needs one at least.", fix="Ask for more."
+        )
     return LocalCluster(count)
 
 
@@ -174,10 +176,14 @@ def _start_scheduler() -> Any:
         processes=False,
         protocol="tcp://",
         host="127.0.0.1",
-        dashboard_address=None,
         silence_logs=logging.CRITICAL,
-        # a task that kills its worker is not tried on the others, one after the other
-        scheduler_kwargs={"allowed_failures": 0},
+        scheduler_kwargs={
+            # a task that kills its worker is not tried on the others, one after the other
+            "allowed_failures": 0,
+            # without a dashboard Dask still opens its port, by default to the whole network
+            "dashboard": False,
+            "dashboard_address": "127.0.0.1:0",
+        },
     )
 
 

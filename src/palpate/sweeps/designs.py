@@ -31,7 +31,7 @@ def grid(
     counts: int | Sequence[int] | None = None,
     step: float | Sequence[float] | None = None,
 ) -> np.ndarray:
-    """Place a regular grid with points on all ends of the ranges; the last input varies fastest.
+    """Place a regular grid that includes all ends of the ranges; the last input varies fastest.
 
     Parameters
     ----------
@@ -67,13 +67,15 @@ def grid(
         counts = int(samples ** (1 / len(space)) + 1e-9)
     numbers = np.broadcast_to(np.asarray(counts, dtype=int), (len(space),))
     if numbers.min() < 2:
-        raise _too_few("grid", f"{numbers.tolist()} values per input", "at least 2 values per input, the ends")
+        raise _too_few(
+            "grid", f"{numbers.tolist()} values per input", "at least 2 values per input, the ends"
+        )
     axes = np.meshgrid(*(np.linspace(0, 1, count) for count in numbers), indexing="ij")
     return space.from_unit(np.stack([axis.ravel() for axis in axes], axis=1))
 
 
 def sobol(space: Space, samples: int, seed: int = 0) -> np.ndarray:
-    """Draw a scrambled Sobol sequence (Sobol 1967; Owen 1998), which fills the space evenly from the first on.
+    """Draw a scrambled Sobol sequence (Sobol 1967; Owen 1998), even from the first point on.
 
     Parameters
     ----------

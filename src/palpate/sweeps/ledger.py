@@ -1,7 +1,8 @@
 """What an interrupted sweep has done so far, on disk.
 
-While a sweep to ``NAME.zarr`` runs, each finished chunk is a small dataset of its own in ``NAME.zarr.parts``, written
-whole or not at all. A sweep of the same configuration takes them up; the last step joins them into ``NAME.zarr``.
+While a sweep to ``NAME.zarr`` runs, what has been finished is written every few seconds as a small dataset of
+its own in ``NAME.zarr.parts``, whole or not at all. A sweep of the same configuration takes the parts up; the
+last step joins them into ``NAME.zarr``.
 """
 
 from __future__ import annotations
@@ -77,7 +78,7 @@ class Ledger:
 
     def add(self, part: Dataset) -> None:
         """Keep a finished part."""
-        part.save(self.parts / f"part-{int(part.data['sample'][0]):06d}.zarr", overwrite=True)
+        part.save(self.parts / f"part-{part.hash[:16]}.zarr", overwrite=True)
 
     def finish(self, dataset: Dataset) -> None:
         """Write the whole dataset and drop the parts."""

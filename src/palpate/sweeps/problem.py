@@ -56,7 +56,7 @@ class Solver(Protocol):
 
 @runtime_checkable
 class Problem(Protocol):
-    """A question with n inputs. It can be pickled; opening it may be dear and is done once per chunk of samples."""
+    """A question with n inputs, which can be pickled. Opening it may be dear: it is done once per chunk."""
 
     @property
     def ranges(self) -> tuple[Range, ...]:

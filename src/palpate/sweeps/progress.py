@@ -14,7 +14,7 @@ Report = Callable[[int, int], None]
 
 @contextlib.contextmanager
 def reporter(progress: bool | Report) -> Iterator[Report]:
-    """Yield what to call: the caller's own function, a bar on standard error if that is a terminal, or nothing."""
+    """Yield what to call: the caller's function, a bar on standard error if it is a terminal, or a no-op."""
     if callable(progress):
         yield progress
     elif progress and sys.stderr.isatty():

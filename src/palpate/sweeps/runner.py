@@ -23,13 +23,11 @@ TRIES = 3  # a sample whose worker died may have died of its neighbour
 
 
 @contextlib.contextmanager
-def connect(
-    cluster: Any, workers: int | None
-) -> Iterator[tuple[distributed.Client, Callable[[], None]]]:
+def connect(cluster: Any, workers: int | None) -> Iterator[tuple[distributed.Client, Callable[[], None]]]:
     """Yield a client of `cluster` and what to call to start dead workers again.
 
-    A `LocalCluster`, a scheduler's address, or a cluster or client of Dask's is used and left running; for ``None``
-    a cluster is started and ended.
+    A `LocalCluster`, a scheduler's address, or a cluster or client of Dask's is used and left running; for
+    ``None`` a cluster is started and ended.
     """
     import distributed
 
@@ -54,8 +52,8 @@ def run(
 ) -> Iterator[tuple[np.ndarray, Columns]]:
     """Solve the chunks and yield each one's rows and answers as they come in.
 
-    A chunk that raises, or whose worker dies, is solved again sample by sample; a sample that then still does so
-    is yielded as a row with the error's words. The sweep goes on.
+    A chunk that raises, or whose worker dies, is solved again sample by sample; a sample that then still does
+    so is yielded as a row with the error's words. The sweep goes on.
 
     Parameters
     ----------

@@ -92,7 +92,7 @@ class Space:
         if values.ndim != 2 or values.shape[1] != len(self) or not np.isfinite(values).all():
             raise UsageError(
                 f"Points of shape {values.shape} can't be taken in this space.",
-                why=f"It has {len(self)} inputs ({', '.join(self.names)}); all values must be finite numbers.",
+                why=f"It has {len(self)} inputs ({', '.join(self.names)}), and all values must be finite.",
                 fix=f"Give an array of shape (N, {len(self)}).",
             )
         return values

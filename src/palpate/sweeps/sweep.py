@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,6 +26,8 @@ from palpate.sweeps.space import Space
 
 __all__ = ["sweep"]
 
+FLUSH_SECONDS = 3.0  # most work that a killed sweep loses; a store of many small files is slow to write
+
 
 def sweep(
     body: Any,
@@ -40,13 +45,13 @@ def sweep(
 ) -> Dataset:
     """Solve a body under many loads, in parallel.
 
-    Samples are solved in chunks of neighbours, each solve starting from the last one's answer. A sample that fails
-    becomes a row with NaN and a message, and the sweep goes on.
+    Samples are solved in chunks of neighbours, each solve starting from the last one's answer. A sample that
+    fails becomes a row with NaN and a message, and the sweep goes on.
 
     Parameters
     ----------
     body : body or Problem
-        Anything with a method ``problem(loads)``, such as a `Cantilever`; or a `Problem`, then without `loads`.
+        Anything with a method ``problem(loads)``, such as a `Cantilever`; or a `Problem`, without `loads`.
     loads : load or sequence of loads
         The n inputs.
     samples : int, optional
@@ -60,11 +65,12 @@ def sweep(
     workers : int, optional
         Processes on this machine, by default one for each core.
     cluster : optional
-        What to run on instead: a `local_cluster`, a Dask scheduler's address, or a cluster or client of Dask's.
+        What to run on instead: a `local_cluster`, a scheduler's address, or a cluster or client of Dask's.
     progress : bool or callable
         A bar on standard error if that is a terminal; or a function (done, total).
     path : path, optional
-        A Zarr store to write. An interrupted sweep takes up its finished samples there, and a finished one is read.
+        A Zarr store to write. An interrupted sweep takes up its finished samples there; a finished one is
+        read.
     max_failed : float
         Largest share of failed samples that is put up with.
 
@@ -111,9 +117,7 @@ class _Plan:
         return assemble(self.space.ranges, layout, self.points[rows], columns, origin, rows)
 
 
-def _plan(
-    body: Any, loads: Any, samples: int | None, seed: int, design: str | Design, points: Any
-) -> _Plan:
+def _plan(body: Any, loads: Any, samples: int | None, seed: int, design: str | Design, points: Any) -> _Plan:
     problem = _problem(body, loads)
     space = Space(problem.ranges)
     if (samples is None) == (points is None):
@@ -153,20 +157,45 @@ def _solve(
     columns = empty(len(plan.points), len(plan.problem.rest))
     done = _take_up(ledger, columns)
     parts = _chunks(plan, done)
-    with reporter(progress) as report:
+    with reporter(progress) as report, _keeping(plan, ledger, columns) as keep:
         report(int(done.sum()), done.size)
         if parts:
             with connect(cluster, workers) as (client, revive):
                 for rows, answers in run(client, revive, plan.problem, plan.points, parts):
                     put(columns, rows, answers)
                     done[rows] = True
-                    if ledger:
-                        ledger.add(plan.label(answers, rows))
+                    keep(rows)
                     report(int(done.sum()), done.size)
     data = plan.label(columns, np.arange(len(plan.points)))
     if ledger:
         ledger.finish(data)
     return data
+
+
+@contextlib.contextmanager
+def _keeping(plan: _Plan, ledger: Ledger | None, columns: Columns) -> Iterator[Callable[[np.ndarray], None]]:
+    """Yield what to call with rows as they are finished; on an interruption all of them are in the ledger."""
+    fresh: list[np.ndarray] = []
+    begun = time.monotonic()
+
+    def flush() -> None:
+        nonlocal begun
+        if ledger and fresh:
+            rows = np.concatenate(fresh)
+            ledger.add(plan.label({name: values[rows] for name, values in columns.items()}, rows))
+        fresh.clear()
+        begun = time.monotonic()
+
+    def keep(rows: np.ndarray) -> None:
+        fresh.append(rows)
+        if time.monotonic() - begun > FLUSH_SECONDS:
+            flush()
+
+    try:
+        yield keep
+    except BaseException:
+        flush()
+        raise
 
 
 def _take_up(ledger: Ledger | None, columns: Columns) -> np.ndarray:
@@ -201,4 +230,6 @@ def _check_failures(data: Dataset, max_failed: float) -> None:
 
 
 def _inputs(data: Dataset, row: int) -> str:
-    return ", ".join(f"{r.name} = {value:g} {r.unit}" for r, value in zip(data.ranges, data.X[row], strict=True))
+    return ", ".join(
+        f"{r.name} = {value:g} {r.unit}" for r, value in zip(data.ranges, data.X[row], strict=True)
+    )

@@ -1,7 +1,7 @@
 """The process that solves: ``python -m palpate.sweeps.worker``, started by `palpate.sweeps.cluster`.
 
-It reads the scheduler's address from the first line of its standard input, and ends when that input closes: so no
-worker outlives the process that started it, however that one died.
+It reads the scheduler's address from the first line of its standard input, and ends when that input closes.
+So no worker outlives the process that started it, however that one died.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ async def _work(address: str, folder: str, name: str) -> None:
         name=name,
         host="127.0.0.1",
         dashboard=False,
+        dashboard_address="127.0.0.1:0",  # Dask opens this port in any case
         local_directory=folder,
         memory_limit=0,  # Dask would pause or restart a worker in the midst of a solve
         death_timeout=60,

@@ -190,6 +190,7 @@ class Loop:
             sample = self.device.read(self.now)
         except (DeviceError, OSError):
             self.holding = False
+            self.out.input(holding=False, late=True)
             self.fail(Fault.DEVICE_ERROR)
             return
         self.holding = sample.holding

@@ -57,11 +57,19 @@ def _windows_class() -> str:
 def _timer_slack() -> str:
     if sys.platform != "linux":
         return "not adjustable"
-    failed = ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, ctypes.c_ulong(1), 0, 0, 0)
-    return "default" if failed else "1 ns"
+    return "1 ns" if _granted("prctl", _PR_SET_TIMERSLACK, 1, 0, 0, 0) else "default"
 
 
 def _memory() -> str:
-    if sys.platform not in {"linux", "darwin"}:
+    if sys.platform == "win32":
         return "pageable"
-    return "pageable" if ctypes.CDLL(None).mlockall(_MCL_CURRENT) else "locked"
+    return "locked" if _granted("mlockall", _MCL_CURRENT) else "pageable"
+
+
+def _granted(call: str, *arguments: int) -> bool:
+    """Whether a C library call with unsigned long arguments exists and returned 0."""
+    try:
+        function = getattr(ctypes.CDLL(None), call)
+    except (OSError, AttributeError):
+        return False
+    return int(function(*map(ctypes.c_ulong, arguments))) == 0

@@ -1,0 +1,38 @@
+"""In the eye: one page that shows the body deform and lets a hand pull on it.
+
+==============  ====================================================================================
+`server`        `serve` and `Viewer`: the page, its websocket and the real-time process behind them
+`messages`      every message between server and page, as dataclasses that generate the TypeScript
+`wire`          how those dataclasses become bytes
+`typescript`    how they become TypeScript
+`hands`         which of several pages holds the hand
+`picture`       from a published tick to a frame, including the spring-back after release
+`session`       the pages of one server: credits, frames, heartbeats
+`guard`         Host, Origin and content-security rules
+`ports`         a free port on this machine
+``client/``     the page's sources (TypeScript, three.js); ``static/`` is what they build to
+==============  ====================================================================================
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from palpate.viewer.ports import free_port
+    from palpate.viewer.server import Viewer, serve
+
+__all__ = ["Viewer", "free_port", "serve"]
+
+
+def __getattr__(name: str) -> Any:
+    # lazy: the command line imports this package to show its help
+    if name in {"Viewer", "serve"}:
+        from palpate.viewer import server
+
+        return getattr(server, name)
+    if name == "free_port":
+        from palpate.viewer.ports import free_port
+
+        return free_port
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,267 @@
+// Generated from palpate/viewer/messages.py; change it there, then
+//   python -m palpate.viewer.messages > src/palpate/viewer/client/src/messages.ts
+
+export type Vec3 = [number, number, number];
+
+export const PROTOCOL = 1;
+
+/** The real-time process as the server sees it. */
+export const Loop = {
+  RUNNING: 0,
+  FROZEN: 1,
+  ENDED: 2,
+} as const;
+
+/** Who holds the hand, from one page's point of view. */
+export const Hold = {
+  FREE: 0,
+  YOURS: 1,
+  ANOTHER: 2,
+} as const;
+
+/** A named interval. */
+export interface RangeInfo {
+  name: string;
+  low: number;
+  high: number;
+  unit: string;
+}
+
+/** The body and the loop, once per connection, server to page. */
+export interface Hello {
+  protocol: number;
+  name: string;
+  rest: Vec3[];
+  radius: number;
+  touch_node: number;
+  nodes_of_interest: number[];
+  inputs: RangeInfo[];
+  parameters: RangeInfo[];
+  reach: number;
+  scale: number;
+  workspace: number;
+  max_force: number;
+  rate: number;
+  faults: string[];
+  meta: Record<string, unknown>;
+}
+
+/** An event in plain words, server to page. */
+export interface Notice {
+  what: string;
+  why: string;
+  fix: string;
+}
+
+export function isHello(message: { kind: string }): message is Hello & { kind: string } {
+  return message.kind === "Hello";
+}
+
+export function isNotice(message: { kind: string }): message is Notice & { kind: string } {
+  return message.kind === "Notice";
+}
+
+export const FRAME = 1;
+
+/** One picture, server to page. */
+export interface Frame {
+  /** counts the loop's ticks */
+  tick: number;
+  /** s, the loop's clock */
+  time: number;
+  /** ms, page clock: `sent` of the last Hand that this page sent */
+  echo: number;
+  /** m, the hand in body metres, as an offset from the held node at rest */
+  position: Vec3;
+  /** m, where the held node is, as an offset from rest */
+  contact: Vec3;
+  /** N, on the hand */
+  force: Vec3;
+  /** Hz, ticks per second achieved */
+  rate: number;
+  /** s, start of the latest tick behind its schedule */
+  lateness: number;
+  /** s, median since the start */
+  lateness_p50: number;
+  /** s, 99th percentile since the start */
+  lateness_p99: number;
+  /** s, largest since the start */
+  lateness_max: number;
+  /** s, median CPU time of one tick */
+  work_p50: number;
+  /** faults since the start, stalls apart */
+  faults: number;
+  /** code of this tick's fault, 0 for none; words in Hello.faults */
+  fault: number;
+  /** code of the latest fault */
+  last_fault: number;
+  /** a Loop */
+  loop: number;
+  /** a Hold */
+  hold: number;
+  /** the hand is within the trained range */
+  inside: boolean;
+  /** the force limit acted */
+  clamped: boolean;
+  /** a hand holds the body */
+  grabbed: boolean;
+  /** the input is older than the loop allows */
+  stalled: boolean;
+  /** current values of Hello.parameters */
+  parameters: Float32Array;
+  /** m, x y z of each node's offset from Hello.rest */
+  displacement: Float32Array;
+}
+
+export function encodeFrame(m: Frame): ArrayBuffer {
+  const view = new DataView(new ArrayBuffer(97 + 4 + 4 * m.parameters.length + 4 + 4 * m.displacement.length));
+  view.setUint8(0, 1);
+  view.setFloat64(1, m.tick, true);
+  view.setFloat64(9, m.time, true);
+  view.setFloat64(17, m.echo, true);
+  view.setFloat32(25, m.position[0], true);
+  view.setFloat32(29, m.position[1], true);
+  view.setFloat32(33, m.position[2], true);
+  view.setFloat32(37, m.contact[0], true);
+  view.setFloat32(41, m.contact[1], true);
+  view.setFloat32(45, m.contact[2], true);
+  view.setFloat32(49, m.force[0], true);
+  view.setFloat32(53, m.force[1], true);
+  view.setFloat32(57, m.force[2], true);
+  view.setFloat32(61, m.rate, true);
+  view.setFloat32(65, m.lateness, true);
+  view.setFloat32(69, m.lateness_p50, true);
+  view.setFloat32(73, m.lateness_p99, true);
+  view.setFloat32(77, m.lateness_max, true);
+  view.setFloat32(81, m.work_p50, true);
+  view.setUint32(85, m.faults, true);
+  view.setUint8(89, m.fault);
+  view.setUint8(90, m.last_fault);
+  view.setUint8(91, m.loop);
+  view.setUint8(92, m.hold);
+  view.setUint8(93, m.inside ? 1 : 0);
+  view.setUint8(94, m.clamped ? 1 : 0);
+  view.setUint8(95, m.grabbed ? 1 : 0);
+  view.setUint8(96, m.stalled ? 1 : 0);
+  let at = 97;
+  view.setUint32(at, m.parameters.length, true);
+  at += 4;
+  for (const value of m.parameters) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
+  view.setUint32(at, m.displacement.length, true);
+  at += 4;
+  for (const value of m.displacement) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
+  return view.buffer;
+}
+
+export function decodeFrame(buffer: ArrayBuffer): Frame {
+  const view = new DataView(buffer);
+  const parametersAt = 97;
+  const parametersEnd = parametersAt + 4 + 4 * view.getUint32(parametersAt, true);
+  const displacementAt = parametersEnd;
+  const displacementEnd = displacementAt + 4 + 4 * view.getUint32(displacementAt, true);
+  return {
+    tick: view.getFloat64(1, true),
+    time: view.getFloat64(9, true),
+    echo: view.getFloat64(17, true),
+    position: [view.getFloat32(25, true), view.getFloat32(29, true), view.getFloat32(33, true)],
+    contact: [view.getFloat32(37, true), view.getFloat32(41, true), view.getFloat32(45, true)],
+    force: [view.getFloat32(49, true), view.getFloat32(53, true), view.getFloat32(57, true)],
+    rate: view.getFloat32(61, true),
+    lateness: view.getFloat32(65, true),
+    lateness_p50: view.getFloat32(69, true),
+    lateness_p99: view.getFloat32(73, true),
+    lateness_max: view.getFloat32(77, true),
+    work_p50: view.getFloat32(81, true),
+    faults: view.getUint32(85, true),
+    fault: view.getUint8(89),
+    last_fault: view.getUint8(90),
+    loop: view.getUint8(91),
+    hold: view.getUint8(92),
+    inside: view.getUint8(93) !== 0,
+    clamped: view.getUint8(94) !== 0,
+    grabbed: view.getUint8(95) !== 0,
+    stalled: view.getUint8(96) !== 0,
+    parameters: new Float32Array(buffer.slice(parametersAt + 4, parametersEnd)),
+    displacement: new Float32Array(buffer.slice(displacementAt + 4, displacementEnd)),
+  };
+}
+
+export const HAND = 2;
+
+/** What the hand does, page to server; also the heartbeat. */
+export interface Hand {
+  /** ms, page clock when this was sent */
+  sent: number;
+  /** s, the longest time to the next of these */
+  period: number;
+  /** m, the hand in device coordinates: body metres / Hello.scale */
+  target: Vec3;
+  /** a hand holds the body */
+  grabbed: boolean;
+  /** the page is in the background */
+  hidden: boolean;
+  /** wanted values of Hello.parameters */
+  parameters: Float32Array;
+}
+
+export function encodeHand(m: Hand): ArrayBuffer {
+  const view = new DataView(new ArrayBuffer(43 + 4 + 4 * m.parameters.length));
+  view.setUint8(0, 2);
+  view.setFloat64(1, m.sent, true);
+  view.setFloat64(9, m.period, true);
+  view.setFloat64(17, m.target[0], true);
+  view.setFloat64(25, m.target[1], true);
+  view.setFloat64(33, m.target[2], true);
+  view.setUint8(41, m.grabbed ? 1 : 0);
+  view.setUint8(42, m.hidden ? 1 : 0);
+  let at = 43;
+  view.setUint32(at, m.parameters.length, true);
+  at += 4;
+  for (const value of m.parameters) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
+  return view.buffer;
+}
+
+export function decodeHand(buffer: ArrayBuffer): Hand {
+  const view = new DataView(buffer);
+  const parametersAt = 43;
+  const parametersEnd = parametersAt + 4 + 4 * view.getUint32(parametersAt, true);
+  return {
+    sent: view.getFloat64(1, true),
+    period: view.getFloat64(9, true),
+    target: [view.getFloat64(17, true), view.getFloat64(25, true), view.getFloat64(33, true)],
+    grabbed: view.getUint8(41) !== 0,
+    hidden: view.getUint8(42) !== 0,
+    parameters: new Float32Array(buffer.slice(parametersAt + 4, parametersEnd)),
+  };
+}
+
+export const CREDIT = 3;
+
+/** Leave to send more frames, page to server. */
+export interface Credit {
+  /** how many more */
+  frames: number;
+}
+
+export function encodeCredit(m: Credit): ArrayBuffer {
+  const view = new DataView(new ArrayBuffer(3));
+  view.setUint8(0, 3);
+  view.setUint16(1, m.frames, true);
+  return view.buffer;
+}
+
+export function decodeCredit(buffer: ArrayBuffer): Credit {
+  const view = new DataView(buffer);
+  return {
+    frames: view.getUint16(1, true),
+  };
+}

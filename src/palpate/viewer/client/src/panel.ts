@@ -1,0 +1,198 @@
+// The side panel: numbers, flags, plots, sliders, and what is known of the model.
+
+import { flags } from "./flags";
+import type { Flag } from "./flags";
+import type { Frame, Hello } from "./messages";
+import { Plot } from "./plot";
+import { fixed, round125, tidy } from "./units";
+
+const EVERY = 80; // ms between changes of the numbers: faster can't be read
+
+export function element<T extends HTMLElement>(id: string): T {
+  return document.getElementById(id) as T;
+}
+
+export class Panel {
+  private readonly force = new Plot(element<HTMLCanvasElement>("force-plot"), "--accent");
+  private readonly lateness = new Plot(element<HTMLCanvasElement>("lateness-plot"), "--accent-2");
+  private hello: Hello | null = null;
+  private shown = "";
+  private last = 0;
+  private pictures = 0;
+  private since = 0;
+
+  recolour(): void {
+    this.force.recolour();
+    this.lateness.recolour();
+    this.last = 0;
+  }
+
+  /** Another body, or the same after a restart. `moved` hears of slider i at a value. */
+  start(hello: Hello, moved: (i: number, value: number) => void): void {
+    this.hello = hello;
+    element("model-name").textContent = hello.name;
+    element("model-line").textContent = `trained on ${hello.inputs
+      .map((r) => `${r.name} ${tidy(r.low)} … ${tidy(r.high)} ${r.unit}`)
+      .join(", ")}`;
+    document.title = `${hello.name} · palpate`;
+    sliders(hello, moved);
+    about(hello);
+  }
+
+  /** Record every frame; now and then show it. */
+  update(frame: Frame, drawn: boolean): void {
+    const hello = this.hello;
+    if (!hello) return;
+    this.force.add(frame.time, Math.hypot(...frame.force));
+    this.lateness.add(frame.time, 1e6 * frame.lateness);
+    this.pictures += drawn ? 1 : 0;
+    const now = performance.now();
+    if (now - this.last < EVERY) return;
+    this.last = now;
+    this.numbers(frame);
+    this.timing(frame, now);
+    this.tell(flags(frame, hello));
+    follow(frame);
+    this.plots(frame);
+  }
+
+  /** The tab went to the background. */
+  hidden(): void {
+    this.tell([{ id: "hidden", tone: "warn", words: "This tab is in the background: the hand has let go." }]);
+  }
+
+  /** Nothing is known any more. */
+  lost(): void {
+    for (const id of ["force-norm", "force-x", "force-y", "tip-x", "tip-y", "tip-norm", "rate", "picture-rate"]) {
+      put(id, NaN, 0);
+    }
+    delete document.documentElement.dataset["tick"];
+    this.tell([{ id: "lost", tone: "bad", words: "Disconnected: nothing is known of the body. Trying again." }]);
+  }
+
+  private numbers(frame: Frame): void {
+    const [fx, fy] = frame.force;
+    put("force-norm", Math.hypot(...frame.force), 3);
+    put("force-x", fx, 3);
+    put("force-y", fy, 3);
+    const mm = frame.contact.map((x) => 1000 * x);
+    put("tip-x", mm[0]!, 1);
+    put("tip-y", mm[1]!, 1);
+    put("tip-norm", Math.hypot(...mm), 1);
+    // for programs that read the page: one frame, whole
+    const data = document.documentElement.dataset;
+    data["tick"] = String(frame.tick);
+    data["position"] = frame.position.join(" ");
+    data["contact"] = frame.contact.join(" ");
+    data["force"] = frame.force.join(" ");
+    data["parameters"] = frame.parameters.join(" ");
+    data["grabbed"] = String(frame.grabbed);
+    data["inside"] = String(frame.inside);
+    data["loop"] = String(frame.loop);
+    data["hold"] = String(frame.hold);
+  }
+
+  private timing(frame: Frame, now: number): void {
+    microseconds("lateness-p50", frame.lateness_p50);
+    microseconds("lateness-p99", frame.lateness_p99);
+    microseconds("lateness-max", frame.lateness_max);
+    put("rate", frame.rate, 0);
+    microseconds("work", frame.work_p50);
+    if (now - this.since > 1000) {
+      put("picture-rate", (1000 * this.pictures) / (now - this.since), 0);
+      [this.pictures, this.since] = [0, now];
+    }
+  }
+
+  private plots(frame: Frame): void {
+    const peak = round125(Math.max(1.02 * this.force.peak(frame.time), 0.1));
+    this.force.draw(frame.time, { unit: "N", low: 0, high: peak, logarithmic: false });
+    const scale = { unit: "µs", low: 0.1, high: 1e4, logarithmic: true };
+    this.lateness.draw(frame.time, scale, [1e6 * frame.lateness_p50, 1e6 * frame.lateness_p99]);
+  }
+
+  private tell(found: Flag[]): void {
+    const key = JSON.stringify(found);
+    if (key === this.shown) return;
+    this.shown = key;
+    element("flags").replaceChildren(
+      ...found.map((flag) => {
+        const row = document.createElement("li");
+        row.textContent = flag.words;
+        row.dataset["flag"] = flag.id;
+        row.dataset["tone"] = flag.tone;
+        return row;
+      }),
+    );
+  }
+}
+
+function put(id: string, value: number, decimals: number): void {
+  const output = element(id);
+  output.textContent = Number.isFinite(value) ? fixed(value, decimals) : "–";
+  output.dataset["value"] = String(value);
+}
+
+function microseconds(id: string, seconds: number): void {
+  put(id, 1e6 * seconds, seconds < 10e-6 ? 1 : 0);
+}
+
+function sliders(hello: Hello, moved: (i: number, value: number) => void): void {
+  element("parameters").hidden = hello.parameters.length === 0;
+  element("sliders").replaceChildren(
+    ...hello.parameters.map((range, i) => {
+      const [label, value, input] = ["label", "output", "input"].map((t) => document.createElement(t));
+      const slider = input as HTMLInputElement;
+      [slider.type, slider.id] = ["range", `parameter-${i}`];
+      [slider.min, slider.max, slider.step] = [range.low, range.high, (range.high - range.low) / 200].map(String) as [
+        string,
+        string,
+        string,
+      ];
+      slider.dataset["unit"] = range.unit;
+      slider.addEventListener("input", () => moved(i, slider.valueAsNumber));
+      label!.append(range.name, value!, slider);
+      return label!;
+    }),
+  );
+}
+
+/** Sliders show the values in force, whoever set them, except under the user's finger. */
+function follow(frame: Frame): void {
+  frame.parameters.forEach((value, i) => {
+    const slider = document.getElementById(`parameter-${i}`) as HTMLInputElement | null;
+    if (!slider) return;
+    if (!slider.matches(":active")) slider.valueAsNumber = value;
+    slider.previousElementSibling!.textContent = `${tidy(value)} ${slider.dataset["unit"]}`;
+  });
+}
+
+const ROWS = 40;
+
+function about(hello: Hello): void {
+  const rows = [...flatten("", hello.meta)].slice(0, ROWS);
+  element("about").hidden = rows.length === 0;
+  element("meta").replaceChildren(
+    ...rows.flatMap(([key, value]) => {
+      const [term, words] = [document.createElement("dt"), document.createElement("dd")];
+      [term.textContent, words.textContent] = [key, value];
+      return [term, words];
+    }),
+  );
+}
+
+function* flatten(path: string, value: unknown): Generator<[string, string]> {
+  if (Array.isArray(value)) {
+    if (value.length <= 8 && value.every((v) => typeof v !== "object")) yield [path, value.map(plain).join(", ")];
+  } else if (value !== null && typeof value === "object") {
+    for (const [key, inner] of Object.entries(value)) {
+      yield* flatten(path ? `${path} · ${key.replaceAll("_", " ")}` : key.replaceAll("_", " "), inner);
+    }
+  } else if (value !== null && value !== undefined && value !== "") {
+    yield [path, plain(value)];
+  }
+}
+
+function plain(value: unknown): string {
+  return typeof value === "number" ? (Number.isInteger(value) ? String(value) : tidy(value)) : String(value);
+}

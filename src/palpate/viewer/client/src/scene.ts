@@ -1,0 +1,295 @@
+// The 3-D view: the body, its ghost at rest, the hand, the force. Rendered only when something changed.
+
+import {
+  BufferGeometry,
+  Color,
+  DirectionalLight,
+  HemisphereLight,
+  LessDepth,
+  Line,
+  LineBasicMaterial,
+  Matrix4,
+  Mesh,
+  MeshBasicMaterial,
+  MeshLambertMaterial,
+  MOUSE,
+  PerspectiveCamera,
+  Plane,
+  Raycaster,
+  Scene,
+  SphereGeometry,
+  TOUCH,
+  Vector2,
+  Vector3,
+  WebGLRenderer,
+} from "three";
+import type { Group } from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { Arrow } from "./arrow";
+import type { Frame, Hello, Vec3 } from "./messages";
+import { surroundings } from "./surroundings";
+import type { Extent } from "./surroundings";
+import { Tube } from "./tube";
+import { css, round125 } from "./units";
+
+const THINNEST = 0.011; // radius as drawn, of the length: thinner would be lost on a small screen
+const LIVELY = 0.1; // a reach below this share of the length is drawn enlarged
+const LIVELY_AIM = 0.3;
+const FRONT = new Vector3(0.16, 0.2, 1).normalize();
+const MARGIN = { left: 20, right: 20, top: 64, bottom: 76 }; // px that the words around the view take
+
+export class View {
+  enlarged = 1; // displacement as drawn / true displacement
+  readonly thickened: number;
+  readonly enlargement: number;
+  readonly extent: Extent;
+  readonly tip = new Vector3();
+  readonly arrow: Arrow;
+
+  private readonly renderer: WebGLRenderer;
+  private readonly scene = new Scene();
+  private readonly camera = new PerspectiveCamera(30, 1, 0.01, 100);
+  private readonly controls: OrbitControls;
+  private readonly tube: Tube;
+  private readonly ghost: Mesh;
+  private readonly shadow: Mesh;
+  private readonly handle: Mesh<SphereGeometry, MeshLambertMaterial>;
+  private readonly hand: Mesh<SphereGeometry, MeshLambertMaterial>;
+  private readonly thread = new Line(new BufferGeometry(), new LineBasicMaterial());
+  private around: Group | null = null;
+  private readonly rest: Float32Array;
+  private readonly points: Float32Array;
+  private readonly shares: Float32Array;
+  private readonly length: number;
+  private dirty = true;
+
+  constructor(
+    readonly canvas: HTMLCanvasElement,
+    readonly hello: Hello,
+  ) {
+    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
+    this.rest = Float32Array.from(hello.rest.flat());
+    this.points = new Float32Array(this.rest.length);
+    this.shares = new Float32Array(hello.rest.length);
+    const xs = hello.rest.map((p) => p[0]);
+    this.length = Math.max(...xs) - Math.min(...xs) || hello.reach;
+    const lively = hello.reach < LIVELY * this.length;
+    this.enlargement = lively ? round125((LIVELY_AIM * this.length) / hello.reach) : 1;
+    this.enlarged = this.enlargement;
+    this.thickened = Math.max(1, Math.ceil((THINNEST * this.length) / hello.radius));
+    const cell = round125(this.length / 14);
+    this.extent = { root: Math.min(...xs), length: this.length, floor: 0, cell };
+
+    const radius = this.thickened * hello.radius;
+    this.tube = new Tube(hello.rest.length, radius);
+    const ball = Math.max(1.9 * radius, 0.022 * this.length);
+    this.handle = new Mesh(new SphereGeometry(ball, 28, 18), new MeshLambertMaterial());
+    this.hand = new Mesh(new SphereGeometry(0.5 * ball, 18, 12), new MeshLambertMaterial());
+    this.arrow = new Arrow(0.3 * this.length, fullForce(hello), 1.15 * ball);
+    this.ghost = new Mesh(this.restGeometry(radius), ghostMaterial());
+    this.shadow = new Mesh(this.tube.geometry, shadowMaterial());
+    this.shadow.matrixAutoUpdate = false;
+    this.assemble();
+    this.controls = this.orbit();
+    this.place();
+    this.recolour();
+    this.resize();
+    this.look();
+  }
+
+  /** Show the displacements at `factor` times their size. */
+  enlarge(factor: number): void {
+    this.enlarged = factor;
+    this.place();
+    this.recolour();
+    this.look();
+  }
+
+  /** Take over one frame's shape; true force, drawn displacement. */
+  show(frame: Frame): void {
+    const { rest, points, shares, hello, enlarged } = this;
+    const u = frame.displacement;
+    for (let i = 0; i < shares.length; i++) {
+      const size = Math.hypot(u[3 * i]!, u[3 * i + 1]!, u[3 * i + 2]!);
+      shares[i] = size / hello.reach;
+      for (let k = 3 * i; k < 3 * i + 3; k++) points[k] = rest[k]! + enlarged * u[k]!;
+    }
+    this.tube.update(points, shares);
+    this.drawn(frame.contact, this.tip);
+    this.handle.position.copy(this.tip);
+    this.drawn(frame.position, this.hand.position);
+    const apart = frame.grabbed && this.hand.position.distanceTo(this.tip) > 0.004 * this.length;
+    this.hand.visible = this.thread.visible = apart;
+    if (apart) this.thread.geometry.setFromPoints([this.tip, this.hand.position]);
+    this.arrow.update(this.tip, frame.force);
+    this.dirty = true;
+  }
+
+  /** Render if anything changed since. */
+  render(): boolean {
+    if (!this.dirty) return false;
+    this.dirty = false;
+    this.renderer.render(this.scene, this.camera);
+    return true;
+  }
+
+  /** Where a point of the scene is on the canvas, CSS pixels. */
+  project(point: Vector3): Vector2 {
+    const p = point.clone().project(this.camera);
+    return new Vector2(((p.x + 1) / 2) * this.canvas.clientWidth, ((1 - p.y) / 2) * this.canvas.clientHeight);
+  }
+
+  /** The offset of the held node (m, true) under a canvas point, in the plane of the body; null beside it. */
+  offsetAt(x: number, y: number): Vec3 | null {
+    const at = new Vector2((2 * x) / this.canvas.clientWidth - 1, 1 - (2 * y) / this.canvas.clientHeight);
+    const ray = new Raycaster();
+    ray.setFromCamera(at, this.camera);
+    const node = this.node();
+    const hit = ray.ray.intersectPlane(new Plane(new Vector3(0, 0, 1), -node.z), new Vector3());
+    if (!hit) return null;
+    hit.sub(node).divideScalar(this.enlarged);
+    return [hit.x, hit.y, 0];
+  }
+
+  /** Whether right-drag, wheel and two fingers turn the view. */
+  set turnable(on: boolean) {
+    this.controls.enabled = on;
+  }
+
+  /** Make the handle answer the pointer. */
+  highlight(on: boolean): void {
+    const size = on ? 1.22 : 1;
+    if (this.handle.scale.x === size) return;
+    this.handle.scale.setScalar(size);
+    this.dirty = true;
+  }
+
+  resize(): void {
+    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
+    if (!width || !height) return;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.dirty = true;
+  }
+
+  /** Look from the front, a little from above, with everything that can happen in the picture. */
+  look(): void {
+    const { root, length, floor } = this.extent;
+    const high = Math.max(0.5 * this.enlarged * this.hello.reach, 0.28 * length);
+    const [depth, centre] = [0.35 * length, new Vector3(root + length / 2, (floor + high) / 2, 0)];
+    const corners = [root - 0.04 * length, root + 1.12 * length].flatMap((x) =>
+      [-depth, depth].flatMap((z) => [new Vector3(x, floor, z), new Vector3(x, high, 0.4 * z)]),
+    );
+    let distance = 3 * length;
+    for (let round = 0; round < 8; round++) distance *= this.frame(corners, centre, distance);
+    this.frame(corners, centre, distance);
+    [this.camera.near, this.camera.far] = [distance / 50, distance * 20];
+    [this.controls.minDistance, this.controls.maxDistance] = [0.1 * distance, 4 * distance];
+    this.camera.updateProjectionMatrix();
+    this.controls.update();
+    this.dirty = true;
+  }
+
+  /** Move `centre` so that the corners lie in the middle of the free part; how much farther they need to be. */
+  private frame(corners: Vector3[], centre: Vector3, distance: number): number {
+    const [width, height] = [this.canvas.clientWidth || 1, this.canvas.clientHeight || 1];
+    this.camera.position.copy(centre).addScaledVector(FRONT, distance);
+    this.camera.lookAt(centre);
+    this.camera.updateMatrixWorld();
+    const seen = corners.map((corner) => this.project(corner));
+    const [xs, ys] = [seen.map((p) => p.x), seen.map((p) => p.y)];
+    const [left, right, top, bottom] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
+    const pixel = (2 * distance * Math.tan((this.camera.fov * Math.PI) / 360)) / height;
+    const aside = (left + right - (width - MARGIN.right + MARGIN.left)) / 2;
+    const below = (top + bottom - (height - MARGIN.bottom + MARGIN.top)) / 2;
+    centre.x += aside * pixel;
+    centre.y -= below * pixel;
+    this.controls.target.copy(centre);
+    const free = [width - MARGIN.left - MARGIN.right, height - MARGIN.top - MARGIN.bottom] as const;
+    return Math.max((right - left) / free[0], (bottom - top) / free[1]);
+  }
+
+  /** Take the theme's colours. */
+  recolour(): void {
+    if (this.around) this.scene.remove(this.around);
+    this.around = surroundings(this.extent);
+    this.scene.add(this.around);
+    this.handle.material.color.set(css("--accent"));
+    this.handle.material.emissive.set(css("--accent")).multiplyScalar(0.3);
+    this.hand.material.color.set(css("--accent-2"));
+    this.hand.material.emissive.set(css("--accent-2")).multiplyScalar(0.3);
+    this.thread.material.color.set(css("--accent-2"));
+    (this.ghost.material as MeshBasicMaterial).color.set(css("--soft"));
+    this.arrow.recolour();
+    this.dirty = true;
+  }
+
+  /** Let go of the graphics memory, before another body is shown. */
+  dispose(): void {
+    this.controls.dispose();
+    this.renderer.dispose();
+  }
+
+  private assemble(): void {
+    const body = new Mesh(this.tube.geometry, new MeshLambertMaterial({ vertexColors: true }));
+    body.frustumCulled = this.shadow.frustumCulled = this.thread.frustumCulled = false;
+    this.scene.add(body, this.ghost, this.shadow, this.handle, this.hand, this.thread, this.arrow.group);
+    this.scene.add(new HemisphereLight(new Color(0xffffff), new Color(0xb9c4cc), 2.3));
+    const sun = new DirectionalLight(0xffffff, 1.5);
+    sun.position.set(-0.5, 1.5, 1.2);
+    this.scene.add(sun);
+    this.hand.visible = this.thread.visible = this.arrow.group.visible = false;
+  }
+
+  private orbit(): OrbitControls {
+    const controls = new OrbitControls(this.camera, this.canvas);
+    controls.mouseButtons = { LEFT: null, MIDDLE: MOUSE.DOLLY, RIGHT: MOUSE.ROTATE };
+    controls.touches = { ONE: null, TWO: TOUCH.DOLLY_ROTATE };
+    controls.enablePan = false;
+    // seen edge-on, the plane in which the hand moves would vanish
+    [controls.minAzimuthAngle, controls.maxAzimuthAngle] = [-1.2, 1.2];
+    [controls.minPolarAngle, controls.maxPolarAngle] = [0.5, 1.7];
+    controls.addEventListener("change", () => (this.dirty = true));
+    return controls;
+  }
+
+  /** Put floor and shadow where the enlarged motion leaves room. */
+  private place(): void {
+    const lowest = Math.max(1.12 * this.enlarged * this.hello.reach, 0.35 * this.length);
+    this.extent.floor = -Math.ceil(lowest / this.extent.cell - 1e-9) * this.extent.cell;
+    const flat = new Matrix4().makeScale(1, 0, 1).setPosition(0, this.extent.floor + 1e-3 * this.length, 0);
+    this.shadow.matrix.copy(flat);
+  }
+
+  private restGeometry(radius: number): BufferGeometry {
+    const tube = new Tube(this.hello.rest.length, 0.9 * radius);
+    tube.update(this.rest, this.shares);
+    return tube.geometry;
+  }
+
+  private node(): Vector3 {
+    return new Vector3(...this.hello.rest[this.hello.touch_node]!);
+  }
+
+  private drawn(offset: Vec3, into: Vector3): void {
+    into.set(...offset).multiplyScalar(this.enlarged).add(this.node());
+  }
+}
+
+function ghostMaterial(): MeshBasicMaterial {
+  return new MeshBasicMaterial({ transparent: true, opacity: 0.16, depthWrite: false });
+}
+
+/** The body squeezed flat on the floor; the strict depth test keeps its two sides from darkening twice. */
+function shadowMaterial(): MeshBasicMaterial {
+  return new MeshBasicMaterial({ color: 0x000000, transparent: true, opacity: 0.13, depthFunc: LessDepth });
+}
+
+/** The largest load that the hand can be asked to supply, N. */
+function fullForce(hello: Hello): number {
+  const others = new Set(hello.parameters.map((r) => r.name));
+  const own = hello.inputs.filter((r) => !others.has(r.name));
+  return Math.max(...own.map((r) => Math.max(Math.abs(r.low), Math.abs(r.high))), 1e-9);
+}

@@ -1,0 +1,198 @@
+"""Every message between the server and its page; ``client/src/messages.ts`` is generated from here.
+
+The conversation, over one websocket at ``/touch``:
+
+1. The server says `Hello` (JSON): the body's geometry, ranges, scales, and the settings of the loop.
+2. The page grants *credits* (`Credit`). The server sends a `Frame` only against a credit, and composes it at
+   that moment from the newest tick, so nothing ever queues: a slow page gets fewer pictures, not older ones.
+   The page grants one credit for each frame it has drawn, two at the start.
+3. The page sends `Hand` at display rate while a hand holds the body, otherwise as a heartbeat every 50 ms.
+   Without heartbeats the loop counts the input as stalled and sends no force. A hidden tab says so.
+4. Only one page holds the hand at a time; `Frame.hold` tells each page where it stands.
+5. Rare events in plain words are `Notice` (JSON).
+
+Frames, signs and units: x along the beam, y up, z towards the viewer; metres, newtons, seconds;
+displacements are offsets from rest; force is the force *on the hand*.
+
+    python -m palpate.viewer.messages > src/palpate/viewer/client/src/messages.ts
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+
+from palpate.viewer.wire import Binary, Json, Wire
+
+__all__ = [
+    "PROTOCOL",
+    "Credit",
+    "Frame",
+    "Hand",
+    "Hello",
+    "Hold",
+    "Loop",
+    "Notice",
+    "RangeInfo",
+]
+
+PROTOCOL = 1  # a page of another protocol reloads itself
+
+Vec3 = tuple[float, float, float]
+
+
+class Loop(IntEnum):
+    """The real-time process as the server sees it."""
+
+    RUNNING = 0
+    FROZEN = 1  # alive, but its ticks stand still
+    ENDED = 2
+
+
+class Hold(IntEnum):
+    """Who holds the hand, from one page's point of view."""
+
+    FREE = 0
+    YOURS = 1
+    ANOTHER = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Frame(Binary):
+    """One picture, server to page."""
+
+    KIND: ClassVar[int] = 1
+
+    tick: Annotated[float, Wire("f64", "counts the loop's ticks")]
+    time: Annotated[float, Wire("f64", "s, the loop's clock")]
+    echo: Annotated[float, Wire("f64", "ms, page clock: `sent` of the last Hand that this page sent")]
+    position: Annotated[
+        Vec3, Wire("vec3", "m, the hand in body metres, as an offset from the held node at rest")
+    ]
+    contact: Annotated[Vec3, Wire("vec3", "m, where the held node is, as an offset from rest")]
+    force: Annotated[Vec3, Wire("vec3", "N, on the hand")]
+    rate: Annotated[float, Wire("f32", "Hz, ticks per second achieved")]
+    lateness: Annotated[float, Wire("f32", "s, start of the latest tick behind its schedule")]
+    lateness_p50: Annotated[float, Wire("f32", "s, median since the start")]
+    lateness_p99: Annotated[float, Wire("f32", "s, 99th percentile since the start")]
+    lateness_max: Annotated[float, Wire("f32", "s, largest since the start")]
+    work_p50: Annotated[float, Wire("f32", "s, median CPU time of one tick")]
+    faults: Annotated[int, Wire("u32", "faults since the start, stalls apart")]
+    fault: Annotated[int, Wire("u8", "code of this tick's fault, 0 for none; words in Hello.faults")]
+    last_fault: Annotated[int, Wire("u8", "code of the latest fault")]
+    loop: Annotated[int, Wire("u8", "a Loop")]
+    hold: Annotated[int, Wire("u8", "a Hold")]
+    inside: Annotated[bool, Wire("flag", "the hand is within the trained range")]
+    clamped: Annotated[bool, Wire("flag", "the force limit acted")]
+    grabbed: Annotated[bool, Wire("flag", "a hand holds the body")]
+    stalled: Annotated[bool, Wire("flag", "the input is older than the loop allows")]
+    parameters: Annotated[np.ndarray, Wire("floats", "current values of Hello.parameters")]
+    displacement: Annotated[np.ndarray, Wire("floats", "m, x y z of each node's offset from Hello.rest")]
+
+
+@dataclass(frozen=True, eq=False)
+class Hand(Binary):
+    """What the hand does, page to server; also the heartbeat."""
+
+    KIND: ClassVar[int] = 2
+
+    sent: Annotated[float, Wire("f64", "ms, page clock when this was sent")]
+    period: Annotated[float, Wire("f64", "s, the longest time to the next of these")]
+    target: Annotated[Vec3, Wire("vec3d", "m, the hand in device coordinates: body metres / Hello.scale")]
+    grabbed: Annotated[bool, Wire("flag", "a hand holds the body")]
+    hidden: Annotated[bool, Wire("flag", "the page is in the background")]
+    parameters: Annotated[np.ndarray, Wire("floats", "wanted values of Hello.parameters")]
+
+
+@dataclass(frozen=True, eq=False)
+class Credit(Binary):
+    """Leave to send more frames, page to server."""
+
+    KIND: ClassVar[int] = 3
+
+    frames: Annotated[int, Wire("u16", "how many more")]
+
+
+@dataclass(frozen=True)
+class RangeInfo:
+    """A named interval."""
+
+    name: str
+    low: float
+    high: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Hello(Json):
+    """The body and the loop, once per connection, server to page.
+
+    Attributes
+    ----------
+    protocol : int
+    name : str
+    rest : (N, 3)
+        Rest positions of the nodes along the body's axis, m.
+    radius : float
+        Of the body, for drawing, m.
+    touch_node : int
+    nodes_of_interest : indices into rest
+    inputs, parameters : ranges
+        All loads; those that the hand does not drive.
+    reach : float
+        Largest trained displacement of the held node, m.
+    scale : float
+        Body metres per metre of hand.
+    workspace : float
+        Radius of the hand's workspace, m.
+    max_force : float
+        The force limit, N.
+    rate : float
+        Hz, what the loop aims at.
+    faults : words for fault codes, by code
+    meta : mapping
+        What the model's file says of its making.
+    """
+
+    protocol: int
+    name: str
+    rest: tuple[Vec3, ...]
+    radius: float
+    touch_node: int
+    nodes_of_interest: tuple[int, ...]
+    inputs: tuple[RangeInfo, ...]
+    parameters: tuple[RangeInfo, ...]
+    reach: float
+    scale: float
+    workspace: float
+    max_force: float
+    rate: float
+    faults: tuple[str, ...]
+    meta: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Notice(Json):
+    """An event in plain words, server to page.
+
+    Attributes
+    ----------
+    what, why, fix : str
+        As in every error of palpate.
+    """
+
+    what: str
+    why: str
+    fix: str
+
+
+if __name__ == "__main__":
+    import sys
+
+    from palpate.viewer.typescript import generate
+
+    sys.stdout.write(generate())

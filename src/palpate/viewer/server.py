@@ -1,0 +1,226 @@
+"""The viewer's server: one page, one websocket, one real-time process.
+
+`Viewer` is a context manager that starts all three and stops them; `serve` keeps one open until interrupted.
+The server runs in a thread with an event loop of its own, so both work in a script, in a notebook and on
+standard input. What page and server say to each other stands in `messages`, who may talk at all in `guard`,
+and credits and heartbeats in `session`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import tempfile
+import threading
+import webbrowser
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.middleware import Middleware
+from starlette.routing import Mount, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+
+from palpate.errors import DeviceError
+from palpate.runtime import LoopProcess
+from palpate.surrogates import TouchModel
+from palpate.viewer.guard import Guard
+from palpate.viewer.ports import listen
+from palpate.viewer.session import Session
+
+__all__ = ["Viewer", "application", "serve"]
+
+STATIC = Path(__file__).parent / "static"
+LARGEST_MESSAGE = 4096  # bytes from a page; a Hand with eight parameters has 79
+START = 10.0  # s until the server must listen
+
+
+def application(session: Session) -> Starlette:
+    """The web application of a session: the built page, and its websocket at ``/touch``."""
+
+    @contextlib.asynccontextmanager
+    async def lifespan(_: Starlette) -> AsyncIterator[None]:
+        watcher = asyncio.create_task(session.watch())
+        yield
+        watcher.cancel()
+        await asyncio.gather(watcher, return_exceptions=True)
+
+    return Starlette(
+        routes=[
+            WebSocketRoute("/touch", session.talk),
+            Mount("/", StaticFiles(directory=STATIC, html=True)),
+        ],
+        middleware=[Middleware(Guard)],
+        lifespan=lifespan,
+    )
+
+
+class Viewer:
+    """A body to look at and pull on, at `url`, while the context lasts.
+
+    Parameters
+    ----------
+    model : TouchModel or path
+    port : int
+        The port wanted; 0 takes any free one.
+    host : str
+        ``127.0.0.1``, ``localhost`` or ``::1``: the viewer serves this machine only.
+    device : str
+        The real-time process's device: ``page`` is the page's own hand.
+    rate : float
+        Of the real-time process, Hz.
+    max_force : float, optional
+        Force limit, N; the device's own by default.
+    strict_port : bool
+        Whether a busy port is an error; otherwise the next free one is taken.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is no touch model.
+    UsageError
+        If the host, port or device can't be.
+    """
+
+    def __init__(
+        self,
+        model: TouchModel | str | os.PathLike[str],
+        *,
+        port: int = 8080,
+        host: str = "127.0.0.1",
+        device: str = "page",
+        rate: float = 1000.0,
+        max_force: float | None = None,
+        strict_port: bool = False,
+    ) -> None:
+        self._closing = contextlib.ExitStack()
+        path = model if not isinstance(model, TouchModel) else self._written(model)
+        self.model = model if isinstance(model, TouchModel) else TouchModel.load(model)
+        self.loop = LoopProcess(path, device=device, rate=rate, max_force=max_force)
+        self._wanted = (port, host, strict_port)
+        self.host, self.port = host, port
+
+    @property
+    def url(self) -> str:
+        """The page's address."""
+        return f"http://{f'[{self.host}]' if ':' in self.host else self.host}:{self.port}/"
+
+    def start(self) -> Self:
+        """Start the real-time process and the server; the page can be opened when this returns.
+
+        Raises
+        ------
+        PortInUseError
+            If no port is free, or the one wanted isn't and `strict_port` is set.
+        DeviceError
+            If the real-time process or the server doesn't start.
+        """
+        try:
+            port, host, strict = self._wanted
+            socket = self._closing.enter_context(listen(port, host, strict=strict))
+            self.port = int(socket.getsockname()[1])
+            self._closing.enter_context(self.loop)
+            server = _server(Session(self.model, self.loop))
+            self._thread = threading.Thread(
+                target=server.run, args=([socket],), name="palpate viewer", daemon=True
+            )
+            self._thread.start()
+            self._closing.callback(self._end, server)
+            self._await(server)
+        except BaseException:
+            self.stop()
+            raise
+        return self
+
+    def stop(self) -> None:
+        """End the server and the real-time process. Harmless when repeated."""
+        self._closing.close()
+
+    def wait(self) -> None:
+        """Return when the server has ended."""
+        while self._thread.is_alive():
+            self._thread.join(0.5)  # in steps: a join without end can't be interrupted on every system
+
+    def _written(self, model: TouchModel) -> Path:
+        """A file of the model, which the real-time process can read."""
+        folder = self._closing.enter_context(tempfile.TemporaryDirectory(prefix="palpate-"))
+        return model.save(Path(folder) / "model.palpate")
+
+    def _await(self, server: uvicorn.Server) -> None:
+        deadline = threading.Event()
+        for _ in range(int(START / 0.01)):
+            if server.started:
+                return
+            if not self._thread.is_alive():
+                break
+            deadline.wait(0.01)
+        raise DeviceError(
+            "The viewer's server did not start.",
+            why="Its thread ended or hangs; the log of 'uvicorn.error' says more.",
+            fix="Try another port, or see `palpate doctor`.",
+        )
+
+    def _end(self, server: uvicorn.Server) -> None:
+        server.should_exit = True
+        self._thread.join()
+
+    def __enter__(self) -> Self:
+        return self.start()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+
+
+def serve(
+    model: TouchModel | str | os.PathLike[str],
+    *,
+    port: int = 8080,
+    host: str = "127.0.0.1",
+    device: str = "page",
+    rate: float = 1000.0,
+    max_force: float | None = None,
+    strict_port: bool = False,
+    open_browser: bool = False,
+    on_ready: Callable[[Viewer], object] | None = None,
+) -> None:
+    """Show a body in the browser until interrupted (Ctrl-C).
+
+    Parameters
+    ----------
+    open_browser : bool
+        Whether to open the page in the user's browser.
+    on_ready : callable, optional
+        Called once with the running `Viewer`, for example to say its `url`.
+
+    The other parameters and the errors are those of `Viewer`.
+    """
+    viewer = Viewer(
+        model, port=port, host=host, device=device, rate=rate, max_force=max_force, strict_port=strict_port
+    )
+    with viewer, contextlib.suppress(KeyboardInterrupt):
+        if on_ready is not None:
+            on_ready(viewer)
+        if open_browser:
+            webbrowser.open(viewer.url)
+        viewer.wait()
+
+
+def _server(session: Session) -> uvicorn.Server:
+    return uvicorn.Server(
+        uvicorn.Config(
+            application(session),
+            log_config=None,  # the program that embeds us decides on logging
+            access_log=False,
+            ws="websockets-sansio",
+            ws_max_size=LARGEST_MESSAGE,
+            ws_per_message_deflate=False,  # frames are small, and packing them would cost more than sending
+            timeout_graceful_shutdown=1,
+            server_header=False,
+        )
+    )

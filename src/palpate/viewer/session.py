@@ -1,0 +1,251 @@
+"""The pages of one server: credits, frames, heartbeats, and the end of the real-time process.
+
+One frame is composed per credit, at the moment it is sent, from the newest published tick. A page that grants
+nothing gets nothing; `MOST_CREDITS` bounds what it may have outstanding and `SHORTEST` how fast it may ask.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import itertools
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from palpate.errors import DeviceError, UsageError
+from palpate.runtime.faults import Fault
+from palpate.runtime.shared import Shared, State, now
+from palpate.viewer.hands import Command, Hands
+from palpate.viewer.messages import PROTOCOL, Credit, Frame, Hand, Hello, Loop, Notice, RangeInfo
+from palpate.viewer.picture import Picture, Shape
+
+if TYPE_CHECKING:
+    from palpate.surrogates import TouchModel
+    from palpate.units import Range
+
+__all__ = ["LoopLike", "Session"]
+
+logger = logging.getLogger("palpate.viewer")
+
+MOST_CREDITS = 4
+SHORTEST = 1.0 / 125.0  # s between frames to one page: no display that matters is faster
+STALE = 0.25  # s without a tick until the loop counts as frozen
+WATCH = 0.1  # s between looks at the real-time process
+MAX_U32 = 2**32 - 1
+_NO_FAULT = (Fault.NONE, Fault.INPUT_STALLED)
+
+ENDED = Notice(
+    "The real-time process has ended: the force is zero and nothing moves any more.",
+    "It was killed or failed; the terminal that serves this page may say more.",
+    "Start palpate again; this page finds the new server by itself.",
+)
+
+
+class LoopLike(Protocol):
+    """What a session needs of `palpate.runtime.LoopProcess`."""
+
+    @property
+    def shared(self) -> Shared:
+        """The memory shared with the real-time process."""
+
+    @property
+    def alive(self) -> bool:
+        """Whether the process runs."""
+
+    @property
+    def rate(self) -> float:
+        """Ticks per second that it aims at, Hz."""
+
+
+@dataclass(eq=False)
+class Page:
+    """One connected page."""
+
+    number: int
+    socket: WebSocket
+    credits: int = 0
+    echo: float = 0.0  # ms, the page's clock
+    granted: asyncio.Event = field(default_factory=asyncio.Event)
+
+    def grant(self, frames: int) -> None:
+        """Add credits, up to `MOST_CREDITS`."""
+        self.credits = min(self.credits + frames, MOST_CREDITS)
+        if self.credits:
+            self.granted.set()
+
+    async def spend(self) -> None:
+        """Wait for a credit and use it up."""
+        await self.granted.wait()
+        self.credits -= 1
+        if not self.credits:
+            self.granted.clear()
+
+
+class Session:
+    """A body, its real-time process and the pages that look at it."""
+
+    def __init__(self, model: TouchModel, loop: LoopLike) -> None:
+        self.model, self.loop = model, loop
+        self._hands = Hands(np.array([(r.low + r.high) / 2 for r in model.parameters]))
+        self._picture = Picture(model)
+        self._pages: dict[int, Page] = {}
+        self._numbers: Iterator[int] = itertools.count(1)
+        self._ended = False
+        self._state = loop.shared.read_state()
+
+    async def talk(self, socket: WebSocket) -> None:
+        """One page's whole conversation."""
+        await socket.accept()
+        page = Page(next(self._numbers), socket)
+        self._pages[page.number] = page
+        with contextlib.suppress(WebSocketDisconnect):
+            await socket.send_text(self.hello().to_json())
+            if self._ended:
+                await socket.send_text(ENDED.to_json())
+            sender = asyncio.create_task(self._show(page))
+            try:
+                await self._listen(page)
+            finally:
+                sender.cancel()
+                self._forget(page)
+                await asyncio.gather(sender, return_exceptions=True)
+
+    async def watch(self) -> None:
+        """Tell the pages and the log once when the real-time process ends."""
+        while self.loop.alive:
+            await asyncio.sleep(WATCH)
+        self._ended = True
+        logger.error("%s %s", ENDED.what, ENDED.fix)
+        for page in list(self._pages.values()):
+            with contextlib.suppress(WebSocketDisconnect, RuntimeError):  # RuntimeError: just closed
+                await page.socket.send_text(ENDED.to_json())
+
+    def hello(self) -> Hello:
+        """The first message to every page."""
+        model, state = self.model, self._read()[0]
+        return Hello(
+            protocol=PROTOCOL,
+            name=model.name,
+            rest=tuple((float(x), float(y), float(z)) for x, y, z in model.rest),
+            radius=model.radius,
+            touch_node=model.touch_node,
+            nodes_of_interest=tuple(int(i) for i in model.nodes_of_interest),
+            inputs=tuple(_range(r) for r in model.inputs),
+            parameters=tuple(_range(r) for r in model.parameters),
+            reach=model.reach,
+            scale=state.scale,
+            workspace=state.radius,
+            max_force=state.max_force,
+            rate=self.loop.rate,
+            faults=tuple(f.meaning for f in Fault),
+            meta=model.meta,
+        )
+
+    def frame(self, page: int = 0, echo: float = 0.0) -> Frame:
+        """The newest state as one page sees it."""
+        state, loop = self._read()
+        held = state.grabbed and not state.stalled and loop is Loop.RUNNING
+        shape = self._shape(state, held)
+        fault, faults, last_fault = _faults(state)
+        return Frame(
+            tick=state.tick,
+            time=state.time,
+            echo=echo,
+            position=_vector(state.position if held else shape.contact),
+            contact=_vector(shape.contact),
+            force=_vector(state.force) if loop is Loop.RUNNING else (0.0, 0.0, 0.0),
+            rate=state.rate,
+            lateness=state.lateness,
+            lateness_p50=state.lateness_p50,
+            lateness_p99=state.lateness_p99,
+            lateness_max=state.lateness_max,
+            work_p50=state.work_p50,
+            faults=faults,
+            fault=fault,
+            last_fault=last_fault,
+            loop=loop,
+            hold=self._hands.hold(page),
+            inside=state.inside or not held,
+            clamped=state.clamped and held,
+            grabbed=state.grabbed and loop is Loop.RUNNING,
+            stalled=state.stalled,
+            parameters=self._hands.parameters,
+            displacement=shape.displacement,
+        )
+
+    def _shape(self, state: State, held: bool) -> Shape:
+        if held:
+            loads = state.loads[: len(self.model.inputs)]
+            return self._picture.held(loads, state.mirrored, state.contact, now())
+        return self._picture.free(self._hands.parameters, now())
+
+    def _read(self) -> tuple[State, Loop]:
+        """The newest tick, or the last one of a process that has ended."""
+        if self._ended or not self.loop.alive:
+            return self._state, Loop.ENDED
+        try:
+            self._state = self.loop.shared.read_state()
+        except DeviceError:  # killed while publishing: `watch` will say so
+            return self._state, Loop.ENDED
+        return self._state, Loop.RUNNING if now() - self._state.time < STALE else Loop.FROZEN
+
+    async def _show(self, page: Page) -> None:
+        """Send frames for credits, for ever."""
+        with contextlib.suppress(WebSocketDisconnect):
+            while True:
+                await page.spend()
+                await page.socket.send_bytes(self.frame(page.number, page.echo).pack())
+                await asyncio.sleep(SHORTEST)
+
+    async def _listen(self, page: Page) -> None:
+        """Take a page's messages until it leaves; bytes that are no message end the conversation."""
+        try:
+            while (data := (await page.socket.receive()).get("bytes")) is not None:
+                self._take(page, data)
+        except UsageError as error:
+            logger.warning("a page was sent away: %s", error)
+            await page.socket.close(1003, error.what)
+
+    def _take(self, page: Page, data: bytes) -> None:
+        if data[:1] == bytes([Credit.KIND]):
+            page.grant(Credit.unpack(data).frames)
+            return
+        hand = Hand.unpack(data)
+        page.echo = hand.sent
+        if (command := self._hands.hear(page.number, hand, now())) is not None:
+            self._tell(command)
+
+    def _tell(self, command: Command) -> None:
+        self.loop.shared.write_command(
+            beat=command.beat,
+            target=command.target if command.grabbed else None,
+            grabbed=command.grabbed,
+            hidden=command.hidden,
+            period=command.period,
+            parameters=command.parameters if command.parameters.size else None,
+        )
+
+    def _forget(self, page: Page) -> None:
+        del self._pages[page.number]
+        if self._hands.leave(page.number):
+            self.loop.shared.write_command(grabbed=False)
+
+
+def _range(r: Range) -> RangeInfo:
+    return RangeInfo(r.name, r.low, r.high, r.unit)
+
+
+def _vector(v: np.ndarray) -> tuple[float, float, float]:
+    return (float(v[0]), float(v[1]), float(v[2]))
+
+
+def _faults(state: State) -> tuple[int, int, int]:
+    """Fault of the tick, count so far, latest kind; without stalls, which have a flag of their own."""
+    counts = {k: int(c) for k, c in enumerate(state.fault_counts) if c and k not in _NO_FAULT}
+    latest = state.last_fault if state.last_fault in counts else max(counts, default=0)
+    return (0 if state.fault in _NO_FAULT else state.fault), min(sum(counts.values()), MAX_U32), latest

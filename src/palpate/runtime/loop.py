@@ -153,6 +153,7 @@ class Loop:
                 self.tick(metronome.wait(rehearse), metronome.lateness, jumped=metronome.jumped)
         finally:
             gc.enable()
+            gc.unfreeze()
             self.end()
 
     def tick(self, now: float, lateness: float = 0.0, *, jumped: bool = False) -> None:

@@ -211,7 +211,8 @@ class LoopProcess:
         return LoopReport.of(self._state(), self._said.get("obtained"), tuple(self._said.get("foreign", ())))
 
     def _failure(self, what: str) -> DeviceError | UsageError:
-        why, code = self._complaint(), self._running.poll()
+        code = self._running.poll()
+        why = self._complaint()
         if code == UsageError.exit_code:
             return UsageError(why or what)
         return DeviceError(

@@ -1,0 +1,83 @@
+"""What every device must do; a new one is tested by being entered in the table of devices."""
+
+from __future__ import annotations
+
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from palpate.errors import UsageError
+from palpate.runtime.devices import Sample, device_named, device_names, device_traits
+
+
+@pytest.fixture(params=device_names())
+def name(request):
+    return request.param
+
+
+@pytest.fixture
+def device(name, shared):
+    shared.write_command(beat=0.0, grabbed=True, target=(0.0, -0.01, 0.0), period=0.1)
+    device = device_named(name, shared.command)
+    yield device
+    device.close()
+
+
+def test_traits_are_physical(name):
+    traits = device_traits(name)
+    assert 0.0 < traits.radius < 1.0
+    assert 0.0 < traits.max_force < 100.0
+    assert traits.damping is None or traits.damping >= 0.0
+    assert traits.source
+    assert device_traits(f"{name}:some=option") == traits
+
+
+def test_reads_one_sample_object_inside_the_workspace(device):
+    first = device.read(0.0)
+    assert isinstance(first, Sample)
+    position, seen = first.position, first.time
+    for k in range(200):
+        sample = device.read(1e-3 * k)
+        assert sample is first
+        assert sample.position is position
+        assert position.shape == (3,)
+        assert np.isfinite(position).all()
+        assert np.linalg.norm(position) <= device.traits.radius
+        assert seen <= sample.time <= 1e-3 * k + 1e-9, "a sign of life is never of the future"
+        assert 0.0 < sample.patience <= 1.0
+        seen = sample.time
+
+
+def test_takes_any_force_and_closes_twice(device):
+    device.read(0.0)
+    for force in (np.zeros(3), np.array([1.0, -2.0, 3.0])):
+        kept = force.copy()
+        device.write(force)
+        np.testing.assert_array_equal(force, kept)
+    device.close()
+    device.close()
+
+
+def test_keeps_no_memory_per_tick(device):
+    force = np.ones(3)
+    for k in range(50):
+        device.read(1e-3 * k)
+    tracemalloc.start()
+    for k in range(50, 1050):
+        device.read(1e-3 * k)
+        device.write(force)
+    kept, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert kept < 1000, "bytes left after a thousand ticks"
+
+
+def test_unknown_options_are_listed(name, shared):
+    with pytest.raises(UsageError, match="no option 'colour'"):
+        device_named(f"{name}:colour=red", shared.command)
+
+
+def test_unknown_devices_are_listed(shared):
+    with pytest.raises(UsageError) as caught:
+        device_named("omega", shared.command)
+    assert all(name in str(caught.value) for name in device_names())

@@ -1,0 +1,283 @@
+"""The tick, stage by stage, on time that the test makes: every rule is counted in ticks."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from conftest import STIFFNESS, PlainModel
+from palpate.errors import DeviceError, UsageError
+from palpate.runtime.devices.device import Sample, Traits
+from palpate.runtime.devices.page import PageDevice
+from palpate.runtime.faults import Fault
+from palpate.runtime.loop import Loop
+from palpate.runtime.safety import Limits
+from palpate.runtime.shared import MAX_INPUTS
+from palpate.runtime.workspace import Workspace
+from palpate.units import Range
+
+TICK = 1e-3
+WORKSPACE = Workspace.for_reach(0.075, 0.25)
+LIMITS = Limits(8.0)
+RAMP = 50  # ticks
+
+
+class Handle:
+    """Hardware as the test wants it."""
+
+    traits = Traits(0.075, 8.0, 1.0, "made up")
+
+    def __init__(self):
+        self.sample = Sample()
+        self.sample.holding = True
+        self.sample.position[:] = (0.0, -0.03, 0.0)
+        self.silent, self.read_error, self.write_error = False, None, None
+        self.sent, self.closed = None, 0
+
+    def read(self, now):
+        if self.read_error is not None:
+            raise self.read_error
+        if not self.silent:
+            self.sample.time = now
+        return self.sample
+
+    def write(self, force):
+        if self.write_error is not None:
+            raise self.write_error
+        self.sent = force.copy()
+
+    def close(self):
+        self.closed += 1
+
+
+class Bench:
+    """A loop with its clock wound by hand; `ticks` returns the published states."""
+
+    def __init__(self, model, device, shared, **options):
+        self.shared, self.device, self.now = shared, device, 10.0
+        self.loop = Loop(model, device, shared, WORKSPACE, LIMITS, **options)
+
+    def ticks(self, count, *, jumped=False):
+        states = []
+        for _ in range(count):
+            self.now += TICK
+            self.loop.tick(self.now, 1e-6, jumped=jumped)
+            states.append(self.shared.read_state())
+        return states
+
+    def settle(self):
+        last = self.ticks(RAMP + 80)[-1]
+        assert np.linalg.norm(last.force) > 0.5
+        return last
+
+
+@pytest.fixture
+def handle():
+    return Handle()
+
+
+@pytest.fixture
+def bench(plain, handle, shared):
+    return Bench(plain, handle, shared)
+
+
+@pytest.fixture
+def page(plain, shared):
+    bench = Bench(plain, PageDevice(shared.command), shared)
+    shared.write_command(beat=bench.now + 1.0, period=0.03, grabbed=True, target=(0.0, -0.03, 0.0))
+    return bench
+
+
+def zero(states):
+    return all(not state.force.any() for state in states)
+
+
+def sizes(states):
+    return np.array([np.linalg.norm(state.force) for state in states])
+
+
+def assert_ramps_in(states, full):
+    """From zero, at most linearly over the ramp, to the full force."""
+    shares = sizes(states) / full
+    assert shares[0] == 0.0
+    assert (shares <= np.arange(len(shares)) / RAMP + 1e-9).all()
+    assert shares[-1] == pytest.approx(1.0)
+
+
+def test_the_hand_feels_the_body(bench):
+    state = bench.settle()
+    np.testing.assert_allclose(state.position, state.hand * WORKSPACE.scale)
+    np.testing.assert_allclose(state.force, -STIFFNESS * state.position)
+    np.testing.assert_allclose(bench.device.sent, state.force)
+    assert (state.fault, state.faults, state.stalled, state.grabbed) == (0, 0, False, True)
+    assert state.tick == RAMP + 80
+    assert state.scale == WORKSPACE.scale
+
+
+def test_a_grab_ramps_in(bench):
+    states = bench.ticks(RAMP + 5)
+    assert_ramps_in(states, STIFFNESS * 0.03 * WORKSPACE.scale)
+
+
+def test_a_strong_body_is_clamped_and_counted(bench, plain):
+    plain.answer.stiffness = 1000.0
+    states = bench.ticks(200)
+    np.testing.assert_allclose(states[-1].force, [0.0, LIMITS.max_force, 0.0])
+    assert states[-1].clamped
+    assert states[-1].clamped_ticks == 200
+
+
+BREAK = {
+    Fault.INPUT_NOT_FINITE: lambda b, m: b.device.sample.position.__setitem__(2, math.inf),
+    Fault.OUTPUT_NOT_FINITE: lambda b, m: setattr(m.answer, "poison", math.nan),
+    Fault.EVALUATOR_ERROR: lambda b, m: setattr(m.answer, "error", ZeroDivisionError()),
+    Fault.DEVICE_ERROR: lambda b, m: setattr(b.device, "read_error", OSError("cable")),
+    Fault.INPUT_STALLED: lambda b, m: setattr(b.device.sample, "asleep", True),
+}
+MEND = {
+    Fault.INPUT_NOT_FINITE: lambda b, m: b.device.sample.position.__setitem__(2, 0.0),
+    Fault.OUTPUT_NOT_FINITE: lambda b, m: setattr(m.answer, "poison", 0.0),
+    Fault.EVALUATOR_ERROR: lambda b, m: setattr(m.answer, "error", None),
+    Fault.DEVICE_ERROR: lambda b, m: setattr(b.device, "read_error", None),
+    Fault.INPUT_STALLED: lambda b, m: setattr(b.device.sample, "asleep", False),
+}
+
+
+@pytest.mark.parametrize("fault", list(BREAK), ids=lambda f: f.name.lower())
+def test_a_fault_is_zero_force_a_record_and_a_ramp(bench, plain, fault):
+    full = np.linalg.norm(bench.settle().force)
+    BREAK[fault](bench, plain)
+    bad = bench.ticks(30)
+    assert zero(bad), "from the very tick"
+    assert not bench.device.sent.any()
+    assert {state.fault for state in bad} == {fault}
+    assert bad[-1].faults == 1, "one onset, not thirty"
+    assert bad[-1].fault_counts[fault] == 1
+    for state in bad:
+        numbers = [*state.hand, *state.position, *state.contact, *state.loads]
+        assert np.isfinite(numbers).all(), "what is published stays finite"
+    MEND[fault](bench, plain)
+    good = bench.ticks(RAMP + 30)
+    assert_ramps_in(good, full)
+    assert (good[0].fault, good[-1].last_fault, good[-1].faults) == (Fault.NONE, fault, 1)
+
+
+def test_a_clock_jump_is_a_fault(bench):
+    full = np.linalg.norm(bench.settle().force)
+    assert zero(bench.ticks(1, jumped=True))
+    after = bench.ticks(RAMP + 30)
+    assert after[-1].last_fault == Fault.CLOCK_JUMP
+    assert_ramps_in(after, full)
+
+
+def test_a_force_that_was_not_delivered_is_not_claimed(bench):
+    bench.settle()
+    bench.device.write_error = DeviceError("The motor amplifier is off.")
+    states = bench.ticks(5)
+    assert zero(states)
+    assert states[-1].fault == Fault.DEVICE_ERROR
+
+
+def test_silent_hardware_gets_zero_force_within_20_ms(bench):
+    bench.settle()
+    bench.device.silent = True
+    heard = bench.now
+    states = bench.ticks(40)
+    for state in states:
+        age = state.time - heard
+        if age > 0.020 + 1e-9:
+            assert not state.force.any()
+            assert state.stalled
+            assert state.fault == Fault.INPUT_STALLED
+        elif age < 0.020 - 1e-9:
+            assert state.force.any(), "no sooner than agreed"
+
+
+@pytest.mark.parametrize(("period", "limit"), [(0.01, 0.100), (0.05, 0.150)])
+def test_a_page_that_falls_silent(page, period, limit):
+    page.settle()
+    heard = page.now
+    page.shared.write_command(beat=heard, period=period)
+    for state in page.ticks(200):
+        age = state.time - heard
+        if age > limit + 1e-9:
+            assert not state.force.any()
+            assert state.stalled
+        elif age < limit - 1e-9:
+            assert state.force.any()
+
+
+def test_a_resting_mouse_is_no_stall(page):
+    page.settle()
+    for _ in range(50):  # 1.5 s of heartbeats without a single new target
+        page.shared.write_command(beat=page.now)
+        assert sizes(page.ticks(30)).min() > 0.5
+
+
+def test_a_hidden_tab_is_a_stall_at_once(page):
+    full = np.linalg.norm(page.settle().force)
+    page.shared.write_command(hidden=True)
+    states = page.ticks(10)
+    assert zero(states)
+    assert {state.fault for state in states} == {Fault.INPUT_STALLED}
+    page.shared.write_command(hidden=False, beat=page.now + 1.0)
+    assert_ramps_in(page.ticks(RAMP + 30), full)
+
+
+def test_letting_go_is_zero_and_no_fault(page):
+    page.settle()
+    page.shared.write_command(grabbed=False, beat=0.0)
+    states = page.ticks(300)
+    assert zero(states)
+    assert states[-1].faults == 0, "nothing held, nothing at fault, even without heartbeats"
+    assert states[-1].stalled
+    assert not states[-1].grabbed
+    assert np.linalg.norm(states[-1].contact) < 1e-3, "the drawn body springs back"
+
+
+def test_parameters_start_in_the_middle_and_follow_the_page(handle, shared):
+    model = PlainModel([Range("p", 0.0, 4.0, "N"), Range("q", -1.0, 3.0, "N")])
+    bench = Bench(model, handle, shared)
+    bench.ticks(1)
+    assert model.answer.seen.tolist() == [2.0, 1.0]
+    shared.write_command(parameters=[3.5])
+    bench.ticks(1)
+    assert model.answer.seen.tolist() == [3.5, 1.0]
+
+
+def test_orphans_stop_and_let_go(plain, handle, shared):
+    gone = []
+    loop = Loop(plain, handle, shared, WORKSPACE, LIMITS, rate=2000.0, orphaned=lambda: bool(gone))
+    gone.append(True)
+    loop.run()
+    state = shared.read_state()
+    assert state.last_fault == Fault.PARENT_GONE
+    assert not state.force.any()
+    assert not handle.sent.any()
+    assert handle.closed == 1
+
+
+def test_an_unforeseen_error_still_lets_go(plain, handle, shared):
+    plain.answer.error = MemoryError()
+    loop = Loop(plain, handle, shared, WORKSPACE, LIMITS)
+    with pytest.raises(MemoryError):
+        loop.run()
+    assert not handle.sent.any()
+    assert handle.closed == 1
+
+
+def test_refuses_what_it_cannot_do(plain, handle, shared):
+    for rate in (0.0, -1.0, math.nan, 1e6):
+        with pytest.raises(UsageError, match="Hz"):
+            Loop(plain, handle, shared, WORKSPACE, LIMITS, rate=rate)
+    many = PlainModel([Range(f"p{i}", 0.0, 1.0) for i in range(MAX_INPUTS + 1)])
+    with pytest.raises(UsageError, match="carries 8"):
+        Loop(many, handle, shared, WORKSPACE, LIMITS)
+
+
+def test_every_fault_has_its_meaning():
+    meanings = {fault.meaning for fault in Fault}
+    assert len(meanings) == len(Fault)
+    assert len(Fault) <= 16, "the shared memory counts 16 kinds"

@@ -1,0 +1,115 @@
+"""The sequence lock: nobody ever sees half a record."""
+
+from __future__ import annotations
+
+import dataclasses
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from palpate.errors import DeviceError, UsageError
+from palpate.runtime import shared as module
+from palpate.runtime.shared import STATE, Shared, State
+
+WRITER = """
+import sys
+from palpate.runtime.shared import Shared
+shared = Shared.attach(sys.argv[1])
+names = ("hand", "force", "histogram", "work_histogram", "max_force")
+for k in range(1, int(sys.argv[2]) + 1):
+    shared.state.record["tick"] = k
+    for name in names:
+        shared.state.record[name] = k
+    shared.state.publish()
+"""
+
+
+def test_reader_never_sees_a_torn_record(shared):
+    count = 100_000
+    writer = subprocess.Popen([sys.executable, "-c", WRITER, shared.name, str(count)])
+    record = shared.state.record
+    seen = set()
+    while writer.poll() is None:
+        for _ in range(50):
+            if shared.state.fetch():
+                tick = int(record["tick"])
+                for name in ("hand", "force", "histogram", "work_histogram"):
+                    assert (record[name] == tick).all()
+                assert record["max_force"] == tick
+                seen.add(tick)
+    assert writer.returncode == 0
+    assert len(seen) > 50, "the reader must have met the writer at work"
+    assert shared.read_state().tick == count
+
+
+def test_unfinished_write_changes_nothing(shared):
+    other = Shared.attach(shared.name)
+    other.state.record["tick"] = 7
+    other.state.publish()
+    assert shared.state.fetch()
+    shared.state._sequence[()] += 1  # a writer has begun
+    assert not shared.state.fetch()
+    assert shared.state.record["tick"] == 7
+    other.close()
+
+
+def test_checksum_catches_what_the_counter_misses(shared):
+    """Stores that a weakly ordered processor lets overtake the counter."""
+    shared.state.publish()
+    reader = Shared.attach(shared.name)
+    shared.state._shared[3] ^= 1
+    assert not reader.state.fetch()
+    shared.state._shared[3] ^= 1
+    assert reader.state.fetch()
+    reader.close()
+
+
+def test_writer_that_died_writing_is_noticed(shared):
+    shared.state._sequence[()] += 1
+    with pytest.raises(DeviceError, match="stopped while it was publishing"):
+        shared.read_state()
+
+
+def test_state_has_the_records_fields(shared):
+    assert [f.name for f in dataclasses.fields(State)] == list(STATE.names)
+    state = shared.read_state()
+    assert state.tick == 0
+    assert state.grabbed is False
+    assert state.force.shape == (3,)
+    shared.state.record["force"] = 1.0
+    assert not state.force.any(), "a state is a copy"
+
+
+def test_command_keeps_what_is_not_given(shared):
+    loop = Shared.attach(shared.name)
+    assert loop.command.fetch()
+    assert np.isnan(loop.command.record["parameters"]).all(), "not set"
+    shared.write_command(target=(0.01, 0.02, 0.03), grabbed=True, parameters=[2.0])
+    shared.write_command(beat=5.0, hidden=True)
+    assert loop.command.fetch()
+    record = loop.command.record
+    assert record["target"].tolist() == [0.01, 0.02, 0.03]
+    assert (record["beat"], record["grabbed"], record["hidden"], record["sequence"]) == (5.0, 1, 1, 1)
+    assert record["parameters"][0] == 2.0
+    with pytest.raises(UsageError, match="carries 8"):
+        shared.write_command(parameters=[0.0] * 9)
+    loop.close()
+
+
+def test_names_end_with_their_owner(tmp_path):
+    blocks = Shared.create()
+    path = Path(blocks.name)
+    assert path.exists()
+    for _ in range(2):
+        blocks.close()
+        blocks.unlink()
+    assert not path.exists()
+    with pytest.raises(DeviceError, match="no shared memory"):
+        Shared.attach(blocks.name)
+    foreign = tmp_path / "foreign"
+    foreign.write_bytes(b"x" * module._SIZE)
+    with pytest.raises(DeviceError, match="not this version"):
+        Shared.attach(str(foreign))

@@ -1,7 +1,7 @@
 """What the body does under load: geometry, materials, loads and the solve.
 
 A `Cantilever` and its loads make a `BeamProblem`, a plain value. `BeamProblem.open` builds the finite
-elements and gives a solver. Its `solve` returns a `Solution`, a plain value again, also where there is no equilibrium.
+elements and gives a solver. Its `solve` returns a `Solution`, a plain value also where there is no equilibrium.
 """
 
 from palpate.physics.beam import Cantilever

@@ -12,7 +12,7 @@ from palpate.physics.solution import Stop
 
 __all__ = ["LoadPath", "follow"]
 
-NEWTON_LIMIT = 25  # a step that needs more iterations is cheaper in two halves
+NEWTON_LIMIT = 60  # a step that needs more iterations is cheaper in two halves
 TOTAL_LIMIT = 600  # iterations over a whole path: bounds the time that a pointless load costs
 SMALLEST_STEP = 2.0**-10
 GROWTH = 2.0

@@ -2,8 +2,13 @@
 
 Finds a minimum of Π(z) = W(z) - f·z. Near the minimum the Newton decrement λ² = rᵀK⁻¹r is twice the energy
 still to be gained, so √(λ²/energy) is the relative error in the energy norm. It is the criterion here because
-it weighs each residual by its compliance: the round-off of a stiff direction (stretching a beam) can neither hide
-nor feign that of a soft one (bending it), as a norm of the residual would.
+it weighs each residual by its compliance: the round-off of a stiff direction (stretching a beam) can neither
+hide nor feign the convergence of a soft one (bending it), as it could in a norm of the residual.
+
+Slender bodies are stiff in some directions and soft in others, and a step along the soft ones that is right to
+first order costs stiff energy in the second: the line search would crawl. So each trial state is first relaxed:
+energy is minimised, by one linear solve, over unknowns in which it is quadratic (variable projection; Golub &
+Pereyra 1973).
 """
 
 from __future__ import annotations
@@ -20,6 +25,7 @@ __all__ = ["Equilibrium", "Model", "Tangent", "minimise"]
 
 ARMIJO = 1e-4  # share of the predicted decrease that a step must bring (Nocedal & Wright 2006, eq. 3.4)
 ROUND_OFF = 1e-6  # below this relative error energy differences drown in round-off: steps are taken whole
+SHIFTS = (0.0, *(1e-4 * 3.0**power for power in range(16)))
 SMALLEST_STEP = 2.0**-14
 
 
@@ -27,7 +33,7 @@ class Tangent(Protocol):
     """Second derivative K of a strain energy at one state."""
 
     def solve(self, rhs: np.ndarray, shift: float) -> np.ndarray | None:
-        """(K + shift·|diag K|)⁻¹ rhs, or None if that matrix is not positive definite."""
+        """(K + shift·M)⁻¹ rhs with a stiffness M of the body's own kind, or None if K + shift·M is indefinite."""
 
 
 class Model(Protocol):
@@ -44,6 +50,9 @@ class Model(Protocol):
 
     def tangent(self, z: np.ndarray) -> Tangent:
         """∂²W/∂z²."""
+
+    def relax(self, z: np.ndarray, load: np.ndarray) -> np.ndarray:
+        """Minimise W - load·z over those unknowns in which W is quadratic, the others held; or return z."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +94,7 @@ def minimise(
 
 
 def _iterate(model: Model, load: np.ndarray, start: np.ndarray, tolerance: float, limit: int) -> Equilibrium:
-    z, last = start, math.inf
+    z, last = model.relax(start, load), math.inf
     for iteration in range(limit):
         step, decrement, stable = _direction(model, load, z)
         error = math.sqrt(decrement / _scale(model, load, z)) if decrement >= 0 else math.nan
@@ -94,10 +103,10 @@ def _iterate(model: Model, load: np.ndarray, start: np.ndarray, tolerance: float
         stagnant = error < ROUND_OFF and error > 0.25 * last
         if error <= tolerance or stagnant:
             return Equilibrium(z - step, Stop.CONVERGED if stable else Stop.UNSTABLE, iteration + 1, error)
-        length = 1.0 if error < ROUND_OFF else _line_search(model, load, z, step, decrement)
-        if length == 0.0:
+        better = z - step if error < ROUND_OFF else _line_search(model, load, z, step, decrement)
+        if better is None:
             return Equilibrium(z, Stop.STEP_TOO_SMALL, iteration + 1, error)
-        z, last = z - length * step, error
+        z, last = better, error
     return Equilibrium(z, Stop.ITERATION_LIMIT, limit, last)
 
 
@@ -112,20 +121,22 @@ def _direction(model: Model, load: np.ndarray, z: np.ndarray) -> tuple[np.ndarra
         return residual, math.nan, False
     tangent = model.tangent(z)
     # an indefinite tangent is shifted until it is positive definite, so that the step goes downhill
-    for shift in (0.0, *np.geomspace(1e-8, 1e2, 11)):
-        step = tangent.solve(residual, float(shift))
+    for shift in SHIFTS:
+        step = tangent.solve(residual, shift)
         if step is not None:
             return step, float(residual @ step), shift == 0.0
     return residual, math.nan, False
 
 
-def _line_search(model: Model, load: np.ndarray, z: np.ndarray, step: np.ndarray, decrement: float) -> float:
-    """Length of a step that lowers the energy enough (Armijo, halving), or 0."""
+def _line_search(
+    model: Model, load: np.ndarray, z: np.ndarray, step: np.ndarray, decrement: float
+) -> np.ndarray | None:
+    """A state along the step that lowers the energy enough (Armijo, halving), or None."""
     here = model.energy(z) - float(load @ z)
     length = 1.0
     while length >= SMALLEST_STEP:
-        there = z - length * step
+        there = model.relax(z - length * step, load)
         if model.energy(there) - float(load @ there) <= here - ARMIJO * length * decrement:  # False for NaN
-            return length
+            return there
         length /= 2
-    return 0.0
+    return None

@@ -67,6 +67,10 @@ class ReissnerBeam:
         ) / 2
         self._form += ngsolve.Variation(density.Compile() * ngsolve.dx)
         self._number(scalar.ndof, len(vertices))
+        # what an indefinite tangent is shifted by: a buckled beam is short of bending stiffness only
+        bending = ngsolve.BilinearForm(self._space)
+        bending += ngsolve.Variation(stiffness.bending * curvature**2 / 2 * ngsolve.dx)
+        self._bending = self._banded(bending, np.zeros(self.size))
         self._vertices = vertices
         self.energy_floor = 1e-24 * stiffness.bending / float(vertices[-1] - vertices[0])
 
@@ -95,6 +99,9 @@ class ReissnerBeam:
         band = int((columns - rows).max())
         self._band_index = (band + rows - columns, columns)
         self._band_shape = (band + 1, self._free.size)
+        self._is_translation = self._free < 2 * scalar_ndof
+        self._translations = np.zeros(self._band_shape)
+        self._translations[self._band_index] = self._is_translation[rows] & self._is_translation[columns]
 
     @property
     def size(self) -> int:
@@ -117,10 +124,18 @@ class ReissnerBeam:
 
     def tangent(self, z: np.ndarray) -> BandedTangent:
         """∂²W/∂z²."""
-        self._form.AssembleLinearization(self._at(z))
-        banded = np.zeros(self._band_shape)
-        banded[self._band_index] = np.asarray(self._form.mat.CSR()[0])[self._entries]
-        return BandedTangent(banded)
+        return BandedTangent(self._banded(self._form, z), self._bending)
+
+    def relax(self, z: np.ndarray, load: np.ndarray) -> np.ndarray:
+        """Minimise W - load·z over u and v, the rotations held: given them, the strains are linear in u and v.
+
+        The axial and shear forces are then in balance with the loads, however slender the beam.
+        """
+        banded = self._banded(self._form, z) * self._translations
+        banded[-1] += ~self._is_translation
+        tangent = BandedTangent(banded, self._bending)
+        step = tangent.solve((self.force(z) - load) * self._is_translation, 0.0)
+        return z if step is None else z - step
 
     def distributed(self, force: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
         """Load vector of a constant force per length (x, y) in N/m: (dof,) and the clamped three."""
@@ -144,23 +159,27 @@ class ReissnerBeam:
         self._work.FV().NumPy()[self._free] = z
         return self._work
 
+    def _banded(self, form: Any, z: np.ndarray) -> np.ndarray:
+        """Second derivative of an energy in upper banded storage."""
+        form.AssembleLinearization(self._at(z))
+        banded = np.zeros(self._band_shape)
+        banded[self._band_index] = np.asarray(form.mat.CSR()[0])[self._entries]
+        return banded
+
     def _forces(self, z: np.ndarray) -> np.ndarray:
         self._form.Apply(self._at(z), self._result)
         return np.asarray(self._result.FV().NumPy())
 
 
 class BandedTangent:
-    """A symmetric matrix in upper banded storage (band + 1, dof) (a `newton.Tangent`)."""
+    """A symmetric matrix K, and M to shift it by, in upper banded storage (band + 1, dof) (a `newton.Tangent`)."""
 
-    def __init__(self, banded: np.ndarray) -> None:
-        self._banded = banded
+    def __init__(self, banded: np.ndarray, shifter: np.ndarray) -> None:
+        self._banded, self._shifter = banded, shifter
 
     def solve(self, rhs: np.ndarray, shift: float) -> np.ndarray | None:
-        """(K + shift·|diag K|)⁻¹ rhs by Cholesky's method, or None if that is not positive definite."""
-        banded = self._banded
-        if shift:
-            banded = banded.copy()
-            banded[-1] += shift * np.abs(banded[-1])
+        """(K + shift·M)⁻¹ rhs by Cholesky's method, or None if K + shift·M is not positive definite."""
+        banded = self._banded + shift * self._shifter if shift else self._banded
         try:
             factor = cholesky_banded(banded, check_finite=False)
         except LinAlgError:

@@ -68,7 +68,7 @@ class Frame(Binary):
     KIND: ClassVar[int] = 1
 
     tick: Annotated[float, Wire("f64", "counts the loop's ticks")]
-    time: Annotated[float, Wire("f64", "s, the loop's clock")]
+    time: Annotated[float, Wire("f64", "s, when the frame was composed, on the loop's clock")]
     echo: Annotated[float, Wire("f64", "ms, page clock: `sent` of the last Hand that this page sent")]
     position: Annotated[
         Vec3, Wire("vec3", "m, the hand in body metres, as an offset from the held node at rest")
@@ -76,8 +76,10 @@ class Frame(Binary):
     contact: Annotated[Vec3, Wire("vec3", "m, where the held node is, as an offset from rest")]
     force: Annotated[Vec3, Wire("vec3", "N, on the hand")]
     rate: Annotated[float, Wire("f32", "Hz, ticks per second achieved")]
-    lateness: Annotated[float, Wire("f32", "s, start of the latest tick behind its schedule")]
-    lateness_p50: Annotated[float, Wire("f32", "s, median since the start")]
+    lateness: Annotated[
+        float, Wire("f32", "s, the latest tick since the frame before, to a quarter of itself")
+    ]
+    lateness_p50: Annotated[float, Wire("f32", "s, median since the start, 0 below a microsecond")]
     lateness_p99: Annotated[float, Wire("f32", "s, 99th percentile since the start")]
     lateness_max: Annotated[float, Wire("f32", "s, largest since the start")]
     work_p50: Annotated[float, Wire("f32", "s, median CPU time of one tick")]

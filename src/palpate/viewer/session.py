@@ -19,6 +19,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from palpate.errors import DeviceError, UsageError
 from palpate.runtime.faults import Fault
+from palpate.runtime.histogram import EDGES
 from palpate.runtime.shared import Shared, State, now
 from palpate.viewer.hands import Command, Hands
 from palpate.viewer.messages import PROTOCOL, Credit, Frame, Hand, Hello, Loop, Notice, RangeInfo
@@ -70,6 +71,7 @@ class Page:
     socket: WebSocket
     credits: int = 0
     echo: float = 0.0  # ms, the page's clock
+    histogram: np.ndarray | None = None  # of lateness, as of the frame before
     granted: asyncio.Event = field(default_factory=asyncio.Event)
 
     def grant(self, frames: int) -> None:
@@ -146,7 +148,7 @@ class Session:
             meta=model.meta,
         )
 
-    def frame(self, page: int = 0, echo: float = 0.0) -> Frame:
+    def frame(self, page: Page) -> Frame:
         """The newest state as one page sees it."""
         state, loop = self._read()
         held = state.grabbed and not state.stalled and loop is Loop.RUNNING
@@ -154,13 +156,13 @@ class Session:
         fault, faults, last_fault = _faults(state)
         return Frame(
             tick=state.tick,
-            time=state.time,
-            echo=echo,
+            time=now(),
+            echo=page.echo,
             position=_vector(state.position if held else shape.contact),
             contact=_vector(shape.contact),
             force=_vector(state.force) if loop is Loop.RUNNING else (0.0, 0.0, 0.0),
             rate=state.rate,
-            lateness=state.lateness,
+            lateness=_latest(state, page),
             lateness_p50=state.lateness_p50,
             lateness_p99=state.lateness_p99,
             lateness_max=state.lateness_max,
@@ -169,7 +171,7 @@ class Session:
             fault=fault,
             last_fault=last_fault,
             loop=loop,
-            hold=self._hands.hold(page),
+            hold=self._hands.hold(page.number),
             inside=state.inside or not held,
             clamped=state.clamped and held,
             grabbed=state.grabbed and loop is Loop.RUNNING,
@@ -199,7 +201,7 @@ class Session:
         with contextlib.suppress(WebSocketDisconnect):
             while True:
                 await page.spend()
-                await page.socket.send_bytes(self.frame(page.number, page.echo).pack())
+                await page.socket.send_bytes(self.frame(page).pack())
                 await asyncio.sleep(SHORTEST)
 
     async def _listen(self, page: Page) -> None:
@@ -242,6 +244,17 @@ def _range(r: Range) -> RangeInfo:
 
 def _vector(v: np.ndarray) -> tuple[float, float, float]:
     return (float(v[0]), float(v[1]), float(v[2]))
+
+
+def _latest(state: State, page: Page) -> float:
+    """The largest lateness (s) since the page's frame before: the upper edge of the highest bin that grew."""
+    before, page.histogram = page.histogram, state.histogram
+    if before is None:
+        return state.lateness
+    grown = np.flatnonzero(state.histogram != before)
+    if not grown.size or grown[-1] == 0:
+        return state.lateness  # all below a microsecond
+    return min(float(EDGES[min(grown[-1], EDGES.size - 1)]), state.lateness_max)
 
 
 def _faults(state: State) -> tuple[int, int, int]:

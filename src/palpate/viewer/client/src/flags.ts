@@ -4,6 +4,8 @@ import { Hold, Loop } from "./messages";
 import type { Frame, Hello } from "./messages";
 import { tidy } from "./units";
 
+const SLOW = 0.9; // of the rate aimed at
+
 export interface Flag {
   id: string;
   tone: "good" | "calm" | "warn" | "bad";
@@ -13,6 +15,7 @@ export interface Flag {
 /** The flags of one frame, the worst first. */
 export function flags(frame: Frame, hello: Hello): Flag[] {
   const found = [...failures(frame, hello), ...limits(frame, hello)];
+  if (found.length === 0) found.push(ordinary(frame));
   if (frame.hold === Hold.ANOTHER) {
     found.push({ id: "watching", tone: "calm", words: "Another page holds the hand; this one watches." });
   }
@@ -20,7 +23,7 @@ export function flags(frame: Frame, hello: Hello): Flag[] {
     const last = hello.faults[frame.last_fault] ?? `code ${frame.last_fault}`;
     found.push({ id: "faults", tone: "calm", words: `Faults so far: ${frame.faults}, the last one: ${last}.` });
   }
-  return found.length ? found : [ordinary(frame)];
+  return found;
 }
 
 function failures(frame: Frame, hello: Hello): Flag[] {
@@ -35,7 +38,7 @@ function failures(frame: Frame, hello: Hello): Flag[] {
     const words = hello.faults[frame.fault] ?? `code ${frame.fault}`;
     found.push({ id: "fault", tone: "bad", words: `Fault: ${words}. The force is zero.` });
   }
-  if (frame.stalled) {
+  if (frame.stalled && frame.grabbed) {
     found.push({
       id: "stalled",
       tone: "warn",
@@ -56,6 +59,10 @@ function limits(frame: Frame, hello: Hello): Flag[] {
   }
   if (frame.clamped) {
     found.push({ id: "clamped", tone: "warn", words: `Force limited to ${tidy(hello.max_force)} N.` });
+  }
+  if (frame.rate < SLOW * hello.rate && frame.tick > hello.rate) {
+    const words = `The real-time loop reaches only ${tidy(frame.rate)} of ${tidy(hello.rate)} ticks per second.`;
+    found.push({ id: "slow", tone: "warn", words });
   }
   return found;
 }

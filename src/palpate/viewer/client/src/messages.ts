@@ -67,7 +67,7 @@ export const FRAME = 1;
 export interface Frame {
   /** counts the loop's ticks */
   tick: number;
-  /** s, the loop's clock */
+  /** s, when the frame was composed, on the loop's clock */
   time: number;
   /** ms, page clock: `sent` of the last Hand that this page sent */
   echo: number;
@@ -79,9 +79,9 @@ export interface Frame {
   force: Vec3;
   /** Hz, ticks per second achieved */
   rate: number;
-  /** s, start of the latest tick behind its schedule */
+  /** s, the latest tick since the frame before, to a quarter of itself */
   lateness: number;
-  /** s, median since the start */
+  /** s, median since the start, 0 below a microsecond */
   lateness_p50: number;
   /** s, 99th percentile since the start */
   lateness_p99: number;

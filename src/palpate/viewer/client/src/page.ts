@@ -57,7 +57,11 @@ function open(hello: Hello): void {
 function notes(view: View): void {
   const times = (n: number): string => (n === 1 ? "to scale" : `drawn × ${tidy(n)}`);
   element("scale-notes").replaceChildren(
-    ...[`displacement ${times(view.enlarged)}`, `thickness ${times(view.thickened)}`].map((words) => {
+    ...[
+      `displacement ${times(view.enlarged)}`,
+      `thickness ${times(view.thickened)}`,
+      "light bands: nodes of interest",
+    ].map((words) => {
       const line = document.createElement("div");
       line.textContent = words;
       return line;
@@ -96,7 +100,7 @@ function describe(frame: Frame): void {
   if (frame.loop === Loop.ENDED) status("ended", "real-time process ended");
   else if (frame.loop === Loop.FROZEN) status("warn", "real-time process stands still");
   else if (frame.hold === Hold.ANOTHER) status("warn", "watching");
-  else if (frame.stalled) status("warn", "no word from the hand");
+  else if (frame.stalled && frame.grabbed) status("warn", "no word from the hand");
   else status("live", frame.grabbed ? "holding" : "live");
 }
 

@@ -2,6 +2,7 @@
 
 import { flags } from "./flags";
 import type { Flag } from "./flags";
+import { Hold, Loop } from "./messages";
 import type { Frame, Hello } from "./messages";
 import { Plot } from "./plot";
 import { fixed, round125, tidy } from "./units";
@@ -20,6 +21,7 @@ export class Panel {
   private last = 0;
   private pictures = 0;
   private since = 0;
+  private delay = NaN; // ms from the hand's message to the picture, smoothed
 
   recolour(): void {
     this.force.recolour();
@@ -44,7 +46,7 @@ export class Panel {
     const hello = this.hello;
     if (!hello) return;
     this.force.add(frame.time, Math.hypot(...frame.force));
-    this.lateness.add(frame.time, 1e6 * frame.lateness);
+    if (frame.loop === Loop.RUNNING) this.lateness.add(frame.time, 1e6 * frame.lateness);
     this.pictures += drawn ? 1 : 0;
     const now = performance.now();
     if (now - this.last < EVERY) return;
@@ -93,11 +95,15 @@ export class Panel {
   }
 
   private timing(frame: Frame, now: number): void {
-    microseconds("lateness-p50", frame.lateness_p50);
-    microseconds("lateness-p99", frame.lateness_p99);
-    microseconds("lateness-max", frame.lateness_max);
+    duration("lateness-p50", frame.lateness_p50);
+    duration("lateness-p99", frame.lateness_p99);
+    duration("lateness-max", frame.lateness_max);
     put("rate", frame.rate, 0);
-    microseconds("work", frame.work_p50);
+    this.delay += 0.2 * (now - frame.echo - this.delay);
+    if (!frame.grabbed || frame.hold !== Hold.YOURS) this.delay = NaN;
+    else if (Number.isNaN(this.delay)) this.delay = now - frame.echo;
+    put("delay", this.delay, 0);
+    duration("work", frame.work_p50);
     if (now - this.since > 1000) {
       put("picture-rate", (1000 * this.pictures) / (now - this.since), 0);
       [this.pictures, this.since] = [0, now];
@@ -105,9 +111,9 @@ export class Panel {
   }
 
   private plots(frame: Frame): void {
-    const peak = round125(Math.max(1.02 * this.force.peak(frame.time), 0.1));
-    this.force.draw(frame.time, { unit: "N", low: 0, high: peak, logarithmic: false });
-    const scale = { unit: "µs", low: 0.1, high: 1e4, logarithmic: true };
+    const peak = round125(Math.max(this.force.peak(frame.time), 0.1));
+    this.force.draw(frame.time, { unit: "N", low: 0, high: peak, logarithmic: false, stepped: false });
+    const scale = { unit: "µs", low: 1, high: 1e5, logarithmic: true, stepped: true };
     this.lateness.draw(frame.time, scale, [1e6 * frame.lateness_p50, 1e6 * frame.lateness_p99]);
   }
 
@@ -133,8 +139,12 @@ function put(id: string, value: number, decimals: number): void {
   output.dataset["value"] = String(value);
 }
 
-function microseconds(id: string, seconds: number): void {
-  put(id, 1e6 * seconds, seconds < 10e-6 ? 1 : 0);
+/** A duration in s as µs or ms. */
+function duration(id: string, seconds: number): void {
+  const [us, output] = [1e6 * seconds, element(id)];
+  output.dataset["value"] = String(us);
+  if (us < 1) output.textContent = "< 1 µs"; // where the loop's histogram starts
+  else output.textContent = us < 9999.5 ? `${fixed(us, us < 9.95 ? 1 : 0)} µs` : `${fixed(us / 1000, 0)} ms`;
 }
 
 function sliders(hello: Hello, moved: (i: number, value: number) => void): void {

@@ -10,6 +10,7 @@ export interface Scale {
   low: number;
   high: number;
   logarithmic: boolean;
+  stepped: boolean; // a value belongs to the whole time since the one before
 }
 
 export class Plot {
@@ -67,11 +68,12 @@ export class Plot {
     this.each(now, (time, value) => {
       // a gap in time is a gap in the line
       if (time - previous > 0.5) pen.moveTo(x(time), y(value));
-      else pen.lineTo(x(time), y(value));
+      else if (scale.stepped) pen.lineTo(x(previous), y(value));
+      pen.lineTo(x(time), y(value));
       previous = time;
     });
     pen.strokeStyle = this.colour;
-    pen.lineWidth = scale.logarithmic ? 1 : 1.8;
+    pen.lineWidth = scale.stepped ? 1 : 1.8;
     pen.lineJoin = "round";
     pen.stroke();
   }

@@ -56,6 +56,7 @@ export class View {
   private readonly handle: Mesh<SphereGeometry, MeshLambertMaterial>;
   private readonly hand: Mesh<SphereGeometry, MeshLambertMaterial>;
   private readonly thread = new Line(new BufferGeometry(), new LineBasicMaterial());
+  private readonly beads: Mesh<SphereGeometry, MeshLambertMaterial>[];
   private around: Group | null = null;
   private readonly rest: Float32Array;
   private readonly points: Float32Array;
@@ -85,6 +86,9 @@ export class View {
     const ball = Math.max(1.9 * radius, 0.022 * this.length);
     this.handle = new Mesh(new SphereGeometry(ball, 28, 18), new MeshLambertMaterial());
     this.hand = new Mesh(new SphereGeometry(0.5 * ball, 18, 12), new MeshLambertMaterial());
+    const bead = new SphereGeometry(1.25 * radius, 18, 12);
+    const beads = hello.nodes_of_interest.filter((i) => i !== hello.touch_node);
+    this.beads = beads.map(() => new Mesh(bead, new MeshLambertMaterial()));
     this.arrow = new Arrow(0.3 * this.length, fullForce(hello), 1.15 * ball);
     this.ghost = new Mesh(this.restGeometry(radius), ghostMaterial());
     this.shadow = new Mesh(this.tube.geometry, shadowMaterial());
@@ -115,6 +119,7 @@ export class View {
       for (let k = 3 * i; k < 3 * i + 3; k++) points[k] = rest[k]! + enlarged * u[k]!;
     }
     this.tube.update(points, shares);
+    this.each((bead, node) => bead.position.fromArray(points, 3 * node));
     this.drawn(frame.contact, this.tip);
     this.handle.position.copy(this.tip);
     this.drawn(frame.position, this.hand.position);
@@ -218,6 +223,7 @@ export class View {
     this.scene.add(this.around);
     this.handle.material.color.set(css("--accent"));
     this.handle.material.emissive.set(css("--accent")).multiplyScalar(0.3);
+    this.each((bead) => bead.material.color.set(css("--bead")));
     this.hand.material.color.set(css("--accent-2"));
     this.hand.material.emissive.set(css("--accent-2")).multiplyScalar(0.3);
     this.thread.material.color.set(css("--accent-2"));
@@ -235,7 +241,7 @@ export class View {
   private assemble(): void {
     const body = new Mesh(this.tube.geometry, new MeshLambertMaterial({ vertexColors: true }));
     body.frustumCulled = this.shadow.frustumCulled = this.thread.frustumCulled = false;
-    this.scene.add(body, this.ghost, this.shadow, this.handle, this.hand, this.thread, this.arrow.group);
+    this.scene.add(body, this.ghost, this.shadow, this.handle, this.hand, this.thread, this.arrow.group, ...this.beads);
     this.scene.add(new HemisphereLight(new Color(0xffffff), new Color(0xb9c4cc), 2.3));
     const sun = new DirectionalLight(0xffffff, 1.5);
     sun.position.set(-0.5, 1.5, 1.2);
@@ -267,6 +273,12 @@ export class View {
     const tube = new Tube(this.hello.rest.length, 0.9 * radius);
     tube.update(this.rest, this.shares);
     return tube.geometry;
+  }
+
+  /** Visit the beads that mark the nodes of interest. */
+  private each(visit: (bead: Mesh<SphereGeometry, MeshLambertMaterial>, node: number) => void): void {
+    const nodes = this.hello.nodes_of_interest.filter((i) => i !== this.hello.touch_node);
+    this.beads.forEach((bead, k) => visit(bead, nodes[k]!));
   }
 
   private node(): Vector3 {

@@ -15,7 +15,7 @@ import {
 } from "three";
 import { css, tidy } from "./units";
 
-const LABEL_HEIGHT = 0.045; // of the body's length
+const LABEL_HEIGHT = 0.052; // of the body's length
 
 export interface Extent {
   root: number; // x of the clamped end, m

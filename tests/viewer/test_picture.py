@@ -1,0 +1,57 @@
+"""What is drawn: the field network's shape while held, a decaying swing after release."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from palpate.surrogates import TouchModel
+from palpate.viewer.picture import DAMPING, FREQUENCY, STILL, Picture, swing
+
+
+def test_the_swing_solves_the_damped_oscillator():
+    w, h = 2 * np.pi * FREQUENCY, 1e-4
+    for t in (0.05, 0.2, 0.6):
+        before, here, after = swing(t - h), swing(t), swing(t + h)
+        residual = (after - 2 * here + before) / h**2 + DAMPING * w * (after - before) / h + w**2 * here
+        assert abs(residual) < 1e-3 * w**2  # differences of second order: w⁴h²/12 ≈ 2e-5
+
+
+def test_the_swing_starts_at_the_held_shape_without_a_jump():
+    assert swing(0.0) == 1.0
+    assert swing(1e-6) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_the_swing_ends_and_its_end_is_no_visible_jump():
+    end = -np.log(STILL) / (DAMPING * 2 * np.pi * FREQUENCY)
+    assert swing(end + 1e-9) == 0.0
+    assert abs(swing(end - 1e-9)) < 1.1 * STILL
+    assert end < 3.0
+
+
+def test_held_is_the_network_and_released_swings_back(rod: TouchModel):
+    picture, load = Picture(rod), np.array([3.0])
+    held = picture.held(load, False, np.array([0.0, -0.1, 0.0]), 10.0)
+    assert np.array_equal(held.displacement, rod.displacement(load))
+    assert held.contact.tolist() == [0.0, -0.1, 0.0]
+    after = picture.free(np.zeros(0), 10.0)
+    assert np.allclose(after.displacement, held.displacement, rtol=0, atol=1e-12)
+    assert np.array_equal(after.contact, after.displacement[rod.touch_node])
+    half = picture.free(np.zeros(0), 10.0 + 0.5 / FREQUENCY)
+    assert half.contact[1] > 0.05  # mirrored: it swings past its rest
+    rest = picture.free(np.zeros(0), 20.0)
+    assert np.array_equal(rest.displacement, rod.displacement(np.zeros(1)))
+
+
+def test_a_body_that_does_not_mirror_stops_at_its_range(rod: TouchModel):
+    picture = Picture(dataclasses.replace(rod, mirrors=False))
+    picture.held(np.array([3.0]), False, np.zeros(3), 0.0)
+    half = picture.free(np.zeros(0), 0.5 / FREQUENCY)
+    assert np.array_equal(half.displacement, rod.displacement(np.zeros(1)))
+
+
+def test_before_any_touch_the_body_rests(rod: TouchModel):
+    shape = Picture(rod).free(np.zeros(0), 5.0)
+    assert np.array_equal(shape.displacement, rod.displacement(np.zeros(1)))

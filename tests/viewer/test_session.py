@@ -1,0 +1,178 @@
+"""Credits, one hand, heartbeats and the end of the loop, through the real server and loop."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import time
+
+import numpy as np
+import pytest
+from websocket_page import Client, client_of
+from websockets.exceptions import ConnectionClosed
+
+from palpate.surrogates import TouchModel
+from palpate.viewer import Viewer
+from palpate.viewer.messages import Frame, Hold, Loop, Notice
+from palpate.viewer.session import MOST_CREDITS
+
+pytestmark = pytest.mark.timeout(60)
+
+
+def hold(client: Client, y: float, *, seconds: float = 0.5) -> Frame:
+    """Hold the tip at y (m) for a while, as a page does; the last frame."""
+    until = time.perf_counter() + seconds
+    while time.perf_counter() < until:
+        client.hand(0.0, y)
+        client.grant(1)
+        frame = client.frame()
+        time.sleep(0.01)
+    return frame
+
+
+def held(client: Client, y: float) -> Frame:
+    """Hold until the loop has arrived and ramped up; on a busy machine that may take several tries."""
+    for _ in range(20):
+        frame = hold(client, y)
+        if frame.hold == Hold.YOURS and not frame.stalled and abs(frame.position[1] - y) < 1e-6:
+            return frame
+    pytest.fail("the loop never followed the hand")
+
+
+def test_without_credit_no_frame(viewer: Viewer):
+    with client_of(viewer) as client:
+        with pytest.raises(TimeoutError):
+            client.frame(timeout=0.4)
+        client.grant(1)
+        client.frame()
+        with pytest.raises(TimeoutError):
+            client.frame(timeout=0.4)
+
+
+def test_a_slow_client_gets_the_newest_frame(viewer: Viewer):
+    with client_of(viewer) as client:
+        client.grant(1)
+        first = client.frame()
+        time.sleep(0.5)
+        newest = viewer.loop.read().tick
+        client.grant(1)
+        second = client.frame()
+        assert second.tick >= newest > first.tick
+
+
+def test_credits_do_not_pile_up(viewer: Viewer):
+    with client_of(viewer) as client:
+        client.grant(60000)
+        client.grant(60000)
+        for _ in range(MOST_CREDITS):
+            client.frame()
+        with pytest.raises(TimeoutError):
+            client.frame(timeout=0.4)
+
+
+def test_force_and_shape_are_the_models_own(viewer: Viewer, rod: TouchModel):
+    y = -0.4 * rod.reach
+    with client_of(viewer) as client:
+        frame = held(client, y)
+    evaluator = rod.evaluator()
+    evaluator(np.array(frame.position), np.zeros(0))
+    # positions travel in 32 bits: half an ulp of y at the largest stiffness
+    slack = abs(y) * 2**-24 * rod.stiffness_max
+    assert np.allclose(frame.force, evaluator.force, rtol=2**-23, atol=slack)
+    assert np.allclose(frame.contact, evaluator.contact, rtol=2**-23, atol=1e-7)
+    shape = rod.displacement(evaluator.loads).astype("f4")
+    assert np.allclose(frame.displacement, shape.ravel(), rtol=0, atol=1e-6)
+    assert frame.inside
+
+
+def test_two_clients_one_hand(viewer: Viewer, rod: TouchModel):
+    with client_of(viewer) as first, client_of(viewer) as second:
+        held(first, -0.1)
+        second.hand(0.0, -0.5)
+        second.grant(1)
+        seen = second.frame()
+        assert seen.hold == Hold.ANOTHER
+        assert hold(first, -0.1, seconds=0.2).position[1] == pytest.approx(-0.1, abs=1e-6)
+        first.hand(grabbed=False)
+        assert held(second, -0.2).hold == Hold.YOURS
+
+
+def test_a_client_that_vanishes_lets_go(viewer: Viewer):
+    with client_of(viewer) as first:
+        held(first, -0.2)
+    with client_of(viewer) as second:
+        for _ in range(50):
+            second.grant(1)
+            frame = second.frame()
+            if frame.hold == Hold.FREE and not frame.grabbed:
+                break
+            time.sleep(0.02)
+        assert (frame.hold, frame.grabbed, frame.force) == (Hold.FREE, False, (0.0, 0.0, 0.0))
+
+
+def test_without_heartbeats_the_force_is_zero(viewer: Viewer):
+    with client_of(viewer) as client:
+        assert math.hypot(*held(client, -0.3).force) > 0.5
+        time.sleep(0.3)  # three silent periods of 50 ms, and some
+        client.grant(1)
+        frame = client.frame()
+        assert frame.stalled
+        assert frame.force == (0.0, 0.0, 0.0)
+
+
+def test_a_hidden_page_lets_go(viewer: Viewer):
+    with client_of(viewer) as client:
+        held(client, -0.3)
+        client.hand(0.0, -0.3, hidden=True)
+        time.sleep(0.1)
+        client.grant(1)
+        frame = client.frame()
+        assert not frame.grabbed
+        assert frame.force == (0.0, 0.0, 0.0)
+
+
+def test_bytes_that_are_no_message_end_the_conversation(viewer: Viewer):
+    for rubbish in (b"\xff\x00", b"\x02", b""):
+        with client_of(viewer) as client:
+            client.socket.send(rubbish)
+            with pytest.raises(ConnectionClosed) as caught:
+                client.frame()
+            assert caught.value.rcvd is not None
+            assert caught.value.rcvd.code == 1003
+
+
+def test_a_target_that_is_no_number_gives_zero_force_and_a_fault(viewer: Viewer):
+    with client_of(viewer) as client:
+        before = held(client, -0.3).faults
+        frame = hold(client, math.nan, seconds=0.3)
+        assert frame.force == (0.0, 0.0, 0.0)
+        assert frame.faults > before
+        assert "finite" in client.hello.faults[frame.last_fault]
+        assert np.isfinite(frame.displacement).all()
+        assert math.hypot(*held(client, -0.3).force) > 0.5  # and is forgiven afterwards
+
+
+def test_the_end_of_the_loop_is_told_and_the_force_is_zero(rod: TouchModel, caplog: pytest.LogCaptureFixture):
+    with Viewer(rod, port=0) as viewer, client_of(viewer) as client:
+        held(client, -0.3)
+        os.kill(viewer.loop.pid, signal.SIGKILL)
+        told = Notice.from_json(str(client.socket.recv(timeout=5)))
+        assert "ended" in told.what
+        client.grant(1)
+        frame = client.frame()
+        assert (frame.loop, frame.force) == (Loop.ENDED, (0.0, 0.0, 0.0))
+        with client_of(viewer) as later:
+            assert "ended" in Notice.from_json(str(later.socket.recv(timeout=5))).what
+    assert "real-time process has ended" in caplog.text
+
+
+def test_a_standing_loop_is_noticed(rod: TouchModel):
+    with Viewer(rod, port=0) as viewer, client_of(viewer) as client:
+        held(client, -0.3)
+        os.kill(viewer.loop.pid, signal.SIGSTOP)
+        time.sleep(0.5)
+        client.grant(1)
+        frame = client.frame()
+        os.kill(viewer.loop.pid, signal.SIGCONT)
+        assert (frame.loop, frame.force) == (Loop.FROZEN, (0.0, 0.0, 0.0))

@@ -1,0 +1,42 @@
+"""A page without a browser: a program's way into the viewer's websocket."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+
+import numpy as np
+from websockets.sync.client import ClientConnection, connect
+
+from palpate.viewer import Viewer
+from palpate.viewer.messages import Credit, Frame, Hand, Hello
+
+
+class Client:
+    """What a page can say and hear."""
+
+    def __init__(self, socket: ClientConnection) -> None:
+        self.socket = socket
+        self.hello = Hello.from_json(str(socket.recv(timeout=5)))
+
+    def grant(self, frames: int) -> None:
+        self.socket.send(Credit(frames).pack())
+
+    def frame(self, timeout: float = 5.0) -> Frame:
+        """The next frame; TimeoutError where none comes."""
+        data = self.socket.recv(timeout=timeout)
+        assert isinstance(data, bytes)
+        return Frame.unpack(data)
+
+    def hand(self, x: float = 0.0, y: float = 0.0, *, grabbed: bool = True, hidden: bool = False) -> None:
+        """Hold the tip at an offset of x, y body metres."""
+        target = (x / self.hello.scale, y / self.hello.scale, 0.0)
+        self.socket.send(Hand(0.0, 0.05, target, grabbed, hidden, np.zeros(0, "f4")).pack())
+
+
+@contextlib.contextmanager
+def client_of(viewer: Viewer) -> Iterator[Client]:
+    """A connected client."""
+    origin = viewer.url.rstrip("/")
+    with connect(f"{viewer.url.replace('http', 'ws', 1)}touch", origin=origin) as socket:
+        yield Client(socket)

@@ -195,8 +195,6 @@ def test_bad_beginnings_are_explained(spring_file, tmp_path):
     for model, options, message in (
         (broken, {}, "broken"),
         (spring_file, {"device": "stroke:colour=red"}, "no option 'colour'"),
-        (spring_file, {"max_force": -1.0}, "force limit"),
-        (spring_file, {"rate": 0.0}, "Hz"),
     ):
         loop = LoopProcess(model, **options)
         with pytest.raises(UsageError, match=message):

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from palpate.errors import DeviceError, UsageError
@@ -19,6 +19,7 @@ targets = st.lists(
 )
 
 
+@settings(deadline=None)
 @given(targets)
 def test_interpolation_never_overshoots(frames):
     """Every point lies between the hull of the last point and its target, frame by frame, jitter or not."""

@@ -1,8 +1,8 @@
 """In the hand: a real-time process that reads a device, evaluates the learnt body and sends a force back.
 
-    shared      state out and commands in, through shared memory
-    process     LoopProcess: the parent's handle
-    loop        one tick, as a list of stages
+    shared, records, seqlock          state out and commands in, through shared memory
+    process, child, report            LoopProcess: the parent's handle, and the process behind it
+    loop, publisher, rehearsal        one tick, as a list of stages
     clock, priority, histogram        being on time, and knowing how much so
     safety, faults, stability         what may reach a hand
     workspace, devices                where the hand is

@@ -8,7 +8,7 @@ __all__ = ["Fault"]
 
 
 class Fault(IntEnum):
-    """Why the force is zero on this tick; the smallest meaningful answer is `NONE`.
+    """Why the force is zero on this tick, or `NONE`.
 
     The numbers travel through the shared memory and the viewer's messages: append, never renumber.
     """

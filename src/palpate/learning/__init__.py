@@ -1,0 +1,40 @@
+"""How a network is learnt: one sample at a time (MRAN with an extended Kalman filter), then refined.
+
+    settings   what the filter is told           state      what it remembers
+    gaussian   value and derivatives             growth     when a unit is added
+    ekf        the update                        pruning    when a unit is removed
+    noise      how far a sample is believed      mran       the step: all of the above in order
+    learn      a fold of the step                history    what happened meanwhile
+    refine     variable projection               structure  how many units a refined network needs
+    posterior  the way back from a refined network to the filter
+    touch      a dataset made into a body that can be touched
+"""
+
+from palpate.learning.history import History
+from palpate.learning.learn import Learned, freeze, learn
+from palpate.learning.mran import Event, step
+from palpate.learning.refine import Refined, refine
+from palpate.learning.settings import Settings, default, founding
+from palpate.learning.state import State, initial
+from palpate.learning.structure import Trial, refined_network
+from palpate.learning.touch import Refinement, learn_touch
+
+__all__ = [
+    "Event",
+    "History",
+    "Learned",
+    "Refined",
+    "Refinement",
+    "Settings",
+    "State",
+    "Trial",
+    "default",
+    "founding",
+    "freeze",
+    "initial",
+    "learn",
+    "learn_touch",
+    "refine",
+    "refined_network",
+    "step",
+]

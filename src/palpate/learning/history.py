@@ -1,0 +1,75 @@
+"""What happened while the filter learnt, one row per observation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.learning.mran import Event
+
+__all__ = ["History"]
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """Growth and errors over T observations.
+
+    Attributes
+    ----------
+    units : (T,) int
+        Units after each observation.
+    error : (T,)
+        Error norm before each observation was used, in scaled outputs.
+    window_rms : (T,)
+        Windowed RMS of it.
+    innovation : (T,)
+        Running root mean square of the innovation per scaled output.
+    grew, pruned : (T,) int
+        Units added and removed by each observation.
+    heldout : (T,)
+        RMSE on held-out data after each observation, relative to full scale; empty where none were given.
+    passes : int
+    """
+
+    units: np.ndarray
+    error: np.ndarray
+    window_rms: np.ndarray
+    innovation: np.ndarray
+    grew: np.ndarray
+    pruned: np.ndarray
+    heldout: np.ndarray
+    passes: int
+
+    @classmethod
+    def of(
+        cls, events: Sequence[Event], innovation: Sequence[float], heldout: Sequence[float], passes: int
+    ) -> History:
+        """Collect events (T) into arrays."""
+        return cls(
+            np.array([e.units for e in events], dtype=np.int64),
+            np.array([e.error for e in events]),
+            np.array([e.window_rms for e in events]),
+            np.sqrt(np.array(innovation)),
+            np.array([int(e.grew) for e in events], dtype=np.int64),
+            np.array([e.pruned for e in events], dtype=np.int64),
+            np.array(heldout),
+            passes,
+        )
+
+    @property
+    def relapse(self) -> float:
+        """Largest ratio of the held-out error to its best so far; 1 is monotone, nan without held-out data."""
+        if not self.heldout.size:
+            return float("nan")
+        return float((self.heldout / np.minimum.accumulate(self.heldout)).max())
+
+    def __str__(self) -> str:
+        text = (
+            f"History: {self.units.size} observations in {self.passes} passes, {self.grew.sum()} units grown, "
+            f"{self.pruned.sum()} pruned, {self.units[-1] if self.units.size else 0} left"
+        )
+        if self.heldout.size:
+            text += f"; held-out error {self.heldout[-1]:.1e} of full scale, never above {self.relapse:.2f} × its best"
+        return text

@@ -1,0 +1,159 @@
+"""The sequential run: samples in shuffled passes, folded through `step`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.learning.gaussian import value
+from palpate.learning.history import History
+from palpate.learning.mran import Event, step
+from palpate.learning.settings import Settings, default
+from palpate.learning.state import State, initial
+from palpate.network import Network, Scaling
+from palpate.units import Quantity, Range
+
+__all__ = ["Learned", "freeze", "learn"]
+
+
+@dataclass(frozen=True, eq=False)
+class Learned:
+    """Outcome of a sequential run.
+
+    Attributes
+    ----------
+    network : Network
+        The state, frozen.
+    state : State
+        From which learning can go on.
+    scaling : Scaling
+        Between the state's scaled quantities and physical ones.
+    history : History
+    """
+
+    network: Network
+    state: State
+    scaling: Scaling
+    history: History
+
+
+def learn(
+    X: np.ndarray,
+    Y: np.ndarray,
+    inputs: Sequence[Range],
+    outputs: Sequence[Quantity],
+    *,
+    settings: Settings | None = None,
+    passes: int = 5,
+    seed: int = 0,
+    heldout: tuple[np.ndarray, np.ndarray] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Learned:
+    """Learn a network sample by sample.
+
+    Sweeps are ordered by load path, and load-ordered data can wreck a sequential run, so every pass is shuffled.
+
+    Parameters
+    ----------
+    X : (N, n)
+        Inputs in SI units.
+    Y : (N, m)
+        Outputs in SI units.
+    inputs, outputs : sequences of n ranges and m quantities
+    settings : Settings, optional
+        `default()` if left out.
+    passes : int
+        How often each sample is presented.
+    seed : int
+        Decides the order of presentation.
+    heldout : (X, Y), optional
+        Unseen samples on which the error is recorded after every observation.
+    progress : callable, optional
+        Called with (done, total) observations.
+
+    Returns
+    -------
+    Learned
+
+    Raises
+    ------
+    UsageError
+        If the arrays do not fit together or hold values that are not finite.
+    """
+    settings = settings or default()
+    _check(X, Y, inputs, outputs)
+    scaling = Scaling.of(inputs, Y)
+    xs, ys = scaling.scale_inputs(X), scaling.scale_outputs(Y)
+    judge = _judge(heldout, scaling, settings)
+    state = initial(len(inputs), len(outputs), settings)
+    rng = np.random.default_rng(seed)
+    events: list[Event] = []
+    innovation: list[float] = []
+    errors: list[float] = []
+    for _ in range(passes):
+        for i in rng.permutation(len(xs)):
+            state, event = step(state, xs[i], ys[i], settings)
+            events.append(event)
+            innovation.append(state.innovation)
+            if judge:
+                errors.append(judge(state))
+        if progress:
+            progress(len(events), passes * len(xs))
+    network = freeze(state, settings, inputs, outputs, scaling)
+    return Learned(network, state, scaling, History.of(events, innovation, errors, passes))
+
+
+def freeze(
+    state: State, settings: Settings, inputs: Sequence[Range], outputs: Sequence[Quantity], scaling: Scaling
+) -> Network:
+    """The state as a network value."""
+    tail = np.zeros((state.outputs, 1 + state.inputs))
+    tail[:, : state.tail.shape[1]] = state.tail
+    return Network.axis_aligned(
+        inputs,
+        outputs,
+        centres=state.centres,
+        widths=state.widths(settings),
+        weights=state.weights.T,
+        tail=tail,
+        scaling=scaling,
+    )
+
+
+def _judge(
+    heldout: tuple[np.ndarray, np.ndarray] | None, scaling: Scaling, settings: Settings
+) -> Callable[[State], float] | None:
+    """A function from a state to its held-out RMSE over the largest held-out output."""
+    if heldout is None:
+        return None
+    X, Y = heldout
+    xs, full = scaling.scale_inputs(X), float(np.abs(Y).max())
+
+    def judge(state: State) -> float:
+        predicted = value(state, xs, settings) * scaling.output_scale + scaling.output_centre
+        return float(np.sqrt(((predicted - Y) ** 2).mean())) / full
+
+    return judge
+
+
+def _check(X: np.ndarray, Y: np.ndarray, inputs: Sequence[Range], outputs: Sequence[Quantity]) -> None:
+    if X.ndim != 2 or Y.ndim != 2 or len(X) != len(Y) or not len(X):
+        raise UsageError(
+            f"Inputs of shape {X.shape} and outputs of shape {Y.shape} are not N samples.",
+            fix="Pass X (N, n) and Y (N, m) with the same N ≥ 1.",
+        )
+    if X.shape[1] != len(inputs) or Y.shape[1] != len(outputs):
+        raise UsageError(
+            f"{X.shape[1]} input and {Y.shape[1]} output columns came with {len(inputs)} ranges and "
+            f"{len(outputs)} quantities.",
+            fix="Name every column.",
+        )
+    if not (np.isfinite(X).all() and np.isfinite(Y).all()):
+        raise UsageError(
+            "Some samples hold values that are not finite.",
+            why="A failed solve leaves not-a-number in its row.",
+            fix="Keep the converged rows only (`Dataset.ok`).",
+        )

@@ -84,6 +84,7 @@ export class Panel {
     // for programs that read the page: one frame, whole
     const data = document.documentElement.dataset;
     data["tick"] = String(frame.tick);
+    data["time"] = String(frame.time);
     data["position"] = frame.position.join(" ");
     data["contact"] = frame.contact.join(" ");
     data["force"] = frame.force.join(" ");

@@ -98,7 +98,16 @@ class LoopProcess:
             self.shared.write_command(parameters=self._parameters)
         self._stderr = tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace")  # noqa: SIM115
         try:
-            self._process = subprocess.Popen(
+            self._process = self._popen()
+            self._await_first_tick()
+        except BaseException:
+            self.stop()
+            raise
+        return self
+
+    def _popen(self) -> subprocess.Popen[str]:
+        try:
+            return subprocess.Popen(
                 [sys.executable, "-m", "palpate.runtime", *self._arguments, f"--state={self.shared.name}"],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
@@ -106,11 +115,12 @@ class LoopProcess:
                 text=True,
                 env=_environment(),
             )
-            self._await_first_tick()
-        except BaseException:
-            self.stop()
-            raise
-        return self
+        except OSError as error:
+            raise DeviceError(
+                "The real-time process could not be started.",
+                why=str(error),
+                fix=f"Check that {sys.executable} may be run.",
+            ) from error
 
     def _await_first_tick(self) -> None:
         until = now() + _START

@@ -14,7 +14,7 @@ from palpate.runtime.workspace import Workspace
 
 __all__ = ["Publisher"]
 
-_EVERY = 100  # ticks between two updates of rate and worst lateness: 10 Hz is what an eye can read
+_EVERY = 100  # ticks between two updates of the rate: 10 Hz is what an eye can read
 
 
 class Publisher:
@@ -30,6 +30,7 @@ class Publisher:
         self._grabbed, self._stalled, self._clamped = record["grabbed"], record["stalled"], record["clamped"]
         self._fault, self._lateness, self._work = record["fault"], record["lateness"], record["work"]
         self._late, self._worked = Histogram(record["histogram"]), Histogram(record["work_histogram"])
+        self._worst = record["lateness_max"]
         self._count, self._before = 0, Fault.NONE
         self._counted, self._since = 1, math.inf  # when the rate was last taken
 
@@ -60,12 +61,13 @@ class Publisher:
         self._count += 1
         self._tick[()], self._time[()], self._lateness[()] = self._count, now, lateness
         self._late.add(lateness)
+        self._worst[()] = self._late.maximum
         if self._count == 1:
             self._since = now
         if fault is not self._before:
             self._changed(fault)
         if self._count % _EVERY == 0:
-            self._digest(now)
+            self._pace(now)
         self._block.publish()
 
     def worked(self, duration: float) -> None:
@@ -76,7 +78,7 @@ class Publisher:
     def end(self) -> None:
         """Publish a last record: nothing held, nothing pushed."""
         self._grabbed[()] = False
-        self._digest(float(self._time))
+        self._pace(float(self._time))
         self._block.publish()
 
     def _changed(self, fault: Fault) -> None:
@@ -87,8 +89,7 @@ class Publisher:
             self._record["faults"] += 1
             self._record["fault_counts"][fault] += 1
 
-    def _digest(self, now: float) -> None:
-        self._record["lateness_max"] = self._late.maximum
+    def _pace(self, now: float) -> None:
         if now > self._since:
             self._record["rate"] = (self._count - self._counted) / (now - self._since)
             self._counted, self._since = self._count, now

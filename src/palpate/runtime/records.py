@@ -98,17 +98,20 @@ class State:
     @property
     def lateness_p50(self) -> float:
         """Median lateness since the start, s."""
-        return percentile(self.histogram, 0.5)
+        return self._late(0.5)
 
     @property
     def lateness_p99(self) -> float:
         """Lateness that one tick in a hundred exceeds, s."""
-        return percentile(self.histogram, 0.99)
+        return self._late(0.99)
 
     @property
     def lateness_p999(self) -> float:
         """Lateness that one tick in a thousand exceeds, s."""
-        return percentile(self.histogram, 0.999)
+        return self._late(0.999)
+
+    def _late(self, share: float) -> float:
+        return min(self.lateness_max, percentile(self.histogram, share))  # a bin reaches beyond its samples
 
     @property
     def work_p50(self) -> float:

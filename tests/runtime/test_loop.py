@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
+from standins import STIFFNESS, PlainModel
 
-from conftest import STIFFNESS, PlainModel
 from palpate.errors import DeviceError, UsageError
 from palpate.runtime.devices.device import Sample, Traits
 from palpate.runtime.devices.page import PageDevice

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from standins import STIFFNESS
 
-from conftest import STIFFNESS
 from palpate.errors import DeviceError, UsageError
 from palpate.runtime import Fault, LoopProcess, now
 

@@ -78,7 +78,8 @@ class Publisher:
     def end(self) -> None:
         """Publish a last record: nothing held, nothing pushed."""
         self._grabbed[()] = False
-        self._pace(float(self._time))
+        if self._count < _EVERY:
+            self._pace(float(self._time))
         self._block.publish()
 
     def _changed(self, fault: Fault) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from standins import STIFFNESS, PlainModel
 
 from models import spring_beam
 from palpate.runtime.shared import Shared

@@ -57,19 +57,16 @@ def _parser() -> argparse.ArgumentParser:
 
 def _run(options: argparse.Namespace) -> int:
     shared = Shared.attach(options.state)
+    shared.unlink()  # both sides have it: from here on no kind of death can leave it behind
     orphaned = _watch_parent()
-    try:
-        model = TouchModel.load(options.model)
-        device = device_named(options.device, shared.command)
-        workspace = Workspace.for_reach(options.radius, model.reach)
-        limits = Limits(options.max_force, options.slew)
-        loop = Loop(model, device, shared, workspace, limits, rate=options.rate, orphaned=orphaned)
-        _say({"obtained": obtain()})
-        loop.run(rehearsal(model, workspace, limits, options.rate))
-        _say({"foreign": [name for name in FOREIGN if sys.modules.get(name)]})
-    finally:
-        if orphaned():
-            shared.unlink()  # nobody else is left to do it
+    model = TouchModel.load(options.model)
+    device = device_named(options.device, shared.command)
+    workspace = Workspace.for_reach(options.radius, model.reach)
+    limits = Limits(options.max_force, options.slew)
+    loop = Loop(model, device, shared, workspace, limits, rate=options.rate, orphaned=orphaned)
+    _say({"obtained": obtain()})
+    loop.run(rehearsal(model, workspace, limits, options.rate))
+    _say({"foreign": [name for name in FOREIGN if sys.modules.get(name)]})
     return 0
 
 

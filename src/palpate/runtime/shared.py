@@ -7,6 +7,7 @@ Python 3.13 every process that merely attached removed the block when it ended.
 
 from __future__ import annotations
 
+import contextlib
 import mmap
 import os
 import tempfile
@@ -184,9 +185,12 @@ class Shared:
         self._map.close()
 
     def unlink(self) -> None:
-        """Remove the name. Harmless when repeated."""
+        """Remove the name; who has attached keeps the memory. Harmless when repeated."""
         if self.name:
-            Path(self.name).unlink(missing_ok=True)
+            with contextlib.suppress(
+                PermissionError
+            ):  # Windows removes only what nobody maps: the last to go does
+                Path(self.name).unlink(missing_ok=True)
 
     def __enter__(self) -> Self:
         return self

@@ -253,15 +253,23 @@ def test_a_hidden_tab_lets_go_and_says_so(visit, viewer: Viewer):
     page = visit(viewer)
     drag(page, -20, 100)
     settled(page, "inside")
-    page.evaluate(
-        """() => {
-            Object.defineProperty(document, "hidden", {get: () => true, configurable: true});
-            document.dispatchEvent(new Event("visibilitychange"));
-        }"""
-    )
-    assert "background" in page.inner_text("#status") or "background" in page.inner_text("#flags")
-    page.wait_for_selector("html[data-grabbed=false]")
-    assert number(page.inner_text("#force-norm")) == 0.0
+    turn = """hidden => {
+        Object.defineProperty(document, "hidden", {get: () => hidden, configurable: true});
+        document.dispatchEvent(new Event("visibilitychange"));
+    }"""
+    page.evaluate(turn, True)
+    assert "background" in page.inner_text("#status")
+    assert "background" in page.inner_text("#flags")
+    for _ in range(100):
+        state = viewer.loop.read()
+        if not state.grabbed and state.stalled:
+            break
+        page.wait_for_timeout(20)
+    assert (state.grabbed, state.stalled, state.force.tolist()) == (False, True, [0.0, 0.0, 0.0])
+    page.evaluate(turn, False)
+    shown = let_go(page)
+    assert number(shown["text"]["force-norm"]) == 0.0
+    assert shown["flags"] == ["free"]
 
 
 def test_the_end_of_the_loop_is_shown_and_the_page_returns(visit, keep, complaints, rod: TouchModel):

@@ -10,11 +10,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import functools
 import os
+import signal
 import tempfile
 import threading
 import webbrowser
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -78,12 +80,18 @@ class Viewer:
     strict_port : bool
         Whether a busy port is an error; otherwise the next free one is taken.
 
+    Attributes
+    ----------
+    model : TouchModel
+    loop : LoopProcess
+        The real-time process, once started.
+    port : int
+        The port taken, once started.
+
     Raises
     ------
     FileFormatError
         If the file is no touch model.
-    UsageError
-        If the host, port or device can't be.
     """
 
     def __init__(
@@ -97,12 +105,12 @@ class Viewer:
         max_force: float | None = None,
         strict_port: bool = False,
     ) -> None:
-        self._closing = contextlib.ExitStack()
-        path = model if not isinstance(model, TouchModel) else self._written(model)
         self.model = model if isinstance(model, TouchModel) else TouchModel.load(model)
-        self.loop = LoopProcess(path, device=device, rate=rate, max_force=max_force)
-        self._wanted = (port, host, strict_port)
         self.host, self.port = host, port
+        self._path = None if isinstance(model, TouchModel) else model
+        self._wanted = (port, host, strict_port)
+        self._loop = functools.partial(LoopProcess, device=device, rate=rate, max_force=max_force)
+        self._closing = contextlib.ExitStack()
 
     @property
     def url(self) -> str:
@@ -116,6 +124,8 @@ class Viewer:
         ------
         PortInUseError
             If no port is free, or the one wanted isn't and `strict_port` is set.
+        UsageError
+            If the host, the port or the device can't be.
         DeviceError
             If the real-time process or the server doesn't start.
         """
@@ -123,7 +133,8 @@ class Viewer:
             port, host, strict = self._wanted
             socket = self._closing.enter_context(listen(port, host, strict=strict))
             self.port = int(socket.getsockname()[1])
-            self._closing.enter_context(self.loop)
+            path = self._written() if self._path is None else self._path
+            self.loop = self._closing.enter_context(self._loop(path))
             server = _server(Session(self.model, self.loop))
             self._thread = threading.Thread(
                 target=server.run, args=([socket],), name="palpate viewer", daemon=True
@@ -145,10 +156,10 @@ class Viewer:
         while self._thread.is_alive():
             self._thread.join(0.5)  # in steps: a join without end can't be interrupted on every system
 
-    def _written(self, model: TouchModel) -> Path:
+    def _written(self) -> Path:
         """A file of the model, which the real-time process can read."""
         folder = self._closing.enter_context(tempfile.TemporaryDirectory(prefix="palpate-"))
-        return model.save(Path(folder) / "model.palpate")
+        return self.model.save(Path(folder) / "model.palpate")
 
     def _await(self, server: uvicorn.Server) -> None:
         deadline = threading.Event()
@@ -189,7 +200,7 @@ def serve(
     open_browser: bool = False,
     on_ready: Callable[[Viewer], object] | None = None,
 ) -> None:
-    """Show a body in the browser until interrupted (Ctrl-C).
+    """Show a body in the browser until interrupted (Ctrl-C) or terminated.
 
     Parameters
     ----------
@@ -203,12 +214,25 @@ def serve(
     viewer = Viewer(
         model, port=port, host=host, device=device, rate=rate, max_force=max_force, strict_port=strict_port
     )
-    with viewer, contextlib.suppress(KeyboardInterrupt):
+    with _termination_interrupts(), contextlib.suppress(KeyboardInterrupt), viewer:
         if on_ready is not None:
             on_ready(viewer)
         if open_browser:
             webbrowser.open(viewer.url)
         viewer.wait()
+
+
+@contextlib.contextmanager
+def _termination_interrupts() -> Iterator[None]:
+    """SIGTERM ends like Ctrl-C: in good order, with the real-time process stopped and its memory freed."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # only the main thread may set signal handlers
+        return
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _server(session: Session) -> uvicorn.Server:

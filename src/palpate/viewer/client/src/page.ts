@@ -60,7 +60,7 @@ function notes(view: View): void {
     ...[
       `displacement ${times(view.enlarged)}`,
       `thickness ${times(view.thickened)}`,
-      "light bands: nodes of interest",
+      "bands: nodes of interest",
     ].map((words) => {
       const line = document.createElement("div");
       line.textContent = words;
@@ -117,6 +117,7 @@ function labelArrow(view: View, frame: Frame): void {
 
 function picture(): void {
   requestAnimationFrame(picture);
+  if (document.hidden) return; // grants no credit, so nothing is sent either
   hand.tick();
   const frame = connection.take();
   const now = performance.now();

@@ -1,5 +1,6 @@
 // The side panel: numbers, flags, plots, sliders, and what is known of the model.
 
+import { about } from "./about";
 import { flags } from "./flags";
 import type { Flag } from "./flags";
 import { Hold, Loop } from "./messages";
@@ -176,34 +177,4 @@ function follow(frame: Frame): void {
     if (!slider.matches(":active")) slider.valueAsNumber = value;
     slider.previousElementSibling!.textContent = `${tidy(value)} ${slider.dataset["unit"]}`;
   });
-}
-
-const ROWS = 40;
-
-function about(hello: Hello): void {
-  const rows = [...flatten("", hello.meta)].slice(0, ROWS);
-  element("about").hidden = rows.length === 0;
-  element("meta").replaceChildren(
-    ...rows.flatMap(([key, value]) => {
-      const [term, words] = [document.createElement("dt"), document.createElement("dd")];
-      [term.textContent, words.textContent] = [key, value];
-      return [term, words];
-    }),
-  );
-}
-
-function* flatten(path: string, value: unknown): Generator<[string, string]> {
-  if (Array.isArray(value)) {
-    if (value.length <= 8 && value.every((v) => typeof v !== "object")) yield [path, value.map(plain).join(", ")];
-  } else if (value !== null && typeof value === "object") {
-    for (const [key, inner] of Object.entries(value)) {
-      yield* flatten(path ? `${path} · ${key.replaceAll("_", " ")}` : key.replaceAll("_", " "), inner);
-    }
-  } else if (value !== null && value !== undefined && value !== "") {
-    yield [path, plain(value)];
-  }
-}
-
-function plain(value: unknown): string {
-  return typeof value === "number" ? (Number.isInteger(value) ? String(value) : tidy(value)) : String(value);
 }

@@ -6,7 +6,7 @@ import functools
 import hashlib
 import json
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -174,6 +174,41 @@ class Dataset:
                 fix="Take rows within it.",
             )
         return Dataset(self.data.isel(sample=rows))
+
+    @classmethod
+    def concat(cls, parts: Sequence[Dataset]) -> Dataset:
+        """The rows of several sweeps of the same body, one after another; the first one's provenance stands.
+
+        Raises
+        ------
+        UsageError
+            If there are none, or they are of different bodies or inputs.
+        """
+        import xarray
+
+        if not parts:
+            raise UsageError("There are no datasets to put together.", fix="Give at least one.")
+        first = parts[0]
+        for other in parts[1:]:
+            if other.provenance["problem"] != first.provenance["problem"] or other.ranges != first.ranges:
+                raise UsageError(
+                    "These datasets are not of the same body and loads.",
+                    why="Rows of different problems would be learnt as if they were of one.",
+                    fix="Keep them apart, or sweep again with one study.",
+                )
+        rows = xarray.concat(
+            [p.data for p in parts],
+            "sample",
+            data_vars="minimal",
+            coords="minimal",
+            compat="override",
+            join="override",
+            combine_attrs="override",
+        )
+        # row numbers of different sweeps mean nothing together
+        return cls(
+            rows.assign_coords(sample=np.arange(rows.sizes["sample"])) if "sample" in rows.coords else rows
+        )
 
     def every(self, k: int, start: int = 0) -> Dataset:
         """Each k-th row, from `start` on."""

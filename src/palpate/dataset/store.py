@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import shutil
 import uuid
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,7 +33,7 @@ def write(dataset: Dataset, path: Path, *, overwrite: bool) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     staging = path.with_name(f".{path.name}.{uuid.uuid4().hex[:8]}")
     try:
-        data = dataset.data.assign_attrs(checksum=dataset.fingerprint())
+        data = dataset.data.assign_attrs(checksum=_checksum(dataset))
         # consolidated metadata is no part of Zarr's format 3
         data.to_zarr(staging, mode="w-", zarr_format=3, consolidated=False)
         if path.exists():
@@ -72,7 +74,7 @@ def _attributes(path: Path) -> dict[str, Any]:
     metadata = path / "zarr.json"
     try:
         attrs = json.loads(metadata.read_text(encoding="utf-8"))["attributes"]
-    except FileNotFoundError as error:
+    except (FileNotFoundError, NotADirectoryError) as error:
         raise FileFormatError(
             f"{path} is no dataset of palpate.",
             why="It isn't a folder with a file zarr.json.",
@@ -89,15 +91,24 @@ def _load(path: Path) -> xarray.Dataset:
     import xarray
 
     try:
-        data: xarray.Dataset = xarray.open_zarr(path, consolidated=False, chunks=None).load()
+        with warnings.catch_warnings():
+            # Zarr only warns of a variable without metadata
+            warnings.filterwarnings("error", message=".*is not recognized as a component of a Zarr hierarchy")
+            data: xarray.Dataset = xarray.open_zarr(path, consolidated=False, chunks=None).load()
         wanted = data.attrs.pop("checksum", "none")
-        found = Dataset(data).fingerprint()
+        found = _checksum(Dataset(data))
     # the kinds of errors that Zarr, its codecs and xarray raise on broken bytes
-    except (OSError, ValueError, KeyError, TypeError, RuntimeError, AttributeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, RuntimeError, AttributeError, UserWarning) as error:
         raise _corrupt(path, f"it can't be decoded: {error!r}.") from error
     if found != wanted:
         raise _corrupt(path, f"its contents don't match its checksum ({found[:12]} against {wanted[:12]}).")
     return data
+
+
+def _checksum(dataset: Dataset) -> str:
+    """SHA-256 over all variables and the provenance, as hexadecimal digits."""
+    origin = json.dumps(dataset.provenance, sort_keys=True)
+    return hashlib.sha256((dataset.fingerprint() + origin).encode()).hexdigest()
 
 
 def _corrupt(path: Path, why: str) -> FileFormatError:

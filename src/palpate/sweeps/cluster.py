@@ -87,16 +87,14 @@ class LocalCluster:
         """
         for place, worker in enumerate(self._workers):
             if worker.poll() is not None:
+                _end(worker)
                 self._workers[place] = self._start_worker()
                 self._tell_address(self._workers[place])
 
     def close(self) -> None:
         """End the scheduler and all workers; closing again does nothing."""
-        for worker in self._workers:
-            if worker.stdin:
-                worker.stdin.close()  # the sign for it to end
         if self._scheduler is not None:
-            self._scheduler.close()
+            self._scheduler.close()  # tells the workers to end
         for worker in self._workers:
             _end(worker)
         self._folder.cleanup()
@@ -169,22 +167,25 @@ def available_cores() -> int:
 
 
 def _start_scheduler() -> Any:
+    import dask
     import distributed
 
-    return distributed.LocalCluster(
-        n_workers=0,
-        processes=False,
-        protocol="tcp://",
-        host="127.0.0.1",
-        silence_logs=logging.CRITICAL,
-        scheduler_kwargs={
-            # a task that kills its worker is not tried on the others, one after the other
-            "allowed_failures": 0,
-            # without a dashboard Dask still opens its port, by default to the whole network
-            "dashboard": False,
-            "dashboard_address": "127.0.0.1:0",
-        },
-    )
+    # one task at a time per worker: a task that kills it takes no other one along
+    with dask.config.set({"distributed.scheduler.worker-saturation": 1.0}):
+        return distributed.LocalCluster(
+            n_workers=0,
+            processes=False,
+            protocol="tcp://",
+            host="127.0.0.1",
+            silence_logs=logging.CRITICAL,
+            scheduler_kwargs={
+                # nor is it tried on the other workers, one after the other
+                "allowed_failures": 0,
+                # without a dashboard Dask still opens its port, by default to the whole network
+                "dashboard": False,
+                "dashboard_address": "127.0.0.1:0",
+            },
+        )
 
 
 def _environment() -> dict[str, str]:
@@ -195,7 +196,9 @@ def _environment() -> dict[str, str]:
 
 def _end(worker: subprocess.Popen[bytes]) -> None:
     try:
-        worker.wait(timeout=2)
+        worker.wait(timeout=0.5)  # most end by themselves; one in the midst of a solve does not
     except subprocess.TimeoutExpired:
         worker.kill()
         worker.wait()
+    if worker.stdin:
+        worker.stdin.close()

@@ -11,6 +11,7 @@ import numpy as np
 
 from palpate.sweeps.answers import Columns, failed_row, solve_chunk
 from palpate.sweeps.cluster import LocalCluster, local_cluster
+from palpate.sweeps.interrupt import deferred_interrupt
 from palpate.sweeps.problem import Problem
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["connect", "run"]
 
 PATIENCE = 0.5  # s between looks at the workers
+FETCH = 5.0  # s; Dask's client may wait for ever for a result whose worker died just after it
 TRIES = 3  # a sample whose worker died may have died of its neighbour
 
 
@@ -49,11 +51,12 @@ def run(
     problem: Problem,
     points: np.ndarray,
     chunks: Sequence[np.ndarray],
-) -> Iterator[tuple[np.ndarray, Columns]]:
-    """Solve the chunks and yield each one's rows and answers as they come in.
+    accept: Callable[[np.ndarray, Columns], None],
+) -> None:
+    """Solve the chunks and hand over each one's rows and answers as they come in.
 
     A chunk that raises, or whose worker dies, is solved again sample by sample; a sample that then still does
-    so is yielded as a row with the error's words. The sweep goes on.
+    so becomes a row with the error's words. The sweep goes on.
 
     Parameters
     ----------
@@ -64,6 +67,8 @@ def run(
     points : (N, n) array
     chunks : sequence of int arrays
         Rows of `points`.
+    accept : callable
+        Takes rows and their answers.
     """
     finished: queue.SimpleQueue[Any] = queue.SimpleQueue()
     pending: dict[Any, tuple[np.ndarray, int]] = {}
@@ -73,31 +78,46 @@ def run(
         pending[future] = (rows, tries)
         future.add_done_callback(finished.put)
 
-    for rows in chunks:
-        submit(rows)
-    while pending:
-        try:
-            future = finished.get(timeout=PATIENCE)
-        except queue.Empty:
-            revive()
-            continue
-        rows, tries = pending.pop(future)
-        error = None if future.status == "finished" else future.exception()
-        if error is None:
-            yield rows, future.result()
-        elif rows.size > 1:
-            for row in rows:
-                submit(row[None])
-        elif type(error).__name__ == "KilledWorker" and tries + 1 < TRIES:
-            submit(rows, tries + 1)
-        else:
-            yield rows, failed_row(len(problem.rest), _words(error))
+    with deferred_interrupt() as check_interrupt:
+        for rows in chunks:
+            submit(rows)
+        while pending:
+            check_interrupt()
+            try:
+                future = finished.get(timeout=PATIENCE)
+            except queue.Empty:
+                revive()
+                continue
+            rows, tries = pending.pop(future)
+            answers, error = _outcome(future)
+            if answers is not None:
+                accept(rows, answers)
+            elif tries + 1 < TRIES and (error is None or (rows.size == 1 and _is_death(error))):
+                submit(rows, tries + 1)
+            elif rows.size > 1:
+                for row in rows:
+                    submit(row[None])
+            else:
+                accept(rows, failed_row(len(problem.rest), _words(error)))
 
 
-def _words(error: BaseException) -> str:
-    if type(error).__name__ == "KilledWorker":
-        return "the process that solved it died"
-    return f"{type(error).__name__}: {error}"
+def _outcome(future: Any) -> tuple[Columns | None, BaseException | None]:
+    """Answers, or the error, or neither where the answers were lost."""
+    try:
+        error = None if future.status == "finished" else future.exception(timeout=FETCH)
+        return (future.result(timeout=FETCH) if error is None else None), error
+    except TimeoutError:
+        return None, None
+
+
+def _is_death(error: BaseException) -> bool:
+    return type(error).__name__ == "KilledWorker"
+
+
+def _words(error: BaseException | None) -> str:
+    if error is None:
+        return "its answer was lost on the way"
+    return "the process that solved it died" if _is_death(error) else f"{type(error).__name__}: {error}"
 
 
 def _nothing() -> None:

@@ -159,13 +159,16 @@ def _solve(
     parts = _chunks(plan, done)
     with reporter(progress) as report, _keeping(plan, ledger, columns) as keep:
         report(int(done.sum()), done.size)
+
+        def accept(rows: np.ndarray, answers: Columns) -> None:
+            put(columns, rows, answers)
+            done[rows] = True
+            keep(rows)
+            report(int(done.sum()), done.size)
+
         if parts:
             with connect(cluster, workers) as (client, revive):
-                for rows, answers in run(client, revive, plan.problem, plan.points, parts):
-                    put(columns, rows, answers)
-                    done[rows] = True
-                    keep(rows)
-                    report(int(done.sum()), done.size)
+                run(client, revive, plan.problem, plan.points, parts, accept)
     data = plan.label(columns, np.arange(len(plan.points)))
     if ledger:
         ledger.finish(data)

@@ -31,7 +31,8 @@ async def _work(address: str, folder: str, name: str) -> None:
 
 
 def _end_with_input() -> None:
-    while sys.stdin.buffer.read(1024):
+    # the descriptor itself is read: a thread inside `sys.stdin` would stall the interpreter's end
+    while os.read(sys.stdin.fileno(), 1024):
         pass
     os._exit(0)
 

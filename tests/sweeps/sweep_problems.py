@@ -1,0 +1,71 @@
+"""Problems with known answers and known ways to fail, for tests of the sweep. Workers import this module."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from palpate.physics.solution import Solution, Stop
+from palpate.units import Range
+
+
+@dataclass(frozen=True)
+class Spring:
+    """One node on a spring of 2 N/m; it misbehaves where told to.
+
+    raises, dies, fails: inputs at which the solver raises, takes its process down, or does not converge.
+    log: a folder that gets one file per solve.
+    """
+
+    raises: tuple[float, ...] = ()
+    dies: tuple[float, ...] = ()
+    fails: tuple[float, ...] = ()
+    log: str = ""
+    seconds: float = 0.0
+    ranges: tuple[Range, ...] = (Range("P", 0.0, 10.0, "N"),)
+    load_nodes: tuple[int, ...] = (0,)
+    load_directions: tuple[tuple[float, float], ...] = ((0.0, -1.0),)
+
+    @property
+    def rest(self):
+        return np.array([[1.0, 0.0]])
+
+    @property
+    def of_interest(self):
+        return np.array([True])
+
+    def describe(self):
+        return {"body": {"type": "Spring", "raises": self.raises, "fails": self.fails}}
+
+    def open(self):
+        return SpringSolver(self)
+
+
+class SpringSolver:
+    def __init__(self, problem):
+        self.problem = problem
+
+    def solve(self, x):
+        force = float(x[0])
+        time.sleep(self.problem.seconds)
+        if self.problem.log:
+            (Path(self.problem.log) / f"{force:.6f}-{time.time_ns()}").touch()
+        if force in self.problem.raises:
+            raise ZeroDivisionError(f"no answer at {force:g}")
+        if force in self.problem.dies:
+            os._exit(1)
+        stop = Stop.UNSTABLE if force in self.problem.fails else Stop.CONVERGED
+        u = force / 2
+        return Solution(
+            stop=stop,
+            iterations=1,
+            residual=0.0,
+            displacement=np.array([[0.0, -u, 0.0]]),
+            root_reaction=np.array([0.0, force, force]),
+            strain_energy=u * u,
+            potential_energy=-u * u,
+        )

@@ -1,0 +1,136 @@
+"""Worker processes: scripts without a guard, nothing left behind, nothing open to the network."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+
+from palpate.errors import UsageError
+from palpate.sweeps import local_cluster
+
+SCRIPT = """
+from palpate.physics import Cantilever, Circle, LinearElastic, TipLoad
+from palpate.sweeps import sweep
+body = Cantilever(1.0, Circle(0.005), LinearElastic(2e9, 0.43), elements=5)
+data = sweep(body, TipLoad(0, 5), samples=8, workers=2)
+print(len(data.ok), "solved")
+"""
+
+ENDLESS = """
+import sys
+sys.path.insert(0, {folder!r})
+from sweep_problems import Spring
+from palpate.sweeps import sweep
+def report(done, total):
+    if done:
+        print("busy", flush=True)
+sweep(Spring(seconds=0.05), samples=2000, workers=2, progress=report, path={path!r})
+"""
+
+
+def children(pid):
+    return psutil.Process(pid).children(recursive=True)
+
+
+def gone(processes, seconds=10.0):
+    _, alive = psutil.wait_procs(processes, timeout=seconds)
+    return not alive
+
+
+@pytest.mark.parametrize("way", ["file", "stdin", "command"])
+def test_a_plain_script_needs_no_guard(tmp_path, way):
+    file = tmp_path / "script.py"
+    file.write_text(SCRIPT, encoding="utf-8")
+    arguments = {"file": [str(file)], "stdin": ["-"], "command": ["-c", SCRIPT]}[way]
+    done = subprocess.run(
+        [sys.executable, "-W", "error", *arguments],
+        input=SCRIPT if way == "stdin" else None,
+        capture_output=True,
+        text=True,
+        timeout=100,
+        cwd=tmp_path,
+        check=False,
+    )
+    assert done.stdout == "8 solved\n"
+    assert not done.stderr
+    assert done.returncode == 0
+
+
+@pytest.fixture
+def busy(tmp_path):
+    """A script in the middle of a sweep, in a process group of its own, and its worker processes."""
+    code = ENDLESS.format(folder=str(Path(__file__).parent), path=str(tmp_path / "a.zarr"))
+    script = subprocess.Popen(
+        [sys.executable, "-c", code],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    assert script.stdout.readline() == "busy\n"
+    workers = children(script.pid)
+    assert len(workers) == 2
+    yield script, workers
+    for process in (script, *workers):
+        if process.poll() is None if isinstance(process, subprocess.Popen) else process.is_running():
+            process.kill()
+    script.communicate()
+
+
+def test_ctrl_c_ends_everything_and_keeps_what_is_done(busy, tmp_path):
+    script, workers = busy
+    os.killpg(script.pid, signal.SIGINT)  # what a terminal does
+    _, errors = script.communicate(timeout=20)
+    assert "KeyboardInterrupt" in errors
+    assert gone(workers)
+    assert list((tmp_path / "a.zarr.parts").glob("part-*.zarr"))
+
+
+def test_a_killed_script_leaves_no_worker(busy):
+    script, workers = busy
+    script.kill()
+    script.communicate()
+    assert gone(workers)
+
+
+def test_a_cluster_ends_with_its_block_also_by_an_error():
+    before = {child.pid for child in children(os.getpid())}
+    workers = []
+
+    def fail():
+        with local_cluster(2) as cluster:
+            workers.extend(psutil.Process(pid) for pid in cluster.process_ids)
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    assert gone(workers, 1.0)
+    assert {child.pid for child in children(os.getpid())} <= before
+
+
+def test_closing_twice_is_harmless():
+    cluster = local_cluster(1)
+    cluster.close()
+    cluster.close()
+
+
+def test_a_cluster_needs_a_worker():
+    with pytest.raises(UsageError):
+        local_cluster(0)
+
+
+def test_nothing_listens_beyond_this_machine(cluster):
+    deadline = time.monotonic() + 20
+    processes = [psutil.Process(pid) for pid in cluster.process_ids]
+    listening = []
+    while len(listening) < 2 and time.monotonic() < deadline:  # a worker starts to listen once it is up
+        listening = [c for p in processes for c in p.net_connections("tcp") if c.status == "LISTEN"]
+    own = [c for c in psutil.Process().net_connections("tcp") if c.status == "LISTEN"]
+    assert listening
+    assert own
+    assert {connection.laddr.ip for connection in listening + own} <= {"127.0.0.1", "::1"}

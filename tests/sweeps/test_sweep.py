@@ -1,0 +1,178 @@
+"""Sweeps on real worker processes."""
+
+import os
+import time
+
+import numpy as np
+import pytest
+from sweep_problems import Spring
+
+from palpate.dataset import Dataset
+from palpate.errors import SolverError, UsageError
+from palpate.physics import Cantilever, Circle, LinearElastic, TipLoad, preset
+from palpate.sweeps import local_cluster, sweep
+
+BODY = Cantilever(1.0, Circle(0.005), LinearElastic(2e9, 0.43), elements=5)
+
+
+def test_a_sweep_is_the_solves_one_by_one(cluster):
+    data = sweep(BODY, TipLoad(0, 5), samples=20, seed=4, cluster=cluster)
+    problem = BODY.problem(TipLoad(0, 5))
+    assert data.ranges == problem.ranges
+    assert data.converged.all()
+    for x, found in zip(data.X, data.displacement, strict=True):
+        np.testing.assert_allclose(found, problem.solve(x).displacement, atol=1e-9)
+    np.testing.assert_allclose(data.root_reaction[:, 1], data.X[:, 0], atol=1e-9)
+    np.testing.assert_array_equal(data.rest, problem.rest)
+    assert data.provenance["problem"] == problem.describe() or data.provenance["problem"]["loads"]
+
+
+def test_the_founding_sweep(cluster):
+    beam = preset("beam-nylon")
+    data = sweep(beam.body, beam.loads, samples=beam.samples, design=beam.design, cluster=cluster)
+    assert len(data) == 501
+    assert data.converged.all()
+    np.testing.assert_allclose(data.X[:, 0], np.arange(501) / 100, atol=1e-15)
+    tip = data.displacement[:, data.load_nodes[0], 1]
+    assert (np.diff(tip) < 0).all()
+    # dΠ/dP = -(displacement along the load), by central differences of neighbouring rows
+    slope = (data.potential_energy[2:] - data.potential_energy[:-2]) / 0.02
+    np.testing.assert_allclose(slope, tip[1:-1], atol=5e-6)  # h² w'''/6
+
+
+def test_the_number_of_workers_changes_no_bit(cluster):
+    two = sweep(BODY, TipLoad(0, 5), samples=40, cluster=cluster)
+    one = sweep(BODY, TipLoad(0, 5), samples=40, workers=1)
+    assert one.hash == two.hash
+
+
+def test_points_and_progress_of_ones_own(cluster):
+    seen = []
+    data = sweep(Spring(), points=[1.0, 7.0, 3.0], cluster=cluster, progress=lambda *done: seen.append(done))
+    np.testing.assert_array_equal(data.X[:, 0], [1, 7, 3])
+    np.testing.assert_array_equal(data.displacement[:, 0, 1], [-0.5, -3.5, -1.5])
+    assert seen[0] == (0, 3)
+    assert seen[-1] == (3, 3)
+    assert data.provenance["design"] == "points"
+
+
+def test_failures_are_rows(cluster):
+    points = np.arange(10.0)
+    data = sweep(Spring(fails=(2.0,), raises=(5.0,)), points=points, cluster=cluster)
+    np.testing.assert_array_equal(np.flatnonzero(~data.converged), [2, 5])
+    assert np.isnan(data.displacement[[2, 5]]).all()
+    np.testing.assert_array_equal(data.ok.displacement[:, 0, 1], -np.delete(points, [2, 5]) / 2)
+    assert "unstable" in data.data["message"].values[2]
+    assert "ZeroDivisionError: no answer at 5" in data.data["message"].values[5]
+
+
+def test_a_sample_that_kills_its_worker_is_a_row():
+    with local_cluster(2) as mortal:
+        before = mortal.process_ids
+        data = sweep(Spring(dies=(4.0,)), points=np.arange(8.0), cluster=mortal)
+        assert mortal.process_ids != before
+    np.testing.assert_array_equal(np.flatnonzero(~data.converged), [4])
+    assert "died" in data.data["message"].values[4]
+
+
+def test_too_many_failures_raise_with_examples(cluster):
+    with pytest.raises(SolverError, match="3 of 4") as caught:
+        sweep(Spring(fails=(1.0, 2.0, 3.0)), points=[0.0, 1.0, 2.0, 3.0], cluster=cluster)
+    assert "P = 1 N" in caught.value.why
+    assert "unstable" in caught.value.why
+    data = sweep(Spring(fails=(1.0, 2.0, 3.0)), points=np.arange(4.0), cluster=cluster, max_failed=0.75)
+    assert len(data.ok) == 1
+
+
+def test_loads_beyond_the_solvers_reach_are_a_solver_error(cluster):
+    with pytest.raises(SolverError) as caught:
+        sweep(BODY, TipLoad(1e6, 1e9), samples=4, cluster=cluster)
+    assert "P = " in caught.value.why
+    assert caught.value.exit_code == 3
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"body": BODY, "loads": TipLoad(0, 1)},
+        {"body": BODY, "loads": TipLoad(0, 1), "samples": 3, "points": [1.0]},
+        {"body": BODY, "samples": 3},
+        {"body": "beam", "loads": TipLoad(0, 1), "samples": 3},
+        {"body": BODY, "loads": TipLoad(0, 1), "samples": 0},
+        {"body": BODY, "loads": TipLoad(0, 1), "points": []},
+        {"body": BODY, "loads": TipLoad(0, 1), "samples": 3, "design": "spiral"},
+        {"body": BODY, "loads": TipLoad(0, 1), "samples": 3, "workers": 0},
+    ],
+)
+def test_wrong_arguments(arguments):
+    with pytest.raises(UsageError):
+        sweep(**arguments)
+
+
+def test_any_scheduler_address_will_do(cluster):
+    import distributed
+
+    by_address = sweep(Spring(), points=[1.0, 2.0], cluster=cluster.address)
+    with distributed.Client(cluster.address, set_as_default=False) as client:
+        by_client = sweep(Spring(), points=[1.0, 2.0], cluster=client)
+        assert client.status == "running"
+    assert by_address.hash == by_client.hash
+
+
+def test_a_finished_sweep_is_read_not_solved_again(cluster, tmp_path):
+    (tmp_path / "log").mkdir()
+    spring = Spring(log=str(tmp_path / "log"))
+    first = sweep(spring, samples=8, cluster=cluster, path=tmp_path / "a.zarr")
+    again = sweep(spring, samples=8, cluster=cluster, path=tmp_path / "a.zarr")
+    assert again.hash == first.hash == Dataset.open(tmp_path / "a.zarr").hash
+    assert len(list((tmp_path / "log").iterdir())) == 8
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.zarr", "log"]
+
+
+@pytest.mark.parametrize("change", [{"samples": 9}, {"seed": 1}, {"body": Spring(fails=(1.0,))}])
+def test_another_sweep_at_the_same_path_is_refused(cluster, tmp_path, change):
+    arguments = {"body": Spring(), "samples": 8, "cluster": cluster, "path": tmp_path / "a.zarr"}
+    first = sweep(**arguments)
+    with pytest.raises(UsageError, match="belongs to another sweep"):
+        sweep(**arguments | change)
+    assert Dataset.open(tmp_path / "a.zarr").hash == first.hash
+
+
+def test_an_interrupted_sweep_goes_on_where_it_stopped(cluster, tmp_path):
+    (tmp_path / "log").mkdir()
+    spring = Spring(log=str(tmp_path / "log"), seconds=0.01)
+    arguments = {"body": spring, "samples": 64, "cluster": cluster, "path": tmp_path / "a.zarr"}
+
+    def interrupt(done, total):
+        if done >= 20:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        sweep(**arguments, progress=interrupt)
+    assert not (tmp_path / "a.zarr").exists()
+    with pytest.raises(UsageError, match="belongs to another sweep"):
+        sweep(**arguments | {"seed": 2})
+    # tasks in flight end by themselves; their solves count for nothing
+    time.sleep(0.5)
+    for file in (tmp_path / "log").iterdir():
+        file.unlink()
+    seen = []
+    data = sweep(**arguments, progress=lambda done, _: seen.append(done))
+    assert seen[0] >= 20
+    assert len(list((tmp_path / "log").iterdir())) == 64 - seen[0]
+    assert not (tmp_path / "a.zarr.parts").exists()
+    assert data.hash == sweep(Spring(), samples=64, cluster=cluster).hash
+
+
+def test_a_damaged_part_is_solved_again(cluster, tmp_path):
+    arguments = {"body": Spring(), "samples": 64, "cluster": cluster, "path": tmp_path / "a.zarr"}
+
+    def interrupt(done, total):
+        if done:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        sweep(**arguments, progress=interrupt)
+    (part,) = (tmp_path / "a.zarr.parts").glob("part-*")
+    os.remove(part / "inputs" / "zarr.json")
+    assert sweep(**arguments).hash == sweep(Spring(), samples=64, cluster=cluster).hash

@@ -33,6 +33,14 @@ sweep(Spring(seconds=0.05), samples=2000, workers=2, progress=report, path={path
 """
 
 
+IN_A_RUNNING_LOOP = f"""
+import asyncio
+async def cell():
+    exec({SCRIPT!r})
+asyncio.run(cell())
+"""
+
+
 def children(pid):
     return psutil.Process(pid).children(recursive=True)
 
@@ -42,11 +50,16 @@ def gone(processes, seconds=10.0):
     return not alive
 
 
-@pytest.mark.parametrize("way", ["file", "stdin", "command"])
+@pytest.mark.parametrize("way", ["file", "stdin", "command", "notebook"])
 def test_a_plain_script_needs_no_guard(tmp_path, way):
     file = tmp_path / "script.py"
     file.write_text(SCRIPT, encoding="utf-8")
-    arguments = {"file": [str(file)], "stdin": ["-"], "command": ["-c", SCRIPT]}[way]
+    arguments = {
+        "file": [str(file)],
+        "stdin": ["-"],
+        "command": ["-c", SCRIPT],
+        "notebook": ["-c", IN_A_RUNNING_LOOP],  # a notebook's cells run inside an event loop
+    }[way]
     done = subprocess.run(
         [sys.executable, "-W", "error", *arguments],
         input=SCRIPT if way == "stdin" else None,

@@ -12,6 +12,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -24,6 +25,7 @@ __all__ = ["LocalCluster", "local_cluster"]
 _ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
 )
+_GRACE = 1.0  # s to end by themselves; a worker in the midst of a solve does not
 _SPARE_LIVES = 12  # workers started again after a crash, per cluster
 
 
@@ -87,7 +89,7 @@ class LocalCluster:
         """
         for place, worker in enumerate(self._workers):
             if worker.poll() is not None:
-                _end(worker)
+                _end(worker, time.monotonic())
                 self._workers[place] = self._start_worker()
                 self._tell_address(self._workers[place])
 
@@ -95,8 +97,9 @@ class LocalCluster:
         """End the scheduler and all workers; closing again does nothing."""
         if self._scheduler is not None:
             self._scheduler.close()  # tells the workers to end
+        deadline = time.monotonic() + _GRACE
         for worker in self._workers:
-            _end(worker)
+            _end(worker, deadline)
         self._folder.cleanup()
 
     def _start_worker(self) -> subprocess.Popen[bytes]:
@@ -194,9 +197,9 @@ def _environment() -> dict[str, str]:
     return {**os.environ, **_ONE_THREAD, "PYTHONPATH": path}
 
 
-def _end(worker: subprocess.Popen[bytes]) -> None:
+def _end(worker: subprocess.Popen[bytes], deadline: float) -> None:
     try:
-        worker.wait(timeout=0.5)  # most end by themselves; one in the midst of a solve does not
+        worker.wait(timeout=max(0.0, deadline - time.monotonic()))
     except subprocess.TimeoutExpired:
         worker.kill()
         worker.wait()

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import zipfile
+import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from pathlib import Path
 
 import numpy as np
 
+from palpate.errors import FileFormatError, UsageError
 from palpate.learning.mran import Event
 
 __all__ = ["History"]
@@ -57,6 +62,38 @@ class History:
             np.array(heldout),
             passes,
         )
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the history as a NumPy archive.
+
+        Raises
+        ------
+        UsageError
+            If the file can't be written.
+        """
+        path = Path(path)
+        try:
+            with path.open("wb") as file:
+                np.savez_compressed(file, **vars(self))
+        except OSError as error:
+            raise UsageError(f"Could not write {path}.", why=str(error)) from error
+        return path
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> History:
+        """Read a history back.
+
+        Raises
+        ------
+        FileFormatError
+            If the file is missing or no history.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                parts = {f.name: file[f.name] for f in fields(cls)}
+        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+            raise FileFormatError(f"{path} is not a learning history.", why=str(error)) from error
+        return cls(**(parts | {"passes": int(parts["passes"])}))
 
     @property
     def relapse(self) -> float:

@@ -24,6 +24,7 @@ __all__ = ["Refined", "refine"]
 
 _LONGEST = 1.0  # largest change of a log width, or of a centre in units of its width, in one iteration
 _DAMPING = (1e-12, 1e12)
+_MOST_LEVERAGE = 0.98  # a sample that decides its own fit says little; its residual counts fifty times
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +39,8 @@ class Refined:
     rms : float
         Training error per scaled output.
     loo : float
-        Leave-one-out error per scaled output, in closed form for fixed centres and widths (Allen 1974).
+        Leave-one-out error per scaled output: in closed form for weights and tail (Allen 1974), with the
+        centres' and widths' degrees of freedom spread evenly over the samples.
     condition : float
         2-norm condition number of the regressors; large values mean that units nearly cancel.
     iterations : int
@@ -169,7 +171,9 @@ def _bounded(step: np.ndarray, theta: np.ndarray) -> np.ndarray:
 
 def _result(X: np.ndarray, T: np.ndarray, theta: np.ndarray, fit: _Fit, count: int, done: bool) -> Refined:
     h = theta.shape[1]
-    leverage = np.minimum((fit.Q**2).sum(axis=1), 1.0 - 1e-6)
+    # centres and widths were fitted too: their 2 h n numbers count as leverage, shared by all samples and outputs
+    shared = 2.0 * theta[0].size / fit.residual.size
+    leverage = np.minimum((fit.Q**2).sum(axis=1) + shared, _MOST_LEVERAGE)
     left_out = fit.residual / (1.0 - leverage)[:, None]
     regressors = np.hstack([_activations(X, theta)[0], T])
     return Refined(

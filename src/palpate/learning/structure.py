@@ -66,7 +66,7 @@ def refined_network(
     trials = [Trial(0, best.loo, best.condition)]
     # as many unknowns as samples would interpolate anything and judge nothing
     room = max(0, (len(xs) - 1 - xs.shape[1]) // (1 + 2 * xs.shape[1]))
-    for h in range(1, min(units_max, room) + 1):
+    for h in _sizes(min(units_max, room)):
         if best.loo <= target:
             break
         found = [refine(xs, ys, *start, tail=tail) for start in _starts(xs, h, starts, seed, known, best)]
@@ -74,6 +74,12 @@ def refined_network(
         trials.append(Trial(h, winner.loo, winner.condition))
         best = min(best, winner, key=lambda r: r.loo)
     return _network(best, inputs, outputs, scaling), best, tuple(trials)
+
+
+def _sizes(largest: int) -> list[int]:
+    """Every size up to six, then by about a third more each time."""
+    sizes = [h for h in (1, 2, 3, 4, 5, 6, 8, 11, 15, 20, 27, 36, 48, 64) if h <= largest]
+    return sizes if not sizes or sizes[-1] == largest else [*sizes, largest]
 
 
 def _none(xs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -88,16 +94,17 @@ def _starts(
     known: tuple[np.ndarray, np.ndarray] | None,
     best: Refined,
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Spread-out centres of several widths, random ones, the filter's units, and the last size's plus one."""
+    """Spread-out centres of several widths, random ones, the filter's units, and the last size's and some more."""
     n = xs.shape[1]
     rng = np.random.default_rng((seed, h))
     spacing = 2.0 / h ** (1.0 / n)
     if known is not None and len(known[0]) >= h:
         chosen = _spread(known[0], h)
         yield known[0][chosen], known[1][chosen]
-    if len(best.centres) == h - 1:
-        extra = xs[rng.integers(len(xs))]
-        yield np.vstack([best.centres, extra]), np.vstack([best.widths, np.full(n, spacing)])
+    if 0 < len(best.centres) < h:
+        new = h - len(best.centres)
+        extra = xs[rng.choice(len(xs), new, replace=False)]
+        yield np.vstack([best.centres, extra]), np.vstack([best.widths, np.full((new, n), spacing)])
     for i in range(count):
         rows = _spread(xs, h) if i % 2 == 0 else rng.choice(len(xs), h, replace=False)
         width = spacing * (0.75, 1.0, 1.5, 0.5, 2.0, 1.25)[i % 6]

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
@@ -86,7 +87,21 @@ def learn_touch(
     UsageError
         If there are too few converged solves to learn from.
     """
-    train = train.ok
+    with threadpool_limits(1):  # small matrices: more BLAS threads cost time and the bits of the result
+        return _learn_touch(train.ok, heldout, name, settings, refinement, passes, seed, coupling, progress)
+
+
+def _learn_touch(
+    train: Dataset,
+    heldout: Dataset | None,
+    name: str,
+    settings: Settings | None,
+    refinement: Refinement | None,
+    passes: int,
+    seed: int,
+    coupling: float | None,
+    progress: Callable[[int, int], None] | None,
+) -> tuple[TouchModel, History]:
     if len(train) < 4:
         raise UsageError(
             f"{len(train)} converged solves are too few to learn from.",
@@ -139,7 +154,7 @@ def _columns(data: Dataset, columns: list[tuple[int, int]]) -> np.ndarray:
 
 
 def _refinement_for(inputs: int) -> Refinement:
-    return Refinement() if inputs == 1 else Refinement(samples=400, units_max=24, target=1e-4, starts=2)
+    return Refinement() if inputs == 1 else Refinement(samples=400, units_max=36, target=2e-5, starts=2)
 
 
 def _spread_rows(data: Dataset, count: int) -> Dataset:
@@ -256,7 +271,7 @@ def _assembled(data: Dataset, parts: dict[str, Any], name: str, meta: dict[str, 
     X, _ = _hand(data, parts["networks"]["field"], node, touched, compliance)
     k = len(touched)
     stiffness = [np.linalg.eigvalsh((J[:, :k] + J[:, :k].T) / 2)[-1] for J in (force.jacobian(x) for x in X)]
-    body = data.provenance.get("body", {})
+    body = data.provenance.get("problem", {}).get("body", {})
     directions = np.zeros((k, 3))
     directions[:, :2] = data.load_directions[list(touched), :2]
     rest = np.zeros((len(data.rest), 3))
@@ -273,7 +288,7 @@ def _assembled(data: Dataset, parts: dict[str, Any], name: str, meta: dict[str, 
         mirrors=_mirrors(data, directions, body),
         reach=float(np.linalg.norm(data.displacement[:, node, :2], axis=1).max()),
         stiffness_max=float(max(stiffness)),
-        radius=float(body.get("radius", 0.005)),
+        radius=float(body.get("half_height", 0.005)),
         meta=meta,
     )
 

@@ -1,0 +1,242 @@
+"""The commands. Each parses, calls the study, prints; heavy imports wait until a command needs them."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from palpate.cli.console import Console
+from palpate.errors import AccuracyError, PalpateError, UsageError
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    name="palpate",
+    help="Turn a finite-element model into something you can touch.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+)
+
+StudyFile = Annotated[Path, typer.Argument(help="A study file; write one with [bold]palpate init[/].")]
+ModelFile = Annotated[Path, typer.Argument(help="A .palpate file, as [bold]palpate learn[/] writes it.")]
+Json = Annotated[bool, typer.Option("--json", help="Results as one JSON object on stdout.")]
+Workers = Annotated[int | None, typer.Option(min=1, help="Worker processes; by default one per core.")]
+Port = Annotated[
+    int, typer.Option(min=0, max=65535, help="Port of the page; a busy one moves on to the next.")
+]
+Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")]
+
+STUDY = Path("study.toml")
+
+
+@app.callback(invoke_without_command=True)
+def _root(
+    version: Annotated[bool, typer.Option("--version", help="Print the version.", is_eager=True)] = False,
+) -> None:
+    if version:
+        from palpate import __version__
+
+        typer.echo(f"palpate {__version__}")
+        raise typer.Exit
+
+
+@app.command()
+def demo(
+    names: Annotated[
+        list[str] | None, typer.Argument(help="Studies to run; by default both founding beams.")
+    ] = None,
+    folder: Annotated[Path, typer.Option(help="Where files go.")] = Path("palpate-demo"),
+    view: Annotated[bool, typer.Option("--view/--no-view", help="Serve the page at the end.")] = True,
+    workers: Workers = None,
+    port: Port = 8080,
+    browser: Browser = True,
+    as_json: Json = False,
+) -> None:
+    """Run the founding cantilevers from finite elements to the fingertip: under a minute."""
+    from palpate.cli.demo import run_demo
+
+    run_demo(names or ["beam-copper", "beam-nylon"], folder, workers, Console(as_json))
+    console = Console(as_json)
+    if view and not as_json:
+        if sys.stdout.isatty():
+            _serve(folder / f"{(names or ['beam-nylon'])[-1]}.palpate", port=port, browser=browser)
+        else:
+            console.say("No terminal, so no page is served: `palpate view FILE` does it.")
+
+
+@app.command()
+def init(
+    path: Annotated[Path, typer.Argument(help="File to write.")] = STUDY,
+    preset: Annotated[str, typer.Option(help="Study to start from.")] = "beam-nylon",
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+    show: Annotated[bool, typer.Option("--print", help="Print it instead of writing a file.")] = False,
+) -> None:
+    """Write a commented study file."""
+    from palpate.study import preset_study, to_toml
+
+    text = to_toml(preset_study(preset))
+    if show:
+        typer.echo(text, nl=False)
+        return
+    if path.exists() and not force:
+        raise UsageError(f"{path} exists already.", fix="Choose another name, or replace it with --force.")
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise UsageError(f"Could not write {path}.", why=str(error)) from error
+    typer.echo(f"{path}: a study called {preset}. Next: palpate sweep {path}")
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON schema of study files."""
+    from palpate.study import study_schema
+
+    typer.echo(study_schema())
+
+
+@app.command()
+def sweep(study: StudyFile = STUDY, workers: Workers = None, as_json: Json = False) -> None:
+    """Solve the study's model over its ranges; an interrupted sweep goes on where it stopped."""
+    from palpate.study import read_study
+    from palpate.study.pipeline import sweep_study
+
+    console = Console(as_json)
+    record = _with_workers(read_study(study), workers)
+    paths = _paths(study, record.name)
+    data, random = sweep_study(record, paths, progress=not as_json)
+    rows = len(data) + (len(random) if random else 0)
+    failed = rows - len(data.ok) - (len(random.ok) if random else 0)
+    console.result(
+        f"{data}\n{paths.data}"
+        + (f"\n{paths.random}: {len(random)} random loads for testing" if random else ""),
+        {
+            "data": str(paths.data),
+            "random": str(paths.random) if random else None,
+            "rows": rows,
+            "failed": failed,
+        },
+    )
+
+
+@app.command()
+def learn(study: StudyFile = STUDY, as_json: Json = False) -> None:
+    """Learn the study's dataset: sequential filter, then refinement."""
+    from palpate.study import read_study
+    from palpate.study.pipeline import learn_study
+
+    console = Console(as_json)
+    record = read_study(study)
+    paths = _paths(study, record.name)
+    train, test = _datasets(record, paths)
+    console.say(f"Learning from {len(train)} solves …")
+    touch, history = learn_study(record, train, test)
+    touch.save(paths.model)
+    history.save(paths.history)
+    units = {name: network.units for name, network in touch.networks.items()}
+    console.result(f"{touch}\n{history}\n{paths.model}", {"model": str(paths.model), "units": units})
+
+
+@app.command()
+def validate(
+    study: StudyFile = STUDY,
+    report: Annotated[bool, typer.Option("--report/--no-report", help="Write the HTML report.")] = True,
+    as_json: Json = False,
+) -> None:
+    """Judge the learnt model on loads it has never seen; exit code 1 where it misses the study's target."""
+    from palpate.learning import History
+    from palpate.study import read_study
+    from palpate.study.pipeline import Outcome, report_study, validate_study
+    from palpate.surrogates import TouchModel
+
+    console = Console(as_json)
+    record = read_study(study)
+    paths = _paths(study, record.name)
+    touch, history = TouchModel.load(paths.model), History.load(paths.history)
+    train, test = _datasets(record, paths)
+    validation = validate_study(record, touch, test, history)
+    text = str(validation)
+    if report:
+        report_study(paths.report, [Outcome(record, touch, train, test, validation, history)])
+        text += f"\nreport: {paths.report}"
+    console.result(text, validation.as_dict() | {"report": str(paths.report) if report else None})
+    validation.raise_if_failed()
+
+
+@app.command()
+def view(
+    model: ModelFile,
+    port: Port = 8080,
+    strict_port: Annotated[bool, typer.Option("--strict-port", help="Fail where the port is busy.")] = False,
+    browser: Browser = True,
+) -> None:
+    """Serve the page on which the model can be touched, on this machine only."""
+    _serve(model, port=port, browser=browser, strict_port=strict_port)
+
+
+@app.command()
+def run(
+    model: ModelFile,
+    seconds: Annotated[float, typer.Option(min=0.1, help="How long.")] = 5.0,
+    device: Annotated[str, typer.Option(help="For example stroke:amplitude=0.02,frequency=1.")] = "stroke",
+    rate: Annotated[float, typer.Option(min=1, max=10000, help="Hz.")] = 1000.0,
+    as_json: Json = False,
+) -> None:
+    """Run the real-time loop without a page, and print how late it was."""
+    from palpate.cli.loop import run_loop
+
+    run_loop(model, seconds, device, rate, Console(as_json))
+
+
+@app.command()
+def doctor(as_json: Json = False) -> None:
+    """Say what this machine can do, and what to do about each miss."""
+    from palpate.cli.doctor import report
+
+    report(Console(as_json))
+
+
+def _serve(model: Path, *, port: int, browser: bool, strict_port: bool = False) -> None:
+    from palpate.viewer import serve
+
+    serve(model, port=port, open_browser=browser and sys.stdout.isatty(), strict_port=strict_port)
+
+
+def _paths(study: Path, name: str) -> Any:
+    from palpate.study.pipeline import Paths
+
+    return Paths(study.parent, name)
+
+
+def _with_workers(study: Any, workers: int | None) -> Any:
+    if workers is None:
+        return study
+    return study.model_copy(update={"sweep": study.sweep.model_copy(update={"workers": workers})})
+
+
+def _datasets(study: Any, paths: Any) -> Any:
+    from palpate.dataset import Dataset
+    from palpate.study.pipeline import train_and_test
+
+    random = Dataset.open(paths.random) if study.test.random else None
+    return train_and_test(study, Dataset.open(paths.data), random)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Entry point: exit codes from the error tree, never a traceback for an error palpate foresaw."""
+    words = sys.argv[1:] if arguments is None else arguments
+    try:
+        app(words, standalone_mode=True)
+    except AccuracyError as error:
+        Console().error(error)  # the figures have been printed already, as JSON where asked
+        sys.exit(error.exit_code)
+    except PalpateError as error:
+        Console(as_json="--json" in words).error(error)
+        sys.exit(error.exit_code)
+    except KeyboardInterrupt:
+        sys.exit(130)

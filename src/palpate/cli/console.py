@@ -1,0 +1,60 @@
+"""Where words go: progress and errors to stderr, results to stdout, as text or as one JSON object."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from palpate.errors import PalpateError
+
+__all__ = ["Console"]
+
+
+@dataclass(frozen=True)
+class Console:
+    """What a command prints with.
+
+    Attributes
+    ----------
+    as_json : bool
+        Results as one JSON object on stdout, and no progress.
+    """
+
+    as_json: bool = False
+
+    def say(self, text: str) -> None:
+        """Progress: one line on stderr, in a terminal or not."""
+        if not self.as_json:
+            print(text, file=sys.stderr, flush=True)  # noqa: T201
+
+    def result(self, text: str, content: Mapping[str, Any]) -> None:
+        """The answer of a command."""
+        # not-a-number is no JSON: it becomes null
+        print(json.dumps(_finite(content), indent=2) if self.as_json else text, flush=True)  # noqa: T201
+
+    def error(self, error: PalpateError) -> None:
+        """A failure: what, why and what to do."""
+        if self.as_json:
+            parts = {"kind": type(error).__name__, "what": error.what, "why": error.why, "fix": error.fix}
+            print(json.dumps({"error": parts}, indent=2), flush=True)  # noqa: T201
+        from rich.console import Console as Rich
+        from rich.text import Text
+
+        rich = Rich(stderr=True, highlight=False, soft_wrap=True)
+        rich.print(Text.assemble(("error: ", "bold red"), (error.what, "bold")))
+        for line in filter(None, (error.why, error.fix)):
+            rich.print(Text(line))
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(k): _finite(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(v) for v in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

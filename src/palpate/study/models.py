@@ -1,0 +1,215 @@
+"""What a study says. Every record is frozen, unknown keys are errors, and quantities may carry units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
+from pydantic_core import CoreSchema, core_schema
+
+from palpate.errors import UsageError
+from palpate.learning import Refinement, Settings
+from palpate.units import to_si
+
+__all__ = [
+    "BodyRecord",
+    "FilterRecord",
+    "LearningRecord",
+    "LoadRecord",
+    "MaterialRecord",
+    "RuntimeRecord",
+    "SectionRecord",
+    "Study",
+    "SweepRecord",
+    "TargetRecord",
+    "TestRecord",
+    "Unit",
+]
+
+
+@dataclass(frozen=True)
+class Unit:
+    """Makes a float field a quantity: a number in this unit, or text with a unit of the same dimension.
+
+    Attributes
+    ----------
+    name : str
+        SI unit.
+    """
+
+    name: str
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(partial(_in_si, unit=self.name), handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, _: GetJsonSchemaHandler) -> dict[str, Any]:
+        text = f"a number in {self.name}, or a quantity with its unit, such as '1 {self.name}'"
+        return {"anyOf": [{"type": "number"}, {"type": "string"}], "description": text}
+
+
+def _in_si(value: Any, unit: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise ValueError(f"{value!r} is not a quantity in {unit}")  # noqa: TRY004 - pydantic collects ValueError
+    try:
+        return to_si(value, unit)
+    except UsageError as error:
+        raise ValueError(str(error).replace("\n", " ")) from error
+
+
+Metres = Annotated[float, Unit("m")]
+SquareMetres = Annotated[float, Unit("m^2")]
+QuarticMetres = Annotated[float, Unit("m^4")]
+Newtons = Annotated[float, Unit("N")]
+Pascals = Annotated[float, Unit("Pa")]
+Densities = Annotated[float, Unit("kg/m^3")]
+Stiffness = Annotated[float, Unit("N/m")]
+
+
+class Record(BaseModel):
+    """Base of all parts of a study: frozen, and unknown keys are errors."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class MaterialRecord(Record):
+    """A linear elastic material."""
+
+    young: Pascals = Field(description="Young's modulus")
+    poisson: float = Field(0.3, description="Poisson's ratio")
+    density: Densities = Field(0.0, description="only matters with self-weight")
+
+
+class SectionRecord(Record):
+    """A cross-section: a radius; or a width and a height; or area, second moment and shear factor."""
+
+    radius: Metres | None = Field(None, description="of a circular section")
+    width: Metres | None = Field(None, description="of a rectangular section, out of the plane")
+    height: Metres | None = Field(None, description="of a rectangular section, in the plane of bending")
+    area: SquareMetres | None = Field(None, description="of any section")
+    second_moment: QuarticMetres | None = Field(None, description="of area, about the axis of bending")
+    shear_factor: float | None = Field(None, description="share of the area that carries shear")
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> SectionRecord:
+        kinds = ({"radius"}, {"width", "height"}, {"area", "second_moment", "shear_factor"})
+        given = {k for k, v in self if v is not None}
+        if given not in kinds:
+            raise ValueError(
+                f"a section is given by radius, or by width and height, or by area, second_moment and "
+                f"shear_factor; found {', '.join(sorted(given)) or 'nothing'}"
+            )
+        return self
+
+
+class BodyRecord(Record):
+    """A plane cantilever, clamped at x = 0."""
+
+    kind: Literal["cantilever"] = "cantilever"
+    length: Metres = Field(1.0, description="from clamp to tip")
+    section: SectionRecord = SectionRecord(radius=0.005)
+    material: str | MaterialRecord = Field("nylon", description="a name, or young, poisson and density")
+    kinematics: Literal["large", "small"] = Field("large", description="'small' is linear: for checks")
+    self_weight: bool = Field(False, description="gravity, 9.80665 m/s² downwards")
+    elements: int = Field(20, ge=1, description="finite elements along the beam")
+    order: int = Field(3, ge=2, le=8, description="polynomial order of the elements")
+    nodes: tuple[Metres, ...] = Field((), description="positions of interest; empty: six, evenly spaced")
+
+
+class LoadRecord(Record):
+    """A point load: one input of the study."""
+
+    name: str = Field(min_length=1, description="name of the input")
+    at: Metres | None = Field(None, description="position along the beam; left out: the tip")
+    low: Newtons = Field(description="smallest load")
+    high: Newtons = Field(description="largest load")
+    direction: tuple[float, float] = Field((0.0, -1.0), description="(x, y); (0, -1) pushes down")
+
+
+class SweepRecord(Record):
+    """Which loads are solved."""
+
+    design: Literal["grid", "sobol", "random"] = Field("grid", description="how the ranges are sampled")
+    samples: int = Field(501, ge=4, description="number of solves")
+    seed: int = Field(0, ge=0, description="decides sobol and random designs")
+    workers: int | None = Field(None, ge=1, description="processes; left out: one per core")
+    scheduler: str | None = Field(None, description="address of a running Dask scheduler")
+
+
+class TestRecord(Record):
+    """Which solves the network never sees."""
+
+    every: int = Field(2, ge=0, description="of the sweep, every n-th row is kept for testing; 0: none")
+    random: int = Field(100, ge=0, description="further solves at random loads")
+    seed: int = Field(7, ge=0, description="decides the random loads")
+
+
+class FilterRecord(Record):
+    """The sequential filter (MRAN with an extended Kalman filter)."""
+
+    passes: int = Field(5, ge=1, description="shuffled presentations of the training data")
+    seed: int = Field(0, ge=0, description="decides the order")
+    form: Literal["default", "founding"] = Field("default", description="'founding' repeats the papers' form")
+    settings: dict[str, float | int | str | bool] = Field(
+        default_factory=dict, description="single settings of the filter, by name"
+    )
+
+    @model_validator(mode="after")
+    def _known_settings(self) -> FilterRecord:
+        unknown = sorted(set(self.settings) - set(Settings.__dataclass_fields__))
+        if unknown:
+            known = ", ".join(Settings.__dataclass_fields__)
+            raise ValueError(f"the filter has no setting {unknown[0]!r}; it has {known}")
+        return self
+
+
+class LearningRecord(Record):
+    """The refinement, and the coupling at the held node."""
+
+    samples: int = Field(26, ge=0, description="solves used for refinement; 0: all training solves")
+    units_max: int = Field(6, ge=0, description="most units per network")
+    target: float = Field(5e-7, ge=0.0, description="leave-one-out error at which growth stops")
+    starts: int = Field(4, ge=1, description="starts per number of units")
+    coupling: Stiffness | None = Field(
+        None, description="between hand and node; left out: chosen from the data"
+    )
+
+    def refinement(self) -> Refinement:
+        """The learner's own record."""
+        return Refinement(self.samples, self.units_max, self.target, self.starts)
+
+
+class TargetRecord(Record):
+    """What `palpate validate` asks of the networks on unseen loads."""
+
+    rmse: float = Field(5e-6, gt=0, description="refined network, relative to full scale")
+    filter_rmse: float = Field(1e-3, ge=0, description="sequential filter alone; 0: not asked")
+    force_median: float = Field(0.01, gt=0, description="relative force error, median")
+    force_p95: float = Field(0.035, gt=0, description="relative force error, 95th percentile")
+
+
+class RuntimeRecord(Record):
+    """The 1 kHz loop and the page."""
+
+    rate: float = Field(1000.0, gt=0, le=10000, description="Hz")
+    device: str = Field("page", description="page, or a scripted stroke")
+    workspace: Metres = Field(0.075, gt=0, description="radius of the hand's workspace")
+    max_force: Newtons = Field(12.0, gt=0, description="the force is clamped to this")
+    port: int = Field(8080, ge=0, le=65535, description="of the page; a busy one moves on to the next")
+
+
+class Study(Record):
+    """A body, its loads, and everything that is done with them."""
+
+    name: str = Field(
+        "beam-nylon", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", description="files are named after it"
+    )
+    body: BodyRecord = BodyRecord()
+    loads: tuple[LoadRecord, ...] = Field((LoadRecord(name="P", low=0.0, high=5.0),), min_length=1)
+    sweep: SweepRecord = SweepRecord()
+    test: TestRecord = TestRecord()
+    filter: FilterRecord = FilterRecord()
+    learning: LearningRecord = LearningRecord()
+    target: TargetRecord = TargetRecord()
+    runtime: RuntimeRecord = RuntimeRecord()

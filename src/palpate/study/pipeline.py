@@ -1,0 +1,334 @@
+"""A study carried out: body → sweep → dataset → learning → model → validation → report.
+
+The only module that knows all of palpate's islands. Each stage takes values and returns values; files are
+written by `carry_out` and by the command line.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from palpate.dataset import Dataset
+from palpate.errors import UsageError
+from palpate.learning import History, Settings, default, founding, learn_touch, node_outputs
+from palpate.learning import learn as learn_samples
+from palpate.physics import Cantilever, Circle, LinearElastic, PointLoad, Rectangle, Section, named_material
+from palpate.study.models import Study
+from palpate.surrogates import TouchModel
+from palpate.sweeps import sweep
+from palpate.validation import Chapter, Limits, Validation, validate, write_report
+
+__all__ = [
+    "Outcome",
+    "Paths",
+    "body_of",
+    "carry_out",
+    "learn_study",
+    "loads_of",
+    "report_study",
+    "rivals_of",
+    "settings_of",
+    "sweep_study",
+    "train_and_test",
+    "validate_study",
+]
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Paths:
+    """Where a study's files are: all named after the study, in one folder."""
+
+    folder: Path
+    name: str
+
+    @property
+    def data(self) -> Path:
+        """The sweep's dataset."""
+        return self.folder / f"{self.name}.zarr"
+
+    @property
+    def random(self) -> Path:
+        """The dataset of random loads, for testing only."""
+        return self.folder / f"{self.name}-random.zarr"
+
+    @property
+    def model(self) -> Path:
+        """The touch model."""
+        return self.folder / f"{self.name}.palpate"
+
+    @property
+    def history(self) -> Path:
+        """What happened while it was learnt."""
+        return self.folder / f"{self.name}.history.npz"
+
+    @property
+    def report(self) -> Path:
+        """The report."""
+        return self.folder / f"{self.name}.html"
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What carrying out a study gave.
+
+    Attributes
+    ----------
+    study : Study
+    touch : TouchModel
+    train, test : Dataset
+    validation : Validation
+    history : History
+    rivals : mapping of name to History
+        The founding form beside ours, for studies with one input.
+    timings : mapping of stage to seconds
+    """
+
+    study: Study
+    touch: TouchModel
+    train: Dataset
+    test: Dataset
+    validation: Validation
+    history: History
+    rivals: Mapping[str, History] = field(default_factory=dict)
+    timings: Mapping[str, float] = field(default_factory=dict)
+
+    def chapter(self) -> Chapter:
+        """The outcome as a chapter of a report."""
+        return Chapter(
+            name=self.study.name,
+            touch=self.touch,
+            train=self.train,
+            test=self.test,
+            validation=self.validation,
+            history=self.history,
+            rivals=self.rivals,
+            settings=self.study.model_dump(mode="json"),
+            timings=self.timings,
+        )
+
+
+def body_of(study: Study) -> Cantilever:
+    """The study's body."""
+    b = study.body
+    material = (
+        named_material(b.material)
+        if isinstance(b.material, str)
+        else LinearElastic(b.material.young, b.material.poisson, b.material.density)
+    )
+    return Cantilever(
+        length=b.length,
+        section=_section(study),
+        material=material,
+        elements=b.elements,
+        order=b.order,
+        kinematics=b.kinematics,
+        self_weight=b.self_weight,
+        nodes=b.nodes,
+    )
+
+
+def _section(study: Study) -> Circle | Rectangle | Section:
+    s = study.body.section
+    if s.radius is not None:
+        return Circle(s.radius)
+    if s.width is not None and s.height is not None:
+        return Rectangle(s.width, s.height)
+    # the record's own check leaves only this kind
+    assert s.area is not None
+    assert s.second_moment is not None
+    assert s.shear_factor is not None
+    return Section(s.area, s.second_moment, s.shear_factor)
+
+
+def loads_of(study: Study) -> tuple[PointLoad, ...]:
+    """The study's loads."""
+    return tuple(PointLoad(p.name, p.at, p.low, p.high, p.direction) for p in study.loads)
+
+
+def settings_of(study: Study) -> Settings:
+    """The filter's settings: a named form with single settings changed."""
+    form = founding() if study.filter.form == "founding" else default()
+    return replace(form, **study.filter.settings)  # type: ignore[arg-type]
+
+
+def sweep_study(
+    study: Study, paths: Paths | None = None, *, cluster: Any = None, progress: Any = True
+) -> tuple[Dataset, Dataset | None]:
+    """Solve the study's design, and its random test loads.
+
+    With `paths` given both are written as they grow, and an interrupted sweep goes on where it stopped.
+
+    Raises
+    ------
+    SolverError
+        If more than half of the solves fail.
+    UsageError
+        If another study's dataset is in the way.
+    """
+    common: dict[str, Any] = {
+        "cluster": cluster if cluster is not None else study.sweep.scheduler,
+        "workers": study.sweep.workers,
+        "progress": progress,
+    }
+    body, loads = body_of(study), loads_of(study)
+    data = sweep(
+        body,
+        loads,
+        samples=study.sweep.samples,
+        seed=study.sweep.seed,
+        design=study.sweep.design,
+        path=paths.data if paths else None,
+        **common,
+    )
+    if not study.test.random:
+        return data, None
+    extra = sweep(
+        body,
+        loads,
+        samples=study.test.random,
+        seed=study.test.seed,
+        design="random",
+        path=paths.random if paths else None,
+        **common,
+    )
+    return data, extra
+
+
+def train_and_test(study: Study, data: Dataset, random: Dataset | None) -> tuple[Dataset, Dataset]:
+    """Training rows, and the rows that the network never sees, random loads among them."""
+    good = data.ok
+    parts = [] if random is None else [random.ok]
+    if study.test.every:
+        rows = range(len(good))
+        held = [i for i in rows if i % study.test.every == study.test.every - 1]
+        parts.insert(0, good.take(held))
+        good = good.take([i for i in rows if i % study.test.every != study.test.every - 1])
+    if not parts:
+        raise UsageError(
+            f"The study {study.name!r} keeps nothing for testing.",
+            why="Both test.every and test.random are 0.",
+            fix="Set one of them: a network is judged on solves that it has never seen.",
+        )
+    return good, Dataset.concat(parts)
+
+
+def learn_study(
+    study: Study,
+    train: Dataset,
+    test: Dataset | None = None,
+    *,
+    progress: Callable[[int, int], None] | None = None,
+) -> tuple[TouchModel, History]:
+    """Learn the study's touch model; `test` is only watched."""
+    return learn_touch(
+        train,
+        heldout=test,
+        name=study.name,
+        settings=settings_of(study),
+        refinement=study.learning.refinement(),
+        passes=study.filter.passes,
+        seed=study.filter.seed,
+        coupling=study.learning.coupling,
+        progress=progress,
+    )
+
+
+def rivals_of(study: Study, train: Dataset, test: Dataset) -> dict[str, History]:
+    """Founding form and ours with thresholds as they are and ten times tighter, for studies of one input."""
+    if len(train.ranges) != 1:
+        return {}
+    forms = {
+        "founding form": founding(),
+        "founding form, thresholds ÷ 10": tightened(founding()),
+        "our form, thresholds ÷ 10": tightened(settings_of(study)),
+    }
+    outputs, columns = node_outputs(train)
+    answers = [d.displacement[:, [i for i, _ in columns], [c for _, c in columns]] for d in (train, test)]
+    return {
+        name: learn_samples(
+            train.X,
+            answers[0],
+            train.ranges,
+            outputs,
+            settings=settings,
+            passes=study.filter.passes,
+            seed=study.filter.seed,
+            heldout=(test.X, answers[1]),
+        ).history
+        for name, settings in forms.items()
+    }
+
+
+def tightened(settings: Settings) -> Settings:
+    """Growth thresholds divided by ten: what a user does who wants more accuracy."""
+    return replace(
+        settings,
+        error_min=settings.error_min / 10,
+        error_rms_min=settings.error_rms_min / 10,
+        distance_min=settings.distance_min / 10,
+    )
+
+
+def validate_study(
+    study: Study, touch: TouchModel, test: Dataset, history: History | None = None
+) -> Validation:
+    """Judge the model on solves it has never seen, by the study's targets."""
+    t = study.target
+    limits = Limits(
+        rmse=t.rmse, filter_rmse=t.filter_rmse or None, force_median=t.force_median, force_p95=t.force_p95
+    )
+    return validate(touch, test, history=history, limits=limits)
+
+
+def report_study(path: Path, outcomes: Sequence[Outcome], **options: Any) -> Path:
+    """Write one report on several outcomes."""
+    return write_report(path, [o.chapter() for o in outcomes], **options)
+
+
+def carry_out(
+    study: Study,
+    paths: Paths,
+    *,
+    cluster: Any = None,
+    progress: Any = True,
+    say: Say = lambda _: None,
+    rivals: bool = True,
+) -> Outcome:
+    """Carry out a study up to its validation and write its dataset, model and history.
+
+    Parameters
+    ----------
+    study : Study
+    paths : Paths
+    cluster : optional
+        A running `local_cluster`, to share between studies.
+    progress : bool or callable
+        For the sweep.
+    say : callable
+        Told what begins, as one line.
+    rivals : bool
+        Whether to run the founding form beside ours.
+    """
+    timings: dict[str, float] = {}
+
+    def timed(stage: str, work: Callable[[], Any]) -> Any:
+        say(stage)
+        began = time.perf_counter()
+        result = work()
+        timings[stage] = time.perf_counter() - began
+        return result
+
+    data, random = timed("sweep", lambda: sweep_study(study, paths, cluster=cluster, progress=progress))
+    train, test = train_and_test(study, data, random)
+    touch, history = timed("learn and refine", lambda: learn_study(study, train, test))
+    touch.save(paths.model)
+    history.save(paths.history)
+    validation = timed("validate", lambda: validate_study(study, touch, test, history))
+    others = timed("founding form", lambda: rivals_of(study, train, test)) if rivals else {}
+    return Outcome(study, touch, train, test, validation, history, others, timings)

@@ -1,0 +1,58 @@
+"""Studies that have a name: the founding study's cantilevers, and two with several loads."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from palpate.physics import Cantilever, Circle
+from palpate.physics.presets import PRESETS, preset
+from palpate.study.models import Study
+
+__all__ = ["preset_names", "preset_study"]
+
+# a network of several inputs has more to learn: more units, more solves, and a target that a person can feel
+_SEVERAL: dict[str, Any] = {
+    "test": {"every": 4},
+    "filter": {"passes": 1},
+    "learning": {"samples": 400, "units_max": 36, "target": 2e-5, "starts": 2},
+    "target": {"rmse": 1e-3, "filter_rmse": 0.0},
+}
+
+
+def preset_names() -> tuple[str, ...]:
+    """Names that `preset_study` knows."""
+    return tuple(PRESETS)
+
+
+def preset_study(name: str) -> Study:
+    """The study of that name.
+
+    Raises
+    ------
+    UsageError
+        If the name is not known; the message lists the names that are.
+    """
+    found = preset(name)
+    body = found.body
+    content: dict[str, Any] = {
+        "name": found.name,
+        "body": {
+            "length": body.length,
+            "section": {"radius": _radius_of(body)},
+            "material": body.material.name,
+            "elements": body.elements,
+            "order": body.order,
+        },
+        "loads": [
+            {"name": p.name, "at": p.at, "low": p.low, "high": p.high, "direction": p.direction}
+            for p in found.loads
+        ],
+        "sweep": {"design": found.design, "samples": found.samples},
+    }
+    return Study.model_validate(content | (_SEVERAL if len(found.loads) > 1 else {}))
+
+
+def _radius_of(body: Cantilever) -> float:
+    if not isinstance(body.section, Circle):
+        raise TypeError(f"the preset's section is a {type(body.section).__name__}, not a circle")
+    return body.section.radius

@@ -1,0 +1,143 @@
+"""A study as TOML with comments, and back, with errors that name the line or the key."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import os
+import tomllib
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from palpate.errors import StudyError
+from palpate.study.models import Study, Unit
+
+__all__ = ["read_study", "study_schema", "to_toml"]
+
+
+def read_study(path: str | os.PathLike[str]) -> Study:
+    """Read a study file.
+
+    Raises
+    ------
+    StudyError
+        If the file is missing, no TOML, or says something a study can't mean: all such places are listed.
+    """
+    path = Path(path)
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise StudyError(f"{path} does not exist.", fix="Write one with `palpate init`.") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise StudyError(f"{path} can't be read.", why=str(error)) from error
+    except tomllib.TOMLDecodeError as error:
+        raise StudyError(f"{path} is not valid TOML.", why=str(error), fix="Mend that line.") from error
+    try:
+        return Study.model_validate(content)
+    except ValidationError as error:
+        raise StudyError(
+            f"{path} does not describe a study:",
+            why="\n".join(f"  {line}" for line in _complaints(error)),
+            fix="`palpate init --print` shows every key with its meaning; `palpate schema` is for editors.",
+        ) from error
+
+
+def study_schema() -> str:
+    """JSON schema of a study file, for editors."""
+    return json.dumps(Study.model_json_schema(), indent=2)
+
+
+def to_toml(study: Study) -> str:
+    """The study as a commented TOML file that `read_study` reads back as the same study."""
+    lines = [
+        "# A palpate study: what is solved, learnt, checked and touched.",
+        '# Quantities are numbers in SI units, or text with a unit: "5 mm", "2 GPa".',
+        "",
+    ]
+    lines += _scalars(study)
+    for name in type(study).model_fields:
+        value = getattr(study, name)
+        if isinstance(value, BaseModel):
+            lines += ["", f"# {_purpose(value)}", f"[{name}]", *_scalars(value), *_tables(name, value)]
+        elif isinstance(value, tuple):
+            for item in value:
+                lines += ["", f"# {_purpose(item)}", f"[[{name}]]", *_scalars(item)]
+    return "\n".join(lines) + "\n"
+
+
+def _purpose(record: BaseModel) -> str:
+    return (type(record).__doc__ or "").strip().splitlines()[0]
+
+
+def _scalars(record: BaseModel) -> Iterator[str]:
+    for name, field in type(record).model_fields.items():
+        value = getattr(record, name)
+        if isinstance(value, BaseModel) or (
+            isinstance(value, tuple) and value and isinstance(value[0], BaseModel)
+        ):
+            continue
+        if isinstance(value, dict):
+            if value:
+                yield f"{name} = {{ {', '.join(f'{k} = {_toml(v)}' for k, v in value.items())} }}"
+            continue
+        comment = f"  # {field.description}" if field.description else ""
+        # a key without a value can't be written in TOML: it stands there as a comment
+        unit = None if isinstance(value, (str, tuple)) else _unit((*field.metadata, field.annotation))
+        yield f"# {name} ={comment}" if value is None else f"{name} = {_toml(value, unit)}{comment}"
+
+
+def _tables(prefix: str, record: BaseModel) -> Iterator[str]:
+    for name in type(record).model_fields:
+        value = getattr(record, name)
+        if isinstance(value, BaseModel):
+            yield ""
+            yield f"[{prefix}.{name}]"
+            yield from _scalars(value)
+
+
+def _unit(parts: Iterable[Any]) -> str | None:
+    """The unit among a field's annotations, however deep."""
+    for part in parts:
+        if isinstance(part, Unit):
+            return part.name
+        if found := _unit((*get_args(part), *getattr(part, "__metadata__", ()))):
+            return found
+    return None
+
+
+def _toml(value: Any, unit: str | None = None) -> str:
+    if unit is not None:
+        return json.dumps(f"{value!r} {unit}")
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(_toml(v) for v in value) + "]"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)  # TOML's basic strings are JSON's
+    if isinstance(value, bool):
+        return str(value).lower()
+    return repr(value)
+
+
+def _complaints(error: ValidationError) -> Iterator[str]:
+    """One line per mistake: where, what, and the nearest key that exists."""
+    for item in error.errors(include_url=False):
+        # a union reports each alternative; its tag is no key of the file
+        place = ".".join(
+            str(p) for p in item["loc"] if not str(p).endswith("Record") and p not in {"str", "float"}
+        )
+        if item["type"] == "extra_forbidden":
+            close = difflib.get_close_matches(str(item["loc"][-1]), _known_keys(Study), n=1)
+            yield f"{place}: there is no such key" + (f"; did you mean {close[0]!r}?" if close else "")
+        else:
+            yield f"{place}: {item['msg'].removeprefix('Value error, ')}"
+
+
+def _known_keys(record: type[BaseModel]) -> set[str]:
+    """Every key that appears anywhere in a study."""
+    keys: set[str] = set()
+    schema = record.model_json_schema()
+    for part in (schema, *schema.get("$defs", {}).values()):
+        keys |= set(part.get("properties", {}))
+    return keys

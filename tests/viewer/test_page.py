@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+from playwright.sync_api import Browser, Page, sync_playwright
 from test_messages import HELLO, sample
 
 from models import linear_network, spring_beam
@@ -54,6 +54,24 @@ def browser(chromium: str) -> Iterator[Browser]:
         running.close()
 
 
+def open_page(browser: Browser, viewer: Viewer, complaints: list[str], **options: Any) -> Page:
+    """The page of a viewer, in a context of its own; errors and foreign requests go to `complaints`."""
+    options.setdefault("viewport", {"width": 860, "height": 520})
+    page = browser.new_context(**options).new_page()
+    page.on("console", lambda m: complaints.append(m.text) if m.type in {"error", "warning"} else None)
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    local = (viewer.url, "data:", "blob:")
+    page.on("request", lambda r: None if r.url.startswith(local) else complaints.append(f"asks {r.url}"))
+    page.goto(viewer.url)
+    page.wait_for_selector("html[data-tick][data-tip]")
+    return page
+
+
+def assert_no(complaints: list[str]) -> None:
+    # what software rendering says of its own slowness is no fault of the page
+    assert [c for c in complaints if "GPU stall due to ReadPixels" not in c] == []
+
+
 @pytest.fixture
 def complaints() -> list[str]:
     """What the browser complained of; a test that expects something empties it."""
@@ -62,28 +80,35 @@ def complaints() -> list[str]:
 
 @pytest.fixture
 def visit(browser: Browser, complaints: list[str]) -> Iterator[Callable[..., Page]]:
-    """Open the page of a viewer; afterwards no console error, page error or foreign request may be left."""
-    contexts: list[BrowserContext] = []
+    """Open the page of a viewer; afterwards there must be no complaint."""
+    pages: list[Page] = []
 
-    def open_page(viewer: Viewer, **options: Any) -> Page:
-        options.setdefault("viewport", {"width": 860, "height": 520})
-        context = browser.new_context(**options)
-        contexts.append(context)
-        page = context.new_page()
-        page.on("console", lambda m: complaints.append(m.text) if m.type in {"error", "warning"} else None)
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        local = (viewer.url, "data:", "blob:")
-        page.on("request", lambda r: None if r.url.startswith(local) else complaints.append(f"asks {r.url}"))
-        page.goto(viewer.url)
-        page.wait_for_selector("html[data-tick][data-tip]")
-        settled(page)  # the body may still swing from the test before
-        return page
+    def one(viewer: Viewer, **options: Any) -> Page:
+        pages.append(open_page(browser, viewer, complaints, **options))
+        settled(pages[-1])  # the body may still swing from the test before
+        return pages[-1]
 
-    yield open_page
-    for context in contexts:
-        context.close()
-    # what software rendering says of its own slowness is no fault of the page
-    assert [c for c in complaints if "GPU stall due to ReadPixels" not in c] == []
+    yield one
+    for page in pages:
+        page.context.close()
+    assert_no(complaints)
+
+
+@pytest.fixture(scope="module")
+def kept_open(browser: Browser, viewer: Viewer) -> Iterator[tuple[Page, list[str]]]:
+    found: list[str] = []
+    page = open_page(browser, viewer, found)
+    yield page, found
+    page.context.close()
+
+
+@pytest.fixture
+def page(kept_open: tuple[Page, list[str]]) -> Iterator[Page]:
+    """One page for all tests that leave it as they found it: opening costs a second of shader compilation."""
+    settled(kept_open[0], "free")
+    yield kept_open[0]
+    assert_no(kept_open[1])
+    kept_open[1].clear()
 
 
 @pytest.fixture
@@ -151,8 +176,7 @@ def check_force(model: TouchModel, shown: dict[str, Any], parameters: np.ndarray
     assert np.allclose(moved, evaluator.contact[:2], rtol=0, atol=0.05e-3 + 1e-6)
 
 
-def test_mouse_pulls_and_the_force_is_the_networks(visit, keep, viewer: Viewer, rod: TouchModel):
-    page = visit(viewer)
+def test_mouse_pulls_and_the_force_is_the_networks(page: Page, keep, rod: TouchModel):
     assert number(page.inner_text("#force-norm")) == 0.0
     keep(page, "rest")
     y = tip(page)[1]
@@ -169,8 +193,7 @@ def test_mouse_pulls_and_the_force_is_the_networks(visit, keep, viewer: Viewer, 
     assert vector(released["data"], "contact") == pytest.approx(0.0, abs=1e-4 * rod.reach)
 
 
-def test_pulling_beyond_the_trained_range_is_flagged(visit, keep, viewer: Viewer, rod: TouchModel):
-    page = visit(viewer)
+def test_pulling_beyond_the_trained_range_is_flagged(page: Page, keep, rod: TouchModel):
     drag(page, -40, 250)
     shown = settled(page, "outside")
     keep(page, "outside")
@@ -202,8 +225,7 @@ def test_a_finger_pulls(visit, keep, viewer: Viewer, rod: TouchModel):
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 
-def test_arrow_keys_pull_and_escape_lets_go(visit, viewer: Viewer, rod: TouchModel):
-    page = visit(viewer)
+def test_arrow_keys_pull_and_escape_lets_go(page: Page, rod: TouchModel):
     page.focus("#view")
     for _ in range(15):
         page.keyboard.press("ArrowDown")
@@ -216,8 +238,7 @@ def test_arrow_keys_pull_and_escape_lets_go(visit, viewer: Viewer, rod: TouchMod
     let_go(page)
 
 
-def test_beside_the_ball_nothing_is_grabbed_and_the_right_button_turns(visit, viewer: Viewer):
-    page = visit(viewer)
+def test_beside_the_ball_nothing_is_grabbed_and_the_right_button_turns(page: Page):
     x, y = tip(page)
     page.mouse.move(x - 120, y + 90)
     page.mouse.down()
@@ -249,8 +270,7 @@ def test_the_second_page_watches(visit, keep, viewer: Viewer):
     assert let_go(second)["flags"] == ["free"]
 
 
-def test_a_hidden_tab_lets_go_and_says_so(visit, viewer: Viewer):
-    page = visit(viewer)
+def test_a_hidden_tab_lets_go_and_says_so(page: Page, viewer: Viewer):
     drag(page, -20, 100)
     settled(page, "inside")
     turn = """hidden => {
@@ -287,13 +307,20 @@ def test_the_end_of_the_loop_is_shown_and_the_page_returns(visit, keep, complain
     assert "disconnected" in page.inner_text("#status")
     assert page.inner_text("#force-norm") == "–"
     keep(page, "disconnected")
+    page.evaluate("document.kept = true")
     with Viewer(rod, port=viewer.port, strict_port=True):
         settled(page, "free")
+        assert page.evaluate("document.kept")
         assert page.is_hidden("#banner")
         drag(page, -20, 100)
         check_force(rod, settled(page, "inside"), np.zeros(0))
+        page.mouse.up()
+    with Viewer(spring_beam(), port=viewer.port, strict_port=True):  # another body: a fresh page
+        page.wait_for_function("document.getElementById('model-name').textContent === 'spring'")
+        page.wait_for_selector("html[data-tick][data-tip]")
+        assert not page.evaluate("document.kept")
         page.context.close()
-    assert all("ERR_CONNECTION_REFUSED" in c for c in complaints)
+    assert [c for c in complaints if "ERR_CONNECTION_REFUSED" not in c] == []
     complaints.clear()
 
 
@@ -346,8 +373,7 @@ def test_small_displacements_are_drawn_enlarged_and_said_to_be(visit, keep):
         page.context.close()
 
 
-def test_messages_mean_the_same_in_typescript(visit, viewer: Viewer):
-    page = visit(viewer)
+def test_messages_mean_the_same_in_typescript(page: Page):
     for before in map(sample, typescript.BINARY):
         read, back = page.evaluate(
             """async ([name, text]) => {

@@ -12,6 +12,10 @@
 `ports`         a free port on this machine
 ``client/``     the page's sources (TypeScript, three.js); ``static/`` is what they build to
 ==============  ====================================================================================
+
+The built page is under version control, so that installing needs no node. After a change in ``client/``:
+
+    npm ci && npm run build        # in src/palpate/viewer/client
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["Picture", "Shape", "swing"]
 
 FREQUENCY = 2.0  # Hz, a pace that the eye can follow; the model's file holds no mass
-DAMPING = 0.2  # of critical: at rest again within a second and a half
+DAMPING = 0.25  # of critical: at rest again within two seconds
 STILL = 1e-3  # share of the last shape below which the body counts as at rest
 
 

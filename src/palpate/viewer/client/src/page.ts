@@ -21,6 +21,10 @@ const connection = new Connection({ hello: start, notice: warn, lost });
 const hand = new HandInput(canvas, connection);
 
 function start(hello: Hello): void {
+  if (view && JSON.stringify(view.hello) !== JSON.stringify(hello)) {
+    location.reload(); // the server is back with another body: a fresh page is simpler than a changed one
+    return;
+  }
   element("banner").hidden = true;
   panel.start(hello, (i, value) => {
     const values = Float32Array.from(latest?.parameters ?? []);
@@ -28,12 +32,11 @@ function start(hello: Hello): void {
     hand.parameters = values;
     hand.send();
   });
-  if (!view || JSON.stringify(view.hello) !== JSON.stringify(hello)) open(hello);
+  if (!view) open(hello);
   lastFrame = performance.now();
 }
 
 function open(hello: Hello): void {
-  view?.dispose();
   try {
     view = new View(canvas, hello);
   } catch (error) {

@@ -232,12 +232,6 @@ export class View {
     this.dirty = true;
   }
 
-  /** Let go of the graphics memory, before another body is shown. */
-  dispose(): void {
-    this.controls.dispose();
-    this.renderer.dispose();
-  }
-
   private assemble(): void {
     const body = new Mesh(this.tube.geometry, new MeshLambertMaterial({ vertexColors: true }));
     body.frustumCulled = this.shadow.frustumCulled = this.thread.frustumCulled = false;

@@ -53,18 +53,31 @@ def updated(state: State, x: np.ndarray, y: np.ndarray, settings: Settings) -> S
 def _iterate(
     state: State, x: np.ndarray, y: np.ndarray, r: float, settings: Settings
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Estimate z (d,), gain K (d, m), P Hᵀ (d, m) and S (m, m) of the last linearisation."""
+    """Estimate z (d,), gain K (d, m), P Hᵀ (d, m) and S (m, m) of the best linearisation.
+
+    The iteration is Gauss–Newton on ‖y − f(z)‖²/R + ‖z − z₀‖²_P⁻¹ and may overshoot: it ends where that rises.
+    """
     prior = state.vector()
-    z, here = prior, state
+    z, here, least = prior, state, np.inf
+    best = None
     for _ in range(settings.iterations):
         f, H = jacobian(here, x, settings)
         PH = state.covariance @ H.T
-        S = H @ PH
-        S[np.diag_indices_from(S)] += r
-        K = cho_solve(cho_factor(S, check_finite=False), PH.T, check_finite=False).T
-        z = prior + K @ (y - f - H @ (prior - z))
+        HPH = H @ PH
+        S = HPH + r * np.eye(y.size)
+        factor = cho_factor(S, check_finite=False)
+        # z − z₀ = P Hᵀ λ, so its P⁻¹ norm is λᵀ H P Hᵀ λ
+        lam = cho_solve(factor, y - f - H @ (prior - z), check_finite=False)
+        z = prior + PH @ lam
         here = state.moved(z)
-    return z, K, PH, S
+        error = y - value(here, x, settings)
+        cost = float(error @ error) / r + float(lam @ HPH @ lam)
+        if best is not None and not cost < least:
+            break
+        least = cost
+        best = (z, cho_solve(factor, PH.T, check_finite=False).T, PH, S)
+    assert best is not None  # settings.iterations is at least 1
+    return best
 
 
 def _excess(state: State, z: np.ndarray, settings: Settings) -> float:

@@ -36,7 +36,8 @@ def wants_growth(state: State, x: np.ndarray, error: np.ndarray, settings: Setti
 
 def grown(state: State, x: np.ndarray, error: np.ndarray, settings: Settings) -> State:
     """The state with a unit at x whose weights are the error: it meets the observation exactly."""
-    distance = min(nearest_distance(state, x), settings.distance_max)
+    # growth asks for at least the smallest distance; the floor keeps a width from collapsing on a duplicate
+    distance = float(np.clip(nearest_distance(state, x), settings.distance_min, settings.distance_max))
     width = np.full(x.size, settings.overlap * distance)
     shape = np.log(width) if settings.widths == "log" else width
     block = np.full(error.size + 2 * x.size, settings.prior)

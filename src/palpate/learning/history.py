@@ -89,7 +89,8 @@ class History:
             If the file is missing or no history.
         """
         try:
-            with np.load(path, allow_pickle=False) as file:
+            # opened here: on a damaged archive NumPy would leave its own handle open
+            with Path(path).open("rb") as raw, np.load(raw, allow_pickle=False) as file:
                 parts = {f.name: file[f.name] for f in fields(cls)}
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
             raise FileFormatError(f"{path} is not a learning history.", why=str(error)) from error

@@ -5,7 +5,7 @@ The header carries
 
     palpate   what the archive is: "networks" or a richer kind such as "touch"
     version   of this layout; a reader refuses later ones
-    sha256    over names, types, shapes and bytes of all arrays and the JSON: a flipped bit is found
+    sha256    over the other entries and names, types, shapes and bytes of all arrays
     content   JSON: per network its inputs, outputs and meta; and the archive's own meta
 """
 
@@ -70,7 +70,7 @@ def save_archive(path: str | os.PathLike[str], archive: Archive) -> Path:
         {"networks": {k: _describe(v) for k, v in archive.networks.items()}, "meta": dict(archive.meta)}
     )
     header = {"palpate": archive.kind, "version": str(VERSION), "content": content}
-    header["sha256"] = _digest(tensors, content)
+    header["sha256"] = _digest(tensors, header)
     temporary = path.with_name(path.name + ".part")
     try:
         temporary.write_bytes(save(tensors, header))
@@ -100,7 +100,7 @@ def load_archive(path: str | os.PathLike[str], *, kind: str | None = None) -> Ar
     path = Path(path)
     header, tensors = _read(path)
     _check_header(path, header, kind)
-    if header.get("sha256") != _digest(tensors, header["content"]):
+    if header.get("sha256") != _digest(tensors, header):
         raise FileFormatError(
             f"{path} is damaged: its contents do not match its checksum.",
             fix="Copy the file again, or make it anew with `palpate learn`.",
@@ -149,8 +149,8 @@ def _check_header(path: Path, header: Mapping[str, str], kind: str | None) -> No
         raise FileFormatError(f"{path} holds {header['palpate']!r}; {kind!r} is needed here.")
 
 
-def _digest(tensors: Mapping[str, np.ndarray], content: str) -> str:
-    digest = hashlib.sha256(content.encode())
+def _digest(tensors: Mapping[str, np.ndarray], header: Mapping[str, str]) -> str:
+    digest = hashlib.sha256("|".join(header[k] for k in ("palpate", "version", "content")).encode())
     for name in sorted(tensors):
         a = tensors[name]
         digest.update(f"{name}|{a.dtype.str}|{a.shape}".encode())

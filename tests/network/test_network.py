@@ -1,0 +1,94 @@
+"""Evaluation: compiled against plain NumPy, Jacobian against complex step, scaling."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from models import linear_network
+
+from palpate.errors import UsageError
+from palpate.network import Network, Scaling
+from palpate.units import Quantity, Range
+
+
+def random_network(n: int, m: int, h: int, seed: int = 0) -> Network:
+    rng = np.random.default_rng(seed)
+    low = rng.normal(size=n)
+    inputs = [Range(f"x{i}", float(a), float(a) + 2.0, "N") for i, a in enumerate(low)]
+    scaling = Scaling(low + 1.0, np.ones(n), rng.normal(size=m), rng.uniform(0.5, 2, m))
+    return Network.axis_aligned(
+        inputs,
+        [Quantity(f"y{i}", "m") for i in range(m)],
+        centres=rng.uniform(-1, 1, (h, n)),
+        widths=rng.uniform(0.3, 2, (h, n)),
+        weights=rng.normal(size=(m, h)),
+        tail=rng.normal(size=(m, 1 + n)),
+        scaling=scaling,
+    )
+
+
+def plain(network: Network, X: np.ndarray) -> np.ndarray:
+    """The formula of the docstring, in NumPy; takes complex inputs."""
+    s = network.scaling
+    xi = (X - s.input_centre) / s.input_half
+    v = np.einsum("krn,Nn->Nkr", network.factors, xi) - network.shifts
+    phi = np.exp(-(v * v).sum(axis=2))
+    eta = np.hstack([np.ones((len(X), 1)), xi]) @ network.tail.T + phi @ network.weights.T
+    return s.output_centre + s.output_scale * eta
+
+
+@pytest.mark.parametrize(("n", "m", "h"), [(1, 5, 6), (3, 4, 10), (2, 1, 0), (6, 60, 100)])
+def test_compiled_evaluation_equals_the_formula(n, m, h):
+    network = random_network(n, m, h)
+    X = np.random.default_rng(1).normal(size=(20, n))
+    np.testing.assert_allclose(network.predict(X), plain(network, X), rtol=1e-11, atol=1e-11)
+
+
+@pytest.mark.parametrize(("n", "m", "h"), [(1, 5, 6), (3, 4, 10)])
+def test_evaluator_equals_predict_to_the_bit(n, m, h):
+    network = random_network(n, m, h)
+    X = np.random.default_rng(2).normal(size=(20, n))
+    evaluator = network.evaluator()
+    np.testing.assert_array_equal(np.array([evaluator(x).copy() for x in X]), network.predict(X))
+
+
+def test_jacobian_equals_complex_step():
+    network = random_network(3, 4, 8)
+    x = np.array([0.3, -0.1, 0.5])
+    columns = [plain(network, (x + 1e-30j * np.eye(3)[i])[None])[0].imag / 1e-30 for i in range(3)]
+    np.testing.assert_allclose(network.jacobian(x), np.array(columns).T, rtol=1e-10, atol=1e-13)
+
+
+def test_axis_aligned_factors_give_centres_and_widths_back():
+    network = random_network(2, 1, 5)
+    rng = np.random.default_rng(0)
+    rng.normal(size=2), rng.normal(size=1), rng.uniform(0.5, 2, 1)
+    np.testing.assert_allclose(network.centres, rng.uniform(-1, 1, (5, 2)), rtol=1e-12)
+
+
+def test_scaling_puts_the_declared_range_on_minus_one_to_one():
+    s = Scaling.of([Range("x", 2.0, 6.0, "N")], np.array([[1.0], [3.0], [8.0]]))
+    np.testing.assert_allclose(s.scale_inputs(np.array([[2.0], [4.0], [6.0]])), [[-1], [0], [1]])
+    np.testing.assert_allclose(s.scale_outputs(np.array([[4.0], [8.0]])), [[0], [1]])
+
+
+def test_constant_outputs_scale_by_one():
+    s = Scaling.of([Range("x", 0.0, 1.0)], np.full((4, 2), 3.0))
+    np.testing.assert_array_equal(s.output_scale, 1.0)
+
+
+def test_wrong_number_of_columns_is_refused():
+    with pytest.raises(UsageError, match="takes 3 inputs"):
+        random_network(3, 2, 4).predict(np.zeros((5, 2)))
+
+
+def test_parts_that_do_not_fit_are_refused():
+    good = linear_network([Range("x", 0, 1)], [Quantity("y")], np.zeros((1, 2)))
+    with pytest.raises(UsageError, match="tail"):
+        Network(
+            good.inputs, good.outputs, good.factors, good.shifts, good.weights, np.zeros((1, 3)), good.scaling
+        )
+
+
+def test_printing_says_what_it_is():
+    assert str(random_network(1, 5, 6)).endswith("5 outputs, 6 units")

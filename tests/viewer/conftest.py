@@ -1,11 +1,16 @@
-"""A body that bends far, and a viewer that shows it."""
+"""A body that bends far, a viewer that shows it, and a browser that looks."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
 
 import pytest
 from bodies import arc_beam
+from chromium_page import ARGUMENTS, assert_no, open_page, settled
+from playwright.sync_api import Browser, Page, sync_playwright
 
 from palpate.surrogates import TouchModel
 from palpate.viewer import Viewer
@@ -20,3 +25,58 @@ def rod() -> TouchModel:
 def viewer(rod: TouchModel) -> Iterator[Viewer]:
     with Viewer(rod, port=0) as running:
         yield running
+
+
+@pytest.fixture(scope="module")
+def browser(chromium: str) -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        running = playwright.chromium.launch(executable_path=chromium, args=ARGUMENTS)
+        yield running
+        running.close()
+
+
+@pytest.fixture
+def complaints() -> list[str]:
+    """What the browser complained of; a test that expects something empties it."""
+    return []
+
+
+@pytest.fixture
+def visit(browser: Browser, complaints: list[str]) -> Iterator[Callable[..., Page]]:
+    """Open the page of a viewer; afterwards there must be no complaint."""
+    pages: list[Page] = []
+
+    def one(viewer: Viewer, **options: Any) -> Page:
+        pages.append(open_page(browser, viewer, complaints, **options))
+        settled(pages[-1])  # the body may still swing from the test before
+        return pages[-1]
+
+    yield one
+    for page in pages:
+        page.context.close()
+    assert_no(complaints)
+
+
+@pytest.fixture(scope="module")
+def kept_open(browser: Browser, viewer: Viewer) -> Iterator[tuple[Page, list[str]]]:
+    found: list[str] = []
+    page = open_page(browser, viewer, found)
+    yield page, found
+    page.context.close()
+
+
+@pytest.fixture
+def page(kept_open: tuple[Page, list[str]]) -> Iterator[Page]:
+    """One page for all tests that leave it as they found it: opening costs a second of shader compilation."""
+    settled(kept_open[0], "free")
+    yield kept_open[0]
+    assert_no(kept_open[1])
+    kept_open[1].clear()
+
+
+@pytest.fixture
+def keep(tmp_path: Path) -> Callable[[Page, str], None]:
+    """Keep a screenshot, in the folder PALPATE_SCREENSHOTS where that is set."""
+    folder = Path(os.environ.get("PALPATE_SCREENSHOTS", tmp_path))
+    folder.mkdir(parents=True, exist_ok=True)
+    return lambda page, name: page.screenshot(path=folder / f"{name}.png") and None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import signal
@@ -64,11 +65,13 @@ def test_a_slow_client_gets_the_newest_frame(viewer: Viewer):
 def test_credits_do_not_pile_up(viewer: Viewer):
     with client_of(viewer) as client:
         client.grant(60000)
-        client.grant(60000)
-        for _ in range(MOST_CREDITS):
-            client.frame()
-        with pytest.raises(TimeoutError):
-            client.frame(timeout=0.4)
+        client.grant(60000)  # may come after the first frames went out
+        frames = 0
+        with contextlib.suppress(TimeoutError):
+            while frames <= 2 * MOST_CREDITS:
+                client.frame(timeout=0.5)
+                frames += 1
+        assert MOST_CREDITS <= frames <= 2 * MOST_CREDITS
 
 
 def test_force_and_shape_are_the_models_own(viewer: Viewer, rod: TouchModel):

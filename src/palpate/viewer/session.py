@@ -37,6 +37,7 @@ MOST_CREDITS = 4
 SHORTEST = 1.0 / 125.0  # s between frames to one page: no display that matters is faster
 STALE = 0.25  # s without a tick until the loop counts as frozen
 WATCH = 0.1  # s between looks at the real-time process
+GRACE = 0.5  # s; a signal that ends the whole program may reach the real-time process first
 MAX_U32 = 2**32 - 1
 _NO_FAULT = (Fault.NONE, Fault.INPUT_STALLED)
 
@@ -121,6 +122,7 @@ class Session:
         """Tell the pages and the log once when the real-time process ends."""
         while self.loop.alive:
             await asyncio.sleep(WATCH)
+        await asyncio.sleep(GRACE)
         self._ended = True
         logger.error("%s %s", ENDED.what, ENDED.fix)
         for page in list(self._pages.values()):

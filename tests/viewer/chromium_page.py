@@ -1,0 +1,107 @@
+"""Driving the page in Chromium: open it, read what it shows, pull on the tip, compare with the network.
+
+Chromium draws in software here; every wait is for a state and not for a time.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, Page
+
+from palpate.surrogates import TouchModel
+from palpate.viewer import Viewer
+
+ARGUMENTS = [
+    "--no-sandbox",  # the tests may run as root, in a container
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--no-first-run",
+]
+
+READ = """() => ({
+    data: {...document.documentElement.dataset},
+    text: Object.fromEntries([...document.querySelectorAll("output[id]")].map(o => [o.id, o.textContent])),
+    flags: [...document.querySelectorAll("#flags li")].map(li => li.dataset.flag),
+})"""
+
+
+def open_page(browser: Browser, viewer: Viewer, complaints: list[str], **options: Any) -> Page:
+    """The page of a viewer, in a context of its own; errors and foreign requests go to `complaints`."""
+    options.setdefault("viewport", {"width": 860, "height": 520})
+    page = browser.new_context(**options).new_page()
+    page.on("console", lambda m: complaints.append(m.text) if m.type in {"error", "warning"} else None)
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    local = (viewer.url, "data:", "blob:")
+    page.on("request", lambda r: None if r.url.startswith(local) else complaints.append(f"asks {r.url}"))
+    page.goto(viewer.url)
+    page.wait_for_selector("html[data-tick][data-tip]")
+    return page
+
+
+def assert_no(complaints: list[str]) -> None:
+    # what software rendering says of its own slowness is no fault of the page
+    assert [c for c in complaints if "GPU stall due to ReadPixels" not in c] == []
+
+
+def tip(page: Page) -> tuple[float, float]:
+    """Where the ball at the tip is, px."""
+    x, y = page.evaluate("document.documentElement.dataset.tip").split()
+    return float(x), float(y)
+
+
+def vector(data: dict[str, str], name: str) -> np.ndarray:
+    return np.array([float(v) for v in data[name].split()])
+
+
+def number(text: str) -> float:
+    return float(text.replace("−", "-"))
+
+
+def settled(page: Page, flag: str = "") -> dict[str, Any]:
+    """What the page shows once body and force have stood still for 0.1 s, with `flag` among the flags."""
+    was = page.evaluate(READ)
+    for _ in range(150):
+        page.wait_for_timeout(100)
+        now = page.evaluate(READ)
+        if float(now["data"]["time"]) < float(was["data"]["time"]) + 0.1:
+            continue  # a busy machine: no picture since
+        still = all(now["data"][k] == was["data"][k] for k in ("position", "contact", "force", "grabbed"))
+        if still and "stalled" not in now["flags"] and (not flag or flag in now["flags"]):
+            return now
+        was = now
+    pytest.fail(f"the page did not settle: {was}")
+
+
+def let_go(page: Page) -> dict[str, Any]:
+    """What the page shows once nobody holds the body; it may still swing."""
+    page.wait_for_selector("#flags [data-flag=free]")
+    return page.evaluate(READ)
+
+
+def drag(page: Page, dx: float, dy: float, steps: int = 6) -> None:
+    """Grab the tip with the mouse and pull it; the button stays down."""
+    x, y = tip(page)
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for i in range(1, steps + 1):
+        page.mouse.move(x + dx * i / steps, y + dy * i / steps)
+
+
+def check_force(model: TouchModel, shown: dict[str, Any], parameters: np.ndarray) -> None:
+    """The numbers on the page are the network's own answer at the hand shown."""
+    evaluator = model.evaluator()
+    evaluator(vector(shown["data"], "position"), parameters)
+    # three decimals on the page, and a position rounded to 32 bits at the largest stiffness
+    slack = 0.5e-3 + 1e-6 + model.reach * 2**-23 * model.stiffness_max
+    force = [number(shown["text"][f"force-{c}"]) for c in "xy"]
+    assert np.allclose(force, evaluator.force[:2], rtol=0, atol=slack)
+    assert number(shown["text"]["force-norm"]) == pytest.approx(np.linalg.norm(evaluator.force), abs=slack)
+    moved = [number(shown["text"][f"tip-{c}"]) / 1000 for c in "xy"]
+    assert np.allclose(moved, evaluator.contact[:2], rtol=0, atol=0.05e-3 + 1e-6)

@@ -1,0 +1,136 @@
+"""Pages of their own: a finger, two pages, other bodies, and servers that come and go."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import signal
+
+import numpy as np
+import pytest
+from chromium_page import check_force, drag, let_go, number, settled, tip, vector
+from playwright.sync_api import expect
+
+from models import linear_network, spring_beam
+from palpate.surrogates import TouchModel
+from palpate.units import Quantity, Range
+from palpate.viewer import Viewer
+
+pytestmark = pytest.mark.timeout(120)
+
+
+def test_a_finger_pulls(visit, keep, viewer: Viewer, rod: TouchModel):
+    page = visit(viewer, viewport={"width": 390, "height": 780}, has_touch=True, is_mobile=True)
+    touch = page.context.new_cdp_session(page)
+    x, y = tip(page)
+
+    def send(kind: str, *points: tuple[float, float]) -> None:
+        touch.send(
+            "Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": a, "y": b} for a, b in points]}
+        )
+
+    send("touchStart", (x + 15, y + 12))  # a finger is not a pixel
+    for i in range(1, 11):
+        send("touchMove", (x + 15, y + 12 + 5 * i))
+    shown = settled(page, "inside")
+    keep(page, "finger")
+    assert vector(shown["data"], "force")[1] > 0.3
+    check_force(rod, shown, np.zeros(0))
+    send("touchEnd")
+    assert number(let_go(page)["text"]["force-norm"]) == 0.0
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+def test_the_second_page_watches(visit, keep, viewer: Viewer):
+    first = visit(viewer)
+    second = visit(viewer)
+    drag(first, -20, 100)
+    held = settled(first, "inside")
+    assert "watching" in settled(second, "watching")["flags"]
+    drag(second, 0, -80)
+    second.wait_for_timeout(300)
+    assert settled(first)["data"]["position"] == held["data"]["position"]
+    keep(second, "watching")
+    first.mouse.up()
+    second.mouse.up()
+    assert let_go(second)["flags"] == ["free"]
+
+
+def test_the_end_of_the_loop_is_shown_and_the_page_returns(visit, keep, complaints, rod: TouchModel):
+    with Viewer(rod, port=0) as viewer:
+        page = visit(viewer)
+        drag(page, -20, 100)
+        assert number(settled(page, "inside")["text"]["force-norm"]) > 0.3
+        os.kill(viewer.loop.pid, signal.SIGKILL)
+        shown = settled(page, "ended")
+        keep(page, "ended")
+        assert number(shown["text"]["force-norm"]) == 0.0
+        expect(page.locator("#banner")).to_contain_text("real-time process has ended")
+        page.mouse.up()
+    page.wait_for_selector("#flags [data-flag=lost]")
+    assert "disconnected" in page.inner_text("#status")
+    assert page.inner_text("#force-norm") == "–"
+    keep(page, "disconnected")
+    page.evaluate("document.kept = true")
+    with Viewer(rod, port=viewer.port, strict_port=True):
+        settled(page, "free")
+        assert page.evaluate("document.kept")
+        assert page.is_hidden("#banner")
+        drag(page, -20, 100)
+        check_force(rod, settled(page, "inside"), np.zeros(0))
+        page.mouse.up()
+    with Viewer(spring_beam(), port=viewer.port, strict_port=True):  # another body: a fresh page
+        expect(page.locator("#model-name")).to_have_text("spring", timeout=10_000)
+        page.wait_for_selector("html[data-tick][data-tip]")
+        assert not page.evaluate("document.kept")
+        page.context.close()
+    assert [c for c in complaints if "ERR_CONNECTION_REFUSED" not in c] == []
+    complaints.clear()
+
+
+def two_loads() -> TouchModel:
+    """A spring beam with a second load that the hand doesn't supply: it moves the tip and the force."""
+    beam = spring_beam()
+    inputs = [*beam.inputs, Range("force at midspan", -2.0, 2.0, "N")]
+    names = [Quantity(f"u_{c} at node {i}", "m") for i in range(21) for c in "xy"]
+    tail = np.hstack([beam.networks["field"].tail, np.zeros((42, 1))])
+    tail[1::2, 2] = -0.02 * beam.rest[:, 0]
+    force = linear_network(
+        [*beam.networks["force"].inputs, inputs[1]], [Quantity("tip", "N")], np.array([[2.5, 2.5, -0.4]])
+    )
+    field = linear_network(inputs, names, tail)
+    networks = {"nodes": field, "field": field, "force": force}
+    return dataclasses.replace(beam, name="two loads", networks=networks, mirrors=False)
+
+
+def test_a_slider_sets_a_load_that_the_hand_does_not_supply(visit, keep):
+    model = two_loads()
+    with Viewer(model, port=0) as viewer:
+        page = visit(viewer)
+        page.locator("#parameter-0").fill("1.5")
+        page.wait_for_selector('html[data-parameters="1.5"]')
+        expect(page.locator("#sliders output")).to_have_text("1.5 N")
+        drag(page, 0, 60)
+        check_force(model, settled(page, "inside"), np.array([1.5]))
+        keep(page, "slider")
+        page.context.close()
+
+
+def test_small_displacements_are_drawn_enlarged_and_said_to_be(visit, keep):
+    model = dataclasses.replace(spring_beam(160.0), name="stiff")  # reaches 31 mm of 1 m
+    with Viewer(model, port=0) as viewer:
+        page = visit(viewer, color_scheme="dark")
+        assert "displacement drawn × 10" in page.inner_text("#scale-notes")
+        drag(page, 0, 50)
+        shown = settled(page, "inside")
+        keep(page, "enlarged-dark")
+        check_force(model, shown, np.zeros(0))
+        page.mouse.up()
+        settled(page, "free")
+        page.click("#true-scale")
+        assert "displacement to scale" in page.inner_text("#scale-notes")
+        drag(page, 0, 5)
+        finer = settled(page, "inside")
+        ratio = vector(finer["data"], "position")[1] / vector(shown["data"], "position")[1]
+        assert ratio == pytest.approx(1.0, rel=0.3)  # a tenth of the way at ten times the scale, to a pixel
+        page.context.close()

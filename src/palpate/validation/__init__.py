@@ -1,0 +1,38 @@
+"""Is it true: a touch model against solves it has never seen, and the report that says so.
+
+    limits     what is asked, and why a person would notice       words     figures as a person reads them
+    region     the outer part of the range; where the worst is    outputs   errors of nodal displacements
+    field      errors of the whole deflected shape                force     errors of the force on the hand
+    stiffness  ∂F/∂x against the finite-element curve             loops     work around closed paths
+    judge      figures against limits                             result    `validate`, and what it returns
+    report/    one self-contained page with figures and tables
+
+Names are loaded when they are first used: Matplotlib and Jinja2 cost time that only a report needs.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from palpate.validation.limits import Check, Limits
+    from palpate.validation.report import Chapter, write_report
+    from palpate.validation.result import Validation, validate
+
+__all__ = ["Chapter", "Check", "Limits", "Validation", "validate", "write_report"]
+
+_HOMES = {
+    "Check": "limits",
+    "Limits": "limits",
+    "Chapter": "report",
+    "write_report": "report",
+    "Validation": "result",
+    "validate": "result",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,220 @@
+"""What is asked of a touch model, and why: thresholds from what a hand and an eye can tell apart.
+
+Just noticeable differences: force about 7 % from 2.5 to 10 N and 10 to 15 % below 1 N (Jones 1989; Pang, Tan &
+Durlach 1991), stiffness 8 to 23 % (Jones & Hunter 1990; Tan, Durlach, Beauregard & Srinivasan 1995), direction
+of a force 25 to 35° (Barbagli, Salisbury, Ho, Spence & Tan 2006; Tan, Barbagli, Salisbury, Ho & Spence 2006). A
+limit is half a just noticeable difference at the median, one at the 95th percentile; "good" is half of that and
+better. What concerns time (Vogels 2004; Di Luca & Mahnan 2019) is judged where the loop and the viewer run.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Literal
+
+from palpate.errors import UsageError
+
+__all__ = ["CRITERIA", "FORCE_JND", "Check", "Criterion", "Grade", "Limits"]
+
+FORCE_JND = 0.07
+"""Just noticeable relative difference of a force (Jones 1989; Pang, Tan & Durlach 1991)."""
+
+Grade = Literal["good", "pass", "fail"]
+Kind = Literal["scale", "metres", "share", "degrees", "times"]
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Largest figures that pass, on solves that the networks have never seen; None asks nothing.
+
+    Attributes
+    ----------
+    rmse : float
+        Of the refined network, over full scale: the largest displacement in the test set.
+    filter_rmse : float
+        The same of the sequential filter's own network.
+    filter_outer_ratio : float
+        RMSE of the filter's network in the outer 10 % of the range over that in the rest.
+    filter_relapse : float
+        Largest ratio of the filter's held-out error to its best so far: what tells drift from convergence.
+    displacement_mean, displacement_max : float
+        Distance of the shown shape's nodes from the finite-element ones, m.
+    force_median, force_p95 : float
+        ‖ΔF‖/‖F‖ where ‖F‖ > f₀ = min(0.5 N, 5 % of the largest).
+    light_force_p95 : float
+        ‖ΔF‖/f₀ at smaller forces.
+    stiffness_p95 : float
+        |ΔK|/K of the force's slope.
+    direction_p95 : float
+        Angle between the forces in degrees, where ‖F‖ > f₀.
+    loop_work : float
+        Largest net work around closed paths, over the energy given on the way.
+
+    Raises
+    ------
+    UsageError
+        If a limit is not positive.
+    """
+
+    rmse: float | None = 1e-3
+    filter_rmse: float | None = None
+    filter_outer_ratio: float | None = None
+    filter_relapse: float | None = None
+    displacement_mean: float | None = 0.35e-3
+    displacement_max: float | None = 1e-3
+    force_median: float | None = 0.035
+    force_p95: float | None = 0.07
+    light_force_p95: float | None = 0.07
+    stiffness_p95: float | None = 0.15
+    direction_p95: float | None = 10.0
+    loop_work: float | None = 0.01
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if value is not None and not (value > 0 and math.isfinite(value)):
+                raise UsageError(
+                    f"The limit {field.name} is {value}; it must be a positive number.",
+                    fix="Give a positive limit, or none to ask nothing.",
+                )
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """One thing that is judged.
+
+    Attributes
+    ----------
+    key : str
+        Its name in `Limits`.
+    label : str
+    kind : "scale", "metres", "share", "degrees" or "times"
+        How its figures are written.
+    good : float or None
+        A figure better than which nothing is gained; None where there is no such thing.
+    source : str
+        Where the threshold comes from.
+    fix : str
+        What to do about a miss.
+    """
+
+    key: str
+    label: str
+    kind: Kind
+    good: float | None
+    source: str
+    fix: str
+
+
+@dataclass(frozen=True)
+class Check:
+    """One figure against its limit.
+
+    Attributes
+    ----------
+    criterion : Criterion
+    measured : float
+    limit : float
+    where : str
+        The worst case in words; empty where there is none to name.
+    """
+
+    criterion: Criterion
+    measured: float
+    limit: float
+    where: str = ""
+
+    @property
+    def passed(self) -> bool:
+        """Whether the figure is within its limit; not-a-number never is."""
+        return bool(self.measured <= self.limit)
+
+    @property
+    def grade(self) -> Grade:
+        """Judgement in one word."""
+        if not self.passed:
+            return "fail"
+        good = self.criterion.good
+        return "good" if good is not None and self.measured <= good else "pass"
+
+    def __str__(self) -> str:
+        """What was measured, what was asked, where the worst case is, what to do."""
+        from palpate.validation.words import shown
+
+        kind = self.criterion.kind
+        text = (
+            f"{self.criterion.label}: {shown(self.measured, kind)} measured, {shown(self.limit, kind)} asked."
+        )
+        if self.where:
+            text += f" The worst case is {self.where}."
+        return text if self.passed else f"{text} {self.criterion.fix}"
+
+
+_MORE = "Sweep more samples, or allow the refined networks more units (units_max of the refinement)."
+_FORCE = "Jones 1989; Pang, Tan & Durlach 1991"
+_FILTER = "Let the filter grow more (lower error_min and error_rms_min), or give it more passes."
+_TARGET = "the study's own target"
+_EYE = "palpate's own: about a pixel where a body of 1 m fills a screen"
+
+CRITERIA = (
+    Criterion(
+        "rmse", "Refined network, RMSE over full scale", "scale", None, "the study's own target", _MORE
+    ),
+    Criterion(
+        "filter_rmse",
+        "Sequential filter, RMSE over full scale",
+        "scale",
+        None,
+        "the study's own target",
+        _FILTER,
+    ),
+    Criterion(
+        "filter_outer_ratio",
+        "Sequential filter, outer 10 % against the rest",
+        "times",
+        1.0,
+        "Narayanan, Singla, Garimella, Waz & Krovi 2011 report drift at the ends of the range",
+        "Believe the ends of the range more (a smaller edge_weight), or sample them more densely.",
+    ),
+    Criterion(
+        "filter_relapse",
+        "Sequential filter, held-out error against its best so far",
+        "times",
+        1.1,
+        _TARGET,
+        "Guard the filter: a larger noise or noise_share, a smaller step_bound or forgetting.",
+    ),
+    Criterion("displacement_mean", "Shape, mean distance of nodes", "metres", 0.1e-3, _EYE, _MORE),
+    Criterion("displacement_max", "Shape, largest distance of a node", "metres", 0.3e-3, _EYE, _MORE),
+    Criterion("force_median", "Force error, median", "share", 0.01, _FORCE, _MORE),
+    Criterion("force_p95", "Force error, 95th percentile", "share", 0.035, _FORCE, _MORE),
+    Criterion(
+        "light_force_p95", "Force error at light touch, 95th percentile of f₀", "share", 0.035, _FORCE, _MORE
+    ),
+    Criterion(
+        "stiffness_p95",
+        "Stiffness error, 95th percentile",
+        "share",
+        0.08,
+        "Jones & Hunter 1990; Tan, Durlach, Beauregard & Srinivasan 1995",
+        _MORE,
+    ),
+    Criterion(
+        "direction_p95",
+        "Direction of the force, 95th percentile",
+        "degrees",
+        5.0,
+        "Barbagli, Salisbury, Ho, Spence & Tan 2006; Tan, Barbagli, Salisbury, Ho & Spence 2006",
+        _MORE,
+    ),
+    Criterion(
+        "loop_work",
+        "Work around a closed path, largest",
+        "share",
+        1e-9,
+        "passivity: a body at rest gives nothing away (Colgate & Schenkel 1997)",
+        "The force is not the gradient of an energy: sweep more samples, or touch one load only.",
+    ),
+)
+"""Everything that is judged, in the order in which it is told."""

@@ -1,0 +1,14 @@
+"""One self-contained page: what was solved, what was learnt, how good it is.
+
+chapter   what the page tells of one body         write    the page itself
+summary   the plain words on top                  tables   rows of its tables
+style     how figures look                        svg      a figure as part of a page
+shapes, errors, growth, forces   the figures
+"""
+
+from __future__ import annotations
+
+from palpate.validation.report.chapter import Chapter
+from palpate.validation.report.write import write_report
+
+__all__ = ["Chapter", "write_report"]

@@ -1,0 +1,114 @@
+"""The page itself."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from palpate.errors import UsageError
+from palpate.validation.report.chapter import Chapter
+from palpate.validation.report.pictures import pictures
+from palpate.validation.report.summary import story
+from palpate.validation.report.tables import flat, judged_rows, node_rows, sources, timing_rows
+from palpate.validation.words import bound
+
+__all__ = ["render", "write_report"]
+
+TITLE = "What the hand will feel"
+
+
+def write_report(
+    path: str | os.PathLike[str],
+    chapters: Sequence[Chapter],
+    *,
+    title: str = TITLE,
+    machine: Mapping[str, Any] | None = None,
+) -> Path:
+    """Write one self-contained HTML file and return its path.
+
+    Parameters
+    ----------
+    path : path
+        Of the file; its folder is made if need be.
+    chapters : sequence of Chapter
+        One per body.
+    title : str
+    machine : mapping, optional
+        What the figures were made on: processor, system, versions.
+
+    Raises
+    ------
+    UsageError
+        If there is no chapter, or the file can't be written.
+    """
+    target = Path(path)
+    page = render(chapters, title=title, machine=machine)
+    part = target.with_name(f".{target.name}.part")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        part.write_text(page, encoding="utf-8", newline="\n")
+        part.replace(target)  # a reader never meets half a page
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise UsageError(
+            f"The report can't be written to {target}.",
+            why=str(error),
+            fix="Name a file in a folder that you may write to.",
+        ) from error
+    return target
+
+
+def render(
+    chapters: Sequence[Chapter], *, title: str = TITLE, machine: Mapping[str, Any] | None = None
+) -> str:
+    """The page as text; the same chapters give the same text.
+
+    Raises
+    ------
+    UsageError
+        If there is no chapter.
+    """
+    if not chapters:
+        raise UsageError("A report needs at least one chapter.", fix="Validate a model first.")
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from markupsafe import Markup
+
+    environment = Environment(
+        loader=PackageLoader("palpate.validation.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["bound"] = bound
+    # figures are made here, with every name in them escaped by Matplotlib; the style sheet is palpate's own
+    style = Markup(environment.get_template("report.css").render())
+    told = [_told(chapter, f"c{i}") for i, chapter in enumerate(chapters, 1)]
+    return environment.get_template("report.html").render(
+        title=title,
+        style=style,
+        chapters=told,
+        sources=sources([c.validation for c in chapters]),
+        machine=list(flat(machine or {})),
+        svg=Markup,
+    )
+
+
+def _told(chapter: Chapter, key: str) -> dict[str, Any]:
+    head, rows = node_rows(chapter.validation)
+    return {
+        "key": key,
+        "name": chapter.name,
+        "story": story(chapter),
+        "pictures": pictures(chapter, key),
+        "judged": judged_rows(chapter.validation),
+        "failures": [str(c) for c in chapter.validation.failures],
+        "notes": chapter.validation.notes,
+        "node_head": head,
+        "node_rows": rows,
+        "timings": timing_rows(chapter),
+        "settings": list(flat(chapter.settings or chapter.touch.meta.get("settings", {}))),
+        "provenance": list(flat(chapter.provenance or chapter.train.provenance)),
+    }

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from laws.beams import INPUT, OUTPUTS, exact, stiffening
 
+from laws.beams import INPUT, OUTPUTS, exact, stiffening
 from palpate.learning import State, default, founding, freeze, initial, learn, step
 from palpate.learning.ekf import updated
 from palpate.learning.gaussian import activations, jacobian, value

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
-from laws.beams import INPUT, OUTPUTS, exact, stiffening
 
+from laws.beams import INPUT, OUTPUTS, exact, stiffening
 from palpate.learning import Settings, initial, posterior, refine, refined_network, step
 from palpate.learning.gaussian import activations, value
 from palpate.learning.refine import _activations
@@ -68,7 +70,7 @@ def test_cost_never_rises_with_iterations():
     x, y = s.scale_inputs(X), s.scale_outputs(Y)
     start = np.linspace(-1, 1, 3)[:, None], np.full((3, 1), 0.8)
     errors = [refine(x, y, *start, iterations=k).rms for k in (0, 1, 3, 10, 40)]
-    assert all(b <= a for a, b in zip(errors, errors[1:], strict=False))
+    assert all(b <= a for a, b in itertools.pairwise(errors))
     assert errors[-1] < 0.2 * errors[0]
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from laws.beams import INPUT, OUTPUTS, exact, stiffening
 
+from laws.beams import INPUT, OUTPUTS, exact, stiffening
 from palpate.errors import FileFormatError, UsageError
 from palpate.learning import History, Settings, default, founding, initial, learn, step
 from palpate.learning.ekf import updated
@@ -162,7 +162,7 @@ def test_history_file_round_trips_and_a_damaged_one_is_named(tmp_path):
     np.testing.assert_array_equal(again.error, history.error)
     assert again.passes == 1
     path.write_bytes(path.read_bytes()[:100])
-    with pytest.raises(FileFormatError, match="h.npz"):
+    with pytest.raises(FileFormatError, match=r"h\.npz"):
         History.load(path)
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from models import linear_network
 
+from models import linear_network
 from palpate.errors import UsageError
 from palpate.network import Network, Scaling
 from palpate.units import Quantity, Range

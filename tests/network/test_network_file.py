@@ -59,7 +59,7 @@ def test_missing_file_and_folder(tmp_path):
 def test_truncated(path, share):
     content = path.read_bytes()
     path.write_bytes(content[: int(share * len(content))])
-    with pytest.raises(FileFormatError, match="m.palpate"):
+    with pytest.raises(FileFormatError, match=r"m\.palpate"):
         load_archive(path)
 
 

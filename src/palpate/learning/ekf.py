@@ -17,6 +17,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from palpate.learning.gaussian import jacobian, value
+from palpate.learning.memory import forgets
 from palpate.learning.noise import variance
 from palpate.learning.settings import Settings
 from palpate.learning.state import State
@@ -35,7 +36,7 @@ def updated(state: State, x: np.ndarray, y: np.ndarray, settings: Settings) -> S
     z, K, PH, S = _iterate(state, x, y, r, settings)
     for _ in range(_TRIES):
         excess = _excess(state, z, settings)
-        if excess <= 1.0 and not _forgets(state, z, settings):
+        if excess <= 1.0 and not forgets(state, state.moved(z), settings):
             break
         # a smaller step by more measurement noise keeps estimate and covariance consistent
         r += max(excess - 1.0, 1.0) * float(np.trace(S)) / y.size
@@ -90,16 +91,3 @@ def _excess(state: State, z: np.ndarray, settings: Settings) -> float:
     centres = np.abs(step[:, m : m + n] / sigma).max()
     widths = np.abs(step[:, m + n :] if settings.widths == "log" else step[:, m + n :] / sigma).max()
     return float(max(centres, widths)) / settings.step_bound
-
-
-def _forgets(state: State, z: np.ndarray, settings: Settings) -> bool:
-    """Whether a step would raise the error over the remembered window by more than is allowed."""
-    if not settings.forgetting or len(state.seen) < 2:
-        return False
-    return _window_error(state.moved(z), settings) > settings.forgetting * _window_error(state, settings)
-
-
-def _window_error(state: State, settings: Settings) -> float:
-    """Sum of squared errors over the window."""
-    X, Y = state.seen[:, : state.inputs], state.seen[:, state.inputs :]
-    return float(((value(state, X, settings) - Y) ** 2).sum())

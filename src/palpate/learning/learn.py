@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from palpate.errors import UsageError
 from palpate.learning.gaussian import value
@@ -93,15 +94,16 @@ def learn(
     events: list[Event] = []
     innovation: list[float] = []
     errors: list[float] = []
-    for _ in range(passes):
-        for i in rng.permutation(len(xs)):
-            state, event = step(state, xs[i], ys[i], settings)
-            events.append(event)
-            innovation.append(state.innovation)
-            if judge:
-                errors.append(judge(state))
-        if progress:
-            progress(len(events), passes * len(xs))
+    with threadpool_limits(1):  # small matrices: more BLAS threads cost time, and the bits of the result
+        for _ in range(passes):
+            for i in rng.permutation(len(xs)):
+                state, event = step(state, xs[i], ys[i], settings)
+                events.append(event)
+                innovation.append(state.innovation)
+                if judge:
+                    errors.append(judge(state))
+            if progress:
+                progress(len(events), passes * len(xs))
     network = freeze(state, settings, inputs, outputs, scaling)
     return Learned(network, state, scaling, History.of(events, innovation, errors, passes))
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from palpate.learning.gaussian import activations
+from palpate.learning.memory import forgets
 from palpate.learning.settings import Settings
 from palpate.learning.state import State
 
@@ -24,13 +25,19 @@ def contributions(state: State, x: np.ndarray, settings: Settings) -> np.ndarray
 
 
 def pruned(state: State, x: np.ndarray, settings: Settings) -> State:
-    """The state after judging every unit at x; units silent for S_w observations in a row are gone."""
+    """The state after judging every unit at x; units silent for S_w observations in a row go.
+
+    With a limit on forgetting, only those without which the window's error stays within it.
+    """
     if not len(state.units) or settings.prune_after == 0:
         return state
     silent = np.where(contributions(state, x, settings) < settings.prune_below, state.silent + 1, 0)
     state = replace(state, silent=silent)
-    drop = np.flatnonzero(silent >= settings.prune_after)
-    return without(state, drop) if drop.size else state
+    for k in np.flatnonzero(silent >= settings.prune_after)[::-1]:
+        fewer = without(state, np.array([k]))
+        if not forgets(state, fewer, settings):
+            state = fewer
+    return state
 
 
 def without(state: State, units: np.ndarray) -> State:

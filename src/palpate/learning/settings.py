@@ -64,7 +64,8 @@ class Settings:
     step_bound : float
         Largest change of a centre (in widths) and of a log width in one update; 0 for none.
     forgetting : float
-        Largest factor by which one update may raise the squared error over the window; 0 for no limit.
+        Largest factor by which one update, or the removal of a unit, may raise the squared error over the
+        window; 0 for no limit.
     update_on_growth : bool
         Whether an observation that added a unit also updates everything.
     prune_below : float
@@ -103,7 +104,7 @@ class Settings:
     forgetting: float = 1.1
     update_on_growth: bool = True
     prune_below: float = 1e-4
-    prune_after: int = 100
+    prune_after: int = 500
     units_max: int = 40
 
     def __post_init__(self) -> None:

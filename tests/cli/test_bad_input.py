@@ -1,0 +1,165 @@
+"""Bad input: one clear message, the right exit code, nothing lost."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import socket
+
+import pytest
+
+from .conftest import SMALL
+
+
+def broken(folder, old: str, new: str):
+    path = folder / "study.toml"
+    assert old in SMALL
+    path.write_text(SMALL.replace(old, new, 1), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("samples = 33", "sampels = 33", ["sweep.sampels", "did you mean 'samples'"]),
+        ('high = "2 N"', 'high = "2 kg"', ["loads.0.high", "not a quantity in N"]),
+        ('high = "2 N"', 'high = "two"', ["loads.0.high"]),
+        ('high = "2 N"', "high = nan", ["loads.0.high"]),
+        ("elements = 10", "elements = 0", ["body.elements"]),
+        ("[sweep]", "[sweeep]", ["sweeep", "did you mean 'sweep'"]),
+        ("[sweep]", "[sweep", ["not valid TOML", "line"]),
+        ('name = "small"', 'name = "../up"', ["name"]),
+        ("passes = 12", "passes = 12\nsettings = { nois = 1.0 }", ["no setting 'nois'"]),
+    ],
+)
+def test_a_study_that_can_not_be_meant(palpate, tmp_path, old, new, words):
+    answer = palpate("sweep", broken(tmp_path, old, new))
+    assert answer.code == 2
+    assert answer.out == ""
+    for word in ["study.toml", *words]:
+        assert word in answer.err
+    assert "Traceback" not in answer.err
+
+
+def test_all_mistakes_of_a_study_are_listed_at_once(palpate, tmp_path):
+    path = broken(tmp_path, "samples = 33", "sampels = 33")
+    path.write_text(path.read_text().replace("elements = 10", "elements = 0"))
+    answer = palpate("sweep", path)
+    assert "sweep.sampels" in answer.err
+    assert "body.elements" in answer.err
+
+
+def test_missing_study(palpate, tmp_path):
+    answer = palpate("sweep", tmp_path / "no.toml")
+    assert answer.code == 2
+    assert "palpate init" in answer.err
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('material = "nylon"', 'material = "nylonn"', ["nylonn", "copper"]),
+        ('high = "2 N"', 'high = "-2 N"', ["range"]),
+        ('high = "2 N"', 'high = "2 N"\ndirection = [0, 0]', ["direction"]),
+        ('high = "2 N"', 'high = "2 N"\nat = "3 m"', ["beam"]),
+    ],
+)
+def test_a_body_that_can_not_be(palpate, tmp_path, old, new, words):
+    answer = palpate("sweep", broken(tmp_path, old, new))
+    assert answer.code == 2
+    for word in words:
+        assert word in answer.err
+
+
+def test_loads_outside_the_solvers_reach(palpate, tmp_path):
+    path = broken(tmp_path, 'high = "2 N"', 'high = "1e9 N"')
+    path.write_text(path.read_text().replace("samples = 33", "samples = 4"))
+    answer = palpate("sweep", path)
+    assert answer.code == 3
+    assert "1e+09" in answer.err or "1000000000" in answer.err
+    assert "Traceback" not in answer.err
+
+
+def test_errors_as_json(palpate, tmp_path):
+    answer = palpate("sweep", tmp_path / "no.toml", "--json")
+    error = json.loads(answer.out)["error"]
+    assert error["kind"] == "StudyError"
+    assert "no.toml" in error["what"]
+
+
+@pytest.fixture
+def copy(carried_out, tmp_path):
+    return shutil.copytree(carried_out, tmp_path / "copy")
+
+
+def test_missing_and_corrupt_dataset(palpate, copy):
+    metadata = copy / "small.zarr" / "zarr.json"
+    metadata.write_bytes(metadata.read_bytes()[:-50])
+    answer = palpate("learn", copy / "study.toml")
+    assert answer.code == 2
+    assert "small.zarr" in answer.err
+    shutil.rmtree(copy / "small.zarr")
+    answer = palpate("learn", copy / "study.toml")
+    assert answer.code == 2
+    assert "small.zarr" in answer.err
+
+
+def test_the_dataset_of_another_study_is_not_overwritten(palpate, copy):
+    path = copy / "study.toml"
+    path.write_text(SMALL.replace('high = "2 N"', 'high = "3 N"'), encoding="utf-8")
+    answer = palpate("sweep", path)
+    assert answer.code == 2
+    assert "small.zarr" in answer.err
+
+
+@pytest.mark.parametrize("command", [("view",), ("run",)])
+def test_corrupt_model(palpate, copy, command):
+    model = copy / "small.palpate"
+    content = bytearray(model.read_bytes())
+    content[-5] ^= 1
+    model.write_bytes(content)
+    answer = palpate(*command, model)
+    assert answer.code == 2
+    assert "checksum" in answer.err
+
+
+def test_validate_names_a_corrupt_model(palpate, copy):
+    model = copy / "small.palpate"
+    model.write_bytes(model.read_bytes()[:1000])
+    answer = palpate("validate", copy / "study.toml")
+    assert answer.code == 2
+    assert "small.palpate" in answer.err
+
+
+def test_a_missed_target_is_exit_code_one_after_the_report_is_written(palpate, copy):
+    path = copy / "study.toml"
+    path.write_text(SMALL + "\n[target]\nrmse = 1e-14\n", encoding="utf-8")
+    answer = palpate("validate", path, "--json")
+    assert answer.code == 1
+    assert json.loads(answer.out)["passed"] is False
+    assert (copy / "small.html").exists()
+    assert "RMSE" in answer.err
+
+
+def test_a_busy_port(palpate, copy):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        answer = palpate("view", copy / "small.palpate", "--port", port, "--strict-port", "--no-browser")
+    assert answer.code == 2
+    assert str(port) in answer.err
+
+
+def test_unknown_device(palpate, copy):
+    answer = palpate("run", copy / "small.palpate", "--device", "phantom")
+    assert answer.code == 2
+    assert "stroke" in answer.err
+
+
+@pytest.mark.parametrize(
+    "words", [["nonsense"], ["run"], ["sweep", "--workers", "0"], ["demo", "no-such-study"]]
+)
+def test_usage(palpate, words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert palpate(*words).code == 2

@@ -1,0 +1,133 @@
+"""Each command on a real study: what it writes, what it prints, where."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from palpate import __version__
+from palpate.dataset import Dataset
+from palpate.study import Study, preset_names, preset_study, read_study
+from palpate.surrogates import TouchModel
+
+from .conftest import SMALL
+
+
+def test_version_and_help(palpate):
+    assert palpate("--version").out == f"palpate {__version__}\n"
+    answer = palpate("--help")
+    for command in ("demo", "init", "sweep", "learn", "validate", "view", "run", "doctor", "schema"):
+        assert command in answer.out
+
+
+def test_python_m_palpate_is_palpate():
+    done = subprocess.run(
+        [sys.executable, "-m", "palpate", "--version"], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == f"palpate {__version__}\n"
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_init_writes_a_study_that_reads_back_as_the_preset(palpate, tmp_path, name):
+    path = tmp_path / "study.toml"
+    assert palpate("init", path, "--preset", name).code == 0
+    assert read_study(path) == preset_study(name)
+    assert palpate("init", "--print", "--preset", name).out == path.read_text(encoding="utf-8")
+
+
+def test_init_does_not_overwrite(palpate, tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_text("mine", encoding="utf-8")
+    answer = palpate("init", path)
+    assert answer.code == 2
+    assert "exists already" in answer.err
+    assert path.read_text(encoding="utf-8") == "mine"
+    assert palpate("init", path, "--force").code == 0
+
+
+def test_schema_describes_every_key(palpate):
+    schema = json.loads(palpate("schema").out)
+    assert set(schema["properties"]) == set(Study.model_fields)
+    assert schema["additionalProperties"] is False
+
+
+def test_sweep_and_learn_write_what_they_say(carried_out):
+    data, random = Dataset.open(carried_out / "small.zarr"), Dataset.open(carried_out / "small-random.zarr")
+    assert (len(data), len(random)) == (33, 8)
+    assert data.converged.all()
+    model = TouchModel.load(carried_out / "small.palpate")
+    assert model.name == "small"
+    evaluator = model.evaluator()
+    row = 20
+    evaluator(np.array([*data.displacement[row, -1, :2], 0.0]), np.zeros(0))
+    np.testing.assert_allclose(evaluator.force, [0.0, data.X[row, 0], 0.0], atol=1e-4)
+
+
+def test_a_finished_sweep_is_not_solved_again(palpate, carried_out):
+    before = Dataset.open(carried_out / "small.zarr").provenance["created"]
+    assert palpate("sweep", carried_out / "study.toml").code == 0
+    assert Dataset.open(carried_out / "small.zarr").provenance["created"] == before
+
+
+def test_validate_keeps_its_limits_and_writes_the_report(palpate, carried_out):
+    answer = palpate("validate", carried_out / "study.toml", "--json")
+    assert answer.code == 0
+    content = json.loads(answer.out)
+    assert content["passed"] is True
+    assert (carried_out / "small.html").read_text(encoding="utf-8").startswith("<!doctype html>")
+
+
+def test_results_go_to_stdout_and_progress_to_stderr(palpate, carried_out, tmp_path):
+    shutil.copytree(carried_out, tmp_path / "s")
+    answer = palpate("learn", tmp_path / "s" / "study.toml", "--json")
+    assert answer.err == ""
+    assert set(json.loads(answer.out)) == {"model", "units"}
+    answer = palpate("learn", tmp_path / "s" / "study.toml")
+    assert "Learning from" in answer.err
+    assert "Learning from" not in answer.out
+
+
+def test_learning_again_gives_the_same_model_bit_for_bit(palpate, carried_out, tmp_path):
+    shutil.copytree(carried_out, tmp_path / "s")
+    palpate("learn", tmp_path / "s" / "study.toml")
+    first, again = (TouchModel.load(f / "small.palpate") for f in (carried_out, tmp_path / "s"))
+    for name, network in first.networks.items():
+        np.testing.assert_array_equal(again.networks[name].factors, network.factors)
+        np.testing.assert_array_equal(again.networks[name].weights, network.weights)
+
+
+def test_run_reports_the_loop(palpate, carried_out):
+    answer = palpate("run", carried_out / "small.palpate", "--seconds", "0.5", "--json")
+    assert answer.code == 0
+    report = json.loads(answer.out)
+    assert report["ticks"] > 50
+
+
+def test_doctor_has_a_remedy_for_each_miss(palpate):
+    checks = json.loads(palpate("doctor", "--json").out)["checks"]
+    assert {"Python", "NGSolve", "chromium"} <= {c["name"] for c in checks}
+    assert all(c["ok"] or c["remedy"] for c in checks)
+
+
+@pytest.mark.slow
+def test_demo_runs_both_founding_beams(tmp_path):
+    command = [sys.executable, "-m", "palpate", "demo", "--folder", str(tmp_path / "d"), "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=280)
+    assert done.returncode == 0, done.stderr
+    content = json.loads(done.stdout)
+    assert set(content["studies"]) == {"beam-copper", "beam-nylon"}
+    assert all(s["passed"] for s in content["studies"].values())
+    assert (tmp_path / "d" / "report.html").stat().st_size < 3_000_000
+    for name in content["studies"]:
+        assert len(Dataset.open(tmp_path / "d" / f"{name}.zarr")) == 501
+
+
+def test_small_study_is_the_one_of_the_fixture(tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_text(SMALL, encoding="utf-8")
+    assert read_study(path).sweep.samples == 33

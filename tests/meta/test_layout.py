@@ -1,0 +1,73 @@
+"""The house keeps its shape: public names exist, start-up stays light, files stay short."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import palpate
+
+PACKAGE = Path(palpate.__file__).parent
+
+
+def modules() -> list[str]:
+    return [
+        m.name
+        for m in pkgutil.walk_packages([str(PACKAGE)], "palpate.")
+        if not m.name.endswith(("__main__", ".client"))
+    ]
+
+
+@pytest.mark.parametrize("name", modules())
+def test_every_public_name_exists(name):
+    module = importlib.import_module(name)
+    for public in getattr(module, "__all__", []):
+        assert getattr(module, public) is not None
+
+
+def test_top_level_names_are_those_promised():
+    assert set(palpate.__all__) == set(palpate._HOMES)
+    for name in palpate.__all__:
+        assert getattr(palpate, name) is not None
+    with pytest.raises(AttributeError, match="no_such_name"):
+        _ = palpate.no_such_name
+
+
+@pytest.mark.parametrize(
+    ("code", "absent"),
+    [
+        ("import palpate", ("numpy",)),
+        (
+            "import palpate.cli",
+            ("numpy", "numba", "ngsolve", "matplotlib", "distributed", "xarray", "pydantic"),
+        ),
+        ("import palpate.study", ("matplotlib", "distributed", "uvicorn")),
+        ("import palpate.viewer", ("ngsolve", "matplotlib", "distributed", "xarray", "pydantic")),
+    ],
+)
+def test_heavy_packages_wait_until_they_are_needed(code, absent):
+    probe = f"{code}\nimport sys\nprint([m for m in {absent!r} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_files_stay_readable():
+    long = {
+        str(p.relative_to(PACKAGE)): n
+        for p in PACKAGE.rglob("*.py")
+        if (n := len(p.read_text(encoding="utf-8").splitlines())) > 400
+    }
+    assert long == {}
+
+
+def test_the_package_is_typed_and_its_version_is_one():
+    import tomllib
+
+    assert (PACKAGE / "py.typed").exists()
+    project = Path(__file__).parents[2] / "pyproject.toml"
+    assert tomllib.loads(project.read_text(encoding="utf-8"))["project"]["version"] == palpate.__version__

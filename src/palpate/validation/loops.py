@@ -70,7 +70,7 @@ def loop_work(
     if len(found) < 10:
         return "Work around closed paths is not judged: too few loops stay inside the trained region."
     net, energy = np.abs([f[0] for f in found]), np.array([f[1] for f in found])
-    ratio = net / energy
+    ratio = np.divide(net, energy, out=np.zeros_like(net), where=energy > 0)  # no force, no work
     p95 = float(np.quantile(ratio, 0.95))
     return LoopWork(len(found), float(np.median(ratio)), p95, float(ratio.max()), float(np.median(energy)))
 

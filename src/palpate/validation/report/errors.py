@@ -95,11 +95,8 @@ def plot_outer(validation: Validation) -> Figure:
                 fontsize=8.5,
             )
     positive = [p for p in points if p > 0]
-    logarithmic(axis, "x")
-    if positive:
-        axis.set_xlim(
-            10 ** np.floor(np.log10(min(positive)) - 0.1), 10 ** np.ceil(np.log10(max(positive)) + 0.2)
-        )
+    low, high = (min(positive), max(positive)) if positive else (1e-15, 1e-10)
+    logarithmic(axis, "x", 10 ** np.floor(np.log10(low) - 0.1), 10 ** np.ceil(np.log10(high) + 0.2))
     axis.set_yticks(range(len(labels)), [TITLES[k] for k in labels])
     axis.set_ylim(len(labels) - 0.5, -0.5)
     axis.set_xlabel("RMSE over full scale")
@@ -122,13 +119,14 @@ def _draw(axis: Any, x: np.ndarray, names: list[str], error: np.ndarray, *, line
                 color=style["color"],
                 markersize=3,
                 alpha=0.8,
+                rasterized=True,  # thousands of marks weigh more than their picture
                 markeredgewidth=0,
                 label=name,
             )
 
 
 def _note(axis: Any, text: str, height: float) -> None:
-    axis.annotate(
+    note = axis.annotate(
         text,
         (0.995, height),
         (0, 3),
@@ -136,7 +134,9 @@ def _note(axis: Any, text: str, height: float) -> None:
         textcoords="offset points",
         ha="right",
         fontsize=8,
+        annotation_clip=True,
     )
+    note.set_in_layout(False)  # a limit far below the axis must not squeeze the panels
 
 
 def _with_unit(quantity: Any) -> str:

@@ -33,16 +33,13 @@ def plot_force_errors(samples: ForceSamples) -> Figure:
     fig, axes = figure(1, 1, size=(4.6, 3.4))
     axis = axes[0, 0]
     heavy = samples.size > samples.light
-    relative = np.sort(samples.error[heavy] / samples.size[heavy]) / FORCE_JND
-    floor = 1e-9
-    shown = np.maximum(relative, floor)
-    if shown.size:
-        share = 100 * np.arange(1, shown.size + 1) / shown.size
-        axis.step(shown, share, where="post", color=BLUE)
-    logarithmic(axis, "x")
-    low = 10 ** np.floor(np.log10(shown[0])) if shown.size else 1e-3
+    relative = samples.error[heavy] / samples.size[heavy] / FORCE_JND
+    shown = np.sort(np.maximum(relative[np.isfinite(relative)], 1e-9))  # zero has no place on this axis
+    share = 100 * np.arange(1, shown.size + 1) / max(relative.size, 1)
+    low = min(0.1, 10 ** np.floor(np.log10(shown[0]))) if shown.size else 1e-3
     high = max(10.0, 3 * float(shown[-1])) if shown.size else 10.0
-    axis.set_xlim(low, high)
+    logarithmic(axis, "x", low, high)
+    axis.step(shown, share, where="post", color=BLUE)
     axis.set_ylim(0, 104)
     axis.axvspan(1.0, high, color=ORANGE, alpha=0.16, linewidth=0)
     axis.axvline(1.0, color=ORANGE, linewidth=1.2)

@@ -47,7 +47,7 @@ def plot_history(history: History, rivals: Mapping[str, History] | None = None) 
     )
     tidy_log(errors, drawn)
     if len(runs) > 1:
-        fig.legend(*errors.get_legend_handles_labels(), loc="outside upper right", ncols=len(runs))
+        fig.legend(*errors.get_legend_handles_labels(), loc="outside upper right", ncols=min(len(runs), 4))
     return fig
 
 

@@ -108,14 +108,13 @@ def series(count: int) -> list[dict[str, Any]]:
     return [{"color": SERIES[i % 6], "linestyle": DASHES[(i + i // 6) % 6]} for i in range(count)]
 
 
-def logarithmic(axes: Axes, which: Literal["x", "y"]) -> None:
+def logarithmic(axes: Axes, which: Literal["x", "y"], low: float, high: float) -> None:
     """A logarithmic axis labelled by powers of ten in plain text, which stays readable where no formula is set."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
 
-    if which == "x":
-        axes.set_xscale("log")
-    else:
-        axes.set_yscale("log")
+    # limits first: data that are all zero leave a logarithmic axis nothing to choose them by
+    axes.set(**{f"{which}lim": (low, high)})
+    axes.set(**{f"{which}scale": "log"})
     axis = axes.xaxis if which == "x" else axes.yaxis
     axis.set_major_locator(LogLocator(numticks=8))
     axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
@@ -127,8 +126,8 @@ def tidy_log(axes: Axes, values: Sequence[np.ndarray], decades: float = 9.0) -> 
     """A logarithmic y axis around the values, at most `decades` deep: rounding noise below tells nothing."""
     positive = np.concatenate([np.ravel(v)[np.ravel(v) > 0] for v in values] or [np.empty(0)])
     positive = positive[np.isfinite(positive)]
-    logarithmic(axes, "y")
+    top, bottom = 1e-9, 1e-16  # errors of exactly zero lie below any such axis
     if positive.size:
         top = 10 ** np.ceil(np.log10(positive.max()) + 0.05)
-        bottom = 10 ** np.floor(np.log10(np.quantile(positive, 0.01)))
-        axes.set_ylim(max(bottom, top / 10**decades), top)
+        bottom = max(10 ** np.floor(np.log10(np.quantile(positive, 0.01))), top / 10**decades)
+    logarithmic(axes, "y", bottom, top)

@@ -39,7 +39,7 @@ def inline_svg(figure: Figure, key: str, alt: str) -> str:
         Text in its place for who cannot see it.
     """
     buffer = io.StringIO()
-    figure.savefig(buffer, format="svg", dpi=170, metadata={"Date": None, "Creator": None})
+    figure.savefig(buffer, format="svg", dpi=140, metadata={"Date": None, "Creator": None})
     text = buffer.getvalue()
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -44,19 +45,24 @@ def write_report(
         If there is no chapter, or the file can't be written.
     """
     target = Path(path)
-    page = render(chapters, title=title, machine=machine)
     part = target.with_name(f".{target.name}.part")
     try:
+        # a path that can't be written is found before the figures are drawn
         target.parent.mkdir(parents=True, exist_ok=True)
-        part.write_text(page, encoding="utf-8", newline="\n")
+        if target.is_dir():
+            raise IsADirectoryError(f"{target} is a folder")
+        part.touch()
+        part.write_text(render(chapters, title=title, machine=machine), encoding="utf-8", newline="\n")
         part.replace(target)  # a reader never meets half a page
     except OSError as error:
-        part.unlink(missing_ok=True)
         raise UsageError(
             f"The report can't be written to {target}.",
             why=str(error),
             fix="Name a file in a folder that you may write to.",
         ) from error
+    finally:
+        with contextlib.suppress(OSError):
+            part.unlink()
     return target
 
 

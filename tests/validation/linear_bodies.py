@@ -1,0 +1,140 @@
+"""Bodies that answer linearly, made by formula, with datasets and touch models that fit them exactly.
+
+Errors put into a model are then known in closed form.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from models import linear_network
+from palpate.dataset import Dataset
+from palpate.dataset.assemble import Layout, assemble
+from palpate.learning import History
+from palpate.network import Network
+from palpate.surrogates import TouchModel
+from palpate.units import Quantity, Range
+
+PLACES = np.linspace(0.0, 1.0, 6)
+REST = np.stack([PLACES, np.zeros(6)], axis=1)
+COMPLIANCE = 0.05  # m/N at the tip
+
+
+def dataset(
+    X: np.ndarray,
+    ranges: list[Range],
+    directions: list[tuple[float, float]],
+    load_nodes: list[int],
+    scale: float = 1.0,
+) -> Dataset:
+    """Every load moves node x by COMPLIANCE · P · x² along its direction."""
+    count = len(X)
+    displacement = np.zeros((count, 6, 3))
+    displacement[:, :, :2] = (
+        scale * COMPLIANCE * (PLACES**2)[None, :, None] * (X @ np.array(directions))[:, None]
+    )
+    layout = Layout(REST, np.ones(6, dtype=bool), load_nodes, directions)
+    answers: dict[str, Any] = {
+        "displacement": displacement,
+        "root_reaction": np.zeros((count, 3)),
+        "strain_energy": np.zeros(count),
+        "potential_energy": np.zeros(count),
+        "converged": np.ones(count, dtype=bool),
+        "iterations": np.ones(count, dtype=np.int64),
+        "residual": np.zeros(count),
+        "message": np.array([""] * count),
+        "solve_seconds": np.zeros(count),
+    }
+    body = {"type": "Cantilever", "length": 1.0, "material": {"name": "rubber"}}
+    return assemble(ranges, layout, X, answers, {"problem": {"body": body}, "seed": 0})
+
+
+def tip_data(X: np.ndarray | None = None, name: str = "P", scale: float = 1.0) -> Dataset:
+    """One load, 0 … 5 N, pushing the tip down."""
+    X = np.linspace(0.0, 5.0, 41)[:, None] if X is None else X
+    return dataset(X, [Range(name, 0.0, 5.0, "N")], [(0.0, -1.0)], [5], scale)
+
+
+def tip_model(
+    *, shift: float = 0.0, slope: float = 0.0, force: float = 1.0, scale: float = 1.0, name: str = "P"
+) -> TouchModel:
+    """The exact model of `tip_data`, with errors put into it.
+
+    Its nodes are off by shift + slope · ξ with the scaled load ξ in [−1, 1]; its force by the factor `force`.
+    """
+    loads = [Range(name, 0.0, 5.0, "N")]
+    half = scale * COMPLIANCE * 2.5
+    fall = -half * PLACES**2
+    nodes = np.stack([fall[1:] + shift, fall[1:] + slope], axis=1)
+    field = np.zeros((12, 2))
+    field[1::2] = fall[:, None]
+    outputs = [Quantity(f"u_y at {x:g} m", "m") for x in PLACES[1:]]
+    names = [Quantity(f"u_{c} at {x:g} m", "m") for x in PLACES for c in "xy"]
+    travel = [Range("h", 0.0, 2 * half, "m")]
+    networks = {
+        "nodes": linear_network(loads, outputs, nodes),
+        "filter": linear_network(loads, outputs, nodes),
+        "field": linear_network(loads, names, field),
+        "force": linear_network(travel, [Quantity(name, "N")], np.full((1, 2), 2.5 * force)),
+    }
+    return _model(networks, (0,), np.array([[0.0, -1.0, 0.0]]), 2 * half)
+
+
+PLANE = [Range("P_x", -4.0, 4.0, "N"), Range("P_y", -4.0, 4.0, "N")]
+
+
+def plane_data(X: np.ndarray | None = None) -> Dataset:
+    """Two loads at the tip, sampled well inside their ranges so that nothing is held at a limit."""
+    X = np.random.default_rng(3).uniform(-2.0, 2.0, (60, 2)) if X is None else X
+    return dataset(X, PLANE, [(1.0, 0.0), (0.0, 1.0)], [5, 5])
+
+
+def plane_model(turn: np.ndarray | None = None) -> TouchModel:
+    """The exact model of `plane_data`, its loads multiplied by the matrix `turn` (2, 2)."""
+    reach = 4.0 * COMPLIANCE
+    pull = 4.0 * (np.eye(2) if turn is None else turn)
+    shape = np.kron((PLACES**2)[:, None], reach * np.eye(2))
+    names = [Quantity(f"u_{c} at {x:g} m", "m") for x in PLACES for c in "xy"]
+    hand = [Range("h_x", -reach, reach, "m"), Range("h_y", -reach, reach, "m")]
+    networks = {
+        "nodes": linear_network(PLANE, names[2:], np.hstack([np.zeros((10, 1)), shape[2:]])),
+        "field": linear_network(PLANE, names, np.hstack([np.zeros((12, 1)), shape])),
+        "force": linear_network(hand, [Quantity("P", "N")] * 2, np.hstack([np.zeros((2, 1)), pull])),
+    }
+    return _model(networks, (0, 1), np.eye(3)[:2], reach)
+
+
+def _model(
+    networks: dict[str, Network], touched: tuple[int, ...], directions: np.ndarray, reach: float
+) -> TouchModel:
+    return TouchModel(
+        name="rubber",
+        networks=networks,
+        rest=np.hstack([REST, np.zeros((6, 1))]),
+        nodes_of_interest=np.arange(6),
+        touch_node=5,
+        touched=touched,
+        directions=directions,
+        compliance=0.0,
+        mirrors=False,
+        reach=reach,
+        stiffness_max=1 / COMPLIANCE,
+        radius=0.005,
+        meta={"refinement": {"used": 26}, "settings": {"window": 50}},
+    )
+
+
+def history(heldout: tuple[float, ...] = (1e-1, 1e-2, 2e-2, 1e-3)) -> History:
+    """Four observations: grew, grew, pruned, nothing."""
+    return History(
+        units=np.array([1, 2, 1, 1]),
+        error=np.array([1.0, 0.5, 0.2, 0.1]),
+        window_rms=np.array([1.0, 0.8, 0.6, 0.4]),
+        innovation=np.array([1.0, 0.8, 0.6, 0.4]),
+        grew=np.array([1, 1, 0, 0]),
+        pruned=np.array([0, 0, 1, 0]),
+        heldout=np.array(heldout),
+        passes=2,
+    )

@@ -1,0 +1,77 @@
+"""Figures as text: nothing of them is lost but digits."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palpate.validation.words import (
+    bound,
+    count,
+    duration,
+    length,
+    plain,
+    power_of_ten,
+    scientific,
+    share,
+    shown,
+)
+
+LOWERED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+UNITS = {"m": 1.0, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9}
+
+
+def number(text: str) -> float:
+    mantissa, _, exponent = text.partition(" × 10")
+    return float(mantissa) * 10.0 ** int(exponent.translate(LOWERED) or 0)
+
+
+@given(st.floats(1e-12, 1e12), st.sampled_from([-1.0, 1.0]))
+def test_numbers_read_back_within_their_digits(size: float, sign: float) -> None:
+    value = sign * size
+    assert number(plain(value)) == pytest.approx(value, rel=0.0501)
+    assert number(scientific(value)) == pytest.approx(value, rel=0.0501)
+
+
+@given(st.floats(1e-9, 1e3))
+def test_lengths_read_back_and_stay_short(metres: float) -> None:
+    text, unit = length(metres).rsplit(" ", 1)
+    assert number(text) * UNITS[unit] == pytest.approx(metres, rel=0.00501)
+    assert len(text) <= 5
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        (length(0.0), "0 m"),
+        (length(9.9999e-4), "1 mm"),
+        (length(3.5e-4), "350 µm"),
+        (length(1e-12), "0.001 nm"),
+        (share(0.07), "7 %"),
+        (duration(0.05), "50 ms"),
+        (duration(7.55), "7.5 s"),
+        (duration(240), "4 min"),
+        (plain(float("nan")), "not a number"),
+        (plain(float("-inf")), "infinite"),
+        (count(1, "unit"), "1 unit"),
+        (count(1255, "unit"), "1,255 units"),
+        (count(2, "pass", "passes"), "2 passes"),
+        (shown(2e-7, "scale"), "2.0 × 10⁻⁷"),
+        (shown(4.5e-3, "degrees"), "0.0045°"),
+        (shown(2.0, "times"), "2 ×"),
+    ],
+)
+def test_examples(text: str, wanted: str) -> None:
+    assert text == wanted
+
+
+def test_powers_of_ten_on_an_axis() -> None:
+    assert [power_of_ten(10.0**k) for k in (-12, -1, 0, 1, 2)] == ["10⁻¹²", "10⁻¹", "1", "10", "10²"]
+
+
+def test_numbers_stay_with_their_units() -> None:
+    space = "\N{NO-BREAK SPACE}"
+    assert bound("P = -1.5 N at 0.4 m") == f"P{space}={space}−1.5{space}N at 0.4{space}m"
+    assert bound("3.4 × 10⁻⁷ %") == f"3.4{space}×{space}10⁻⁷{space}%"
+    assert bound("beam-3 and 5 men") == "beam-3 and 5 men"

@@ -6,6 +6,11 @@ import os
 import shutil
 
 import pytest
+from hypothesis import settings
+
+# machines are shared and kernels compile on first use: time is no law here; examples are the same on every run
+settings.register_profile("palpate", deadline=None, derandomize=True)
+settings.load_profile("palpate")
 
 
 def require_program(*names: str) -> str:

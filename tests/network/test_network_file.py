@@ -101,7 +101,7 @@ def test_numbers_that_are_not_finite_are_refused(tmp_path):
         load_archive(path)
 
 
-@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(position=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7))
 def test_no_flipped_bit_goes_unnoticed_or_crashes(path, position, bit):
     content = bytearray(path.read_bytes())
@@ -116,7 +116,7 @@ def test_no_flipped_bit_goes_unnoticed_or_crashes(path, position, bit):
     pytest.fail(f"bit {bit} of byte {i} was flipped and nobody noticed")
 
 
-@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(content=st.binary(max_size=300))
 def test_arbitrary_bytes_are_refused(tmp_path, content):
     path = tmp_path / "noise.palpate"

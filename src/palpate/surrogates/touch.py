@@ -45,6 +45,7 @@ __all__ = ["TouchEvaluator", "TouchModel"]
 
 KIND = "touch"
 OUTSIDE, MIRRORED = 1, 2  # flags of one evaluation
+SLACK = 1e-3  # of a load's range: more than a network's error at the edge, less than a hand can tell
 
 
 @dataclass(frozen=True, eq=False)
@@ -326,6 +327,9 @@ def _touch(position, parameters, force, contact, loads, maps, limits, laws, work
     for a in range(touched.size):
         i = touched[a]
         loads[i] = _clip(pull[a], low[i], high[i])
+        # where a load beyond its trained range would be needed, the hand is where no trained state is
+        if abs(loads[i] - pull[a]) > SLACK * (high[i] - low[i]):
+            flags |= OUTSIDE
     value_into(loads, tip, *tip_net)
     _answer(force, contact, loads, maps, tip, (flags & MIRRORED) != 0)
     if compliance > 0.0:

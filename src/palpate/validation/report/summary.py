@@ -83,7 +83,7 @@ def _learnt(chapter: Chapter) -> str:
     if own is not None:
         text = (
             f"A sequential filter met the solves one at a time, {count(chapter.history.units.size, 'observation')} in "
-            f"{count(chapter.history.passes, 'pass', 'passes')}, grew {count(own.units, 'unit')} and came within "
+            f"{count(chapter.history.passes, 'pass', 'passes')}, ended with {count(own.units, 'unit')} and came within "
             f"{length(own.rmse)} (root mean square). "
         )
     solves = f" from {count(used, 'solve')}" if isinstance(used, int) else ""

@@ -1,0 +1,14 @@
+"""Benchmarks: palpate beside named rivals, as tables of ratios.
+
+    python -m benchmarks                all of them; --quick only checks that they run
+    python -m benchmarks.cantilever     one of them; the same options
+
+cantilever  the filter's forms, the refined network and batch rivals on the founding study's two beams
+latency     one query, interleaved with NumPy, SciPy and scikit-learn in the same run
+runtime     the 1 kHz loop in its own process: CPU time of a tick, and lateness
+sweep       solves per second, serial and on the local Dask cluster
+
+cases       the solves that all of them learn from     rivals   interpolation and regression by others
+table       a table as a value                         machine  where the figures come from
+runner      options, printing, and the blocks of docs/benchmarks.md
+"""

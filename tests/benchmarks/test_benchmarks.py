@@ -1,0 +1,134 @@
+"""Each benchmark runs, its tables come out, and what must hold at any size holds."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+def run(*arguments):
+    found = subprocess.run(
+        [sys.executable, "-m", "benchmarks", *arguments],
+        cwd=ROOT,
+        env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert found.returncode == 0, found.stderr
+    return found.stdout
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    path = tmp_path_factory.mktemp("benchmarks") / "page.md"
+    path.write_text(
+        "before\n<!-- benchmark runtime: begin -->\nold\n<!-- benchmark runtime: end -->\nafter\n"
+    )
+    return path
+
+
+@pytest.fixture(scope="module")
+def quick(page):
+    return json.loads(run("--quick", "--json", "--into", str(page)))
+
+
+@pytest.fixture(scope="module")
+def tables(quick):
+    return {table["name"]: table for table in quick["tables"]}
+
+
+def rows(table, **wanted):
+    found = [row for row in table["rows"] if all(row[key] == value for key, value in wanted.items())]
+    assert found, f"no row with {wanted}"
+    return found
+
+
+def test_machine_is_named_with_versions_and_date(quick):
+    assert {"date", "processor", "system", "python", "numpy", "scipy", "BLAS threads"} <= set(
+        quick["machine"]
+    )
+
+
+@pytest.mark.parametrize("beam", ["copper", "nylon"])
+def test_refinement_beats_the_filter_with_fewer_solves_than_the_targets_allow(tables, beam):
+    forms = tables["cantilever-forms"]
+    (refined,) = rows(forms, beam=beam, form="refined network")
+    (default,) = rows(forms, beam=beam, form="default form")
+    (founding,) = rows(forms, beam=beam, form="founding form")
+    assert refined["solves"] <= 26
+    assert max(refined["units_all"]) <= 6
+    assert max(refined["rmse_all"]) < 5e-6
+    assert max(refined["rmse_all"]) < min(default["rmse_all"])
+    assert max(default["rmse_all"]) < min(founding["rmse_all"])
+
+
+def test_tightened_founding_form_grows_on(tables):
+    for beam in ("copper", "nylon"):
+        (plain,) = rows(tables["cantilever-forms"], beam=beam, form="founding form")
+        (tight,) = rows(tables["cantilever-forms"], beam=beam, form="founding form, thresholds ÷ 10")
+        assert tight["units_all"][0] > plain["units_all"][0]
+
+
+@pytest.mark.parametrize("beam", ["copper", "nylon"])
+def test_every_rival_has_learnt_the_beam(tables, beam):
+    found = rows(tables["cantilever-rivals"], beam=beam)
+    assert len(found) >= 5
+    for row in found:
+        assert row["rmse"] < 0.02, row["method"]
+
+
+def test_a_spline_error_falls_with_the_fourth_power(tables):
+    # so the solves themselves are exact far below what the networks are judged by
+    (row,) = rows(tables["cantilever-rivals"], beam="copper", method="CubicSpline (SciPy)")
+    assert row["rmse"] < 1e-10
+
+
+def test_compiled_query_is_not_slower_than_plain_numpy(tables):
+    latency = tables["latency"]
+    assert {row["query"] for row in latency["rows"] if row["who"] == "NumPy"} == {
+        row["query"] for row in latency["rows"]
+    }
+    for claim in latency["claims"]:
+        assert claim["values"][0] < 1.0, claim["what"]
+
+
+def test_loop_ticked_without_faults(tables):
+    (row,) = tables["runtime"]["rows"]
+    assert row["ticks"] > 300
+    assert row["faults"] == "none"
+    assert 0 < row["work_p50"] < 1000
+
+
+def test_sweep_is_set_against_a_plain_loop(tables):
+    table = tables["sweep"]
+    assert any(row["ratio"] == 1.0 for row in table["rows"])
+    assert all(math.isfinite(row["rate"]) and row["rate"] > 0 for row in table["rows"])
+
+
+def test_documentation_holds_a_block_for_every_table(tables):
+    text = (ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8")
+    for name, table in tables.items():
+        begin, end = (f"<!-- benchmark {name}: {edge} -->" for edge in ("begin", "end"))
+        block = text.partition(begin)[2].partition(end)[0]
+        assert "|" in block, name
+        assert "quick" not in block, "figures of a quick run mean nothing"
+        titles = next(line for line in block.splitlines() if line.startswith("| "))
+        assert len(titles.split("|")) > 4, table["title"]
+
+
+def test_blocks_are_replaced_in_place(quick, page):
+    text = page.read_text()
+    assert text.startswith("before\n")
+    assert text.endswith("\nafter\n")
+    assert "old" not in text
+    assert str(quick["tables"][-2]["rows"][0]["ticks"]) in text
+    assert quick["machine"]["processor"] in text

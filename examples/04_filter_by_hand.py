@@ -1,7 +1,7 @@
 """The sequential filter, one observation at a time: `step(state, x, y) -> (state, event)`.
 
-A function of one input is learnt from noisy samples. Each line of stars is one event in which the network changed
-its size.
+A function of one input is learnt from noisy samples. Each line of stars is an observation after which the network
+had another size; a star is a unit.
 """
 
 import numpy as np
@@ -9,7 +9,15 @@ import numpy as np
 from palpate.learning import Settings, initial, step
 from palpate.learning.gaussian import value
 
-settings = Settings(error_min=0.05, error_rms_min=0.03, distance_min=0.1, noise=1e-4, prune_below=0.05, prune_after=30)
+settings = Settings(
+    error_min=0.05,
+    error_rms_min=0.03,
+    distance_min=0.1,
+    noise=1e-4,
+    forgetting=2.0,
+    prune_below=0.05,
+    prune_after=30,
+)
 rng = np.random.default_rng(0)
 
 

@@ -8,7 +8,7 @@ import palpate as pp
 from palpate.runtime import LoopProcess
 
 beam = pp.Cantilever(length=1.0, section=pp.Circle(radius=0.005), material=pp.named_material("copper"))
-data = pp.sweep(beam, pp.TipLoad(0.0, 5.0), samples=32, seed=0)
+data = pp.sweep(beam, pp.TipLoad(0.0, 5.0), samples=32, seed=0, workers=2)
 touch, _ = pp.learn(data, name="copper")
 path = touch.save("copper.palpate")
 

@@ -1,0 +1,130 @@
+"""Renews the tables of the study file's reference from the study's own records: python docs/study_reference.py."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, get_args
+
+from pydantic import BaseModel
+
+from palpate.learning import Settings, default, founding
+from palpate.study.models import MaterialRecord, SectionRecord, Study, Unit
+
+PAGE = Path(__file__).parent / "guide" / "study-file.md"
+BEGIN, END = "<!-- generated: begin -->", "<!-- generated: end -->"
+
+
+def renewed(text: str) -> str:
+    """The page's text with its generated part renewed."""
+    head, rest = text.split(BEGIN)
+    return "\n".join([head + BEGIN, "", *_tables(), END + rest.split(END)[1]])
+
+
+def _tables() -> Iterator[str]:
+    yield from _table("Top level", Study, "")
+    for name, field in Study.model_fields.items():
+        annotation = get_args(field.annotation)[0] if name == "loads" else field.annotation
+        if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+            title = "`[[loads]]`, once per load" if name == "loads" else f"`[{name}]`"
+            yield from _table(title, annotation, (annotation.__doc__ or "").splitlines()[0])
+            if name == "body":
+                yield from _table(
+                    "`[body.section]`", SectionRecord, (SectionRecord.__doc__ or "").splitlines()[0]
+                )
+                about = "In place of a name: " + (MaterialRecord.__doc__ or "").splitlines()[0][0].lower()
+                about += (MaterialRecord.__doc__ or "").splitlines()[0][1:]
+                yield from _table("`[body.material]`", MaterialRecord, about)
+            if name == "filter":
+                yield from _settings()
+
+
+def _table(title: str, record: type[BaseModel], about: str) -> Iterator[str]:
+    yield f"### {title}"
+    yield ""
+    if about:
+        yield about
+        yield ""
+    yield "| key | kind | default | meaning |"
+    yield "|---|---|---|---|"
+    schema = record.model_json_schema()["properties"]
+    for name, field in record.model_fields.items():
+        if _is_table(name, field.annotation):
+            continue
+        unit = _unit((*field.metadata, field.annotation))
+        start = "needed" if field.is_required() else _shown(field.get_default(call_default_factory=True))
+        yield f"| `{name}` | {_kind(schema[name], unit)} | {start} | {field.description or ''} |"
+    yield ""
+
+
+def _is_table(name: str, annotation: Any) -> bool:
+    return name == "loads" or (isinstance(annotation, type) and issubclass(annotation, BaseModel))
+
+
+def _unit(parts: Any) -> str:
+    for part in parts:
+        if isinstance(part, Unit):
+            return part.name
+        if found := _unit((*get_args(part), *getattr(part, "__metadata__", ()))):
+            return found
+    return ""
+
+
+def _kind(schema: dict[str, Any], unit: str) -> str:
+    bounds = [
+        f"{sign} {schema[key]:g}"
+        for key, sign in (("minimum", "≥"), ("exclusiveMinimum", ">"), ("maximum", "≤"))
+        if key in schema
+    ]
+    if "const" in schema:
+        return f"`{json.dumps(schema['const'])}`"
+    if "enum" in schema:
+        return ", ".join(f"`{json.dumps(word)}`" for word in schema["enum"])
+    many = "list of " if schema.get("type") == "array" else ""
+    if unit:
+        return many + f"{unit}" + "".join(f", {b}" for b in bounds)
+    words = {
+        "integer": "integer",
+        "number": "number",
+        "boolean": "true or false",
+        "string": "text",
+        "object": "table",
+    }
+    if many:
+        return "list of numbers"
+    if "anyOf" in schema:
+        kinds = [
+            words.get(part.get("type", ""), "") for part in schema["anyOf"] if part.get("type") != "null"
+        ]
+        inner = [f"≥ {part['minimum']:g}" for part in schema["anyOf"] if "minimum" in part]
+        return ", ".join([" or ".join(k if k else "table" for k in kinds), *inner])
+    return ", ".join([words.get(schema.get("type", ""), ""), *bounds])
+
+
+def _shown(value: Any) -> str:
+    if value is None or value in ((), {}):
+        return "–"
+    if isinstance(value, tuple):
+        return "`[" + ", ".join(map(repr, value)) + "]`"
+    if isinstance(value, float):
+        return f"`{value:g}`"
+    return f"`{json.dumps(value)}`"
+
+
+def _settings() -> Iterator[str]:
+    yield "### `[filter] settings`"
+    yield ""
+    yield "Single settings of the filter, by name: `settings = { error_min = 0.005 }`. Their meaning is in"
+    yield "[learning](../method/learning.md) and in the docstring of `palpate.Settings`."
+    yield ""
+    yield "| setting | `default` | `founding` |"
+    yield "|---|---|---|"
+    ours, theirs = default(), founding()
+    for name in Settings.__dataclass_fields__:
+        yield f"| `{name}` | {_shown(getattr(ours, name))} | {_shown(getattr(theirs, name))} |"
+    yield ""
+
+
+if __name__ == "__main__":
+    PAGE.write_text(renewed(PAGE.read_text(encoding="utf-8")), encoding="utf-8")

@@ -1,0 +1,109 @@
+"""Every example runs as a file, in a process of its own, and says what it promises."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+pytestmark = pytest.mark.timeout(240)
+
+
+def run(name: str, folder: Path) -> str:
+    """Standard output of an example that was run in `folder`."""
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLES / name)],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        env=os.environ | {"PYTHONIOENCODING": "utf-8", "PYTHONWARNINGS": ""},
+        stdin=subprocess.DEVNULL,
+        timeout=200,
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    return done.stdout
+
+
+def cantilever(text: str, folder: Path) -> None:
+    assert "Dataset of 64 solves of Cantilever, all converged" in text
+    assert "beam on 16 unseen solves: every limit kept" in text
+    assert (folder / "beam.palpate").stat().st_size > 1000
+    assert "http" not in text  # without a terminal nothing is served
+
+
+def two_loads(text: str, folder: Path) -> None:
+    assert "every limit kept" in text
+    coupling = float(re.search(r"virtual coupling: (\d+) N/m", text)[1])
+    answers = re.findall(
+        r"hand at \((.+), (.+)\) m: force on it \((.+), (.+)\) N, tip at \((.+), (.+)\) m", text
+    )
+    assert len(answers) == 3
+    for row in [tuple(map(float, a)) for a in answers[:2]]:
+        # what the hand feels is what stretches the coupling, to the printed digits
+        for hand, force, tip in zip(row[0:2], row[2:4], row[4:6], strict=True):
+            assert force == pytest.approx(-coupling * (hand - tip), abs=0.02 + 0.001 * coupling)
+    assert text.count("inside the trained range") == 2
+    assert text.count("outside the trained range") == 1
+
+
+def own_beam(text: str, folder: Path) -> None:
+    weight = 9.80665 * 1080.0 * 0.02 * 0.006 * 0.15
+    assert (
+        f"the clamp carries {1000 * weight:.1f} mN" in text
+    )  # at rest the clamp carries the weight, to the digit
+    sag = float(re.search(r"own weight: ([\d.]+) mm", text)[1])
+    linear = weight * 0.15**3 / (8 * 1.1e6 * 0.02 * 0.006**3 / 12)
+    assert 0.5 * linear < sag / 1000 < linear  # a beam that bends far bends less than the linear one
+    assert "strip on 8 unseen solves: every limit kept" in text
+    assert re.search(r"500 N: (?!converged)", text)
+
+
+def by_hand(text: str, folder: Path) -> None:
+    stars = [len(s) for s in re.findall(r"\*+", text)]
+    assert text.count("grew") > 3
+    assert text.count("pruned") > 0
+    units, rms = re.search(r"(\d+) units, RMS error ([\d.]+)", text).groups()
+    assert int(units) == stars[-1] == text.count("centre")
+    assert float(rms) < 0.03
+
+
+def program(text: str, folder: Path) -> None:
+    down = float(re.search(r"-20 mm: (\S+) N", text)[1])
+    up = float(re.search(r"\+20 mm: (\S+) N", text)[1])
+    assert up == -down < 0.0
+    # 3EI w/L³ for a small deflection
+    stiffness = 3 * 110e9 * 3.14159265 * 0.005**4 / 4
+    assert down == pytest.approx(0.02 * stiffness, rel=2e-3)
+    assert "+5.000 N on the hand (beyond the trained range" in text
+    ticks = [int(t) for t in re.findall(r"tick +(\d+)", text)]
+    assert ticks == sorted(set(ticks))
+    assert len(ticks) == 5
+    assert "faults    none" in text or "clock jump" in text  # a busy machine may suspend the loop
+
+
+CHECKS: dict[str, Callable[[str, Path], None]] = {
+    "01_cantilever.py": cantilever,
+    "02_two_loads.py": two_loads,
+    "03_your_own_beam.py": own_beam,
+    "04_filter_by_hand.py": by_hand,
+    "05_program_touches.py": program,
+}
+QUICK = {"04_filter_by_hand.py"}
+
+
+def test_every_example_is_checked():
+    assert {path.name for path in EXAMPLES.glob("*.py")} == set(CHECKS)
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[] if n in QUICK else pytest.mark.slow) for n in sorted(CHECKS)]
+)
+def test_example(name: str, tmp_path: Path):
+    CHECKS[name](run(name, tmp_path), tmp_path)

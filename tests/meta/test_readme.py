@@ -47,6 +47,7 @@ def test_the_program_runs_as_a_file_without_a_guard(tmp_path: Path):
     path = os.pathsep.join(filter(None, [str(tmp_path / "site"), os.environ.get("PYTHONPATH", "")]))
     done = subprocess.run(
         [sys.executable, "program.py"],
+        check=False,
         cwd=tmp_path,
         capture_output=True,
         text=True,
@@ -104,7 +105,7 @@ def test_the_page_on_commands_is_complete():
     text = (ROOT / "docs" / "guide" / "commands.md").read_text(encoding="utf-8")
     known = commands()
     assert re.findall(r"^## palpate ([a-z]+)", text, re.MULTILINE) == list(known)
-    named = set(re.findall(r"--[a-z-]+", text))
+    named = set(re.findall(r"--[a-z][a-z-]+", text))
     assert named <= {option for options in known.values() for option in options}
     # `palpate NAME` stands in the README's table for each of them
     assert {name for name in known if f"| `palpate {name}` |" in README} == set(known)

@@ -29,9 +29,6 @@ workers = 1
 
 [test]
 random = 8
-
-[filter]
-passes = 12
 """
 
 

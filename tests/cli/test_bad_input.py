@@ -29,7 +29,7 @@ def broken(folder, old: str, new: str):
         ("[sweep]", "[sweeep]", ["sweeep", "did you mean 'sweep'"]),
         ("[sweep]", "[sweep", ["not valid TOML", "line"]),
         ('name = "small"', 'name = "../up"', ["name"]),
-        ("passes = 12", "passes = 12\nsettings = { nois = 1.0 }", ["no setting 'nois'"]),
+        ("random = 8", "random = 8\n[filter]\nsettings = { nois = 1.0 }", ["no setting 'nois'"]),
     ],
 )
 def test_a_study_that_can_not_be_meant(palpate, tmp_path, old, new, words):

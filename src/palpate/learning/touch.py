@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -20,6 +21,9 @@ from palpate.surrogates import TouchModel
 from palpate.units import Quantity, Range, bounds
 
 __all__ = ["Refinement", "hand_coordinates", "learn_touch", "node_outputs"]
+
+
+_OBSERVATIONS = 1250  # five passes over the founding study's 251 training loads
 
 
 @dataclass(frozen=True)
@@ -51,7 +55,7 @@ def learn_touch(
     name: str = "beam",
     settings: Settings | None = None,
     refinement: Refinement | None = None,
-    passes: int = 5,
+    passes: int | None = None,
     seed: int = 0,
     coupling: float | None = None,
     progress: Callable[[int, int], None] | None = None,
@@ -69,8 +73,10 @@ def learn_touch(
         Of the sequential filter.
     refinement : Refinement, optional
         By default 26 solves and 6 units for one input, all solves and more units for several.
-    passes, seed : int
-        Shuffled presentations of the data, and what decides their order.
+    passes : int, optional
+        Shuffled presentations of the data; by default five, or as many as make 1,250 observations.
+    seed : int
+        Decides their order.
     coupling : float, optional
         Stiffness k_c of the virtual coupling at the held node, N/m. By default none for one touched load, and
         four times the mean lateral stiffness for several (see `palpate.surrogates.touch`).
@@ -97,7 +103,7 @@ def _learn_touch(
     name: str,
     settings: Settings | None,
     refinement: Refinement | None,
-    passes: int,
+    passes: int | None,
     seed: int,
     coupling: float | None,
     progress: Callable[[int, int], None] | None,
@@ -109,6 +115,8 @@ def _learn_touch(
         )
     settings = settings or default()
     refinement = refinement or _refinement_for(len(train.ranges))
+    # few solves need more presentations: the filter sees each one's linearisation once per pass
+    passes = passes or max(5, math.ceil(_OBSERVATIONS / len(train)))
     outputs, columns = node_outputs(train)
     sequential = learn(
         train.X,

@@ -148,7 +148,11 @@ class TestRecord(Record):
 class FilterRecord(Record):
     """The sequential filter (MRAN with an extended Kalman filter)."""
 
-    passes: int = Field(5, ge=1, description="shuffled presentations of the training data")
+    passes: int | None = Field(
+        None,
+        ge=1,
+        description="shuffled presentations of the data; left out: 5, or enough for 1,250 observations",
+    )
     seed: int = Field(0, ge=0, description="decides the order")
     form: Literal["default", "founding"] = Field("default", description="'founding' repeats the papers' form")
     settings: dict[str, float | int | str | bool] = Field(

@@ -244,7 +244,7 @@ def learn_study(
     return replace(touch, meta={**touch.meta, "runtime": study.runtime.model_dump()}), history
 
 
-def rivals_of(study: Study, train: Dataset, test: Dataset) -> dict[str, History]:
+def rivals_of(study: Study, train: Dataset, test: Dataset, passes: int) -> dict[str, History]:
     """Founding form and ours with thresholds as they are and ten times tighter, for studies of one input."""
     if len(train.ranges) != 1:
         return {}
@@ -262,7 +262,7 @@ def rivals_of(study: Study, train: Dataset, test: Dataset) -> dict[str, History]
             train.ranges,
             outputs,
             settings=settings,
-            passes=study.filter.passes,
+            passes=passes,
             seed=study.filter.seed,
             heldout=(test.X, answers[1]),
         ).history
@@ -364,5 +364,5 @@ def carry_out(
     validation = timed("validate", lambda: validate_study(study, touch, test, history))
     touch = judged(touch, validation)
     touch.save(paths.model)
-    others = timed("founding form", lambda: rivals_of(study, train, test)) if rivals else {}
+    others = timed("founding form", lambda: rivals_of(study, train, test, history.passes)) if rivals else {}
     return Outcome(study, touch, train, test, validation, history, others, timings)

@@ -54,6 +54,9 @@ def preset_study(name: str) -> Study:
     elif body.material.name == "copper":
         # stiffer, so nearly linear over these loads: more can be asked of the filter
         content["target"] = {"filter_rmse": 1e-4}
+    elif found.loads[0].high > 5.0:
+        # at 10 N nylon is at P L²/EI = 10, where the tip has turned by 80°: the filter alone comes this far
+        content["target"] = {"filter_rmse": 2e-3}
     return Study.model_validate(content)
 
 

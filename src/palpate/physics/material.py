@@ -60,7 +60,7 @@ def _unphysical(what: str, value: float, rule: str) -> UsageError:
     )
 
 
-_FOUNDING = "Narayanan, Singla, Garimella, Waz & Krovi 2011, IDETC"
+_FOUNDING = "Narayanan, Singla, Garimella, Waz & Krovi 2011, ASME DSCC"
 
 MATERIALS: dict[str, LinearElastic] = {
     material.name: material

@@ -28,7 +28,9 @@ Json = Annotated[bool, typer.Option("--json", help="Results as one JSON object o
 Workers = Annotated[int | None, typer.Option(min=1, help="Worker processes; by default one per core.")]
 Port = Annotated[
     int | None,
-    typer.Option(min=0, max=65535, help="Port of the page, by default the study's; a busy one moves on to the next."),
+    typer.Option(
+        min=0, max=65535, help="Port of the page, by default the study's; a busy one moves on to the next."
+    ),
 ]
 Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")]
 
@@ -186,7 +188,7 @@ def run(
     model: ModelFile,
     seconds: Annotated[float, typer.Option(min=0.1, help="How long.")] = 5.0,
     device: Annotated[str, typer.Option(help="For example stroke:amplitude=0.02,frequency=1.")] = "stroke",
-    rate: Annotated[float | None, typer.Option(min=1, max=10000, help="Hz; by default the study's.")] = None,
+    rate: Annotated[float | None, typer.Option(min=10, max=10000, help="Hz; by default the study's.")] = None,
     as_json: Json = False,
 ) -> None:
     """Run the real-time loop without a page, and print how late it was."""

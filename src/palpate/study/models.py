@@ -140,9 +140,9 @@ class SweepRecord(Record):
 class TestRecord(Record):
     """Which solves the network never sees."""
 
-    every: int = Field(2, ge=0, description="of the sweep, every n-th row is kept for testing; 0: none")
+    every: int = Field(2, ge=0, description="one row in so many of the sweep is kept for testing; 0: none")
     random: int = Field(100, ge=0, description="further solves at random loads")
-    seed: int = Field(7, ge=0, description="decides the random loads")
+    seed: int = Field(7, ge=0, description="decides what is random here")
 
 
 class FilterRecord(Record):
@@ -200,7 +200,7 @@ class TargetRecord(Record):
 class RuntimeRecord(Record):
     """The 1 kHz loop and the page: what `palpate view` and `palpate run` do unless told otherwise."""
 
-    rate: float = Field(1000.0, gt=0, le=10000, description="Hz")
+    rate: float = Field(1000.0, ge=10, le=10000, description="Hz")
     max_force: Newtons = Field(12.0, gt=0, description="the force is clamped to this")
     port: int = Field(8080, ge=0, le=65535, description="of the page; a busy one moves on to the next")
 

@@ -14,6 +14,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from palpate import __version__
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
@@ -209,10 +211,9 @@ def train_and_test(study: Study, data: Dataset, random: Dataset | None) -> tuple
     good = data.ok
     parts = [] if random is None else [random.ok]
     if study.test.every:
-        rows = range(len(good))
-        held = [i for i in rows if i % study.test.every == study.test.every - 1]
-        parts.insert(0, good.take(held))
-        good = good.take([i for i in rows if i % study.test.every != study.test.every - 1])
+        held = _held_rows(study, len(good))
+        parts.insert(0, good.take(np.flatnonzero(held)))
+        good = good.take(np.flatnonzero(~held))
     if not parts:
         raise UsageError(
             f"The study {study.name!r} keeps nothing for testing.",
@@ -220,6 +221,21 @@ def train_and_test(study: Study, data: Dataset, random: Dataset | None) -> tuple
             fix="Set one of them: a network is judged on solves that it has never seen.",
         )
     return good, Dataset.concat(parts)
+
+
+def _held_rows(study: Study, count: int) -> np.ndarray:
+    """Which of the sweep's rows (count,) are kept for testing: one in `test.every`.
+
+    Of a grid every n-th; of other designs random ones. A Sobol sequence fills space in turns, so that every n-th
+    of its points lie in one corner, and the network would never see that corner.
+    """
+    every = study.test.every
+    if study.sweep.design == "grid":
+        return np.asarray(np.arange(count) % every == every - 1)
+    held = np.zeros(count, dtype=bool)
+    rng = np.random.default_rng((study.test.seed, count))
+    held[rng.choice(count, count // every, replace=False)] = True
+    return held
 
 
 def learn_study(

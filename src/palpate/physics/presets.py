@@ -82,15 +82,15 @@ def beam_plane() -> Preset:
         TipLoad(-1.5, 1.5, direction=(1.0, 0.0), name="P_x"),
         TipLoad(-5.0, 5.0, direction=(0.0, 1.0), name="P_y"),
     )
-    summary = "nylon cantilever, tip pushed in the plane: P_x ±1.5 N, P_y ±5 N, 512 solves"
-    return Preset("beam-plane", summary, founding_beam("nylon"), loads, "sobol", 512)
+    summary = "nylon cantilever, tip pushed in the plane: P_x ±1.5 N, P_y ±5 N, 768 solves"
+    return Preset("beam-plane", summary, founding_beam("nylon"), loads, "sobol", 768)
 
 
 def beam_three_loads() -> Preset:
     """Nylon cantilever pushed down at three nodes: the n-dimensional case that the founding study planned."""
     loads = tuple(PointLoad(f"P_{x:g}m", x, 0.0, 2.0) for x in (0.4, 0.6, 1.0))
-    summary = "nylon cantilever pushed down at 0.4, 0.6 and 1.0 m by 0 … 2 N each, 512 solves"
-    return Preset("beam-three-loads", summary, founding_beam("nylon"), loads, "sobol", 512)
+    summary = "nylon cantilever pushed down at 0.4, 0.6 and 1.0 m by 0 … 2 N each, 768 solves"
+    return Preset("beam-three-loads", summary, founding_beam("nylon"), loads, "sobol", 768)
 
 
 PRESETS: dict[str, Callable[[], Preset]] = {

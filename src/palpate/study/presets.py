@@ -14,7 +14,7 @@ __all__ = ["preset_names", "preset_study"]
 _SEVERAL: dict[str, Any] = {
     "test": {"every": 4},
     "filter": {"passes": 1},
-    "learning": {"samples": 400, "units_max": 36, "target": 2e-5, "starts": 2},
+    "learning": {"samples": 0, "units_max": 48, "target": 2e-5, "starts": 2},
     "target": {"rmse": 1e-3, "filter_rmse": 0.0, "filter_outer_ratio": 0.0},
 }
 

@@ -1,0 +1,115 @@
+"""A study as a record: text and back, units at the door, rows for training and testing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from palpate.dataset import Dataset
+from palpate.errors import UsageError
+from palpate.physics import Circle, Rectangle, Section
+from palpate.study import Study, preset_names, preset_study, read_study, to_toml
+from palpate.study.pipeline import body_of, loads_of, settings_of, train_and_test
+from palpate.sweeps import sweep
+
+
+def study(**parts) -> Study:
+    return Study.model_validate(parts)
+
+
+def test_quantities_may_carry_units():
+    s = study(body={"length": "25 cm", "section": {"radius": "5 mm"}, "material": {"young": "110 GPa"}})
+    assert s.body.length == pytest.approx(0.25)
+    assert s.body.section.radius == pytest.approx(0.005)
+    assert s.body.material.young == pytest.approx(1.1e11)
+
+
+def test_a_study_is_frozen():
+    with pytest.raises(ValidationError, match="frozen"):
+        study().name = "other"
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_every_preset_builds_its_body(name):
+    s = preset_study(name)
+    problem = body_of(s).problem(loads_of(s))
+    assert len(problem.ranges) == len(s.loads)
+    assert settings_of(s).units_max > 0
+
+
+@pytest.mark.parametrize(
+    ("section", "kind"),
+    [
+        ({"radius": 0.01}, Circle),
+        ({"width": 0.01, "height": "2 mm"}, Rectangle),
+        ({"area": 1e-4, "second_moment": "1e-9 m^4", "shear_factor": 0.9}, Section),
+    ],
+)
+def test_sections(section, kind):
+    assert isinstance(body_of(study(body={"section": section})).section, kind)
+
+
+def test_single_settings_change_a_named_form():
+    s = settings_of(study(filter={"form": "founding", "settings": {"noise": 0.5}}))
+    assert (s.noise, s.widths) == (0.5, "plain")
+
+
+def test_toml_keeps_every_number(tmp_path):
+    s = study(body={"length": 1 / 3}, filter={"settings": {"noise": 1e-7, "tail": "none"}})
+    path = tmp_path / "s.toml"
+    path.write_text(to_toml(s), encoding="utf-8")
+    assert read_study(path) == s
+
+
+@pytest.fixture(scope="module")
+def solved():
+    """64 Sobol points of two loads, and 9 grid points of one, solved in one worker."""
+    s = study(body={"elements": 6}, sweep={"design": "grid", "samples": 9, "workers": 1})
+    two = preset_study("beam-plane")
+    grid = sweep(body_of(s), loads_of(s), samples=9, design="grid", workers=1, progress=False)
+    sobol = sweep(body_of(two), loads_of(two), samples=64, design="sobol", workers=1, progress=False)
+    return s, grid, two, sobol
+
+
+def test_a_grid_is_parted_row_by_row_and_keeps_its_ends_for_training(solved):
+    s, grid, _, _ = solved
+    train, test = train_and_test(s, grid, None)
+    np.testing.assert_allclose(train.X[:, 0], grid.X[::2, 0])
+    np.testing.assert_allclose(test.X[:, 0], grid.X[1::2, 0])
+
+
+def test_a_sobol_design_is_parted_at_random_so_that_no_corner_is_left_out(solved):
+    _, _, two, sobol = solved
+    train, test = train_and_test(two, sobol, None)
+    assert len(train) + len(test) == len(sobol) == 64
+    assert len(test) == 16
+    corners = {(x > 0, y > 0) for x, y in train.X}
+    assert len(corners) == 4
+    every_fourth = sobol.X[3::4]
+    assert len({(x > 0, y > 0) for x, y in every_fourth}) < 4  # what this guards against
+
+
+def test_random_loads_test_and_never_train(solved):
+    s, grid, _, _ = solved
+    train, test = train_and_test(s, grid, grid.take([0, 1]))
+    assert len(test) == 4 + 2
+    assert len(train) == 5
+
+
+def test_something_must_be_kept_for_testing(solved):
+    s, grid, _, _ = solved
+    with pytest.raises(UsageError, match="nothing for testing"):
+        train_and_test(
+            s.model_copy(update={"test": s.test.model_copy(update={"every": 0, "random": 0})}), grid, None
+        )
+
+
+def test_datasets_of_different_bodies_are_not_put_together(solved):
+    _, grid, _, sobol = solved
+    with pytest.raises(UsageError, match="same body"):
+        Dataset.concat([grid, sobol])
+    both = Dataset.concat([grid, grid])
+    np.testing.assert_array_equal(both.X, np.vstack([grid.X, grid.X]))
+    assert both.ranges == grid.ranges
+    assert both.rest.shape == grid.rest.shape

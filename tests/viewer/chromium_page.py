@@ -67,15 +67,14 @@ def number(text: str) -> float:
 def settled(page: Page, flag: str = "") -> dict[str, Any]:
     """What the page shows once body and force have stood still for 0.1 s, with `flag` among the flags."""
     was = page.evaluate(READ)
-    for _ in range(150):
-        page.wait_for_timeout(100)
+    for _ in range(400):
+        page.wait_for_timeout(40)
         now = page.evaluate(READ)
-        if float(now["data"]["time"]) < float(was["data"]["time"]) + 0.1:
-            continue  # a busy machine: no picture since
         still = all(now["data"][k] == was["data"][k] for k in ("position", "contact", "force", "grabbed"))
-        if still and "stalled" not in now["flags"] and (not flag or flag in now["flags"]):
+        if not still or "stalled" in now["flags"] or (flag and flag not in now["flags"]):
+            was = now
+        elif float(now["data"]["time"]) >= float(was["data"]["time"]) + 0.1:
             return now
-        was = now
     pytest.fail(f"the page did not settle: {was}")
 
 

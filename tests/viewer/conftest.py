@@ -13,7 +13,7 @@ from chromium_page import ARGUMENTS, assert_no, open_page, settled
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from palpate.surrogates import TouchModel
-from palpate.viewer import Viewer
+from palpate.viewer import Viewer, picture
 
 
 @pytest.fixture(scope="session")
@@ -21,14 +21,22 @@ def rod() -> TouchModel:
     return arc_beam()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def viewer(rod: TouchModel) -> Iterator[Viewer]:
     with Viewer(rod, port=0) as running:
         yield running
 
 
 @pytest.fixture(scope="module")
-def browser(chromium: str) -> Iterator[Browser]:
+def brief_swing() -> Iterator[None]:
+    """The swing back to rest takes 0.2 s instead of two, for tests that only wait for its end."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(picture, "FREQUENCY", 10 * picture.FREQUENCY)
+        yield
+
+
+@pytest.fixture(scope="module")
+def browser(chromium: str, brief_swing: None) -> Iterator[Browser]:
     with sync_playwright() as playwright:
         running = playwright.chromium.launch(executable_path=chromium, args=ARGUMENTS)
         yield running
@@ -74,9 +82,9 @@ def page(kept_open: tuple[Page, list[str]]) -> Iterator[Page]:
     kept_open[1].clear()
 
 
-@pytest.fixture
-def keep(tmp_path: Path) -> Callable[[Page, str], None]:
-    """Keep a screenshot, in the folder PALPATE_SCREENSHOTS where that is set."""
-    folder = Path(os.environ.get("PALPATE_SCREENSHOTS", tmp_path))
-    folder.mkdir(parents=True, exist_ok=True)
-    return lambda page, name: page.screenshot(path=folder / f"{name}.png") and None
+@pytest.fixture(scope="session")
+def keep() -> Callable[[Page, str], None]:
+    """Keep a screenshot, where the variable PALPATE_SCREENSHOTS names a folder."""
+    if (folder := os.environ.get("PALPATE_SCREENSHOTS")) is None:
+        return lambda page, name: None
+    return lambda page, name: page.screenshot(path=Path(folder) / f"{name}.png") and None

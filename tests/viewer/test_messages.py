@@ -28,6 +28,7 @@ HELLO = Hello(
     inputs=(RangeInfo("tip force", 0.0, 5.0, "N"),),
     parameters=(),
     reach=0.7,
+    travel=((-0.4, -0.7, 0.0), (0.0, 0.7, 0.0)),
     scale=11.7,
     workspace=0.075,
     max_force=20.0,

@@ -100,6 +100,44 @@ def test_a_hidden_tab_lets_go_and_says_so(page: Page, viewer: Viewer):
     assert shown["flags"] == ["free"]
 
 
+@pytest.mark.parametrize(("width", "height"), [(1060, 640), (700, 800), (390, 780)])
+def test_the_first_view_has_room_for_all_that_the_tip_can_do(page: Page, keep, width: int, height: int):
+    before = page.viewport_size
+    page.set_viewport_size({"width": width, "height": height})
+    settled(page)
+    box = page.locator("#view").bounding_box()
+    title = page.locator("#title").bounding_box()
+    legend = page.locator("#legend").bounding_box()
+    x = tip(page)[0]
+    assert 0.4 * box["width"] < x - box["x"] < box["width"] - 15
+    for far, name in ((box["y"] + 2, "up"), (box["y"] + box["height"] - 2, "down")):
+        drag(page, 0, far - tip(page)[1], steps=2)
+        settled(page, "outside")  # the tip is as far as it goes
+        keep(page, f"{name}-{width}")
+        assert title["y"] + title["height"] < tip(page)[1] < legend["y"]
+        page.mouse.up()
+        settled(page, "free")
+    page.set_viewport_size(before)
+
+
+def test_what_is_known_of_the_model_reads_well(page: Page):
+    page.click("#about > summary")
+    words = " ".join(page.inner_text("#meta").replace("\N{NO-BREAK SPACE}", " ").split())
+    for figure in (
+        "unseen solves 101",
+        "displacement RMSE / full scale 3.41 × 10⁻⁷",
+        "force error, 95th percentile 1.2 %",
+        "limits kept yes",
+    ):
+        assert figure in words
+    assert words.index("validation") < words.index("settings")
+    page.get_by_text("body", exact=True).click()
+    assert "young 2 GPa length 1 m" in " ".join(
+        page.inner_text("#meta").replace("\N{NO-BREAK SPACE}", " ").split()
+    )
+    page.click("#about > summary")
+
+
 def test_messages_mean_the_same_in_typescript(page: Page):
     for before in map(sample, typescript.BINARY):
         read, back = page.evaluate(

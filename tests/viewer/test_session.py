@@ -145,8 +145,8 @@ def test_bytes_that_are_no_message_end_the_conversation(viewer: Viewer):
             assert caught.value.rcvd.code == 1003
 
 
-def test_a_target_that_is_no_number_gives_zero_force_and_a_fault(viewer: Viewer):
-    with client_of(viewer) as client:
+def test_a_target_that_is_no_number_gives_zero_force_and_a_fault(rod: TouchModel):
+    with Viewer(rod, port=0) as viewer, client_of(viewer) as client:
         before = held(client, -0.3).faults
         frame = hold(client, math.nan, seconds=0.3)
         assert frame.force == (0.0, 0.0, 0.0)

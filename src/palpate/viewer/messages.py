@@ -147,6 +147,8 @@ class Hello(Json):
         All loads; those that the hand does not drive.
     reach : float
         Largest trained displacement of the held node, m.
+    travel : (2, 3)
+        Lower and upper corner of the box of the held node's offsets under all trained loads, m.
     scale : float
         Body metres per metre of hand.
     workspace : float
@@ -169,6 +171,7 @@ class Hello(Json):
     inputs: tuple[RangeInfo, ...]
     parameters: tuple[RangeInfo, ...]
     reach: float
+    travel: tuple[Vec3, ...]
     scale: float
     workspace: float
     max_force: float

@@ -24,6 +24,7 @@ from palpate.runtime.shared import Shared, State, now
 from palpate.viewer.hands import Command, Hands
 from palpate.viewer.messages import PROTOCOL, Credit, Frame, Hand, Hello, Loop, Notice, RangeInfo
 from palpate.viewer.picture import Picture, Shape
+from palpate.viewer.travel import travel
 
 if TYPE_CHECKING:
     from palpate.surrogates import TouchModel
@@ -96,6 +97,7 @@ class Session:
         self.model, self.loop = model, loop
         self._hands = Hands(np.array([(r.low + r.high) / 2 for r in model.parameters]))
         self._picture = Picture(model)
+        self._travel = tuple(_vector(corner) for corner in travel(model))
         self._pages: dict[int, Page] = {}
         self._numbers: Iterator[int] = itertools.count(1)
         self._ended = False
@@ -135,13 +137,14 @@ class Session:
         return Hello(
             protocol=PROTOCOL,
             name=model.name,
-            rest=tuple((float(x), float(y), float(z)) for x, y, z in model.rest),
+            rest=tuple(_vector(node) for node in model.rest),
             radius=model.radius,
             touch_node=model.touch_node,
             nodes_of_interest=tuple(int(i) for i in model.nodes_of_interest),
             inputs=tuple(_range(r) for r in model.inputs),
             parameters=tuple(_range(r) for r in model.parameters),
             reach=model.reach,
+            travel=self._travel,
             scale=state.scale,
             workspace=state.radius,
             max_force=state.max_force,

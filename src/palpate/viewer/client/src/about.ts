@@ -1,10 +1,20 @@
 // What is known of the model: its own figures, and what its file says of how it was made.
 
 import type { Hello } from "./messages";
-import { metres, tidy } from "./units";
+import { fixed, metres, share, tidy } from "./units";
 
-const ROWS = 40; // of one group
-const FIRST = ["errors", "validation"]; // groups that matter most stand first and open
+const ROWS = 80; // of one group
+const FIRST = ["validation", "errors"]; // groups that matter most stand first and open
+const RATIOS = /error, |full scale/; // names of figures that read best in per cent
+const UNITS: Record<string, readonly [unit: string, factor: number]> = {
+  young: ["GPa", 1e-9],
+  density: ["kg/m³", 1],
+  length: ["m", 1],
+  radius: ["mm", 1e3],
+  "half height": ["mm", 1e3],
+  "max force": ["N", 1],
+  rate: ["Hz", 1],
+};
 
 type Row = readonly [string, string];
 
@@ -12,7 +22,8 @@ export function about(hello: Hello): void {
   const entries = Object.entries(hello.meta);
   const loose = entries.filter(([, value]) => !isGroup(value)).flatMap(([key, value]) => rows([key], value));
   const groups = entries.filter(([, value]) => isGroup(value));
-  groups.sort(([a], [b]) => Number(FIRST.includes(b)) - Number(FIRST.includes(a)));
+  const rank = (key: string): number => (FIRST.includes(key) ? FIRST.indexOf(key) : FIRST.length);
+  groups.sort(([a], [b]) => rank(a) - rank(b));
   document
     .getElementById("meta")!
     .replaceChildren(table([...figures(hello), ...loose]), ...groups.map(([key, value]) => group(key, value)));
@@ -55,16 +66,31 @@ function rows(path: string[], value: unknown): Row[] {
   if (isGroup(value)) {
     return Object.entries(value).flatMap(([key, inner]) => rows([...path, key.replaceAll("_", " ")], inner));
   }
-  if (Array.isArray(value)) {
-    const short = value.length <= 8 && value.every((v) => typeof v !== "object");
-    return short ? [[path.slice(-2).join(" · "), value.map(plain).join(", ")]] : [];
+  const name = path.slice(-2).join(" · ");
+  if (!Array.isArray(value)) return [[name, measured(path.at(-1) ?? "", value)]];
+  if (value.some(isGroup)) {
+    return value.flatMap((inner, i) => rows([...path.slice(0, -1), `${path.at(-1)} ${i + 1}`], inner));
   }
-  return [[path.slice(-2).join(" · "), plain(value)]];
+  return value.length <= 8 ? [[name, value.map(plain).join(", ")]] : [];
+}
+
+/** A value with its unit, or in per cent, where its name tells which. */
+function measured(name: string, value: unknown): string {
+  if (typeof value !== "number") return plain(value);
+  if (RATIOS.test(name) && value !== 0 && Math.abs(value) < 1) return share(value);
+  const [unit, factor] = UNITS[name] ?? ["", 1];
+  return unit ? `${plain(factor * value)}\u00a0${unit}` : plain(value);
 }
 
 function plain(value: unknown): string {
-  if (typeof value === "number") return Number.isInteger(value) && value < 1e6 ? String(value) : tidy(value);
+  if (typeof value === "number") return whole(value) ? fixed(value, 0) : tidy(value);
   if (typeof value === "boolean") return value ? "yes" : "no";
   const words = String(value);
-  return /^[0-9a-f]{32,}$/.test(words) ? `${words.slice(0, 12)}…` : words;
+  if (/^[0-9a-f]{32,}$/.test(words)) return `${words.slice(0, 12)}…`;
+  // to the minute, and the zone only where it is the common one
+  return words.replace(/^(\d{4}-\d\d-\d\d)T(\d\d:\d\d)\S*\+00:00$/, "$1 $2 UTC");
+}
+
+function whole(value: number): boolean {
+  return Number.isInteger(value) && Math.abs(value) < 1e6;
 }

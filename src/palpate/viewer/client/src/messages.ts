@@ -38,6 +38,7 @@ export interface Hello {
   inputs: RangeInfo[];
   parameters: RangeInfo[];
   reach: number;
+  travel: Vec3[];
   scale: number;
   workspace: number;
   max_force: number;

@@ -38,7 +38,7 @@ function start(hello: Hello): void {
 
 function open(hello: Hello): void {
   try {
-    view = new View(canvas, hello);
+    view = new View(canvas, hello, ["title", "tools", "scale-notes", "legend"].map(element));
   } catch (error) {
     // a browser without WebGL still shows the numbers
     say(`No 3-D view: this browser offers no WebGL (${String(error)}).`, "calm");
@@ -55,6 +55,7 @@ function open(hello: Hello): void {
   );
   element("true-scale").hidden = view.enlargement === 1;
   notes(view);
+  view.look(); // now that the words stand where they will
 }
 
 function notes(view: View): void {
@@ -112,10 +113,13 @@ function labelArrow(view: View, frame: Frame): void {
   label.hidden = !view.arrow.group.visible;
   if (label.hidden) return;
   label.textContent = `${fixed(Math.hypot(...frame.force), 2)} N`;
-  const at = view.project(view.arrow.end);
-  const beside = at.x + 16 + label.offsetWidth < canvas.clientWidth;
-  const x = beside ? at.x + 12 : at.x - 12 - label.offsetWidth;
-  label.style.transform = `translate(${x}px, ${Math.max(at.y - 12, 4)}px)`;
+  const [at, from] = [view.project(view.arrow.end), view.project(view.tip)];
+  const [width, height] = [label.offsetWidth, label.offsetHeight];
+  const level = Math.abs(at.x - from.x) > Math.abs(at.y - from.y); // beside its end it would hide tip or body
+  const beside = at.x + 16 + width < canvas.clientWidth ? at.x + 12 : at.x - 12 - width;
+  const x = level ? at.x - width / 2 : beside;
+  const y = level ? at.y - height - 14 : at.y - 12;
+  label.style.transform = `translate(${Math.max(x, 4)}px, ${Math.max(y, 4)}px)`;
 }
 
 function picture(): void {

@@ -4,9 +4,9 @@ import { about } from "./about";
 import { flags } from "./flags";
 import type { Flag } from "./flags";
 import { Hold, Loop } from "./messages";
-import type { Frame, Hello } from "./messages";
+import type { Frame, Hello, RangeInfo } from "./messages";
 import { Plot } from "./plot";
-import { fixed, round125, tidy } from "./units";
+import { fixed, printed, round125, tidy } from "./units";
 
 const EVERY = 80; // ms between changes of the numbers: faster can't be read
 
@@ -34,9 +34,7 @@ export class Panel {
   start(hello: Hello, moved: (i: number, value: number) => void): void {
     this.hello = hello;
     element("model-name").textContent = hello.name;
-    element("model-line").textContent = `trained on ${hello.inputs
-      .map((r) => `${r.name} ${tidy(r.low)} … ${tidy(r.high)} ${r.unit}`)
-      .join(", ")}`;
+    element("model-line").replaceChildren("trained on ", ...hello.inputs.flatMap(trained));
     document.title = `${hello.name} · palpate`;
     sliders(hello, moved);
     about(hello);
@@ -135,6 +133,14 @@ export class Panel {
   }
 }
 
+/** An input and its range, which no line break parts. */
+function trained(range: RangeInfo, i: number): (Node | string)[] {
+  const words = document.createElement("span");
+  words.className = "whole";
+  words.append(...printed(range.name), ` ${tidy(range.low)} … ${tidy(range.high)} ${range.unit}`);
+  return i === 0 ? [words] : [", ", words];
+}
+
 function put(id: string, value: number, decimals: number): void {
   const output = element(id);
   output.textContent = Number.isFinite(value) ? fixed(value, decimals) : "–";
@@ -163,7 +169,9 @@ function sliders(hello: Hello, moved: (i: number, value: number) => void): void 
       ];
       slider.dataset["unit"] = range.unit;
       slider.addEventListener("input", () => moved(i, slider.valueAsNumber));
-      label!.append(range.name, value!, slider);
+      const name = document.createElement("span");
+      name.append(...printed(range.name));
+      label!.append(name, value!, slider);
       return label!;
     }),
   );

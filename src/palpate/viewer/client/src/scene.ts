@@ -26,8 +26,10 @@ import {
 import type { Group } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { Arrow } from "./arrow";
+import { fit, free, outline, pixel, project } from "./framing";
+import type { Size } from "./framing";
 import type { Frame, Hello, Vec3 } from "./messages";
-import { surroundings } from "./surroundings";
+import { sizeLabels, surroundings } from "./surroundings";
 import type { Extent } from "./surroundings";
 import { Tube } from "./tube";
 import { css, round125 } from "./units";
@@ -35,8 +37,6 @@ import { css, round125 } from "./units";
 const THINNEST = 0.011; // radius as drawn, of the length: thinner would be lost on a small screen
 const LIVELY = 0.1; // a reach below this share of the length is drawn enlarged
 const LIVELY_AIM = 0.3;
-const FRONT = new Vector3(0.16, 0.2, 1).normalize();
-const MARGIN = { left: 20, right: 20, top: 64, bottom: 76 }; // px that the words around the view take
 
 export class View {
   enlarged = 1; // displacement as drawn / true displacement
@@ -67,6 +67,7 @@ export class View {
   constructor(
     readonly canvas: HTMLCanvasElement,
     readonly hello: Hello,
+    private readonly words: readonly Element[], // that stand in front of the canvas
   ) {
     this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
     this.rest = Float32Array.from(hello.rest.flat());
@@ -79,7 +80,8 @@ export class View {
     this.enlarged = this.enlargement;
     this.thickened = Math.max(1, Math.ceil((THINNEST * this.length) / hello.radius));
     const cell = round125(this.length / 14);
-    this.extent = { root: Math.min(...xs), length: this.length, floor: 0, cell };
+    const depth = Math.round((0.2 * this.length) / cell) * cell;
+    this.extent = { root: Math.min(...xs), length: this.length, floor: 0, cell, depth };
 
     const radius = this.thickened * hello.radius;
     this.tube = new Tube(hello.rest.length, radius);
@@ -140,8 +142,7 @@ export class View {
 
   /** Where a point of the scene is on the canvas, CSS pixels. */
   project(point: Vector3): Vector2 {
-    const p = point.clone().project(this.camera);
-    return new Vector2(((p.x + 1) / 2) * this.canvas.clientWidth, ((1 - p.y) / 2) * this.canvas.clientHeight);
+    return project(this.camera, this.size(), point);
   }
 
   /** The offset of the held node (m, true) under a canvas point, in the plane of the body; null beside it. */
@@ -176,20 +177,15 @@ export class View {
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
+    this.sizeLabels();
     this.dirty = true;
   }
 
-  /** Look from the front, a little from above, with everything that can happen in the picture. */
+  /** Look from the front, a little from above, with all that the held node can do in the picture. */
   look(): void {
-    const { root, length, floor } = this.extent;
-    const high = Math.max(0.5 * this.enlarged * this.hello.reach, 0.28 * length);
-    const [depth, centre] = [0.35 * length, new Vector3(root + length / 2, (floor + high) / 2, 0)];
-    const corners = [root - 0.04 * length, root + 1.12 * length].flatMap((x) =>
-      [-depth, depth].flatMap((z) => [new Vector3(x, floor, z), new Vector3(x, high, 0.4 * z)]),
-    );
-    let distance = 3 * length;
-    for (let round = 0; round < 8; round++) distance *= this.frame(corners, centre, distance);
-    this.frame(corners, centre, distance);
+    const room = free(this.canvas, this.words);
+    const { centre, distance } = fit(this.camera, this.size(), room, outline(this.extent, ...this.room()));
+    this.controls.target.copy(centre);
     [this.camera.near, this.camera.far] = [distance / 50, distance * 20];
     [this.controls.minDistance, this.controls.maxDistance] = [0.1 * distance, 4 * distance];
     this.camera.updateProjectionMatrix();
@@ -197,30 +193,12 @@ export class View {
     this.dirty = true;
   }
 
-  /** Move `centre` so that the corners lie in the middle of the free part; how much farther they need to be. */
-  private frame(corners: Vector3[], centre: Vector3, distance: number): number {
-    const [width, height] = [this.canvas.clientWidth || 1, this.canvas.clientHeight || 1];
-    this.camera.position.copy(centre).addScaledVector(FRONT, distance);
-    this.camera.lookAt(centre);
-    this.camera.updateMatrixWorld();
-    const seen = corners.map((corner) => this.project(corner));
-    const [xs, ys] = [seen.map((p) => p.x), seen.map((p) => p.y)];
-    const [left, right, top, bottom] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
-    const pixel = (2 * distance * Math.tan((this.camera.fov * Math.PI) / 360)) / height;
-    const aside = (left + right - (width - MARGIN.right + MARGIN.left)) / 2;
-    const below = (top + bottom - (height - MARGIN.bottom + MARGIN.top)) / 2;
-    centre.x += aside * pixel;
-    centre.y -= below * pixel;
-    this.controls.target.copy(centre);
-    const free = [width - MARGIN.left - MARGIN.right, height - MARGIN.top - MARGIN.bottom] as const;
-    return Math.max((right - left) / free[0], (bottom - top) / free[1]);
-  }
-
   /** Take the theme's colours. */
   recolour(): void {
     if (this.around) this.scene.remove(this.around);
     this.around = surroundings(this.extent);
     this.scene.add(this.around);
+    this.sizeLabels();
     this.handle.material.color.set(css("--accent"));
     this.handle.material.emissive.set(css("--accent")).multiplyScalar(0.3);
     this.each((bead) => bead.material.color.set(css("--bead")));
@@ -255,9 +233,24 @@ export class View {
     return controls;
   }
 
+  private size(): Size {
+    return [this.canvas.clientWidth || 1, this.canvas.clientHeight || 1];
+  }
+
+  private sizeLabels(): void {
+    if (this.around) sizeLabels(this.around, pixel(this.camera, this.size()));
+  }
+
+  /** Opposite corners of the box that the ball at the held node may fill, as drawn. */
+  private room(): [Vector3, Vector3] {
+    const [low, high] = this.hello.travel.map((corner) => this.drawn(corner, new Vector3()));
+    const ball = 1.3 * this.handle.geometry.parameters.radius; // a highlighted one is larger
+    return [low!.subScalar(ball), high!.addScalar(ball)];
+  }
+
   /** Put floor and shadow where the enlarged motion leaves room. */
   private place(): void {
-    const lowest = Math.max(1.12 * this.enlarged * this.hello.reach, 0.35 * this.length);
+    const lowest = Math.max(-this.room()[0].y, 0.35 * this.length);
     this.extent.floor = -Math.ceil(lowest / this.extent.cell - 1e-9) * this.extent.cell;
     const flat = new Matrix4().makeScale(1, 0, 1).setPosition(0, this.extent.floor + 1e-3 * this.length, 0);
     this.shadow.matrix.copy(flat);
@@ -279,8 +272,8 @@ export class View {
     return new Vector3(...this.hello.rest[this.hello.touch_node]!);
   }
 
-  private drawn(offset: Vec3, into: Vector3): void {
-    into.set(...offset).multiplyScalar(this.enlarged).add(this.node());
+  private drawn(offset: Vec3, into: Vector3): Vector3 {
+    return into.set(...offset).multiplyScalar(this.enlarged).add(this.node());
   }
 }
 

@@ -12,16 +12,20 @@ import {
   MeshLambertMaterial,
   Sprite,
   SpriteMaterial,
+  SRGBColorSpace,
 } from "three";
 import { css, tidy } from "./units";
 
-const LABEL_HEIGHT = 0.052; // of the body's length
+export const WALL = 0.16; // of the body's length, height of the wall above the axis
+export const WALL_DEPTH = 0.3;
+const LABEL = 18; // px, height of a label's box, letters being two thirds of it
 
 export interface Extent {
   root: number; // x of the clamped end, m
   length: number; // m
   floor: number; // y, m
   cell: number; // m, spacing of the grid
+  depth: number; // m, the grid to either side of the body
 }
 
 /** Everything that doesn't move, in the colours of the current theme. */
@@ -36,10 +40,10 @@ function cellsAlong(extent: Extent): number {
   return Math.ceil((1.1 * extent.length) / extent.cell - 1e-9);
 }
 
-function grid({ root, length, floor, cell }: Extent): LineSegments {
-  const half = Math.round((0.3 * length) / cell) * cell;
+function grid(extent: Extent): LineSegments {
+  const { root, floor, cell, depth: half } = extent;
   const points: number[] = [];
-  const end = root + cellsAlong({ root, length, floor, cell }) * cell;
+  const end = root + cellsAlong(extent) * cell;
   for (let x = root; x < end + cell / 2; x += cell) points.push(x, floor, -half, x, floor, half);
   for (let z = -half; z < half + cell / 2; z += cell) points.push(root, floor, z, end, floor, z);
   const geometry = new BufferGeometry();
@@ -49,8 +53,8 @@ function grid({ root, length, floor, cell }: Extent): LineSegments {
 
 function wall({ root, length, floor }: Extent): Group {
   const thickness = 0.03 * length;
-  const [top, bottom] = [0.16 * length, floor];
-  const box = new BoxGeometry(thickness, top - bottom, 0.3 * length);
+  const [top, bottom] = [WALL * length, floor];
+  const box = new BoxGeometry(thickness, top - bottom, WALL_DEPTH * length);
   const group = new Group();
   const mesh = new Mesh(box, new MeshLambertMaterial({ color: css("--wall") }));
   mesh.position.set(root - thickness / 2, (top + bottom) / 2, 0);
@@ -58,18 +62,24 @@ function wall({ root, length, floor }: Extent): Group {
   return group;
 }
 
+/** Keep the labels at one size on the screen; `pixel`: a pixel's size at distance 1 from the camera. */
+export function sizeLabels(group: Group, pixel: number): void {
+  for (const child of group.children) {
+    if (child instanceof Sprite) child.scale.set((LABEL * pixel * 128) / 48, LABEL * pixel, 1);
+  }
+}
+
 function* labels(extent: Extent): Generator<Sprite> {
-  const { root, length, floor, cell } = extent;
-  const half = Math.round((0.3 * length) / cell) * cell;
+  const { root, length, floor, cell, depth } = extent;
   for (let i = 0; i <= cellsAlong(extent); i += 2) {
     const last = i + 2 > cellsAlong(extent);
-    const sprite = text(`${tidy(i * cell)}${last ? " m" : ""}`, LABEL_HEIGHT * length);
-    sprite.position.set(root + i * cell, floor, half + 0.05 * length);
+    const sprite = text(`${tidy(i * cell)}${last ? " m" : ""}`);
+    sprite.position.set(root + i * cell, floor, depth + 0.05 * length);
     yield sprite;
   }
 }
 
-function text(words: string, height: number): Sprite {
+function text(words: string): Sprite {
   const canvas = document.createElement("canvas");
   [canvas.width, canvas.height] = [128, 48];
   const pen = canvas.getContext("2d")!;
@@ -78,8 +88,7 @@ function text(words: string, height: number): Sprite {
   pen.textBaseline = "middle";
   pen.fillStyle = css("--soft");
   pen.fillText(words, 64, 25);
-  const material = new SpriteMaterial({ map: new CanvasTexture(canvas), transparent: true, depthWrite: false });
-  const sprite = new Sprite(material);
-  sprite.scale.set((height * 128) / 48, height, 1);
-  return sprite;
+  const map = new CanvasTexture(canvas);
+  map.colorSpace = SRGBColorSpace;
+  return new Sprite(new SpriteMaterial({ map, transparent: true, depthWrite: false, sizeAttenuation: false }));
 }

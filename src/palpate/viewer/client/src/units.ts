@@ -12,12 +12,34 @@ export function round125(x: number): number {
   return step * power;
 }
 
-/** Three significant digits without trailing zeros, and a proper minus sign. */
+const RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹";
+
+/** Three significant digits without trailing zeros, a proper minus sign, and powers as 2.5 × 10⁻⁸. */
 export function tidy(x: number): string {
   if (x === 0) return "0";
   const size = Math.abs(x);
-  const short = size < 1e-3 || size >= 1e5 ? x.toExponential(2) : String(Number(x.toPrecision(3)));
-  return short.replace("e+", "e").replaceAll("-", "−");
+  if (size >= 1e-3 && size < 1e5) return minus(String(Number(x.toPrecision(3))));
+  const [mantissa, power] = x.toExponential(2).split("e") as [string, string];
+  const raised = power.replace("+", "").replace("-", "⁻").replace(/\d/g, (d) => RAISED[Number(d)]!);
+  return minus(`${Number(mantissa)}\u00a0×\u00a010${raised}`);
+}
+
+/** A ratio in per cent; ratios too small for that as they are. */
+export function share(x: number): string {
+  return Math.abs(x) >= 1e-5 ? `${tidy(Number((100 * x).toPrecision(2)))}\u00a0%` : tidy(x);
+}
+
+/** A name as it is printed: what follows its underscore stands lower. */
+export function printed(name: string): Node[] {
+  const [stem, ...rest] = name.split("_");
+  if (stem === undefined || stem.length > 2 || rest.length !== 1) return [document.createTextNode(name)];
+  const below = document.createElement("sub");
+  below.textContent = rest[0]!.replace(/([\d.]+)m$/, "$1\u00a0m");
+  return [document.createTextNode(stem), below];
+}
+
+function minus(words: string): string {
+  return words.replaceAll("-", "−");
 }
 
 /** Fixed decimals with a proper minus sign; what rounds to zero carries none. */

@@ -209,9 +209,6 @@ def _serve(model: Path, *, port: int | None, browser: bool, strict_port: bool = 
     from palpate.surrogates import TouchModel
     from palpate.viewer import serve
 
-    def ready(viewer: Any) -> None:
-        Console().say(f"{viewer.url} shows {viewer.model.name}. Pull the tip; Ctrl-C ends it.")
-
     settings = TouchModel.load(model).meta.get("runtime", {})
     serve(
         model,
@@ -220,7 +217,6 @@ def _serve(model: Path, *, port: int | None, browser: bool, strict_port: bool = 
         max_force=settings.get("max_force"),
         open_browser=browser and sys.stdout.isatty(),
         strict_port=strict_port,
-        on_ready=ready,
     )
 
 

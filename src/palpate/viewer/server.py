@@ -13,6 +13,7 @@ import contextlib
 import functools
 import os
 import signal
+import sys
 import tempfile
 import threading
 import webbrowser
@@ -207,7 +208,8 @@ def serve(
     open_browser : bool
         Whether to open the page in the user's browser.
     on_ready : callable, optional
-        Called once with the running `Viewer`, for example to say its `url`.
+        Called once with the running `Viewer`; by default its address is written to stderr, because a script
+        that waits here must say where to look.
 
     The other parameters and the errors are those of `Viewer`.
     """
@@ -215,11 +217,15 @@ def serve(
         model, port=port, host=host, device=device, rate=rate, max_force=max_force, strict_port=strict_port
     )
     with _termination_interrupts(), contextlib.suppress(KeyboardInterrupt), viewer:
-        if on_ready is not None:
-            on_ready(viewer)
+        (on_ready or _announce)(viewer)
         if open_browser:
             webbrowser.open(viewer.url)
         viewer.wait()
+
+
+def _announce(viewer: Viewer) -> None:
+    sys.stderr.write(f"{viewer.url} shows {viewer.model.name}. Pull the tip; Ctrl-C ends it.\n")
+    sys.stderr.flush()
 
 
 @contextlib.contextmanager

@@ -17,6 +17,8 @@ from palpate.viewer.messages import Credit, Frame, Hand, Hello, Hold, Loop, Noti
 from palpate.viewer.wire import Binary, Json, Layout
 
 VIEWER = Path(palpate.viewer.__file__).parent
+# the sources are part of the repository, not of the installed package
+CLIENT = Path(__file__).parents[2] / "src" / "palpate" / "viewer" / "client"
 
 HELLO = Hello(
     protocol=1,
@@ -63,17 +65,16 @@ def same(a: Binary, b: Binary) -> bool:
 
 
 def test_generated_typescript_is_up_to_date():
-    written = (VIEWER / "client" / "src" / "messages.ts").read_text(encoding="utf-8")
+    written = (CLIENT / "src" / "messages.ts").read_text(encoding="utf-8")
     assert written == typescript.generate(), "run python -m palpate.viewer.messages > …/messages.ts"
 
 
 def test_the_built_page_is_of_these_sources():
-    client = VIEWER / "client"
     own = ["index.html", "package-lock.json", "package.json", "tsconfig.json", "vite.config.js"]
-    inside = [f"{folder}/{p.name}" for folder in ("public", "src") for p in (client / folder).iterdir()]
+    inside = [f"{folder}/{p.name}" for folder in ("public", "src") for p in (CLIENT / folder).iterdir()]
     digest = hashlib.sha256()
     for name in sorted([*own, *inside]):
-        text = (client / name).read_text(encoding="utf-8").replace("\r\n", "\n")
+        text = (CLIENT / name).read_text(encoding="utf-8").replace("\r\n", "\n")
         digest.update(f"{name}\n{text}\n".encode())
     stamp = (VIEWER / "static" / "sources.sha256").read_text(encoding="utf-8").strip()
     assert stamp == digest.hexdigest(), "run npm ci && npm run build in src/palpate/viewer/client"

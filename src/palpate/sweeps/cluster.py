@@ -173,6 +173,8 @@ def _start_scheduler() -> Any:
     import dask
     import distributed
 
+    # Dask silences its loggers while a cluster runs; a connection that closes just after would still be told
+    logging.getLogger("distributed.batched").setLevel(logging.WARNING)
     # one task at a time per worker: a task that kills it takes no other one along
     with dask.config.set({"distributed.scheduler.worker-saturation": 1.0}):
         return distributed.LocalCluster(

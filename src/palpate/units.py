@@ -107,12 +107,16 @@ def to_si(value: str | float, unit: str) -> float:
 
     try:
         quantity = _registry().Quantity(value)
-        if quantity.unitless and unit and not any(c.isalpha() for c in value.replace("e", "")):
-            return float(quantity.magnitude)  # "5" alone: already in the wanted unit
+        if unit and quantity.unitless:
+            raise UsageError(
+                f"{value!r} has no unit.",
+                why=f"As text a quantity needs one; as a number, without quotes, it is in {unit}.",
+                fix=f'Write "{value.strip()} {unit}", or the number without quotes.',
+            )
         return float(quantity.to(unit or "dimensionless").magnitude)
     except (pint.errors.PintError, ValueError, TypeError, AttributeError, AssertionError) as error:
         raise UsageError(
             f"{value!r} is not a quantity in {unit or 'pure numbers'}.",
-            why=str(error),
+            why=f"{error}.",
             fix=f'Write a number in {unit or "no unit"}, or a quantity such as "1 {unit}".',
         ) from error

@@ -73,7 +73,7 @@ def test_a_body_that_can_not_be(palpate, tmp_path, old, new, words):
 
 def test_loads_outside_the_solvers_reach(palpate, tmp_path):
     path = broken(tmp_path, 'high = "2 N"', 'high = "1e9 N"')
-    path.write_text(path.read_text().replace("samples = 33", "samples = 4"))
+    path.write_text(path.read_text().replace("samples = 33", "samples = 8"))
     answer = palpate("sweep", path)
     assert answer.code == 3
     assert "1e+09" in answer.err or "1000000000" in answer.err
@@ -163,3 +163,51 @@ def test_unknown_device(palpate, copy):
 def test_usage(palpate, words, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert palpate(*words).code == 2
+
+
+def test_mistakes_of_ranges_materials_and_places_are_told_at_once(palpate, tmp_path):
+    path = broken(tmp_path, 'material = "nylon"', 'material = "nylonn"')
+    path.write_text(
+        path.read_text().replace('low = "0 N"', 'low = "3 N"').replace("samples = 33", "samples = 3")
+    )
+    answer = palpate("sweep", path)
+    assert answer.code == 2
+    assert "body.material" in answer.err
+    assert "loads.0: its range is empty" in answer.err
+    assert "sweep.samples" in answer.err
+
+
+def test_a_mistake_in_a_part_is_told_once(palpate, tmp_path):
+    answer = palpate("sweep", broken(tmp_path, 'high = "2 N"', 'high = "2 kg"'))
+    assert answer.err.count("loads") == 1
+
+
+def test_text_without_a_unit_is_a_question(palpate, tmp_path):
+    answer = palpate("sweep", broken(tmp_path, 'high = "2 N"', 'high = "2"'))
+    assert answer.code == 2
+    assert '"2 N"' in answer.err
+
+
+def test_a_study_changed_after_its_sweep_is_not_learnt(palpate, copy):
+    path = copy / "study.toml"
+    path.write_text(SMALL.replace("elements = 10", 'elements = 10\nlength = "0.5 m"'), encoding="utf-8")
+    for command in ("learn", "validate"):
+        answer = palpate(command, path)
+        assert answer.code == 2
+        assert "not of this study's body" in answer.err
+
+
+def test_solves_that_were_trained_with_do_not_pass_for_unseen(palpate, copy):
+    path = copy / "study.toml"
+    path.write_text(SMALL.replace("random = 8", "random = 8\nevery = 5"), encoding="utf-8")
+    assert palpate("learn", path).code == 0
+    path.write_text(SMALL, encoding="utf-8")
+    answer = palpate("validate", path)
+    assert answer.code == 2
+    assert "learnt from other solves" in answer.err
+
+
+def test_a_folder_is_no_study(palpate, tmp_path):
+    answer = palpate("sweep", tmp_path)
+    assert answer.code == 2
+    assert "palpate init" in answer.err

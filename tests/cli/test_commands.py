@@ -34,10 +34,15 @@ def test_python_m_palpate_is_palpate():
 
 @pytest.mark.parametrize("name", preset_names())
 def test_init_writes_a_study_that_reads_back_as_the_preset(palpate, tmp_path, name):
-    path = tmp_path / "study.toml"
+    path = tmp_path / "mine.toml"
     assert palpate("init", path, "--preset", name).code == 0
+    assert read_study(path) == preset_study(name).model_copy(update={"name": "mine"})
+    path.write_text(palpate("init", "--print", "--preset", name).out, encoding="utf-8")
     assert read_study(path) == preset_study(name)
-    assert palpate("init", "--print", "--preset", name).out == path.read_text(encoding="utf-8")
+
+
+def test_a_file_name_that_can_not_name_a_study_is_refused(palpate, tmp_path):
+    assert palpate("init", tmp_path / "-x y.toml").code == 2
 
 
 def test_init_does_not_overwrite(palpate, tmp_path):
@@ -86,7 +91,7 @@ def test_results_go_to_stdout_and_progress_to_stderr(palpate, carried_out, tmp_p
     shutil.copytree(carried_out, tmp_path / "s")
     answer = palpate("learn", tmp_path / "s" / "study.toml", "--json")
     assert answer.err == ""
-    assert set(json.loads(answer.out)) == {"model", "units"}
+    assert set(json.loads(answer.out)) == {"model", "units", "rmse"}
     answer = palpate("learn", tmp_path / "s" / "study.toml")
     assert "Learning from" in answer.err
     assert "Learning from" not in answer.out

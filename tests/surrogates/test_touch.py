@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from models import linear_network, spring_beam
-from palpate.errors import FileFormatError
+from palpate.errors import FileFormatError, UsageError
 from palpate.network import Archive, save_archive
 from palpate.surrogates import TouchModel
 from palpate.units import Quantity, Range
@@ -204,3 +204,23 @@ def test_a_file_whose_parts_do_not_fit_is_refused(tmp_path, change):
     save_archive(tmp_path / "m.palpate", Archive(model.networks, arrays, meta, "touch"))
     with pytest.raises(FileFormatError, match=r"m\.palpate"):
         TouchModel.load(tmp_path / "m.palpate")
+
+
+def test_plain_sequences_are_as_good_as_arrays():
+    evaluator = spring_beam(stiffness=20.0).evaluator()
+    evaluator([0, -0.1, 0])
+    np.testing.assert_allclose(evaluator.force, [0.0, 2.0, 0.0], atol=1e-12)
+    evaluator((0.0, -0.1, 0.0), ())
+    np.testing.assert_allclose(evaluator.force, [0.0, 2.0, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize(("position", "parameters"), [([0.0, 0.0], []), ([0.0, 0.0, 0.0], [1.0]), (0.0, [])])
+def test_shapes_that_do_not_fit_are_refused(position, parameters):
+    with pytest.raises(UsageError, match=r"\(3,\)"):
+        spring_beam().evaluator()(position, parameters)
+
+
+def test_displacement_holds_loads_at_their_trained_limits():
+    model = spring_beam(load=5.0)
+    np.testing.assert_array_equal(model.displacement([50.0]), model.displacement([5.0]))
+    np.testing.assert_array_equal(model.displacement([-1.0]), model.displacement([0.0]))

@@ -80,9 +80,14 @@ def init(
     show: Annotated[bool, typer.Option("--print", help="Print it instead of writing a file.")] = False,
 ) -> None:
     """Write a commented study file."""
-    from palpate.study import preset_study, to_toml
+    from palpate.study import named, preset_study, to_toml
 
-    text = to_toml(preset_study(preset))
+    record = preset_study(preset)
+    if (
+        path != STUDY and not show
+    ):  # a file with a name of its own gives the study, and so its files, that name
+        record = named(record, path.stem)
+    text = to_toml(record)
     if show:
         typer.echo(text, nl=False)
         return
@@ -92,7 +97,7 @@ def init(
         path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise UsageError(f"Could not write {path}.", why=str(error)) from error
-    typer.echo(f"{path}: a study called {preset}. Next: palpate sweep {path}")
+    typer.echo(f"{path}: a study called {record.name}. Next: palpate sweep {path}")
 
 
 @app.command()
@@ -112,6 +117,8 @@ def sweep(study: StudyFile = STUDY, workers: Workers = None, as_json: Json = Fal
     console = Console(as_json)
     record = _with_workers(read_study(study), workers)
     paths = _paths(study, record.name)
+    if paths.data.with_name(paths.data.name + ".parts").exists():
+        console.say(f"Going on with the interrupted sweep in {paths.data} …")
     data, random = sweep_study(record, paths, progress=not as_json)
     rows = len(data) + (len(random) if random else 0)
     failed = rows - len(data.ok) - (len(random.ok) if random else 0)
@@ -139,11 +146,18 @@ def learn(study: StudyFile = STUDY, as_json: Json = False) -> None:
     train, test = _datasets(record, paths)
     console.say(f"Learning from {len(train)} solves …")
     touch, history = learn_study(record, train, test)
-    touch = judged(touch, validate_study(record, touch, test, history))
+    validation = validate_study(record, touch, test, history)
+    touch = judged(touch, validation)
     touch.save(paths.model)
     history.save(paths.history)
     units = {name: network.units for name, network in touch.networks.items()}
-    console.result(f"{touch}\n{history}\n{paths.model}", {"model": str(paths.model), "units": units})
+    errors = {name: e.relative for name, e in validation.networks.items()}
+    said = "\n".join(f"  {name}: RMSE {e:.1e} of full scale on unseen solves" for name, e in errors.items())
+    console.result(
+        f"{touch}\n{history}\n{said}\n{paths.model}",
+        {"model": str(paths.model), "units": units, "rmse": errors},
+    )
+    console.say(f"Next: palpate validate {study}, palpate view {paths.model}")
 
 
 @app.command()
@@ -155,14 +169,17 @@ def validate(
     """Judge the learnt model on loads it has never seen; exit code 1 where it misses the study's target."""
     from palpate.learning import History
     from palpate.study import read_study
-    from palpate.study.pipeline import Outcome, report_study, validate_study
+    from palpate.study.pipeline import Outcome, check_model, report_study, validate_study
     from palpate.surrogates import TouchModel
 
     console = Console(as_json)
     record = read_study(study)
     paths = _paths(study, record.name)
-    touch, history = TouchModel.load(paths.model), History.load(paths.history)
     train, test = _datasets(record, paths)
+    touch, history = (
+        check_model(TouchModel.load(paths.model), train, paths.model),
+        History.load(paths.history),
+    )
     validation = validate_study(record, touch, test, history)
     text = str(validation)
     if report:
@@ -234,10 +251,11 @@ def _with_workers(study: Any, workers: int | None) -> Any:
 
 def _datasets(study: Any, paths: Any) -> Any:
     from palpate.dataset import Dataset
-    from palpate.study.pipeline import train_and_test
+    from palpate.study.pipeline import check_data, train_and_test
 
-    random = Dataset.open(paths.random) if study.test.random else None
-    return train_and_test(study, Dataset.open(paths.data), random)
+    data = check_data(study, Dataset.open(paths.data), paths.data)
+    random = check_data(study, Dataset.open(paths.random), paths.random) if study.test.random else None
+    return train_and_test(study, data, random)
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -252,4 +270,6 @@ def main(arguments: list[str] | None = None) -> None:
         Console(as_json="--json" in words).error(error)
         sys.exit(error.exit_code)
     except KeyboardInterrupt:
+        kept = " What is solved is kept: the same command goes on." if {"sweep", "demo"} & set(words) else ""
+        Console().say(f"\nInterrupted.{kept}")
         sys.exit(130)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import time
 from pathlib import Path
@@ -23,7 +24,12 @@ def run_loop(model: Path, seconds: float, device: str, rate: float | None, conso
     felt = Workspace.for_reach(traits.radius, touch.reach).felt(touch.stiffness_max)
     if warning := stiffness_warning(felt, traits.damping, rate):
         console.say(warning)
-    with LoopProcess(model, device=device, rate=rate, max_force=settings.get("max_force")) as loop:
+    limit = settings.get("max_force")
+    # whoever stops it early still wants to know
+    with (
+        LoopProcess(model, device=device, rate=rate, max_force=limit) as loop,
+        contextlib.suppress(KeyboardInterrupt),
+    ):
         _wait(loop, seconds, console)
     report = loop.report()  # after the end: only then is it known what the system granted
     console.result(str(report), report.as_dict())

@@ -18,9 +18,10 @@ from palpate.learning.refine import Refined, refine
 from palpate.learning.settings import Settings, default, founding
 from palpate.learning.state import State, initial
 from palpate.learning.structure import Trial, refined_network
-from palpate.learning.touch import Refinement, hand_coordinates, learn_touch, node_outputs
+from palpate.learning.touch import FEWEST, Refinement, hand_coordinates, learn_touch, node_outputs
 
 __all__ = [
+    "FEWEST",
     "Event",
     "History",
     "Learned",

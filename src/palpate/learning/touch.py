@@ -20,9 +20,10 @@ from palpate.network import Network
 from palpate.surrogates import TouchModel
 from palpate.units import Quantity, Range, bounds
 
-__all__ = ["Refinement", "hand_coordinates", "learn_touch", "node_outputs"]
+__all__ = ["FEWEST", "Refinement", "hand_coordinates", "learn_touch", "node_outputs"]
 
 
+FEWEST = 4  # solves for an affine map of one input, and one to judge it by
 _OBSERVATIONS = 1250  # five passes over the founding study's 251 training loads
 
 

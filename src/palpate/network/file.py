@@ -123,7 +123,7 @@ def _read(path: Path) -> tuple[dict[str, str], dict[str, np.ndarray]]:
     if not path.is_file():
         what = "is a folder, not a network file" if path.is_dir() else "does not exist"
         raise FileFormatError(
-            f"{path} {what}.", fix="Give the path of a .palpate file, as `palpate learn` writes it."
+            f"{path} {what}.", fix="`palpate learn` writes such a file; or give the path of another."
         )
     try:
         with safe_open(path, framework="numpy") as file:

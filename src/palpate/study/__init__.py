@@ -7,7 +7,7 @@ pipeline   a study carried out: sweep, learn, validate, report
 """
 
 from palpate.study.models import Study
-from palpate.study.presets import preset_names, preset_study
+from palpate.study.presets import named, preset_names, preset_study
 from palpate.study.text import read_study, study_schema, to_toml
 
-__all__ = ["Study", "preset_names", "preset_study", "read_study", "study_schema", "to_toml"]
+__all__ = ["Study", "named", "preset_names", "preset_study", "read_study", "study_schema", "to_toml"]

@@ -6,11 +6,20 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    field_validator,
+    model_validator,
+)
 from pydantic_core import CoreSchema, core_schema
 
 from palpate.errors import UsageError
-from palpate.learning import Refinement, Settings
+from palpate.learning import FEWEST, Refinement, Settings
+from palpate.physics import named_material
 from palpate.units import to_si
 
 __all__ = [
@@ -76,6 +85,7 @@ class Record(BaseModel):
 class MaterialRecord(Record):
     """A linear elastic material."""
 
+    name: str = Field("own material", description="for the report")
     young: Pascals = Field(description="Young's modulus")
     poisson: float = Field(0.3, description="Poisson's ratio")
     density: Densities = Field(0.0, description="only matters with self-weight")
@@ -84,12 +94,18 @@ class MaterialRecord(Record):
 class SectionRecord(Record):
     """A cross-section: a radius; or a width and a height; or area, second moment and shear factor."""
 
-    radius: Metres | None = Field(None, description="of a circular section")
-    width: Metres | None = Field(None, description="of a rectangular section, out of the plane")
-    height: Metres | None = Field(None, description="of a rectangular section, in the plane of bending")
-    area: SquareMetres | None = Field(None, description="of any section")
-    second_moment: QuarticMetres | None = Field(None, description="of area, about the axis of bending")
-    shear_factor: float | None = Field(None, description="share of the area that carries shear")
+    radius: Metres | None = Field(None, description="of a circular section", examples=["5 mm"])
+    width: Metres | None = Field(
+        None, description="of a rectangular section, out of the plane", examples=["25 mm"]
+    )
+    height: Metres | None = Field(None, description="the same, in the plane of bending", examples=["1 mm"])
+    area: SquareMetres | None = Field(None, description="of any section", examples=["25 mm^2"])
+    second_moment: QuarticMetres | None = Field(
+        None, description="about the axis of bending", examples=["2 mm^4"]
+    )
+    shear_factor: float | None = Field(
+        None, description="share of the area that carries shear", examples=[0.85]
+    )
 
     @model_validator(mode="after")
     def _one_kind(self) -> SectionRecord:
@@ -109,22 +125,51 @@ class BodyRecord(Record):
     kind: Literal["cantilever"] = "cantilever"
     length: Metres = Field(1.0, description="from clamp to tip")
     section: SectionRecord = SectionRecord(radius=0.005)
-    material: str | MaterialRecord = Field("nylon", description="a name, or young, poisson and density")
+    material: str | MaterialRecord = Field(
+        "nylon", description='a name, or { young = "70 GPa", poisson = 0.33, density = "2700 kg/m^3" }'
+    )
     kinematics: Literal["large", "small"] = Field("large", description="'small' is linear: for checks")
     self_weight: bool = Field(False, description="gravity, 9.80665 m/s² downwards")
     elements: int = Field(20, ge=1, description="finite elements along the beam")
     order: int = Field(3, ge=2, le=8, description="polynomial order of the elements")
     nodes: tuple[Metres, ...] = Field((), description="positions of interest; empty: six, evenly spaced")
 
+    @field_validator("material")
+    @classmethod
+    def _known_material(cls, value: str | MaterialRecord) -> str | MaterialRecord:
+        if isinstance(value, str):
+            try:
+                named_material(value)
+            except UsageError as error:
+                raise ValueError(" ".join(str(error).split("\n"))) from error
+        return value
+
+    @model_validator(mode="after")
+    def _nodes_on_the_beam(self) -> BodyRecord:
+        for x in self.nodes:
+            if not 0.0 <= x <= self.length:
+                raise ValueError(f"the node of interest at {x:g} m is not on the beam, 0 … {self.length:g} m")
+        return self
+
 
 class LoadRecord(Record):
     """A point load: one input of the study."""
 
     name: str = Field(min_length=1, description="name of the input")
-    at: Metres | None = Field(None, description="position along the beam; left out: the tip")
+    at: Metres | None = Field(
+        None, description="position along the beam; left out: the tip", examples=["0.4 m"]
+    )
     low: Newtons = Field(description="smallest load")
     high: Newtons = Field(description="largest load")
     direction: tuple[float, float] = Field((0.0, -1.0), description="(x, y); (0, -1) pushes down")
+
+    @model_validator(mode="after")
+    def _a_range_and_a_direction(self) -> LoadRecord:
+        if not self.low < self.high:
+            raise ValueError(f"its range is empty: low {self.low:g} N is not below high {self.high:g} N")
+        if not any(self.direction):
+            raise ValueError("its direction (0, 0) points nowhere")
+        return self
 
 
 class SweepRecord(Record):
@@ -133,8 +178,10 @@ class SweepRecord(Record):
     design: Literal["grid", "sobol", "random"] = Field("grid", description="how the ranges are sampled")
     samples: int = Field(501, ge=4, description="number of solves")
     seed: int = Field(0, ge=0, description="decides sobol and random designs")
-    workers: int | None = Field(None, ge=1, description="processes; left out: one per core")
-    scheduler: str | None = Field(None, description="address of a running Dask scheduler")
+    workers: int | None = Field(None, ge=1, description="processes; left out: one per core", examples=[2])
+    scheduler: str | None = Field(
+        None, description="a running Dask scheduler", examples=["tcp://127.0.0.1:8786"]
+    )
 
 
 class TestRecord(Record):
@@ -219,3 +266,21 @@ class Study(Record):
     learning: LearningRecord = LearningRecord()
     target: TargetRecord = TargetRecord()
     runtime: RuntimeRecord = RuntimeRecord()
+
+    @model_validator(mode="after")
+    def _parts_fit_together(self) -> Study:
+        for load in self.loads:
+            if load.at is not None and not 0.0 < load.at <= self.body.length:
+                raise ValueError(
+                    f"the load {load.name!r} at {load.at:g} m is not on the beam, 0 … {self.body.length:g} m"
+                )
+        if len({load.name for load in self.loads}) < len(self.loads):
+            raise ValueError("two loads share a name")
+        kept = self.sweep.samples // self.test.every if self.test.every else 0
+        if self.sweep.samples - kept < FEWEST:
+            raise ValueError(
+                f"{self.sweep.samples - kept} solves are left for training; {FEWEST} are the fewest"
+            )
+        if not kept and not self.test.random:
+            raise ValueError("test.every and test.random are both 0: nothing is kept for testing")
+        return self

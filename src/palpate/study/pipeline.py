@@ -6,6 +6,7 @@ written by `carry_out` and by the command line.
 
 from __future__ import annotations
 
+import json
 import os
 import platform
 import time
@@ -32,6 +33,8 @@ __all__ = [
     "Paths",
     "body_of",
     "carry_out",
+    "check_data",
+    "check_model",
     "judged",
     "learn_study",
     "loads_of",
@@ -125,7 +128,7 @@ def body_of(study: Study) -> Cantilever:
     material = (
         named_material(b.material)
         if isinstance(b.material, str)
-        else LinearElastic(b.material.young, b.material.poisson, b.material.density)
+        else LinearElastic(b.material.young, b.material.poisson, b.material.density, b.material.name)
     )
     return Cantilever(
         length=b.length,
@@ -204,6 +207,43 @@ def sweep_study(
         **common,
     )
     return data, extra
+
+
+def check_data(study: Study, data: Dataset, path: Path) -> Dataset:
+    """The dataset, if it is of the study's body and loads.
+
+    Raises
+    ------
+    UsageError
+        If it is not: the file has the study's name, but the study was changed since.
+    """
+    wanted = body_of(study).problem(loads_of(study)).describe()
+    found = data.provenance["problem"]
+    # compared as the file has it: tuples are lists there
+    if json.loads(json.dumps(wanted)) != found:
+        raise UsageError(
+            f"{path} is not of this study's body and loads.",
+            why="The study was changed after the sweep.",
+            fix="Delete it and run `palpate sweep`, or give the changed study another name.",
+        )
+    return data
+
+
+def check_model(touch: TouchModel, train: Dataset, path: Path) -> TouchModel:
+    """The model, if it was learnt from just these training rows.
+
+    Raises
+    ------
+    UsageError
+        If it was not: rows that it has seen might be taken for unseen ones.
+    """
+    if touch.meta.get("dataset", {}).get("hash") != train.hash:
+        raise UsageError(
+            f"{path} was learnt from other solves than this study trains with.",
+            why="The sweep or its split was changed since, and what is unseen here may have been seen there.",
+            fix="Run `palpate learn` again.",
+        )
+    return touch
 
 
 def train_and_test(study: Study, data: Dataset, random: Dataset | None) -> tuple[Dataset, Dataset]:

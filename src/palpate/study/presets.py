@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
+from pydantic import ValidationError
+
+from palpate.errors import UsageError
 from palpate.physics import Cantilever, Circle
 from palpate.physics.presets import PRESETS, preset
 from palpate.study.models import Study
 
-__all__ = ["preset_names", "preset_study"]
+__all__ = ["named", "preset_names", "preset_study"]
 
 # a network of several inputs has more to learn: more units, more solves, and a target that a person can feel
 _SEVERAL: dict[str, Any] = {
@@ -22,6 +25,23 @@ _SEVERAL: dict[str, Any] = {
 def preset_names() -> tuple[str, ...]:
     """Names that `preset_study` knows."""
     return tuple(PRESETS)
+
+
+def named(study: Study, name: str) -> Study:
+    """The study under another name.
+
+    Raises
+    ------
+    UsageError
+        If files can't have that name.
+    """
+    try:
+        return Study.model_validate(study.model_dump() | {"name": name})
+    except ValidationError as error:
+        raise UsageError(
+            f"{name!r} can't name a study and its files.",
+            fix="Use letters, digits, dots, dashes and underscores, a letter or a digit first.",
+        ) from error
 
 
 def preset_study(name: str) -> Study:

@@ -32,9 +32,15 @@ def read_study(path: str | os.PathLike[str]) -> Study:
     except FileNotFoundError as error:
         raise StudyError(f"{path} does not exist.", fix="Write one with `palpate init`.") from error
     except (OSError, UnicodeDecodeError) as error:
-        raise StudyError(f"{path} can't be read.", why=str(error)) from error
+        raise StudyError(
+            f"{path} can't be read as a study.",
+            why=f"{error}.",
+            fix="A study is a text file: write one with `palpate init`.",
+        ) from error
     except tomllib.TOMLDecodeError as error:
-        raise StudyError(f"{path} is not valid TOML.", why=str(error), fix="Mend that line.") from error
+        twice = "overwrite" in str(error)
+        fix = "A key or a table stands there twice: keep one." if twice else "Mend that line."
+        raise StudyError(f"{path} is not valid TOML.", why=f"{error}.", fix=fix) from error
     try:
         return Study.model_validate(content)
     except ValidationError as error:
@@ -84,9 +90,11 @@ def _scalars(record: BaseModel) -> Iterator[str]:
                 yield f"{name} = {{ {', '.join(f'{k} = {_toml(v)}' for k, v in value.items())} }}"
             continue
         comment = f"  # {field.description}" if field.description else ""
-        # a key without a value can't be written in TOML: it stands there as a comment
+        if value is None:  # TOML has no such value: an example stands there as a comment
+            yield f"# {name} = {_toml((field.examples or [''])[0])}{comment}"
+            continue
         unit = None if isinstance(value, (str, tuple)) else _unit((*field.metadata, field.annotation))
-        yield f"# {name} ={comment}" if value is None else f"{name} = {_toml(value, unit)}{comment}"
+        yield f"{name} = {_toml(value, unit)}{comment}"
 
 
 def _tables(prefix: str, record: BaseModel) -> Iterator[str]:
@@ -122,16 +130,26 @@ def _toml(value: Any, unit: str | None = None) -> str:
 
 def _complaints(error: ValidationError) -> Iterator[str]:
     """One line per mistake: where, what, and the nearest key that exists."""
-    for item in error.errors(include_url=False):
-        # a union reports each alternative; its tag is no key of the file
-        place = ".".join(
-            str(p) for p in item["loc"] if not str(p).endswith("Record") and p not in {"str", "float"}
-        )
-        if item["type"] == "extra_forbidden":
-            close = difflib.get_close_matches(str(item["loc"][-1]), _known_keys(Study), n=1)
-            yield f"{place}: there is no such key" + (f"; did you mean {close[0]!r}?" if close else "")
-        else:
-            yield f"{place}: {item['msg'].removeprefix('Value error, ')}"
+    items = [(_place(item["loc"]), item) for item in error.errors(include_url=False)]
+    for place, item in items:
+        # what is wrong with a whole because of one of its parts, or of another form it might have had, is no news
+        if any(other != place and other[: len(place)] == place for other, _ in items):
+            continue
+        yield f"{'.'.join(place) or 'study'}: {_words(item)}"
+
+
+def _place(location: tuple[int | str, ...]) -> tuple[str, ...]:
+    """Keys that lead to a mistake; a union's tag is no key of the file."""
+    return tuple(str(p) for p in location if not str(p).endswith("Record") and p not in {"str", "float"})
+
+
+def _words(item: Any) -> str:
+    if item["type"] == "extra_forbidden":
+        close = difflib.get_close_matches(str(item["loc"][-1]), _known_keys(Study), n=1)
+        return "there is no such key" + (f"; did you mean {close[0]!r}?" if close else "")
+    if item["type"] == "string_pattern_mismatch":
+        return f"{item['input']!r} can't name files: letters, digits, dots, dashes and underscores can"
+    return str(item["msg"]).removeprefix("Value error, ")
 
 
 def _known_keys(record: type[BaseModel]) -> set[str]:

@@ -36,7 +36,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from palpate.errors import FileFormatError
+from palpate.errors import FileFormatError, UsageError
 from palpate.network import Archive, Network, load_archive, save_archive
 from palpate.network.evaluate import value_into
 from palpate.units import Range, bounds
@@ -45,6 +45,7 @@ __all__ = ["TouchEvaluator", "TouchModel"]
 
 KIND = "touch"
 OUTSIDE, MIRRORED = 1, 2  # flags of one evaluation
+_NONE = np.zeros(0)
 SLACK = 1e-3  # of a load's range: more than a network's error at the edge, less than a hand can tell
 
 
@@ -110,8 +111,12 @@ class TouchModel:
         return tuple(r for i, r in enumerate(self.inputs) if i not in self.touched)
 
     def displacement(self, loads: np.ndarray, *, mirrored: bool = False) -> np.ndarray:
-        """Displacement (N, 3) of every mesh node under loads (n,), m."""
-        planar = self.networks["field"].predict(np.atleast_2d(loads)).reshape(len(self.rest), 2)
+        """Displacement (N, 3) of every mesh node under loads (n,), m.
+
+        Loads beyond their trained range are held at its end: the network knows nothing further out.
+        """
+        held = np.clip(np.atleast_2d(loads), *bounds(self.inputs))
+        planar = self.networks["field"].predict(held).reshape(len(self.rest), 2)
         full = np.zeros_like(self.rest)
         full[:, :2] = planar
         return _reflect(full, self.directions[0]) if mirrored else full
@@ -205,6 +210,7 @@ class TouchEvaluator:
         others = [i for i in range(n) if i not in model.touched]
         self.force, self.contact, self.loads = np.zeros(3), np.zeros(3), np.zeros(n)
         self.inside, self.mirrored = True, False
+        self._shape = (len(others),)
         self._maps = (
             np.array(model.touched),
             np.array(others, dtype=np.int64),
@@ -217,16 +223,27 @@ class TouchEvaluator:
         self._tip_net = _restricted(model.networks["field"], model.touch_node).arrays
         self(np.zeros(3), np.array([r.low for r in model.parameters]))  # compile now, not in the loop
 
-    def __call__(self, position: np.ndarray, parameters: np.ndarray) -> None:
-        """Evaluate at a hand position.
+    def __call__(self, position: np.ndarray, parameters: np.ndarray = _NONE) -> None:
+        """Evaluate at a hand position; float64 arrays are taken as they are, other sequences are converted.
 
         Parameters
         ----------
         position : (3,) float64
             Offset of the hand from the held node's rest position, m.
         parameters : (p,) float64
-            Loads that the hand does not supply, N.
+            Loads that the hand does not supply, N; none for a body whose only loads are at the held node.
+
+        Raises
+        ------
+        UsageError
+            If there are not three coordinates and p parameters.
         """
+        position, parameters = np.asarray(position, np.float64), np.asarray(parameters, np.float64)
+        if position.shape != (3,) or parameters.shape != self._shape:
+            raise UsageError(
+                f"A hand at {position.shape} with parameters {parameters.shape} can't be answered.",
+                fix=f"Give a position (3,) in m and parameters {self._shape} in N.",
+            )
         flags = _touch(
             position,
             parameters,

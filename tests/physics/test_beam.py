@@ -7,7 +7,17 @@ import numpy as np
 import pytest
 
 from palpate.errors import UsageError
-from palpate.physics import PRESETS, Cantilever, Circle, LinearElastic, PointLoad, Stop, TipLoad, preset
+from palpate.physics import (
+    PRESETS,
+    Cantilever,
+    Circle,
+    LinearElastic,
+    PointLoad,
+    Rectangle,
+    Stop,
+    TipLoad,
+    preset,
+)
 from palpate.physics.solver import STANDARD_GRAVITY
 
 SECTION, MATERIAL = Circle(0.005), LinearElastic(2e9, 0.43, 1150.0)
@@ -77,6 +87,34 @@ def test_the_answer_does_not_depend_on_the_path():
     restarted = problem.open().solve(target, start=found)
     np.testing.assert_allclose(restarted.displacement, cold.displacement, atol=1e-12)
     assert restarted.iterations < cold.iterations
+
+
+def ruler(**changes):
+    """A ruler of aluminium, 0.3 m by 25 mm by 1 mm, under its own weight."""
+    section, material = Rectangle(width=0.025, height=0.001), LinearElastic(70e9, 0.33, 2700.0)
+    return Cantilever(0.3, section, material, self_weight=True, **changes)
+
+
+@pytest.mark.parametrize("load", [-500.0, -300.0, 300.0, 500.0])
+def test_far_beyond_the_linear_range_cold_and_warm_starts_agree(load):
+    """P L²/EI up to 300: a whole load step from rest ends in an equilibrium with a loop."""
+    problem = ruler().problem(TipLoad(-500, 500))
+    solver = problem.open()
+    for x in np.linspace(-abs(load), load, 33):
+        warm = solver.solve(x)
+    cold = problem.solve(load)
+    assert cold.converged, cold.message
+    assert warm.converged, warm.message
+    np.testing.assert_allclose(cold.displacement, warm.displacement, atol=1e-10)
+    assert -np.sign(load) * cold.displacement[-1, 2] == pytest.approx(np.pi / 2, abs=1e-3)
+
+
+@pytest.mark.parametrize("load", [1000.0, 2000.0])
+def test_a_finer_mesh_reaches_further_by_the_same_branch(load):
+    """The tip's turn is a quarter of a circle, without a loop."""
+    solution = ruler(elements=40).problem(TipLoad(0, 2000)).solve(load)
+    assert solution.converged, solution.message
+    assert -solution.displacement[-1, 2] == pytest.approx(np.pi / 2, abs=1e-6)
 
 
 def test_small_kinematics_are_linear():

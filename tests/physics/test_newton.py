@@ -83,6 +83,10 @@ def admit(_):
     return Stop.CONVERGED
 
 
+def anywhere(*_):
+    return True
+
+
 @pytest.mark.parametrize("start", [(-1.2, 1.0), (3.0, -2.0), (0.0, 0.0)])
 def test_rosenbrocks_valley(start):
     found = minimise(Rosenbrock(), np.zeros(2), np.array(start))
@@ -115,15 +119,52 @@ def test_no_minimum_ends_at_the_iteration_limit():
 
 def test_a_path_without_end_is_given_up_in_bounded_time():
     path = LoadPath(np.zeros(1), np.array([2.0]), np.zeros(1))
-    found = follow(Slope(), path, np.zeros(1), admit)
+    found = follow(Slope(), path, np.zeros(1), admit, anywhere)
     assert found.stop is not Stop.CONVERGED
     assert found.iterations <= 600
 
 
 def test_a_path_that_leaves_the_models_reach_ends_there():
     path = LoadPath(np.zeros(1), np.array([0.9]), np.zeros(1))
-    found = follow(Slope(), path, np.zeros(1), lambda z: Stop.STRAIN_LIMIT if z[0] > 1 else Stop.CONVERGED)
+    found = follow(
+        Slope(), path, np.zeros(1), lambda z: Stop.STRAIN_LIMIT if z[0] > 1 else Stop.CONVERGED, anywhere
+    )
     assert found.stop is Stop.STRAIN_LIMIT
+
+
+class Wells(Function):
+    """1 - cos z + z²/50: wells near the multiples of 2π, the outer ones higher."""
+
+    def energy(self, z):
+        return float(1 - np.cos(z[0]) + z[0] ** 2 / 50)
+
+    def force(self, z):
+        return np.array([np.sin(z[0]) + z[0] / 25])
+
+
+def near(before, after):
+    return abs(after[0] - before[0]) < 1
+
+
+def test_a_step_that_leads_into_another_well_is_cut_back():
+    """The predictor lies in the next well; the load's own path leaves the first one never."""
+    path = LoadPath(np.zeros(1), np.array([0.9]), np.zeros(1))
+    predictor = np.array([2 * np.pi + 0.8])
+    far = follow(Wells(), path, predictor, admit, anywhere)
+    found = follow(Wells(), path, predictor, admit, near)
+    assert far.stop is found.stop is Stop.CONVERGED
+    assert far.z[0] > 5
+    assert 0 < found.z[0] < np.pi / 2
+    np.testing.assert_allclose(Wells().force(found.z), 0.9, atol=1e-9)
+
+
+def test_what_is_far_after_the_smallest_step_is_a_snap():
+    """Beyond a load of about 1.06 the first well is gone: sin z + z/25 has no such value before the next one."""
+    path = LoadPath(np.zeros(1), np.array([1.15]), np.zeros(1))
+    found = follow(Wells(), path, np.zeros(1), admit, near)
+    assert found.stop is Stop.CONVERGED
+    assert found.z[0] > 5
+    np.testing.assert_allclose(Wells().force(found.z), 1.15, atol=1e-9)
 
 
 def test_convergence_is_quadratic_near_the_minimum():

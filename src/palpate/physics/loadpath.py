@@ -33,11 +33,18 @@ class LoadPath:
 
 
 def follow(
-    model: Model, path: LoadPath, predictor: np.ndarray, admit: Callable[[np.ndarray], Stop]
+    model: Model,
+    path: LoadPath,
+    predictor: np.ndarray,
+    admit: Callable[[np.ndarray], Stop],
+    near: Callable[[np.ndarray, np.ndarray], bool],
 ) -> Equilibrium:
     """Follow the equilibrium along a path of loads.
 
-    The whole path is tried in one step first. A step that fails is halved, one that succeeds is doubled.
+    The whole path is tried in one step first. A step that fails is halved, one that succeeds is doubled. So is a
+    step halved that leads far away: under a large load a body may have several stable equilibria, and a long
+    step may fall into another one than that which the load leads to. What is still far after the smallest step
+    is where the body snaps to.
 
     Parameters
     ----------
@@ -48,26 +55,31 @@ def follow(
     admit : callable
         Says of an equilibrium's unknowns `Stop.CONVERGED`, or why the model has no say there, which ends the
         path.
+    near : callable
+        Whether an equilibrium's unknowns (second) are near enough to those before the step (first) to be of the
+        same branch of equilibria.
 
     Returns
     -------
     Equilibrium
         With the iterations of all steps.
     """
-    state, position, step, spent = path.state, 0.0, 1.0, 0
+    state, position, step, spent, trusted = path.state, 0.0, 1.0, 0, True
     while True:
         target = min(1.0, position + step)
         load = path.at(target)
-        guess = _lower(model, load, state, predictor) if target == 1.0 else state
+        guess = _lower(model, load, state, predictor) if target == 1.0 and trusted else state
         found = minimise(model, load, guess, limit=min(NEWTON_LIMIT, TOTAL_LIMIT - spent))
         spent += found.iterations
-        if found.stop is Stop.CONVERGED:
+        half = (target - position) / 2
+        if found.stop is Stop.CONVERGED and (near(state, found.z) or half < SMALLEST_STEP):
             verdict = admit(found.z)
             if target == 1.0 or verdict is not Stop.CONVERGED:
                 return replace(found, stop=verdict, iterations=spent)
             state, position, step = found.z, target, step * GROWTH
         else:
-            step = (target - position) / 2
+            trusted = trusted and found.stop is not Stop.CONVERGED  # else it led astray
+            step = half
         if spent >= TOTAL_LIMIT or step < SMALLEST_STEP:
             return replace(found, z=state, stop=_reason(found.stop), iterations=spent)
 
@@ -79,5 +91,5 @@ def _lower(model: Model, load: np.ndarray, state: np.ndarray, predictor: np.ndar
 
 
 def _reason(stop: Stop) -> Stop:
-    """A step's iteration limit is the cause for cutting it back, not the reason for the end."""
-    return Stop.STEP_TOO_SMALL if stop is Stop.ITERATION_LIMIT else stop
+    """What a step was cut back for, its iteration limit or leading far, is not the reason for the end."""
+    return Stop.STEP_TOO_SMALL if stop in {Stop.ITERATION_LIMIT, Stop.CONVERGED} else stop

@@ -17,6 +17,9 @@ __all__ = ["STANDARD_GRAVITY", "BeamSolver"]
 
 STANDARD_GRAVITY = 9.80665  # m/s², 3rd General Conference on Weights and Measures 1901
 COARSE = 1.0  # rad that one element may bend: cubics follow a quarter of a circle to about 1e-3
+# In one load step, more bending of an element or more turning of a section hints at another equilibrium: a load
+# across turns a beam at rest by at most a quarter of a circle, and more only where it loops.
+FAR_BEND, FAR_TURN = 0.5, 2.0  # rad
 
 
 @dataclass(frozen=True)
@@ -93,12 +96,15 @@ class BeamSolver:
     def _search(self, load: np.ndarray) -> Equilibrium:
         """From the last answer; where that fails, once more from the undeformed beam."""
         last = self._last
-        found = follow(self._model, LoadPath(last.load, load, last.state), self._predict(load), self._admit)
+        found = self._follow(LoadPath(last.load, load, last.state), self._predict(load))
         if found.stop is Stop.CONVERGED or not last.load.any():
             return found
         rest = np.zeros_like(load)
-        again = follow(self._model, LoadPath(rest, load, rest), rest, self._admit)
+        again = self._follow(LoadPath(rest, load, rest), rest)
         return Equilibrium(again.z, again.stop, found.iterations + again.iterations, again.residual)
+
+    def _follow(self, path: LoadPath, predictor: np.ndarray) -> Equilibrium:
+        return follow(self._model, path, predictor, self._admit, self._near)
 
     def _predict(self, load: np.ndarray) -> np.ndarray:
         """Extrapolate the last two states along the loads (secant)."""
@@ -118,6 +124,14 @@ class BeamSolver:
             return Stop.COARSE_MESH
         return Stop.CONVERGED
 
+    def _near(self, before: np.ndarray, after: np.ndarray) -> bool:
+        """Whether a load step from one state to the other stays on one branch of equilibria."""
+        if self._problem.body.kinematics == "small":
+            return True  # one equilibrium only
+        turned = after - before
+        far = self._bend(turned) > FAR_BEND or self._turn(turned) > FAR_TURN
+        return not far
+
     def _fibre_strain(self, state: np.ndarray) -> float:
         axial, _, curvature = np.abs(self._model.strains(state)).T
         return float((axial + self._problem.body.section.half_height * curvature).max())
@@ -125,6 +139,10 @@ class BeamSolver:
     def _bend(self, state: np.ndarray) -> float:
         """Largest angle in rad by which one element bends."""
         return float(np.abs(np.diff(state[self._model.vertex_dofs[:, 2]], prepend=0.0)).max())
+
+    def _turn(self, state: np.ndarray) -> float:
+        """Largest angle in rad by which a section turns."""
+        return float(np.abs(state[self._model.vertex_dofs[:, 2]]).max())
 
     def _load_vectors(self) -> np.ndarray:
         """Load vector of 1 N of each load, shape (n, dof)."""

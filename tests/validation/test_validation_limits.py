@@ -87,7 +87,7 @@ def test_a_miss_is_told_in_plain_words() -> None:
     assert re.search(r"The worst case is u_y at [\d.]+ m under P = 5 N\.", error.why)
     assert "Force error, 95th percentile: 3 % measured, 1 % asked." in error.why
     assert "units_max" in error.fix
-    assert error.fix.count("Sweep more samples") == 1
+    assert error.fix.count("Sweep more loads") == 1
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])

@@ -13,6 +13,7 @@ from palpate.validation.words import (
     length,
     plain,
     power_of_ten,
+    pressure,
     scientific,
     share,
     shown,
@@ -32,6 +33,14 @@ def test_numbers_read_back_within_their_digits(size: float, sign: float) -> None
     value = sign * size
     assert number(plain(value)) == pytest.approx(value, rel=0.0501)
     assert number(scientific(value)) == pytest.approx(value, rel=0.0501)
+
+
+@given(st.floats(1.0, 1e13))
+def test_moduli_read_back_and_stay_short(pascals: float) -> None:
+    text, unit = pressure(pascals).rsplit(" ", 1)
+    assert number(text) * {"GPa": 1e9, "MPa": 1e6, "kPa": 1e3, "Pa": 1.0}[unit] == pytest.approx(
+        pascals, rel=0.00501
+    )
 
 
 @given(st.floats(1e-9, 1e3))

@@ -151,9 +151,15 @@ class Check:
         return text if self.passed else f"{text} {self.criterion.fix}"
 
 
-_MORE = "Sweep more samples, or allow the refined networks more units (units_max of the refinement)."
+_MORE = (
+    "Sweep more loads (`samples` in [sweep]), or allow the refined networks more units and solves (`units_max` and "
+    "`samples` in [learning])."
+)
 _FORCE = "Jones 1989; Pang, Tan & Durlach 1991"
-_FILTER = "Let the filter grow more (lower error_min and error_rms_min), or give it more passes."
+_FILTER = (
+    "Give the filter more `passes` in [filter], or let it grow more: `settings = { error_min = …, error_rms_min = … }` "
+    "there, with smaller values."
+)
 _TARGET = "the study's own target"
 _EYE = "palpate's own: about a pixel where a body of 1 m fills a screen"
 
@@ -175,7 +181,8 @@ CRITERIA = (
         "times",
         1.0,
         "Narayanan, Singla, Garimella, Waz & Krovi 2011 report drift at the ends of the range",
-        "Believe the ends of the range more (a smaller edge_weight), or sample them more densely.",
+        "Believe the ends of the range more: `settings = { edge_weight = … }` in [filter], with a smaller value; or "
+        "sweep more loads (`samples` in [sweep]).",
     ),
     Criterion(
         "filter_relapse",
@@ -183,7 +190,8 @@ CRITERIA = (
         "times",
         1.1,
         _TARGET,
-        "Guard the filter: a larger noise or noise_share, a smaller step_bound or forgetting.",
+        "Guard the filter: `settings = { noise_share = … }` in [filter] with a larger value, or `noise`, or "
+        "`step_bound` with a smaller one.",
     ),
     Criterion("displacement_mean", "Shape, mean distance of nodes", "metres", 0.1e-3, _EYE, _MORE),
     Criterion("displacement_max", "Shape, largest distance of a node", "metres", 0.3e-3, _EYE, _MORE),
@@ -214,7 +222,7 @@ CRITERIA = (
         "share",
         1e-9,
         "passivity: a body at rest gives nothing away (Colgate & Schenkel 1997)",
-        "The force is not the gradient of an energy: sweep more samples, or touch one load only.",
+        "The force is not the gradient of an energy: sweep more loads (`samples` in [sweep]), or touch one load only.",
     ),
 )
 """Everything that is judged, in the order in which it is told."""

@@ -15,6 +15,8 @@ from palpate.errors import AccuracyError, UsageError
 from palpate.learning import History
 from palpate.learning.touch import node_outputs
 from palpate.surrogates import TouchModel
+from palpate.surrogates.touch import SLACK
+from palpate.units import bounds
 from palpate.validation.field import FieldErrors, field_errors
 from palpate.validation.force import ForceErrors, force_errors, force_samples
 from palpate.validation.judge import checks, figures
@@ -22,9 +24,9 @@ from palpate.validation.limits import Check, Limits
 from palpate.validation.loops import LoopWork, loop_work
 from palpate.validation.outputs import OutputErrors, output_errors
 from palpate.validation.stiffness import StiffnessErrors, stiffness_errors
-from palpate.validation.words import count, length, plain, scientific, shown
+from palpate.validation.words import count, length, plain, scientific, share, shown
 
-__all__ = ["Validation", "node_truth", "validate"]
+__all__ = ["Validation", "node_truth", "validate", "worse_than_filter"]
 
 NETWORKS = {"refined": "nodes", "filter": "filter"}
 """Networks for the nodes' displacements: what they are called here and in a `TouchModel`."""
@@ -177,12 +179,25 @@ def validate(
     if len(touch.touched) == 1:
         notes.append("Direction is not judged: the hand feels one direction only.")
     if force.outside:
-        notes.append(f"{force.outside} of {len(test)} hand positions count as outside the trained range.")
+        notes.append(_outside(touch, test, force.outside))
+    if (worse := worse_than_filter(networks)) is not None:
+        notes.append(worse)
     curve = None if isinstance(stiffness, str) else stiffness
     work = None if isinstance(loops, str) else loops
     judged = checks(figures(networks, field, force, curve, work, relapse), limits or Limits())
     return Validation(
         touch.name, len(test), networks, field, force, curve, work, relapse, judged, tuple(notes)
+    )
+
+
+def worse_than_filter(networks: Mapping[str, OutputErrors]) -> str | None:
+    """A sentence for a refined network that is worse than the filter it should improve; None if it isn't."""
+    if "filter" not in networks or not networks["refined"].rmse > networks["filter"].rmse:
+        return None
+    refined, own = networks["refined"], networks["filter"]
+    return (
+        f"The refined network is worse than the sequential filter: RMSE {length(refined.rmse)} against "
+        f"{length(own.rmse)}. Allow it more units (`units_max` in [learning]) or more solves (`samples` there)."
     )
 
 
@@ -204,6 +219,21 @@ def node_truth(touch: TouchModel, data: Dataset) -> np.ndarray:
             fix="Test with solves of the study that the model was learnt from.",
         )
     return np.stack([data.displacement[:, node, axis] for node, axis in columns], axis=1)
+
+
+def _outside(touch: TouchModel, test: Dataset, number: int) -> str:
+    """How many hand positions count as outside, and why they do where their loads are inside."""
+    text = f"{number} of {len(test)} hand positions count as outside the trained range"
+    low, high = bounds(touch.inputs)
+    if not np.array_equal(np.clip(test.X, low, high), test.X):
+        return f"{text}."
+    slack = f"{share(SLACK)} of a load's range"
+    if touch.compliance > 0:
+        slack += ", or the hand by more than 1 % of the reach"
+    return (
+        f"{text} although their loads are inside: at the border of the trained travel, or where the answer misses "
+        f"the load by more than {slack}."
+    )
 
 
 def _check_fits(touch: TouchModel, data: Dataset) -> None:

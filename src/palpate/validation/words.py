@@ -12,12 +12,14 @@ __all__ = [
     "length",
     "plain",
     "power_of_ten",
+    "pressure",
     "scientific",
     "share",
     "shown",
 ]
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_PRESSURES = ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (1.0, "Pa"))
 _LENGTHS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
 
 
@@ -53,7 +55,9 @@ def bound(text: str) -> str:
     text = re.sub(r"(?<![\w-])-(?=\d)", "−", text)
     text = text.replace(" × 10", "\N{NO-BREAK SPACE}×\N{NO-BREAK SPACE}10")
     text = text.replace(" = ", "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}")
-    return re.sub(r"(?<=[\d⁰¹²³⁴-⁹]) (?=(?:[nµm]?m|N|m?s|min|units?|×)\b|[%×])", "\N{NO-BREAK SPACE}", text)
+    return re.sub(
+        r"(?<=[\d⁰¹²³⁴-⁹]) (?=(?:[nµm]?m|[GMk]?Pa|N|m?s|min|units?|×)\b|[%×])", "\N{NO-BREAK SPACE}", text
+    )
 
 
 def count(number: int, one: str, many: str = "") -> str:
@@ -68,6 +72,12 @@ def length(metres: float) -> str:
         return f"{plain(metres)} m"
     factor, unit = next((u for u in _LENGTHS if size >= 0.9995 * u[0]), _LENGTHS[-1])
     return f"{plain(metres / factor, 3)} {unit}"
+
+
+def pressure(pascals: float) -> str:
+    """A modulus in GPa, MPa, kPa or Pa."""
+    factor, unit = next((u for u in _PRESSURES if pascals >= 0.9995 * u[0]), _PRESSURES[-1])
+    return f"{plain(pascals / factor, 3)} {unit}"
 
 
 def share(value: float) -> str:

@@ -8,9 +8,9 @@ import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.surrogates import TouchModel
+from palpate.validation.report.networks import units_of
 from palpate.validation.report.style import BLUE, INK, ORANGE, figure, logarithmic, series, tidy_log
 from palpate.validation.result import NETWORKS, Validation, node_truth
-from palpate.validation.words import count
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -62,7 +62,7 @@ def plot_node_errors(touch: TouchModel, data: Dataset, limit: float | None = Non
             if limit is not None and label == "refined":
                 axis.axhline(limit, color=INK, linewidth=0.9, linestyle=(0, (2, 2)))
                 _note(axis, "RMSE asked", limit)
-        axes[0, column].set_title(f"{TITLES[label]}, {count(touch.networks[NETWORKS[label]].units, 'unit')}")
+        axes[0, column].set_title(f"{TITLES[label]}: {units_of(touch, NETWORKS[label])}")
     for axis in axes[:, 0]:
         axis.set_ylabel("|error| / m")
     tidy_log(axes[0, 0], [*values, np.array([limit or 0.0])])

@@ -1,4 +1,4 @@
-"""The force on the hand: against the tip's travel, and how its error compares with what a person notices."""
+"""The force on the hand: against its displacement, and how its error compares with what a person notices."""
 
 from __future__ import annotations
 
@@ -15,11 +15,18 @@ from palpate.validation.report.style import BLUE, INK, ORANGE, SERIES, figure, l
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["plot_force", "plot_force_errors"]
+__all__ = ["heading", "plot_force", "plot_force_errors"]
+
+HEADINGS = {
+    "down": (0.0, -1.0, 0.0),
+    "up": (0.0, 1.0, 0.0),
+    "away from the clamp": (1.0, 0.0, 0.0),
+    "towards the clamp": (-1.0, 0.0, 0.0),
+}
 
 
 def plot_force(touch: TouchModel, data: Dataset, samples: ForceSamples) -> Figure:
-    """Force against the held node's travel for one load; network against finite elements for several."""
+    """Force against the hand's displacement, both with their sign, for one load; a parity plot for several."""
     fig, axes = figure(1, 1, size=(4.6, 3.4))
     if len(data.ranges) == 1:
         _draw_curve(axes[0, 0], touch, samples)
@@ -64,22 +71,31 @@ def _draw_curve(axis: Any, touch: TouchModel, samples: ForceSamples) -> None:
     evaluate, force = touch.evaluator(), []
     for place in hand_positions(touch, along[:, None]):
         evaluate(place, np.empty(0))
-        force.append(float(np.linalg.norm(evaluate.force)))
+        force.append(-float(touch.directions[0] @ evaluate.force))
     order = np.argsort(samples.hand[:, 0])
     some = order[np.unique(np.linspace(0, order.size - 1, 28).astype(int))]
     axis.plot(1e3 * along, force, color=BLUE, label="network", zorder=1)
     axis.plot(
         1e3 * samples.hand[some, 0],
-        samples.size[some],
+        -samples.truth[some] @ touch.directions[0],
         "o",
         color=ORANGE,
         markersize=4,
         label="finite elements, unseen",
         zorder=2,
     )
-    axis.set_xlabel("deflection of the held node / mm")
-    axis.set_ylabel("force on the hand / N")
+    name, along_load = touch.inputs[touch.touched[0]].name, touch.directions[0]
+    axis.set_xlabel(f"displacement along {name} ({heading(along_load)}) / mm")
+    axis.set_ylabel(f"force on the hand against {name} ({heading(-along_load)}) / N")
     axis.legend(loc="best")
+
+
+def heading(direction: np.ndarray) -> str:
+    """A unit vector (3,) as a person says it: down, up, outwards, inwards, or its components."""
+    for word, axis in HEADINGS.items():
+        if np.allclose(direction, axis, atol=1e-9):
+            return word
+    return f"direction {direction[0]:.2g}, {direction[1]:.2g}".replace("-", "−")
 
 
 def _draw_parity(axis: Any, touch: TouchModel, samples: ForceSamples) -> None:

@@ -11,6 +11,7 @@ from palpate.validation.report.chapter import Chapter
 from palpate.validation.report.errors import plot_node_errors, plot_outer
 from palpate.validation.report.forces import plot_force, plot_force_errors
 from palpate.validation.report.growth import plot_history
+from palpate.validation.report.networks import units_of
 from palpate.validation.report.shapes import colour_of_load, plot_shapes
 from palpate.validation.report.style import styled
 from palpate.validation.report.svg import Picture, inline_svg
@@ -42,7 +43,8 @@ def _shapes(chapter: Chapter, key: str) -> Picture:
         "Deflected shapes",
         f"Two panels with the deflected shapes of {chapter.name} under {count(len(data), 'load')}: finite elements on "
         f"the left, the network on the right. {alike}",
-        f"All {len(data)} unseen loads, coloured by {colour.split(' / ')[0]}. Dots mark the nodes of interest, the "
+        f"All {len(data)} unseen loads, coloured by {colour.split(' / ')[0]}; on the right the "
+        f"{units_of(chapter.touch, 'field')}. Dots mark the nodes of interest, the "
         f"dashed line the body at rest. {alike}",
         lambda: plot_shapes(chapter.touch, data),
     )
@@ -52,9 +54,11 @@ def _errors(chapter: Chapter, key: str) -> Picture:
     v = chapter.validation
     refined, own = v.networks["refined"], v.networks.get("filter")
     limit = next((c.limit * refined.full_scale for c in v.checks if c.criterion.key == "rmse"), None)
-    text = f"Refinement leaves at most {length(refined.max)} ({refined.worst})."
+    text = f"Refinement (network “nodes”) leaves at most {length(refined.max)} ({refined.worst})."
     if own:
-        text = f"The filter alone is off by at most {length(own.max)} ({own.worst}). {text}"
+        text = (
+            f"The filter alone (network “filter”) is off by at most {length(own.max)} ({own.worst}). {text}"
+        )
     dips = (
         " Dips are loads at which an error changes sign."
         if len(v.networks["refined"].worst.inputs) == 1
@@ -76,7 +80,7 @@ def _growth(chapter: Chapter, key: str) -> Picture:
         f"{key}-growth",
         "Growth and pruning while learning",
         f"Units of the sequential filter over observations of {chapter.name}, with the error beside them. {text}",
-        f"{text} Dotted lines part the passes over the data.",
+        f"Network “filter”: {text} Dotted lines part the passes over the data.",
         lambda: plot_history(h, chapter.rivals),
     )
 
@@ -108,7 +112,7 @@ def _compared(rivals: Mapping[str, History]) -> str:
 def _force(chapter: Chapter, key: str) -> list[Picture]:
     data, force = chapter.test.ok, chapter.validation.force
     samples = force_samples(chapter.touch, data)
-    what = "against the deflection of the held node"
+    what = "against the hand's displacement"
     if len(data.ranges) > 1:
         what = "of the network against that of finite elements"
     felt = "No touch was strong enough to judge in relative terms."
@@ -118,7 +122,8 @@ def _force(chapter: Chapter, key: str) -> list[Picture]:
         f"{key}-force",
         "Force on the hand",
         f"Force on the hand {what}, for {chapter.name}, up to {plain(force.largest, 3)} N.",
-        f"The force {what}, asked of the same evaluator that runs at 1 kHz.",
+        f"The force {what}: {units_of(chapter.touch, 'force')}, asked through the evaluator that runs at 1 kHz."
+        f"{_signs(chapter)}",
         lambda: plot_force(chapter.touch, data, samples),
     )
     second = _picture(
@@ -130,6 +135,15 @@ def _force(chapter: Chapter, key: str) -> list[Picture]:
         lambda: plot_force_errors(samples),
     )
     return [first, second]
+
+
+def _signs(chapter: Chapter) -> str:
+    """What a sign means on the axes of the force against the displacement."""
+    if len(chapter.test.ranges) > 1:
+        return ""
+    text = " Displacement counts along the load, force against it: a body that resists has both of one sign."
+    weight = chapter.train.provenance.get("problem", {}).get("body", {}).get("self_weight")
+    return f"{text} At no force the body hangs under its own weight." if weight else text
 
 
 def _outer(chapter: Chapter, key: str) -> Picture:

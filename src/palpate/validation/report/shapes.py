@@ -10,8 +10,8 @@ from palpate.dataset import Dataset
 from palpate.surrogates import TouchModel
 from palpate.units import bounds
 from palpate.validation.field import predicted_field
+from palpate.validation.report.networks import units_of
 from palpate.validation.report.style import INK, figure, loads_map
-from palpate.validation.words import count
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -41,7 +41,7 @@ def plot_shapes(touch: TouchModel, data: Dataset) -> Figure:
     fig, axes = figure(1, 2, size=_size(data), sharex=True, sharey=True)
     names = (
         f"Finite elements, {len(data)} solves",
-        f"Network, {count(touch.networks['field'].units, 'unit')}",
+        units_of(touch, "field").capitalize(),
     )
     for axis, shape, name in zip(axes[0], shapes, names, strict=True):
         _draw(axis, data, shape, order, colour.to_rgba(shade), name)

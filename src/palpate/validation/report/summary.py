@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from palpate.validation.report.body import body_words, strain_words
 from palpate.validation.report.chapter import Chapter
-from palpate.validation.result import Validation
+from palpate.validation.result import Validation, worse_than_filter
 from palpate.validation.words import count, length, plain, scientific, share
 
 __all__ = ["Fact", "Story", "story"]
@@ -53,7 +54,10 @@ def _facts(chapter: Chapter) -> tuple[Fact, ...]:
     facts = [
         Fact(length(v.field.reach), "travel of the held node, at most"),
         Fact(f"{plain(v.force.largest, 3)} N", "largest force on the hand in the test"),
-        Fact(count(refined.units, "unit"), f"answer for {len(refined.per_output)} displacements"),
+        Fact(
+            count(refined.units, "unit"),
+            f"of network “nodes” answer for {len(refined.per_output)} displacements",
+        ),
         Fact(length(refined.rmse), f"RMSE at the nodes, {scientific(refined.relative)} of full scale"),
     ]
     if v.force.p95 is not None and v.force.p95_jnd is not None:
@@ -69,10 +73,12 @@ def _solved(chapter: Chapter) -> str:
     )
     failed = len(chapter.train) + len(chapter.test) - len(chapter.train.ok) - len(chapter.test.ok)
     text = (
-        f"{_body(chapter)} was solved by finite elements under loads {loads}: {len(chapter.train.ok)} solves to learn "
-        f"from and {len(chapter.test.ok)} that the networks never saw."
+        f"{body_words(chapter.train.provenance)} was solved by finite elements under loads {loads}: "
+        f"{len(chapter.train.ok)} solves to learn from and {len(chapter.test.ok)} that the networks never saw."
     )
-    return text if not failed else f"{text} {count(failed, 'solve')} did not converge and were left out."
+    if failed:
+        text += f" {count(failed, 'solve')} did not converge and were left out."
+    return f"{text} {strain_words(chapter.train, chapter.test)}".rstrip()
 
 
 def _learnt(chapter: Chapter) -> str:
@@ -88,9 +94,22 @@ def _learnt(chapter: Chapter) -> str:
         )
     solves = f" from {count(used, 'solve')}" if isinstance(used, int) else ""
     return (
-        f"{text}Refinement{solves} then needed {count(refined.units, 'unit')} to come within {length(refined.rmse)}; "
-        f"the largest error at any node is {length(refined.max)} ({refined.worst})."
+        f"{text}Refinement{solves} gave the network “nodes” {count(refined.units, 'unit')}, and it came within "
+        f"{length(refined.rmse)}; the largest error at any node is {length(refined.max)} ({refined.worst})."
+        f"{_shortfall(v)}"
     )
+
+
+def _shortfall(v: Validation) -> str:
+    """Where refinement did no good, or not enough."""
+    text = "" if (worse := worse_than_filter(v.networks)) is None else f" {worse}"
+    missed = next((c for c in v.failures if c.criterion.key == "rmse"), None)
+    if missed is not None:
+        text += (
+            f" The refined network misses its target: {scientific(missed.measured)} of full scale measured, "
+            f"{scientific(missed.limit)} asked."
+        )
+    return text
 
 
 def _good(v: Validation) -> str:
@@ -127,15 +146,3 @@ def _felt(jnd: float) -> str:
         )
     shown = f"{float(f'{times:.2g}'):,.0f}" if times >= 10 else plain(times)
     return f"{shown} times less than a person notices"
-
-
-def _body(chapter: Chapter) -> str:
-    body = chapter.train.provenance.get("problem", {}).get("body", {})
-    kind = str(body.get("type", "body")).lower()
-    material = body.get("material", {})
-    words = f"A {kind}"
-    if isinstance(material, dict) and material.get("name"):
-        words += f" of {material['name']}"
-    if isinstance(body.get("length"), (int, float)):
-        words += f", {body['length']:g} m long,"
-    return words

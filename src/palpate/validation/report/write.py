@@ -10,6 +10,7 @@ from typing import Any
 
 from palpate.errors import UsageError
 from palpate.validation.report.chapter import Chapter
+from palpate.validation.report.networks import network_rows
 from palpate.validation.report.pictures import pictures
 from palpate.validation.report.summary import story
 from palpate.validation.report.tables import flat, judged_rows, node_rows, sources, timing_rows
@@ -112,6 +113,7 @@ def _told(chapter: Chapter, key: str) -> dict[str, Any]:
         "judged": judged_rows(chapter.validation),
         "failures": [str(c) for c in chapter.validation.failures],
         "notes": chapter.validation.notes,
+        "networks": network_rows(chapter.touch),
         "node_head": head,
         "node_rows": rows,
         "timings": timing_rows(chapter),

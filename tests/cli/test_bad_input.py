@@ -76,7 +76,8 @@ def test_loads_outside_the_solvers_reach(palpate, tmp_path):
     path.write_text(path.read_text().replace("samples = 33", "samples = 8"))
     answer = palpate("sweep", path)
     assert answer.code == 3
-    assert "1e+09" in answer.err or "1000000000" in answer.err
+    assert "7 of 8 solves failed" in answer.err  # no load is no trouble
+    assert "e+08 N" in answer.err
     assert "Traceback" not in answer.err
 
 

@@ -10,7 +10,8 @@ from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.physics import Circle, Rectangle, Section
 from palpate.study import Study, preset_names, preset_study, read_study, to_toml
-from palpate.study.pipeline import body_of, loads_of, settings_of, train_and_test
+from palpate.study.build import body_of, loads_of, settings_of
+from palpate.study.rows import train_and_test
 from palpate.sweeps import sweep
 
 

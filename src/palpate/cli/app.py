@@ -169,7 +169,8 @@ def validate(
     """Judge the learnt model on loads it has never seen; exit code 1 where it misses the study's target."""
     from palpate.learning import History
     from palpate.study import read_study
-    from palpate.study.pipeline import Outcome, check_model, report_study, validate_study
+    from palpate.study.pipeline import Outcome, report_study, validate_study
+    from palpate.study.rows import check_model
     from palpate.surrogates import TouchModel
 
     console = Console(as_json)
@@ -251,7 +252,7 @@ def _with_workers(study: Any, workers: int | None) -> Any:
 
 def _datasets(study: Any, paths: Any) -> Any:
     from palpate.dataset import Dataset
-    from palpate.study.pipeline import check_data, train_and_test
+    from palpate.study.rows import check_data, train_and_test
 
     data = check_data(study, Dataset.open(paths.data), paths.data)
     random = check_data(study, Dataset.open(paths.random), paths.random) if study.test.random else None

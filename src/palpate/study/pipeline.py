@@ -6,7 +6,6 @@ written by `carry_out` and by the command line.
 
 from __future__ import annotations
 
-import json
 import os
 import platform
 import time
@@ -15,15 +14,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from palpate import __version__
 from palpate.dataset import Dataset
-from palpate.errors import UsageError
-from palpate.learning import History, Settings, default, founding, learn_touch, node_outputs
+from palpate.learning import History, Settings, founding, learn_touch, node_outputs
 from palpate.learning import learn as learn_samples
-from palpate.physics import Cantilever, Circle, LinearElastic, PointLoad, Rectangle, Section, named_material
+from palpate.study.build import body_of, loads_of, settings_of
 from palpate.study.models import Study
+from palpate.study.rows import train_and_test
 from palpate.surrogates import TouchModel
 from palpate.sweeps import sweep
 from palpate.validation import Chapter, Limits, Validation, validate, write_report
@@ -31,18 +28,12 @@ from palpate.validation import Chapter, Limits, Validation, validate, write_repo
 __all__ = [
     "Outcome",
     "Paths",
-    "body_of",
     "carry_out",
-    "check_data",
-    "check_model",
     "judged",
     "learn_study",
-    "loads_of",
     "report_study",
     "rivals_of",
-    "settings_of",
     "sweep_study",
-    "train_and_test",
     "validate_study",
 ]
 
@@ -122,50 +113,6 @@ class Outcome:
         )
 
 
-def body_of(study: Study) -> Cantilever:
-    """The study's body."""
-    b = study.body
-    material = (
-        named_material(b.material)
-        if isinstance(b.material, str)
-        else LinearElastic(b.material.young, b.material.poisson, b.material.density, b.material.name)
-    )
-    return Cantilever(
-        length=b.length,
-        section=_section(study),
-        material=material,
-        elements=b.elements,
-        order=b.order,
-        kinematics=b.kinematics,
-        self_weight=b.self_weight,
-        nodes=b.nodes,
-    )
-
-
-def _section(study: Study) -> Circle | Rectangle | Section:
-    s = study.body.section
-    if s.radius is not None:
-        return Circle(s.radius)
-    if s.width is not None and s.height is not None:
-        return Rectangle(s.width, s.height)
-    # the record's own check leaves only this kind
-    assert s.area is not None
-    assert s.second_moment is not None
-    assert s.shear_factor is not None
-    return Section(s.area, s.second_moment, s.shear_factor)
-
-
-def loads_of(study: Study) -> tuple[PointLoad, ...]:
-    """The study's loads."""
-    return tuple(PointLoad(p.name, p.at, p.low, p.high, p.direction) for p in study.loads)
-
-
-def settings_of(study: Study) -> Settings:
-    """The filter's settings: a named form with single settings changed."""
-    form = founding() if study.filter.form == "founding" else default()
-    return replace(form, **study.filter.settings)  # type: ignore[arg-type]
-
-
 def sweep_study(
     study: Study, paths: Paths | None = None, *, cluster: Any = None, progress: Any = True
 ) -> tuple[Dataset, Dataset | None]:
@@ -207,75 +154,6 @@ def sweep_study(
         **common,
     )
     return data, extra
-
-
-def check_data(study: Study, data: Dataset, path: Path) -> Dataset:
-    """The dataset, if it is of the study's body and loads.
-
-    Raises
-    ------
-    UsageError
-        If it is not: the file has the study's name, but the study was changed since.
-    """
-    wanted = body_of(study).problem(loads_of(study)).describe()
-    found = data.provenance["problem"]
-    # compared as the file has it: tuples are lists there
-    if json.loads(json.dumps(wanted)) != found:
-        raise UsageError(
-            f"{path} is not of this study's body and loads.",
-            why="The study was changed after the sweep.",
-            fix="Delete it and run `palpate sweep`, or give the changed study another name.",
-        )
-    return data
-
-
-def check_model(touch: TouchModel, train: Dataset, path: Path) -> TouchModel:
-    """The model, if it was learnt from just these training rows.
-
-    Raises
-    ------
-    UsageError
-        If it was not: rows that it has seen might be taken for unseen ones.
-    """
-    if touch.meta.get("dataset", {}).get("hash") != train.hash:
-        raise UsageError(
-            f"{path} was learnt from other solves than this study trains with.",
-            why="The sweep or its split was changed since, and what is unseen here may have been seen there.",
-            fix="Run `palpate learn` again.",
-        )
-    return touch
-
-
-def train_and_test(study: Study, data: Dataset, random: Dataset | None) -> tuple[Dataset, Dataset]:
-    """Training rows, and the rows that the network never sees, random loads among them."""
-    good = data.ok
-    parts = [] if random is None else [random.ok]
-    if study.test.every:
-        held = _held_rows(study, len(good))
-        parts.insert(0, good.take(np.flatnonzero(held)))
-        good = good.take(np.flatnonzero(~held))
-    if not parts:
-        raise UsageError(
-            f"The study {study.name!r} keeps nothing for testing.",
-            why="Both test.every and test.random are 0.",
-            fix="Set one of them: a network is judged on solves that it has never seen.",
-        )
-    return good, Dataset.concat(parts)
-
-
-def _held_rows(study: Study, count: int) -> np.ndarray:
-    """Which of the sweep's rows (count,) are kept for testing: one in `test.every`.
-
-    Of a grid every n-th; of other designs random ones. A Sobol sequence fills space in turns, so that every n-th
-    of its points lie in one corner, and the network would never see that corner.
-    """
-    every = study.test.every
-    if study.sweep.design == "grid":
-        return np.asarray(np.arange(count) % every == every - 1)
-    held = np.zeros(count, dtype=bool)
-    rng = np.random.default_rng((study.test.seed, count))
-    held[rng.choice(count, count // every, replace=False)] = True
-    return held
 
 
 def learn_study(

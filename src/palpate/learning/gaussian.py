@@ -16,7 +16,7 @@ import numpy as np
 from palpate.learning.settings import Settings
 from palpate.learning.state import State
 
-__all__ = ["activations", "jacobian", "predict", "tail_row", "value"]
+__all__ = ["activations", "jacobian", "tail_row", "value"]
 
 
 def tail_row(x: np.ndarray, columns: int) -> np.ndarray:
@@ -35,9 +35,6 @@ def value(state: State, x: np.ndarray, settings: Settings) -> np.ndarray:
     """f(x): (m,) at one scaled point (n,), (N, m) at many (N, n)."""
     phi = activations(x, state.centres, state.widths(settings))
     return np.asarray(tail_row(x, state.tail.shape[1]) @ state.tail.T + phi @ state.weights)
-
-
-predict = value
 
 
 def jacobian(state: State, x: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.ndarray]:

@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numba import njit
 
-__all__ = ["jacobian_into", "regressors", "value_into", "values_into"]
+__all__ = ["jacobian_into", "value_into", "values_into"]
 
 # fastmath stays off: the runtime must agree with Network.predict to the last bits on every machine
 _jit = njit(cache=True, nogil=True, error_model="numpy")
@@ -109,21 +109,3 @@ def jacobian_into(
             slope *= -2.0 * phi / half[i]
             for j in range(m):
                 J[j, i] += rows[1 + n + k, j] * slope
-
-
-def regressors(X: np.ndarray, factors: np.ndarray, shifts: np.ndarray) -> np.ndarray:
-    """Unit activations φ of scaled inputs.
-
-    Parameters
-    ----------
-    X : (N, n)
-        Scaled inputs.
-    factors : (h, r, n)
-    shifts : (h, r)
-
-    Returns
-    -------
-    (N, h)
-    """
-    v = np.einsum("krn,Nn->Nkr", factors, X) - shifts
-    return np.asarray(np.exp(-np.einsum("Nkr,Nkr->Nk", v, v)))

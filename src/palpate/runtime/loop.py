@@ -132,7 +132,6 @@ class Loop:
         self._commands, self._quit = shared.command, shared.command.record["quit"]
         self._wished = shared.command.record["parameters"]
         self._orphaned = orphaned
-        self._sample = np.zeros(3)
         self.stages = (self.read, self.map, self.evaluate, self.limit, self.write)
 
     def run(self, rehearse: Callable[[], None] = lambda: None) -> None:

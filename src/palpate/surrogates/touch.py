@@ -223,6 +223,10 @@ class TouchEvaluator:
         self._tip_net = _restricted(model.networks["field"], model.touch_node).arrays
         self(np.zeros(3), np.array([r.low for r in model.parameters]))  # compile now, not in the loop
 
+    def __repr__(self) -> str:
+        where = "inside" if self.inside else "outside"
+        return f"TouchEvaluator: force {self.force} N, contact {self.contact} m, loads {self.loads} N, {where} the range"
+
     def __call__(self, position: np.ndarray, parameters: np.ndarray = _NONE) -> None:
         """Evaluate at a hand position; float64 arrays are taken as they are, other sequences are converted.
 

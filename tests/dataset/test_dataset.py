@@ -253,6 +253,26 @@ def test_foreign_things_are_refused(tmp_path):
             Dataset.open(tmp_path / name)
 
 
+def test_the_largest_strain_is_kept_and_told(tmp_path):
+    plain = make()
+    strained = Dataset(plain.data.assign(largest_strain=("sample", np.linspace(0, 0.012, 20))))
+    strained.save(tmp_path / "a.zarr")
+    opened = Dataset.open(tmp_path / "a.zarr")
+    np.testing.assert_array_equal(opened.largest_strain, np.linspace(0, 0.012, 20))
+    assert "largest fibre strain 1.2 %" in str(opened)
+
+
+def test_a_dataset_without_strains_is_read_and_joined(stored):
+    there = Dataset.open(stored)
+    plain = Dataset(there.data.assign_attrs(provenance=json.dumps({"problem": {}})))
+    assert np.isnan(plain.largest_strain).all()
+    assert "strain" not in str(plain)
+    strained = Dataset(plain.data.assign(largest_strain=("sample", np.full(20, 0.01))))
+    for parts, known in (((plain, strained), slice(20, 40)), ((strained, plain), slice(0, 20))):
+        found = Dataset.concat(parts).largest_strain
+        np.testing.assert_array_equal(np.flatnonzero(np.isfinite(found)), np.arange(40)[known])
+
+
 @pytest.mark.parametrize("version", [2, 99, "1", None])
 def test_a_later_format_asks_for_a_newer_palpate(stored, version):
     edit_metadata(stored, lambda metadata: metadata["attributes"].update(format_version=version))

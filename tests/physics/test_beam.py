@@ -130,6 +130,22 @@ def test_small_kinematics_are_the_limit_of_small_loads():
     np.testing.assert_allclose(large.displacement[:, 1:], small.displacement[:, 1:], rtol=1e-8)
 
 
+def test_the_largest_strain_is_that_of_the_outer_fibre_at_the_clamp():
+    """κ = P L/EI at the clamp of a beam that bends little; on a pull ε = P/EA (Euler-Bernoulli)."""
+    bent = beam(kinematics="small").problem(TipLoad(0, 5)).solve(3.0)
+    assert bent.largest_strain == pytest.approx(3.0 / BENDING * SECTION.radius, rel=1e-6)
+    pulled = beam().problem(TipLoad(0, 100, direction=(1, 0))).solve(50.0)
+    assert pulled.largest_strain == pytest.approx(50.0 / (MATERIAL.young * SECTION.area), rel=1e-9)
+
+
+def test_the_largest_strain_of_a_large_bend_follows_from_the_clamps_moment():
+    """κ = M/EI at the clamp, whatever the shape."""
+    solution = ruler().problem(TipLoad(0, 50)).solve(10.0)
+    section = Rectangle(width=0.025, height=0.001)
+    bending = abs(solution.root_reaction[2]) / (70e9 * section.second_moment) * section.half_height
+    assert solution.largest_strain == pytest.approx(bending, rel=0.01)
+
+
 @pytest.mark.parametrize("load", [0.0, 3.0])
 def test_self_weight_adds_its_own_deflection(load):
     """W L³/8EI + W L/2kGA at the tip of a small-displacement beam, for a weight W."""
@@ -217,6 +233,7 @@ def test_pointless_loads_fail_with_a_reason_and_leave_the_solver_usable(load, re
     assert failed.iterations <= 1200
     assert np.isnan(failed.displacement).all()
     assert np.isnan(failed.root_reaction).all()
+    assert np.isnan(failed.largest_strain)
     np.testing.assert_allclose(solver.solve(3.0).displacement, before.displacement, atol=1e-12)
 
 

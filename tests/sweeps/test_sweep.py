@@ -24,6 +24,8 @@ def test_a_sweep_is_the_solves_one_by_one(cluster):
         np.testing.assert_allclose(found, problem.solve(x).displacement, atol=1e-9)
     np.testing.assert_allclose(data.root_reaction[:, 1], data.X[:, 0], atol=1e-9)
     np.testing.assert_array_equal(data.rest, problem.rest)
+    strains = [problem.solve(x).largest_strain for x in data.X]
+    np.testing.assert_allclose(data.largest_strain, strains, rtol=1e-6)
     assert data.provenance["problem"] == problem.describe() or data.provenance["problem"]["loads"]
 
 

@@ -42,12 +42,14 @@ ANSWERS: dict[str, tuple[tuple[str, ...], str, str]] = {
     "root_reaction": (("reaction",), "N, N, N m", "force and moment of the clamp on the body"),
     "strain_energy": ((), "J", "energy stored in the body"),
     "potential_energy": ((), "J", "strain energy less the potential of the loads"),
+    "largest_strain": ((), "", "largest strain of a fibre along the body"),
     "converged": ((), "", "whether this row is an equilibrium"),
     "iterations": ((), "", "Newton iterations"),
     "residual": ((), "", "relative error left, in the energy norm"),
     "message": ((), "", "why the solver stopped"),
     "solve_seconds": ((), "s", "wall-clock time of the solve"),
 }
+OPTIONAL = frozenset({"largest_strain"})  # not every body has it, nor had earlier versions
 
 
 def assemble(
@@ -67,7 +69,7 @@ def assemble(
     inputs : (sample, n) array
         In the units of `ranges`.
     answers : mapping
-        An array for each name in `ANSWERS`, samples first.
+        An array for each name in `ANSWERS`, samples first; ``"largest_strain"`` may be missing.
     provenance : mapping
         Plain data for a JSON file: where the answers come from.
     samples : (sample,) array of int, optional
@@ -83,6 +85,8 @@ def assemble(
         "inputs": (("sample", "input"), np.asarray(inputs, dtype=float), _attrs(_units(ranges), "inputs")),
     }
     for name, (dims, unit, meaning) in ANSWERS.items():
+        if name in OPTIONAL and name not in answers:
+            continue
         values = np.asarray(answers[name], dtype=np.dtypes.StringDType() if name == "message" else None)
         variables[name] = (("sample", *dims), values, _attrs(unit, meaning))
     coords = _coords(ranges, layout)

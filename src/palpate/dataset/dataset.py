@@ -34,8 +34,9 @@ class Dataset:
     ----------
     data : xarray.Dataset
         Variables ``inputs`` (sample, input), ``displacement`` (sample, node, component), ``root_reaction``
-        (sample, reaction), ``strain_energy``, ``potential_energy``, ``converged``, ``iterations``,
-        ``residual``, ``message`` and ``solve_seconds`` (sample); units stand in each variable's attributes.
+        (sample, reaction), ``strain_energy``, ``potential_energy``, ``largest_strain``, ``converged``,
+        ``iterations``, ``residual``, ``message`` and ``solve_seconds`` (sample); units stand in each variable's
+        attributes. ``largest_strain`` may be missing.
         Rows that did not converge hold NaN and a message.
     """
 
@@ -104,6 +105,13 @@ class Dataset:
     def potential_energy(self) -> np.ndarray:
         """Strain energy less the potential of the loads in J, shape (sample,)."""
         return self._values("potential_energy")
+
+    @property
+    def largest_strain(self) -> np.ndarray:
+        """Largest strain of a fibre along the body, shape (sample,); NaN where it isn't known."""
+        if "largest_strain" in self.data:
+            return self._values("largest_strain")
+        return np.full(len(self), np.nan)
 
     @property
     def converged(self) -> np.ndarray:
@@ -261,9 +269,14 @@ class Dataset:
                 f"Dataset of {len(self)} solves of {body}, {tail}",
                 *(f"  input   {r}" for r in self.ranges),
                 f"  answers displacement of {nodes} nodes ({of_interest} of interest), reaction, energies",
+                *self._strain_line(),
                 f"  hash    {self.hash[:12]}",
             ]
         )
+
+    def _strain_line(self) -> list[str]:
+        known = self.largest_strain[np.isfinite(self.largest_strain)]
+        return [f"  largest fibre strain {100 * known.max():.2g} %"] if known.size else []
 
     __repr__ = __str__
 

@@ -148,10 +148,11 @@ class ReissnerBeam:
         values = form.vec.FV().NumPy()
         return values[self._free].copy(), values[self.root].copy()
 
-    def strains(self, z: np.ndarray, per_element: int = 4) -> np.ndarray:
-        """Axial strain, shear strain and curvature inside each element, shape (points, 3)."""
+    def strains(self, z: np.ndarray, per_element: int = 5) -> np.ndarray:
+        """Axial strain, shear strain and curvature from end to end of each element, shape (points, 3)."""
         self._at(z)
-        inside = (np.arange(per_element) + 0.5) / per_element
+        # just inside its ends, where a point belongs to one element only
+        inside = np.linspace(1e-9, 1 - 1e-9, per_element)
         x = (self._vertices[:-1, None] + np.diff(self._vertices)[:, None] * inside).ravel()
         return np.asarray(self._measures(self._space.mesh(x)))
 

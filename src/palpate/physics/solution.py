@@ -42,6 +42,9 @@ class Solution:
         Force (x, y) in N and moment in N·m that the clamp exerts on the beam.
     strain_energy, potential_energy : float
         In J; the potential energy is the strain energy less the work potential of loads and weight.
+    largest_strain : float
+        Largest strain of a fibre along the beam, |ε| + |κ| times the section's half height: what tells whether a
+        linear elastic material could bear the load.
     detail : str
         Figures that belong to the reason.
     state : (dof,) array
@@ -55,6 +58,7 @@ class Solution:
     root_reaction: np.ndarray
     strain_energy: float
     potential_energy: float
+    largest_strain: float = np.nan
     detail: str = ""
     state: np.ndarray = field(default_factory=lambda: np.empty(0), repr=False)
 

@@ -163,6 +163,7 @@ class BeamSolver:
             root_reaction=self._model.clamp_force(found.z) - self._clamp_weight,
             strain_energy=energy,
             potential_energy=energy - float(load @ found.z),
+            largest_strain=self._fibre_strain(found.z),
             state=found.z,
         )
 

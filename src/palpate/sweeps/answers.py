@@ -21,6 +21,7 @@ def empty(count: int, nodes: int) -> Columns:
         "root_reaction": np.full((count, 3), np.nan),
         "strain_energy": np.full(count, np.nan),
         "potential_energy": np.full(count, np.nan),
+        "largest_strain": np.full(count, np.nan),
         "converged": np.zeros(count, dtype=bool),
         "iterations": np.zeros(count, dtype=np.int64),
         "residual": np.full(count, np.nan),
@@ -64,3 +65,5 @@ def _record(columns: Columns, row: int, answer: Answer) -> None:
         columns["root_reaction"][row] = answer.root_reaction
         columns["strain_energy"][row] = answer.strain_energy
         columns["potential_energy"][row] = answer.potential_energy
+        # a problem of the caller's own may know of no strain
+        columns["largest_strain"][row] = getattr(answer, "largest_strain", np.nan)

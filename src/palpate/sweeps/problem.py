@@ -12,7 +12,10 @@ __all__ = ["Answer", "Problem", "Solver"]
 
 
 class Answer(Protocol):
-    """One solve's answer, a value also where the solve failed."""
+    """One solve's answer, a value also where the solve failed.
+
+    It may have a `largest_strain` too, a float, which then goes into the dataset.
+    """
 
     @property
     def converged(self) -> bool:

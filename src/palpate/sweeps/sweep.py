@@ -208,7 +208,9 @@ def _take_up(ledger: Ledger | None, columns: Columns) -> np.ndarray:
         ledger.begin()
         for part in ledger.read():
             rows = part.data["sample"].values
-            put(columns, rows, {name: part.data[name].values for name in columns})
+            # parts of an earlier version lack what is recorded since
+            known = {name: part.data[name].values for name in columns if name in part.data}
+            put(columns, rows, {name: values[rows] for name, values in columns.items()} | known)
             done[rows] = True
     return done
 

@@ -225,7 +225,7 @@ class TouchEvaluator:
 
     def __repr__(self) -> str:
         where = "inside" if self.inside else "outside"
-        return f"TouchEvaluator: force {self.force} N, contact {self.contact} m, loads {self.loads} N, {where} the range"
+        return f"TouchEvaluator: force {self.force} N, contact {self.contact} m, {where} the trained range"
 
     def __call__(self, position: np.ndarray, parameters: np.ndarray = _NONE) -> None:
         """Evaluate at a hand position; float64 arrays are taken as they are, other sequences are converted.

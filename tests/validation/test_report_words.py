@@ -62,6 +62,8 @@ def test_a_body_is_named_by_all_that_decides_its_answer() -> None:
         "A cantilever of a material of E = 1.1 MPa, 150 mm long, of rectangular section, 20 mm wide and 6 mm high, "
         "bending under its own weight,"
     )
+    record = {"name": "own material", "young": 70e9}  # what a study file writes without a name
+    assert body_words(provenance(material=record)).startswith("A cantilever of a material of E = 70 GPa, ")
     free = {"type": "Section", "area": 1e-4, "second_moment": 2e-9, "shear": 0.8}
     assert "of a section with A = 1.00 × 10⁻⁴ m² and I = 2.00 × 10⁻⁹ m⁴" in body_words(
         provenance(section=free)

@@ -1,0 +1,73 @@
+"""What the guide to Python says about judging and reporting: its program runs, its limits are those of the code."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from linear_bodies import tip_model
+
+from palpate.study import Study
+from palpate.validation import Limits
+
+GUIDE = (Path(__file__).parents[2] / "docs" / "guide" / "python.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(240)
+def test_the_program_that_writes_a_report_runs(tmp_path: Path) -> None:
+    (program,) = (block for block in BLOCKS if "write_report(" in block)
+    (tmp_path / "program.py").write_text(program, encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "program.py"],
+        check=False,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        env=os.environ | {"PYTHONIOENCODING": "utf-8"},
+        stdin=subprocess.DEVNULL,
+        timeout=200,
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    assert "beam on 16 unseen solves: every limit kept" in done.stdout
+    assert "A cantilever of nylon (E = 2 GPa)" in (tmp_path / "beam.html").read_text(
+        encoding="utf-8"
+    ).replace("\N{NO-BREAK SPACE}", " ")
+
+
+def test_a_model_is_asked_as_the_guide_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import palpate as pp
+
+    (asking,) = (block for block in BLOCKS if "touch.evaluator()" in block)
+    tip_model().save(tmp_path / "beam.palpate")
+    monkeypatch.chdir(tmp_path)
+    names = {"pp": pp}
+    exec(asking, names)
+    # 0.05 m/N at the tip
+    assert names["answer"].force == pytest.approx([0.0, 0.4, 0.0])
+    touch = names["touch"]
+    assert np.array_equal(touch.displacement(np.array([9.0])), touch.displacement(np.array([5.0])))
+
+
+def test_the_defaults_of_both_kinds_of_limits_are_those_of_the_table() -> None:
+    rows = dict(re.findall(r"^\| (`(?:rmse|filter|force)[^|]*?) \| (.*) \|$", GUIDE, re.MULTILINE))
+    assert len(rows) == 4
+    for keys, cells in rows.items():
+        columns = [cell.split(", ") for cell in cells.split(" | ")]
+        for i, key in enumerate(re.findall(r"`(\w+)`", keys)):
+            python, study = (column[min(i, len(column) - 1)] for column in columns)
+            assert figure(python) == getattr(Limits(), key)
+            assert figure(study) == getattr(Study().target, key)
+
+
+def figure(text: str) -> float | None:
+    if text == "not asked":
+        return None
+    return float(text.removesuffix(" %")) / 100 if text.endswith("%") else float(text)

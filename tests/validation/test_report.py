@@ -151,6 +151,11 @@ def test_a_miss_is_told_on_the_page(read: Reader) -> None:
     assert "Every limit kept" in read.text
 
 
+def test_keys_of_a_study_file_are_set_as_code(report: Path, read: Reader) -> None:
+    assert "<code>units_max</code>" in report.read_text(encoding="utf-8")
+    assert "`" not in read.text
+
+
 def test_tables_hold_what_was_given(read: Reader) -> None:
     for words in (
         "sweep",

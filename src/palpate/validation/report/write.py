@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from palpate.errors import UsageError
 from palpate.validation.report.chapter import Chapter
@@ -15,6 +16,9 @@ from palpate.validation.report.pictures import pictures
 from palpate.validation.report.summary import story
 from palpate.validation.report.tables import flat, judged_rows, node_rows, sources, timing_rows
 from palpate.validation.words import bound
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
 
 __all__ = ["render", "write_report"]
 
@@ -89,7 +93,7 @@ def render(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["bound"] = bound
+    environment.filters |= {"bound": bound, "prose": _prose}
     # figures are made here, with every name in them escaped by Matplotlib; the style sheet is palpate's own
     style = Markup(environment.get_template("report.css").render())
     told = [_told(chapter, f"c{i}") for i, chapter in enumerate(chapters, 1)]
@@ -101,6 +105,13 @@ def render(
         machine=list(flat(machine or {})),
         svg=Markup,
     )
+
+
+def _prose(text: str) -> Markup:
+    """Text as HTML: escaped, numbers bound to their units, what stands between backticks as code."""
+    from markupsafe import Markup, escape
+
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(bound(text)))))
 
 
 def _told(chapter: Chapter, key: str) -> dict[str, Any]:

@@ -88,6 +88,46 @@ def test_impossible_numbers_are_refused_with_reason_and_remedy(make):
     assert caught.value.fix
 
 
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: Cantilever("0.3 m", Circle(1), NYLON),
+        lambda: Cantilever(None, Circle(1), NYLON),
+        lambda: Cantilever(1, 0.005, NYLON),
+        lambda: Cantilever(1, "circle", NYLON),
+        lambda: Cantilever(1, Circle(1), 2e9),
+        lambda: Cantilever(1, Circle(1), NYLON, nodes=("tip",)),
+        lambda: Cantilever(1, Circle(1), NYLON, elements="many"),
+        lambda: Cantilever(1, Circle(1), NYLON).problem("5 N"),
+        lambda: Cantilever(1, Circle(1), NYLON).problem(5.0),
+        lambda: TipLoad("0 N", "5 N"),
+        lambda: TipLoad(0, None),
+        lambda: TipLoad(0, 5, direction="down"),
+        lambda: TipLoad(0, 5, direction=("0", "1")),
+        lambda: TipLoad(0, 5, direction=1.0),
+        lambda: PointLoad("P", "0.5 m", 0, 1),
+        lambda: Circle("5 mm"),
+        lambda: LinearElastic("70 GPa", 0.33),
+    ],
+)
+def test_arguments_of_the_wrong_kind_say_what_to_pass(make):
+    with pytest.raises(UsageError) as caught:
+        make()
+    assert caught.value.why
+    assert any(word in caught.value.fix for word in ("SI units", "Pass", "for example"))
+
+
+def test_a_materials_name_is_no_material():
+    with pytest.raises(UsageError) as caught:
+        Cantilever(1, Circle(1), material="nylon")
+    assert "named_material('nylon')" in caught.value.fix
+
+
+def test_numpys_numbers_are_numbers():
+    body = Cantilever(np.float64(1), Circle(np.float32(0.005)), NYLON, nodes=np.linspace(0, 1, 3))
+    assert body.problem(TipLoad(np.int64(0), np.float64(5))).solve(1.0).converged
+
+
 def test_unknown_material_lists_the_known_and_the_nearest():
     with pytest.raises(UsageError, match="coper") as caught:
         named_material("coper")

@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.physics.arguments import require_number
 from palpate.physics.loads import PointLoad, as_loads
 from palpate.physics.material import LinearElastic
 from palpate.physics.problem import BeamProblem
@@ -62,12 +63,13 @@ class Cantilever:
     strain_limit: float = 0.5
 
     def __post_init__(self) -> None:
+        self._check_kinds()
         _check(math.isfinite(self.length) and self.length > 0, "length", self.length, "positive, in m")
         _check(self.elements >= 1, "elements", self.elements, "at least 1")
         _check(2 <= self.order <= 8, "order", self.order, "between 2 and 8: linear elements lock in shear")
         _check(self.kinematics in {"large", "small"}, "kinematics", self.kinematics, "'large' or 'small'")
         _check(self.strain_limit > 0, "strain_limit", self.strain_limit, "positive")
-        nodes = self.nodes or tuple(float(x) for x in np.linspace(0, self.length, 6))
+        nodes = tuple(self.nodes) or tuple(float(x) for x in np.linspace(0, self.length, 6))
         for x in nodes:
             _check(0 <= x <= self.length, "node of interest", x, f"on the beam, 0 … {self.length} m")
         object.__setattr__(self, "nodes", tuple(sorted({float(x) for x in nodes})))
@@ -101,8 +103,37 @@ class Cantilever:
         ]
         return np.concatenate([*pieces, fixed[-1:]])
 
+    def _check_kinds(self) -> None:
+        require_number("The cantilever's length", self.length, "m")
+        for name in ("elements", "order", "strain_limit"):
+            require_number(f"The cantilever's {name}", getattr(self, name))
+        for x in self.nodes:
+            require_number("A node of interest", x, "m")
+        _check_section(self.section)
+        _check_material(self.material)
+
     def _cuts(self, span: float) -> int:
         return max(1, round(self.elements * span / self.length))
+
+
+def _check_section(section: object) -> None:
+    if not all(hasattr(section, name) for name in ("area", "second_moment", "half_height", "shear_factor")):
+        raise UsageError(
+            f"The cantilever's section is {section!r}, of type {type(section).__name__}.",
+            why="It must be a cross-section, with its measures in m.",
+            fix="Pass Circle(radius=0.005), Rectangle(width=0.02, height=0.004) or a Section of its numbers.",
+        )
+
+
+def _check_material(material: object) -> None:
+    if isinstance(material, LinearElastic):
+        return
+    by_name = f"named_material({material!r})" if isinstance(material, str) else 'named_material("nylon")'
+    raise UsageError(
+        f"The cantilever's material is {material!r}, of type {type(material).__name__}.",
+        why="It must be a LinearElastic; names are looked up by named_material.",
+        fix=f"Pass {by_name}, or LinearElastic(young=70e9, poisson=0.33, density=2700.0).",
+    )
 
 
 def _check(holds: bool, what: str, value: object, rule: str) -> None:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from palpate.errors import UsageError
+from palpate.physics.arguments import require_number
 from palpate.units import Range
 
 __all__ = ["PointLoad", "TipLoad"]
@@ -40,8 +41,12 @@ class PointLoad:
     direction: tuple[float, float] = (0.0, -1.0)
 
     def __post_init__(self) -> None:
+        require_number(f"The lower end of the load {self.name!r}", self.low, "N")
+        require_number(f"The upper end of the load {self.name!r}", self.high, "N")
+        if self.at is not None:
+            require_number(f"The position of the load {self.name!r}", self.at, "m")
         Range(self.name, self.low, self.high, "N")  # raises for an empty range
-        x, y = (float(part) for part in self.direction)
+        x, y = _pair(self.name, self.direction)
         length = math.hypot(x, y)
         if not (math.isfinite(length) and length > 0):
             raise UsageError(
@@ -56,6 +61,19 @@ class PointLoad:
     def range(self) -> Range:
         """The input's name, range and unit."""
         return Range(self.name, self.low, self.high, "N")
+
+
+def _pair(name: str, direction: object) -> tuple[float, float]:
+    parts = tuple(direction) if isinstance(direction, Iterable) else (direction,)
+    if len(parts) != 2:
+        raise UsageError(
+            f"The direction of the load {name!r} is {direction!r}.",
+            why="It must be two numbers, along the beam and across it.",
+            fix="Give (x, y), for example (0, -1) for downwards.",
+        )
+    for part in parts:
+        require_number(f"The direction of the load {name!r}", part)
+    return float(parts[0]), float(parts[1])
 
 
 def TipLoad(
@@ -77,7 +95,14 @@ def as_loads(loads: PointLoad | Sequence[PointLoad]) -> tuple[PointLoad, ...]:
     UsageError
         Without loads, or if two share a name.
     """
-    several = (loads,) if isinstance(loads, PointLoad) else tuple(loads)
+    several = tuple(loads) if isinstance(loads, Iterable) else (loads,)
+    for load in several:
+        if not isinstance(load, PointLoad):
+            raise UsageError(
+                f"{load!r} is no load.",
+                why=f"It is of type {type(load).__name__}.",
+                fix="Pass loads such as TipLoad(0, 5), with their ranges in N.",
+            )
     names = [load.name for load in several]
     if not names or len(set(names)) < len(names):
         raise UsageError(

@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass
 
 from palpate.errors import UsageError
+from palpate.physics.arguments import require_number
 
 __all__ = ["MATERIALS", "LinearElastic", "named_material"]
 
@@ -39,6 +40,9 @@ class LinearElastic:
     source: str = ""
 
     def __post_init__(self) -> None:
+        require_number("Young's modulus", self.young, "Pa")
+        require_number("Poisson's ratio", self.poisson)
+        require_number("The density", self.density, "kg/m³")
         if not (math.isfinite(self.young) and self.young > 0):
             raise _unphysical("Young's modulus", self.young, "positive and finite, in Pa")
         if not -1 < self.poisson <= 0.5:

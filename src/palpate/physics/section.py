@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from palpate.errors import UsageError
+from palpate.physics.arguments import require_number
 
 __all__ = ["Circle", "CrossSection", "Rectangle", "Section"]
 
@@ -152,6 +153,7 @@ class Section:
 
 
 def _check_positive(name: str, value: float) -> None:
+    require_number(f"The section's {name}", value, "SI units")
     if not (math.isfinite(value) and value > 0):
         raise UsageError(
             f"The section's {name} is {value}.",

@@ -8,9 +8,10 @@ import pytest
 from sweep_problems import Spring
 
 from palpate.dataset import Dataset
-from palpate.errors import SolverError, UsageError
+from palpate.errors import FileFormatError, SolverError, UsageError
 from palpate.physics import Cantilever, Circle, LinearElastic, TipLoad, preset
 from palpate.sweeps import local_cluster, sweep
+from palpate.sweeps.progress import reporter
 
 BODY = Cantilever(1.0, Circle(0.005), LinearElastic(2e9, 0.43), elements=5)
 
@@ -84,6 +85,18 @@ def test_too_many_failures_raise_with_examples(cluster):
     assert "unstable" in caught.value.why
     data = sweep(Spring(fails=(1.0, 2.0, 3.0)), points=np.arange(4.0), cluster=cluster, max_failed=0.75)
     assert len(data.ok) == 1
+
+
+def test_the_advice_fits_the_failures(cluster):
+    points = np.arange(5.0)
+    with pytest.raises(SolverError) as some:
+        sweep(Spring(fails=(1.0, 2.0, 3.0, 4.0)), points=points, cluster=cluster)
+    assert "The first of them:" in some.value.why
+    assert "in Python, max_failed=0.8" in some.value.fix
+    with pytest.raises(SolverError) as every:
+        sweep(Spring(fails=(1.0, 2.0)), points=points[1:3], cluster=cluster)
+    assert "They are:" in every.value.why
+    assert "max_failed" not in every.value.fix
 
 
 def test_loads_beyond_the_solvers_reach_are_a_solver_error(cluster):
@@ -164,6 +177,70 @@ def test_an_interrupted_sweep_goes_on_where_it_stopped(cluster, tmp_path):
     assert len(list((tmp_path / "log").iterdir())) == 64 - seen[0]
     assert not (tmp_path / "a.zarr.parts").exists()
     assert data.hash == sweep(Spring(), samples=64, cluster=cluster).hash
+
+
+def test_a_damaged_dataset_at_the_path_says_to_delete_it(cluster, tmp_path):
+    arguments = {"body": Spring(), "samples": 8, "cluster": cluster, "path": tmp_path / "a.zarr"}
+    sweep(**arguments)
+    (tmp_path / "a.zarr" / "inputs" / "zarr.json").unlink()
+    with pytest.raises(FileFormatError, match="corrupt") as caught:
+        sweep(**arguments)
+    assert "Delete" in caught.value.fix
+    assert "sweep again" in caught.value.fix
+
+
+@pytest.mark.parametrize("when", [0, 1])
+def test_two_runs_of_one_sweep_end_alike(cluster, tmp_path, when):
+    """A second run starts and ends while the first one is at it: as it begins, or just before its end."""
+    arguments = {"body": Spring(), "samples": 64, "cluster": cluster, "path": tmp_path / "a.zarr"}
+    others = []
+
+    def meanwhile(done, total):
+        if done == when * total and not others:
+            others.append(sweep(**arguments))
+
+    first = sweep(**arguments, progress=meanwhile)
+    assert first.hash == others[0].hash == Dataset.open(tmp_path / "a.zarr").hash
+    assert [p.name for p in tmp_path.iterdir()] == ["a.zarr"]
+
+
+def test_another_sweep_that_takes_the_path_meanwhile_is_spared(cluster, tmp_path):
+    arguments = {"samples": 8, "cluster": cluster, "path": tmp_path / "a.zarr"}
+    other = sweep(Spring(fails=(99.0,)), samples=8, cluster=cluster)
+
+    def meanwhile(done, total):
+        if done == total:
+            other.save(tmp_path / "a.zarr")
+
+    with pytest.raises(UsageError, match="belongs to another sweep"):
+        sweep(Spring(), **arguments, progress=meanwhile)
+    assert Dataset.open(tmp_path / "a.zarr").hash == other.hash
+
+
+def test_a_bar_starts_where_an_earlier_run_stopped(monkeypatch):
+    seen = []
+
+    class Bar:
+        def __init__(self, *_, **__):
+            pass
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            pass
+
+        def add_task(self, _, **fields):
+            seen.append(fields)
+
+        def update(self, _, **fields):
+            seen.append(fields)
+
+    monkeypatch.setattr("rich.progress.Progress", Bar)
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    with reporter(True) as report:
+        report(20, 64)
+    assert seen == [{"completed": 20, "total": 64}]
 
 
 def test_a_damaged_part_is_solved_again(cluster, tmp_path):

@@ -46,10 +46,19 @@ class Ledger:
         ------
         UsageError
             If something else is at the path.
+        FileFormatError
+            If what is there can't be read.
         """
         if not self.path.exists():
             return None
-        there = Dataset.open(self.path)
+        try:
+            there = Dataset.open(self.path)
+        except FileFormatError as error:
+            raise FileFormatError(
+                error.what,
+                why=error.why,
+                fix=f"Delete {self.path} and sweep again, or write to another path.",
+            ) from error
         self._check(self.path, there.provenance.get("config_hash"))
         return there
 
@@ -78,12 +87,33 @@ class Ledger:
 
     def add(self, part: Dataset) -> None:
         """Keep a finished part."""
+        if not self.parts.exists():
+            return  # another run of the same sweep has finished and tidied up
         part.save(self.parts / f"part-{part.hash[:16]}.zarr", overwrite=True)
 
-    def finish(self, dataset: Dataset) -> None:
-        """Write the whole dataset and drop the parts."""
-        dataset.save(self.path)
-        shutil.rmtree(self.parts)
+    def finish(self, dataset: Dataset) -> Dataset:
+        """Write the whole dataset and drop the parts.
+
+        Returns
+        -------
+        Dataset
+            What is at the path now: where another run of the same sweep was faster, that run's.
+
+        Raises
+        ------
+        UsageError
+            If something else has appeared at the path meanwhile.
+        """
+        there = self.complete()
+        if there is None:
+            try:
+                dataset.save(self.path)
+            except (UsageError, OSError):  # the other run may have come in between
+                there = self.complete()
+                if there is None:
+                    raise
+        shutil.rmtree(self.parts, ignore_errors=True)  # the other run may be at it too
+        return dataset if there is None else there
 
     def _check(self, place: Path, found: object) -> None:
         if found != self.config:

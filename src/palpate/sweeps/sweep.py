@@ -170,9 +170,7 @@ def _solve(
             with connect(cluster, workers) as (client, revive):
                 run(client, revive, plan.problem, plan.points, parts, accept)
     data = plan.label(columns, np.arange(len(plan.points)))
-    if ledger:
-        ledger.finish(data)
-    return data
+    return ledger.finish(data) if ledger else data
 
 
 @contextlib.contextmanager
@@ -226,11 +224,21 @@ def _check_failures(data: Dataset, max_failed: float) -> None:
     failed = np.flatnonzero(~data.converged)
     if failed.size == 0 or failed.size <= max_failed * len(data):
         return
-    shown = [f"{_inputs(data, row)}: {data.data['message'].values[row]}" for row in failed[:3]]
+    first = [f"{_inputs(data, row)}: {data.data['message'].values[row]}" for row in failed[:3]]
+    heading = "The first of them:" if failed.size > 3 else "They are:" if failed.size > 1 else "It is:"
     raise SolverError(
         f"{failed.size} of {len(data)} solves failed.",
-        why="\n".join(["The first of them:", *(f"  {line}" for line in shown)]),
-        fix="Narrow the ranges of the loads, refine the mesh, or allow more failures by max_failed.",
+        why="\n".join([heading, *(f"  {line}" for line in first)]),
+        fix=_advice(failed.size / len(data)),
+    )
+
+
+def _advice(share: float) -> str:
+    narrow = "Narrow the ranges of the loads, or refine the mesh"
+    return (
+        f"{narrow}."
+        if share == 1
+        else f"{narrow}; in Python, max_failed={share:.2g} allows so many failures."
     )
 
 

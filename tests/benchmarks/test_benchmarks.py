@@ -63,12 +63,10 @@ def test_refinement_beats_the_filter_with_fewer_solves_than_the_targets_allow(ta
     forms = tables["cantilever-forms"]
     (refined,) = rows(forms, beam=beam, form="refined network")
     (default,) = rows(forms, beam=beam, form="default form")
-    (founding,) = rows(forms, beam=beam, form="founding form")
     assert refined["solves"] <= 26
     assert max(refined["units_all"]) <= 6
     assert max(refined["rmse_all"]) < 5e-6
     assert max(refined["rmse_all"]) < min(default["rmse_all"])
-    assert max(default["rmse_all"]) < min(founding["rmse_all"])
 
 
 def test_tightened_founding_form_grows_on(tables):

@@ -83,6 +83,7 @@ def test_default_form(beam, request):
     for seed in SEEDS:
         learned = beam.filtered(default(), seed)
         assert beam.rmse(learned.network) < target
+        assert beam.rmse(learned.network) < beam.rmse(beam.filtered(founding(), seed).network)
         assert learned.history.relapse < 2.0
         assert beam.rmse(learned.network, outer) < 2.0 * beam.rmse(learned.network, ~outer)
 

@@ -223,7 +223,9 @@ def _networks(
 
 
 def _widths(network: Network) -> np.ndarray:
-    return np.asarray(1.0 / np.diagonal(network.factors, axis1=1, axis2=2)).reshape(network.units, -1)
+    return np.asarray(1.0 / np.diagonal(network.factors, axis1=1, axis2=2)).reshape(
+        network.units, len(network.inputs)
+    )
 
 
 def _compliance(

@@ -8,6 +8,7 @@ from pydantic import ValidationError
 
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
+from palpate.learning import Refinement, hand_coordinates, learn_touch
 from palpate.physics import Circle, Rectangle, Section
 from palpate.study import Study, preset_names, preset_study, read_study, to_toml
 from palpate.study.build import body_of, loads_of, settings_of
@@ -114,3 +115,43 @@ def test_datasets_of_different_bodies_are_not_put_together(solved):
     np.testing.assert_array_equal(both.X, np.vstack([grid.X, grid.X]))
     assert both.ranges == grid.ranges
     assert both.rest.shape == grid.rest.shape
+
+
+def test_networks_may_do_without_units(solved):
+    _, grid, _, _ = solved
+    touch, _ = learn_touch(grid, refinement=Refinement(units_max=0))
+    assert {name: n.units for name, n in touch.networks.items() if name != "filter"} == {
+        "nodes": 0,
+        "field": 0,
+        "force": 0,
+    }
+
+
+def test_too_few_solves_are_refused(solved):
+    _, grid, _, _ = solved
+    with pytest.raises(UsageError, match="too few"):
+        learn_touch(grid.take([0, 1, 2]))
+
+
+def test_a_coupling_that_holds_nothing_is_refused(solved):
+    _, grid, _, _ = solved
+    with pytest.raises(UsageError, match="holds nothing"):
+        learn_touch(grid, coupling=0.0)
+
+
+def test_two_loads_get_a_coupling_and_the_answer_leads_back_to_the_hand(solved):
+    _, _, _, sobol = solved
+    touch, _ = learn_touch(
+        sobol, passes=1, refinement=Refinement(samples=0, units_max=8, target=1e-3, starts=1)
+    )
+    assert touch.compliance > 0
+    hand = hand_coordinates(sobol, touch.touch_node, touch.touched, touch.compliance)
+    evaluator = touch.evaluator()
+    for h, P in zip(hand[:10], sobol.X[:10], strict=True):
+        evaluator(h @ touch.directions)
+        np.testing.assert_allclose(evaluator.force, -P @ touch.directions, atol=0.2)
+        np.testing.assert_allclose(
+            evaluator.contact + touch.compliance * evaluator.loads @ touch.directions,
+            h @ touch.directions,
+            atol=0.05,
+        )

@@ -30,6 +30,7 @@ def broken(folder, old: str, new: str):
         ("[sweep]", "[sweep", ["not valid TOML", "line"]),
         ('name = "small"', 'name = "../up"', ["name"]),
         ("random = 8", "random = 8\n[filter]\nsettings = { nois = 1.0 }", ["no setting 'nois'"]),
+        ("random = 8", 'random = 8\n[filter]\nsettings = { tail = "cubic" }', ["tail", "'cubic'"]),
     ],
 )
 def test_a_study_that_can_not_be_meant(palpate, tmp_path, old, new, words):

@@ -189,7 +189,18 @@ def test_arrays_that_do_not_fit_are_refused(X, Y):
         learn(X, Y, INPUT, OUTPUTS)
 
 
-@pytest.mark.parametrize("change", [{"noise": 0.0}, {"window": 0}, {"gate": -1.0}, {"distance_decay": 1.5}])
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"noise": 0.0},
+        {"window": 0},
+        {"gate": -1.0},
+        {"distance_decay": 1.5},
+        {"tail": "cubic"},
+        {"noise": "small"},
+        {"widths": "wide"},
+    ],
+)
 def test_settings_out_of_range_are_refused(change):
     with pytest.raises(UsageError, match=next(iter(change))):
         Settings(**change)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
+
+import numpy as np
 
 from palpate.errors import UsageError
 
@@ -14,16 +16,11 @@ Widths = Literal["log", "plain"]
 
 _POSITIVE = (
     *("window", "distance_max", "distance_min", "overlap", "prior", "width_prior", "tail_prior"),
-    *("noise", "edge_weight", "iterations", "units_max"),
+    *("distance_decay", "noise", "edge_weight", "iterations"),
 )
 _NOT_NEGATIVE = (
-    "error_min",
-    "error_rms_min",
-    "process_noise",
-    "noise_share",
-    "gate",
-    "step_bound",
-    "forgetting",
+    *("error_min", "error_rms_min", "process_noise", "noise_share", "gate", "step_bound", "forgetting"),
+    *("prune_below", "prune_after", "units_max"),
 )
 
 
@@ -108,22 +105,20 @@ class Settings:
     units_max: int = 40
 
     def __post_init__(self) -> None:
-        for name in _POSITIVE:
-            if not getattr(self, name) > 0:
-                raise UsageError(f"The filter's {name} is {getattr(self, name)}; it must be positive.")
-        for name in (
-            "error_min",
-            "error_rms_min",
-            "process_noise",
-            "noise_share",
-            "gate",
-            "step_bound",
-            "forgetting",
-        ):
-            if not getattr(self, name) >= 0:
-                raise UsageError(f"The filter's {name} is {getattr(self, name)}; it must not be negative.")
+        for name in (*_POSITIVE, *_NOT_NEGATIVE):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
+                raise UsageError(f"The filter's {name} is {value!r}; it must be a number.")
+            if not (value > 0 if name in _POSITIVE else value >= 0):
+                rule = "be positive" if name in _POSITIVE else "not be negative"
+                raise UsageError(f"The filter's {name} is {value}; it must {rule}.")
         if not 0 < self.distance_decay <= 1:
             raise UsageError(f"The filter's distance_decay is {self.distance_decay}; it must lie in (0, 1].")
+        for name, known in (("tail", get_args(Tail)), ("widths", get_args(Widths))):
+            if getattr(self, name) not in known:
+                raise UsageError(
+                    f"The filter's {name} is {getattr(self, name)!r}; it is one of {', '.join(known)}."
+                )
 
 
 def default() -> Settings:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Annotated, Any, Literal
 
@@ -212,6 +212,10 @@ class FilterRecord(Record):
         if unknown:
             known = ", ".join(Settings.__dataclass_fields__)
             raise ValueError(f"the filter has no setting {unknown[0]!r}; it has {known}")
+        try:
+            replace(Settings(), **self.settings)  # type: ignore[arg-type]
+        except UsageError as error:
+            raise ValueError(str(error)) from error
         return self
 
 

@@ -41,12 +41,13 @@ class NumpyNetwork:
     """
 
     def __init__(self, network: Network) -> None:
-        centre, half, factors, shifts, rows = network.arrays
-        self.a = factors[:, 0, 0] / half[0]
-        self.b = shifts[:, 0] + self.a * centre[0]
-        self.d = rows[1] / half[0]
-        self.c = rows[0] - self.d * centre[0]
-        self.w = np.ascontiguousarray(rows[2:])
+        s = network.scaling
+        centre, half = s.input_centre[0], s.input_half[0]
+        self.a = network.factors[:, 0, 0] / half
+        self.b = network.shifts[:, 0] + self.a * centre
+        self.d = network.tail[:, 1] * s.output_scale / half
+        self.c = network.tail[:, 0] * s.output_scale + s.output_centre - self.d * centre
+        self.w = np.ascontiguousarray((network.weights * s.output_scale[:, None]).T)
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
         """Outputs (m,) at x (1,)."""

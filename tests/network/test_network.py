@@ -10,6 +10,8 @@ from palpate.errors import UsageError
 from palpate.network import Network, Scaling
 from palpate.units import Quantity, Range
 
+from .networks import any_network
+
 
 def random_network(n: int, m: int, h: int, seed: int = 0) -> Network:
     rng = np.random.default_rng(seed)
@@ -91,4 +93,6 @@ def test_parts_that_do_not_fit_are_refused():
 
 
 def test_printing_says_what_it_is():
-    assert str(random_network(1, 5, 6)).endswith("5 outputs, 6 units")
+    assert str(random_network(2, 5, 6)).endswith("5 outputs, 6 units (axis-aligned, gaussian)")
+    text = str(any_network(3, 50, 7, form="rank 1", radial="matern-5/2", modes=4))
+    assert text.endswith("50 outputs through 4 modes, 7 units (rank 1, matern-5/2)")

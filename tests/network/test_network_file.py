@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,8 +13,11 @@ from safetensors import safe_open
 from safetensors.numpy import save_file
 
 from palpate.errors import FileFormatError, PalpateError, UsageError
-from palpate.network import Archive, load_archive, save_archive
+from palpate.network import Archive, Network, load_archive, save_archive
+from palpate.network.radial import RADIAL_FUNCTIONS
 
+from .forgery import forge, parts_of
+from .networks import FORMS, any_network, points
 from .test_network import random_network
 
 
@@ -76,8 +80,9 @@ def rewritten(path, **changes):
     save_file(tensors, path, header | changes)
 
 
-def test_future_version(path):
-    rewritten(path, version="2")
+@pytest.mark.parametrize("version", ["3", "20", "two", "", "-1", "0", "²"])
+def test_future_version(path, version):
+    rewritten(path, version=version)
     with pytest.raises(FileFormatError, match="Upgrade palpate"):
         load_archive(path)
 
@@ -93,12 +98,64 @@ def test_changed_description_is_found_by_the_checksum(path):
         load_archive(path)
 
 
-def test_numbers_that_are_not_finite_are_refused(tmp_path):
-    network = random_network(1, 1, 2)
-    network.weights[0, 0] = np.inf
-    path = save_archive(tmp_path / "inf.palpate", Archive({"a": network}))
-    with pytest.raises(FileFormatError, match="finite"):
-        load_archive(path)
+@pytest.mark.parametrize(
+    ("part", "value"), [("weights", np.inf), ("weights", np.nan), ("shifts", 1e200), ("weights", 1e306)]
+)
+def test_numbers_that_can_not_be_evaluated_are_refused(tmp_path, part, value):
+    network = random_network(2, 1, 2)
+    bad = np.array(getattr(network, part))
+    bad[0, 0] = value
+    with pytest.raises(UsageError, match=r"can't be saved: its .* (finite|overflow)"):
+        replace(network, **{part: bad}).save(tmp_path / "inf.palpate")
+    assert not list(tmp_path.iterdir())
+
+
+def test_settings_that_json_does_not_know_are_refused(tmp_path):
+    with pytest.raises(UsageError, match="can't be saved"):
+        replace(random_network(1, 1, 2), meta={"made": {1, 2}}).save(tmp_path / "a.palpate")
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("radial", RADIAL_FUNCTIONS)
+@pytest.mark.parametrize("modes", [None, 3])
+def test_every_network_comes_back_bit_for_bit(tmp_path, form, radial, modes):
+    extras = {"covariance": np.eye(5), "groups": np.arange(4)}
+    meta = {"training": "sha256 of the samples", "rmse": 1e-3}
+    network = any_network(3, 8, 6, form=form, radial=radial, modes=modes, extras=extras, meta=meta)
+    again = Network.load(network.save(tmp_path / "n.palpate"))
+    X = points(network, 9)
+    np.testing.assert_array_equal(again.predict(X), network.predict(X))
+    np.testing.assert_array_equal(again.jacobian(X[0]), network.jacobian(X[0]))
+    assert (again.radial, again.form, again.inputs, again.outputs) == (
+        radial,
+        form,
+        network.inputs,
+        network.outputs,
+    )
+    assert again.meta == meta
+    assert again.extras.keys() == extras.keys()
+    for name, array in extras.items():
+        np.testing.assert_array_equal(again.extras[name], array)
+        assert again.extras[name].dtype == array.dtype
+
+
+def test_a_file_of_several_networks_is_not_one(path, archive, tmp_path):
+    with pytest.raises(FileFormatError, match="'networks' is needed"):
+        Network.load(path)
+    several = save_archive(tmp_path / "two.palpate", replace(archive, kind="networks"))
+    with pytest.raises(FileFormatError, match="2 networks"):
+        Network.load(several)
+
+
+def test_version_1_is_read_as_gaussian(tmp_path):
+    network = any_network(2, 3, 4)
+    content, tensors = parts_of(network)
+    for key in ("radial", "basis", "extras"):
+        del content["networks"]["network"][key]
+    again = Network.load(forge(tmp_path / "old.palpate", content, tensors, version="1"))
+    X = points(network, 5)
+    assert again.radial == "gaussian"
+    np.testing.assert_array_equal(again.predict(X), network.predict(X))
 
 
 @settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])

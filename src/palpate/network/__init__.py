@@ -1,6 +1,17 @@
-"""The thing learnt, as a frozen value: evaluation, Jacobian and file format. Knows nothing of training."""
+"""The thing learnt, as a frozen value: evaluation, derivatives, file format and publication to other processes.
 
+    network, scaling, description         the value and what is said about it
+    radial                                 radial functions, in NumPy
+    compiled, evaluate, evaluator          … evaluated one point at a time, without allocation
+    radial_kernels, combine                the loops behind that
+    file, soundness                        kept in a file, and read back with suspicion
+
+Knows nothing of training.
+"""
+
+from palpate.network.evaluator import Evaluator
 from palpate.network.file import Archive, load_archive, save_archive
-from palpate.network.network import Evaluator, Network, Scaling
+from palpate.network.network import Network
+from palpate.network.scaling import Scaling
 
 __all__ = ["Archive", "Evaluator", "Network", "Scaling", "load_archive", "save_archive"]

@@ -2,58 +2,29 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from palpate.errors import UsageError
 from palpate.network import evaluate
-from palpate.units import Quantity, Range, bounds
+from palpate.network.compiled import Precision, packed, pattern, workspace
+from palpate.network.evaluator import Evaluator, refused
+from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction
+from palpate.network.scaling import Scaling
+from palpate.units import Quantity, Range
 
-__all__ = ["Evaluator", "Network", "Scaling"]
-
-
-@dataclass(frozen=True, eq=False)
-class Scaling:
-    """Affine maps between physical and scaled quantities.
-
-    Inputs: ξ = (x − input_centre)/input_half, in [−1, 1] over the declared ranges. Outputs:
-    y = output_centre + output_scale · η, one scale for a whole group of outputs so that their errors compare.
-
-    Attributes
-    ----------
-    input_centre, input_half : (n,)
-    output_centre, output_scale : (m,)
-    """
-
-    input_centre: np.ndarray
-    input_half: np.ndarray
-    output_centre: np.ndarray
-    output_scale: np.ndarray
-
-    @classmethod
-    def of(cls, inputs: Sequence[Range], Y: np.ndarray, *, scale: float | None = None) -> Scaling:
-        """Scaling from declared ranges and training outputs Y (N, m), one scale for all of them."""
-        low, high = bounds(inputs)
-        centre = Y.mean(axis=0)
-        size = scale if scale is not None else float(np.abs(Y - centre).max())
-        return cls((low + high) / 2, (high - low) / 2, centre, np.full(Y.shape[1], size if size > 0 else 1.0))
-
-    def scale_inputs(self, X: np.ndarray) -> np.ndarray:
-        """Physical inputs (…, n) to scaled ones."""
-        return np.asarray((X - self.input_centre) / self.input_half)
-
-    def scale_outputs(self, Y: np.ndarray) -> np.ndarray:
-        """Physical outputs (…, m) to scaled ones."""
-        return np.asarray((Y - self.output_centre) / self.output_scale)
+__all__ = ["Network"]
 
 
 @dataclass(frozen=True, eq=False)
 class Network:
-    """f(x) = T·[1, ξ] + Σ_k w_k exp(−‖A_k ξ − b_k‖²) in scaled inputs ξ and scaled outputs.
+    """f(x) = basis · (T·[1, ξ] + Σ_k w_k g(‖A_k ξ − b_k‖²)) in scaled inputs ξ and scaled outputs.
 
     Platt 1991 (resource-allocating network); the affine tail T is palpate's addition.
 
@@ -66,9 +37,17 @@ class Network:
         A_k. Axis-aligned Gaussians have A_k = diag(1/σ_k).
     shifts : (h, r)
         b_k = A_k μ_k.
-    weights : (m, h)
-    tail : (m, 1 + n)
+    weights : (k, h)
+        Of k latent outputs; without a basis these are the m outputs.
+    tail : (k, 1 + n)
+        Zero where there is none, or no slope.
     scaling : Scaling
+    radial : {"gaussian", "inverse-multiquadric", "matern-5/2"}
+        The radial function g.
+    basis : (m, k), optional
+        Output modes: m outputs of which only k move independently.
+    extras : mapping of name to array
+        Further arrays that belong to the network and travel in its file, such as the posterior covariance.
     meta : mapping
         What the file remembers of the training: method, samples, errors, dataset hash.
     """
@@ -81,6 +60,9 @@ class Network:
     tail: np.ndarray
     scaling: Scaling
     meta: Mapping[str, Any] = field(default_factory=dict)
+    radial: RadialFunction = "gaussian"
+    basis: np.ndarray | None = None
+    extras: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @classmethod
     def axis_aligned(
@@ -104,12 +86,36 @@ class Network:
         )
 
     def __post_init__(self) -> None:
-        h, r, n, m = *self.factors.shape, len(self.outputs)
+        for name in ("factors", "shifts", "weights", "tail", "basis"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, _frozen(getattr(self, name)))
+        object.__setattr__(self, "inputs", tuple(self.inputs))
+        object.__setattr__(self, "outputs", tuple(self.outputs))
+        self._check_shapes()
+        if self.radial not in RADIAL_FUNCTIONS:
+            raise UsageError(
+                f"There is no radial function {self.radial!r}.",
+                fix=f"Choose one of {', '.join(RADIAL_FUNCTIONS)}.",
+            )
+
+    def _check_shapes(self) -> None:
+        if self.factors.ndim != 3 or not self.inputs or not self.outputs:
+            raise UsageError(
+                f"A network of {len(self.inputs)} inputs, {len(self.outputs)} outputs and factors of shape "
+                f"{self.factors.shape} can't be.",
+                fix="Give at least one input and output, and factors (units, rank, inputs).",
+            )
+        (h, r, n), m, s = self.factors.shape, len(self.outputs), self.scaling
+        latent = m if self.basis is None else len(np.atleast_1d(self.weights))
         shapes = {
             "inputs": ((len(self.inputs),), (n,)),
+            "factors": (self.factors.shape, (h, min(max(r, 1), n), n)),
             "shifts": (self.shifts.shape, (h, r)),
-            "weights": (self.weights.shape, (m, h)),
-            "tail": (self.tail.shape, (m, 1 + n)),
+            "weights": (self.weights.shape, (latent, h)),
+            "tail": (self.tail.shape, (latent, 1 + n)),
+            "basis": ((m, latent) if self.basis is None else self.basis.shape, (m, max(latent, 1))),
+            "input scales": ((np.shape(s.input_centre), np.shape(s.input_half)), ((n,), (n,))),
+            "output scales": ((np.shape(s.output_centre), np.shape(s.output_scale)), ((m,), (m,))),
         }
         for name, (found, wanted) in shapes.items():
             if found != wanted:
@@ -119,12 +125,26 @@ class Network:
 
     def __str__(self) -> str:
         names = ", ".join(str(r) for r in self.inputs)
-        return f"Network: {names} → {len(self.outputs)} outputs, {self.units} units"
+        modes = "" if self.basis is None else f" through {self.basis.shape[1]} modes"
+        kind = f" ({self.form}, {self.radial})" if self.units else ""
+        return f"Network: {names} → {len(self.outputs)} outputs{modes}, {self.units} units{kind}"
 
     @property
     def units(self) -> int:
         """Number of units h."""
         return int(self.factors.shape[0])
+
+    @property
+    def form(self) -> str:
+        """What the factors look like: isotropic, axis-aligned, rotated (triangular), full, or their rank."""
+        r, n = self.factors.shape[1:]
+        rows, columns = pattern(self.factors).T
+        if r < n:
+            return f"rank {r}"
+        if (rows == columns).all():
+            diagonal = np.diagonal(self.factors, axis1=1, axis2=2)
+            return "isotropic" if n == 1 or (diagonal == diagonal[:, :1]).all() else "axis-aligned"
+        return "rotated" if (rows >= columns).all() else "full"
 
     @cached_property
     def centres(self) -> np.ndarray:
@@ -134,21 +154,21 @@ class Network:
         ).reshape(self.units, len(self.inputs))
 
     @cached_property
-    def arrays(self) -> tuple[np.ndarray, ...]:
-        """(centre, half, factors, shifts, rows): what the compiled kernels of `evaluate` take."""
-        s = self.scaling
-        rows = np.vstack([self.tail.T, self.weights.T]) * s.output_scale
-        rows[0] += s.output_centre
-        parts = (s.input_centre, s.input_half, self.factors, self.shifts, rows)
-        return tuple(np.ascontiguousarray(a, dtype=np.float64) for a in parts)
+    def _packed(self) -> tuple[np.ndarray, ...]:
+        return packed(self, "double")
 
-    def predict(self, X: np.ndarray) -> np.ndarray:
+    def compiled(self, precision: Precision = "double") -> tuple[np.ndarray, ...]:
+        """What the kernels of `evaluate` take after their own arguments, with a workspace for one thread."""
+        parts = self._packed if precision == "double" else packed(self, precision)
+        return (*workspace(parts), *parts)
+
+    def predict(self, X: np.ndarray, *, precision: Precision = "double") -> np.ndarray:
         """Outputs (N, m) at inputs X (N, n), both in physical (SI) units.
 
         Raises
         ------
         UsageError
-            If X has the wrong number of columns.
+            If X has the wrong number of columns, or there is no such precision.
         """
         X = np.ascontiguousarray(X, dtype=np.float64)
         if X.ndim != 2 or X.shape[1] != len(self.inputs):
@@ -157,33 +177,111 @@ class Network:
                 f"an array of shape {X.shape} came.",
                 fix=f"Pass an array of shape (N, {len(self.inputs)}).",
             )
-        Y = np.empty((X.shape[0], len(self.outputs)))
-        evaluate.values_into(X, Y, *self.arrays)
+        compiled = self.compiled(precision)
+        Y = np.empty((X.shape[0], len(self.outputs)), compiled[0].dtype)
+        evaluate.values_into(X, Y, *compiled)
         return Y
 
+    def precision_error(self, X: np.ndarray) -> np.ndarray:
+        """Largest |single − double| (m,) of each output over the points X (N, n), in output units: a measurement.
+
+        Raises
+        ------
+        UsageError
+            If X has the wrong number of columns.
+        """
+        difference = self.predict(X, precision="single") - self.predict(X)
+        return np.asarray(np.abs(difference).max(axis=0, initial=0.0))
+
     def jacobian(self, x: np.ndarray) -> np.ndarray:
-        """∂f/∂x (m, n) at one point x (n,), in output units per input unit."""
-        J = np.empty((len(self.outputs), len(self.inputs)))
-        evaluate.jacobian_into(np.ascontiguousarray(x, dtype=np.float64), J, *self.arrays)
-        return J
+        """∂f/∂x (m, n) at one point x (n,), in output units per input unit.
 
-    def evaluator(self) -> Evaluator:
-        """An allocation-free single-point evaluator for the 1 kHz path."""
-        return Evaluator(self)
+        Raises
+        ------
+        UsageError
+            If x has another shape.
+        """
+        J = np.empty((len(self.inputs), len(self.outputs)))
+        evaluate.jacobian_into(self._point(x), J, *self.compiled())
+        return np.ascontiguousarray(J.T)
+
+    def hessian(self, x: np.ndarray) -> np.ndarray:
+        """∂²f/∂x² (n, n) at one point x (n,) of a network with one output.
+
+        Raises
+        ------
+        UsageError
+            If the network has several outputs, or x another shape.
+        """
+        if len(self.outputs) != 1:
+            raise UsageError(
+                f"A Hessian is of one output; this network has {len(self.outputs)}.",
+                fix="Pick one: network.select([0]).hessian(x).",
+            )
+        n = len(self.inputs)
+        H = np.empty((n, n))
+        evaluate.hessian_into(self._point(x), H, np.empty((n, n)), np.empty(n), *self.compiled())
+        return H
+
+    def _point(self, x: np.ndarray) -> np.ndarray:
+        x = np.ascontiguousarray(x, dtype=np.float64)
+        if x.shape != (len(self.inputs),):
+            raise refused(x, len(self.inputs))
+        return x
+
+    def evaluator(self, *, precision: Precision = "double", jacobian: bool = False) -> Evaluator:
+        """An allocation-free single-point evaluator for the 1 kHz path, with the Jacobian if asked."""
+        return Evaluator(self, precision=precision, jacobian=jacobian)
+
+    def select(self, outputs: slice | Sequence[int]) -> Network:
+        """The network of some of the outputs, without `extras`; a basis larger than them is multiplied out."""
+        rows = outputs if isinstance(outputs, slice) else list(outputs)
+        kept = tuple(np.array(self.outputs, dtype=object)[rows])
+        basis, weights, tail = self.basis, self.weights, self.tail
+        if basis is None:
+            weights, tail = weights[rows], tail[rows]
+        else:
+            basis = basis[rows]
+            if basis.shape[0] <= basis.shape[1]:
+                weights, tail, basis = basis @ weights, basis @ tail, None
+        return replace(
+            self,
+            outputs=kept,
+            weights=weights,
+            tail=tail,
+            basis=basis,
+            scaling=self.scaling.select(outputs),
+            extras={},
+        )
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write this network alone to a file.
+
+        Raises
+        ------
+        UsageError
+            If the folder does not exist or can't be written, or the network's numbers can't be evaluated.
+        """
+        from palpate.network.file import Archive, save_archive
+
+        return save_archive(path, Archive({"network": self}))
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Network:
+        """Read back what `save` wrote, bit for bit.
+
+        Raises
+        ------
+        FileFormatError
+            If the file is missing, truncated, corrupt, foreign or from a later version, or holds something else.
+        """
+        from palpate.network.file import load_alone
+
+        return load_alone(path)
 
 
-class Evaluator:
-    """Evaluates one point at a time into an array it owns: `y = evaluator(x)` allocates nothing.
-
-    The returned array (m,) is overwritten by the next call; copy it to keep it.
-    """
-
-    def __init__(self, network: Network) -> None:
-        self._arrays = network.arrays
-        self._y = np.empty(len(network.outputs))
-        self(np.array([r.low for r in network.inputs]))  # compile now, not in the loop
-
-    def __call__(self, x: np.ndarray) -> np.ndarray:
-        """Outputs (m,) at x (n,), float64, in SI units."""
-        evaluate.value_into(x, self._y, *self._arrays)
-        return self._y
+def _frozen(array: np.ndarray) -> np.ndarray:
+    """A private double-precision copy that nobody can write to."""
+    copy = np.array(array, dtype=np.float64, order="C")
+    copy.flags.writeable = False
+    return copy

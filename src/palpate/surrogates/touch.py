@@ -219,8 +219,9 @@ class TouchEvaluator:
         self._limits = (low, high, h_low, h_high)
         self._laws = (float(model.compliance), bool(model.mirrors), 0.01 * model.reach)
         self._work = (np.zeros(n), np.zeros(k), np.zeros(2))
-        self._force_net = model.networks["force"].arrays
-        self._tip_net = _restricted(model.networks["field"], model.touch_node).arrays
+        held = slice(2 * model.touch_node, 2 * model.touch_node + 2)
+        self._force_net = model.networks["force"].compiled()
+        self._tip_net = model.networks["field"].select(held).compiled()
         self(np.zeros(3), np.array([r.low for r in model.parameters]))  # compile now, not in the loop
 
     def __repr__(self) -> str:
@@ -262,23 +263,6 @@ class TouchEvaluator:
             self._tip_net,
         )
         self.inside, self.mirrored = (flags & OUTSIDE) == 0, (flags & MIRRORED) != 0
-
-
-def _restricted(network: Network, node: int) -> Network:
-    """The field network with only the two outputs of one node."""
-    rows = slice(2 * node, 2 * node + 2)
-    s = network.scaling
-    scaling = type(s)(s.input_centre, s.input_half, s.output_centre[rows], s.output_scale[rows])
-    outputs = network.outputs[rows]
-    return Network(
-        network.inputs,
-        outputs,
-        network.factors,
-        network.shifts,
-        network.weights[rows],
-        network.tail[rows],
-        scaling,
-    )
 
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")

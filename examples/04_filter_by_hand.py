@@ -7,14 +7,14 @@ had another size; a star is a unit.
 import numpy as np
 
 from palpate.learning import Settings, initial, step
-from palpate.learning.gaussian import value
+from palpate.learning.model import value
 
 settings = Settings(
     error_min=0.05,
     error_rms_min=0.03,
     distance_min=0.1,
     noise=1e-4,
-    forgetting=2.0,
+    relapse_limit=2.0,
     prune_below=0.05,
     prune_after=30,
 )
@@ -35,6 +35,6 @@ for t in range(400):
 
 grid = np.linspace(-1, 1, 201)[:, None]
 rms = np.sqrt(((value(state, grid, settings) - truth(grid)) ** 2).mean())
-print(f"{len(state.units)} units, RMS error {rms:.3f}")
-for unit, centre, width in zip(state.weights, state.centres, state.widths(settings), strict=True):
+print(f"{state.units} units, RMS error {rms:.3f}")
+for unit, centre, width in zip(state.weights, state.centres(settings), state.widths(settings), strict=True):
     print(f"  centre {centre[0]:+.2f}  width {width[0]:.2f}  weight {unit[0]:+.2f}")

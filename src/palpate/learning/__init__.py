@@ -1,10 +1,13 @@
 """How a network is learnt: one sample at a time (MRAN with an extended Kalman filter), then refined.
 
-settings   what the filter is told           state      what it remembers
-gaussian   value and derivatives             growth     when a unit is added
-ekf        the update                        pruning    when a unit is removed
-noise      how far a sample is believed      mran       the step: all of the above in order
-learn      a fold of the step                history    what happened meanwhile
+settings   what the filter is told           presets    named members of the family
+forms      what a unit may look like         regressors units and tail, with all derivatives
+state      what the filter remembers         covariance what it keeps of its uncertainty
+model      the state's value and Jacobian    updates    what an observation changes
+growth     when a unit is added              pruning    when one is removed
+noise      how far a sample is believed      memory     what the window forbids
+mran       the step: all of these in order   learn      a fold of the step
+history    what happened meanwhile
 refine     variable projection               structure  how many units a refined network needs
 posterior  the way back from a refined network to the filter
 touch      a dataset made into a body that can be touched
@@ -12,19 +15,23 @@ touch      a dataset made into a body that can be touched
 
 from palpate.learning.history import History
 from palpate.learning.learn import Learned, freeze, learn
-from palpate.learning.mran import Event, step
+from palpate.learning.mran import Event, observe, step
+from palpate.learning.observation import Observation
 from palpate.learning.posterior import posterior
+from palpate.learning.presets import PRESETS, default, founding
 from palpate.learning.refine import Refined, refine
-from palpate.learning.settings import Settings, default, founding
+from palpate.learning.settings import Settings
 from palpate.learning.state import State, initial
 from palpate.learning.structure import Trial, refined_network
 from palpate.learning.touch import FEWEST, Refinement, hand_coordinates, learn_touch, node_outputs
 
 __all__ = [
     "FEWEST",
+    "PRESETS",
     "Event",
     "History",
     "Learned",
+    "Observation",
     "Refined",
     "Refinement",
     "Settings",
@@ -38,6 +45,7 @@ __all__ = [
     "learn",
     "learn_touch",
     "node_outputs",
+    "observe",
     "posterior",
     "refine",
     "refined_network",

@@ -9,10 +9,11 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from palpate.errors import UsageError
-from palpate.learning.gaussian import value
 from palpate.learning.history import History
+from palpate.learning.model import value
 from palpate.learning.mran import Event, step
-from palpate.learning.settings import Settings, default
+from palpate.learning.presets import default
+from palpate.learning.settings import Settings
 from palpate.learning.state import State, initial
 from palpate.network import Network, Scaling
 from palpate.units import Quantity, Range
@@ -97,7 +98,7 @@ def learn(
     with threadpool_limits(1):  # small matrices: more BLAS threads cost time, and the bits of the result
         for _ in range(passes):
             for i in rng.permutation(len(xs)):
-                state, event = step(state, xs[i], ys[i], settings)
+                state, event = step(state, xs[i], ys[i], settings, donate=True)
                 events.append(event)
                 innovation.append(state.innovation)
                 if judge:
@@ -112,16 +113,19 @@ def freeze(
     state: State, settings: Settings, inputs: Sequence[Range], outputs: Sequence[Quantity], scaling: Scaling
 ) -> Network:
     """The state as a network value."""
+    of = settings.regressors(state.inputs)
     tail = np.zeros((state.outputs, 1 + state.inputs))
-    tail[:, : state.tail.shape[1]] = state.tail
-    return Network.axis_aligned(
-        inputs,
-        outputs,
-        centres=state.centres,
-        widths=state.widths(settings),
-        weights=state.weights.T,
+    tail[:, : of.tail_size] = state.tail
+    factors, shifts = of.form.factors(state.theta)
+    return Network(
+        tuple(inputs),
+        tuple(outputs),
+        factors=factors.copy(),
+        shifts=shifts.copy(),
+        weights=state.weights.T.copy(),
         tail=tail,
         scaling=scaling,
+        radial=settings.radial,
     )
 
 

@@ -8,21 +8,30 @@ all that is left of their sum.
 
 from __future__ import annotations
 
-from palpate.learning.gaussian import value
+import numpy as np
+
 from palpate.learning.settings import Settings
 from palpate.learning.state import State
 
 __all__ = ["forgets", "window_error"]
 
 
-def window_error(state: State, settings: Settings) -> float:
-    """Sum of squared errors of a state over its window."""
+def window_error(state: State, coefficients: np.ndarray, theta: np.ndarray, settings: Settings) -> float:
+    """Sum of squared errors of other parameters, (p_t + h, m or r) and (h, p), over a state's window."""
     X, Y = state.seen[:, : state.inputs], state.seen[:, state.inputs :]
-    return float(((value(state, X, settings) - Y) ** 2).sum())
+    of = settings.regressors(state.inputs)
+    error = np.hstack([of.tail_rows(X), of.phi(X, theta)]) @ coefficients - Y
+    return float(np.vdot(error, error))
 
 
-def forgets(before: State, after: State, settings: Settings) -> bool:
-    """Whether a change raises the error over the window by more than the settings allow."""
-    if not settings.forgetting or len(before.seen) < 2:
+def forgets(state: State, z: np.ndarray, settings: Settings) -> bool:
+    """Whether other parameters z (d,) raise the error over the window by more than the settings allow."""
+    return spoils(state, *state.split(z), settings)
+
+
+def spoils(state: State, coefficients: np.ndarray, theta: np.ndarray, settings: Settings) -> bool:
+    """The same for coefficients and shapes; both by the output modes where the window is."""
+    if not settings.relapse_limit or len(state.seen) < 2:
         return False
-    return window_error(after, settings) > settings.forgetting * window_error(before, settings)
+    before = window_error(state, state.led, state.theta, settings)
+    return window_error(state, coefficients, theta, settings) > settings.relapse_limit * before

@@ -1,6 +1,6 @@
 """MRAN: one observation in, the network grown, updated and pruned (Lu, Sundararajan & Saratchandran 1997, 1998).
 
-`step` is the whole of the method; `learn` in `palpate.learning.learn` is a fold of it.
+The settings say which rules; `step` is the whole of the method; `learn` in `palpate.learning.learn` is a fold of it.
 """
 
 from __future__ import annotations
@@ -9,15 +9,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.learning.ekf import updated
-from palpate.learning.gaussian import value
 from palpate.learning.growth import grown, wants_growth
+from palpate.learning.model import value
 from palpate.learning.noise import running_mean_square
+from palpate.learning.observation import Observation
 from palpate.learning.pruning import pruned
 from palpate.learning.settings import Settings
 from palpate.learning.state import State
+from palpate.learning.updates import updated
 
-__all__ = ["Event", "step"]
+__all__ = ["Event", "observe", "step"]
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,9 @@ class Event:
     why: str = ""
 
 
-def step(state: State, x: np.ndarray, y: np.ndarray, settings: Settings) -> tuple[State, Event]:
+def step(
+    state: State, x: np.ndarray, y: np.ndarray, settings: Settings, *, donate: bool = False
+) -> tuple[State, Event]:
     """Learn one observation.
 
     Parameters
@@ -59,40 +62,47 @@ def step(state: State, x: np.ndarray, y: np.ndarray, settings: Settings) -> tupl
     y : (m,)
         Scaled output.
     settings : Settings
+    donate : bool
+        Whether the old state's arrays may be overwritten. It saves copying the covariance; the old state must
+        not be used again.
 
     Returns
     -------
     State, Event
-        The new state; the old one is untouched. An observation that isn't finite is skipped and says so.
+        The new state; the old one is untouched unless donated. An observation that isn't finite is skipped and
+        says so.
     """
-    if not (np.isfinite(x).all() and np.isfinite(y).all()):
-        return state, Event(np.nan, np.nan, False, False, 0, len(state.units), "not finite")
-    error = y - value(state, x, settings)
-    state = _remembered(state, x, y, error, settings)
-    grew = wants_growth(state, x, error, settings)
+    return observe(state, Observation(x, y), settings, donate=donate)
+
+
+def observe(
+    state: State, seen: Observation, settings: Settings, *, donate: bool = False
+) -> tuple[State, Event]:
+    """Learn one observation that may have a weight and slopes; else as `step`."""
+    if not seen.finite:
+        return state, Event(np.nan, np.nan, False, False, 0, state.units, "not finite")
+    error = seen.y - value(state, seen.x, settings)
+    size = float(np.sqrt(error @ error))
+    state = _remembered(state, seen, error, settings)
+    grew = wants_growth(state, seen.x, error, settings)
     if grew:
         # the new unit meets the observation, so the update below starts from a zero error, not twice the old one
-        state = grown(state, x, error, settings)
+        state = grown(state, seen.x, error, settings)
+        error = np.zeros_like(error)
     use = settings.update_on_growth or not grew
     if use:
-        state = updated(state, x, y, settings)
-    before = len(state.units)
-    state = pruned(state, x, settings)
-    event = Event(
-        float(np.linalg.norm(error)),
-        float(np.sqrt(state.errors.mean())),
-        grew,
-        use,
-        before - len(state.units),
-        len(state.units),
-    )
+        state = updated(state, seen, error, settings, donate=donate)
+    before = state.units
+    state = pruned(state, seen.x, settings)
+    event = Event(size, float(np.sqrt(state.errors.mean())), grew, use, before - state.units, state.units)
     return state, event
 
 
-def _remembered(state: State, x: np.ndarray, y: np.ndarray, error: np.ndarray, settings: Settings) -> State:
+def _remembered(state: State, seen: Observation, error: np.ndarray, settings: Settings) -> State:
     """The state with one more observation counted, and it and its error in the window."""
     errors = np.append(state.errors, float(error @ error))[-settings.window :]
-    seen = np.vstack([state.seen, np.concatenate([x, y])])[-settings.window :]
+    y = seen.y if state.modes is None else seen.y @ state.modes
+    window = np.vstack([state.seen, np.concatenate([seen.x, y])])[-settings.window :]
     count = state.count + 1
     innovation = running_mean_square(state.innovation, error, count)
-    return replace(state, errors=errors, seen=seen, count=count, innovation=innovation)
+    return replace(state, errors=errors, seen=window, count=count, innovation=innovation)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from palpate.learning.gaussian import jacobian
+from palpate.learning.covariance import Full
+from palpate.learning.model import jacobian
+from palpate.learning.observation import Observation
 from palpate.learning.refine import Refined
 from palpate.learning.settings import Settings
 from palpate.learning.state import State, initial
@@ -36,29 +40,29 @@ def posterior(refined: Refined, X: np.ndarray, settings: Settings) -> State:
     h, m = refined.weights.shape if len(refined.centres) else (0, refined.tail.shape[1])
     n = X.shape[1]
     empty = initial(n, m, settings)
-    units = np.hstack([refined.weights.reshape(h, m), refined.centres, np.log(refined.widths)])
-    mean = State(
-        tail=refined.tail.T.copy(),
-        units=units,
-        covariance=np.zeros((0, 0)),
-        errors=empty.errors,
-        seen=empty.seen,
+    theta = np.hstack([refined.centres, np.log(refined.widths)])
+    mean = replace(
+        empty,
+        coefficients=np.vstack([refined.tail, refined.weights.reshape(h, m)]),
+        theta=theta,
+        places=refined.centres,
         silent=np.zeros(h, dtype=np.int64),
         count=len(X),
         innovation=refined.rms**2,
-        inputs=n,
     )
     variance = max(settings.noise, refined.rms**2)
     information = np.diag(1.0 / _prior(mean, settings))
     for x in X:
-        H = jacobian(mean, x, settings)[1]
+        H = jacobian(mean, Observation(x, np.zeros(m)), settings)[1]
         information += H.T @ H / variance
     covariance = cho_solve(cho_factor(information), np.eye(len(information)))
-    return State(**{**vars(mean), "covariance": (covariance + covariance.T) / 2})
+    return replace(mean, covariance=Full(np.asfortranarray(covariance), mean.tail.size))
 
 
 def _prior(state: State, settings: Settings) -> np.ndarray:
     """Prior variances (d,) of the parameters."""
-    unit = np.full(state.units.shape[1], settings.prior)
-    unit[state.outputs + state.inputs :] = settings.width_prior
-    return np.concatenate([np.full(state.tail.size, settings.tail_prior), np.tile(unit, len(state.units))])
+    form = settings.regressors(state.inputs).form
+    unit = np.concatenate(
+        [np.full(state.outputs, settings.prior), form.variances(settings.prior, settings.width_prior)]
+    )
+    return np.concatenate([np.full(state.tail.size, settings.tail_prior), np.tile(unit, state.units)])

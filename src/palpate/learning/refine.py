@@ -1,29 +1,36 @@
-"""Refinement: all centres and widths by Levenberg–Marquardt, weights and tail by least squares inside.
+"""Refinement: all units at once by Levenberg–Marquardt, weights and tail by least squares inside.
 
-Variable projection (Golub & Pereyra 1973): for given centres and log widths θ the best weights and tail are a
-linear least-squares solution, so only θ is searched. With the regressors Φ (N, c), Φ = Q R, and the projector
-P = I − Q Qᵀ, the Gauss–Newton matrix in Kaufman's approximation (1975) is
+Variable projection (Golub & Pereyra 1973): for given units θ the best weights and tail are a linear least-squares
+solution, so only θ is searched (see `projection`). The sequential filter says how many units are needed and where;
+this buys the last digits.
 
-    (Dᵀ P D) ∘ (W Wᵀ)
-
-D holding ∂φ_k/∂θ_k and W the weights; the right-hand side is Dᵀ (residual Wᵀ). Neither grows with the number
-of outputs. The sequential filter says how many units are needed and where; this buys the last digits.
+Damping follows the ratio of gained to predicted descent (Marquardt 1963; Moré 1978). A step's units are held back
+one by one: a unit that the data hardly see asks for leaps, and must neither get them nor stop the others.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve, qr
+from scipy.linalg import blas, lapack
 
-from palpate.learning.gaussian import tail_row
-from palpate.learning.settings import Tail
+from palpate.errors import UsageError
+from palpate.learning.forms import Form
+from palpate.learning.leave_one_out import left_out
+from palpate.learning.projection import Fit, Solver, gauss_newton, project
+from palpate.learning.regressors import Regressors
+from palpate.learning.rows import Rows
 
 __all__ = ["Refined", "refine"]
 
 _LONGEST = 1.0  # largest change of a log width, or of a centre in units of its width, in one iteration
 _DAMPING = (1e-12, 1e12)
+_FLOOR = 1e-2  # of the mean curvature: a unit of hardly any weight would else move freely
+_SINGLE_FROM = 300  # unknowns from which single precision saves time
+_SINGLE_DAMPING = 1e-5  # below this the damped matrix may be singular to single precision
 _MOST_LEVERAGE = 0.98  # a sample that decides its own fit says little; its residual counts fifty times
 
 
@@ -33,53 +40,71 @@ class Refined:
 
     Attributes
     ----------
-    centres, widths : (h, n)
-    weights : (h, m)
-    tail : (p, m)
+    regressors : Regressors
+    theta : (h, p)
+        Its units.
+    coefficients : (p_t + h, m)
+        The tail's, then the units' weights.
     rms : float
-        Training error per scaled output.
+        Weighted root mean square training error per scaled output, of values only.
     loo : float
         Leave-one-out error per scaled output: in closed form for weights and tail (Allen 1974), with the
-        centres' and widths' degrees of freedom spread evenly over the samples.
+        units' degrees of freedom spread evenly over the samples.
     condition : float
         2-norm condition number of the regressors; large values mean that units nearly cancel.
     iterations : int
     converged : bool
-        Whether the last steps brought no more gain; False means the iteration limit came first.
+        Whether the last steps brought no more gain; False means that a limit came first.
+    heldout : float
+        Root mean square error per scaled output on the held-out samples; not-a-number without them.
     """
 
-    centres: np.ndarray
-    widths: np.ndarray
-    weights: np.ndarray
-    tail: np.ndarray
+    regressors: Regressors
+    theta: np.ndarray
+    coefficients: np.ndarray
     rms: float
     loo: float
     condition: float
     iterations: int
     converged: bool
+    heldout: float = float("nan")
 
+    @property
+    def tail(self) -> np.ndarray:
+        """(p_t, m)."""
+        return self.coefficients[: self.regressors.tail_size]
 
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """Least-squares solution for one θ: coefficients (c, m), basis Q (N, c), residual (N, m), cost."""
+    @property
+    def weights(self) -> np.ndarray:
+        """(h, m)."""
+        return self.coefficients[self.regressors.tail_size :]
 
-    coefficients: np.ndarray
-    Q: np.ndarray
-    residual: np.ndarray
-    cost: float
+    def predict(self, X: np.ndarray) -> np.ndarray:
+        """Scaled outputs (N, m) at scaled inputs X (N, n)."""
+        r = self.regressors
+        return np.asarray(r.tail_rows(X) @ self.tail + r.phi(X, self.theta) @ self.weights)
 
 
 def refine(
     X: np.ndarray,
     Y: np.ndarray,
-    centres: np.ndarray,
-    widths: np.ndarray,
+    theta: np.ndarray,
+    regressors: Regressors,
     *,
-    tail: Tail = "affine",
+    weights: np.ndarray | None = None,
+    slopes: np.ndarray | None = None,
+    slope_weight: float | np.ndarray = 1.0,
     ridge: float = 1e-13,
     iterations: int = 200,
+    seconds: float | None = None,
+    solver: Solver = "kaufman",
+    heldout: tuple[np.ndarray, np.ndarray] | None = None,
+    patience: int = 20,
+    tolerance: float = 1e-9,
 ) -> Refined:
     """Refine a network from a start.
+
+    The cost is Σ_i w_i (‖y_i − f(x_i)‖² + s_i ‖∂y_i/∂x − ∂f/∂x(x_i)‖²) + ridge · Σ_i w_i · ‖W‖².
 
     Parameters
     ----------
@@ -87,103 +112,195 @@ def refine(
         Scaled inputs.
     Y : (N, m)
         Scaled outputs.
-    centres, widths : (h, n)
-        Start, scaled; h = 0 fits the tail alone.
-    tail : {"affine", "constant", "none"}
+    theta : (h, p)
+        Start; h = 0 fits the tail alone.
+    regressors : Regressors
+    weights : (N,), optional
+        w; a weight of two is the sample given twice.
+    slopes : (N, m, n), optional
+        ∂y/∂x, scaled as outputs over inputs.
+    slope_weight : float or (N,)
+        s; zero where no slopes are known.
     ridge : float
-        Penalty on squared weights, relative to N: it holds near-cancelling units together.
+        Penalty on squared weights: it holds near-cancelling units together.
     iterations : int
         Limit on Levenberg–Marquardt iterations.
+    seconds : float, optional
+        Limit on time; the iteration under way is finished.
+    solver : {"kaufman", "full"}
+        Gauss–Newton matrix: Kaufman's approximation, or that of Golub and Pereyra in full.
+    heldout : (X (N', n), Y (N', m)), optional
+        Unseen samples: the iterate with the least error on them is returned.
+    patience : int
+        Iterations without a better one on `heldout` after which to stop.
+    tolerance : float
+        Relative gain of the cost below which it has converged.
 
     Returns
     -------
     Refined
+
+    Raises
+    ------
+    UsageError
+        If shapes disagree or numbers are not finite.
     """
-    h = len(centres)
-    T = tail_row(X, {"affine": 1 + X.shape[1], "constant": 1, "none": 0}[tail])
-    theta = np.stack([centres, np.log(widths)])
-    penalty = ridge * len(X)
-    fit = _project(X, Y, T, theta, penalty)
-    damping, done, count = 1e-2, h == 0, 0
-    while not done and count < iterations:
-        count += 1
-        new, new_fit, damping = _improve(X, Y, T, theta, fit, penalty, damping)
-        if new is None:
-            done = True
+    theta = np.array(theta, float)
+    if theta.ndim != 2 or theta.shape[1] != regressors.form.size or not np.isfinite(theta).all():
+        raise UsageError(
+            f"Units of shape {theta.shape} are not finite {regressors.form.name} units of "
+            f"{regressors.form.size} numbers each.",
+            fix="Make them with the form's own `unit`.",
+        )
+    rows = Rows.of(regressors, X, Y, weights=weights, slopes=slopes, slope_weight=slope_weight)
+    # the floor keeps the triangle regular where units coincide
+    penalty = max(ridge, 1e-30) * rows.total
+    judge = _judge(rows, heldout)
+    deadline = np.inf if seconds is None else time.monotonic() + seconds
+    search = _Search(rows, penalty, solver, tolerance, deadline)
+    now = _Point(theta, project(rows, theta, penalty))
+    best, error, since, count = now, judge(now), 0, 0
+    while not now.done and count < iterations and time.monotonic() < deadline and since < patience:
+        now, count = search.improved(now), count + 1
+        if heldout is None:
+            best = now
+        elif (found := judge(now)) < error:
+            # a gain in the fifth digit is no reason to go on
+            since = 0 if found < error * (1.0 - 1e-3) else since + 1
+            best, error = now, found
         else:
-            done = fit.cost - new_fit.cost < 1e-9 * fit.cost
-            theta, fit = new, new_fit
-    return _result(X, T, theta, fit, count, done)
+            since += 1
+    return _result(rows, best, count, now.done, error)
 
 
-def _activations(X: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """φ (N, h) and ∂φ_k/∂(μ_k, log σ_k) (N, h, 2n)."""
-    centres, sigma = theta[0], np.exp(theta[1])
-    t = (X[:, None, :] - centres) / sigma
-    phi = np.exp(-(t * t).sum(axis=2))
-    return phi, np.concatenate([t / sigma, t * t], axis=2) * (2.0 * phi)[:, :, None]
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """Where the search stands: units, their fit, and the damping to begin with."""
+
+    theta: np.ndarray
+    fit: Fit
+    damping: float = 1e-2
+    single: bool = True
+    done: bool = False
+
+    def __post_init__(self) -> None:
+        if not len(self.theta):
+            object.__setattr__(self, "done", True)
 
 
-def _project(X: np.ndarray, Y: np.ndarray, T: np.ndarray, theta: np.ndarray, penalty: float) -> _Fit:
-    h, p = theta.shape[1], T.shape[1]
-    phi = _activations(X, theta)[0]
-    # the tail carries a penalty of round-off size only, so that duplicate samples can't make R singular
-    shrink = np.sqrt(np.r_[np.full(h, penalty), np.full(p, 1e-24)])
-    Q, R = qr(np.vstack([np.hstack([phi, T]), np.diag(shrink)]), mode="economic", check_finite=False)
-    Q = Q[: len(X)]
-    C = np.linalg.solve(R, Q.T @ Y)
-    residual = Y - np.hstack([phi, T]) @ C
-    cost = float((residual**2).sum() + penalty * (C[:h] ** 2).sum())
-    return _Fit(C, Q, residual, cost)
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """The problem that Levenberg–Marquardt solves, and when it may stop."""
+
+    rows: Rows
+    penalty: float
+    solver: Solver
+    tolerance: float
+    deadline: float
+
+    def improved(self, now: _Point) -> _Point:
+        """After one accepted step; `done` where none helps or hardly any is gained."""
+        single = now.single and now.theta.size >= _SINGLE_FROM and now.damping > _SINGLE_DAMPING
+        G, descent = gauss_newton(self.rows, now.theta, now.fit, self.solver, single=single)
+        system = _Scaled(G, descent)
+        damping = now.damping
+        while damping < _DAMPING[1]:
+            step = system.step(damping)
+            if step is None:
+                damping *= 4.0
+                continue
+            step = _held_back(self.rows.regressors.form, now.theta, step.reshape(now.theta.shape))
+            new = now.theta + step
+            fit = project(self.rows, new, self.penalty)
+            gain = now.fit.cost - fit.cost
+            if gain > 0:
+                ratio = gain / max(system.predicted(step.ravel()), 1e-300)
+                done = gain < self.tolerance * now.fit.cost and not single
+                return _Point(new, fit, _next(damping, ratio), now.single and gain > 1e-7 * fit.cost, done)
+            damping *= 4.0
+            if time.monotonic() > self.deadline:
+                return replace(now, damping=damping)
+        # rounding may have hidden a step; double precision has the last word
+        return replace(now, damping=1e-2, single=False, done=not single)
 
 
-def _improve(
-    X: np.ndarray, Y: np.ndarray, T: np.ndarray, theta: np.ndarray, fit: _Fit, penalty: float, damping: float
-) -> tuple[np.ndarray | None, _Fit, float]:
-    """One accepted Levenberg–Marquardt step, or None where no damping helps."""
-    h, n = theta.shape[1:]
-    D = _activations(X, theta)[1]
-    W = fit.coefficients[:h]
-    gradient = np.einsum("nk,nkp->kp", fit.residual @ W.T, D).ravel()
-    flat = D.reshape(len(X), -1)
-    projected = flat - fit.Q @ (fit.Q.T @ flat)
-    G = (projected.T @ projected) * np.kron(W @ W.T, np.ones((2 * n, 2 * n)))
-    scale = np.diag(G) + 1e-9 * max(float(np.diag(G).max()), 1e-300)
-    while damping < _DAMPING[1]:
-        try:
-            step = cho_solve(cho_factor(G + np.diag(damping * scale)), gradient)
-        except LinAlgError:
-            damping *= 10.0
-            continue
-        new = theta + _bounded(step.reshape(h, 2, n).swapaxes(0, 1), theta)
-        new_fit = _project(X, Y, T, new, penalty)
-        if new_fit.cost < fit.cost:
-            return new, new_fit, max(damping / 5.0, _DAMPING[0])
-        damping *= 4.0
-    return None, fit, damping
+class _Scaled:
+    """A Gauss–Newton matrix with its diagonal made one, solved for any damping without forming it again."""
+
+    def __init__(self, G: np.ndarray, descent: np.ndarray) -> None:
+        curvature = np.diagonal(G).astype(float)
+        self._shrink = 1.0 / np.sqrt(curvature + _FLOOR * max(float(curvature.mean()), 1e-300))
+        kind = G.dtype.type
+        G *= self._shrink.astype(kind)[:, None]
+        G *= self._shrink.astype(kind)
+        self._G, self._descent, self._kind = G, descent * self._shrink, kind
+        single = kind is np.float32
+        self._factor, self._solve = (
+            (lapack.spotrf, lapack.spotrs) if single else (lapack.dpotrf, lapack.dpotrs)
+        )
+        self._times = blas.ssymv if single else blas.dsymv
+
+    def step(self, damping: float) -> np.ndarray | None:
+        """The damped step (h p,), or None where the matrix is not positive definite to its precision."""
+        H = self._G.copy(order="F")
+        H[np.diag_indices(len(H))] += self._kind(damping)
+        L, failed = self._factor(H, lower=1, overwrite_a=1, clean=0)
+        if failed:
+            return None
+        found = np.asarray(self._solve(L, self._descent.astype(self._kind), lower=1)[0], float)
+        return found * self._shrink if np.isfinite(found).all() else None
+
+    def predicted(self, step: np.ndarray) -> float:
+        """How much the cost falls along a step, to second order."""
+        s = step / self._shrink
+        return float(2.0 * self._descent @ s - s @ self._times(1.0, self._G, s.astype(self._kind), lower=1))
 
 
-def _bounded(step: np.ndarray, theta: np.ndarray) -> np.ndarray:
-    """A step (2, h, n), shortened so that no width or centre leaps."""
-    longest = max(float(np.abs(step[0] / np.exp(theta[1])).max()), float(np.abs(step[1]).max()))
-    return step * min(1.0, _LONGEST / max(longest, 1e-300))
+def _next(damping: float, ratio: float) -> float:
+    """Less damping after steps that kept their promise, more after those that did not."""
+    factor = 0.2 if ratio > 0.75 else 0.5 if ratio > 0.4 else 1.0 if ratio > 0.2 else 2.0
+    return max(damping * factor, _DAMPING[0])
 
 
-def _result(X: np.ndarray, T: np.ndarray, theta: np.ndarray, fit: _Fit, count: int, done: bool) -> Refined:
-    h = theta.shape[1]
-    # centres and widths were fitted too: their 2 h n numbers count as leverage, shared by all samples and outputs
-    shared = 2.0 * theta[0].size / fit.residual.size
-    leverage = np.minimum((fit.Q**2).sum(axis=1) + shared, _MOST_LEVERAGE)
-    left_out = fit.residual / (1.0 - leverage)[:, None]
-    regressors = np.hstack([_activations(X, theta)[0], T])
+def _held_back(form: Form, theta: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """A step (h, p), shortened unit by unit so that no width or centre leaps."""
+    if form.stride(theta, step) <= _LONGEST:
+        return step
+    longest = np.array([form.stride(theta[k : k + 1], step[k : k + 1]) for k in range(len(theta))])
+    return np.asarray(step * np.minimum(1.0, _LONGEST / np.maximum(longest, 1e-300))[:, None])
+
+
+def _judge(rows: Rows, heldout: tuple[np.ndarray, np.ndarray] | None) -> Callable[[_Point], float]:
+    """The error of a point on held-out samples; not-a-number without them."""
+    if heldout is None:
+        return lambda point: float("nan")
+    X, Y = heldout
+    latent = Y @ rows.modes.T
+    beyond = max(float((Y**2).sum() - (latent**2).sum()), 0.0)  # what no mode of the training data reaches
+    tail = rows.regressors.tail_rows(X)
+
+    def judge(point: _Point) -> float:
+        predicted = np.hstack([tail, rows.regressors.phi(X, point.theta)]) @ point.fit.coefficients
+        return float(np.sqrt((((predicted - latent) ** 2).sum() + beyond) / Y.size))
+
+    return judge
+
+
+def _result(rows: Rows, point: _Point, count: int, done: bool, error: float) -> Refined:
+    fit, m = point.fit, rows.modes.shape[1]
+    # units were fitted too: their h p numbers count as leverage, shared by all rows and modes
+    shared = point.theta.size / rows.targets.size
+    missed = left_out(rows, fit, shared=shared, most=_MOST_LEVERAGE)
+    F = rows.matrix(point.theta)
+    squares = float((fit.residual[: len(rows.X)] ** 2).sum())
     return Refined(
-        theta[0],
-        np.exp(theta[1]),
-        fit.coefficients[:h],
-        fit.coefficients[h:],
-        float(np.sqrt((fit.residual**2).mean())),
-        float(np.sqrt((left_out**2).mean())),
-        float(np.linalg.cond(regressors)) if regressors.size else 1.0,
+        rows.regressors,
+        point.theta,
+        fit.coefficients @ rows.modes,
+        float(np.sqrt(squares / (rows.total * m))),
+        float(np.sqrt((missed**2 * rows.scale[:, None] ** 2).sum() / (rows.total * m))),
+        float(np.linalg.cond(F)) if F.size else 1.0,
         count,
         done,
+        error,
     )

@@ -65,7 +65,7 @@ class Regressors:
         A, b = self.form.factors(theta)
         v = self._v(X, A, b)
         g1 = radial(self.radial, np.einsum("nkr,nkr->nk", v, v))[1]
-        return np.einsum("nk,nkr,kri->nik", 2.0 * g1, v, A, optimize=True)
+        return np.asarray(np.einsum("nkr,kri->nik", 2.0 * g1[..., None] * v, A))
 
     def slopes_by_theta(self, X: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """∂φ_k/∂x_i (N, n, h) and its derivatives by θ_k (N, n, h, p)."""

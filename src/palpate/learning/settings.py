@@ -1,25 +1,31 @@
-"""The filter's settings, and two named sets of them."""
+"""The filter's settings: which rules it follows, and their thresholds."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal, get_args
 
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.learning.forms import Widths, form
+from palpate.learning.regressors import Regressors, Tail
+from palpate.network.radial import RadialFunction
 
-__all__ = ["Settings", "default", "founding"]
+__all__ = ["Growth", "Pruning", "Settings", "Update"]
 
-Tail = Literal["affine", "constant", "none"]
-Widths = Literal["log", "plain"]
+Update = Literal["full", "decoupled", "winner", "shared", "gradient"]
+Growth = Literal["distance", "significance"]
+Pruning = Literal["contribution", "significance"]
+Density = Literal["uniform", "samples"]
 
 _POSITIVE = (
     *("window", "distance_max", "distance_min", "overlap", "prior", "width_prior", "tail_prior"),
-    *("distance_decay", "noise", "edge_weight", "iterations"),
+    *("distance_decay", "noise", "edge_weight", "iterations", "forgetting_factor", "learning_rate"),
 )
 _NOT_NEGATIVE = (
-    *("error_min", "error_rms_min", "process_noise", "noise_share", "gate", "step_bound", "forgetting"),
+    *("error_min", "error_rms_min", "process_noise", "noise_share", "gate", "step_bound", "relapse_limit"),
     *("prune_below", "prune_after", "units_max"),
 )
 
@@ -30,10 +36,21 @@ class Settings:
 
     Attributes
     ----------
+    form : str
+        Of a unit: isotropic, axis-aligned, rotated, rank-1, rank-2, … (see `palpate.learning.forms`).
+    radial : {"gaussian", "inverse-multiquadric", "matern-5/2"}
     tail : {"affine", "constant", "none"}
         What is added to the units: T·[1, x], T, or nothing.
     widths : {"log", "plain"}
         Whether the filter's states are log σ, so that no step can make a width negative, or σ itself.
+    update : {"full", "decoupled", "winner", "shared", "gradient"}
+        Which covariance the filter keeps, and what an observation may change (see `palpate.learning.updates`).
+    growth : {"distance", "significance"}
+        What the first growth criterion asks of a new unit: its error, or its significance (GAP-RBF).
+    pruning : {"contribution", "significance"}
+        Whether silent units go (MRAN), or the nearest one when it is insignificant (GAP-RBF).
+    density : {"uniform", "samples"}
+        Of the inputs, for significance: over [−1, 1]ⁿ (GAP), or as the window has them (GGAP).
     error_min, error_rms_min : float
         e_min and e'_min: growth needs an error norm above the first and a windowed RMS error above the second.
     window : int
@@ -60,7 +77,11 @@ class Settings:
         Linearisations per update; 1 is the plain extended filter.
     step_bound : float
         Largest change of a centre (in widths) and of a log width in one update; 0 for none.
-    forgetting : float
+    forgetting_factor : float
+        λ in (0, 1]: every update divides the covariance by it, so that old observations fade like λᵗ.
+    learning_rate : float
+        α of the gradient rule.
+    relapse_limit : float
         Largest factor by which one update, or the removal of a unit, may raise the squared error over the
         window; 0 for no limit.
     update_on_growth : bool
@@ -78,8 +99,14 @@ class Settings:
         If a number is out of its range.
     """
 
+    form: str = "axis-aligned"
+    radial: RadialFunction = "gaussian"
     tail: Tail = "affine"
     widths: Widths = "log"
+    update: Update = "full"
+    growth: Growth = "distance"
+    pruning: Pruning = "contribution"
+    density: Density = "uniform"
     error_min: float = 1e-2
     error_rms_min: float = 1e-2
     window: int = 50
@@ -98,7 +125,9 @@ class Settings:
     edge_weight: float = 0.005
     iterations: int = 5
     step_bound: float = 0.1
-    forgetting: float = 1.1
+    forgetting_factor: float = 1.0
+    learning_rate: float = 0.05
+    relapse_limit: float = 1.1
     update_on_growth: bool = True
     prune_below: float = 1e-4
     prune_after: int = 500
@@ -112,43 +141,39 @@ class Settings:
             if not (value > 0 if name in _POSITIVE else value >= 0):
                 rule = "be positive" if name in _POSITIVE else "not be negative"
                 raise UsageError(f"The filter's {name} is {value}; it must {rule}.")
-        if not 0 < self.distance_decay <= 1:
-            raise UsageError(f"The filter's distance_decay is {self.distance_decay}; it must lie in (0, 1].")
-        for name, known in (("tail", get_args(Tail)), ("widths", get_args(Widths))):
+        for name in ("distance_decay", "forgetting_factor"):
+            if not 0 < getattr(self, name) <= 1:
+                raise UsageError(f"The filter's {name} is {getattr(self, name)}; it must lie in (0, 1].")
+        for name, known in _CHOICES.items():
             if getattr(self, name) not in known:
                 raise UsageError(
                     f"The filter's {name} is {getattr(self, name)!r}; it is one of {', '.join(known)}."
                 )
+        if not isinstance(self.form, str):
+            raise UsageError(f"The filter's form is {self.form!r}; it must be a name, such as 'rotated'.")
+
+    def regressors(self, inputs: int) -> Regressors:
+        """Units and tail for n inputs.
+
+        Raises
+        ------
+        UsageError
+            If there is no such form for so many inputs.
+        """
+        return _regressors(self.form, inputs, self.widths, self.radial, self.tail)
 
 
-def default() -> Settings:
-    """Affine tail, log widths, guarded noise, iterated and bounded steps: stable on noise-free data."""
-    return Settings()
+_CHOICES: dict[str, tuple[str, ...]] = {
+    "radial": get_args(RadialFunction),
+    "tail": get_args(Tail),
+    "widths": get_args(Widths),
+    "update": get_args(Update),
+    "growth": get_args(Growth),
+    "pruning": get_args(Pruning),
+    "density": get_args(Density),
+}
 
 
-def founding() -> Settings:
-    """The form of the papers: plain widths, no tail, one linearisation, fixed R, growth once the window is full.
-
-    After Lu, Sundararajan & Saratchandran 1997 and Narayanan, Singla, Garimella, Waz & Krovi 2011, who tuned
-    thresholds by hand for each beam; these are for inputs in [−1, 1] and outputs scaled to 1. The finite-element
-    papers write exp(−½ …), so their κ = 0.87 is 1.2 here.
-    """
-    return Settings(
-        tail="none",
-        widths="plain",
-        error_min=5e-3,
-        error_rms_min=5e-3,
-        overlap=1.2,
-        wait_for_window=True,
-        distance_min=0.2,
-        window=25,
-        forgetting=0.0,
-        noise=1e-3,
-        noise_share=0.0,
-        gate=0.0,
-        edge_weight=1.0,
-        iterations=1,
-        step_bound=0.0,
-        prune_below=1e-3,
-        prune_after=50,
-    )
+@lru_cache(maxsize=64)
+def _regressors(name: str, inputs: int, widths: Widths, radial: RadialFunction, tail: Tail) -> Regressors:
+    return Regressors(form(name, inputs, widths), radial, tail)

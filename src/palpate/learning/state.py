@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from palpate.learning.covariance import Blocks, Covariance, Full, Nothing, Shared
 from palpate.learning.settings import Settings
 
 __all__ = ["State", "initial"]
@@ -17,91 +18,142 @@ class State:
 
     Attributes
     ----------
-    tail : (m, p)
-        T; p is 1 + n, 1 or 0 by the kind of tail.
-    units : (h, m + 2n)
-        One row per unit: weights w (m), centre μ (n), and log σ or σ (n).
-    covariance : (d, d)
-        P over z = [tail row by row, units row by row], d = m p + h (m + 2n).
+    coefficients : (p_t + h, m)
+        The tail's columns, then one row of weights per unit; p_t is 1 + n, 1 or 0 by the kind of tail.
+    theta : (h, p)
+        The units' numbers, by the settings' form.
+    covariance : Covariance
+        Of the parameters, as the settings' update rule keeps it.
+    places : (h, n)
+        Where each unit was added.
     errors : (≤ M,)
         The last squared error norms ‖e‖², newest last.
-    seen : (≤ M, n + m)
-        The last observations [x, y], newest last.
+    seen : (≤ M, n + m) or (≤ M, n + r)
+        The last observations [x, y], newest last; y by the output modes where there are some.
     silent : (h,) int
         Observations in a row in which each unit was silent.
     count : int
         t, observations seen over all passes.
     innovation : float
         Running mean square of the innovation, per output.
-    inputs : int
-        n.
+    modes : (m, r), optional
+        Orthonormal output directions that drive the shapes under the shared-weight rule; None for all outputs.
+    in_modes : (p_t + h, r), optional
+        The coefficients by those modes, kept up to date so that no step has to form them.
     """
 
-    tail: np.ndarray
-    units: np.ndarray
-    covariance: np.ndarray
+    coefficients: np.ndarray
+    theta: np.ndarray
+    covariance: Covariance
+    places: np.ndarray
     errors: np.ndarray
     seen: np.ndarray
     silent: np.ndarray
     count: int
     innovation: float
-    inputs: int
+    modes: np.ndarray | None = None
+    in_modes: np.ndarray | None = None
+
+    @property
+    def inputs(self) -> int:
+        """Number of inputs n."""
+        return int(self.places.shape[1])
 
     @property
     def outputs(self) -> int:
         """Number of outputs m."""
-        return int(self.tail.shape[0])
+        return int(self.coefficients.shape[1])
+
+    @property
+    def units(self) -> int:
+        """Number of units h."""
+        return len(self.theta)
+
+    @property
+    def tail(self) -> np.ndarray:
+        """T (m, p_t)."""
+        return self.coefficients[: len(self.coefficients) - self.units].T
 
     @property
     def weights(self) -> np.ndarray:
         """w (h, m)."""
-        return self.units[:, : self.outputs]
+        return self.coefficients[len(self.coefficients) - self.units :]
 
     @property
-    def centres(self) -> np.ndarray:
+    def led(self) -> np.ndarray:
+        """The coefficients (p_t + h, r) by the modes, or (p_t + h, m) where there are none."""
+        return self.coefficients if self.in_modes is None else self.in_modes
+
+    @property
+    def led_weights(self) -> np.ndarray:
+        """The weights' part of `led`, (h, r) or (h, m)."""
+        return self.led[len(self.coefficients) - self.units :]
+
+    @property
+    def unit_size(self) -> int:
+        """Unknowns per unit, m + p."""
+        return self.outputs + int(self.theta.shape[1])
+
+    def centres(self, settings: Settings) -> np.ndarray:
         """μ (h, n)."""
-        return self.units[:, self.outputs : self.outputs + self.inputs]
-
-    @property
-    def shape(self) -> np.ndarray:
-        """log σ or σ (h, n), as the settings have it."""
-        return self.units[:, self.outputs + self.inputs :]
+        return settings.regressors(self.inputs).form.centres(self.theta)
 
     def widths(self, settings: Settings) -> np.ndarray:
-        """σ (h, n)."""
-        return np.asarray(np.exp(self.shape)) if settings.widths == "log" else self.shape
+        """σ (h, n) along the axes: reciprocals of A's diagonal, for units that have a centre."""
+        A = settings.regressors(self.inputs).form.factors(self.theta)[0]
+        return np.asarray(1.0 / np.diagonal(A, axis1=1, axis2=2))
 
     def vector(self) -> np.ndarray:
-        """z (d,)."""
-        return np.concatenate([self.tail.ravel(), self.units.ravel()])
+        """z (d,): the tail row by row, then (w, θ) unit by unit."""
+        return np.concatenate([self.tail.ravel(), np.hstack([self.weights, self.theta]).ravel()])
+
+    def split(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Coefficients (p_t + h, m) and θ (h, p) that a vector z (d,) holds."""
+        h, m = self.units, self.outputs
+        a = (len(self.coefficients) - h) * m
+        units = z[a:].reshape(h, self.unit_size)
+        return np.vstack([z[:a].reshape(m, -1).T, units[:, :m]]), units[:, m:]
 
     def moved(self, z: np.ndarray) -> State:
         """The state with its parameters replaced by a vector z (d,)."""
-        tail, units = self.split(z)
-        return replace(self, tail=tail, units=units)
-
-    def split(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The tail (m, p) and units (h, m + 2n) that a vector z (d,) holds."""
-        a = self.tail.size
-        return z[:a].reshape(self.tail.shape), z[a:].reshape(self.units.shape)
+        coefficients, theta = self.split(z)
+        return replace(self, coefficients=coefficients, theta=theta)
 
     def block(self, unit: int) -> slice:
-        """Rows of P that belong to a unit."""
-        size, start = self.units.shape[1], self.tail.size
-        return slice(start + unit * size, start + (unit + 1) * size)
+        """Places of a unit in z."""
+        start = self.tail.size + unit * self.unit_size
+        return slice(start, start + self.unit_size)
 
 
-def initial(inputs: int, outputs: int, settings: Settings) -> State:
-    """The state before the first observation: no units, zero tail with its prior variance."""
-    p = {"affine": 1 + inputs, "constant": 1, "none": 0}[settings.tail]
+def initial(inputs: int, outputs: int, settings: Settings, modes: np.ndarray | None = None) -> State:
+    """The state before the first observation: no units, zero tail with its prior variance.
+
+    `modes` (m, r) are orthonormal output directions for the shared-weight rule.
+    """
+    regressors = settings.regressors(inputs)
+    p, p_t = regressors.form.size, regressors.tail_size
+    columns = inputs + (outputs if modes is None else modes.shape[1])
     return State(
-        tail=np.zeros((outputs, p)),
-        units=np.zeros((0, outputs + 2 * inputs)),
-        covariance=settings.tail_prior * np.eye(outputs * p),
+        coefficients=np.zeros((p_t, outputs)),
+        theta=np.zeros((0, p)),
+        covariance=_prior(p_t, outputs, p, settings),
+        places=np.zeros((0, inputs)),
         errors=np.zeros(0),
-        seen=np.zeros((0, inputs + outputs)),
+        seen=np.zeros((0, columns)),
         silent=np.zeros(0, dtype=np.int64),
         count=0,
         innovation=0.0,
-        inputs=inputs,
+        modes=modes,
+        in_modes=None if modes is None else np.zeros((p_t, modes.shape[1])),
     )
+
+
+def _prior(p_t: int, m: int, p: int, settings: Settings) -> Covariance:
+    match settings.update:
+        case "full":
+            return Full.prior(m * p_t, settings.tail_prior)
+        case "decoupled" | "winner":
+            return Blocks.prior(m * p_t, settings.tail_prior, m + p)
+        case "shared":
+            return Shared.prior(p_t, settings.tail_prior)
+    return Nothing()

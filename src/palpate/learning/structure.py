@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.learning.refine import Refined, refine
-from palpate.learning.settings import Tail
+from palpate.learning.regressors import Tail
 from palpate.network import Network, Scaling
 from palpate.units import Quantity, Range
 

@@ -14,7 +14,8 @@ from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.learning.history import History
 from palpate.learning.learn import Learned, learn
-from palpate.learning.settings import Settings, default
+from palpate.learning.presets import default
+from palpate.learning.settings import Settings
 from palpate.learning.structure import refined_network
 from palpate.network import Network
 from palpate.surrogates import TouchModel
@@ -202,7 +203,7 @@ def _networks(
         "starts": refinement.starts,
         "seed": seed,
     }
-    known = (sequential.state.centres, sequential.state.widths(settings))
+    known = (sequential.state.centres(settings), sequential.state.widths(settings))
     nodes = refined_network(data.X, _columns(data, columns), data.ranges, outputs, known=known, **options)[0]
     names = [Quantity(f"u_{c} at {x:g} m", "m") for x in data.rest[:, 0] for c in "xy"]
     planar = data.displacement[:, :, :2].reshape(len(data), -1)

@@ -1,0 +1,10 @@
+"""How one observation changes the parameters.
+
+kalman     extended Kalman filter over everything (RAN-EKF, MRAN), unit by unit, or the winning unit alone (EMRAN)
+shared     one covariance for the linear parameters of all outputs, one for the units' shapes
+gradient   least mean squares (RAN)
+"""
+
+from palpate.learning.updates.rule import updated
+
+__all__ = ["updated"]

@@ -125,8 +125,8 @@ def test_covariance_stays_symmetric_positive_definite(update):
         grew, pruned = grew + event.grew, pruned + event.pruned
         if t % 50 == 0 or event.grew or event.pruned:
             np.linalg.cholesky(state.covariance.matrix)
-    assert grew > 20
-    assert pruned > 20
+    assert grew >= 10
+    assert pruned >= 10
 
 
 @pytest.mark.parametrize("name", FORMS)

@@ -5,6 +5,7 @@
     compiled, evaluate, evaluator          … evaluated one point at a time, without allocation
     radial_kernels, combine                the loops behind that
     file, soundness                        kept in a file, and read back with suspicion
+    shared, publication, seqlock, mapped   published to other processes, who never wait
 
 Knows nothing of training.
 """
@@ -13,5 +14,15 @@ from palpate.network.evaluator import Evaluator
 from palpate.network.file import Archive, load_archive, save_archive
 from palpate.network.network import Network
 from palpate.network.scaling import Scaling
+from palpate.network.shared import Publisher, Subscriber
 
-__all__ = ["Archive", "Evaluator", "Network", "Scaling", "load_archive", "save_archive"]
+__all__ = [
+    "Archive",
+    "Evaluator",
+    "Network",
+    "Publisher",
+    "Scaling",
+    "Subscriber",
+    "load_archive",
+    "save_archive",
+]

@@ -12,7 +12,7 @@ from palpate.network.network import Network
 from palpate.network.scaling import Scaling
 from palpate.units import Quantity, Range
 
-__all__ = ["describe", "described"]
+__all__ = ["describe", "described", "quantity_of", "range_of"]
 
 _PARTS = ("factors", "shifts", "weights", "tail")
 _SCALES = ("input_centre", "input_half", "output_centre", "output_scale")
@@ -60,8 +60,8 @@ def described(description: Mapping[str, Any], arrays: Mapping[str, np.ndarray], 
         if array.dtype != np.float64:
             raise TypeError(f"{name} holds {array.dtype} numbers; double precision is needed")
     return Network(
-        inputs=tuple(_range(r) for r in description["inputs"]),
-        outputs=tuple(_quantity(q) for q in description["outputs"]),
+        inputs=tuple(range_of(r) for r in description["inputs"]),
+        outputs=tuple(quantity_of(q) for q in description["outputs"]),
         factors=plain["factors"],
         shifts=plain["shifts"],
         weights=plain["weights"],
@@ -84,11 +84,13 @@ def _exactly(found: Any, keys: Mapping[str, type]) -> None:
             raise TypeError(f"{key} is {found[key]!r:.40}, not of type {kind.__name__}")
 
 
-def _range(found: Any) -> Range:
+def range_of(found: Any) -> Range:
+    """A range from its JSON, checked."""
     _exactly(found, {"name": str, "low": float, "high": float, "unit": str})
     return Range(found["name"], float(found["low"]), float(found["high"]), found["unit"])
 
 
-def _quantity(found: Any) -> Quantity:
+def quantity_of(found: Any) -> Quantity:
+    """A quantity from its JSON, checked."""
     _exactly(found, {"name": str, "unit": str})
     return Quantity(found["name"], found["unit"])

@@ -1,6 +1,6 @@
 """In the hand: a real-time process that reads a device, evaluates the learnt body and sends a force back.
 
-    shared, records, seqlock          state out and commands in, through shared memory
+    shared, records                   state out and commands in, through shared memory
     process, child, report            LoopProcess: the parent's handle, and the process behind it
     loop, publisher, rehearsal        one tick, as a list of stages
     clock, priority, histogram        being on time, and knowing how much so

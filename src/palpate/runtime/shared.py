@@ -1,29 +1,24 @@
 """The memory that the real-time process shares with everyone else: one state block out, one command block in.
 
-Both blocks live in one memory-mapped file (in RAM where the system has ``/dev/shm``), whose path is its name.
-A plain mapped file and not `multiprocessing.shared_memory`: that one starts a tracker process, and before
-Python 3.13 every process that merely attached removed the block when it ended.
+Both blocks live in one memory-mapped file (`network.mapped`), whose path is its name.
 """
 
 from __future__ import annotations
 
-import contextlib
 import mmap
-import os
-import tempfile
 import threading
 import time
 import zlib
 from collections.abc import Sequence
-from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 import numpy as np
 
 from palpate.errors import DeviceError, UsageError
+from palpate.network import mapped
+from palpate.network.seqlock import Block
 from palpate.runtime.records import COMMAND, MAX_INPUTS, STATE, State
-from palpate.runtime.seqlock import Block
 
 __all__ = ["COMMAND", "MAX_INPUTS", "STATE", "Block", "Shared", "State", "now"]
 
@@ -59,18 +54,13 @@ class Shared:
         DeviceError
             If the system gives no shared memory.
         """
-        ram = Path("/dev/shm")
         try:
-            handle, name = tempfile.mkstemp(
-                prefix="palpate-", suffix=".shm", dir=ram if os.access(ram, os.W_OK) else None
-            )
-            with os.fdopen(handle, "r+b") as file:
-                file.write(_MAGIC.ljust(_SIZE, b"\0"))
+            name = mapped.create(_MAGIC, _SIZE)
         except OSError as error:
             raise DeviceError(
                 "No shared memory for the real-time process.",
                 why=str(error),
-                fix=f"Free some space in {ram if ram.is_dir() else tempfile.gettempdir()}.",
+                fix=f"Free some space in {mapped.folder()}.",
             ) from error
         shared = cls.attach(name)
         shared.command.record["parameters"] = np.nan
@@ -88,8 +78,7 @@ class Shared:
             If there are none of that name, or another version of palpate made them.
         """
         try:
-            with Path(name).open("r+b") as file:
-                memory = mmap.mmap(file.fileno(), 0)
+            memory = mapped.attach(name)
         except (OSError, ValueError) as error:
             raise DeviceError(
                 f"There is no shared memory named {name!r}.",
@@ -187,10 +176,7 @@ class Shared:
     def unlink(self) -> None:
         """Remove the name; who has attached keeps the memory. Harmless when repeated."""
         if self.name:
-            with contextlib.suppress(
-                PermissionError
-            ):  # Windows removes only what nobody maps: the last to go does
-                Path(self.name).unlink(missing_ok=True)
+            mapped.remove(self.name)
 
     def __enter__(self) -> Self:
         return self

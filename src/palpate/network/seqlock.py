@@ -19,7 +19,8 @@ class Block:
     """One record in shared bytes: a single writer publishes, readers fetch, nobody waits.
 
     `record` (shape ()) and the views taken of it are this side's private copy: the writer fills it and calls
-    `publish`; a reader calls `fetch` and finds it renewed.
+    `publish`; a reader calls `fetch` and finds it renewed. Of a record that is seldom full only the beginning
+    need travel.
     """
 
     HEADER = 16
@@ -27,18 +28,21 @@ class Block:
     def __init__(self, memory: memoryview, dtype: np.dtype[np.void]) -> None:
         self._sequence = np.ndarray((), np.int64, memory, 0)
         self._checksum = np.ndarray((), np.uint32, memory, 8)
+        self._size = np.ndarray((), np.uint32, memory, 12)
         self._shared = np.ndarray(dtype.itemsize, np.uint8, memory, self.HEADER)
         self._private = np.zeros(dtype.itemsize, np.uint8)
         self._scratch = np.zeros(dtype.itemsize, np.uint8)
         self._fetched = -1
         self.record = self._private.view(dtype).reshape(())
 
-    def publish(self) -> None:
-        """Copy the private record out: about 2 µs, never blocks."""
+    def publish(self, size: int | None = None) -> None:
+        """Copy the private record, or its first `size` bytes, out: a few µs, never blocks."""
+        size = self._private.size if size is None else size
         sequence = int(self._sequence) | 1  # odd also where the writer before us died while writing
         self._sequence[()] = sequence
-        self._shared[:] = self._private
-        self._checksum[()] = zlib.crc32(self._private.data)
+        self._shared[:size] = self._private[:size]
+        self._size[()] = size
+        self._checksum[()] = zlib.crc32(self._private.data[:size])
         self._sequence[()] = sequence + 1
 
     def fetch(self) -> bool:
@@ -48,15 +52,17 @@ class Block:
             return False
         if sequence == self._fetched:
             return True
-        self._scratch[:] = self._shared
-        if int(self._sequence) != sequence or zlib.crc32(self._scratch.data) != int(self._checksum):
+        size = min(int(self._size), self._private.size)
+        self._scratch[:size] = self._shared[:size]
+        if int(self._sequence) != sequence or zlib.crc32(self._scratch.data[:size]) != int(self._checksum):
             return False
-        self._private[:] = self._scratch
+        self._private[:size] = self._scratch[:size]
         self._fetched = sequence
         return True
 
     def release(self) -> None:
         """Let go of the shared bytes, so that the map can be closed; the private record stays."""
         size = self._private.size
-        self._sequence, self._checksum = np.zeros((), np.int64), np.zeros((), np.uint32)
+        self._sequence = np.zeros((), np.int64)
+        self._checksum, self._size = np.zeros((), np.uint32), np.zeros((), np.uint32)
         self._shared = np.zeros(size, np.uint8)

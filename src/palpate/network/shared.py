@@ -1,0 +1,274 @@
+"""A network published to other processes: readers never wait, and never see half of one.
+
+The publisher writes each network into the older of two slots and then says which is the newer, so a reader
+fails only if two networks are published while it copies one; it then keeps what it has. Each slot has a sequence
+number and a checksum (`seqlock`). What does not change — names, units, ranges, capacities — is said once.
+
+    publisher = Publisher.create(inputs, outputs, units=100)      # the process that learns
+    publisher.publish(network)
+
+    subscriber = Subscriber.attach(name)                          # the process that evaluates
+    subscriber.fetch()                                            # each tick: new? else 1 µs
+    y = subscriber(x)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.network import mapped
+from palpate.network.compiled import Precision
+from palpate.network.description import quantity_of, range_of
+from palpate.network.evaluator import Evaluator
+from palpate.network.network import Network
+from palpate.network.publication import HEAD, Memory, create, parts_of, shapes_of
+from palpate.network.radial import RADIAL_FUNCTIONS
+from palpate.network.scaling import Scaling
+from palpate.network.soundness import flaw
+from palpate.units import Quantity, Range
+
+__all__ = ["Publisher", "Subscriber"]
+
+
+class Publisher:
+    """The writing side: one process, one thread."""
+
+    def __init__(self, memory: Memory, inputs: tuple[Range, ...], outputs: tuple[Quantity, ...]) -> None:
+        self._memory, self._inputs, self._outputs = memory, inputs, outputs
+        self._serial = 0
+
+    @classmethod
+    def create(
+        cls,
+        inputs: Sequence[Range],
+        outputs: Sequence[Quantity],
+        *,
+        units: int,
+        rank: int | None = None,
+        modes: int | None = None,
+    ) -> Publisher:
+        """Room for networks of up to `units` units, `rank` rows in a factor and `modes` output modes.
+
+        Parameters
+        ----------
+        inputs, outputs
+            Of every network that will be published.
+        units, rank, modes : int
+            Capacities; rank is n unless given, and without modes only networks without a basis are taken.
+
+        Raises
+        ------
+        UsageError
+            If a capacity makes no sense, or the system gives no shared memory.
+        """
+        n, m = len(inputs), len(outputs)
+        text = {
+            "inputs": [asdict(r) for r in inputs],
+            "outputs": [asdict(q) for q in outputs],
+            "units": units,
+            "rank": (rows := n if rank is None else rank),
+            "modes": (columns := modes or 0),
+        }
+        if not (n and m and units >= 0 and 1 <= rows <= n and columns >= 0):
+            raise UsageError(
+                f"There is no room for networks of {n} inputs, {m} outputs, {units} units, rank {rank}, "
+                f"{modes} modes.",
+                fix="Give at least one input and output, and a rank between 1 and the number of inputs.",
+            )
+        try:
+            memory = create(text)
+        except OSError as error:
+            raise UsageError(
+                "No shared memory to publish networks in.",
+                why=str(error),
+                fix=f"Free some space in {mapped.folder()}, or ask for less capacity.",
+            ) from error
+        return cls(memory, tuple(inputs), tuple(outputs))
+
+    @property
+    def name(self) -> str:
+        """What `Subscriber.attach` needs."""
+        return self._memory.name
+
+    def publish(self, network: Network) -> int:
+        """Make this the newest network; returns its serial number, from 1 on. `extras` and `meta` stay here.
+
+        Raises
+        ------
+        UsageError
+            If the network has other inputs or outputs, does not fit, or holds numbers that can't be evaluated.
+        """
+        text = self._memory.text
+        (h, r, _), k = network.factors.shape, len(network.weights)
+        fault = flaw(network)
+        if (network.inputs, network.outputs) != (self._inputs, self._outputs):
+            fault = "its inputs or outputs are not those that were declared"
+        elif h > text["units"] or r > text["rank"] or (network.basis is not None and k > text["modes"]):
+            fault = (
+                f"{h} units of rank {r} with {k} latent outputs exceed the {text['units']} units, rank "
+                f"{text['rank']} and {text['modes']} modes that were declared"
+            )
+        elif self._memory.map.closed:
+            fault = "the publisher is closed"
+        if fault:
+            raise UsageError(
+                f"A network can't be published: {fault}.", fix="Create the publisher with what it will need."
+            )
+        serial = self._serial + 1
+        slot = self._memory.slots[serial % 2]
+        basis = network.basis is not None
+        slot.record["head"][:6] = serial, h, r, k, basis, RADIAL_FUNCTIONS.index(network.radial)
+        used = 0
+        for part in parts_of(network):
+            slot.record["numbers"][used : used + part.size] = part.ravel()
+            used += part.size
+        slot.publish(8 * (HEAD + used))
+        self._memory.latest[()] = self._serial = serial
+        return serial
+
+    def close(self) -> None:
+        """Stop publishing: the name is gone, subscribers keep what they have. Harmless when repeated."""
+        self._memory.close()
+        mapped.remove(self._memory.name)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+class Subscriber:
+    """The reading side, in any process; one thread.
+
+    Parameters
+    ----------
+    name : str
+        `Publisher.name`.
+    precision, jacobian
+        Of the evaluator, see `Network.evaluator`.
+
+    Attributes
+    ----------
+    serial : int
+        Number of the network held; 0 before the first.
+    """
+
+    def __init__(self, name: str, *, precision: Precision = "double", jacobian: bool = False) -> None:
+        self._memory = Memory(name)
+        self._options: dict[str, Any] = {"precision": precision, "jacobian": jacobian}
+        self._inputs = tuple(range_of(r) for r in self._memory.text["inputs"])
+        self._outputs = tuple(quantity_of(q) for q in self._memory.text["outputs"])
+        self._network: Network | None = None
+        self._evaluator: Evaluator | None = None
+        self.serial = 0
+
+    @classmethod
+    def attach(cls, name: str, *, precision: Precision = "double", jacobian: bool = False) -> Subscriber:
+        """Join a publisher of another process.
+
+        Raises
+        ------
+        UsageError
+            If nobody publishes under that name.
+        """
+        return cls(name, precision=precision, jacobian=jacobian)
+
+    def fetch(self) -> bool:
+        """Take over the newest network if there is a newer one; never waits.
+
+        False, and nothing changes, where there is none, or where the publisher overtook the copy: the next
+        call will see it.
+        """
+        latest = int(self._memory.latest)
+        if latest == self.serial:
+            return False
+        slot = self._memory.slots[latest % 2]
+        if not slot.fetch() or int(slot.record["head"][0]) <= self.serial:
+            return False
+        self.serial = int(slot.record["head"][0])
+        self._network = self._rebuilt(slot.record)
+        self._evaluator = self._network.evaluator(**self._options)
+        return True
+
+    def _rebuilt(self, record: np.ndarray) -> Network:
+        _, h, r, k, basis, radial = (int(i) for i in record["head"][:6])
+        n, m, used, parts = len(self._inputs), len(self._outputs), 0, []
+        for shape in shapes_of(n, m, h, r, k, basis):
+            parts.append(record["numbers"][used : used + math.prod(shape)].reshape(shape))
+            used += math.prod(shape)
+        factors, shifts, weights, tail, *scales = parts
+        return Network(
+            inputs=self._inputs,
+            outputs=self._outputs,
+            factors=factors,
+            shifts=shifts,
+            weights=weights,
+            tail=tail,
+            scaling=Scaling(*(np.array(s) for s in scales[:4])),
+            radial=RADIAL_FUNCTIONS[radial],
+            basis=scales[4] if basis else None,
+        )
+
+    @property
+    def network(self) -> Network:
+        """The network held, a frozen value without `extras` and `meta`.
+
+        Raises
+        ------
+        UsageError
+            If none was fetched yet.
+        """
+        if self._network is None:
+            raise _nothing_yet()
+        return self._network
+
+    def __call__(self, x: np.ndarray) -> np.ndarray:
+        """Outputs (m,) of the network held at x (n,), in an array that the next call overwrites.
+
+        Raises
+        ------
+        UsageError
+            If none was fetched yet, or x has not n numbers.
+        """
+        if self._evaluator is None:
+            raise _nothing_yet()
+        return self._evaluator(x)
+
+    @property
+    def jacobian(self) -> np.ndarray:
+        """∂f/∂x (m, n) where the last call evaluated.
+
+        Raises
+        ------
+        UsageError
+            If none was fetched yet, or the Jacobian was not asked for.
+        """
+        if self._evaluator is None:
+            raise _nothing_yet()
+        return self._evaluator.jacobian
+
+    def close(self) -> None:
+        """Let go of the memory; the network held stays. Harmless when repeated."""
+        self._memory.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _nothing_yet() -> UsageError:
+    return UsageError("No network has been fetched yet.", fix="Call fetch() until it says True.")

@@ -26,7 +26,7 @@ def window_error(state: State, coefficients: np.ndarray, theta: np.ndarray, sett
 
 def forgets(state: State, z: np.ndarray, settings: Settings) -> bool:
     """Whether other parameters z (d,) raise the error over the window by more than the settings allow."""
-    return spoils(state, *state.split(z), settings)
+    return bool(settings.relapse_limit) and spoils(state, *state.split(z), settings)
 
 
 def spoils(state: State, coefficients: np.ndarray, theta: np.ndarray, settings: Settings) -> bool:

@@ -66,11 +66,12 @@ def _rows(
     state: State, tail: np.ndarray, phi: np.ndarray, by_theta: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """One linear functional of f (m,), and its rows of H (m, d), from its regressors (p_t,), (h,), (h, p)."""
-    m, h, p = state.outputs, *state.theta.shape
-    units = np.zeros((m, h, m + p))
-    units[np.arange(m), :, np.arange(m)] = phi
+    m, (h, p), p_t = state.outputs, state.theta.shape, tail.size
+    each = np.arange(m)
+    H = np.zeros((m, m * p_t + h * (m + p)))
+    # views into H: its rows are contiguous
+    tails, units = H[:, : m * p_t].reshape(m, m, p_t), H[:, m * p_t :].reshape(m, h, m + p)
+    tails[each, each] = tail
+    units[each, :, each] = phi
     np.multiply(state.weights.T[:, :, None], by_theta, out=units[:, :, m:])
-    H = np.empty((m, m * tail.size + units[0].size))
-    H[:, : m * tail.size] = np.kron(np.eye(m), tail)
-    H[:, m * tail.size :] = units.reshape(m, -1)
     return np.concatenate([tail, phi]) @ state.coefficients, H

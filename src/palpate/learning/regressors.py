@@ -85,7 +85,10 @@ class Regressors:
 
     def tail_rows(self, X: np.ndarray) -> np.ndarray:
         """The tail's regressors (N, p_t): the first columns of [1, x]."""
-        return np.hstack([np.ones((len(X), 1)), X])[:, : self.tail_size]
+        rows = np.ones((len(X), self.tail_size))
+        if self.tail_size > 1:
+            rows[:, 1:] = X
+        return rows
 
     def tail_slopes(self, count: int) -> np.ndarray:
         """∂/∂x_i of the tail's regressors at N points, (N, n, p_t)."""

@@ -105,14 +105,23 @@ class State:
 
     def vector(self) -> np.ndarray:
         """z (d,): the tail row by row, then (w, θ) unit by unit."""
-        return np.concatenate([self.tail.ravel(), np.hstack([self.weights, self.theta]).ravel()])
+        h, m = self.units, self.outputs
+        a = (len(self.coefficients) - h) * m
+        z = np.empty(a + h * self.unit_size)
+        z[:a] = self.tail.ravel()
+        units = z[a:].reshape(h, self.unit_size)
+        units[:, :m], units[:, m:] = self.weights, self.theta
+        return z
 
     def split(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Coefficients (p_t + h, m) and θ (h, p) that a vector z (d,) holds."""
         h, m = self.units, self.outputs
         a = (len(self.coefficients) - h) * m
         units = z[a:].reshape(h, self.unit_size)
-        return np.vstack([z[:a].reshape(m, -1).T, units[:, :m]]), units[:, m:]
+        coefficients = np.empty_like(self.coefficients)
+        coefficients[: len(coefficients) - h] = z[:a].reshape(m, -1).T
+        coefficients[len(coefficients) - h :] = units[:, :m]
+        return coefficients, units[:, m:]
 
     def moved(self, z: np.ndarray) -> State:
         """The state with its parameters replaced by a vector z (d,)."""

@@ -31,7 +31,8 @@ class Centred:
     def widths(self, theta: np.ndarray) -> np.ndarray:
         """σ (h, n): reciprocals of A's diagonal."""
         s = theta[:, self.inputs : self.inputs + self._widths]
-        return np.asarray(np.broadcast_to(np.exp(s) if self.log else s, (len(theta), self.inputs)))
+        sigma = np.exp(s) if self.log else s
+        return sigma if self._widths == self.inputs else np.repeat(sigma, self.inputs, axis=1)
 
     def centres(self, theta: np.ndarray) -> np.ndarray:
         """μ (h, n)."""
@@ -46,14 +47,17 @@ class Centred:
     def factors(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """A (h, n, n) and b = A μ (h, n)."""
         n = self.inputs
-        A = np.zeros((len(theta), n, n))
-        A[:, self.rows, self.columns] = self._entries(theta)
+        A, entries = np.zeros((len(theta), n, n)), self._entries(theta)
+        A[:, self.rows, self.columns] = entries
         if self.rows.size == n:
-            return A, theta[:, :n] / self.widths(theta)
+            return A, theta[:, :n] * entries
         return A, np.einsum("kij,kj->ki", A, theta[:, :n])
 
     def _entries(self, theta: np.ndarray) -> np.ndarray:
-        return np.hstack([1.0 / self.widths(theta), theta[:, self.inputs + self._widths :]])
+        diagonal = 1.0 / self.widths(theta)
+        if self.rows.size == self.inputs:
+            return diagonal
+        return np.hstack([diagonal, theta[:, self.inputs + self._widths :]])
 
     def unit(self, x: np.ndarray, width: float, seed: int = 0) -> np.ndarray:
         """θ (p,) of a round unit at x (n,)."""

@@ -96,7 +96,8 @@ def test_compiled_query_is_not_slower_than_plain_numpy(tables):
         row["query"] for row in latency["rows"]
     }
     for claim in latency["claims"]:
-        assert claim["values"][0] < 1.0, claim["what"]
+        if claim["what"].endswith("over NumPy"):
+            assert claim["values"][0] < 1.0, claim["what"]
 
 
 def test_loop_ticked_without_faults(tables):

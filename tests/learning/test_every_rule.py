@@ -14,14 +14,15 @@ from palpate.learning.covariance import Full, Shared
 from palpate.learning.growth import grown
 from palpate.learning.model import value
 from palpate.learning.pruning import without
-from palpate.learning.updates import updated
+from palpate.learning.updates import predicted, updated
 
 every_rule = pytest.mark.parametrize("rule", RULES)
 
 
 def shown(state, x, y, settings):
     """The state after an update alone: no growth, no pruning, no memory."""
-    return updated(state, Observation(x, y), y - value(state, x, settings), settings)
+    seen = Observation(x, y)
+    return updated(state, seen, predicted(state, seen, settings), settings)
 
 
 def eager(rule):

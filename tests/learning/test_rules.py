@@ -16,12 +16,13 @@ from palpate.learning.growth import grown, nearest, wants_growth
 from palpate.learning.model import value
 from palpate.learning.noise import edge_factor, variance
 from palpate.learning.pruning import contributions, pruned
-from palpate.learning.updates import updated
+from palpate.learning.updates import predicted, updated
 
 
 def shown(state, x, y, settings):
     """The state after an update alone: no growth, no pruning, no memory."""
-    return updated(state, Observation(x, y), y - value(state, x, settings), settings)
+    seen = Observation(x, y)
+    return updated(state, seen, predicted(state, seen, settings), settings)
 
 
 def with_errors(settings: Settings, *errors: float, count: int = 1000):

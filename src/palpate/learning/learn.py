@@ -11,7 +11,9 @@ from threadpoolctl import threadpool_limits
 from palpate.errors import UsageError
 from palpate.learning.history import History
 from palpate.learning.model import value
-from palpate.learning.mran import Event, step
+from palpate.learning.modes import output_modes
+from palpate.learning.mran import Event, observe
+from palpate.learning.observation import Observation
 from palpate.learning.presets import default
 from palpate.learning.settings import Settings
 from palpate.learning.state import State, initial
@@ -51,6 +53,9 @@ def learn(
     settings: Settings | None = None,
     passes: int = 5,
     seed: int = 0,
+    weights: np.ndarray | None = None,
+    slopes: np.ndarray | None = None,
+    slope_weight: float = 1.0,
     heldout: tuple[np.ndarray, np.ndarray] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Learned:
@@ -71,6 +76,12 @@ def learn(
         How often each sample is presented.
     seed : int
         Decides the order of presentation.
+    weights : (N,), optional
+        How many ordinary samples each one counts as.
+    slopes : (N, m, n), optional
+        ∂Y/∂X in SI units; the filter learns them as well.
+    slope_weight : float
+        How many ordinary values a scaled slope counts as.
     heldout : (X, Y), optional
         Unseen samples on which the error is recorded after every observation.
     progress : callable, optional
@@ -90,7 +101,9 @@ def learn(
     scaling = Scaling.of(inputs, Y)
     xs, ys = scaling.scale_inputs(X), scaling.scale_outputs(Y)
     judge = _judge(heldout, scaling, settings)
-    state = initial(len(inputs), len(outputs), settings)
+    shown = _observations(xs, ys, scaling, weights, slopes, slope_weight)
+    modes = output_modes(ys, settings.modes) if settings.update == "shared" else None
+    state = initial(len(inputs), len(outputs), settings, modes)
     rng = np.random.default_rng(seed)
     events: list[Event] = []
     innovation: list[float] = []
@@ -98,7 +111,7 @@ def learn(
     with threadpool_limits(1):  # small matrices: more BLAS threads cost time, and the bits of the result
         for _ in range(passes):
             for i in rng.permutation(len(xs)):
-                state, event = step(state, xs[i], ys[i], settings, donate=True)
+                state, event = observe(state, shown[i], settings, donate=True)
                 events.append(event)
                 innovation.append(state.innovation)
                 if judge:
@@ -127,6 +140,30 @@ def freeze(
         scaling=scaling,
         radial=settings.radial,
     )
+
+
+def _observations(
+    xs: np.ndarray,
+    ys: np.ndarray,
+    scaling: Scaling,
+    weights: np.ndarray | None,
+    slopes: np.ndarray | None,
+    slope_weight: float,
+) -> list[Observation]:
+    """The samples as the filter takes them."""
+    N, m, n = len(xs), ys.shape[1], xs.shape[1]
+    if weights is not None and (np.shape(weights) != (N,) or not (np.asarray(weights) > 0).all()):
+        raise UsageError(f"Weights must be {N} positive numbers, one per sample.")
+    w = np.ones(N) if weights is None else np.asarray(weights, dtype=np.float64)
+    if slopes is None:
+        return [Observation(xs[i], ys[i], float(w[i])) for i in range(N)]
+    if slopes.shape != (N, m, n) or not np.isfinite(slopes).all():
+        raise UsageError(
+            f"Slopes of shape {slopes.shape} do not fit {N} samples of {m} outputs and {n} inputs.",
+            fix=f"Pass finite slopes of shape ({N}, {m}, {n}).",
+        )
+    scaled = slopes * scaling.input_half / scaling.output_scale[:, None]
+    return [Observation(xs[i], ys[i], float(w[i]), scaled[i], slope_weight * float(w[i])) for i in range(N)]
 
 
 def _judge(

@@ -10,13 +10,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from palpate.learning.growth import grown, wants_growth
-from palpate.learning.model import value
 from palpate.learning.noise import running_mean_square
 from palpate.learning.observation import Observation
 from palpate.learning.pruning import pruned
 from palpate.learning.settings import Settings
 from palpate.learning.state import State
-from palpate.learning.updates import updated
+from palpate.learning.updates import predicted, updated
 
 __all__ = ["Event", "observe", "step"]
 
@@ -38,6 +37,8 @@ class Event:
         Units afterwards.
     why : str
         For a skipped observation, the reason; else empty.
+    refined : bool
+        Whether an iteration of the refinement on retained samples followed (see `palpate.learning.online`).
     """
 
     error: float
@@ -47,6 +48,7 @@ class Event:
     pruned: int
     units: int
     why: str = ""
+    refined: bool = False
 
 
 def step(
@@ -81,17 +83,18 @@ def observe(
     """Learn one observation that may have a weight and slopes; else as `step`."""
     if not seen.finite:
         return state, Event(np.nan, np.nan, False, False, 0, state.units, "not finite")
-    error = seen.y - value(state, seen.x, settings)
+    found = predicted(state, seen, settings)
+    error = seen.y - found[0][: seen.y.size]
     size = float(np.sqrt(error @ error))
     state = _remembered(state, seen, error, settings)
     grew = wants_growth(state, seen.x, error, settings)
     if grew:
         # the new unit meets the observation, so the update below starts from a zero error, not twice the old one
         state = grown(state, seen.x, error, settings)
-        error = np.zeros_like(error)
+        found = predicted(state, seen, settings)
     use = settings.update_on_growth or not grew
     if use:
-        state = updated(state, seen, error, settings, donate=donate)
+        state = updated(state, seen, found, settings, donate=donate)
     before = state.units
     state = pruned(state, seen.x, settings)
     event = Event(size, float(np.sqrt(state.errors.mean())), grew, use, before - state.units, state.units)

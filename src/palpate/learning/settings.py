@@ -22,7 +22,7 @@ Density = Literal["uniform", "samples"]
 
 _POSITIVE = (
     *("window", "distance_max", "distance_min", "overlap", "prior", "width_prior", "tail_prior"),
-    *("distance_decay", "noise", "edge_weight", "iterations", "forgetting_factor", "learning_rate"),
+    *("distance_decay", "noise", "edge_weight", "iterations", "forgetting_factor", "learning_rate", "modes"),
 )
 _NOT_NEGATIVE = (
     *("error_min", "error_rms_min", "process_noise", "noise_share", "gate", "step_bound", "relapse_limit"),
@@ -92,6 +92,8 @@ class Settings:
         S_w: silent observations in a row after which a unit is removed; 0 for never.
     units_max : int
         Growth stops here.
+    modes : int
+        Under the shared-weight rule, output directions that drive the units' shapes.
 
     Raises
     ------
@@ -132,6 +134,7 @@ class Settings:
     prune_below: float = 1e-4
     prune_after: int = 500
     units_max: int = 40
+    modes: int = 10
 
     def __post_init__(self) -> None:
         for name in (*_POSITIVE, *_NOT_NEGATIVE):

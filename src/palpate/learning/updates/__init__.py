@@ -5,6 +5,6 @@ shared     one covariance for the linear parameters of all outputs, one for the 
 gradient   least mean squares (RAN)
 """
 
-from palpate.learning.updates.rule import updated
+from palpate.learning.updates.rule import predicted, updated
 
-__all__ = ["updated"]
+__all__ = ["predicted", "updated"]

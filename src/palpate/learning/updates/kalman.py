@@ -43,12 +43,18 @@ class _Linear:
     factor: np.ndarray
 
 
-def updated(state: State, seen: Observation, settings: Settings, *, donate: bool = False) -> State:
-    """The state after one observation; with `donate` the old covariance is overwritten."""
+def updated(
+    state: State,
+    seen: Observation,
+    first: tuple[np.ndarray, np.ndarray],
+    settings: Settings,
+    *,
+    donate: bool = False,
+) -> State:
+    """The state after one observation, predicted by `first`; with `donate` the old covariance is overwritten."""
     P = state.covariance
     assert isinstance(P, (Full, Blocks))  # the settings' update rule made the state
     unit = nearest(state, seen.x, settings)[0] if settings.update == "winner" and state.units else None
-    first = jacobian(state, seen, settings)
     error = (seen.targets() - first[0])[: seen.y.size]
     r = variance(seen.x, error, state.innovation, settings)
     found = _iterate(state, seen, r, first, unit, settings)

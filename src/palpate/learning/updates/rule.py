@@ -4,23 +4,37 @@ from __future__ import annotations
 
 import numpy as np
 
+from palpate.learning.model import jacobian, measured
 from palpate.learning.observation import Observation
 from palpate.learning.settings import Settings
 from palpate.learning.state import State
 from palpate.learning.updates import gradient, kalman, shared
 
-__all__ = ["updated"]
+__all__ = ["Predicted", "predicted", "updated"]
+
+Predicted = tuple[np.ndarray, np.ndarray]
+
+
+def predicted(state: State, seen: Observation, settings: Settings) -> Predicted:
+    """What the network has for an observation, (q,), and its derivatives (q, d).
+
+    The shared-weight rule has no use for the derivatives, and with many outputs no room: they are (q, 0) there.
+    """
+    if settings.update == "shared":
+        f = measured(state, seen, settings)
+        return f, np.zeros((f.size, 0))
+    return jacobian(state, seen, settings)
 
 
 def updated(
-    state: State, seen: Observation, error: np.ndarray, settings: Settings, *, donate: bool = False
+    state: State, seen: Observation, found: Predicted, settings: Settings, *, donate: bool = False
 ) -> State:
-    """The state after one observation, in scaled quantities, whose error y − f(x) (m,) is known already.
+    """The state after one observation, in scaled quantities, for which it predicted what was `found`.
 
     With `donate` the old state's arrays may be overwritten: the caller promises not to use it again.
     """
     if settings.update == "gradient":
-        return gradient.updated(state, seen, settings)
+        return gradient.updated(state, seen, found, settings)
     if settings.update == "shared":
-        return shared.updated(state, seen, error, settings, donate=donate)
-    return kalman.updated(state, seen, settings, donate=donate)
+        return shared.updated(state, seen, seen.y - found[0][: seen.y.size], settings, donate=donate)
+    return kalman.updated(state, seen, found, settings, donate=donate)

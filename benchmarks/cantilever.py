@@ -79,7 +79,7 @@ def refined(c: Case, solves: int, seed: int) -> tuple[Network, float]:
     began = time.process_time()
     X, Y = c.few(solves)
     found = learn(X, Y, c.inputs, c.outputs, passes=PASSES, seed=seed)
-    known = (found.state.centres(default()), found.state.widths(default()))
+    known = found.state.theta
     network = refined_network(X, Y, c.inputs, c.outputs, units_max=UNITS_MAX, seed=seed, known=known)[0]
     return network, time.process_time() - began
 

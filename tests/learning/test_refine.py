@@ -1,125 +1,222 @@
-"""Refinement against closed forms, and the way back to the filter."""
+"""Refinement against networks that are known, weights against repetition, slopes, limits and rank deficiency."""
 
 from __future__ import annotations
 
 import itertools
+import time
 
 import numpy as np
 import pytest
 
-from laws.beams import INPUT, OUTPUTS, exact, stiffening
-from palpate.learning import Settings, initial, posterior, refine, refined_network, step
-from palpate.learning.gaussian import activations, value
-from palpate.learning.refine import _activations
+from laws.beams import INPUT, stiffening
+from palpate.errors import UsageError
+from palpate.learning import refine
+from palpate.learning.forms import form
+from palpate.learning.regressors import Regressors
 from palpate.network import Scaling
+
+LINE = Regressors(form("axis-aligned", 1))
+NONE = np.zeros((0, 2))
+
+
+def line_units(centres, widths):
+    return np.column_stack([centres, np.log(widths)])
 
 
 def two_gaussians(X):
-    phi = activations(X, np.array([[-0.4], [0.5]]), np.array([[0.5], [0.8]]))
+    phi = LINE.phi(X, line_units([-0.4, 0.5], [0.5, 0.8]))
     return phi @ np.array([[1.0, -0.5], [0.3, 2.0]]) + np.hstack([np.ones_like(X), X]) @ np.array(
         [[0.1, 0.2], [0.5, -1]]
     )
 
 
+def known_network(name, radial="gaussian", *, n=2, h=3, m=3, seed=0):
+    """Regressors, θ and coefficients of a random network, and a start near it."""
+    rng = np.random.default_rng(seed)
+    r = Regressors(form(name, n), radial)
+    theta = np.array([r.form.unit(x, 0.9, seed=i) for i, x in enumerate(rng.uniform(-0.7, 0.7, (h, n)))])
+    C = rng.normal(size=(r.tail_size + h, m))
+    return r, theta, C, theta + rng.normal(0, 0.05, theta.shape)
+
+
+def slopes_of(r, theta, C, X):
+    """∂f/∂x (N, m, n)."""
+    both = np.concatenate([r.tail_slopes(len(X)), r.slopes(X, theta)], axis=2)
+    return (both @ C).transpose(0, 2, 1)
+
+
+def curved():
+    """Scaled samples of a smooth map with three outputs, and a start of three units."""
+    X, Y = stiffening(26)
+    s = Scaling.of(INPUT, Y)
+    return s.scale_inputs(X), s.scale_outputs(Y), line_units(np.linspace(-1, 1, 3), np.full(3, 0.8))
+
+
 def test_a_network_of_the_same_form_is_found_again():
     X = np.linspace(-1, 1, 40)[:, None]
-    found = refine(X, two_gaussians(X), np.array([[-0.7], [0.7]]), np.full((2, 1), 0.6), iterations=500)
-    order = np.argsort(found.centres[:, 0])
-    np.testing.assert_allclose(found.centres[order, 0], [-0.4, 0.5], atol=1e-4)
-    np.testing.assert_allclose(found.widths[order, 0], [0.5, 0.8], atol=1e-4)
+    found = refine(X, two_gaussians(X), line_units([-0.7, 0.7], [0.6, 0.6]), LINE, iterations=500)
+    order = np.argsort(found.theta[:, 0])
+    np.testing.assert_allclose(found.theta[order, 0], [-0.4, 0.5], atol=1e-4)
+    np.testing.assert_allclose(np.exp(found.theta[order, 1]), [0.5, 0.8], atol=1e-4)
     assert found.rms < 1e-7
     assert found.converged
+
+
+@pytest.mark.parametrize("solver", ["kaufman", "full"])
+@pytest.mark.parametrize("name", ["isotropic", "axis-aligned", "rotated", "rank-1"])
+@pytest.mark.parametrize("radial", ["gaussian", "inverse-multiquadric", "matern-5/2"])
+def test_values_and_slopes_of_a_network_lead_back_to_it(name, radial, solver):
+    r, theta, C, start = known_network(name, radial)
+    X = np.random.default_rng(1).uniform(-1, 1, (12, 2))
+    Y = np.hstack([r.tail_rows(X), r.phi(X, theta)]) @ C
+    found = refine(X, Y, start, r, slopes=slopes_of(r, theta, C, X), ridge=0.0, solver=solver)
+    unseen = np.random.default_rng(2).uniform(-1, 1, (50, 2))
+    truth = np.hstack([r.tail_rows(unseen), r.phi(unseen, theta)]) @ C
+    np.testing.assert_allclose(found.predict(unseen), truth, atol=2e-5)
+    np.testing.assert_allclose(found.theta, theta, atol=2e-3)
 
 
 def test_without_units_it_is_least_squares():
     rng = np.random.default_rng(0)
     X, Y = rng.normal(size=(30, 2)), rng.normal(size=(30, 3))
-    found = refine(X, Y, np.zeros((0, 2)), np.ones((0, 2)))
+    found = refine(X, Y, np.zeros((0, 5)), Regressors(form("rotated", 2)))
     A = np.hstack([np.ones((30, 1)), X])
     np.testing.assert_allclose(found.tail, np.linalg.lstsq(A, Y, rcond=None)[0], rtol=1e-9)
 
 
-def test_leave_one_out_in_closed_form_equals_leaving_one_out():
+@pytest.mark.parametrize("tail", ["affine", "constant", "none"])
+def test_leave_one_out_in_closed_form_equals_leaving_one_out(tail):
     rng = np.random.default_rng(1)
     X, Y = rng.normal(size=(15, 1)), rng.normal(size=(15, 2))
-    found = refine(X, Y, np.zeros((0, 1)), np.ones((0, 1)))
+    r = Regressors(form("axis-aligned", 1), tail=tail)
+    found = refine(X, Y, NONE, r)
     errors = []
     for i in range(15):
         rest = np.arange(15) != i
-        A = np.hstack([np.ones((15, 1)), X])
+        A = r.tail_rows(X)
         errors.append(Y[i] - A[i] @ np.linalg.lstsq(A[rest], Y[rest], rcond=None)[0])
     assert found.loo == pytest.approx(np.sqrt(np.mean(np.square(errors))), rel=1e-9)
 
 
-def test_derivatives_of_the_activations_equal_complex_step():
-    rng = np.random.default_rng(2)
-    X, theta = rng.uniform(-1, 1, (7, 3)), rng.normal(0, 0.4, (2, 4, 3))
-    _, D = _activations(X, theta)
-    for k in range(4):
-        for p in range(6):
-            moved = theta.astype(complex)
-            moved[p // 3, k, p % 3] += 1e-30j
-            t = (X[:, None, :] - moved[0]) / np.exp(moved[1])
-            numeric = np.exp(-(t * t).sum(axis=2))[:, k].imag / 1e-30
-            np.testing.assert_allclose(D[:, k, p], numeric, rtol=1e-10, atol=1e-14)
-
-
 def test_cost_never_rises_with_iterations():
-    X, Y = stiffening(26)
-    s = Scaling.of(INPUT, Y)
-    x, y = s.scale_inputs(X), s.scale_outputs(Y)
-    start = np.linspace(-1, 1, 3)[:, None], np.full((3, 1), 0.8)
-    errors = [refine(x, y, *start, iterations=k).rms for k in (0, 1, 3, 10, 40)]
+    x, y, start = curved()
+    errors = [refine(x, y, start, LINE, iterations=k).rms for k in (0, 1, 3, 10, 40)]
     assert all(b <= a for a, b in itertools.pairwise(errors))
     assert errors[-1] < 0.2 * errors[0]
 
 
-def test_refined_network_is_the_smallest_that_meets_the_target():
-    X, Y = stiffening(26)
-    unseen, answers = stiffening(333)
-    network, found, trials = refined_network(X, Y, INPUT, OUTPUTS, target=1e-5)
-    assert [t.units for t in trials] == list(range(network.units + 1))
-    assert found.loo <= 1e-5 < min(t.loo for t in trials[:-1])
-    assert np.abs(network.predict(unseen) - answers).max() < 2e-5
+def test_a_weight_of_three_is_the_sample_three_times():
+    x, y, start = curved()
+    rng = np.random.default_rng(5)
+    y = y + rng.normal(0, 0.01, y.shape)
+    w = rng.integers(0, 4, len(x))
+    slopes = rng.normal(0, 0.1, (*y.shape, 1))
+    weighted = refine(x, y, start, LINE, weights=w, slopes=slopes, slope_weight=0.1, iterations=30)
+    again = np.repeat(np.arange(len(x)), w)
+    repeated = refine(x[again], y[again], start, LINE, slopes=slopes[again], slope_weight=0.1, iterations=30)
+    np.testing.assert_allclose(weighted.theta, repeated.theta, rtol=1e-6)
+    np.testing.assert_allclose(weighted.predict(x), repeated.predict(x), atol=1e-8)
+    assert weighted.rms == pytest.approx(repeated.rms, rel=1e-8)
 
 
-def test_units_are_limited_by_the_samples_there_are():
-    X, Y = stiffening(6)
-    network, _, _ = refined_network(X, Y, INPUT, OUTPUTS, target=0.0, units_max=50)
-    assert network.units <= 1
+def test_slopes_at_few_points_teach_what_values_leave_open():
+    few = np.linspace(-1, 1, 7)[:, None]
+    unseen = np.linspace(-1, 1, 101)[:, None]
+    f, df = (lambda x: np.sin(5 * x)), (lambda x: 5 * np.cos(5 * x))
+    start = line_units(np.linspace(-0.8, 0.8, 4), np.full(4, 0.4))
+    plain = refine(few, f(few), start, LINE, ridge=1e-8)
+    informed = refine(few, f(few), start, LINE, ridge=1e-8, slopes=df(few)[:, :, None], slope_weight=0.05)
+    assert (
+        np.abs(informed.predict(unseen) - f(unseen)).max()
+        < 0.1 * np.abs(plain.predict(unseen) - f(unseen)).max()
+    )
+
+
+def test_unknown_slopes_have_no_weight_and_may_be_missing():
+    r, theta, C, start = known_network("rotated")
+    X = np.random.default_rng(1).uniform(-1, 1, (40, 2))
+    Y = np.hstack([r.tail_rows(X), r.phi(X, theta)]) @ C
+    slopes = slopes_of(r, theta, C, X)
+    slopes[10:] = np.nan
+    known = np.where(np.arange(40) < 10, 1.0, 0.0)
+    found = refine(X, Y, start, r, slopes=slopes, slope_weight=known, ridge=0.0)
+    np.testing.assert_allclose(found.predict(X), Y, atol=1e-5)
+
+
+def test_outputs_of_few_modes_are_refined_as_few():
+    """Thousands of outputs, the same answer as their modes."""
+    x, y, start = curved()
+    V = np.linalg.qr(np.random.default_rng(0).normal(size=(3000, 3)))[0].T
+    wide, narrow = refine(x, y @ V, start, LINE, iterations=5), refine(x, y, start, LINE, iterations=5)
+    np.testing.assert_allclose(wide.theta, narrow.theta, rtol=1e-6)
+    np.testing.assert_allclose(wide.coefficients, narrow.coefficients @ V, atol=1e-8)
+
+
+@pytest.mark.parametrize("solver", ["kaufman", "full"])
+def test_units_that_coincide_are_survived(solver):
+    x, y, _ = curved()
+    start = line_units(np.zeros(4), np.ones(4))
+    found = refine(x, y, start, LINE, solver=solver)
+    assert np.isfinite(found.coefficients).all()
+    alone = refine(x, y, start[:1], LINE, iterations=0)
+    assert found.rms <= alone.rms * (1 + 1e-6)
+
+
+def test_units_that_see_no_sample_stop_nobody():
+    x, y, start = curved()
+    far = np.vstack([start, line_units([40.0], [0.1])])
+    assert refine(x, y, far, LINE).rms < 1.1 * refine(x, y, start, LINE).rms
 
 
 def test_duplicate_samples_are_no_trouble():
-    X, Y = stiffening(20)
-    network, found, _ = refined_network(np.vstack([X, X]), np.vstack([Y, Y]), INPUT, OUTPUTS, units_max=3)
+    x, y, start = curved()
+    found = refine(np.vstack([x, x]), np.vstack([y, y]), start, LINE)
     assert np.isfinite(found.loo)
-    assert np.abs(network.predict(X) - Y).max() < 1e-3
+    assert found.rms < 1e-2
 
 
-def test_posterior_of_a_linear_model_is_the_filters_own_covariance():
-    rng = np.random.default_rng(3)
-    X = rng.uniform(-1, 1, (30, 1))
-    Y = 2 * X + 1 + 0.01 * rng.normal(size=(30, 1))
-    settings = exact(noise=1e-2)
-    state = initial(1, 1, settings)
-    for x, y in zip(X, Y, strict=True):
-        state, _ = step(state, x, y, settings)
-    found = posterior(refine(X, Y, np.zeros((0, 1)), np.ones((0, 1))), X, settings)
-    np.testing.assert_allclose(found.covariance, state.covariance, rtol=1e-8)
+def test_time_limit_is_kept_to_within_an_iteration():
+    rng = np.random.default_rng(0)
+    r = Regressors(form("rotated", 3), "inverse-multiquadric")
+    X, Y = rng.uniform(-1, 1, (400, 3)), rng.normal(size=(400, 20))
+    start = np.array([r.form.unit(x, 0.7) for x in X[:60]])
+    refine(X, Y, start, r, iterations=1)
+    began = time.perf_counter()
+    refine(X, Y, start, r, iterations=2)
+    two = time.perf_counter() - began
+    began = time.perf_counter()
+    found = refine(X, Y, start, r, iterations=10_000, seconds=0.2)
+    assert time.perf_counter() - began < 0.2 + 3 * two
+    assert not found.converged
+    assert found.iterations > 1
 
 
-def test_learning_goes_on_from_the_posterior_without_harm():
-    X, Y = stiffening(26)
-    s = Scaling.of(INPUT, Y)
-    x, y = s.scale_inputs(X), s.scale_outputs(Y)
-    found = refine(x, y, np.linspace(-1, 1, 3)[:, None], np.full((3, 1), 0.8))
-    settings = Settings(units_max=3, noise=max(found.rms**2, 1e-12))
-    state = posterior(found, x, settings)
-    unseen, answers = stiffening(211)
-    u, v = s.scale_inputs(unseen), s.scale_outputs(answers)
-    before = np.sqrt(((value(state, u, settings) - v) ** 2).mean())
-    for i in np.random.default_rng(0).permutation(len(u)):
-        state, _ = step(state, u[i], v[i], settings)
-    after = np.sqrt(((value(state, u, settings) - v) ** 2).mean())
-    assert after < 1.5 * before
-    np.linalg.cholesky(state.covariance)
+def test_held_out_samples_stop_it_where_they_are_known_best():
+    rng = np.random.default_rng(0)
+    X = rng.uniform(-1, 1, (60, 1))
+    Y = np.sin(3 * X) + 0.2 * rng.normal(size=(60, 1))
+    start = line_units(X[:9, 0], np.full(9, 0.3))
+    unseen = np.linspace(-1, 1, 200)[:, None]
+    kept = refine(X, Y, start, LINE, heldout=(unseen, np.sin(3 * unseen)), iterations=100)
+    whole = refine(X, Y, start, LINE, iterations=100)
+    error = lambda r: np.sqrt(((r.predict(unseen) - np.sin(3 * unseen)) ** 2).mean())  # noqa: E731
+    assert kept.heldout == pytest.approx(error(kept), rel=1e-9)
+    assert error(kept) < error(whole)
+    assert np.isnan(whole.heldout)
+
+
+def test_same_input_same_bits():
+    r, theta, C, start = known_network("rank-1", "matern-5/2")
+    X = np.random.default_rng(1).uniform(-1, 1, (60, 2))
+    Y = np.hstack([r.tail_rows(X), r.phi(X, theta)]) @ C
+    a, b = (refine(X, Y, start, r, iterations=20) for _ in range(2))
+    np.testing.assert_array_equal(a.theta, b.theta)
+    np.testing.assert_array_equal(a.coefficients, b.coefficients)
+
+
+def test_units_of_another_form_are_refused():
+    x, y, start = curved()
+    with pytest.raises(UsageError, match="2 numbers each"):
+        refine(x, y, np.zeros((3, 5)), LINE)
+    with pytest.raises(UsageError):
+        refine(x, y, start * np.nan, LINE)

@@ -19,7 +19,7 @@ from scipy.linalg import blas, lapack
 
 from palpate.errors import UsageError
 from palpate.learning.forms import Form
-from palpate.learning.leave_one_out import left_out
+from palpate.learning.leave_one_out import left_out, without_each
 from palpate.learning.projection import Fit, Solver, gauss_newton, project
 from palpate.learning.regressors import Regressors
 from palpate.learning.rows import Rows
@@ -55,6 +55,8 @@ class Refined:
     iterations : int
     converged : bool
         Whether the last steps brought no more gain; False means that a limit came first.
+    without : (h,)
+        The leave-one-out error were one unit removed and the others left as they are, for each unit.
     heldout : float
         Root mean square error per scaled output on the held-out samples; not-a-number without them.
     """
@@ -67,6 +69,7 @@ class Refined:
     condition: float
     iterations: int
     converged: bool
+    without: np.ndarray
     heldout: float = float("nan")
 
     @property
@@ -291,6 +294,7 @@ def _result(rows: Rows, point: _Point, count: int, done: bool, error: float) -> 
     # units were fitted too: their h p numbers count as leverage, shared by all rows and modes
     shared = point.theta.size / rows.targets.size
     missed = left_out(rows, fit, shared=shared, most=_MOST_LEVERAGE)
+    reduced = without_each(rows, fit, len(point.theta), shared=shared, most=_MOST_LEVERAGE)
     F = rows.matrix(point.theta)
     squares = float((fit.residual[: len(rows.X)] ** 2).sum())
     return Refined(
@@ -302,5 +306,6 @@ def _result(rows: Rows, point: _Point, count: int, done: bool, error: float) -> 
         float(np.linalg.cond(F)) if F.size else 1.0,
         count,
         done,
+        np.sqrt(reduced / (rows.total * m)),
         error,
     )

@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
+from palpate.learning.forms import Centred
 from palpate.learning.history import History
 from palpate.learning.learn import Learned, learn
 from palpate.learning.presets import default
@@ -203,13 +204,13 @@ def _networks(
         "starts": refinement.starts,
         "seed": seed,
     }
-    known = (sequential.state.centres(settings), sequential.state.widths(settings))
-    nodes = refined_network(data.X, _columns(data, columns), data.ranges, outputs, known=known, **options)[0]
+    known = _known(sequential, settings)
+    nodes, refined, _ = refined_network(
+        data.X, _columns(data, columns), data.ranges, outputs, known=known, **options
+    )
     names = [Quantity(f"u_{c} at {x:g} m", "m") for x in data.rest[:, 0] for c in "xy"]
     planar = data.displacement[:, :, :2].reshape(len(data), -1)
-    field = refined_network(
-        data.X, planar, data.ranges, names, known=(nodes.centres, _widths(nodes)), **options
-    )[0]
+    field = refined_network(data.X, planar, data.ranges, names, known=refined.theta, **options)[0]
     node, touched = _touched(data)
     compliance = _compliance(field, node, touched, data, coupling)
     X, ranges = _hand(data, field, node, touched, compliance)
@@ -223,10 +224,12 @@ def _networks(
     }
 
 
-def _widths(network: Network) -> np.ndarray:
-    return np.asarray(1.0 / np.diagonal(network.factors, axis1=1, axis2=2)).reshape(
-        network.units, len(network.inputs)
-    )
+def _known(sequential: Learned, settings: Settings) -> np.ndarray | None:
+    """The filter's units as axis-aligned ones, where they have centres."""
+    state = sequential.state
+    if settings.form not in {"isotropic", "axis-aligned", "rotated"}:
+        return None
+    return Centred("axis-aligned", state.inputs).of(state.centres(settings), state.widths(settings))
 
 
 def _compliance(

@@ -237,15 +237,17 @@ def picture(path: Path) -> None:
             dense = np.geomspace(sizes[0], sizes[-1], 50)
             laws = [(20, s) if key == "outputs" else (s, 10) for s in dense]
             kept = [
-                8 * filled(3, m, h, replace(PLAIN, update=update)).covariance.numbers
+                8e-6 * filled(3, m, h, replace(PLAIN, update=update)).covariance.numbers
                 for h, m in shapes
                 if update != "full" or filled_size(3, m, h) < 6000
             ]
-            axes.loglog(dense, [8 * law(update, h, m) for h, m in laws], color=colour, lw=1)
+            axes.loglog(dense, [8e-6 * law(update, h, m) for h, m in laws], color=colour, lw=1)
             axes.loglog(sizes[: len(kept)], kept, "o", color=colour, ms=5, label=update)
+        axes.set_xticks(sizes, [str(s) for s in sizes], minor=False)
+        axes.set_xticks([], minor=True)
         axes.set_xlabel("units h, at m = 10" if key == "units" else "outputs m, at h = 20")
         axes.grid(alpha=0.3)
-    left.set_ylabel("covariance, bytes")
+    left.set_ylabel("covariance, MB")
     left.legend(frameon=False)
     figure.suptitle(
         "What the filters remember: kept (dots) and declared (lines); n = 3, axis-aligned", fontsize=10

@@ -6,6 +6,7 @@
     radial_kernels, combine                the loops behind that
     file, soundness                        kept in a file, and read back with suspicion
     shared, publication, seqlock, mapped   published to other processes, who never wait
+    uncertainty, region                    how far it may be off, and where it was trained
 
 Knows nothing of training.
 """
@@ -13,8 +14,10 @@ Knows nothing of training.
 from palpate.network.evaluator import Evaluator
 from palpate.network.file import Archive, load_archive, save_archive
 from palpate.network.network import Network
+from palpate.network.region import TrainedRegion
 from palpate.network.scaling import Scaling
 from palpate.network.shared import Publisher, Subscriber
+from palpate.network.uncertainty import Uncertainty
 
 __all__ = [
     "Archive",
@@ -23,6 +26,8 @@ __all__ = [
     "Publisher",
     "Scaling",
     "Subscriber",
+    "TrainedRegion",
+    "Uncertainty",
     "load_archive",
     "save_archive",
 ]

@@ -90,11 +90,11 @@ class Uncertainty:
         UsageError
             If there are too few samples for the level: N must be at least level/(1 − level).
         """
-        z, rank = _quantile(level), math.ceil((len(X) + 1) * level)
+        z, rank = _quantile(level), _ceil((len(X) + 1) * level)
         if rank > len(X):
             raise UsageError(
                 f"{len(X)} samples are too few to calibrate intervals of {level:.0%}.",
-                fix=f"Keep at least {math.ceil(level / (1.0 - level))} apart from training.",
+                fix=f"Keep at least {_ceil(level / (1.0 - level))} apart from training.",
             )
         scores = np.abs(Y - self.network.predict(X)) / self.deviation(X)
         return replace(self, factor=self.factor * np.sort(scores, axis=0)[rank - 1] / z)
@@ -114,11 +114,15 @@ class Uncertainty:
         UsageError
             If its arrays do not fit the network.
         """
-        parts = {k: network.extras.get(_PREFIX + k) for k in (*_ARRAYS, "pattern")}
-        if any(v is None for v in parts.values()):
+        parts = {
+            k: network.extras[_PREFIX + k] for k in (*_ARRAYS, "pattern") if _PREFIX + k in network.extras
+        }
+        if not parts:
             return None
-        found = cls(network, **{k: np.asarray(v) for k, v in parts.items()})
-        return replace(found, pattern=found.pattern.astype(np.int64))
+        if len(parts) <= len(_ARRAYS) or any(np.ndim(v) == 0 for v in parts.values()):
+            raise UsageError("The uncertainty's arrays are not complete.", fix="Make it anew.")
+        parts["pattern"] = np.asarray(parts["pattern"]).astype(np.int64)
+        return cls(network, **parts)
 
     def __post_init__(self) -> None:
         h, r, n = self.network.factors.shape
@@ -180,3 +184,8 @@ def _quantile(level: float) -> float:
             f"A level of {level} is no probability.", fix="Choose one between 0 and 1, such as 0.9."
         )
     return NormalDist().inv_cdf((1.0 + level) / 2.0)
+
+
+def _ceil(number: float) -> int:
+    """The next whole number, of one that rounding may have lifted just above its own."""
+    return math.ceil(number - 1e-9)

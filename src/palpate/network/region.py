@@ -1,0 +1,142 @@
+"""Where a network was trained: the distance to its data, cheap enough for a 1 kHz loop.
+
+A box of ranges says little in several dimensions, and units of less than full rank do not decay, so neither tells
+interpolation from extrapolation. The nearest training input does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from palpate.errors import UsageError
+
+__all__ = ["TrainedRegion"]
+
+_jit = njit(cache=True, nogil=True, error_model="numpy")
+
+_MOST = 512  # points kept: a few microseconds per query
+_TYPICAL = 0.99  # share of the data's own nearest-neighbour distances that a radius covers
+
+
+@dataclass(frozen=True, eq=False)
+class TrainedRegion:
+    """The union of balls around training inputs, all in scaled inputs.
+
+    Attributes
+    ----------
+    points : (S, n)
+        The data, or so many of them that all others lie within the radius of one.
+    radius : float
+    """
+
+    points: np.ndarray
+    radius: float
+
+    def __post_init__(self) -> None:
+        points = np.array(self.points, dtype=np.float64, order="C", ndmin=2)
+        points.flags.writeable = False
+        object.__setattr__(self, "points", points)
+        if points.ndim != 2 or not points.size or not np.isfinite(points).all() or not self.radius >= 0:
+            raise UsageError(
+                f"Points of shape {points.shape} and a radius of {self.radius} are no region.",
+                fix="Make it of the training inputs: TrainedRegion.of(X).",
+            )
+
+    @classmethod
+    def of(cls, X: np.ndarray, *, most: int = _MOST) -> TrainedRegion:
+        """Of scaled training inputs X (N, n).
+
+        More than `most` are thinned by farthest-point selection (Gonzalez 1985). The radius is what 99 % of the
+        data are from their nearest other kept point, as each was left out, and never less than what it takes to
+        hold all data.
+
+        Raises
+        ------
+        UsageError
+            If X is empty or not finite.
+        """
+        everything = cls(X, 0.0).points  # checked
+        kept, cover = _farthest(everything, min(most, len(everything)))
+        gaps = _gaps(everything, everything[kept], kept)
+        typical = float(np.quantile(gaps, _TYPICAL)) if len(everything) > 1 else 0.0
+        return cls(everything[kept], max(typical, float(np.sqrt(cover))))
+
+    def distance(self, x: np.ndarray) -> float:
+        """From a scaled input x (n,) to the nearest point."""
+        return float(_distance(x, self.points))
+
+    def distances(self, X: np.ndarray) -> np.ndarray:
+        """From scaled inputs X (N, n) to the nearest points, (N,)."""
+        return np.asarray(_distances(np.ascontiguousarray(X, dtype=np.float64), self.points))
+
+    def inside(self, x: np.ndarray) -> bool:
+        """Whether a scaled input x (n,) is within the radius of a training input."""
+        return bool(_distance(x, self.points) <= self.radius)
+
+
+@_jit
+def _distance(x: np.ndarray, points: np.ndarray) -> float:
+    S, n = points.shape
+    best = np.inf
+    for i in range(S):
+        q = 0.0
+        for j in range(n):
+            d = x[j] - points[i, j]
+            q += d * d
+        best = min(best, q)
+    return float(np.sqrt(best))
+
+
+@_jit
+def _distances(X: np.ndarray, points: np.ndarray) -> np.ndarray:
+    out = np.empty(len(X))
+    for i in range(len(X)):
+        out[i] = _distance(X[i], points)
+    return out
+
+
+@_jit
+def _farthest(X: np.ndarray, count: int) -> tuple[np.ndarray, float]:
+    """Indices of points far from each other, the first near the middle, and the largest squared gap left."""
+    N, n = X.shape
+    middle = np.zeros(n)
+    for i in range(N):
+        middle += X[i] / N
+    chosen = np.empty(count, np.int64)
+    gap = np.full(N, np.inf)
+    first, least = 0, np.inf
+    for i in range(N):
+        q = ((X[i] - middle) ** 2).sum()
+        if q < least:
+            first, least = i, q
+    chosen[0] = first
+    for k in range(count):
+        last, farthest, widest = chosen[k], 0, -1.0
+        for i in range(N):
+            q = 0.0
+            for j in range(n):
+                d = X[i, j] - X[last, j]
+                q += d * d
+            gap[i] = min(gap[i], q)
+            if gap[i] > widest:
+                farthest, widest = i, gap[i]
+        if k + 1 < count:
+            chosen[k + 1] = farthest
+    return chosen, widest
+
+
+@_jit
+def _gaps(X: np.ndarray, points: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """Distance (N,) of each row of X to the nearest kept point that it is not itself."""
+    out = np.empty(len(X))
+    for i in range(len(X)):
+        best = np.inf
+        for k in range(len(points)):
+            if own[k] != i:
+                q = ((X[i] - points[k]) ** 2).sum()
+                best = min(best, q)
+        out[i] = np.sqrt(best)
+    return out

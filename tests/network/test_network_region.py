@@ -1,0 +1,81 @@
+"""The trained region against brute force."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from palpate.errors import UsageError
+from palpate.network.region import TrainedRegion
+
+
+@pytest.mark.parametrize("n", [1, 3, 6])
+def test_distance_is_that_to_the_nearest_point(n):
+    rng = np.random.default_rng(n)
+    X, unseen = rng.uniform(-1, 1, (200, n)), rng.uniform(-2, 2, (100, n))
+    region = TrainedRegion.of(X)
+    brute = np.linalg.norm(unseen[:, None] - X, axis=2).min(axis=1)
+    np.testing.assert_allclose(region.distances(unseen), brute, rtol=1e-13)
+    for x, d in zip(unseen, brute, strict=True):
+        assert region.distance(x) == pytest.approx(d, rel=1e-13)
+        assert region.inside(x) == (region.distance(x) <= region.radius)
+
+
+@pytest.mark.parametrize(("N", "n"), [(50, 1), (300, 3), (3000, 2), (3000, 6)])
+def test_training_data_are_inside_and_far_points_outside(N, n):
+    X = np.random.default_rng(0).uniform(-1, 1, (N, n))
+    region = TrainedRegion.of(X)
+    assert len(region.points) <= 512
+    assert (region.distances(X) <= region.radius * (1 + 1e-12)).all()
+    assert not region.inside(np.full(n, 3.0))
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_new_data_of_the_same_kind_are_mostly_inside(n):
+    rng = np.random.default_rng(0)
+    region = TrainedRegion.of(rng.uniform(-1, 1, (400, n)))
+    share = (region.distances(rng.uniform(-1, 1, (5000, n))) <= region.radius).mean()
+    assert share > 0.95
+
+
+def test_radius_is_the_datas_own_spacing():
+    grid = np.linspace(-1, 1, 21)[:, None]
+    assert TrainedRegion.of(grid).radius == pytest.approx(0.1)
+    assert not TrainedRegion.of(grid).inside(np.array([1.11]))
+    hole = np.concatenate([np.linspace(-1, -0.5, 200), np.linspace(0.5, 1, 200)])[:, None]
+    assert not TrainedRegion.of(hole).inside(np.array([0.0]))
+
+
+def test_thinning_keeps_every_sample_near_a_kept_one():
+    X = np.random.default_rng(1).normal(size=(2000, 3))
+    region = TrainedRegion.of(X, most=64)
+    gaps = np.linalg.norm(X[:, None] - region.points, axis=2).min(axis=1)
+    assert len(region.points) == 64
+    assert region.radius >= gaps.max() * (1 - 1e-12)
+
+
+def test_single_and_repeated_points_are_regions():
+    assert TrainedRegion.of(np.zeros((1, 2))).inside(np.zeros(2))
+    assert TrainedRegion.of(np.ones((600, 2))).inside(np.ones(2))
+
+
+def test_what_is_no_region_is_refused():
+    for bad in (np.zeros((0, 2)), np.full((3, 2), np.nan)):
+        with pytest.raises(UsageError, match="no region"):
+            TrainedRegion.of(bad)
+    with pytest.raises(UsageError):
+        TrainedRegion(np.zeros((3, 2)), -1.0)
+
+
+def test_a_query_costs_microseconds():
+    region = TrainedRegion.of(np.random.default_rng(0).uniform(-1, 1, (2000, 6)))
+    x = np.zeros(6)
+    region.inside(x)
+    times = []
+    for _ in range(200):
+        began = time.perf_counter()
+        region.inside(x)
+        times.append(time.perf_counter() - began)
+    assert min(times) < 20e-6  # 2 µs on an idle machine

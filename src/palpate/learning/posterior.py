@@ -11,8 +11,6 @@ from scipy.linalg import cho_factor, cho_solve
 from palpate.errors import UsageError
 from palpate.learning.covariance import Blocks, Covariance, Full, Nothing, Shared
 from palpate.learning.laplace import Posterior
-from palpate.learning.model import jacobian
-from palpate.learning.observation import Observation
 from palpate.learning.refine import Refined
 from palpate.learning.regressors import Regressors
 from palpate.learning.settings import Settings
@@ -22,7 +20,12 @@ __all__ = ["posterior"]
 
 
 def posterior(
-    refined: Refined, X: np.ndarray, settings: Settings, *, modes: np.ndarray | None = None
+    refined: Refined,
+    X: np.ndarray,
+    settings: Settings,
+    *,
+    modes: np.ndarray | None = None,
+    weights: np.ndarray | None = None,
 ) -> State:
     """The filter's state that a refined network stands for.
 
@@ -44,6 +47,8 @@ def posterior(
     settings : Settings
     modes : (m, r), optional
         Orthonormal output directions for the shared-weight rule.
+    weights : (N,), optional
+        How many ordinary samples each one counts as.
 
     Returns
     -------
@@ -71,41 +76,60 @@ def posterior(
         innovation=refined.rms**2,
         in_modes=None if modes is None else refined.coefficients @ modes,
     )
-    return replace(mean, covariance=_COVARIANCES[settings.update](mean, refined, X, settings))
+    w = np.ones(len(X)) if weights is None else weights
+    return replace(mean, covariance=_COVARIANCES[settings.update](mean, refined, X, w, settings))
 
 
 def _kind(r: Regressors) -> tuple[object, ...]:
     return r.form.name, r.form.inputs, getattr(r.form, "log", None), r.radial, r.tail
 
 
-def _full(mean: State, refined: Refined, X: np.ndarray, settings: Settings) -> Covariance:
-    information = np.diag(1.0 / _prior(mean, settings))
-    root = 1.0 / np.sqrt(_variance(refined, settings))
-    for x in X:
-        H = root * jacobian(mean, Observation(x, np.zeros(mean.outputs)), settings)[1]
-        information += H.T @ H
-    return Full(np.asfortranarray(_inverse(information)), mean.tail.size)
+def _full(mean: State, refined: Refined, X: np.ndarray, w: np.ndarray, settings: Settings) -> Covariance:
+    m, h, a, p = mean.outputs, mean.units, mean.tail.size, mean.theta.shape[1]
+    F, D = _rows(mean, refined, X, w)
+    FF, FD = F.T @ F, F.T @ D
+    unit = a + np.arange(h)[:, None] * mean.unit_size
+    by_theta = (unit + m + np.arange(p)).ravel()
+    information = np.diag(1.0 / _prior(mean, settings)) * _variance(refined, settings)
+    for j, weights in enumerate(mean.weights.T):  # the outputs meet only through the units' shapes
+        by_coefficient = np.r_[j * (a // m) + np.arange(a // m), (unit + j).ravel()]
+        across = FD * np.repeat(weights, p)
+        information[np.ix_(by_coefficient, by_coefficient)] += FF
+        information[np.ix_(by_coefficient, by_theta)] = across
+        information[np.ix_(by_theta, by_coefficient)] = across.T
+    shapes = (D.T @ D).reshape(h, p, h, p) * (mean.weights @ mean.weights.T)[:, None, :, None]
+    information[np.ix_(by_theta, by_theta)] += shapes.reshape(h * p, h * p)
+    return Full(np.asfortranarray(_variance(refined, settings) * _inverse(information)), a)
 
 
-def _blocks(mean: State, refined: Refined, X: np.ndarray, settings: Settings) -> Covariance:
-    r, m, a = refined.regressors, mean.outputs, mean.tail.size
-    tail = np.kron(np.eye(m), r.tail_rows(X).T @ r.tail_rows(X))
-    phi, D = r.by_theta(X, mean.theta)
+def _blocks(mean: State, refined: Refined, X: np.ndarray, w: np.ndarray, settings: Settings) -> Covariance:
+    m, a, p = mean.outputs, mean.tail.size, mean.theta.shape[1]
+    F, D = _rows(mean, refined, X, w)
+    p_t = F.shape[1] - mean.units
+    tail, phi = F[:, :p_t], F[:, p_t:]
     b, prior, variance = mean.unit_size, 1.0 / _prior(mean, settings), _variance(refined, settings)
     units = np.empty((mean.units, b, b))
-    for k, w in enumerate(mean.weights):
-        across = np.outer(w, phi[:, k] @ D[:, k])
+    for k, weights in enumerate(mean.weights):
+        Dk = D[:, k * p : (k + 1) * p]
+        across = np.outer(weights, phi[:, k] @ Dk)
         information = np.block(
             [
                 [(phi[:, k] @ phi[:, k]) * np.eye(m), across],
-                [across.T, (w @ w) * (D[:, k].T @ D[:, k])],
+                [across.T, (weights @ weights) * (Dk.T @ Dk)],
             ]
         )
         units[k] = _inverse(information / variance + np.diag(prior[mean.block(k)]))
-    return Blocks(_inverse(tail / variance + np.diag(prior[:a])), units)
+    return Blocks(_inverse(np.kron(np.eye(m), tail.T @ tail) / variance + np.diag(prior[:a])), units)
 
 
-def _shared(mean: State, refined: Refined, X: np.ndarray, settings: Settings) -> Covariance:
+def _rows(mean: State, refined: Refined, X: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Weighted regressors (N, p_t + h) and ∂φ_k/∂θ_k (N, h p)."""
+    r, root = refined.regressors, np.sqrt(w)[:, None]
+    phi, D = r.by_theta(X, mean.theta)
+    return root * np.hstack([r.tail_rows(X), phi]), root * D.reshape(len(X), -1)
+
+
+def _shared(mean: State, refined: Refined, X: np.ndarray, w: np.ndarray, settings: Settings) -> Covariance:
     variance = _variance(refined, settings)
     prior = np.r_[
         np.full(refined.regressors.tail_size, settings.tail_prior), np.full(mean.units, settings.prior)
@@ -116,15 +140,16 @@ def _shared(mean: State, refined: Refined, X: np.ndarray, settings: Settings) ->
         noise=np.full(mean.outputs, variance),
         ridge=variance / prior,
         prior=_shape_prior(mean, settings),
+        weights=w,
     )
     return Shared(np.asfortranarray(variance * found.coefficients), np.asfortranarray(found.shapes))
 
 
-def _nothing(mean: State, refined: Refined, X: np.ndarray, settings: Settings) -> Covariance:
+def _nothing(mean: State, refined: Refined, X: np.ndarray, w: np.ndarray, settings: Settings) -> Covariance:
     return Nothing()
 
 
-_COVARIANCES: dict[str, Callable[[State, Refined, np.ndarray, Settings], Covariance]] = {
+_COVARIANCES: dict[str, Callable[[State, Refined, np.ndarray, np.ndarray, Settings], Covariance]] = {
     "full": _full,
     "decoupled": _blocks,
     "winner": _blocks,

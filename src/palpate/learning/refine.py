@@ -4,8 +4,7 @@ Variable projection (Golub & Pereyra 1973): for given units θ the best weights 
 solution, so only θ is searched (see `projection`). The sequential filter says how many units are needed and where;
 this buys the last digits.
 
-Damping follows the ratio of gained to predicted descent (Marquardt 1963; Moré 1978). A step's units are held back
-one by one: a unit that the data hardly see asks for leaps, and must neither get them nor stop the others.
+The steps themselves are `marquardt`'s.
 """
 
 from __future__ import annotations
@@ -15,20 +14,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import blas, lapack
 
 from palpate.errors import UsageError
-from palpate.learning.forms import Form
 from palpate.learning.leave_one_out import left_out, without_each
+from palpate.learning.marquardt import DAMPING, Scaled, held_back, next_damping
 from palpate.learning.projection import Fit, Solver, gauss_newton, project
 from palpate.learning.regressors import Regressors
 from palpate.learning.rows import Rows
 
 __all__ = ["Refined", "refine"]
 
-_LONGEST = 1.0  # largest change of a log width, or of a centre in units of its width, in one iteration
-_DAMPING = (1e-12, 1e12)
-_FLOOR = 1e-2  # of the mean curvature: a unit of hardly any weight would else move freely
 _SINGLE_FROM = 300  # unknowns from which single precision saves time
 _SINGLE_DAMPING = 1e-5  # below this the damped matrix may be singular to single precision
 _MOST_LEVERAGE = 0.98  # a sample that decides its own fit says little; its residual counts fifty times
@@ -205,72 +200,28 @@ class _Search:
         """After one accepted step; `done` where none helps or hardly any is gained."""
         single = now.single and now.theta.size >= _SINGLE_FROM and now.damping > _SINGLE_DAMPING
         G, descent = gauss_newton(self.rows, now.theta, now.fit, self.solver, single=single)
-        system = _Scaled(G, descent)
+        system = Scaled(G, descent)
         damping = now.damping
-        while damping < _DAMPING[1]:
+        while damping < DAMPING[1]:
             step = system.step(damping)
             if step is None:
                 damping *= 4.0
                 continue
-            step = _held_back(self.rows.regressors.form, now.theta, step.reshape(now.theta.shape))
+            step = held_back(self.rows.regressors.form, now.theta, step.reshape(now.theta.shape))
             new = now.theta + step
             fit = project(self.rows, new, self.penalty)
             gain = now.fit.cost - fit.cost
             if gain > 0:
                 ratio = gain / max(system.predicted(step.ravel()), 1e-300)
                 done = gain < self.tolerance * now.fit.cost and not single
-                return _Point(new, fit, _next(damping, ratio), now.single and gain > 1e-7 * fit.cost, done)
+                return _Point(
+                    new, fit, next_damping(damping, ratio), now.single and gain > 1e-7 * fit.cost, done
+                )
             damping *= 4.0
             if time.monotonic() > self.deadline:
                 return replace(now, damping=damping)
         # rounding may have hidden a step; double precision has the last word
         return replace(now, damping=1e-2, single=False, done=not single)
-
-
-class _Scaled:
-    """A Gauss–Newton matrix with its diagonal made one, solved for any damping without forming it again."""
-
-    def __init__(self, G: np.ndarray, descent: np.ndarray) -> None:
-        curvature = np.diagonal(G).astype(float)
-        self._shrink = 1.0 / np.sqrt(curvature + _FLOOR * max(float(curvature.mean()), 1e-300))
-        kind = G.dtype.type
-        G *= self._shrink.astype(kind)[:, None]
-        G *= self._shrink.astype(kind)
-        self._G, self._descent, self._kind = G, descent * self._shrink, kind
-        single = kind is np.float32
-        self._factor, self._solve = (
-            (lapack.spotrf, lapack.spotrs) if single else (lapack.dpotrf, lapack.dpotrs)
-        )
-        self._times = blas.ssymv if single else blas.dsymv
-
-    def step(self, damping: float) -> np.ndarray | None:
-        """The damped step (h p,), or None where the matrix is not positive definite to its precision."""
-        H = self._G.copy(order="F")
-        H[np.diag_indices(len(H))] += self._kind(damping)
-        L, failed = self._factor(H, lower=1, overwrite_a=1, clean=0)
-        if failed:
-            return None
-        found = np.asarray(self._solve(L, self._descent.astype(self._kind), lower=1)[0], float)
-        return found * self._shrink if np.isfinite(found).all() else None
-
-    def predicted(self, step: np.ndarray) -> float:
-        """How much the cost falls along a step, to second order."""
-        s = step / self._shrink
-        return float(2.0 * self._descent @ s - s @ self._times(1.0, self._G, s.astype(self._kind), lower=1))
-
-
-def _next(damping: float, ratio: float) -> float:
-    """Less damping after steps that kept their promise, more after those that did not."""
-    factor = 0.2 if ratio > 0.75 else 0.5 if ratio > 0.4 else 1.0 if ratio > 0.2 else 2.0
-    return max(damping * factor, _DAMPING[0])
-
-
-def _held_back(form: Form, theta: np.ndarray, step: np.ndarray) -> np.ndarray:
-    """A step (h, p), shortened unit by unit so that no width or centre leaps."""
-    if form.stride(theta, step) <= _LONGEST:
-        return step
-    longest = np.array([form.stride(theta[k : k + 1], step[k : k + 1]) for k in range(len(theta))])
-    return np.asarray(step * np.minimum(1.0, _LONGEST / np.maximum(longest, 1e-300))[:, None])
 
 
 def _judge(rows: Rows, heldout: tuple[np.ndarray, np.ndarray] | None) -> Callable[[_Point], float]:

@@ -1,0 +1,119 @@
+"""Retained samples of a stream: a bounded sample of all of it, or of its recent past."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+import numpy as np
+
+from palpate.errors import UsageError
+
+__all__ = ["Keeping", "Reservoir"]
+
+Keeping = Literal["uniform", "fading", "latest"]
+
+
+class Reservoir:
+    """At most R samples of a stream of (x, y), in scaled quantities.
+
+    uniform   after t samples each of them is kept with probability R/t (algorithm R, Vitter 1985)
+    fading    every new one is kept, in a random place: ages are geometric with mean R (Aggarwal 2006)
+    latest    the last R
+
+    The seed decides which. Memory: R (n + m + 3) numbers, and R m n more once a sample comes with slopes.
+
+    Parameters
+    ----------
+    capacity : int
+        R.
+    inputs, outputs : int
+        n and m.
+    keeping : {"uniform", "fading", "latest"}
+    seed : int
+
+    Raises
+    ------
+    UsageError
+        If the capacity is not positive, or there is no such way of keeping.
+    """
+
+    def __init__(
+        self, capacity: int, inputs: int, outputs: int, *, keeping: Keeping = "uniform", seed: int = 0
+    ) -> None:
+        if capacity < 1 or keeping not in get_args(Keeping):
+            raise UsageError(
+                f"There is no reservoir of {capacity} samples that keeps {keeping!r} ones.",
+                fix=f"Give it room for one at least, and one of {', '.join(get_args(Keeping))}.",
+            )
+        self.capacity, self.keeping = capacity, keeping
+        self.seen = 0
+        self._rng = np.random.default_rng(seed)
+        self._x, self._y = np.empty((capacity, inputs)), np.empty((capacity, outputs))
+        self._times = np.empty(capacity, np.int64)
+        self._weights, self._slope_weights = np.ones(capacity), np.zeros(capacity)
+        self._slopes: np.ndarray | None = None
+
+    def __len__(self) -> int:
+        return min(self.seen, self.capacity)
+
+    @property
+    def X(self) -> np.ndarray:
+        """Inputs (N, n), in no order."""
+        return self._x[: len(self)]
+
+    @property
+    def Y(self) -> np.ndarray:
+        """Outputs (N, m)."""
+        return self._y[: len(self)]
+
+    @property
+    def ages(self) -> np.ndarray:
+        """How many samples came after each, (N,)."""
+        return np.asarray(self.seen - 1 - self._times[: len(self)])
+
+    @property
+    def weights(self) -> np.ndarray:
+        """(N,)."""
+        return self._weights[: len(self)]
+
+    @property
+    def slopes(self) -> np.ndarray | None:
+        """∂y/∂x (N, m, n), where any sample came with them."""
+        return None if self._slopes is None else self._slopes[: len(self)]
+
+    @property
+    def slope_weights(self) -> np.ndarray:
+        """(N,), zero for samples without slopes."""
+        return self._slope_weights[: len(self)]
+
+    def add(
+        self,
+        x: np.ndarray,
+        y: np.ndarray,
+        *,
+        weight: float = 1.0,
+        slopes: np.ndarray | None = None,
+        slope_weight: float = 1.0,
+    ) -> bool:
+        """Show one more sample x (n,), y (m,); whether it was kept."""
+        place = self._place()
+        self.seen += 1
+        if place >= self.capacity:
+            return False
+        self._x[place], self._y[place] = x, y
+        self._times[place] = self.seen - 1
+        self._weights[place] = weight
+        self._slope_weights[place] = 0.0 if slopes is None else slope_weight
+        if slopes is not None:
+            if self._slopes is None:
+                self._slopes = np.zeros((self.capacity, *slopes.shape))
+            self._slopes[place] = slopes
+        return True
+
+    def _place(self) -> int:
+        if self.seen < self.capacity:
+            return self.seen
+        if self.keeping == "latest":
+            return self.seen % self.capacity
+        # a place past the last means that the sample is not kept
+        return int(self._rng.integers(self.capacity if self.keeping == "fading" else self.seen + 1))

@@ -8,7 +8,7 @@ import pytest
 from palpate.errors import UsageError
 from palpate.learning.forms import form
 from palpate.learning.leave_one_out import left_out, without_each
-from palpate.learning.projection import gauss_newton, project
+from palpate.learning.projection import fitted, gauss_newton, project
 from palpate.learning.regressors import Regressors
 from palpate.learning.rows import Rows, modes
 
@@ -175,3 +175,17 @@ def test_what_is_not_a_sample_is_refused():
         Rows.of(r, X * np.nan, Y)
     with pytest.raises(UsageError):
         Rows.of(r, X[:, :1], Y)
+
+
+@pytest.mark.parametrize("slopes", [False, True])
+def test_degrees_of_freedom_of_units_are_the_trace_of_their_hat_matrix(slopes):
+    rows, theta = some_rows(slopes=slopes)
+    fit = project(rows, theta, 1e-12)
+    F, D, W = rows.matrix(theta), rows.derivatives(theta), fit.coefficients[-len(theta) :]
+    D -= F @ np.linalg.lstsq(F, D, rcond=None)[0]
+    # rows of the Jacobian mode by mode: w_kj P ∂φ_k/∂θ_k
+    J = np.vstack([D * np.repeat(w, theta.shape[1]) for w in W.T])
+    hat = np.diag(J @ np.linalg.pinv(J)).reshape(W.shape[1], -1)
+    found = fitted(rows, theta, fit)
+    np.testing.assert_allclose(found, hat.sum(axis=1), rtol=1e-5)
+    assert found.sum() == pytest.approx(theta.size, rel=1e-5)

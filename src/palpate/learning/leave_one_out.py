@@ -20,22 +20,24 @@ from palpate.learning.rows import Rows
 __all__ = ["left_out", "without_each"]
 
 
-def left_out(rows: Rows, fit: Fit, *, shared: float = 0.0, most: float = 1.0 - 1e-12) -> np.ndarray:
+def left_out(
+    rows: Rows, fit: Fit, *, shared: float | np.ndarray = 0.0, most: float = 1.0 - 1e-12
+) -> np.ndarray:
     """Errors (N, k) of the values at each sample, in modes, when it and its slopes are left out.
 
-    Exact for given units. `shared` is leverage to add to every row for what else was fitted; no row's leverage
-    counts as more than `most`.
+    Exact for given units. `shared`, one number or (k,), is leverage to add to every row for what else was fitted;
+    no row's leverage counts as more than `most`.
     """
     Q, N = fit.Q, len(rows.X)
-    leverage = np.minimum((Q[:N] ** 2).sum(axis=1) + shared, most)
-    errors = fit.residual[:N] / (1.0 - leverage)[:, None]
+    leverage = np.minimum((Q[:N] ** 2).sum(axis=1)[:, None] + shared, most)
+    errors = fit.residual[:N] / (1.0 - leverage)
     n = rows.X.shape[1]
     for j, i in enumerate(rows.sloped):
         block = np.r_[i, N + j * n + np.arange(n)]
         hat = Q[block] @ Q[block].T
-        hat[np.diag_indices(len(hat))] += shared
         values, V = np.linalg.eigh(hat)
-        errors[i] = (V / (1.0 - np.minimum(values, most)) @ (V.T @ fit.residual[block]))[0]
+        left = 1.0 - np.minimum(values[:, None] + shared, most)
+        errors[i] = V[0] @ ((V.T @ fit.residual[block]) / left)
     return np.asarray(errors / rows.scale[:, None])
 
 

@@ -20,7 +20,7 @@ from scipy.linalg import blas, lapack
 
 from palpate.learning.rows import Rows
 
-__all__ = ["Fit", "Solver", "gauss_newton", "project"]
+__all__ = ["Fit", "Solver", "fitted", "gauss_newton", "project"]
 
 Solver = Literal["kaufman", "full"]
 
@@ -98,24 +98,46 @@ def gauss_newton(
     D = rows.derivatives(theta, below=c)
     descent = np.einsum("nk,nkp->kp", fit.residual @ W.T, D[:R].reshape(R, h, p)).ravel()
     S = D[:R].T @ fit.residual if solver == "full" else None
-    kind = np.float32 if single else np.float64
-    Z = D.astype(kind, copy=False)
-    ormqr, syrk = (lapack.sormqr, blas.ssyrk) if single else (lapack.dormqr, blas.dsyrk)
-    # the rows of QᵀD below the first c are D's part outside the regressors' span
-    Zt = ormqr(
-        "R",
-        "N",
-        fit.reflectors.astype(kind, copy=False),
-        fit.tau.astype(kind, copy=False),
-        Z.T,
-        64 * (h * p + 64),
-        overwrite_c=1,
-    )[0]
-    G = syrk(1.0, Zt[:, c:], lower=1)
+    G = _outside(fit, D, single)
     blocks = G.T.reshape(h, p, h, p)
-    blocks *= (W @ W.T).astype(kind)[:, None, :, None]
+    blocks *= (W @ W.T).astype(G.dtype)[:, None, :, None]
     if S is not None:
         extra = blas.dsyrk(1.0, S, lower=1)
         extra.T.reshape(h, p, h, p)[:] *= fit.inverse[c - h :, c - h :][:, None, :, None]
         G += extra
     return G, descent
+
+
+def fitted(rows: Rows, theta: np.ndarray, fit: Fit) -> np.ndarray:
+    """How many degrees of freedom of each mode (k,) the units' numbers take up; together all h p of them.
+
+    The trace of their part of the hat matrix, mode by mode: the modes of the largest weights take the most.
+    """
+    h, p = theta.shape
+    W = fit.coefficients[len(fit.tau) - h :]
+    G = _outside(fit, rows.derivatives(theta, below=len(fit.tau)), False)
+    strict = np.tril(G, -1)
+    G = strict + strict.T + np.diag(np.diagonal(G))
+    joint = (G.reshape(h, p, h, p) * (W @ W.T)[:, None, :, None]).reshape(h * p, h * p)
+    size = np.sqrt(np.diagonal(joint))
+    size = np.maximum(size, 1e-8 * max(float(size.max()), 1e-300))
+    joint /= size[:, None] * size
+    joint[np.diag_indices(h * p)] += 1e-10
+    inverse, failed = lapack.dpotri(*lapack.dpotrf(joint, lower=1)[:1], lower=1)
+    if failed:
+        return np.full(W.shape[1], theta.size / W.shape[1])
+    inverse = np.tril(inverse) + np.tril(inverse, -1).T
+    folded = (inverse / (size[:, None] * size) * G).reshape(h, p, h, p).sum(axis=(1, 3))
+    return np.asarray(np.einsum("kj,kl,lj->j", W, folded, W, optimize=True))
+
+
+def _outside(fit: Fit, D: np.ndarray, single: bool) -> np.ndarray:
+    """Dᵀ P D (h p, h p), lower triangle, of D (R + c, h p), whose last rows are zero; D is overwritten."""
+    c, kind = len(fit.tau), np.float32 if single else np.float64
+    ormqr, syrk = (lapack.sormqr, blas.ssyrk) if single else (lapack.dormqr, blas.dsyrk)
+    reflectors, tau = fit.reflectors.astype(kind, copy=False), fit.tau.astype(kind, copy=False)
+    Z = D.astype(kind, copy=False).T
+    if c:
+        Z = ormqr("R", "N", reflectors, tau, Z, 64 * (len(Z) + 64), overwrite_c=1)[0]
+    # the rows of QᵀD below the first c are D's part outside the regressors' span
+    return np.asarray(syrk(1.0, Z[:, c:], lower=1))

@@ -8,11 +8,16 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from palpate.errors import FileFormatError, UsageError
 from palpate.learning.mran import Event
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 __all__ = ["History"]
 
@@ -95,6 +100,23 @@ class History:
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
             raise FileFormatError(f"{path} is not a learning history.", why=str(error)) from error
         return cls(**(parts | {"passes": int(parts["passes"])}))
+
+    def plot(self, ax: Axes | None = None) -> Figure:
+        """Draw errors and units against the observations; ▲ marks a unit added, ▼ one removed.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw errors, with units on a second axis at the right. If left out a figure of its own is
+            made, of no window and no global state: `savefig` writes it, a notebook shows it.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from palpate.learning.drawing import plotted
+
+        return plotted(self, ax)
 
     @property
     def relapse(self) -> float:

@@ -126,7 +126,7 @@ def refine(
     iterations : int
         Limit on Levenberg–Marquardt iterations.
     seconds : float, optional
-        Limit on time; the iteration under way is finished.
+        Limit on the search's time; the iteration under way is finished.
     solver : {"kaufman", "full"}
         Gauss–Newton matrix: Kaufman's approximation, or that of Golub and Pereyra in full.
     heldout : (X (N', n), Y (N', m)), optional
@@ -145,6 +145,7 @@ def refine(
     UsageError
         If shapes disagree or numbers are not finite.
     """
+    deadline = np.inf if seconds is None else time.monotonic() + seconds
     theta = np.array(theta, float)
     if theta.ndim != 2 or theta.shape[1] != regressors.form.size or not np.isfinite(theta).all():
         raise UsageError(
@@ -156,7 +157,6 @@ def refine(
     # the floor keeps the triangle regular where units coincide
     penalty = max(ridge, 1e-30) * rows.total
     judge = _judge(rows, heldout)
-    deadline = np.inf if seconds is None else time.monotonic() + seconds
     search = _Search(rows, penalty, solver, tolerance, deadline)
     now = _Point(theta, project(rows, theta, penalty))
     best, error, since, count = now, judge(now), 0, 0

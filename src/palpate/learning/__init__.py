@@ -9,11 +9,14 @@ noise      how far a sample is believed      memory     what the window forbids
 mran       the step: all of these in order   learn      a fold of the step
 history    what happened meanwhile
 refine     variable projection               structure  how many units a refined network needs
+rows       its weighted values and slopes    projection its cost and Gauss–Newton matrix
+leave_one_out  errors without fitting again  laplace    the structured posterior, for predictive variance
 posterior  the way back from a refined network to the filter
 touch      a dataset made into a body that can be touched
 """
 
 from palpate.learning.history import History
+from palpate.learning.laplace import Posterior
 from palpate.learning.learn import Learned, freeze, learn
 from palpate.learning.mran import Event, observe, step
 from palpate.learning.observation import Observation
@@ -22,7 +25,7 @@ from palpate.learning.presets import PRESETS, default, founding
 from palpate.learning.refine import Refined, refine
 from palpate.learning.settings import Settings
 from palpate.learning.state import State, initial
-from palpate.learning.structure import Trial, refined_network
+from palpate.learning.structure import Trial, grow, prune, refined_network
 from palpate.learning.touch import FEWEST, Refinement, hand_coordinates, learn_touch, node_outputs
 
 __all__ = [
@@ -32,6 +35,7 @@ __all__ = [
     "History",
     "Learned",
     "Observation",
+    "Posterior",
     "Refined",
     "Refinement",
     "Settings",
@@ -40,6 +44,7 @@ __all__ = [
     "default",
     "founding",
     "freeze",
+    "grow",
     "hand_coordinates",
     "initial",
     "learn",
@@ -47,6 +52,7 @@ __all__ = [
     "node_outputs",
     "observe",
     "posterior",
+    "prune",
     "refine",
     "refined_network",
     "step",

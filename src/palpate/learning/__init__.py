@@ -21,7 +21,7 @@ from palpate.learning.learn import Learned, freeze, learn
 from palpate.learning.mran import Event, observe, step
 from palpate.learning.observation import Observation
 from palpate.learning.posterior import posterior
-from palpate.learning.presets import PRESETS, default, founding
+from palpate.learning.presets import PRESETS, default, founding, recommended
 from palpate.learning.refine import Refined, refine
 from palpate.learning.settings import Settings
 from palpate.learning.state import State, initial
@@ -53,6 +53,7 @@ __all__ = [
     "observe",
     "posterior",
     "prune",
+    "recommended",
     "refine",
     "refined_network",
     "step",

@@ -15,7 +15,7 @@ from palpate.errors import UsageError
 from palpate.learning.forms import Centred
 from palpate.learning.history import History
 from palpate.learning.learn import Learned, learn
-from palpate.learning.presets import default
+from palpate.learning.presets import recommended
 from palpate.learning.settings import Settings
 from palpate.learning.structure import refined_network
 from palpate.network import Network
@@ -73,7 +73,7 @@ def learn_touch(
         Unseen solves; the filter's error on them is recorded while it learns, and never acted upon.
     name : str
     settings : Settings, optional
-        Of the sequential filter.
+        Of the sequential filter; `recommended` if left out.
     refinement : Refinement, optional
         By default 26 solves and 6 units for one input, all solves and more units for several.
     passes : int, optional
@@ -116,7 +116,7 @@ def _learn_touch(
             f"{len(train)} converged solves are too few to learn from.",
             fix="Sweep at least 4, better 26 or more.",
         )
-    settings = settings or default()
+    settings = settings or recommended(len(train.ranges))
     refinement = refinement or _refinement_for(len(train.ranges))
     # few solves need more presentations: the filter sees each one's linearisation once per pass
     passes = passes or max(5, math.ceil(_OBSERVATIONS / len(train)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from palpate.learning import Settings, default, founding
+from palpate.learning import PRESETS, Settings, recommended
 from palpate.physics import Cantilever, Circle, LinearElastic, PointLoad, Rectangle, Section, named_material
 from palpate.study.models import Study
 
@@ -51,5 +51,5 @@ def loads_of(study: Study) -> tuple[PointLoad, ...]:
 
 def settings_of(study: Study) -> Settings:
     """The filter's settings: a named form with single settings changed."""
-    form = founding() if study.filter.form == "founding" else default()
+    form = PRESETS[study.filter.form]() if study.filter.form else recommended(len(study.loads))
     return replace(form, **study.filter.settings)  # type: ignore[arg-type]

@@ -18,7 +18,7 @@ from pydantic import (
 from pydantic_core import CoreSchema, core_schema
 
 from palpate.errors import UsageError
-from palpate.learning import FEWEST, Refinement, Settings
+from palpate.learning import FEWEST, PRESETS, Refinement, Settings
 from palpate.physics import named_material
 from palpate.units import to_si
 
@@ -201,13 +201,19 @@ class FilterRecord(Record):
         description="shuffled presentations of the data; left out: 5, or enough for 1,250 observations",
     )
     seed: int = Field(0, ge=0, description="decides the order")
-    form: Literal["default", "founding"] = Field("default", description="'founding' repeats the papers' form")
+    form: str | None = Field(
+        None,
+        description="a named form, such as 'founding', which repeats the papers'; left out: 'default' for one load, "
+        "'shared' for several",
+    )
     settings: dict[str, float | int | str | bool] = Field(
         default_factory=dict, description="single settings of the filter, by name"
     )
 
     @model_validator(mode="after")
     def _known_settings(self) -> FilterRecord:
+        if self.form is not None and self.form not in PRESETS:
+            raise ValueError(f"there is no form {self.form!r} of the filter; there are {', '.join(PRESETS)}")
         unknown = sorted(set(self.settings) - set(Settings.__dataclass_fields__))
         if unknown:
             known = ", ".join(Settings.__dataclass_fields__)

@@ -16,7 +16,6 @@ __all__ = ["named", "preset_names", "preset_study"]
 # a network of several inputs has more to learn: more units, more solves, and a target that a person can feel
 _SEVERAL: dict[str, Any] = {
     "test": {"every": 4},
-    "filter": {"passes": 1},
     "learning": {"samples": 0, "units_max": 48, "target": 2e-5, "starts": 2},
     "target": {"rmse": 1e-3, "filter_rmse": 0.0, "filter_outer_ratio": 0.0},
 }

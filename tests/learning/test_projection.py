@@ -178,7 +178,7 @@ def test_what_is_not_a_sample_is_refused():
 
 
 @pytest.mark.parametrize("slopes", [False, True])
-def test_degrees_of_freedom_of_units_are_the_trace_of_their_hat_matrix(slopes):
+def test_leverage_of_units_is_the_diagonal_of_their_hat_matrix(slopes):
     rows, theta = some_rows(slopes=slopes)
     fit = project(rows, theta, 1e-12)
     F, D, W = rows.matrix(theta), rows.derivatives(theta), fit.coefficients[-len(theta) :]
@@ -187,5 +187,8 @@ def test_degrees_of_freedom_of_units_are_the_trace_of_their_hat_matrix(slopes):
     J = np.vstack([D * np.repeat(w, theta.shape[1]) for w in W.T])
     hat = np.diag(J @ np.linalg.pinv(J)).reshape(W.shape[1], -1)
     found = fitted(rows, theta, fit)
-    np.testing.assert_allclose(found, hat.sum(axis=1), rtol=1e-5)
+    np.testing.assert_allclose(found, hat.T, atol=1e-6)
     assert found.sum() == pytest.approx(theta.size, rel=1e-5)
+    even = fitted(rows, theta, fit, work=0.0)
+    np.testing.assert_allclose(even.sum(axis=0), found.sum(axis=0), rtol=1e-5)
+    assert np.ptp(even, axis=0).max() == 0.0

@@ -25,18 +25,19 @@ def left_out(
 ) -> np.ndarray:
     """Errors (N, k) of the values at each sample, in modes, when it and its slopes are left out.
 
-    Exact for given units. `shared`, one number or (k,), is leverage to add to every row for what else was fitted;
-    no row's leverage counts as more than `most`.
+    Exact for given units. `shared`, one number or (R, k), is leverage to add for what else was fitted; no row's
+    leverage counts as more than `most`.
     """
     Q, N = fit.Q, len(rows.X)
-    leverage = np.minimum((Q[:N] ** 2).sum(axis=1)[:, None] + shared, most)
+    shared = np.broadcast_to(shared, fit.residual.shape)
+    leverage = np.minimum((Q[:N] ** 2).sum(axis=1)[:, None] + shared[:N], most)
     errors = fit.residual[:N] / (1.0 - leverage)
     n = rows.X.shape[1]
     for j, i in enumerate(rows.sloped):
         block = np.r_[i, N + j * n + np.arange(n)]
         hat = Q[block] @ Q[block].T
         values, V = np.linalg.eigh(hat)
-        left = 1.0 - np.minimum(values[:, None] + shared, most)
+        left = 1.0 - np.minimum(values[:, None] + shared[block].mean(axis=0), most)
         errors[i] = V[0] @ ((V.T @ fit.residual[block]) / left)
     return np.asarray(errors / rows.scale[:, None])
 

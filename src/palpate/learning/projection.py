@@ -108,27 +108,36 @@ def gauss_newton(
     return G, descent
 
 
-def fitted(rows: Rows, theta: np.ndarray, fit: Fit) -> np.ndarray:
-    """How many degrees of freedom of each mode (k,) the units' numbers take up; together all h p of them.
+def fitted(rows: Rows, theta: np.ndarray, fit: Fit, *, work: float = 4e9) -> np.ndarray:
+    """Leverage (R, k) of each row on its own value, mode by mode, through the units' numbers.
 
-    The trace of their part of the hat matrix, mode by mode: the modes of the largest weights take the most.
+    The diagonal of their part of the hat matrix of the linearised problem; it sums to h p. Modes of large weights
+    take most of it. Beyond `work` multiplications the lesser modes get their share spread evenly over the rows.
     """
-    h, p = theta.shape
+    (h, p), (R, k) = theta.shape, rows.targets.shape
     W = fit.coefficients[len(fit.tau) - h :]
-    G = _outside(fit, rows.derivatives(theta, below=len(fit.tau)), False)
-    strict = np.tril(G, -1)
-    G = strict + strict.T + np.diag(np.diagonal(G))
+    D = rows.derivatives(theta, below=len(fit.tau))
+    strict = np.tril(_outside(fit, D.copy(), False), -1)
+    D = D[:R]
+    D -= fit.Q @ (fit.Q.T @ D)
+    G = strict + strict.T + np.diag(np.einsum("nd,nd->d", D, D))
     joint = (G.reshape(h, p, h, p) * (W @ W.T)[:, None, :, None]).reshape(h * p, h * p)
     size = np.sqrt(np.diagonal(joint))
     size = np.maximum(size, 1e-8 * max(float(size.max()), 1e-300))
     joint /= size[:, None] * size
     joint[np.diag_indices(h * p)] += 1e-10
-    inverse, failed = lapack.dpotri(*lapack.dpotrf(joint, lower=1)[:1], lower=1)
+    factor, failed = lapack.dpotrf(joint, lower=1)
     if failed:
-        return np.full(W.shape[1], theta.size / W.shape[1])
-    inverse = np.tril(inverse) + np.tril(inverse, -1).T
-    folded = (inverse / (size[:, None] * size) * G).reshape(h, p, h, p).sum(axis=(1, 3))
-    return np.asarray(np.einsum("kj,kl,lj->j", W, folded, W, optimize=True))
+        return np.full((R, k), theta.size / (R * k))
+    lower = np.tril(lapack.dpotri(factor, lower=1)[0])
+    inverse = (lower + np.tril(lower, -1).T) / (size[:, None] * size)
+    folded = (inverse * G).reshape(h, p, h, p).sum(axis=(1, 3))
+    total = np.einsum("kj,kl,lj->j", W, folded, W, optimize=True)
+    found = np.repeat(total[None] / R, R, axis=0)
+    for j in np.argsort(-total)[: int(work / (R * (h * p) ** 2))]:
+        moved = D * np.repeat(W[:, j], p)
+        found[:, j] = np.einsum("nd,nd->n", moved @ inverse, moved)
+    return found
 
 
 def _outside(fit: Fit, D: np.ndarray, single: bool) -> np.ndarray:

@@ -26,7 +26,7 @@ __all__ = ["Refined", "refine"]
 
 _SINGLE_FROM = 300  # unknowns from which single precision saves time
 _SINGLE_DAMPING = 1e-5  # below this the damped matrix may be singular to single precision
-_COUNTED = 2500  # unknowns up to which each mode's share of them is counted; beyond, all modes share alike
+_COUNTED = 2500  # unknowns up to which each row's share of them is counted; beyond, all share alike
 _MOST_LEVERAGE = 0.98  # a sample that decides its own fit says little; its residual counts fifty times
 
 
@@ -45,7 +45,7 @@ class Refined:
         Weighted root mean square training error per scaled output, of values only.
     loo : float
         Leave-one-out error per scaled output: in closed form for weights and tail (Allen 1974), with the
-        units' degrees of freedom counted mode by mode and spread evenly over the samples.
+        units' own numbers counted as leverage in the linearised problem.
     condition : float
         2-norm condition number of the regressors; large values mean that units nearly cancel.
     iterations : int
@@ -53,7 +53,7 @@ class Refined:
         Whether the last steps brought no more gain; False means that a limit came first.
     without : (h,)
         The leave-one-out error were one unit removed and the others left as they are, for each unit, with the
-        units' degrees of freedom spread over all modes alike.
+        units' degrees of freedom spread over all rows alike.
     heldout : float
         Root mean square error per scaled output on the held-out samples; not-a-number without them.
     """
@@ -244,9 +244,9 @@ def _judge(rows: Rows, heldout: tuple[np.ndarray, np.ndarray] | None) -> Callabl
 
 def _result(rows: Rows, point: _Point, count: int, done: bool, error: float) -> Refined:
     fit, m = point.fit, rows.modes.shape[1]
-    # units were fitted too: their h p numbers count as leverage, shared by all rows
-    R, even = len(rows.targets), point.theta.size / rows.targets.size
-    shared = fitted(rows, point.theta, fit) / R if 0 < point.theta.size <= _COUNTED else even
+    # units were fitted too: their h p numbers count as leverage
+    even = point.theta.size / rows.targets.size
+    shared = fitted(rows, point.theta, fit) if 0 < point.theta.size <= _COUNTED else even
     missed = left_out(rows, fit, shared=shared, most=_MOST_LEVERAGE)
     reduced = without_each(rows, fit, len(point.theta), shared=even, most=_MOST_LEVERAGE)
     F = rows.matrix(point.theta)

@@ -9,6 +9,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from palpate.errors import UsageError
+from palpate.learning.automatic import automatic, check_target, relative_error, spread_of
 from palpate.learning.history import History
 from palpate.learning.model import value
 from palpate.learning.modes import output_modes
@@ -36,12 +37,38 @@ class Learned:
     scaling : Scaling
         Between the state's scaled quantities and physical ones.
     history : History
+    settings : Settings
+        Those that were used.
+    target : float, optional
+        Error that was asked for, relative to the outputs' spread.
+    error : float
+        Root mean square error that was reached, relative to the outputs' spread: on held-out samples where there
+        were some, else on all samples.
     """
 
     network: Network
     state: State
     scaling: Scaling
     history: History
+    settings: Settings
+    target: float | None = None
+    error: float = float("nan")
+
+    @property
+    def reached(self) -> bool:
+        """Whether the error is within the target; True where none was set."""
+        return self.target is None or self.error <= self.target
+
+    def __str__(self) -> str:
+        text = f"{self.history}\nError {self.error:.1e} of the outputs' spread"
+        if self.target is None:
+            return text
+        if self.reached:
+            return f"{text}: within the target of {self.target:.1e}."
+        return (
+            f"{text}: the target of {self.target:.1e} is not reached.\n{_limit(self)}\n"
+            "Refinement goes further than the filter; else give more samples or passes, or a looser target."
+        )
 
 
 def learn(
@@ -51,6 +78,7 @@ def learn(
     outputs: Sequence[Quantity],
     *,
     settings: Settings | None = None,
+    target: float | None = None,
     passes: int = 5,
     seed: int = 0,
     weights: np.ndarray | None = None,
@@ -71,7 +99,10 @@ def learn(
         Outputs in SI units.
     inputs, outputs : sequences of n ranges and m quantities
     settings : Settings, optional
-        `default()` if left out.
+        `default()` if left out, or `automatic` ones if a target is given.
+    target : float, optional
+        Root mean square error wanted, relative to the outputs' root mean square deviation from their means. What
+        was reached is in the outcome; a target that was missed raises nothing.
     passes : int
         How often each sample is presented.
     seed : int
@@ -94,10 +125,15 @@ def learn(
     Raises
     ------
     UsageError
-        If the arrays do not fit together or hold values that are not finite.
+        If the arrays do not fit together or hold values that are not finite, or the target is not positive.
     """
-    settings = settings or default()
     _check(X, Y, inputs, outputs)
+    if target is not None:
+        check_target(target)
+        settings = settings or automatic(
+            X, Y, inputs, target=target, passes=passes, seed=seed, weights=weights
+        )
+    settings = settings or default()
     scaling = Scaling.of(inputs, Y)
     xs, ys = scaling.scale_inputs(X), scaling.scale_outputs(Y)
     judge = _judge(heldout, scaling, settings)
@@ -119,7 +155,23 @@ def learn(
             if progress:
                 progress(len(events), passes * len(xs))
     network = freeze(state, settings, inputs, outputs, scaling)
-    return Learned(network, state, scaling, History.of(events, innovation, errors, passes))
+    places, truth = (X, Y) if heldout is None else heldout
+    error = relative_error(network.predict(places), truth, spread_of(Y))
+    history = History.of(events, innovation, errors, passes)
+    return Learned(network, state, scaling, history, settings, target, error)
+
+
+def _limit(learned: Learned) -> str:
+    """What kept the filter from its target, as far as its own records tell."""
+    settings, innovation = learned.settings, learned.history.innovation
+    if learned.state.units >= settings.units_max:
+        return f"The network is at its limit of {settings.units_max} units (units_max)."
+    if innovation.size and innovation[-1] ** 2 <= 4.0 * settings.noise:
+        return "What is left is about the noise that neighbouring samples show; nothing can predict it."
+    passes = np.array_split(innovation, max(learned.history.passes, 1))
+    if len(passes) > 1 and passes[-1].mean() < 0.7 * passes[-2].mean():
+        return "The error was still falling: more passes would help."
+    return "The error has settled: this is as far as one observation at a time goes here."
 
 
 def freeze(

@@ -1,0 +1,185 @@
+"""The refined network as an estimator."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from functools import partial
+from typing import Any, Literal
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from palpate.estimators.base import RadialRegressor
+from palpate.estimators.data import merged, weights_of
+from palpate.learning.automatic import check_target
+from palpate.learning.forms import form as form_of
+from palpate.learning.refine import Refined, refine
+from palpate.learning.regressors import Regressors
+from palpate.learning.structure import Trial, freeze_refined, placed
+from palpate.network import Scaling
+
+__all__ = ["RBFNetworkRegressor"]
+
+_ITERATIONS = 60  # per size: the next one moves all units again
+_PATIENCE = 3  # sizes in a row that may bring nothing
+_FEWEST = 20  # samples from which a fifth of them can judge
+_GAIN = 0.98  # what a size must lower the error to, to have brought something
+
+
+class RBFNetworkRegressor(RadialRegressor):
+    """Network of radial basis functions refined all at once: centres, widths and weights by variable projection.
+
+    Golub & Pereyra 1973. A fifth of the samples is kept apart while units are added, until the error on them meets
+    the target or no longer falls; then the weights are fitted to all samples. Below 20 samples the leave-one-out
+    error judges.
+
+    Parameters
+    ----------
+    target : float
+        Error wanted on samples kept apart, relative to the outputs' spread: root mean square error over root mean
+        square deviation from the mean.
+    form : str, optional
+        Of a unit (see `palpate.learning.forms`); if left out rotated up to three inputs, ridges of rank 1 above.
+    radial : {"gaussian", "inverse-multiquadric", "matern-5/2"}
+    tail : {"affine", "constant", "none"}
+    units_max : int
+    seconds : float
+        Time after which no more units are added.
+    ranges : sequence of (low, high), optional
+        Trained interval of each input; of the data if left out.
+    scale_outputs : {"each", "together"}
+        Whether outputs are quantities of their own, each learnt relative to its spread, or parts of one quantity,
+        such as a displacement, whose errors are to be compared as they are.
+    random_state : int, RandomState or None
+        Decides which samples are kept apart, and directions where units have them.
+
+    Attributes
+    ----------
+    network_ : Network
+        What predicts.
+    error_ : float
+        Its error on the samples that judged, relative as `target`.
+    trials_ : tuple of Trial
+        Sizes that were tried.
+    n_features_in_ : int
+    feature_names_in_ : (n,)
+        Where X was a table with named columns.
+
+    Notes
+    -----
+    Rows that are equal in X and y count as one with the sum of their weights, so a weight of two is the same as
+    the row given twice, and the order of rows does not matter.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> X = np.linspace(-1, 1, 60)[:, None]
+    >>> model = RBFNetworkRegressor(target=1e-3, random_state=0).fit(X, np.sin(3 * X[:, 0]))
+    >>> bool(model.score(X, np.sin(3 * X[:, 0])) > 0.99999)
+    True
+    """
+
+    def __init__(
+        self,
+        *,
+        target: float = 1e-3,
+        form: str | None = None,
+        radial: str = "gaussian",
+        tail: str = "affine",
+        units_max: int = 100,
+        seconds: float = 30.0,
+        ranges: Sequence[tuple[float, float]] | None = None,
+        scale_outputs: Literal["each", "together"] = "each",
+        random_state: Any = None,
+    ) -> None:
+        self.target = target
+        self.form = form
+        self.radial = radial
+        self.tail = tail
+        self.units_max = units_max
+        self.seconds = seconds
+        self.ranges = ranges
+        self.scale_outputs = scale_outputs
+        self.random_state = random_state
+
+    def fit(self, X: Any, y: Any, sample_weight: Any = None) -> RBFNetworkRegressor:
+        """Learn from all samples.
+
+        Parameters
+        ----------
+        X : array-like (N, n)
+        y : array-like (N,) or (N, m)
+        sample_weight : array-like (N,), optional
+
+        Returns
+        -------
+        RBFNetworkRegressor
+
+        Raises
+        ------
+        ValueError
+            If arrays do not fit together or hold values that are not finite.
+        UsageError
+            If a parameter is out of its range.
+        """
+        check_target(self.target)
+        X, Y = self._checked(X, y, first=True)
+        X, Y, weights = merged(X, Y, weights_of(sample_weight, len(X)))
+        units = self._units(X, Y)
+        scaling = Scaling.of(units.inputs, Y / units.divisor)
+        xs, ys = scaling.scale_inputs(X), scaling.scale_outputs(Y / units.divisor)
+        spread = float(np.sqrt((ys**2).mean())) or 1.0
+        with threadpool_limits(1):
+            found, error, self.trials_ = self._grown(xs, ys, weights, self.target * spread)
+        self.error_ = error / spread
+        self.network_ = units.back(freeze_refined(found, units.inputs, units.outputs, scaling))
+        return self
+
+    def _grown(
+        self, X: np.ndarray, Y: np.ndarray, weights: np.ndarray, target: float
+    ) -> tuple[Refined, float, tuple[Trial, ...]]:
+        """The first size that meets the target, or the best until more units bring nothing, or time is up."""
+        start, seed = time.monotonic(), self._seed()
+        regressors, most = self._regressors(X.shape[1], Y)
+        learns = _learns(len(X), seed)
+        unseen = None if learns.all() else (X[~learns], Y[~learns])
+        xs, ys = X[learns], Y[learns]
+        fit = partial(refine, weights=weights[learns], iterations=_ITERATIONS, heldout=unseen)
+        best = fit(xs, ys, np.zeros((0, regressors.form.size)), regressors)
+        least, trials, worse = _error(best), [Trial.of(best)], 0
+        while least > target and len(best.theta) + worse < most and worse < _PATIENCE:
+            left = self.seconds - (time.monotonic() - start)
+            if left <= 0:
+                break
+            # where a size brought nothing, the next one sets out from the same units with one more
+            h = len(best.theta)
+            new = placed(xs, ys, best, min(max(1, h // 4) + worse, most - h), seed)
+            now = fit(xs, ys, np.vstack([best.theta, new]), regressors, seconds=left)
+            trials.append(Trial.of(now))
+            worse = 0 if _error(now) < _GAIN * least else worse + 1
+            if _error(now) < least:
+                best, least = now, _error(now)
+        # units stay, weights learn from all samples
+        return refine(X, Y, best.theta, regressors, weights=weights, iterations=0), least, tuple(trials)
+
+    def _regressors(self, n: int, Y: np.ndarray) -> tuple[Regressors, int]:
+        """What units are, and how many of them leave some data over."""
+        form = self.form or ("axis-aligned" if n == 1 else "rotated" if n <= 3 else "rank-1")
+        made = Regressors(form_of(form, n), self.radial, self.tail)  # type: ignore[arg-type]
+        m = Y.shape[1]
+        room = max(0.0, Y.size / 1.25 - m * made.tail_size) / (m + made.form.size)
+        return made, min(self.units_max, int(room), len(Y) // 2)
+
+
+def _learns(rows: int, seed: int) -> np.ndarray:
+    """Which samples choose the units (N,); the others judge, where there are enough."""
+    learns = np.ones(rows, dtype=bool)
+    if rows >= _FEWEST:
+        learns[np.random.default_rng(seed).permutation(rows)[: rows // 5]] = False
+    return learns
+
+
+def _error(found: Refined) -> float:
+    """On samples it has not seen; by leaving one out where all were needed."""
+    return found.loo if np.isnan(found.heldout) else found.heldout

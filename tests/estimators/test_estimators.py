@@ -1,0 +1,230 @@
+"""The estimators keep scikit-learn's conventions, and work where its own do."""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.base import clone
+from sklearn.model_selection import GridSearchCV, KFold, cross_val_score
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from sklearn.utils.estimator_checks import check_estimator, parametrize_with_checks
+
+from palpate.errors import UsageError
+from palpate.estimators import MRANRegressor, RBFNetworkRegressor
+from palpate.estimators.data import merged
+from palpate.learning import Settings
+from palpate.network import Network
+
+BOTH = [
+    pytest.param(MRANRegressor(settings="default", passes=3, random_state=0), id="MRAN"),
+    pytest.param(RBFNetworkRegressor(units_max=10, random_state=0), id="RBF"),
+]
+
+
+@pytest.fixture(scope="module")
+def wave():
+    """A smooth map of two inputs, 120 samples."""
+    X = np.random.default_rng(3).uniform(-1, 1, (120, 2))
+    return X, np.sin(2 * X[:, 0]) * np.exp(-X[:, 1])
+
+
+# one pass, so that the many small fits of the checks stay quick; the default is checked below, more slowly
+@parametrize_with_checks([MRANRegressor(passes=1), RBFNetworkRegressor()])
+def test_conventions(estimator, check):
+    check(estimator)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings(
+    "ignore::sklearn.exceptions.SkipTestWarning"
+)  # the array API is switched off in SciPy
+def test_conventions_as_it_comes():
+    outcomes = check_estimator(MRANRegressor(), on_fail=None)
+    assert {o["check_name"] for o in outcomes if o["status"] != "passed"} <= {"check_array_api_input"}
+    assert len(outcomes) > 50
+
+
+@pytest.mark.parametrize("model", BOTH)
+def test_grid_search_pipeline_and_cross_validation(model, wave):
+    X, y = wave
+    folds = KFold(3, shuffle=True, random_state=0)
+    pipe = make_pipeline(StandardScaler(), clone(model))
+    assert cross_val_score(pipe, X, y, cv=folds).min() > 0.95
+    name = type(model).__name__.lower()
+    search = GridSearchCV(pipe, {f"{name}__units_max": [0, 10]}, cv=folds).fit(X, y)
+    # a plane alone can't follow the wave
+    assert search.best_params_ == {f"{name}__units_max": 10}
+    assert search.best_estimator_[-1].network_.units > 0
+    assert search.cv_results_["mean_test_score"][0] < search.best_score_ - 0.05
+
+
+def test_automatic_settings_in_a_pipeline(wave):
+    X, y = wave
+    model = MRANRegressor(target=0.1, random_state=0)
+    assert cross_val_score(model, 1e6 * X + 1e7, 1e-9 * y, cv=3).min() > 0.95
+
+
+def test_refined_meets_its_target_with_few_units(wave):
+    X, y = wave
+    model = RBFNetworkRegressor(target=1e-3, random_state=0).fit(X[:100], y[:100])
+    assert model.error_ <= 1e-3
+    assert 1.0 - model.score(X[100:], y[100:]) < (10 * 1e-3) ** 2
+    assert model.network_.units <= 12
+    looser = RBFNetworkRegressor(target=1e-1, random_state=0).fit(X[:100], y[:100])
+    assert looser.network_.units < model.network_.units
+
+
+@pytest.mark.parametrize("model", BOTH)
+def test_shape_of_y_comes_back(model, wave):
+    X, y = wave
+    model = clone(model)
+    assert model.fit(X, y).predict(X[:5]).shape == (5,)
+    assert model.fit(X, y[:, None]).predict(X[:5]).shape == (5, 1)
+    assert model.fit(X, np.vstack([y, y, y]).T).predict(X[:5]).shape == (5, 3)
+
+
+@pytest.mark.parametrize("model", BOTH)
+def test_outputs_of_different_size_are_learnt_alike(model, wave):
+    X, y = wave
+    Y = np.vstack([1e6 * y, 1e-6 * X[:, 0] * X[:, 1]]).T
+    each = clone(model).fit(X, Y)
+    assert min(1 - ((each.predict(X) - Y) ** 2).sum(axis=0) / ((Y - Y.mean(axis=0)) ** 2).sum(axis=0)) > 0.95
+    together = clone(model).set_params(scale_outputs="together").fit(X, Y)
+    assert np.ptp(together.network_.scaling.output_scale) == 0.0
+    assert np.ptp(each.network_.scaling.output_scale) > 0.0
+
+
+@pytest.mark.parametrize("model", BOTH)
+def test_constant_columns_survive(model, wave):
+    X, y = wave
+    wide = np.hstack([X, np.full((len(X), 1), 7.0), np.zeros((len(X), 1))])
+    Y = np.vstack([y, np.full(len(y), 1 / 3)]).T
+    predicted = clone(model).fit(wide, Y).predict(wide)
+    assert np.isfinite(predicted).all()
+    np.testing.assert_allclose(predicted[:, 1], 1 / 3, rtol=1e-12)
+    assert np.corrcoef(predicted[:, 0], y)[0, 1] > 0.95
+    np.testing.assert_allclose(clone(model).fit(wide, np.full(len(y), 3.0)).predict(wide[:4]), 3.0)
+
+
+@pytest.mark.parametrize("model", BOTH)
+def test_order_of_rows_does_not_matter_and_the_seed_decides(model, wave):
+    X, y = wave
+    order = np.random.default_rng(0).permutation(len(X))
+    first = clone(model).fit(X, y).predict(X)
+    assert (clone(model).fit(X[order], y[order]).predict(X) == first).all()
+    assert (clone(model).fit(X, y).predict(X) == first).all()
+    if isinstance(model, MRANRegressor):
+        assert (clone(model).set_params(random_state=1).fit(X, y).predict(X) != first).any()
+
+
+def test_equal_rows_become_one():
+    X = np.array([[1.0], [0.0], [1.0], [-0.0], [2.0]])
+    Y = np.array([[5.0], [6.0], [5.0], [6.0], [7.0]])
+    rows, values, weights = merged(X, Y, np.array([1.0, 2.0, 3.0, 2.0, 0.0]))
+    np.testing.assert_array_equal(rows, [[0.0], [1.0]])
+    np.testing.assert_array_equal(values, [[6.0], [5.0]])
+    np.testing.assert_allclose(weights, [1.0, 1.0])
+
+
+@pytest.mark.parametrize("model", BOTH)
+def test_a_heavy_sample_is_met_more_closely(model, wave):
+    X, y = wave
+    odd = y.copy()
+    odd[7] += 0.5
+    heavy = np.ones(len(y))
+    heavy[7] = 1e4
+    even = clone(model).fit(X, odd).predict(X[7:8]) - odd[7]
+    drawn = clone(model).fit(X, odd, sample_weight=heavy).predict(X[7:8]) - odd[7]
+    assert abs(drawn[0]) < 0.3 * abs(even[0])
+
+
+@pytest.mark.parametrize("batch", [1, 7, 80])
+@pytest.mark.parametrize("settings", ["default", "shared", "emran", "ran", None])
+def test_batches_are_one_pass_to_the_last_bit(batch, settings, wave):
+    X, y = wave
+    whole = MRANRegressor(settings=settings, random_state=0, passes=1).partial_fit(X[:40], y[:40])
+    cut = pickle.loads(pickle.dumps(whole))
+    whole.partial_fit(X[40:], y[40:])
+    for i in range(40, len(X), batch):
+        cut.partial_fit(X[i : i + batch], y[i : i + batch])
+    assert (cut.predict(X) == whole.predict(X)).all()
+    assert cut.state_.count == len(X)
+
+
+def test_learning_goes_on_after_fit_and_fit_begins_anew(wave):
+    X, y = wave
+    model = MRANRegressor(settings="default", passes=2, random_state=0).fit(X[:60], y[:60])
+    before = model.state_
+    assert model.partial_fit(X[60:], y[60:]).state_.count == 180
+    assert before.count == 120
+    assert (model.fit(X[:60], y[:60]).state_.vector() == before.vector()).all()
+    with pytest.raises(ValueError, match="outputs"):
+        model.partial_fit(X, np.vstack([y, y]).T)
+
+
+def test_samples_of_no_weight_are_passed_over(wave):
+    X, y = wave
+    zero = np.ones(len(y))
+    zero[50:] = 0.0
+    spoilt = np.where(zero > 0, y, 1e6)
+    model = MRANRegressor(settings="default").partial_fit(X, spoilt, sample_weight=zero)
+    assert (
+        model.predict(X) == MRANRegressor(settings="default").partial_fit(X[:50], y[:50]).predict(X)
+    ).all()
+    for wrong in (-zero, 0 * zero, zero[:3], np.full(len(y), np.nan)):
+        with pytest.raises(ValueError, match=r"weight"):
+            model.fit(X, y, sample_weight=wrong)
+
+
+@pytest.mark.parametrize("model", BOTH)
+def test_names_and_ranges_reach_the_network(model, wave, tmp_path):
+    X, y = wave
+    table = pd.DataFrame(X, columns=["force", "modulus"])
+    fitted = clone(model).set_params(ranges=((-2, 2), (-1, 3))).fit(table, y)
+    assert [r.name for r in fitted.network_.inputs] == list(fitted.feature_names_in_) == ["force", "modulus"]
+    assert [(r.low, r.high) for r in fitted.network_.inputs] == [(-2.0, 2.0), (-1.0, 3.0)]
+    again = Network.load(fitted.network_.save(tmp_path / "wave.palpate"))
+    assert (again.predict(X)[:, 0] == fitted.predict(table)).all()
+    with pytest.raises(ValueError, match="1 ranges"):
+        clone(model).set_params(ranges=((-2, 2),)).fit(X, y)
+
+
+def test_what_is_wrong_is_told(wave):
+    X, y = wave
+    with pytest.raises(ValueError, match="no preset"):
+        MRANRegressor(settings="mram").fit(X, y)
+    with pytest.raises(ValueError, match="scale_outputs"):
+        MRANRegressor(scale_outputs="both").fit(X, y)
+    for model in (MRANRegressor(target=0.0), RBFNetworkRegressor(target=-1.0)):
+        with pytest.raises(UsageError, match="target"):
+            model.fit(X, y)
+
+
+def test_settings_by_hand_and_single_ones(wave):
+    X, y = wave
+    hand = Settings(distance_min=0.7, units_max=5)
+    model = MRANRegressor(settings=hand, form="isotropic", passes=1).fit(X, y)
+    assert model.settings_.distance_min == 0.7
+    assert model.settings_.form == "isotropic"
+    assert model.network_.units <= 5
+    assert model.history_.units.size == len(y)
+    automatic = MRANRegressor(target=0.5, radial="matern-5/2", passes=1).fit(X, y)
+    assert automatic.network_.radial == "matern-5/2"
+
+
+def test_without_scikit_learn_the_way_is_told():
+    probe = (
+        "import sys; sys.modules['sklearn'] = None\n"
+        "import palpate.learning\n"
+        "from palpate.errors import UsageError\n"
+        "try:\n    import palpate.estimators\n"
+        "except UsageError as error:\n    print(error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
+    assert 'pip install "palpate[sklearn]"' in done.stdout

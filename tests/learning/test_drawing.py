@@ -22,10 +22,10 @@ def history(T=60, heldout=True):
         np.cumsum(grew - pruned),
         error,
         error,
-        error / 2,
+        fall / 2,
         grew,
         pruned,
-        error / 3 if heldout else np.zeros(0),
+        fall / 3 if heldout else np.zeros(0),
         2,
     )
 

@@ -1,37 +1,71 @@
-"""The remembered window as a judge: a change must not undo what the last observations taught.
+"""The remembered observations as a judge: a change must not undo what they taught.
 
-The window of the growth rule remembers the observations themselves here, not their errors alone. Both the
-update and pruning ask it. Without it the filter relapses: a step that fits one sample can spoil the others where
-the linearisation is bad, and a unit that contributes little beside much larger ones that nearly cancel may be
-all that is left of their sum.
+More than the window of the growth rule is remembered here, and the observations themselves, not their errors
+alone. Updates, growth and pruning ask it. Without it the filter relapses: a step that fits one sample can spoil
+the others where the linearisation is bad, a new unit may reach too far, and a unit that contributes little beside
+much larger ones that nearly cancel may be all that is left of their sum.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
 from palpate.learning.settings import Settings
 from palpate.learning.state import State
 
-__all__ = ["forgets", "window_error"]
+__all__ = ["forgets", "spoils", "window_error", "with_least"]
+
+
+_LEAST = (
+    2.0  # on mean squares: above this times their least so far only steps that do not raise them are taken
+)
 
 
 def window_error(state: State, coefficients: np.ndarray, theta: np.ndarray, settings: Settings) -> float:
-    """Sum of squared errors of other parameters, (p_t + h, m or r) and (h, p), over a state's window."""
+    """Sum of squared errors of other parameters, (p_t + h, m or r) and (h, p), over a state's memory.
+
+    With a forgetting factor λ an observation of age a counts λᵃ, as in the filter.
+    """
     X, Y = state.seen[:, : state.inputs], state.seen[:, state.inputs :]
     of = settings.regressors(state.inputs)
     error = np.hstack([of.tail_rows(X), of.phi(X, theta)]) @ coefficients - Y
+    if settings.forgetting_factor < 1.0:
+        error *= np.sqrt(_counts(state, settings))[:, None]
     return float(np.vdot(error, error))
 
 
 def forgets(state: State, z: np.ndarray, settings: Settings) -> bool:
-    """Whether other parameters z (d,) raise the error over the window by more than the settings allow."""
+    """Whether other parameters z (d,) raise the error over the memory by more than the settings allow."""
     return bool(settings.relapse_limit) and spoils(state, *state.split(z), settings)
 
 
 def spoils(state: State, coefficients: np.ndarray, theta: np.ndarray, settings: Settings) -> bool:
-    """The same for coefficients and shapes; both by the output modes where the window is."""
+    """The same for coefficients and shapes; both by the output modes where the memory is.
+
+    One step may raise the error by the settings' limit. Many such steps would add up, so the limit counts from the
+    least error so far; above it no step may raise the error.
+    """
     if not settings.relapse_limit or len(state.seen) < 2:
         return False
     before = window_error(state, state.led, state.theta, settings)
-    return window_error(state, coefficients, theta, settings) > settings.relapse_limit * before
+    least = min(before, state.least * float(_counts(state, settings).sum()))
+    after = window_error(state, coefficients, theta, settings)
+    return after > max(before, settings.relapse_limit * least)
+
+
+def with_least(state: State, settings: Settings) -> State:
+    """The state with its least mean squared error over the memory so far.
+
+    That fades as the memory does, by e over its length, so that a target that has moved can be followed.
+    """
+    if not settings.relapse_limit or len(state.seen) < settings.window:
+        return state
+    counts = float(_counts(state, settings).sum())
+    now = window_error(state, state.led, state.theta, settings) / counts
+    return replace(state, least=min(state.least * (1.0 + 1.0 / counts), now))
+
+
+def _counts(state: State, settings: Settings) -> np.ndarray:
+    return np.asarray(settings.forgetting_factor ** np.arange(len(state.seen), dtype=float)[::-1])

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from palpate.learning.growth import grown, wants_growth
+from palpate.learning.memory import spoils, with_least
 from palpate.learning.noise import running_mean_square
 from palpate.learning.observation import Observation
 from palpate.learning.pruning import pruned
@@ -90,22 +91,34 @@ def observe(
     grew = wants_growth(state, seen.x, error, settings)
     if grew:
         # the new unit meets the observation, so the update below starts from a zero error, not twice the old one
-        state = grown(state, seen.x, error, settings)
+        state = _with_unit(state, seen.x, error, settings)
         found = predicted(state, seen, settings)
     use = settings.update_on_growth or not grew
     if use:
         state = updated(state, seen, found, settings, donate=donate)
     before = state.units
-    state = pruned(state, seen.x, settings)
+    # by significance: the nearest unit, once it was updated
+    if settings.pruning == "contribution" or not grew:
+        state = pruned(state, seen.x, settings)
+    state = with_least(state, settings)
     event = Event(size, float(np.sqrt(state.errors.mean())), grew, use, before - state.units, state.units)
     return state, event
+
+
+def _with_unit(state: State, x: np.ndarray, error: np.ndarray, settings: Settings) -> State:
+    """The state with a unit at x; without weight, for the update to decide, where it would spoil what was learnt."""
+    more = grown(state, x, error, settings)
+    if spoils(state, more.led, more.theta, settings):
+        return grown(state, x, np.zeros_like(error), settings)
+    return more
 
 
 def _remembered(state: State, seen: Observation, error: np.ndarray, settings: Settings) -> State:
     """The state with one more observation counted, and it and its error in the window."""
     errors = np.append(state.errors, float(error @ error))[-settings.window :]
     y = seen.y if state.modes is None else seen.y @ state.modes
-    window = np.vstack([state.seen, np.concatenate([seen.x, y])])[-settings.window :]
+    remembered = max(settings.window, settings.memory) if settings.relapse_limit else settings.window
+    window = np.vstack([state.seen, np.concatenate([seen.x, y])])[-remembered:]
     count = state.count + 1
     innovation = running_mean_square(state.innovation, error, count)
     return replace(state, errors=errors, seen=window, count=count, innovation=innovation)

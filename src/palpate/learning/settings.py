@@ -26,7 +26,7 @@ _POSITIVE = (
 )
 _NOT_NEGATIVE = (
     *("error_min", "error_rms_min", "process_noise", "noise_share", "gate", "step_bound", "relapse_limit"),
-    *("prune_below", "prune_after", "units_max"),
+    *("prune_below", "prune_after", "units_max", "memory"),
 )
 
 
@@ -82,8 +82,11 @@ class Settings:
     learning_rate : float
         α of the gradient rule.
     relapse_limit : float
-        Largest factor by which one update, or the removal of a unit, may raise the squared error over the
-        window; 0 for no limit.
+        Largest factor by which one update, or a unit added or removed, may raise the squared error over the
+        memory; 0 for no limit.
+    memory : int
+        Observations remembered for that, M at least. Too few leave places where nothing forbids a unit to
+        spoil what was learnt there: a sample should have been near every unit.
     update_on_growth : bool
         Whether an observation that added a unit also updates everything.
     prune_below : float
@@ -130,6 +133,7 @@ class Settings:
     forgetting_factor: float = 1.0
     learning_rate: float = 0.05
     relapse_limit: float = 1.1
+    memory: int = 250
     update_on_growth: bool = True
     prune_below: float = 1e-4
     prune_after: int = 500

@@ -28,8 +28,9 @@ class State:
         Where each unit was added.
     errors : (≤ M,)
         The last squared error norms ‖e‖², newest last.
-    seen : (≤ M, n + m) or (≤ M, n + r)
-        The last observations [x, y], newest last; y by the output modes where there are some.
+    seen : (≤ S, n + m) or (≤ S, n + r)
+        The last observations [x, y], newest last, as many as the settings remember; y by the output modes where
+        there are some.
     silent : (h,) int
         Observations in a row in which each unit was silent.
     count : int
@@ -40,6 +41,8 @@ class State:
         Orthonormal output directions that drive the shapes under the shared-weight rule; None for all outputs.
     in_modes : (p_t + h, r), optional
         The coefficients by those modes, kept up to date so that no step has to form them.
+    least : float
+        Least mean squared error over the memory so far, ‖e‖² per observation; slowly fading.
     """
 
     coefficients: np.ndarray
@@ -53,6 +56,7 @@ class State:
     innovation: float
     modes: np.ndarray | None = None
     in_modes: np.ndarray | None = None
+    least: float = float("inf")
 
     @property
     def inputs(self) -> int:

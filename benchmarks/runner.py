@@ -19,7 +19,7 @@ from benchmarks.table import Table
 
 __all__ = ["BENCHMARKS", "Benchmark", "main"]
 
-BENCHMARKS = ("cantilever", "filters", "latency", "refinement", "runtime", "sweep")
+BENCHMARKS = ("cantilever", "filters", "latency", "literature", "peers", "refinement", "runtime", "sweep")
 
 
 class Benchmark(Protocol):

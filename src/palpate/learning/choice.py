@@ -1,0 +1,371 @@
+"""A network from nothing but samples: unit form, radial function, size and ridge are chosen by held-out error.
+
+No form wins everywhere: ridges follow targets made of plane waves, rotated units those made of bumps, and a kernel
+layer whatever has no small structure. So a kernel layer sets the mark, the forms race against it (see `race`), and
+what time is left goes to the winner, or to a committee where that is worth more (see `committee`).
+
+Work is counted in iterations and samples, so the seed decides; the time limit is only the last resort.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.learning.committee import Member, averaged, expected_error, refitted
+from palpate.learning.kernel_layer import KernelLayer, Metric, likely_metric
+from palpate.learning.race import RIDGE, Race, Runner, Split, best_of, carried, forms_for
+from palpate.learning.regressors import Regressors
+from palpate.network import Network, Scaling
+from palpate.network.radial import RADIAL_FUNCTIONS
+from palpate.units import Quantity, Range
+
+__all__ = ["Choice", "Fitted", "fit"]
+
+_NUMBERS = 1500  # unknowns in the units of a full-size runner for 30 s
+_SMALL = 600  # and of one that is only looked at
+_SAMPLES = 1000  # to learn from while choosing
+_MEMBERS = 5
+_MODES_MAX = 96
+_BEHIND = 1.2  # times the best error: too far for another ten iterations
+_HOPELESS = 3.0  # times the kernel layer's error after the race: no refinement will make up for that
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One thing that was tried: what, with how many units, its held-out error (scaled) and when, s."""
+
+    what: str
+    units: int
+    heldout: float
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """What was chosen.
+
+    Attributes
+    ----------
+    network : Network
+    form : str
+        Of its units: rank-1, rank-2, rotated, axis-aligned, or kernel layer.
+    radial : str
+    units : int
+    heldout : float
+        Error on held-out samples relative to the outputs' standard deviation, before the weights saw them.
+    trials : tuple of Choice
+    seconds : float
+    """
+
+    network: Network
+    form: str
+    radial: str
+    units: int
+    heldout: float
+    trials: tuple[Choice, ...]
+    seconds: float
+
+
+def fit(
+    X: np.ndarray,
+    Y: np.ndarray,
+    inputs: Sequence[Range],
+    outputs: Sequence[Quantity],
+    *,
+    seconds: float = 30.0,
+    seed: int = 0,
+    target: float | None = None,
+) -> Fitted:
+    """Choose and fit a network.
+
+    Parameters
+    ----------
+    X : (N, n)
+        Inputs in SI units; 20 samples at least.
+    Y : (N, m)
+        Outputs in SI units.
+    inputs, outputs : sequences of n ranges and m quantities
+    seconds : float
+        Limit on time, on one core.
+    seed : int
+    target : float, optional
+        Held-out error relative to the outputs' standard deviation that is good enough.
+
+    Returns
+    -------
+    Fitted
+
+    Raises
+    ------
+    UsageError
+        If there are too few samples, shapes disagree or numbers are not finite.
+    """
+    from threadpoolctl import threadpool_limits
+
+    X, Y = np.asarray(X, float), np.asarray(Y, float)
+    _check(X, Y, inputs, outputs)
+    with threadpool_limits(1):  # small matrices: threads would cost more than they bring
+        return _Chooser(X, Y, inputs, outputs, seconds, seed, target).chosen()
+
+
+class _Chooser:
+    """The stages of a choice, and the trials so far."""
+
+    def __init__(
+        self,
+        X: np.ndarray,
+        Y: np.ndarray,
+        inputs: Sequence[Range],
+        outputs: Sequence[Quantity],
+        seconds: float,
+        seed: int,
+        target: float | None,
+    ) -> None:
+        self.began = time.monotonic()
+        self.inputs, self.outputs, self.seed = inputs, outputs, seed
+        spread = float(np.sqrt(((Y - Y.mean(axis=0)) ** 2).mean()))
+        self.scaling = Scaling.of(inputs, Y, scale=spread)
+        self.X = self.scaling.scale_inputs(X)
+        self.Y, self.basis = _leading(self.scaling.scale_outputs(Y))
+        # errors are told per latent output until the end
+        self.unit = float(np.sqrt(len(self.outputs) / self.Y.shape[1]))
+        self.target = 0.0 if target is None else target * self.unit
+        # refitting on all samples and freezing come after the race
+        self.deadline = self.began + 0.85 * seconds
+        self.size = min(2.0, np.sqrt(seconds / 30.0))
+        self.share = 0.15 if len(X) >= 1000 else 0.2
+        self.split = Split.of(self.X, self.Y, share=self.share, seed=seed)
+        self.trials: list[Choice] = []
+        self.ran: list[Runner] = []
+
+    def chosen(self) -> Fitted:
+        if not self.Y.any():
+            return self._constant()
+        layer, mark, scales = self._kernel()
+        race = Race(self.split, scales, self.seed, self.deadline)
+        winner = self._radials(race, *self._forms(race, mark))
+        if winner.theta.size < 0.6 * _NUMBERS * self.size:
+            winner = self._sizes(race, winner)
+        if winner.heldout > _HOPELESS * mark:
+            return self._kernel_network(layer, mark)
+        began = time.monotonic()
+        if winner.heldout > self.target:
+            winner = race.run(winner, round(120 * self.size))
+            self._note(winner)
+        if winner.found is None or winner.heldout > mark:
+            return self._kernel_network(layer, mark)
+        spent = time.monotonic() - began
+        return self._network(*self._finalists(race, winner, spent))
+
+    def _kernel(self) -> tuple[Metric, float, np.ndarray]:
+        """The kernel layer's metric and error, and the input scales from which units start."""
+        found, scales = [], np.ones(self.X.shape[1])
+        for name in RADIAL_FUNCTIONS:
+            metric = likely_metric(name, self.split.X, self.split.Y, samples=round(500 * min(1.0, self.size)))
+            found.append((self._judged(metric), metric))
+            if name == "inverse-multiquadric":
+                scales = metric.scales
+        error, best = min(found, key=lambda pair: pair[0])
+        # the likelihood was of a part of the samples: more of them may want another width
+        for scale, ridge in ((1.25, 1.0), (0.8, 1.0), (1.0, 0.1), (1.0, 10.0)):
+            other = best.altered(scale, ridge)
+            if time.monotonic() < self.began + 0.2 * (self.deadline - self.began):
+                trial = self._judged(other)
+                if trial < error:
+                    error, best = trial, other
+        return best, error, scales
+
+    def _judged(self, metric: Metric) -> float:
+        held, wanted = self.split.unseen
+        layer = KernelLayer.fit(metric, self.split.X, self.split.Y, seed=self.seed)
+        error = float(np.sqrt(((layer.predict(held) - wanted) ** 2).mean()))
+        self._noted(f"kernel layer {metric.radial}", len(layer.centres), error)
+        return error
+
+    def _forms(self, race: Race, mark: float) -> tuple[Runner, Runner]:
+        """The form that does best, at full size if that is more than a look needs, and it before its last run."""
+        looks = [
+            self._ran(race, race.entered(name, round(_SMALL * self.size)), 20, _SAMPLES)
+            for name in forms_for(self.X.shape[1])
+        ]
+        best = best_of(looks)
+        # a form that leads by far, and leads the kernel layer too, has won; else the larger size tells
+        far = 2.0 if best.heldout < mark else 3.0
+        kept = sorted((r for r in looks if r.heldout <= far * best.heldout), key=lambda r: r.heldout)
+        # rotated units show what they can do only when there are many: they and the best other go on
+        others = [r for r in kept if r.regressors.form.name != "rotated"][:1]
+        kept = others + [r for r in kept if r.regressors.form.name == "rotated"]
+        larger = [race.entered(r.regressors.form.name, round(_NUMBERS * self.size)) for r in kept]
+        grown = [
+            self._ran(race, r, 10, _SAMPLES)
+            for r, old in zip(larger, kept, strict=True)
+            if len(r.theta) > 1.5 * len(old.theta)
+        ]
+        if not grown:
+            return best, best
+        least = best_of(grown).heldout
+        pairs = [(self._ran(race, r, 15, _SAMPLES), r) for r in grown if r.heldout <= _BEHIND * least]
+        return min([*pairs, (best, best)], key=lambda pair: pair[0].heldout)
+
+    def _radials(self, race: Race, winner: Runner, before: Runner) -> Runner:
+        """The same units with each radial function; those not far behind go on to all samples."""
+        if winner.heldout <= self.target:
+            return winner
+        others = [carried(before, name) for name in RADIAL_FUNCTIONS if name != winner.regressors.radial]
+        both = [winner, *(self._ran(race, other, 15, _SAMPLES) for other in others)]
+        least = best_of(both).heldout
+        kept = [r for r in both if r.heldout <= 1.6 * least]
+        return kept[0] if len(kept) == 1 else best_of([self._ran(race, r, 15) for r in kept])
+
+    def _sizes(self, race: Race, winner: Runner) -> Runner:
+        """Fewer units where samples, not time, set their number: the largest network may know too much by heart."""
+        tried = [winner]
+        for factor in (0.6, 0.35, 0.2):
+            if tried[-1].heldout <= self.target or (len(tried) > 1 and best_of(tried) is not tried[-1]):
+                break
+            fresh = race.entered(winner.regressors.form.name, round(factor * winner.theta.size))
+            fresh = race.run(fresh, 10)
+            tried.append(
+                self._ran(race, carried(fresh, winner.regressors.radial), max(30, winner.iterations))
+            )
+        return best_of(tried)
+
+    def _ran(self, race: Race, runner: Runner, iterations: int, samples: int | None = None) -> Runner:
+        if race.deadline < time.monotonic():
+            return runner
+        runner = race.run(runner, iterations, samples=samples)
+        self._note(runner)
+        return runner
+
+    def _finalists(self, race: Race, winner: Runner, spent: float) -> tuple[list[Member], float]:
+        """Members of the best committee and its error: the winner's, or a rival's where time allows to compare."""
+        began = time.monotonic()
+        best = self._committee(race, winner, spent)
+        each = time.monotonic() - began
+        if len(best[0]) == _MEMBERS:
+            for rival in self._rivals(winner):
+                if race.deadline - time.monotonic() < 2.0 * each:
+                    break
+                other = self._committee(race, race.run(rival, rival.iterations), each / _MEMBERS)
+                if len(other[0]) == _MEMBERS and other[1] < best[1]:
+                    best = other
+        members, error = best
+        single = float(np.sqrt(np.mean([member.heldout**2 for member in members])))
+        if len(members) == 1 or error > 0.9 * single:
+            return members[:1], single
+        return members, error
+
+    def _rivals(self, winner: Runner) -> list[Runner]:
+        """The best of three other pairs of form and radial function, if they are not far behind."""
+        found: dict[Regressors, Runner] = {}
+        for runner in sorted(self.ran, key=lambda r: r.heldout):
+            if runner.found is not None and runner.heldout < 2.5 * winner.heldout:
+                found.setdefault(runner.regressors, runner)
+        return [runner for pair, runner in found.items() if pair != winner.regressors][:3]
+
+    def _committee(self, race: Race, winner: Runner, spent: float) -> tuple[list[Member], float]:
+        """The winner, with others of its kind from other starts and folds if time allows, and the error to expect."""
+        members = [self._member(winner)]
+        while len(members) < _MEMBERS and race.deadline - time.monotonic() > 1.3 * spent:
+            began, k = time.monotonic(), len(members)
+            split = Split.of(self.X, self.Y, share=self.share, seed=self.seed, fold=k)
+            other = Race(split, race.scales, self.seed + k, race.deadline)
+            fresh = other.entered(winner.regressors.form.name, winner.theta.size)
+            fresh = carried(other.run(fresh, 15, samples=_SAMPLES), winner.regressors.radial)
+            fresh = other.run(fresh, max(30, winner.iterations))
+            spent = max(spent, time.monotonic() - began)
+            if fresh.found is None:
+                break
+            members.append(self._member(fresh))
+        error = expected_error(members, self.X)
+        if len(members) > 1:
+            self._noted(f"{len(members)} × {winner.name}", len(members) * len(winner.theta), error)
+        return members, error
+
+    def _member(self, runner: Runner) -> Member:
+        assert runner.found is not None
+        return Member(refitted(runner.found, self.X, self.Y, RIDGE), runner.heldout)
+
+    def _network(self, members: list[Member], error: float) -> Fitted:
+        A, b, weights, tail = averaged(members)
+        regressors = members[0].found.regressors
+        network = self._frozen(A, b, weights, tail, regressors.radial, error)
+        return self._fitted(network, regressors.form.name, error)
+
+    def _kernel_network(self, metric: Metric, error: float) -> Fitted:
+        layer = KernelLayer.fit(metric, self.X, self.Y, seed=self.seed)
+        A, b = layer.units()
+        network = self._frozen(A, b, layer.weights, layer.tail, metric.radial, error)
+        return self._fitted(network, "kernel layer", error)
+
+    def _constant(self) -> Fitted:
+        """Outputs that never change: no units."""
+        n, k = self.X.shape[1], self.Y.shape[1]
+        A, tail = np.zeros((0, n, n)), np.zeros((1 + n, k))
+        network = self._frozen(A, np.zeros((0, n)), np.zeros((0, k)), tail, "gaussian", 0.0)
+        return self._fitted(network, "none", 0.0)
+
+    def _frozen(
+        self, A: np.ndarray, b: np.ndarray, weights: np.ndarray, tail: np.ndarray, radial: str, error: float
+    ) -> Network:
+        W, T, basis = weights.T, tail.T, self.basis.T
+        if basis.shape[0] <= basis.shape[1]:  # as many modes as outputs: no need of them
+            W, T, basis = basis @ W, basis @ T, None
+        return Network(
+            tuple(self.inputs),
+            tuple(self.outputs),
+            A,
+            b,
+            W,
+            T,
+            self.scaling,
+            meta={"heldout": error / self.unit, "refined": True},
+            radial=radial,
+            basis=basis,
+        )
+
+    def _fitted(self, network: Network, form: str, error: float) -> Fitted:
+        spent = time.monotonic() - self.began
+        return Fitted(
+            network, form, network.radial, network.units, error / self.unit, tuple(self.trials), spent
+        )
+
+    def _note(self, runner: Runner) -> None:
+        self.ran.append(runner)
+        self._noted(runner.name, len(runner.theta), runner.heldout)
+
+    def _noted(self, what: str, units: int, error: float) -> None:
+        self.trials.append(Choice(what, units, error / self.unit, time.monotonic() - self.began))
+
+
+def _leading(Y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Y (N, m) ≈ L (N, k) V (k, m): the modes that carry all but 1e-8 of it, 96 at most.
+
+    A range finder with one power iteration (Halko, Martinsson & Tropp 2011).
+    """
+    count = min(*Y.shape, _MODES_MAX + 10)
+    sample = Y @ np.random.default_rng(0).normal(size=(Y.shape[1], count))
+    Q = np.linalg.qr(Y @ (Y.T @ np.linalg.qr(sample)[0]))[0]
+    U, s, V = np.linalg.svd(Q.T @ Y, full_matrices=False)
+    rest = np.sqrt(np.maximum(np.cumsum((s**2)[::-1])[::-1], 0.0))
+    k = int(np.clip((rest > 1e-8 * max(float(rest[0]), 1e-300)).sum(), 1, _MODES_MAX))
+    return np.ascontiguousarray(Q @ (U[:, :k] * s[:k])), np.ascontiguousarray(V[:k])
+
+
+def _check(X: np.ndarray, Y: np.ndarray, inputs: Sequence[Range], outputs: Sequence[Quantity]) -> None:
+    if X.ndim != 2 or Y.ndim != 2 or X.shape != (len(Y), len(inputs)) or Y.shape[1] != len(outputs):
+        raise UsageError(
+            f"Inputs {X.shape} and outputs {Y.shape} are not samples of {len(inputs)} inputs and {len(outputs)} "
+            "outputs.",
+            fix="Pass X (N, n) and Y (N, m) with one range for each input and one quantity for each output.",
+        )
+    if len(X) < 20 or not (np.isfinite(X).all() and np.isfinite(Y).all()):
+        raise UsageError(
+            f"{len(X)} samples, or some that are not finite, are too little to choose a network by.",
+            fix="Give at least 20 finite samples.",
+        )

@@ -1,0 +1,156 @@
+"""A network whose units sit at the data and share one metric: kernel interpolation, smoothed by a ridge.
+
+    f(x) = T·[1, x] + Σ_k w_k g(‖s ∘ (x − x_k)‖²),   w = (K + λ I)⁻¹ (Y − [1, x] Tᵀ)
+
+Where no small network follows a target this is what is left, and it is never bad. The input scales s and the ridge λ
+maximise the Gaussian-process likelihood of a part of the data (Rasmussen & Williams 2006, eq. 5.8), all output
+modes sharing kernel and variance, so that the variance drops out: with C = K + λ I and m modes
+
+    L = ½ N m log tr(Yᵀ C⁻¹ Y) + ½ m log det C.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import lapack
+from scipy.optimize import minimize
+
+from palpate.network.radial import RadialFunction, radial
+
+__all__ = ["KernelLayer", "Metric", "likely_metric"]
+
+_SCALES = (np.log(1e-3), np.log(30.0))
+_RIDGES = (np.log(1e-11), np.log(10.0))
+_UNITS_MAX = 2000  # beyond as many centres the others are fitted by least squares
+
+
+@dataclass(frozen=True)
+class Metric:
+    """Radial function, input scales s (n,) and ridge λ of a kernel."""
+
+    radial: RadialFunction
+    scales: np.ndarray
+    ridge: float
+
+    def kernel(self, X: np.ndarray, Z: np.ndarray) -> np.ndarray:
+        """K (N, M) between X (N, n) and Z (M, n)."""
+        return np.asarray(radial(self.radial, _squares(X * self.scales, Z * self.scales))[0])
+
+    def altered(self, scale: float, ridge: float) -> Metric:
+        """All scales and the ridge multiplied by two factors."""
+        return replace(self, scales=self.scales * scale, ridge=self.ridge * ridge)
+
+
+@dataclass(frozen=True, eq=False)
+class KernelLayer:
+    """A fitted kernel layer in scaled quantities.
+
+    Attributes
+    ----------
+    metric : Metric
+    centres : (h, n)
+    weights : (h, k)
+    tail : (1 + n, k)
+    """
+
+    metric: Metric
+    centres: np.ndarray
+    weights: np.ndarray
+    tail: np.ndarray
+
+    @classmethod
+    def fit(cls, metric: Metric, X: np.ndarray, Y: np.ndarray, *, seed: int = 0) -> KernelLayer:
+        """To X (N, n) and Y (N, k); up to 2,000 samples become centres, the others are fitted in least squares."""
+        one = _tail(X)
+        tail = np.linalg.lstsq(one, Y, rcond=None)[0]
+        residual = Y - one @ tail
+        if len(X) <= _UNITS_MAX:
+            C = metric.kernel(X, X)
+            C[np.diag_indices(len(C))] += metric.ridge
+            return cls(metric, X, _solved(C, residual), tail)
+        chosen = np.random.default_rng(seed).choice(len(X), _UNITS_MAX, replace=False)
+        Z = X[np.sort(chosen)]
+        cross, own = metric.kernel(X, Z), metric.kernel(Z, Z)
+        # the subset-of-regressors equations (Rasmussen & Williams 2006, eq. 8.14)
+        return cls(
+            metric, Z, _solved(cross.T @ cross + max(metric.ridge, 1e-9) * own, cross.T @ residual), tail
+        )
+
+    def predict(self, X: np.ndarray) -> np.ndarray:
+        """Scaled outputs (N, k) at scaled inputs X (N, n)."""
+        return np.asarray(_tail(X) @ self.tail + self.metric.kernel(X, self.centres) @ self.weights)
+
+    def units(self) -> tuple[np.ndarray, np.ndarray]:
+        """Factors A (h, n, n) and shifts b (h, n) of the same network, unit by unit."""
+        h, n = self.centres.shape
+        A = np.zeros((h, n, n))
+        A[:, np.arange(n), np.arange(n)] = self.metric.scales
+        return A, self.centres * self.metric.scales
+
+
+def likely_metric(
+    name: RadialFunction, X: np.ndarray, Y: np.ndarray, *, samples: int = 500, iterations: int = 40
+) -> Metric:
+    """Scales and ridge of the largest likelihood on the first `samples` of X (N, n) and Y (N, k)."""
+    X, Y = X[:samples], Y[:samples]
+    one = _tail(X)
+    Y = Y - one @ np.linalg.lstsq(one, Y, rcond=None)[0]
+    n = X.shape[1]
+    start = np.r_[np.full(n, -0.5 * np.log(n)), np.log(1e-5)]
+    if not np.any(Y) or len(X) < n + 3:
+        return Metric(name, np.exp(start[:n]), 1e-8)
+    found = minimize(
+        _unlikelihood,
+        start,
+        args=(name, X, Y),
+        jac=True,
+        method="L-BFGS-B",
+        bounds=[_SCALES] * n + [_RIDGES],
+        options={"maxiter": iterations},
+    )
+    return Metric(name, np.exp(found.x[:n]), float(np.exp(found.x[n])))
+
+
+def _unlikelihood(
+    logs: np.ndarray, name: RadialFunction, X: np.ndarray, Y: np.ndarray
+) -> tuple[float, np.ndarray]:
+    """L per number observed and its gradient by log s and log λ."""
+    (N, n), m = X.shape, Y.shape[1]
+    Z, ridge = X * np.exp(logs[:n]), float(np.exp(logs[n]))
+    C, slope, _ = radial(name, _squares(Z, Z))
+    C[np.diag_indices(N)] += ridge
+    L, failed = lapack.dpotrf(C, lower=1)
+    if failed:
+        return 1e10, np.zeros_like(logs)
+    alpha = lapack.dpotrs(L, Y, lower=1)[0]
+    fit = float((Y * alpha).sum())
+    inverse = lapack.dpotri(L, lower=1)[0]
+    inverse = np.tril(inverse) + np.tril(inverse, -1).T
+    by_C = 0.5 * m * inverse - 0.5 * N * m * (alpha @ alpha.T) / max(fit, 1e-300)
+    value = 0.5 * N * m * np.log(max(fit, 1e-300)) + m * float(np.log(np.diagonal(L)).sum())
+    by_q = by_C * slope
+    # Σ_ij M_ij 2 (z_i − z_j)² for symmetric M
+    spread = 4.0 * (by_q.sum(axis=1) @ (Z * Z) - np.einsum("ni,ni->i", Z, by_q @ Z))
+    return value / (N * m), np.r_[spread, ridge * np.trace(by_C)] / (N * m)
+
+
+def _squares(X: np.ndarray, Z: np.ndarray) -> np.ndarray:
+    return np.asarray(np.maximum((X * X).sum(1)[:, None] + (Z * Z).sum(1) - 2.0 * X @ Z.T, 0.0))
+
+
+def _tail(X: np.ndarray) -> np.ndarray:
+    return np.hstack([np.ones((len(X), 1)), X])
+
+
+def _solved(C: np.ndarray, Y: np.ndarray) -> np.ndarray:
+    """C⁻¹ Y of a symmetric positive definite C, helped by jitter where rounding spoilt it."""
+    jitter, size = 0.0, float(np.trace(C)) / len(C)
+    while True:
+        trial = C.copy(order="F")
+        trial[np.diag_indices(len(C))] += jitter
+        _, weights, failed = lapack.dposv(trial, Y, lower=1, overwrite_a=1)
+        if not failed:
+            return np.asarray(weights)
+        jitter = max(10.0 * jitter, 1e-14 * size)

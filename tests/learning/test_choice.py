@@ -1,0 +1,194 @@
+"""The automatic choice finds what the target is made of, and falls back on a kernel layer where nothing small is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from palpate.errors import UsageError
+from palpate.learning.choice import fit
+from palpate.learning.committee import Member, averaged, expected_error, refitted
+from palpate.learning.forms import form
+from palpate.learning.kernel_layer import KernelLayer, Metric, _unlikelihood, likely_metric
+from palpate.learning.race import Race, Runner, Split, carried, start
+from palpate.learning.regressors import Regressors
+from palpate.network.radial import RADIAL_FUNCTIONS
+from palpate.units import Quantity, Range
+
+INPUTS = tuple(Range(f"x{i}", 2.0, 6.0, "N") for i in range(3))
+OUTPUTS = tuple(Quantity(f"y{i}", "m") for i in range(4))
+
+
+def samples(of, seed=0, count=300):
+    """X in the declared range, and outputs mixed from the terms `of` of scaled inputs, a metre or so."""
+    rng = np.random.default_rng(seed)
+    X = rng.uniform(2, 6, (count + 400, 3))
+    Y = of((X - 4) / 2) @ np.random.default_rng(9).normal(size=(6, 4)) * 3 + 7
+    return X[:count], Y[:count], X[count:], Y[count:]
+
+
+def ridges(x):
+    rng = np.random.default_rng(1)
+    return np.tanh(x @ rng.normal(0, 1.2, (3, 6)) + rng.normal(0, 0.5, 6))
+
+
+def rotated_bumps(x):
+    rng = np.random.default_rng(2)
+    q = [(((x - rng.uniform(-1, 1, 3)) @ rng.normal(0, 1.2, (3, 3))) ** 2).sum(axis=1) for _ in range(6)]
+    return 1 / (1 + np.array(q).T)
+
+
+def relative(found, X, Y, train):
+    return np.linalg.norm(found.network.predict(X) - Y) / np.linalg.norm(Y - train.mean(axis=0))
+
+
+def cubic_error(X, Y, X_test, Y_test):
+    from scipy.interpolate import RBFInterpolator
+
+    predicted = RBFInterpolator((X - 4) / 2, Y, kernel="cubic", degree=1)((X_test - 4) / 2)
+    return np.linalg.norm(predicted - Y_test) / np.linalg.norm(Y_test - Y.mean(axis=0))
+
+
+@pytest.fixture(scope="module")
+def ridge_fit():
+    data = samples(ridges)
+    return fit(*data[:2], INPUTS, OUTPUTS, seconds=8.0), data
+
+
+@pytest.fixture(scope="module")
+def bump_fit():
+    data = samples(rotated_bumps)
+    return fit(*data[:2], INPUTS, OUTPUTS, seconds=8.0), data
+
+
+def test_ridges_are_learnt_by_ridges(ridge_fit):
+    found, (X, Y, X_test, Y_test) = ridge_fit
+    assert found.form == "rank-1"
+    assert relative(found, X_test, Y_test, Y) < 0.2 * cubic_error(X, Y, X_test, Y_test)
+
+
+def test_rotated_bumps_are_not(bump_fit):
+    found, (X, Y, X_test, Y_test) = bump_fit
+    assert found.form in {"rotated", "rank-2"}
+    assert relative(found, X_test, Y_test, Y) < 0.5 * cubic_error(X, Y, X_test, Y_test)
+
+
+@pytest.mark.parametrize("which", ["ridge_fit", "bump_fit"])
+def test_heldout_error_tells_the_test_error_roughly(which, request):
+    found, (_, Y, X_test, Y_test) = request.getfixturevalue(which)
+    assert 1 / 4 < relative(found, X_test, Y_test, Y) / found.heldout < 4
+
+
+def test_seed_decides_everything():
+    X, Y, _, _ = samples(ridges, count=80)
+    # a target that is met soon, so that no clock has a say
+    one, two = (fit(X, Y, INPUTS, OUTPUTS, seconds=60.0, seed=3, target=0.2) for _ in range(2))
+    assert [(t.what, t.heldout) for t in one.trials] == [(t.what, t.heldout) for t in two.trials]
+    for name in ("factors", "shifts", "weights", "tail"):
+        np.testing.assert_array_equal(getattr(one.network, name), getattr(two.network, name))
+    other = fit(X, Y, INPUTS, OUTPUTS, seconds=60.0, seed=4, target=0.2)
+    assert other.trials[0].heldout != one.trials[0].heldout
+
+
+def test_noise_is_not_learnt():
+    X, _, X_test, _ = samples(ridges)
+    noise = np.random.default_rng(5).normal(size=(len(X), 4))
+    found = fit(X, noise, INPUTS, OUTPUTS, seconds=3.0)
+    assert found.heldout > 0.8
+    assert np.sqrt((found.network.predict(X_test) ** 2).mean()) < 0.6
+
+
+def test_constant_outputs():
+    X = samples(ridges, count=30)[0]
+    found = fit(X, np.full((30, 4), 5.0), INPUTS, OUTPUTS, seconds=2.0)
+    np.testing.assert_allclose(found.network.predict(X), 5.0)
+
+
+def test_many_outputs_of_few_modes_go_through_a_basis(ridge_fit):
+    X, Y, X_test, Y_test = ridge_fit[1]
+    many = np.random.default_rng(0).normal(size=(4, 200))
+    outputs = tuple(Quantity(f"u{i}", "m") for i in range(200))
+    found = fit(X, Y @ many, INPUTS, outputs, seconds=3.0)
+    assert found.network.basis.shape == (200, 4)
+    miss = found.network.predict(X_test) - Y_test @ many
+    assert np.linalg.norm(miss) < 0.1 * np.linalg.norm((Y_test - Y.mean(axis=0)) @ many)
+
+
+@pytest.mark.parametrize(
+    ("X", "Y"),
+    [
+        (np.zeros((10, 3)), np.zeros((10, 4))),
+        (np.zeros((30, 2)), np.zeros((30, 4))),
+        (np.zeros((30, 3)), np.full((30, 4), np.nan)),
+    ],
+    ids=["few", "shape", "nan"],
+)
+def test_what_is_no_sample_is_refused(X, Y):
+    with pytest.raises(UsageError):
+        fit(X, Y, INPUTS, OUTPUTS)
+
+
+@pytest.mark.parametrize("name", RADIAL_FUNCTIONS)
+def test_likelihood_has_its_gradient(name):
+    rng = np.random.default_rng(0)
+    X, Y = rng.uniform(-1, 1, (25, 2)), rng.normal(size=(25, 3))
+    logs = np.array([0.2, -0.3, -2.0])
+    gradient = _unlikelihood(logs, name, X, Y)[1]
+    for i, step in enumerate(1e-6 * np.eye(3)):
+        difference = _unlikelihood(logs + step, name, X, Y)[0] - _unlikelihood(logs - step, name, X, Y)[0]
+        np.testing.assert_allclose(gradient[i], difference / 2e-6, rtol=1e-5, atol=1e-8)
+
+
+def test_likelihood_sees_the_input_that_matters():
+    X = np.random.default_rng(0).uniform(-1, 1, (150, 2))
+    scales = likely_metric("gaussian", X, np.sin(4 * X[:, :1])).scales
+    assert scales[0] > 20 * scales[1]
+
+
+def test_kernel_layer_interpolates_and_its_units_are_itself():
+    rng = np.random.default_rng(0)
+    X, Y = rng.uniform(-1, 1, (40, 3)), rng.normal(size=(40, 2))
+    layer = KernelLayer.fit(Metric("matern-5/2", np.array([1.0, 2.0, 0.5]), 1e-12), X, Y)
+    np.testing.assert_allclose(layer.predict(X), Y, atol=1e-6)
+    A, b = layer.units()
+    points = rng.uniform(-1, 1, (5, 3))
+    from palpate.network.radial import radial
+
+    v = np.einsum("kri,ni->nkr", A, points) - b
+    phi = radial("matern-5/2", (v * v).sum(axis=2))[0]
+    np.testing.assert_allclose(
+        np.c_[np.ones(5), points] @ layer.tail + phi @ layer.weights, layer.predict(points)
+    )
+
+
+@pytest.mark.parametrize("name", ["rank-1", "rank-2", "rotated", "axis-aligned"])
+def test_carried_units_stand_where_they_stood_as_wide_at_half_height(name):
+    X = np.random.default_rng(0).uniform(-1, 1, (50, 3))
+    f = form(name, 3)
+    theta = start(f, X, np.array([0.5, 1.0, 2.0]), 7, seed=0)
+    before = Runner(Regressors(f, "inverse-multiquadric"), theta)
+    after = carried(before, "gaussian")
+    (A, b), (A2, b2) = f.factors(before.theta), f.factors(after.theta)
+    np.testing.assert_allclose(A2, 0.48 * A, rtol=1e-12)
+    np.testing.assert_allclose(b2, 0.48 * b, rtol=1e-12)
+    # (1 + q)^-1/2 and exp(-(0.48)² q) are both a half at q = 3
+    assert np.exp(-(0.48**2) * 3) == pytest.approx(0.5, abs=2e-3)
+
+
+def test_committee_is_the_mean_of_its_members_and_errs_no_more_than_they_on_average():
+    X, Y, X_test, Y_test = samples(rotated_bumps, count=120)
+    xs, xt, ys, yt = (X - 4) / 2, (X_test - 4) / 2, Y - 7, Y_test - 7
+    members = []
+    for k in range(3):
+        split = Split.of(xs, ys, share=0.2, seed=0, fold=k)
+        assert len(split.X) + len(split.unseen[0]) == 120
+        race = Race(split, np.ones(3), k, np.inf)
+        runner = race.run(race.entered("rotated", 90), 20)
+        members.append(Member(refitted(runner.found, xs, ys, 1e-10), runner.heldout))
+    A, b, weights, tail = averaged(members)
+    v = np.einsum("kri,ni->nkr", A, xt) - b
+    together = 1 / np.sqrt(1 + (v * v).sum(axis=2)) @ weights + np.c_[np.ones(len(xt)), xt] @ tail
+    np.testing.assert_allclose(together, np.mean([m.found.predict(xt) for m in members], axis=0), rtol=1e-9)
+    squares = np.mean([((m.found.predict(xt) - yt) ** 2).mean() for m in members])
+    assert ((together - yt) ** 2).mean() <= squares
+    assert expected_error(members, xs) <= np.sqrt(np.mean([m.heldout**2 for m in members]))

@@ -89,12 +89,27 @@ def program(text: str, folder: Path) -> None:
     assert "faults    none" in text or "clock jump" in text  # a busy machine may suspend the loop
 
 
+def scikit_learn(text: str, folder: Path) -> None:
+    validated, searched = (
+        float(v) for v in re.findall(r"(?:cross-validated R²:|, R²) ([\d.]+)$", text, re.MULTILINE)[:2]
+    )
+    assert validated > 0.999
+    assert searched >= validated
+    samples, scores = zip(*re.findall(r"after +(\d+) samples: .*R² ([\d.]+)", text), strict=True)
+    assert [int(s) for s in samples] == [60, 120, 180, 240]
+    assert 0.8 < float(scores[0]) < float(scores[-1])
+    assert float(re.search(r"five passes: .*R² ([\d.]+)", text)[1]) > 0.98
+    assert (folder / "history.png").read_bytes().startswith(b"\x89PNG")
+    assert (folder / "strip.palpate").stat().st_size > 1000
+
+
 CHECKS: dict[str, Callable[[str, Path], None]] = {
     "01_cantilever.py": cantilever,
     "02_two_loads.py": two_loads,
     "03_your_own_beam.py": own_beam,
     "04_filter_by_hand.py": by_hand,
     "05_program_touches.py": program,
+    "07_scikit_learn.py": scikit_learn,
 }
 QUICK = {"04_filter_by_hand.py"}
 

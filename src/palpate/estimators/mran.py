@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 from palpate.estimators.base import RadialRegressor
 from palpate.estimators.data import BadValue, Units, merged, weights_of
 from palpate.learning import PRESETS, Observation, Settings, freeze, initial, learn, observe
-from palpate.learning.automatic import automatic
+from palpate.learning.automatic import UNITS_MAX, automatic
 from palpate.learning.modes import output_modes
 from palpate.learning.state import State
 from palpate.network import Scaling
@@ -183,6 +183,9 @@ class MRANRegressor(RadialRegressor):
         units = self._units(X, Y)
         scaled = Y / units.divisor
         settings = self._settings(X, scaled, units, self._seed(), None)
+        if self.settings is None and self.units_max is None:
+            # what the first batch has data for says nothing about the stream
+            settings = replace(settings, units_max=UNITS_MAX)
         scaling = Scaling.of(units.inputs, scaled)
         modes = (
             output_modes(scaling.scale_outputs(scaled), settings.modes)

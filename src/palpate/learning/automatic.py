@@ -7,7 +7,7 @@ update                 full up to 5 outputs and 1,000 unknowns, where an observa
 R                      the noise that neighbouring samples show, at least a tenth of the target
 edge_weight            1 with noise or several inputs: there a sample at the edge must not count 200 times
 M, S_w                 50 samples, fewer where there are few; two passes
-units_max              one and a half data per unknown at least
+units_max              one datum per unknown at least, and 60
 ε_max, γ               √n, half the range's diagonal; ε_min is reached after a third of the first pass
 κ, P₀                  the form's own: distances and outputs are scaled
 e_min, e'_min, ε_min   a rung of a ladder from few units to many, chosen by trial
@@ -34,10 +34,13 @@ from palpate.learning.settings import Settings
 from palpate.network import Scaling
 from palpate.units import Quantity, Range
 
-__all__ = ["automatic", "check_target", "ranges_of", "relative_error", "spread_of"]
+__all__ = ["UNITS_MAX", "automatic", "check_target", "ranges_of", "relative_error", "spread_of"]
 
 RUNGS = ((0.5, 0.3), (0.35, 0.1), (0.25, 0.03), (0.18, 0.01), (0.13, 3e-3), (0.09, 1e-3))
 """ε_min/√n, and e'_min over the outputs' spread."""
+
+UNITS_MAX = 60
+"""Beyond this an observation costs more than it brings; a refinement is the better way there."""
 
 _FEWEST = 20  # samples from which a fifth of them can judge
 _MARGIN = 0.5  # of the target: runs on other samples, in another order, differ by about a factor of two
@@ -157,7 +160,7 @@ def _base(N: int, n: int, m: int, noisy: bool) -> Settings:
     """What the data's shape decides."""
     form = "axis-aligned" if n == 1 or n > 3 else "rotated"
     p = Settings(form=form).regressors(n).form.size
-    units = int(np.clip((N * m / 1.5 - m * (1 + n)) / (m + p), 0, 60))
+    units = int(np.clip((N * m - m * (1 + n)) / (m + p), 0, UNITS_MAX))
     unknowns = m * (1 + n) + units * (m + p)
     update = "shared" if m > 5 else ("full" if unknowns <= _LARGEST else "decoupled")
     return Settings(

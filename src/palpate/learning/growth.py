@@ -45,7 +45,8 @@ def wants_growth(state: State, x: np.ndarray, error: np.ndarray, settings: Setti
     if distance <= threshold:
         return False
     size = float(np.linalg.norm(error))
-    if settings.growth == "significance":
+    # the first unit's width is no distance to another, so it is not judged by what it would contribute
+    if settings.growth == "significance" and state.units:
         unit = _unit(state, x, distance, settings)[None]
         size = float(significance(state, unit, np.array([size]), settings)[0])
     return size > settings.error_min
@@ -74,6 +75,6 @@ def grown(state: State, x: np.ndarray, error: np.ndarray, settings: Settings) ->
 
 def _unit(state: State, x: np.ndarray, distance: float, settings: Settings) -> np.ndarray:
     # growth asks for at least the smallest distance; the floor keeps a width from collapsing on a duplicate
-    distance = float(np.clip(distance, settings.distance_min, settings.distance_max))
+    distance = max(distance, settings.distance_min) if state.units else settings.distance_max
     form = settings.regressors(state.inputs).form
     return form.unit(x, settings.overlap * distance, seed=state.count)

@@ -162,7 +162,7 @@ def _perceptron(X: np.ndarray, Y: np.ndarray) -> tuple[Any, str]:
     def of(decay: float, steps: int) -> Fit:
         def fit(X: np.ndarray, Y: np.ndarray) -> Model:
             model = MLPRegressor(
-                (100, 100),
+                hidden_layer_sizes=(100, 100),
                 activation="tanh",
                 solver="lbfgs",
                 alpha=decay,

@@ -15,13 +15,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.errors import UsageError
 from palpate.learning.committee import Member, averaged, expected_error, refitted
 from palpate.learning.kernel_layer import KernelLayer, Metric, likely_metric
+from palpate.learning.problem import Problem
 from palpate.learning.race import RIDGE, Race, Runner, Split, best_of, carried, forms_for
 from palpate.learning.regressors import Regressors
-from palpate.network import Network, Scaling
-from palpate.network.radial import RADIAL_FUNCTIONS
+from palpate.network import Network
+from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction
 from palpate.units import Quantity, Range
 
 __all__ = ["Choice", "Fitted", "fit"]
@@ -30,7 +30,6 @@ _NUMBERS = 1500  # unknowns in the units of a full-size runner for 30 s
 _SMALL = 600  # and of one that is only looked at
 _SAMPLES = 1000  # to learn from while choosing
 _MEMBERS = 5
-_MODES_MAX = 96
 _BEHIND = 1.2  # times the best error: too far for another ten iterations
 _HOPELESS = 3.0  # times the kernel layer's error after the race: no refinement will make up for that
 
@@ -107,38 +106,26 @@ def fit(
     """
     from threadpoolctl import threadpool_limits
 
-    X, Y = np.asarray(X, float), np.asarray(Y, float)
-    _check(X, Y, inputs, outputs)
+    began = time.monotonic()
     with threadpool_limits(1):  # small matrices: threads would cost more than they bring
-        return _Chooser(X, Y, inputs, outputs, seconds, seed, target).chosen()
+        problem = Problem.of(X, Y, inputs, outputs)
+        return _Chooser(problem, began, seconds, seed, target).chosen()
 
 
 class _Chooser:
     """The stages of a choice, and the trials so far."""
 
     def __init__(
-        self,
-        X: np.ndarray,
-        Y: np.ndarray,
-        inputs: Sequence[Range],
-        outputs: Sequence[Quantity],
-        seconds: float,
-        seed: int,
-        target: float | None,
+        self, problem: Problem, began: float, seconds: float, seed: int, target: float | None
     ) -> None:
-        self.began = time.monotonic()
-        self.inputs, self.outputs, self.seed = inputs, outputs, seed
-        spread = float(np.sqrt(((Y - Y.mean(axis=0)) ** 2).mean()))
-        self.scaling = Scaling.of(inputs, Y, scale=spread)
-        self.X = self.scaling.scale_inputs(X)
-        self.Y, self.basis = _leading(self.scaling.scale_outputs(Y))
-        # errors are told per latent output until the end
-        self.unit = float(np.sqrt(len(self.outputs) / self.Y.shape[1]))
-        self.target = 0.0 if target is None else target * self.unit
+        self.problem, self.began, self.seed = problem, began, seed
+        self.X, self.Y = problem.X, problem.Y
+        # errors are per latent output until they are told
+        self.target = 0.0 if target is None else target * problem.unit
         # refitting on all samples and freezing come after the race
-        self.deadline = self.began + 0.85 * seconds
+        self.deadline = began + 0.85 * seconds
         self.size = min(2.0, np.sqrt(seconds / 30.0))
-        self.share = 0.15 if len(X) >= 1000 else 0.2
+        self.share = 0.15 if len(self.X) >= 1000 else 0.2
         self.split = Split.of(self.X, self.Y, share=self.share, seed=seed)
         self.trials: list[Choice] = []
         self.ran: list[Runner] = []
@@ -292,80 +279,34 @@ class _Chooser:
         return Member(refitted(runner.found, self.X, self.Y, RIDGE), runner.heldout)
 
     def _network(self, members: list[Member], error: float) -> Fitted:
-        A, b, weights, tail = averaged(members)
         regressors = members[0].found.regressors
-        network = self._frozen(A, b, weights, tail, regressors.radial, error)
-        return self._fitted(network, regressors.form.name, error)
+        return self._fitted(averaged(members), regressors.radial, regressors.form.name, error)
 
     def _kernel_network(self, metric: Metric, error: float) -> Fitted:
         layer = KernelLayer.fit(metric, self.X, self.Y, seed=self.seed)
-        A, b = layer.units()
-        network = self._frozen(A, b, layer.weights, layer.tail, metric.radial, error)
-        return self._fitted(network, "kernel layer", error)
+        return self._fitted((*layer.units(), layer.weights, layer.tail), metric.radial, "kernel layer", error)
 
     def _constant(self) -> Fitted:
         """Outputs that never change: no units."""
         n, k = self.X.shape[1], self.Y.shape[1]
-        A, tail = np.zeros((0, n, n)), np.zeros((1 + n, k))
-        network = self._frozen(A, np.zeros((0, n)), np.zeros((0, k)), tail, "gaussian", 0.0)
-        return self._fitted(network, "none", 0.0)
+        arrays = (np.zeros((0, n, n)), np.zeros((0, n)), np.zeros((0, k)), np.zeros((1 + n, k)))
+        return self._fitted(arrays, "gaussian", "none", 0.0)
 
-    def _frozen(
-        self, A: np.ndarray, b: np.ndarray, weights: np.ndarray, tail: np.ndarray, radial: str, error: float
-    ) -> Network:
-        W, T, basis = weights.T, tail.T, self.basis.T
-        if basis.shape[0] <= basis.shape[1]:  # as many modes as outputs: no need of them
-            W, T, basis = basis @ W, basis @ T, None
-        return Network(
-            tuple(self.inputs),
-            tuple(self.outputs),
-            A,
-            b,
-            W,
-            T,
-            self.scaling,
-            meta={"heldout": error / self.unit, "refined": True},
-            radial=radial,
-            basis=basis,
-        )
-
-    def _fitted(self, network: Network, form: str, error: float) -> Fitted:
+    def _fitted(
+        self,
+        arrays: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+        radial: RadialFunction,
+        form: str,
+        error: float,
+    ) -> Fitted:
+        heldout = error / self.problem.unit
+        network = self.problem.network(*arrays, radial, heldout=heldout)
         spent = time.monotonic() - self.began
-        return Fitted(
-            network, form, network.radial, network.units, error / self.unit, tuple(self.trials), spent
-        )
+        return Fitted(network, form, radial, network.units, heldout, tuple(self.trials), spent)
 
     def _note(self, runner: Runner) -> None:
         self.ran.append(runner)
         self._noted(runner.name, len(runner.theta), runner.heldout)
 
     def _noted(self, what: str, units: int, error: float) -> None:
-        self.trials.append(Choice(what, units, error / self.unit, time.monotonic() - self.began))
-
-
-def _leading(Y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Y (N, m) ≈ L (N, k) V (k, m): the modes that carry all but 1e-8 of it, 96 at most.
-
-    A range finder with one power iteration (Halko, Martinsson & Tropp 2011).
-    """
-    count = min(*Y.shape, _MODES_MAX + 10)
-    sample = Y @ np.random.default_rng(0).normal(size=(Y.shape[1], count))
-    Q = np.linalg.qr(Y @ (Y.T @ np.linalg.qr(sample)[0]))[0]
-    U, s, V = np.linalg.svd(Q.T @ Y, full_matrices=False)
-    rest = np.sqrt(np.maximum(np.cumsum((s**2)[::-1])[::-1], 0.0))
-    k = int(np.clip((rest > 1e-8 * max(float(rest[0]), 1e-300)).sum(), 1, _MODES_MAX))
-    return np.ascontiguousarray(Q @ (U[:, :k] * s[:k])), np.ascontiguousarray(V[:k])
-
-
-def _check(X: np.ndarray, Y: np.ndarray, inputs: Sequence[Range], outputs: Sequence[Quantity]) -> None:
-    if X.ndim != 2 or Y.ndim != 2 or X.shape != (len(Y), len(inputs)) or Y.shape[1] != len(outputs):
-        raise UsageError(
-            f"Inputs {X.shape} and outputs {Y.shape} are not samples of {len(inputs)} inputs and {len(outputs)} "
-            "outputs.",
-            fix="Pass X (N, n) and Y (N, m) with one range for each input and one quantity for each output.",
-        )
-    if len(X) < 20 or not (np.isfinite(X).all() and np.isfinite(Y).all()):
-        raise UsageError(
-            f"{len(X)} samples, or some that are not finite, are too little to choose a network by.",
-            fix="Give at least 20 finite samples.",
-        )
+        self.trials.append(Choice(what, units, error / self.problem.unit, time.monotonic() - self.began))

@@ -80,6 +80,20 @@ def test_refined_meets_its_target_with_few_units(wave):
     assert looser.network_.units < model.network_.units
 
 
+def test_form_and_kernel_by_trial(wave):
+    X, y = wave
+    Y = np.vstack([1e3 * y, X[:, 0] ** 2]).T
+    model = RBFNetworkRegressor(form="auto", target=1e-2, seconds=5.0, random_state=0).fit(X[:100], Y[:100])
+    assert 1.0 - model.score(X[100:], Y[100:]) < (5 * 1e-2) ** 2
+    assert model.error_ < 0.05
+    # differing weights are not for the trial; they count all the same
+    half = (np.arange(120) < 60).astype(float)
+    weighted = RBFNetworkRegressor(form="auto", units_max=5, random_state=0)
+    assert (
+        weighted.fit(X, Y, sample_weight=2.0 - half).predict(X) != weighted.fit(X, Y, 1.0 + half).predict(X)
+    ).any()
+
+
 @pytest.mark.parametrize("model", BOTH)
 def test_shape_of_y_comes_back(model, wave):
     X, y = wave

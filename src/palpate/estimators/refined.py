@@ -11,7 +11,8 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from palpate.estimators.base import RadialRegressor
-from palpate.estimators.data import merged, weights_of
+from palpate.estimators.data import Units, merged, weights_of
+from palpate.learning import choice
 from palpate.learning.automatic import check_target
 from palpate.learning.forms import form as form_of
 from palpate.learning.refine import Refined, refine
@@ -41,6 +42,9 @@ class RBFNetworkRegressor(RadialRegressor):
         square deviation from the mean.
     form : str, optional
         Of a unit (see `palpate.learning.forms`); if left out rotated up to three inputs, ridges of rank 1 above.
+        "auto" tries forms, radial functions and sizes against each other (see `palpate.learning.choice`) and takes
+        up to `seconds`; `radial`, `tail` and `units_max` then have no effect. Where weights differ, or below 20
+        samples, it is as if left out.
     radial : {"gaussian", "inverse-multiquadric", "matern-5/2"}
     tail : {"affine", "constant", "none"}
     units_max : int
@@ -60,8 +64,8 @@ class RBFNetworkRegressor(RadialRegressor):
         What predicts.
     error_ : float
         Its error on the samples that judged, relative as `target`.
-    trials_ : tuple of Trial
-        Sizes that were tried.
+    trials_ : tuple of Trial or Choice
+        What was tried.
     n_features_in_ : int
     feature_names_in_ : (n,)
         Where X was a table with named columns.
@@ -79,6 +83,9 @@ class RBFNetworkRegressor(RadialRegressor):
     >>> bool(model.score(X, np.sin(3 * X[:, 0])) > 0.99999)
     True
     """
+
+    error_: float
+    trials_: tuple[Trial | choice.Choice, ...]
 
     def __init__(
         self,
@@ -127,6 +134,8 @@ class RBFNetworkRegressor(RadialRegressor):
         X, Y = self._checked(X, y, first=True)
         X, Y, weights = merged(X, Y, weights_of(sample_weight, len(X)))
         units = self._units(X, Y)
+        if self.form == "auto" and len(X) >= _FEWEST and not np.ptp(weights):
+            return self._chosen(X, Y, units)
         scaling = Scaling.of(units.inputs, Y / units.divisor)
         xs, ys = scaling.scale_inputs(X), scaling.scale_outputs(Y / units.divisor)
         spread = float(np.sqrt((ys**2).mean())) or 1.0
@@ -134,6 +143,20 @@ class RBFNetworkRegressor(RadialRegressor):
             found, error, self.trials_ = self._grown(xs, ys, weights, self.target * spread)
         self.error_ = error / spread
         self.network_ = units.back(freeze_refined(found, units.inputs, units.outputs, scaling))
+        return self
+
+    def _chosen(self, X: np.ndarray, Y: np.ndarray, units: Units) -> RBFNetworkRegressor:
+        found = choice.fit(
+            X,
+            Y / units.divisor,
+            units.inputs,
+            units.outputs,
+            seconds=self.seconds,
+            seed=self._seed(),
+            target=self.target,
+        )
+        self.error_, self.trials_ = found.heldout, found.trials
+        self.network_ = units.back(found.network)
         return self
 
     def _grown(
@@ -165,7 +188,11 @@ class RBFNetworkRegressor(RadialRegressor):
 
     def _regressors(self, n: int, Y: np.ndarray) -> tuple[Regressors, int]:
         """What units are, and how many of them leave some data over."""
-        form = self.form or ("axis-aligned" if n == 1 else "rotated" if n <= 3 else "rank-1")
+        form = (
+            self.form
+            if self.form not in {None, "auto"}
+            else ("axis-aligned" if n == 1 else "rotated" if n <= 3 else "rank-1")
+        )
         made = Regressors(form_of(form, n), self.radial, self.tail)  # type: ignore[arg-type]
         m = Y.shape[1]
         room = max(0.0, Y.size / 1.25 - m * made.tail_size) / (m + made.form.size)

@@ -20,7 +20,7 @@ class Nudge:
     Attributes
     ----------
     theta : (h, p)
-        Units.
+        Units; where they started if no damping helped.
     fit : Fit
         The best weights and tail for them.
     damping : float

@@ -9,16 +9,18 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.learning.nudge import nudged
 from palpate.learning.posterior import posterior
+from palpate.learning.projection import Fit, project
 from palpate.learning.refine import Refined
 from palpate.learning.reservoir import Keeping, Reservoir
 from palpate.learning.rows import Rows
 from palpate.learning.settings import Settings
 from palpate.learning.state import State
-from palpate.learning.structure import placed
 
 __all__ = ["Progress", "Refining", "refined_state"]
 
 _SETTLED = 0.1  # a step that gains less of the cost than this: what is left needs more units, not other ones
+_WIDE = 1.5  # new units' widths relative to their spacing
+_WIDTHS = 0.4  # spread of new units' log widths
 _FILLED = 0.5  # unknowns per number in the reservoir up to which units are added
 
 
@@ -42,6 +44,10 @@ class Refining:
         Units added at a time, relative to those there are; one at least.
     ridge : float
         Penalty on squared weights, per sample.
+    judges : int
+        One retained sample in so many judges whether moved or added units are better; 0 for none.
+    patience : int
+        Iterations that units on trial may take to become better.
     """
 
     samples: int = 500
@@ -51,16 +57,23 @@ class Refining:
     grows: bool = True
     share: float = 0.25
     ridge: float = 1e-13
+    judges: int = 5
+    patience: int = 20
 
     def __post_init__(self) -> None:
-        if self.samples < 1 or self.every < 0 or self.tries < 1 or self.share < 0 or self.ridge < 0:
+        if (
+            self.samples < 1
+            or self.every < 0
+            or self.tries < 1
+            or min(self.share, self.ridge, self.judges) < 0
+        ):
             raise UsageError(
                 f"{self} makes no sense.",
                 fix="Keep one sample at least, try one damping at least, and let nothing be negative.",
             )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Progress:
     """What the last iteration leaves to the next one.
 
@@ -71,11 +84,23 @@ class Progress:
         By how much it lowered the cost, relative; 0 before the first.
     rms : float
         Root mean square error over the reservoir, per scaled output.
+    expected : float
+        The same over the judging samples, before they were fitted too.
+    scout : (h', p), optional
+        Units on trial: they were iterated from, but have not become better than the state's yet.
+    since : int
+        Iterations of theirs so far.
+    failed : int
+        Trials that failed since the last one that did not.
     """
 
     damping: float = 1e-2
     gain: float = 0.0
     rms: float = float("nan")
+    expected: float = float("nan")
+    scout: np.ndarray | None = None
+    since: int = 0
+    failed: int = 0
 
 
 def refined_state(
@@ -83,58 +108,144 @@ def refined_state(
 ) -> tuple[State, Progress]:
     """The state after one iteration on the reservoir, with the Gauss–Newton posterior, and what it achieved.
 
-    With a forgetting factor λ a sample of age a weighs λᵃ, as it does in the filter.
+    With a forgetting factor λ a sample of age a weighs λᵃ, as it does in the filter. Moved and new units
+    replace the state's once they have less error on the judging samples; weights and tail are then fitted to all.
     """
-    of = settings.regressors(state.inputs)
     weights = kept.weights * settings.forgetting_factor**kept.ages
-    rows = Rows.of(of, kept.X, kept.Y, weights=weights, slopes=kept.slopes, slope_weight=kept.slope_weights)
-    theta = _with_new_units(state, kept, settings, refining, last)
-    new = len(theta) - state.units
-    damping = 1e-2 if new else last.damping
-    found = nudged(
-        rows, theta, max(refining.ridge, 1e-30) * rows.total, damping=damping, tries=refining.tries
+    judging = _judging(kept, weights, refining)
+    penalty = max(refining.ridge, 1e-30)
+    rows = _rows(state, kept, settings, np.where(judging, 0.0, weights))
+    start, damping, new = _start(state, kept, settings, refining, last)
+    found = nudged(rows, start, penalty * rows.total, damping=damping, tries=refining.tries)
+    before = _error(
+        rows, kept, judging, weights, state.theta, project(rows, state.theta, penalty * rows.total)
     )
-    squares = float((found.fit.residual[: len(rows.X)] ** 2).sum())
-    refined = _refined(state, settings, found.theta, found.fit.coefficients @ rows.modes)
-    refined = replace(refined, rms=float(np.sqrt(squares / (rows.total * state.outputs))))
-    covariance = posterior(refined, kept.X, settings, modes=state.modes, weights=weights).covariance
+    after = _error(rows, kept, judging, weights, found.theta, found.fit)
+    better = not after > before
+    theta = found.theta if better else state.theta
+    everything = _rows(state, kept, settings, weights)
+    fit = project(everything, theta, penalty * everything.total)
+    squares = float((fit.residual[: len(everything.X)] ** 2).sum())
+    rms = float(np.sqrt(squares / (everything.total * state.outputs)))
+    progress = Progress(
+        damping=found.damping,
+        gain=found.gain,
+        rms=rms,
+        expected=min(before, after) if judging.any() else rms,
+        scout=None if better else found.theta,
+        since=0 if better else 1 if new else last.since + 1,
+        failed=0 if better else last.failed + (new and last.since > 0),
+    )
+    coefficients = fit.coefficients @ everything.modes
+    return _continued(state, kept, weights, settings, theta, coefficients, progress), progress
+
+
+def _continued(
+    state: State,
+    kept: Reservoir,
+    weights: np.ndarray,
+    settings: Settings,
+    theta: np.ndarray,
+    coefficients: np.ndarray,
+    progress: Progress,
+) -> State:
+    """The filter's state with other parameters and their posterior."""
+    new = len(theta) - state.units
+    refined = replace(_refined(state, settings, theta, coefficients), rms=progress.expected)
+    found = posterior(refined, kept.X, settings, modes=state.modes, weights=weights)
     state = replace(
         state,
-        coefficients=refined.coefficients,
-        theta=refined.theta,
-        covariance=covariance,
-        places=np.vstack([state.places, of.form.centres(theta[state.units :])]) if new else state.places,
+        coefficients=coefficients,
+        theta=theta,
+        covariance=found.covariance,
+        places=np.vstack([state.places, found.places[state.units :]]),
         silent=np.append(state.silent, np.zeros(new, np.int64)),
-        innovation=min(state.innovation, refined.rms**2),
-        in_modes=None if state.modes is None else refined.coefficients @ state.modes,
+        innovation=min(state.innovation, progress.expected**2),
+        in_modes=found.in_modes,
     )
-    state = replace(state, errors=_window_errors(state, settings))
-    return state, Progress(found.damping, found.gain, refined.rms)
+    return replace(state, errors=_window_errors(state, settings))
+
+
+def _judging(kept: Reservoir, weights: np.ndarray, refining: Refining) -> np.ndarray:
+    """Which retained samples (N,) judge: a place says nothing about when its sample came."""
+    if not refining.judges or len(kept) < 2 * refining.judges:
+        return np.zeros(len(kept), bool)
+    return np.asarray(np.arange(len(kept)) % refining.judges == refining.judges - 1)
+
+
+def _rows(state: State, kept: Reservoir, settings: Settings, weights: np.ndarray) -> Rows:
+    of = settings.regressors(state.inputs)
+    return Rows.of(of, kept.X, kept.Y, weights=weights, slopes=kept.slopes, slope_weight=kept.slope_weights)
+
+
+def _error(
+    rows: Rows, kept: Reservoir, judging: np.ndarray, weights: np.ndarray, theta: np.ndarray, fit: Fit
+) -> float:
+    """Weighted RMS error per scaled output on the judging samples; 0 where there are none."""
+    if not judging.any():
+        return 0.0
+    X, w = kept.X[judging], weights[judging]
+    phi = np.hstack([rows.regressors.tail_rows(X), rows.regressors.phi(X, theta)])
+    error = phi @ (fit.coefficients @ rows.modes) - kept.Y[judging]
+    return float(np.sqrt(((error**2).mean(axis=1) * w).sum() / w.sum()))
 
 
 def _window_errors(state: State, settings: Settings) -> np.ndarray:
     """Squared errors (≤ M,) over the window: growth must not be asked for by errors that are gone."""
-    X, Y = state.seen[:, : state.inputs], state.seen[:, state.inputs :]
+    seen = state.seen[-settings.window :]
+    X, Y = seen[:, : state.inputs], seen[:, state.inputs :]
     of = settings.regressors(state.inputs)
     error = np.hstack([of.tail_rows(X), of.phi(X, state.theta)]) @ state.led - Y
     return np.asarray((error**2).sum(axis=1))
 
 
-def _with_new_units(
+def _start(
     state: State, kept: Reservoir, settings: Settings, refining: Refining, last: Progress
-) -> np.ndarray:
-    """The units, and some more where growth is due: they have settled, and the error is still too large."""
-    h, N = state.units, len(kept)
+) -> tuple[np.ndarray, float, bool]:
+    """Units to iterate from, a damping, and whether they are new on trial.
+
+    They are those on trial; or, where growth is due, the state's and some more; or, after a trial that failed, all
+    drawn anew in turns with the state's; or the state's.
+    """
+    if last.scout is not None and last.since < refining.patience:
+        return last.scout, last.damping, False
+    fresh, settled = Progress().damping, last.since > 0 or last.gain <= _SETTLED
+    rng = np.random.default_rng((state.count, state.units))
+    if settled and (new := _growth(state, len(kept), settings, refining, last)):
+        return np.vstack([state.theta, _drawn(state, kept, settings, new, rng)]), fresh, True
+    if last.since and last.failed % 2 == 0 and refining.grows:
+        none = replace(state, theta=state.theta[:0], coefficients=state.coefficients[: -state.units or None])
+        return _drawn(none, kept, settings, state.units, rng), fresh, True
+    return state.theta, fresh if last.since else last.damping, True
+
+
+def _growth(state: State, samples: int, settings: Settings, refining: Refining, last: Progress) -> int:
+    """How many units to add: none while the error is small enough, or where samples would not decide on them."""
+    h = state.units
     new = min(max(1, round(refining.share * h)), settings.units_max - h)
-    if not refining.grows or new < 1 or last.gain > _SETTLED:
-        return state.theta
-    if np.isfinite(last.rms) and last.rms * np.sqrt(state.outputs) <= settings.error_rms_min:
-        return state.theta
+    if not refining.grows or new < 1:
+        return 0
+    if last.expected * np.sqrt(state.outputs) <= settings.error_rms_min:
+        return 0
     unknowns = (h + new) * (1.0 + state.theta.shape[1] / state.outputs) + len(state.tail.T)
-    if unknowns > _FILLED * N:
-        return state.theta
-    now = _refined(state, settings, state.theta, state.coefficients)
-    return np.vstack([state.theta, placed(kept.X, kept.Y, now, new, seed=state.count)])
+    return new if unknowns <= _FILLED * samples else 0
+
+
+def _drawn(
+    state: State, kept: Reservoir, settings: Settings, count: int, rng: np.random.Generator
+) -> np.ndarray:
+    """Units (count, p) at samples drawn by squared error and distance from the others, about their spacing wide."""
+    of, X, n = settings.regressors(state.inputs), kept.X, state.inputs
+    f = np.hstack([of.tail_rows(X), of.phi(X, state.theta)]) @ state.coefficients
+    error = ((kept.Y - f) ** 2).sum(axis=1)
+    width = _WIDE * 2.0 / (state.units + count) ** (1.0 / n)
+    distance = np.full(len(X), width**2)
+    units = []
+    for w in width * np.exp(rng.normal(0.0, _WIDTHS, count)):
+        i = int(np.argmax(error * distance * rng.exponential(size=len(X))))
+        units.append(of.form.unit(X[i], w, seed=int(rng.integers(2**31))))
+        distance = np.minimum(distance, ((X - X[i]) ** 2).sum(axis=1))
+    return np.array(units)
 
 
 def _refined(state: State, settings: Settings, theta: np.ndarray, coefficients: np.ndarray) -> Refined:

@@ -20,7 +20,8 @@ class Reservoir:
     fading    every new one is kept, in a random place: ages are geometric with mean R (Aggarwal 2006)
     latest    the last R
 
-    The seed decides which. Memory: R (n + m + 3) numbers, and R m n more once a sample comes with slopes.
+    The seed decides which. A sample at exactly the inputs of a retained one takes its place: a second sight of it must
+    not count twice against the others. Memory: R (n + m + 3) numbers, and R m n more once a sample comes with slopes.
 
     Parameters
     ----------
@@ -46,7 +47,7 @@ class Reservoir:
                 fix=f"Give it room for one at least, and one of {', '.join(get_args(Keeping))}.",
             )
         self.capacity, self.keeping = capacity, keeping
-        self.seen = 0
+        self.seen = self.fresh = 0  # samples shown, and those at inputs that were not held
         self._rng = np.random.default_rng(seed)
         self._x, self._y = np.empty((capacity, inputs)), np.empty((capacity, outputs))
         self._times = np.empty(capacity, np.int64)
@@ -54,7 +55,7 @@ class Reservoir:
         self._slopes: np.ndarray | None = None
 
     def __len__(self) -> int:
-        return min(self.seen, self.capacity)
+        return min(self.fresh, self.capacity)
 
     @property
     def X(self) -> np.ndarray:
@@ -96,7 +97,7 @@ class Reservoir:
         slope_weight: float = 1.0,
     ) -> bool:
         """Show one more sample x (n,), y (m,); whether it was kept."""
-        place = self._place()
+        place = self._place(x)
         self.seen += 1
         if place >= self.capacity:
             return False
@@ -110,10 +111,14 @@ class Reservoir:
             self._slopes[place] = slopes
         return True
 
-    def _place(self) -> int:
-        if self.seen < self.capacity:
-            return self.seen
+    def _place(self, x: np.ndarray) -> int:
+        same = np.flatnonzero((x == self.X).all(axis=1))
+        if same.size:
+            return int(same[0])
+        self.fresh += 1
+        if self.fresh <= self.capacity:
+            return self.fresh - 1
         if self.keeping == "latest":
-            return self.seen % self.capacity
+            return (self.fresh - 1) % self.capacity
         # a place past the last means that the sample is not kept
-        return int(self._rng.integers(self.capacity if self.keeping == "fading" else self.seen + 1))
+        return int(self._rng.integers(self.capacity if self.keeping == "fading" else self.fresh))

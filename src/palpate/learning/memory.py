@@ -15,12 +15,28 @@ import numpy as np
 from palpate.learning.settings import Settings
 from palpate.learning.state import State
 
-__all__ = ["forgets", "spoils", "window_error", "with_least"]
+__all__ = ["forgets", "kept", "spoils", "window_error", "with_least"]
 
 
 _LEAST = (
     2.0  # on mean squares: above this times their least so far only steps that do not raise them are taken
 )
+
+
+def kept(state: State, x: np.ndarray, y: np.ndarray, settings: Settings) -> np.ndarray:
+    """The remembered observations (≤ S, n + m) with one more, newest last.
+
+    Without a limit on relapses these are the window's. Else, once the memory is full, the new one replaces the
+    nearest, so that places which are seldom visited are not forgotten.
+    """
+    row = np.concatenate([x, y])
+    if not settings.relapse_limit:
+        return np.vstack([state.seen, row])[-settings.window :]
+    seen = state.seen
+    if len(seen) >= max(settings.window, settings.memory):
+        nearest = int(((seen[:, : x.size] - x) ** 2).sum(axis=1).argmin())
+        seen = np.delete(seen, nearest, axis=0)
+    return np.vstack([seen, row])
 
 
 def window_error(state: State, coefficients: np.ndarray, theta: np.ndarray, settings: Settings) -> float:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from palpate.learning.growth import grown, wants_growth
-from palpate.learning.memory import spoils, with_least
+from palpate.learning.memory import kept, spoils, with_least
 from palpate.learning.noise import running_mean_square
 from palpate.learning.observation import Observation
 from palpate.learning.pruning import pruned
@@ -117,8 +117,8 @@ def _remembered(state: State, seen: Observation, error: np.ndarray, settings: Se
     """The state with one more observation counted, and it and its error in the window."""
     errors = np.append(state.errors, float(error @ error))[-settings.window :]
     y = seen.y if state.modes is None else seen.y @ state.modes
-    remembered = max(settings.window, settings.memory) if settings.relapse_limit else settings.window
-    window = np.vstack([state.seen, np.concatenate([seen.x, y])])[-remembered:]
     count = state.count + 1
     innovation = running_mean_square(state.innovation, error, count)
-    return replace(state, errors=errors, seen=window, count=count, innovation=innovation)
+    return replace(
+        state, errors=errors, seen=kept(state, seen.x, y, settings), count=count, innovation=innovation
+    )

@@ -85,8 +85,8 @@ class Settings:
         Largest factor by which one update, or a unit added or removed, may raise the squared error over the
         memory; 0 for no limit.
     memory : int
-        Observations remembered for that, M at least. Too few leave places where nothing forbids a unit to
-        spoil what was learnt there: a sample should have been near every unit.
+        Observations remembered for that, M at least; a new one then replaces the nearest. Too few leave places
+        where nothing forbids a unit to spoil what was learnt there: a sample should be near every unit.
     update_on_growth : bool
         Whether an observation that added a unit also updates everything.
     prune_below : float

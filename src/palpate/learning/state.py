@@ -29,8 +29,7 @@ class State:
     errors : (≤ M,)
         The last squared error norms ‖e‖², newest last.
     seen : (≤ S, n + m) or (≤ S, n + r)
-        The last observations [x, y], newest last, as many as the settings remember; y by the output modes where
-        there are some.
+        Remembered observations [x, y], newest last (see `memory`); y by the output modes where there are some.
     silent : (h,) int
         Observations in a row in which each unit was silent.
     count : int

@@ -131,7 +131,10 @@ def smt_rbf(X: np.ndarray, Y: np.ndarray) -> Model:
 
 
 def mlp(X: np.ndarray, Y: np.ndarray) -> Model:
-    """scikit-learn's `MLPRegressor`: two layers of 100 tanh, L-BFGS; decay by hold-out at a fifth of the steps."""
+    """scikit-learn's `MLPRegressor`: two layers of 100 tanh, L-BFGS; decay by hold-out at a fifth of the steps.
+
+    2,000 steps, or 10,000 up to 1,000 samples.
+    """
     model, label = _perceptron(X, Y)
     return Model(model.predict, model, label)
 
@@ -147,7 +150,12 @@ def onnx_mlp(X: np.ndarray, Y: np.ndarray) -> Model:
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     session = onnxruntime.InferenceSession(written, options, providers=["CPUExecutionProvider"])
     name = session.get_inputs()[0].name
-    return Model(lambda q: session.run(None, {name: q.astype(np.float32)})[0], written, label)
+
+    def predict(q: np.ndarray) -> np.ndarray:
+        # the exporter flattens several outputs into one column
+        return np.asarray(session.run(None, {name: q.astype(np.float32)})[0]).reshape(len(q), -1)
+
+    return Model(predict, written, label)
 
 
 _TRAINED: list[tuple[np.ndarray, np.ndarray, Any, str]] = []  # the last perceptron, as two rivals share it
@@ -179,8 +187,8 @@ def _perceptron(X: np.ndarray, Y: np.ndarray) -> tuple[Any, str]:
 
         return fit
 
-    steps = 2000
-    decays = (1e-4, 1e-2, 1.0)
+    steps = 2000 if len(X) > 1000 else 10000
+    decays = (1e-4, 1e-3, 1e-2, 1e-1)
     errors = [_heldout_error(of(decay, steps // 5), X, Y) for decay in decays]
     model = of(decays[int(np.argmin(errors))], steps)(X, Y)
     _TRAINED[:] = [(X, Y, model.kept, model.chosen)]

@@ -95,8 +95,8 @@ def tables(*, quick: bool = False) -> list[Table]:
             (
                 "relative RMSE: ‖error‖/‖test outputs − training mean‖",
                 "kB: the network's file, or what a rival keeps, pickled",
-                "perceptron: 2,000 steps of L-BFGS, a training budget rather than the end of training; the ONNX row "
-                "is the same perceptron, and shares its training",
+                "perceptron: 2,000 to 10,000 steps of L-BFGS, a training budget rather than its end; "
+                "the ONNX row is the same perceptron, and shares its training",
                 *(f"not installed: {name}" for name in MISSING),
             ),
         )

@@ -31,6 +31,7 @@ _SMALL = 600  # and of one that is only looked at
 _SAMPLES = 1000  # to learn from while choosing
 _MEMBERS = 5
 _BEHIND = 1.2  # times the best error: too far for another ten iterations
+_ROUND_OFF = 1e-9  # of the outputs: nobody asks for less
 _HOPELESS = 3.0  # times the kernel layer's error after the race: no refinement will make up for that
 
 
@@ -52,7 +53,7 @@ class Fitted:
     ----------
     network : Network
     form : str
-        Of its units: rank-1, rank-2, rotated, axis-aligned, or kernel layer.
+        Of its units: rank-1, rank-2, rotated, axis-aligned; kernel layer; or affine, without units.
     radial : str
     units : int
     heldout : float
@@ -121,7 +122,7 @@ class _Chooser:
         self.problem, self.began, self.seed = problem, began, seed
         self.X, self.Y = problem.X, problem.Y
         # errors are per latent output until they are told
-        self.target = 0.0 if target is None else target * problem.unit
+        self.target = max(target or 0.0, _ROUND_OFF) * problem.unit
         # refitting on all samples and freezing come after the race
         self.deadline = began + 0.85 * seconds
         self.size = min(2.0, np.sqrt(seconds / 30.0))
@@ -131,8 +132,9 @@ class _Chooser:
         self.ran: list[Runner] = []
 
     def chosen(self) -> Fitted:
-        if not self.Y.any():
-            return self._constant()
+        tail, error = self._tail()
+        if error <= self.target:
+            return tail
         layer, mark, scales = self._kernel()
         race = Race(self.split, scales, self.seed, self.deadline)
         winner = self._radials(race, *self._forms(race, mark))
@@ -144,7 +146,7 @@ class _Chooser:
         if winner.heldout > self.target:
             winner = race.run(winner, round(120 * self.size))
             self._note(winner)
-        if winner.found is None or winner.heldout > mark:
+        if winner.found is None or winner.heldout > max(mark, self.target):
             return self._kernel_network(layer, mark)
         spent = time.monotonic() - began
         return self._network(*self._finalists(race, winner, spent))
@@ -286,11 +288,14 @@ class _Chooser:
         layer = KernelLayer.fit(metric, self.X, self.Y, seed=self.seed)
         return self._fitted((*layer.units(), layer.weights, layer.tail), metric.radial, "kernel layer", error)
 
-    def _constant(self) -> Fitted:
-        """Outputs that never change: no units."""
-        n, k = self.X.shape[1], self.Y.shape[1]
-        arrays = (np.zeros((0, n, n)), np.zeros((0, n)), np.zeros((0, k)), np.zeros((1 + n, k)))
-        return self._fitted(arrays, "gaussian", "none", 0.0)
+    def _tail(self) -> tuple[Fitted, float]:
+        """An affine function without units, and its error."""
+        (n, k), (held, wanted) = (self.X.shape[1], self.Y.shape[1]), self.split.unseen
+        one, ahead = (np.hstack([np.ones((len(X), 1)), X]) for X in (self.split.X, held))
+        tail = np.linalg.lstsq(one, self.split.Y, rcond=None)[0]
+        error = float(np.sqrt(((ahead @ tail - wanted) ** 2).mean()))
+        arrays = (np.zeros((0, n, n)), np.zeros((0, n)), np.zeros((0, k)), tail)
+        return self._fitted(arrays, "gaussian", "affine", error), error
 
     def _fitted(
         self,

@@ -151,7 +151,11 @@ def carried(runner: Runner, radial: RadialFunction) -> Runner:
     else:
         theta *= factor
     return replace(
-        runner, regressors=replace(runner.regressors, radial=radial), theta=theta, heldout=float("inf")
+        runner,
+        regressors=replace(runner.regressors, radial=radial),
+        theta=theta,
+        heldout=float("inf"),
+        found=None,
     )
 
 

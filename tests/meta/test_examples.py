@@ -103,12 +103,33 @@ def scikit_learn(text: str, folder: Path) -> None:
     assert (folder / "strip.palpate").stat().st_size > 1000
 
 
+def drifting(text: str, folder: Path) -> None:
+    rows = re.findall(r"stiffness +(\d+) %.*: following ([\d.]+), constant ([\d.]+), frozen ([\d.]+)", text)
+    stiffness = [int(row[0]) for row in rows]
+    assert (stiffness[0], stiffness[-1]) == (100, 70)
+    following, constant, frozen = (float(e) for e in rows[-1][1:])
+    assert following < 0.1 * frozen
+    assert following < 0.2 * constant
+    # while it drifts too, not only afterwards
+    assert max(float(row[1]) for row in rows) < 0.2 * frozen
+    # a rod that has lost 30 % of its stiffness: the frozen network is wrong by some centimetres
+    assert 20.0 < frozen < 100.0
+    evaluations, networks = map(
+        int, re.search(r"evaluated (\d+) times with (\d+) networks, in order: True", text).groups()
+    )
+    assert evaluations > 100
+    assert networks > 20
+    there, here = re.search(r"tip at 2.5 N: (\S+) mm in the reader, (\S+) mm here", text).groups()
+    assert there == here
+
+
 CHECKS: dict[str, Callable[[str, Path], None]] = {
     "01_cantilever.py": cantilever,
     "02_two_loads.py": two_loads,
     "03_your_own_beam.py": own_beam,
     "04_filter_by_hand.py": by_hand,
     "05_program_touches.py": program,
+    "06_drifting_stiffness.py": drifting,
     "07_scikit_learn.py": scikit_learn,
 }
 QUICK = {"04_filter_by_hand.py"}

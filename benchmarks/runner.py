@@ -19,7 +19,18 @@ from benchmarks.table import Table
 
 __all__ = ["BENCHMARKS", "Benchmark", "main"]
 
-BENCHMARKS = ("cantilever", "filters", "latency", "literature", "peers", "refinement", "runtime", "sweep")
+BENCHMARKS = (
+    "cantilever",
+    "filters",
+    "latency",
+    "literature",
+    "online",
+    "peers",
+    "refinement",
+    "runtime",
+    "stability",
+    "sweep",
+)
 
 
 class Benchmark(Protocol):

@@ -5,13 +5,15 @@ forms      what a unit may look like         regressors units and tail, with all
 state      what the filter remembers         covariance what it keeps of its uncertainty
 model      the state's value and Jacobian    updates    what an observation changes
 growth     when a unit is added              pruning    when one is removed
-noise      how far a sample is believed      memory     what the window forbids
+noise      how far a sample is believed      memory     what observations forbid
 mran       the step: all of these in order   learn      a fold of the step
 history    what happened meanwhile
 refine     variable projection               structure  how many units a refined network needs
 rows       its weighted values and slopes    projection its cost and Gauss–Newton matrix
 leave_one_out  errors without fitting again  laplace    the structured posterior, for predictive variance
 posterior  the way back from a refined network to the filter
+online     a stream: the step, refinement on retained samples, snapshots for readers
+reservoir  which samples are retained        refining   one bounded iteration on them
 touch      a dataset made into a body that can be touched
 """
 
@@ -20,9 +22,12 @@ from palpate.learning.laplace import Posterior
 from palpate.learning.learn import Learned, freeze, learn
 from palpate.learning.mran import Event, observe, step
 from palpate.learning.observation import Observation
+from palpate.learning.online import Learner
 from palpate.learning.posterior import posterior
 from palpate.learning.presets import PRESETS, default, founding, recommended
 from palpate.learning.refine import Refined, refine
+from palpate.learning.refining import Refining
+from palpate.learning.reservoir import Reservoir
 from palpate.learning.settings import Settings
 from palpate.learning.state import State, initial
 from palpate.learning.structure import Trial, grow, prune, refined_network
@@ -34,10 +39,13 @@ __all__ = [
     "Event",
     "History",
     "Learned",
+    "Learner",
     "Observation",
     "Posterior",
     "Refined",
     "Refinement",
+    "Refining",
+    "Reservoir",
     "Settings",
     "State",
     "Trial",

@@ -26,7 +26,7 @@ from palpate.learning.refining import Refining
 from palpate.network import Scaling
 from palpate.units import Quantity, Range
 
-__all__ = ["tables"]
+__all__ = ["Stream", "at_once", "streamed", "streams", "tables"]
 
 RATIO = 3.0
 STARTS = 4  # of the batch refinement
@@ -68,10 +68,10 @@ def tables(*, quick: bool = False) -> list[Table]:
     """One table; `quick` takes one beam, coarsely."""
     seeds = range(1 if quick else 3)
     rows, claims = [], []
-    for stream in _streams(quick=quick):
-        runs = [_streamed(stream, seed) for seed in seeds]
+    for stream in streams(quick=quick):
+        runs = [streamed(stream, seed) for seed in seeds]
         units = round(statistics.median(r[1] for r in runs))
-        batch, spent = _at_once(stream, units, seeds)
+        batch, spent = at_once(stream, units, seeds)
         errors = [r[0] for r in runs]
         times = 1e3 * np.concatenate([r[2] for r in runs])
         rows.append(
@@ -99,7 +99,8 @@ def tables(*, quick: bool = False) -> list[Table]:
     return [_table(rows, claims, len(seeds), " (quick)" * quick)]
 
 
-def _streams(*, quick: bool) -> list[Stream]:
+def streams(*, quick: bool = False) -> list[Stream]:
+    """Both cantilevers, `data1` and `data2`; `quick` has one of the beams, coarsely."""
     found = []
     for beam in BEAMS[1:] if quick else BEAMS:
         c = case(beam, 51 if quick else 501)
@@ -146,7 +147,7 @@ def _peer(
     return Stream(name, data, inputs, outputs, settings, refining, passes, basis)
 
 
-def _streamed(stream: Stream, seed: int) -> tuple[float, int, np.ndarray]:
+def streamed(stream: Stream, seed: int) -> tuple[float, int, np.ndarray]:
     """Error at the end, units, and seconds of every observation."""
     X, Y, _, _ = stream.data
     learner = Learner(
@@ -166,7 +167,7 @@ def _streamed(stream: Stream, seed: int) -> tuple[float, int, np.ndarray]:
     return stream.error(network.predict), network.units, np.array(spent)
 
 
-def _at_once(stream: Stream, units: int, seeds: Sequence[int]) -> tuple[list[float], float]:
+def at_once(stream: Stream, units: int, seeds: Sequence[int]) -> tuple[list[float], float]:
     """Errors of the refinement of all training samples, best of some starts by leave-one-out, and CPU seconds."""
     X, Y, _, _ = stream.data
     scaling = Scaling.of(stream.inputs, Y)

@@ -18,7 +18,7 @@ from benchmarks.runner import main
 from benchmarks.table import Claim, Column, Table
 from palpate.learning import Settings, default, learn
 
-__all__ = ["tables"]
+__all__ = ["run", "scaled", "tables"]
 
 PASSES = 5
 SEEDS = 100

@@ -87,6 +87,7 @@ def tables(*, quick: bool = False) -> list[Table]:
                 "median": float(np.median(times)),
                 "p99": float(np.percentile(times, 99)),
                 "most": float(times.max()),
+                "megabytes": max(r[3] for r in runs) * 8 / 1e6,
                 "seconds": statistics.median(float(r[2].sum()) for r in runs),
                 "batch_seconds": spent,
                 "rmse_all": errors,
@@ -147,8 +148,8 @@ def _peer(
     return Stream(name, data, inputs, outputs, settings, refining, passes, basis)
 
 
-def streamed(stream: Stream, seed: int) -> tuple[float, int, np.ndarray]:
-    """Error at the end, units, and seconds of every observation."""
+def streamed(stream: Stream, seed: int) -> tuple[float, int, np.ndarray, int]:
+    """Error at the end, units, seconds of every observation, and numbers kept."""
     X, Y, _, _ = stream.data
     learner = Learner(
         *(stream.inputs, stream.outputs),
@@ -164,7 +165,7 @@ def streamed(stream: Stream, seed: int) -> tuple[float, int, np.ndarray]:
             learner.observe(X[i], Y[i])
             spent.append(time.perf_counter() - began)
     network = learner.network
-    return stream.error(network.predict), network.units, np.array(spent)
+    return stream.error(network.predict), network.units, np.array(spent), learner.numbers
 
 
 def at_once(stream: Stream, units: int, seeds: Sequence[int]) -> tuple[list[float], float]:
@@ -211,6 +212,7 @@ def _table(rows: list[dict[str, Any]], claims: list[Claim], seeds: int, shape: s
             Column("p99", "99 %", ".0f"),
             Column("most", "most", ".0f"),
             Column("seconds", "s in all", ".1f"),
+            Column("megabytes", "MB kept", ".2f"),
             Column("batch_seconds", "CPU s at once", ".1f"),
         ),
         rows,

@@ -135,6 +135,33 @@ def test_bad_numbers_are_skipped_and_nothing_else_changes():
     assert dirty.count == 2 * clean.count + 1
 
 
+STREAMS = {
+    "one point": lambda rng, t: (np.zeros(2), np.ones(3)),
+    "two points": lambda rng, t: (np.full(2, float(t % 2)), np.full(3, t % 2)),
+    "constant": lambda rng, t: (rng.uniform(-1, 1, 2), np.full(3, 0.25)),
+    "a line": lambda rng, t: (rng.uniform(-1, 1) * np.array([1.0, 1.0]), rng.normal(size=3)),
+    "noise": lambda rng, t: (rng.uniform(-1, 1, 2), rng.normal(size=3)),
+    "outliers": lambda rng, t: (rng.uniform(-1, 1, 2), np.full(3, 1e5 if t % 17 == 16 else 0.1)),
+    "tiny": lambda rng, t: (1e-9 * rng.uniform(-1, 1, 2), 1e-9 * rng.normal(size=3)),
+    "far": lambda rng, t: (9.0 * rng.uniform(-1, 1, 2), rng.normal(size=3)),
+}
+
+
+@pytest.mark.parametrize("update", ["full", "decoupled", "winner", "shared", "gradient"])
+@pytest.mark.parametrize("name", STREAMS)
+def test_no_stream_of_numbers_stops_the_loop(name, update):
+    rng = np.random.default_rng(0)
+    settings = replace(default(), update=update, form="rotated", units_max=5, forgetting_factor=0.97)
+    scaling = Scaling(np.zeros(2), np.ones(2), np.zeros(3), np.ones(3))
+    inputs = (Range("a", -1.0, 1.0), Range("b", -1.0, 1.0))
+    learner = Learner(
+        *(inputs, OUTPUTS), settings=settings, scaling=scaling, refining=Refining(samples=20, every=3)
+    )
+    for t in range(100):
+        learner.observe(*STREAMS[name](rng, t))
+    assert np.isfinite(learner.network.predict(rng.uniform(-1, 1, (50, 2)))).all()
+
+
 def test_a_wrong_shape_is_the_programs_mistake():
     learner = Learner(SQUARE, OUTPUTS)
     with pytest.raises(UsageError, match="2 inputs and 3 outputs"):
@@ -264,6 +291,11 @@ def test_memory_does_not_grow_with_the_stream():
     assert learner.history.error.size == 50
     assert len(learner.state.seen) <= max(learner.settings.window, learner.settings.memory)
     assert len(learner.state.errors) == learner.settings.window
+    h, d = learner.state.units, learner.state.vector().size
+    assert d == 3 * 2 + h * (3 + 2)
+    declared = d * d + 30 * (1 + 3 + 3) + learner.settings.memory * (1 + 3)
+    assert declared - 200 < learner.numbers < declared + 200
+    assert learner.expected > 0
 
 
 READER = """

@@ -213,6 +213,18 @@ class Learner:
         return publisher.publish(self.network)
 
     @property
+    def expected(self) -> float:
+        """RMS error per scaled output on the samples that judge; not-a-number before the first refinement."""
+        return self._progress.expected
+
+    @property
+    def numbers(self) -> int:
+        """How many numbers are kept, but for events: parameters, covariance, memory and retained samples."""
+        s = self.state
+        own = s.coefficients.size + s.theta.size + s.covariance.numbers + s.seen.size + s.errors.size
+        return own + (0 if self._kept is None else self._kept.numbers)
+
+    @property
     def history(self) -> History:
         """What the last observations did."""
         events, innovation = zip(*self._events, strict=True) if self._events else ((), ())
@@ -297,15 +309,22 @@ class Learner:
                 *(seen.x, seen.y), weight=seen.weight, slopes=seen.slopes, slope_weight=seen.slope_weight
             )
             if self._kept.seen % self.refining.every == 0:
-                before = state.units
-                state, self._progress = refined_state(
-                    state, self._kept, self.settings, self.refining, self._progress
-                )
+                before, state = state.units, self._refined(state, self._kept, self.refining)
                 event = replace(
                     event, grew=event.grew or state.units > before, units=state.units, refined=True
                 )
         self._state = state
         return event
+
+    def _refined(self, state: State, kept: Reservoir, refining: Refining) -> State:
+        try:
+            found, progress = refined_state(state, kept, self.settings, refining, self._progress)
+        except ValueError:  # LAPACK's, for a matrix that is singular or not finite: the filter goes on alone
+            self._progress = Progress()
+            return state
+        sound = np.isfinite(found.coefficients).all() and np.isfinite(found.theta).all()
+        self._progress = progress if sound else Progress()
+        return found if sound else state
 
 
 def _skipped(units: int, why: str) -> Event:

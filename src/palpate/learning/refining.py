@@ -111,7 +111,7 @@ def refined_state(
     With a forgetting factor λ a sample of age a weighs λᵃ, as it does in the filter. Moved and new units
     replace the state's once they have less error on the judging samples; weights and tail are then fitted to all.
     """
-    weights = kept.weights * settings.forgetting_factor**kept.ages
+    weights = kept.weights * settings.forgetting_factor ** (kept.ages - kept.ages.min())
     judging = _judging(kept, weights, refining)
     penalty = max(refining.ridge, 1e-30)
     rows = _rows(state, kept, settings, np.where(judging, 0.0, weights))
@@ -158,7 +158,7 @@ def _continued(
         coefficients=coefficients,
         theta=theta,
         covariance=found.covariance,
-        places=np.vstack([state.places, found.places[state.units :]]),
+        places=found.places,
         silent=np.append(state.silent, np.zeros(new, np.int64)),
         innovation=min(state.innovation, progress.expected**2),
         in_modes=found.in_modes,
@@ -168,9 +168,12 @@ def _continued(
 
 def _judging(kept: Reservoir, weights: np.ndarray, refining: Refining) -> np.ndarray:
     """Which retained samples (N,) judge: a place says nothing about when its sample came."""
+    none = np.zeros(len(kept), bool)
     if not refining.judges or len(kept) < 2 * refining.judges:
-        return np.zeros(len(kept), bool)
-    return np.asarray(np.arange(len(kept)) % refining.judges == refining.judges - 1)
+        return none
+    chosen = np.arange(len(kept)) % refining.judges == refining.judges - 1
+    # where old samples fade, all that count may be on one side
+    return chosen if weights[chosen].any() and weights[~chosen].any() else none
 
 
 def _rows(state: State, kept: Reservoir, settings: Settings, weights: np.ndarray) -> Rows:

@@ -87,6 +87,12 @@ class Reservoir:
         """(N,), zero for samples without slopes."""
         return self._slope_weights[: len(self)]
 
+    @property
+    def numbers(self) -> int:
+        """How many numbers there is room for."""
+        parts = (self._x, self._y, self._times, self._weights, self._slope_weights, self._slopes)
+        return sum(p.size for p in parts if p is not None)
+
     def add(
         self,
         x: np.ndarray,

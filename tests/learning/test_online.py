@@ -29,7 +29,12 @@ def shuffled(N=200, seed=0):
 
 
 def streamed(learner, X, Y):
-    return [learner.observe(x, y) for x, y in zip(X, Y, strict=True)]
+    """Events of all samples, handed over in the same two buffers each time."""
+    x, y, events = np.empty(X.shape[1]), np.empty(Y.shape[1]), []
+    for i in range(len(X)):
+        x[:], y[:] = X[i], Y[i]
+        events.append(learner.observe(x, y))
+    return events
 
 
 def misses(learner):

@@ -13,7 +13,8 @@ rows       its weighted values and slopes    projection its cost and Gauss–New
 leave_one_out  errors without fitting again  laplace    the structured posterior, for predictive variance
 posterior  the way back from a refined network to the filter
 online     a stream: the step, refinement on retained samples, snapshots for readers
-reservoir  which samples are retained        refining   one bounded iteration on them
+reservoir  which samples are retained        refining   one bounded iteration on them, by nudge
+gauge      a stream's scaling and modes      marquardt  the step of an iteration
 touch      a dataset made into a body that can be touched
 """
 

@@ -15,6 +15,7 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from palpate.errors import UsageError
+from palpate.learning.gauge import Gauge, declared
 from palpate.learning.history import History
 from palpate.learning.learn import freeze
 from palpate.learning.modes import output_modes
@@ -26,11 +27,9 @@ from palpate.learning.reservoir import Reservoir
 from palpate.learning.settings import Settings
 from palpate.learning.state import State, initial
 from palpate.network import Network, Publisher, Scaling
-from palpate.units import Quantity, Range, bounds
+from palpate.units import Quantity, Range
 
 __all__ = ["Learner"]
-
-_Seen = tuple[np.ndarray, np.ndarray, float, np.ndarray | None, float]
 
 # beyond these a scaled number is a broken sensor's: its square would swamp what double precision keeps
 _FARTHEST_INPUT, _FARTHEST_OUTPUT = 10.0, 1e6
@@ -105,10 +104,10 @@ class Learner:
         # two rules that both add units would add too many
         grows = self.refining is not None and self.refining.grows
         self._filter = replace(self.settings, units_max=0) if grows else self.settings
-        self._scaling = scaling or _declared(inputs, outputs)
-        self._directions: np.ndarray | None = None
+        self._scaling = scaling or declared(inputs, outputs)
+        self._gauge: Gauge | None = None
         self._settle, self._basis, self._seed = settle, basis, seed
-        self._early: list[_Seen] = []
+        self._early: list[Observation] = []
         self._state: State | None = None
         self._kept: Reservoir | None = None
         self._progress = Progress()
@@ -116,7 +115,7 @@ class Learner:
         self._threads = ThreadpoolController()
         by_modes = self.settings.update == "shared" and len(outputs) > self.settings.modes
         if self._scaling is not None and basis is None and not by_modes:
-            self._start()
+            self._start(Gauge(self._scaling))
 
     def observe(
         self,
@@ -154,17 +153,21 @@ class Learner:
         UsageError
             If an array has the wrong shape.
         """
-        x, y = np.asarray(x, np.float64), np.asarray(y, np.float64)
+        # copies: a loop may hand over the same buffers each time
+        x, y = np.array(x, np.float64), np.array(y, np.float64)
+        slopes = None if slopes is None else np.array(slopes, np.float64)
         n, m = len(self.inputs), len(self.outputs)
-        if x.shape != (n,) or y.shape != (m,) or not (slopes is None or np.shape(slopes) == (m, n)):
+        if x.shape != (n,) or y.shape != (m,) or not (slopes is None or slopes.shape == (m, n)):
             raise UsageError(
                 f"An observation of shapes {x.shape} and {y.shape} came to a learner of {n} inputs and {m} outputs.",
                 fix=f"Pass x ({n},), y ({m},) and, where they are known, slopes ({m}, {n}).",
             )
         self.count += 1
-        seen = (x, y, weight, slopes, slope_weight)
+        seen = Observation(x, y, weight, slopes, slope_weight)
         with self._threads.limit(limits=1), np.errstate(all="ignore"):
-            event = self._settling(seen) if self._state is None else self._learnt(self._scaled(seen))
+            event = (
+                self._settling(seen) if self._gauge is None else self._learnt(self._gauge.observation(seen))
+            )
         innovation = np.nan if self._state is None else self._state.innovation
         self._events.append((event, innovation))
         return event
@@ -194,11 +197,11 @@ class Learner:
         UsageError
             Before the first observation, unless the scaling is declared.
         """
-        if self._state is not None and self._scaling is not None:
-            return self._frozen(self._state, self._scaling)
+        if self._gauge is not None:
+            return self._gauge.frozen(self.state, self.settings, self.inputs, self.outputs)
         if not self._early:
             raise UsageError("Nothing has been observed yet.", fix="Observe, or declare the scaling.")
-        scaling = self._scaling or Scaling.of(self.inputs, np.array([y for _, y, *_ in self._early]))
+        scaling = self._scaling or Scaling.of(self.inputs, np.array([one.y for one in self._early]))
         mean = initial(len(self.inputs), len(self.outputs), self.settings)
         return freeze(mean, self.settings, self.inputs, self.outputs, scaling)
 
@@ -230,69 +233,27 @@ class Learner:
         events, innovation = zip(*self._events, strict=True) if self._events else ((), ())
         return History.of(events, innovation, (), 1)
 
-    def _frozen(self, state: State, scaling: Scaling) -> Network:
-        if self._directions is None:
-            return freeze(state, self.settings, self.inputs, self.outputs, scaling)
-        of = self.settings.regressors(state.inputs)
-        tail = np.zeros((state.outputs, 1 + state.inputs))
-        tail[:, : of.tail_size] = state.tail
-        factors, shifts = of.form.factors(state.theta)
-        return Network(
-            *(
-                self.inputs,
-                self.outputs,
-                factors.copy(),
-                shifts.copy(),
-                state.weights.T.copy(),
-                tail,
-                scaling,
-            ),
-            radial=self.settings.radial,
-            basis=self._directions,
-        )
-
-    def _settling(self, seen: _Seen) -> Event:
+    def _settling(self, seen: Observation) -> Event:
         """Before the scaling is known: collect; with the last one, learn all."""
-        if not Observation(*seen).finite:
+        if not seen.finite:
             return _skipped(0, "not finite")
         self._early.append(seen)
         if len(self._early) < self._settle:
             return _skipped(0, "settling the scaling")
-        Y = np.array([y for _, y, *_ in self._early])
-        self._scaling = self._scaling or Scaling.of(self.inputs, Y)
-        scaled = self._scaling.scale_outputs(Y)
-        if self._basis is not None:
-            self._directions = output_modes(scaled, self._basis)
-        self._start(scaled)
+        Y = np.array([one.y for one in self._early])
+        scaling = self._scaling or Scaling.of(self.inputs, Y)
+        directions = output_modes(scaling.scale_outputs(Y), self._basis) if self._basis else None
+        gauge = self._start(Gauge(scaling, directions), Y)
         early, self._early = self._early, []
-        return [self._learnt(self._scaled(one)) for one in early][-1]
+        return [self._learnt(gauge.observation(one)) for one in early][-1]
 
-    def _start(self, scaled: np.ndarray | None = None) -> None:
-        n, m = len(self.inputs), len(self.outputs)
-        modes = None
-        if self._directions is not None:
-            m = self._directions.shape[1]
-            leading = self.settings.modes < m and self.settings.update == "shared"
-            modes = np.eye(m)[:, : self.settings.modes] if leading else None
-        elif self.settings.update == "shared" and scaled is not None:
-            modes = output_modes(scaled, self.settings.modes)
-        self._state = initial(n, m, self.settings, modes)
+    def _start(self, gauge: Gauge, Y: np.ndarray | None = None) -> Gauge:
+        self._gauge, self._state = gauge, gauge.initial(self.settings, Y)
         if self.refining is not None:
-            self._kept = Reservoir(
-                self.refining.samples, n, m, keeping=self.refining.keeping, seed=self._seed
-            )
-
-    def _scaled(self, seen: _Seen) -> Observation:
-        x, y, weight, slopes, slope_weight = seen
-        s = self._scaling
-        assert s is not None  # settled
-        xi, eta = s.scale_inputs(x), s.scale_outputs(y)
-        if slopes is not None:
-            slopes = slopes * s.input_half / s.output_scale[:, None]
-        if self._directions is not None:
-            eta = eta @ self._directions
-            slopes = None if slopes is None else self._directions.T @ slopes
-        return Observation(xi, eta, weight, slopes, slope_weight * weight)
+            size = self._state.inputs, self._state.outputs
+            keeping, samples = self.refining.keeping, self.refining.samples
+            self._kept = Reservoir(samples, *size, keeping=keeping, seed=self._seed)
+        return gauge
 
     def _learnt(self, seen: Observation) -> Event:
         state = self.state
@@ -329,12 +290,3 @@ class Learner:
 
 def _skipped(units: int, why: str) -> Event:
     return Event(np.nan, np.nan, False, False, 0, units, why)
-
-
-def _declared(inputs: Sequence[Range], outputs: Sequence[Quantity | Range]) -> Scaling | None:
-    """The scaling that ranges of all outputs declare: their middles, and half of the widest."""
-    ranges = [o for o in outputs if isinstance(o, Range)]
-    if len(ranges) < len(outputs):
-        return None
-    low, high = bounds(ranges)
-    return Scaling.of(inputs, (low + high)[None] / 2, scale=float((high - low).max() / 2))

@@ -113,8 +113,12 @@ def decoupled() -> Settings:
 
 
 def shared() -> Settings:
-    """Ours, for many outputs: the weights of all outputs share one covariance."""
-    return replace(default(), update="shared")
+    """Ours, for many outputs: the weights of all outputs share one covariance.
+
+    Steps may be twice as long: over several inputs units have farther to go, and on Franke's surface and a beam
+    under two loads this takes a quarter to a half off the error.
+    """
+    return replace(default(), update="shared", step_bound=0.2)
 
 
 def recommended(inputs: int) -> Settings:

@@ -134,7 +134,7 @@ def test_no_update_raises_the_windows_error_beyond_what_is_allowed(seed):
     rng = np.random.default_rng(seed)
     state = grown(initial(1, 1, settings), rng.uniform(-1, 1, 1), rng.normal(size=1), settings)
     seen = rng.normal(size=(6, 2))
-    state = replace(state, seen=seen)
+    state = replace(state, seen=seen, when=np.arange(1, 7), count=6)
     after = shown(state, rng.uniform(-1, 1, 1), 3 * rng.normal(size=1), settings)
 
     def error(s):
@@ -206,8 +206,14 @@ def test_arrays_that_do_not_fit_are_refused(X, Y):
         {"tail": "cubic"},
         {"noise": "small"},
         {"widths": "wide"},
+        {"window": 2.5},
+        {"noise": float("inf")},
+        {"distance_max": 0.1, "distance_min": 0.2},
+        {"form": "rank-1", "growth": "significance"},
     ],
 )
 def test_settings_out_of_range_are_refused(change):
-    with pytest.raises(UsageError, match=next(iter(change))):
+    with pytest.raises(
+        UsageError, match=str(next(iter(change.values())) if "form" in change else next(iter(change)))
+    ):
         Settings(**change)

@@ -18,25 +18,20 @@ from palpate.learning.state import State
 __all__ = ["forgets", "kept", "spoils", "window_error", "with_least"]
 
 
-_LEAST = (
-    2.0  # on mean squares: above this times their least so far only steps that do not raise them are taken
-)
-
-
-def kept(state: State, x: np.ndarray, y: np.ndarray, settings: Settings) -> np.ndarray:
-    """The remembered observations (≤ S, n + m) with one more, newest last.
+def kept(state: State, x: np.ndarray, y: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
+    """The remembered observations (≤ S, n + m) with one more, newest last, and when each was seen (≤ S,).
 
     Without a limit on relapses these are the window's. Else, once the memory is full, the new one replaces the
     nearest, so that places which are seldom visited are not forgotten.
     """
-    row = np.concatenate([x, y])
+    row, now = np.concatenate([x, y]), state.count + 1
+    seen, when = state.seen, state.when
     if not settings.relapse_limit:
-        return np.vstack([state.seen, row])[-settings.window :]
-    seen = state.seen
-    if len(seen) >= max(settings.window, settings.memory):
+        seen, when = (old[max(0, len(old) - settings.window + 1) :] for old in (seen, when))
+    elif len(seen) >= max(settings.window, settings.memory):
         nearest = int(((seen[:, : x.size] - x) ** 2).sum(axis=1).argmin())
-        seen = np.delete(seen, nearest, axis=0)
-    return np.vstack([seen, row])
+        seen, when = np.delete(seen, nearest, axis=0), np.delete(when, nearest)
+    return np.vstack([seen, row]), np.append(when, now)
 
 
 def window_error(state: State, coefficients: np.ndarray, theta: np.ndarray, settings: Settings) -> float:
@@ -84,4 +79,4 @@ def with_least(state: State, settings: Settings) -> State:
 
 
 def _counts(state: State, settings: Settings) -> np.ndarray:
-    return np.asarray(settings.forgetting_factor ** np.arange(len(state.seen), dtype=float)[::-1])
+    return np.asarray(settings.forgetting_factor ** (state.count - state.when).astype(float))

@@ -119,6 +119,5 @@ def _remembered(state: State, seen: Observation, error: np.ndarray, settings: Se
     y = seen.y if state.modes is None else seen.y @ state.modes
     count = state.count + 1
     innovation = running_mean_square(state.innovation, error, count)
-    return replace(
-        state, errors=errors, seen=kept(state, seen.x, y, settings), count=count, innovation=innovation
-    )
+    remembered, when = kept(state, seen.x, y, settings)
+    return replace(state, errors=errors, seen=remembered, when=when, count=count, innovation=innovation)

@@ -29,6 +29,8 @@ _NOT_NEGATIVE = (
     *("prune_below", "prune_after", "units_max", "memory"),
 )
 
+_COUNTS = ("window", "memory", "iterations", "modes", "prune_after", "units_max")
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -50,7 +52,7 @@ class Settings:
     pruning : {"contribution", "significance"}
         Whether silent units go (MRAN), or the nearest one when it is insignificant (GAP-RBF).
     density : {"uniform", "samples"}
-        Of the inputs, for significance: over [−1, 1]ⁿ (GAP), or as the window has them (GGAP).
+        Of the inputs, for significance: over [−1, 1]ⁿ (GAP), or as the remembered observations have them (GGAP).
     error_min, error_rms_min : float
         e_min and e'_min: growth needs an error norm above the first and a windowed RMS error above the second.
     window : int
@@ -66,7 +68,7 @@ class Settings:
     process_noise : float
         q₀, added to every variance after each update.
     noise : float
-        R, the smallest measurement variance of one scaled output.
+        R, the smallest measurement variance of one scaled output, before weights and `edge_weight`.
     noise_share, gate : float
         The measurement variance is at least these shares of the running mean square of the innovation and of
         this innovation's own mean square. Finite-element data have no noise, but the linearised filter has
@@ -74,7 +76,8 @@ class Settings:
     edge_weight : float
         Smallest factor on R at the ends of the input range (see `noise.edge_factor`); 1 turns this off.
     iterations : int
-        Linearisations per update; 1 is the plain extended filter.
+        Linearisations per update; 1 is the plain extended filter. The shared-weight rule always takes one, and
+        the gradient rule has no use for them.
     step_bound : float
         Largest change of a centre (in widths) and of a log width in one update; 0 for none.
     forgetting_factor : float
@@ -83,7 +86,7 @@ class Settings:
         α of the gradient rule.
     relapse_limit : float
         Largest factor by which one update, or a unit added or removed, may raise the squared error over the
-        memory; 0 for no limit.
+        memory; 0 for no limit. The gradient rule knows none.
     memory : int
         Observations remembered for that, M at least; a new one then replaces the nearest. Too few leave places
         where nothing forbids a unit to spoil what was learnt there: a sample should be near every unit.
@@ -142,15 +145,14 @@ class Settings:
 
     def __post_init__(self) -> None:
         for name in (*_POSITIVE, *_NOT_NEGATIVE):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
-                raise UsageError(f"The filter's {name} is {value!r}; it must be a number.")
-            if not (value > 0 if name in _POSITIVE else value >= 0):
-                rule = "be positive" if name in _POSITIVE else "not be negative"
-                raise UsageError(f"The filter's {name} is {value}; it must {rule}.")
+            self._check_number(name)
         for name in ("distance_decay", "forgetting_factor"):
             if not 0 < getattr(self, name) <= 1:
                 raise UsageError(f"The filter's {name} is {getattr(self, name)}; it must lie in (0, 1].")
+        if self.distance_max < self.distance_min:
+            raise UsageError(
+                f"The filter's distance_max {self.distance_max} is less than its distance_min {self.distance_min}."
+            )
         for name, known in _CHOICES.items():
             if getattr(self, name) not in known:
                 raise UsageError(
@@ -158,6 +160,23 @@ class Settings:
                 )
         if not isinstance(self.form, str):
             raise UsageError(f"The filter's form is {self.form!r}; it must be a name, such as 'rotated'.")
+        if "significance" in {self.growth, self.pruning} and self.form.startswith("rank-"):
+            raise UsageError(
+                f"Units of form {self.form} have no significance.",
+                why="They do not decay across the range, so their mean contribution says little of their use.",
+                fix='Choose growth="distance" and pruning="contribution", or a form with a centre.',
+            )
+
+    def _check_number(self, name: str) -> None:
+        value = getattr(self, name)
+        if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
+            raise UsageError(f"The filter's {name} is {value!r}; it must be a number.")
+        if not (value > 0 if name in _POSITIVE else value >= 0):
+            rule = "be positive" if name in _POSITIVE else "not be negative"
+            raise UsageError(f"The filter's {name} is {value}; it must {rule}.")
+        if not np.isfinite(value) or (name in _COUNTS and value != int(value)):
+            rule = "be a whole number" if name in _COUNTS else "be finite"
+            raise UsageError(f"The filter's {name} is {value}; it must {rule}.")
 
     def regressors(self, inputs: int) -> Regressors:
         """Units and tail for n inputs.

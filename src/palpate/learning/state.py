@@ -30,6 +30,8 @@ class State:
         The last squared error norms ‖e‖², newest last.
     seen : (≤ S, n + m) or (≤ S, n + r)
         Remembered observations [x, y], newest last (see `memory`); y by the output modes where there are some.
+    when : (≤ S,) int
+        Which observation each of those was, counting from one.
     silent : (h,) int
         Observations in a row in which each unit was silent.
     count : int
@@ -50,6 +52,7 @@ class State:
     places: np.ndarray
     errors: np.ndarray
     seen: np.ndarray
+    when: np.ndarray
     silent: np.ndarray
     count: int
     innovation: float
@@ -152,6 +155,7 @@ def initial(inputs: int, outputs: int, settings: Settings, modes: np.ndarray | N
         places=np.zeros((0, inputs)),
         errors=np.zeros(0),
         seen=np.zeros((0, columns)),
+        when=np.zeros(0, dtype=np.int64),
         silent=np.zeros(0, dtype=np.int64),
         count=0,
         innovation=0.0,

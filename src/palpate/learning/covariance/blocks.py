@@ -55,39 +55,27 @@ class Blocks:
         """Without one unit's block."""
         return Blocks(self.first, np.delete(self.units, unit, axis=0))
 
-    def times(self, Ht: np.ndarray, unit: int | None = None) -> np.ndarray:
-        """P Hᵀ (d, q); with a winning unit, zero for all others."""
+    def times(self, Ht: np.ndarray) -> np.ndarray:
+        """P Hᵀ (d, q)."""
         a, (h, b, _), q = len(self.first), self.units.shape, Ht.shape[1]
-        out = np.zeros_like(Ht)
-        out[:a] = self.first @ Ht[:a]
-        if unit is None:
-            out[a:] = (self.units @ Ht[a:].reshape(h, b, q)).reshape(h * b, q)
-        else:
-            rows = slice(a + unit * b, a + (unit + 1) * b)
-            out[rows] = self.units[unit] @ Ht[rows]
-        return out
+        units = (self.units @ Ht[a:].reshape(h, b, q)).reshape(h * b, q)
+        return np.vstack([self.first @ Ht[:a], units])
 
-    def reduced(
-        self,
-        K: np.ndarray,
-        B: np.ndarray,
-        *,
-        growth: float,
-        added: float,
-        donate: bool,
-        unit: int | None = None,
-    ) -> Blocks:
-        """Each block of (P − K Bᵀ − B Kᵀ) · growth + added · I; with a winning unit, its own and the tail's."""
+    def reduced(self, K: np.ndarray, B: np.ndarray, *, growth: float, added: float, donate: bool) -> Blocks:
+        """Each block of (P − K Bᵀ − B Kᵀ) · growth + added · I."""
         a, (h, b, _), q = len(self.first), self.units.shape, K.shape[1]
-        first = _downdated(self.first, K[:a], B[:a], growth, added)
-        if unit is None:
-            return Blocks(
-                first, _downdated(self.units, K[a:].reshape(h, b, q), B[a:].reshape(h, b, q), growth, added)
-            )
+        units = _downdated(self.units, K[a:].reshape(h, b, q), B[a:].reshape(h, b, q), growth, added)
+        return Blocks(_downdated(self.first, K[:a], B[:a], growth, added), units)
+
+    def only(self, unit: int) -> Blocks:
+        """The tail's block and one unit's."""
+        return Blocks(self.first, self.units[unit : unit + 1])
+
+    def renewed(self, unit: int, part: Blocks, *, donate: bool) -> Blocks:
+        """With the tail's block and one unit's from another covariance."""
         units = self.units if donate else self.units.copy()
-        rows = slice(a + unit * b, a + (unit + 1) * b)
-        units[unit] = _downdated(units[unit], K[rows], B[rows], growth, added)
-        return Blocks(first, units)
+        units[unit] = part.units[0]
+        return Blocks(part.first, units)
 
 
 def _downdated(P: np.ndarray, K: np.ndarray, B: np.ndarray, growth: float, added: float) -> np.ndarray:

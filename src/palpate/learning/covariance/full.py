@@ -50,20 +50,11 @@ class Full:
         start = self.tail + unit * size
         return Full(triangle.without(self.lower, start, start + size), self.tail)
 
-    def times(self, Ht: np.ndarray, unit: int | None = None) -> np.ndarray:
+    def times(self, Ht: np.ndarray) -> np.ndarray:
         """P Hᵀ (d, q)."""
         return triangle.product(self.lower, Ht)
 
-    def reduced(
-        self,
-        K: np.ndarray,
-        B: np.ndarray,
-        *,
-        growth: float,
-        added: float,
-        donate: bool,
-        unit: int | None = None,
-    ) -> Full:
+    def reduced(self, K: np.ndarray, B: np.ndarray, *, growth: float, added: float, donate: bool) -> Full:
         """(P − K Bᵀ − B Kᵀ) · growth + added · I for K, B (d, q)."""
         new = triangle.reduced(self.lower, K, B, growth=growth, added=added, donate=donate)
         return Full(new, self.tail)

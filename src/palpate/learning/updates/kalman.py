@@ -8,18 +8,18 @@ triangle: it can't lose symmetry and is, to first order, insensitive to round-of
 With more than one iteration the measurement is re-linearised about the latest estimate while the prior stays
 where it was (iterated extended Kalman filter, Bell & Cathey 1993): the observation is used once.
 
-Over a block-diagonal P this is the decoupled filter; with all but one unit's block held, EMRAN's winner rule.
+Over a block-diagonal P this is the decoupled filter.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg.lapack import dpotrf, dpotrs
 
 from palpate.learning.covariance import Blocks, Full
-from palpate.learning.growth import nearest
 from palpate.learning.memory import forgets
 from palpate.learning.model import jacobian, measured
 from palpate.learning.noise import variance
@@ -29,7 +29,7 @@ from palpate.learning.state import State
 
 __all__ = ["updated"]
 
-# a step that is still too long after so many enlargements of R is not taken; the covariance still shrinks
+# a step that is still too long after so many enlargements of R is not taken
 _TRIES = 4
 
 
@@ -49,35 +49,48 @@ def updated(
     first: tuple[np.ndarray, np.ndarray],
     settings: Settings,
     *,
+    spoils: Callable[[np.ndarray], bool] | None = None,
     donate: bool = False,
 ) -> State:
-    """The state after one observation, predicted by `first`; with `donate` the old covariance is overwritten."""
-    P = state.covariance
-    assert isinstance(P, (Full, Blocks))  # the settings' update rule made the state
-    unit = nearest(state, seen.x, settings)[0] if settings.update == "winner" and state.units else None
+    """The state after one observation, predicted by `first`.
+
+    `spoils` says of parameters z (d,) that they may not be taken, by default what the memory says. With `donate`
+    the old covariance is overwritten.
+    """
+    spoils = spoils or (lambda z: forgets(state, z, settings))
     error = (seen.targets() - first[0])[: seen.y.size]
     r = variance(seen.x, error, state.innovation, settings)
-    found = _iterate(state, seen, r, first, unit, settings)
-    z = found.z
-    for _ in range(_TRIES):
-        excess = _excess(state, z, settings)
-        if excess <= 1.0 and not forgets(state, z, settings):
-            break
+    for _ in range(_TRIES + 1):
+        found = _iterate(state, seen, r, first, settings)
+        excess = _excess(state, found.z, settings)
+        if excess <= 1.0 and not spoils(found.z):
+            K = dpotrs(found.factor, found.PH.T, lower=1)[0].T
+            return _taken(state, found.z, K, found.PH - 0.5 * K @ found.S, settings, donate=donate)
         # a smaller step by more measurement noise keeps estimate and covariance consistent
         r += max(excess - 1.0, 1.0) * float(np.trace(found.S)) / len(found.S)
-        found = _iterate(state, seen, r, first, unit, settings)
-        z = found.z
-    else:
-        z = state.vector()
-    K = dpotrs(found.factor, found.PH.T, lower=1)[0].T
-    B = found.PH - 0.5 * K @ found.S
+    # no step, so nothing was learnt and nothing is surer than before
+    nothing = np.zeros_like(found.PH)
+    return _taken(state, state.vector(), nothing, nothing, settings, donate=donate)
+
+
+def _taken(
+    state: State,
+    z: np.ndarray,
+    K: np.ndarray,
+    B: np.ndarray,
+    settings: Settings,
+    *,
+    donate: bool,
+) -> State:
+    """The state at z (d,), with P ← (P − K Bᵀ − B Kᵀ)/λ + q₀ I."""
+    P = state.covariance
+    assert isinstance(P, (Full, Blocks))
     covariance = P.reduced(
         K,
         B,
         growth=1.0 / settings.forgetting_factor,
         added=settings.process_noise,
         donate=donate,
-        unit=unit,
     )
     return replace(state.moved(z), covariance=covariance)
 
@@ -87,7 +100,6 @@ def _iterate(
     seen: Observation,
     r: float,
     first: tuple[np.ndarray, np.ndarray],
-    unit: int | None,
     settings: Settings,
 ) -> _Linear:
     """The best linearisation.
@@ -102,7 +114,7 @@ def _iterate(
     for i in range(settings.iterations):
         if i:
             f, H = jacobian(state.moved(z), seen, settings)
-        PH = P.times(H.T, unit)
+        PH = P.times(H.T)
         HPH = H @ PH
         S = HPH + np.diag(R)
         factor, info = dpotrf(S, lower=1)

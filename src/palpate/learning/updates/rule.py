@@ -8,7 +8,7 @@ from palpate.learning.model import jacobian, measured
 from palpate.learning.observation import Observation
 from palpate.learning.settings import Settings
 from palpate.learning.state import State
-from palpate.learning.updates import gradient, kalman, shared
+from palpate.learning.updates import gradient, kalman, shared, winner
 
 __all__ = ["Predicted", "predicted", "updated"]
 
@@ -18,9 +18,9 @@ Predicted = tuple[np.ndarray, np.ndarray]
 def predicted(state: State, seen: Observation, settings: Settings) -> Predicted:
     """What the network has for an observation, (q,), and its derivatives (q, d).
 
-    The shared-weight rule has no use for the derivatives, and with many outputs no room: they are (q, 0) there.
+    The winner's and the shared-weight rule form their own derivatives, of a part: theirs are (q, 0) here.
     """
-    if settings.update == "shared":
+    if settings.update in {"shared", "winner"}:
         f = measured(state, seen, settings)
         return f, np.zeros((f.size, 0))
     return jacobian(state, seen, settings)
@@ -37,4 +37,6 @@ def updated(
         return gradient.updated(state, seen, found, settings)
     if settings.update == "shared":
         return shared.updated(state, seen, seen.y - found[0][: seen.y.size], settings, donate=donate)
+    if settings.update == "winner":
+        return winner.updated(state, seen, found[0], settings, donate=donate)
     return kalman.updated(state, seen, found, settings, donate=donate)

@@ -56,29 +56,32 @@ def updated(
     M, spread = H @ PH, float(row @ gain)
     led = error if state.modes is None else state.modes.T @ error
     r = variance(seen.x, error, state.innovation, settings) / seen.weight
-    taken = False
     for _ in range(_TRIES + 1):
         s = r + spread
         S = M + s * np.eye(len(M))
-        factor = dpotrf(S, lower=1)[0]
+        factor, flaw = dpotrf(S, lower=1)
+        if flaw:
+            raise FloatingPointError("the innovation covariance is not positive definite")
         lam = dpotrs(factor, led, lower=1)[0]
         step = (PH @ lam).reshape(state.theta.shape)
         led_after = state.led + np.outer(gain, lam)
         excess = _excess(state, step, settings)
-        taken = excess <= 1.0 and not spoils(state, led_after, state.theta + step, settings)
-        if taken:
+        if excess <= 1.0 and not spoils(state, led_after, state.theta + step, settings):
             break
         # a smaller step by more measurement noise keeps estimate and covariance consistent
         r += max(excess - 1.0, 1.0) * (s + float(np.trace(M)) / max(len(M), 1))
-    state = replace(state, covariance=_reduced(P, gain, s, PH, S, factor, state, settings, donate))
-    if not taken:
-        return state
+    else:
+        # no step, so nothing was learnt and nothing is surer than before
+        return replace(
+            state, covariance=_reduced(P, 0.0 * gain, 1.0, 0.0 * PH, S, factor, state, settings, donate)
+        )
     whole = lam if state.modes is None else error / s + state.modes @ (lam - led / s)
     C = dger(1.0, whole, gain, a=state.coefficients.T, overwrite_a=int(donate)).T
     return replace(
         state,
         coefficients=C,
         theta=state.theta + step,
+        covariance=_reduced(P, gain, s, PH, S, factor, state, settings, donate),
         in_modes=None if state.modes is None else led_after,
     )
 

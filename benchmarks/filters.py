@@ -21,7 +21,7 @@ from scipy.linalg.blas import dsymm, dsyr2k
 from benchmarks.runner import main
 from benchmarks.table import Claim, Column, Table
 from palpate.learning import Settings, State, initial, step
-from palpate.learning.growth import grown
+from palpate.learning.filter.growth import grown
 
 __all__ = ["picture", "tables"]
 

@@ -19,10 +19,10 @@ from benchmarks.cases import BEAMS, case
 from benchmarks.runner import main
 from benchmarks.table import Claim, Column, Table
 from palpate.learning import Settings, default, refine
+from palpate.learning.filter.presets import shared
 from palpate.learning.modes import output_modes
-from palpate.learning.online import Learner
-from palpate.learning.presets import shared
-from palpate.learning.refining import Refining
+from palpate.learning.stream.learner import Learner
+from palpate.learning.stream.refining import Refining
 from palpate.network import Scaling
 from palpate.units import Quantity, Range
 

@@ -18,8 +18,8 @@ from benchmarks import peer_data
 from benchmarks.runner import main
 from benchmarks.table import Claim, Column, Table
 from palpate.learning import refine
-from palpate.learning.forms import form
-from palpate.learning.regressors import Regressors
+from palpate.learning.units.forms import form
+from palpate.learning.units.regressors import Regressors
 from palpate.network import TrainedRegion
 from palpate.network.radial import RadialFunction
 

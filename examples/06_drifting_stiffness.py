@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from palpate.learning import default
-from palpate.learning.online import Learner
+from palpate.learning.stream.learner import Learner
 from palpate.network import Publisher, Subscriber
 from palpate.physics.presets import preset
 from palpate.units import Range

@@ -17,10 +17,10 @@ import numpy as np
 
 from benchmarks.table import Claim, Column
 from palpate.learning import Settings, State, default, initial, learn, refine, step
-from palpate.learning.forms import form
-from palpate.learning.model import value
-from palpate.learning.regressors import Regressors
-from palpate.learning.structure import grow
+from palpate.learning.filter.model import value
+from palpate.learning.refinement.structure import grow
+from palpate.learning.units.forms import form
+from palpate.learning.units.regressors import Regressors
 from palpate.network import Scaling
 from palpate.units import Quantity, Range
 

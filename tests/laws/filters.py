@@ -8,8 +8,8 @@ import numpy as np
 
 from laws.beams import exact
 from palpate.learning import PRESETS, Settings, State, initial
-from palpate.learning.covariance import Blocks, Full, Shared
-from palpate.learning.growth import grown
+from palpate.learning.filter.covariance import Blocks, Full, Shared
+from palpate.learning.filter.growth import grown
 from palpate.network.radial import RADIAL_FUNCTIONS
 
 FORMS = ("isotropic", "axis-aligned", "rotated", "rank-1", "rank-2")

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from palpate.errors import UsageError
-from palpate.learning.choice import fit
-from palpate.learning.committee import Member, averaged, expected_error, refitted
-from palpate.learning.forms import form
-from palpate.learning.kernel_layer import KernelLayer, Metric, _unlikelihood, likely_metric
-from palpate.learning.race import Race, Runner, Split, carried, start
-from palpate.learning.regressors import Regressors
+from palpate.learning.choosing.choice import fit
+from palpate.learning.choosing.committee import Member, averaged, expected_error, refitted
+from palpate.learning.choosing.kernel_layer import KernelLayer, Metric, _unlikelihood, likely_metric
+from palpate.learning.choosing.race import Race, Runner, Split, carried, start
+from palpate.learning.units.forms import form
+from palpate.learning.units.regressors import Regressors
 from palpate.network.radial import RADIAL_FUNCTIONS
 from palpate.units import Quantity, Range
 

@@ -10,10 +10,10 @@ import pytest
 from laws.filters import FORMS, RADIAL, exact, frozen_shapes, populated
 from palpate.errors import UsageError
 from palpate.learning import Observation, freeze, observe, step
-from palpate.learning.forms import Centred, form
-from palpate.learning.growth import grown
-from palpate.learning.model import jacobian, measured, regressors_at, value
-from palpate.learning.pruning import without
+from palpate.learning.filter.growth import grown
+from palpate.learning.filter.model import jacobian, measured, regressors_at, value
+from palpate.learning.filter.pruning import without
+from palpate.learning.units.forms import Centred, form
 from palpate.network import Scaling
 from palpate.units import Quantity, Range
 

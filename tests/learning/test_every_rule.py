@@ -10,11 +10,11 @@ import pytest
 from laws.beams import INPUT, OUTPUTS, stiffening
 from laws.filters import COVARIANT, FORMS, RULES, exact, frozen_shapes, populated
 from palpate.learning import PRESETS, Observation, initial, learn, observe, step
-from palpate.learning.covariance import Full, Shared
-from palpate.learning.growth import grown
-from palpate.learning.model import value
-from palpate.learning.pruning import without
-from palpate.learning.updates import predicted, updated
+from palpate.learning.filter.covariance import Full, Shared
+from palpate.learning.filter.growth import grown
+from palpate.learning.filter.model import value
+from palpate.learning.filter.pruning import without
+from palpate.learning.filter.updates import predicted, updated
 
 every_rule = pytest.mark.parametrize("rule", RULES)
 

@@ -12,10 +12,10 @@ import pytest
 from laws.beams import INPUT, OUTPUTS, stiffening
 from palpate.errors import UsageError
 from palpate.learning import default, initial, refine, step
-from palpate.learning.online import Learner
-from palpate.learning.presets import shared
-from palpate.learning.refining import Refining
-from palpate.learning.reservoir import Reservoir
+from palpate.learning.filter.presets import shared
+from palpate.learning.stream.learner import Learner
+from palpate.learning.stream.refining import Refining
+from palpate.learning.stream.reservoir import Reservoir
 from palpate.network import Publisher, Scaling
 from palpate.units import Quantity, Range
 

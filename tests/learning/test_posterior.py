@@ -10,11 +10,11 @@ import pytest
 from laws.beams import INPUT, exact, stiffening
 from palpate.errors import UsageError
 from palpate.learning import Settings, initial, posterior, refine, step
-from palpate.learning.forms import form
-from palpate.learning.laplace import Posterior
-from palpate.learning.model import value
-from palpate.learning.regressors import Regressors
-from palpate.learning.structure import freeze_refined
+from palpate.learning.filter.model import value
+from palpate.learning.refinement.laplace import Posterior
+from palpate.learning.refinement.structure import freeze_refined
+from palpate.learning.units.forms import form
+from palpate.learning.units.regressors import Regressors
 from palpate.network import Scaling
 from palpate.units import Quantity, Range
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from palpate.errors import UsageError
-from palpate.learning.forms import form
-from palpate.learning.leave_one_out import left_out, without_each
-from palpate.learning.projection import fitted, gauss_newton, project
-from palpate.learning.regressors import Regressors
-from palpate.learning.rows import Rows, modes
+from palpate.learning.refinement.leave_one_out import left_out, without_each
+from palpate.learning.refinement.projection import fitted, gauss_newton, project
+from palpate.learning.refinement.rows import Rows, modes
+from palpate.learning.units.forms import form
+from palpate.learning.units.regressors import Regressors
 
 FORMS = ("isotropic", "axis-aligned", "rotated", "rank-1")
 RADIALS = ("gaussian", "inverse-multiquadric", "matern-5/2")

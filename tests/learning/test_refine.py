@@ -11,8 +11,8 @@ import pytest
 from laws.beams import INPUT, stiffening
 from palpate.errors import UsageError
 from palpate.learning import refine
-from palpate.learning.forms import form
-from palpate.learning.regressors import Regressors
+from palpate.learning.units.forms import form
+from palpate.learning.units.regressors import Regressors
 from palpate.network import Scaling
 
 LINE = Regressors(form("axis-aligned", 1))

@@ -9,9 +9,9 @@ import pytest
 
 from laws.beams import INPUT, OUTPUTS, stiffening
 from palpate.learning import refine, refined_network
-from palpate.learning.forms import form
-from palpate.learning.regressors import Regressors
-from palpate.learning.structure import grow, placed, prune
+from palpate.learning.refinement.structure import grow, placed, prune
+from palpate.learning.units.forms import form
+from palpate.learning.units.regressors import Regressors
 
 RADIALS = ("gaussian", "inverse-multiquadric", "matern-5/2")
 

@@ -9,10 +9,10 @@ import pytest
 
 from palpate.errors import UsageError
 from palpate.learning import refine
-from palpate.learning.forms import form
-from palpate.learning.laplace import Posterior
-from palpate.learning.regressors import Regressors
-from palpate.learning.structure import freeze_refined
+from palpate.learning.refinement.laplace import Posterior
+from palpate.learning.refinement.structure import freeze_refined
+from palpate.learning.units.forms import form
+from palpate.learning.units.regressors import Regressors
 from palpate.network import Network, Scaling
 from palpate.network.uncertainty import Uncertainty
 from palpate.units import Quantity, Range

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.learning.automatic import ranges_of
+from palpate.learning.choosing.automatic import ranges_of
 from palpate.network import Network
 from palpate.units import Quantity, Range
 

@@ -12,9 +12,9 @@ from threadpoolctl import threadpool_limits
 from palpate.estimators.base import RadialRegressor
 from palpate.estimators.data import BadValue, Units, merged, weights_of
 from palpate.learning import PRESETS, Observation, Settings, freeze, initial, learn, observe
-from palpate.learning.automatic import UNITS_MAX, automatic
+from palpate.learning.choosing.automatic import UNITS_MAX, automatic
+from palpate.learning.filter.state import State
 from palpate.learning.modes import output_modes
-from palpate.learning.state import State
 from palpate.network import Scaling
 
 __all__ = ["MRANRegressor"]
@@ -30,7 +30,7 @@ class MRANRegressor(RadialRegressor):
     ----------
     target : float
         Error wanted, relative to the outputs' spread: root mean square error over root mean square deviation from
-        the mean. Thresholds and size follow from it and from the data (see `palpate.learning.automatic`).
+        the mean. Thresholds and size follow from it and from the data (see `palpate.learning.choosing.automatic`).
     settings : Settings or str, optional
         The filter's settings, or the name of a preset, in place of automatic ones; then `target` has no effect.
     form, radial, tail, update, units_max : optional

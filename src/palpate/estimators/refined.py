@@ -12,12 +12,12 @@ from threadpoolctl import threadpool_limits
 
 from palpate.estimators.base import RadialRegressor
 from palpate.estimators.data import Units, merged, weights_of
-from palpate.learning import choice
-from palpate.learning.automatic import check_target
-from palpate.learning.forms import form as form_of
-from palpate.learning.refine import Refined, refine
-from palpate.learning.regressors import Regressors
-from palpate.learning.structure import Trial, freeze_refined, placed
+from palpate.learning.choosing import choice
+from palpate.learning.choosing.automatic import check_target
+from palpate.learning.refinement.refine import Refined, refine
+from palpate.learning.refinement.structure import Trial, freeze_refined, placed
+from palpate.learning.units.forms import form as form_of
+from palpate.learning.units.regressors import Regressors
 from palpate.network import Scaling
 
 __all__ = ["RBFNetworkRegressor"]
@@ -41,9 +41,9 @@ class RBFNetworkRegressor(RadialRegressor):
         Error wanted on samples kept apart, relative to the outputs' spread: root mean square error over root mean
         square deviation from the mean.
     form : str, optional
-        Of a unit (see `palpate.learning.forms`); if left out rotated up to three inputs, ridges of rank 1 above.
-        "auto" tries forms, radial functions and sizes against each other (see `palpate.learning.choice`) and takes
-        up to `seconds`; `radial`, `tail` and `units_max` then have no effect. Where weights differ, or below 20
+        Of a unit (see `palpate.learning.units.forms`); if left out rotated up to three inputs, ridges above.
+        "auto" tries forms, radial functions and sizes against each other (`palpate.learning.fit`) and takes up to
+        `seconds`; `radial`, `tail` and `units_max` then have no effect. Where weights differ, or below 20
         samples, it is as if left out.
     radial : {"gaussian", "inverse-multiquadric", "matern-5/2"}
     tail : {"affine", "constant", "none"}

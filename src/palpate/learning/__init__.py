@@ -1,43 +1,39 @@
 """How a network is learnt: one sample at a time (MRAN with an extended Kalman filter), then refined.
 
-settings   what the filter is told           presets    named members of the family
-forms      what a unit may look like         regressors units and tail, with all derivatives
-state      what the filter remembers         covariance what it keeps of its uncertainty
-model      the state's value and Jacobian    updates    what an observation changes
-growth     when a unit is added              pruning    when one is removed
-noise      how far a sample is believed      memory     what observations forbid
-mran       the step: all of these in order   learn      a fold of the step
-history    what happened meanwhile
-refine     variable projection               structure  how many units a refined network needs
-rows       its weighted values and slopes    projection its cost and Gauss–Newton matrix
-leave_one_out  errors without fitting again  laplace    the structured posterior, for predictive variance
-posterior  the way back from a refined network to the filter
-online     a stream: the step, refinement on retained samples, snapshots for readers
-reservoir  which samples are retained        refining   one bounded iteration on them, by nudge
-gauge      a stream's scaling and modes      marquardt  the step of an iteration
-touch      a dataset made into a body that can be touched
+units        what a network is made of: forms of unit, regressors and all their derivatives
+filter       the sequential filter and its family: `step`, and the rules that it is made of
+learn        a fold of the step over a data set
+refinement   variable projection, growth and pruning, the posterior
+choosing     form, size and thresholds from the data alone
+stream       learning while it runs: a learner, samples retained, bounded refinement
+history      what happened meanwhile, and its picture (drawing)
+modes        the few directions in which many outputs move
+touch        a dataset made into a body that can be touched
 """
 
+from palpate.learning.choosing.automatic import automatic
+from palpate.learning.choosing.choice import Fitted, fit
+from palpate.learning.filter.observation import Observation
+from palpate.learning.filter.presets import PRESETS, default, founding, recommended
+from palpate.learning.filter.settings import Settings
+from palpate.learning.filter.state import State, initial
+from palpate.learning.filter.step import Event, observe, step
 from palpate.learning.history import History
-from palpate.learning.laplace import Posterior
 from palpate.learning.learn import Learned, freeze, learn
-from palpate.learning.mran import Event, observe, step
-from palpate.learning.observation import Observation
-from palpate.learning.online import Learner
-from palpate.learning.posterior import posterior
-from palpate.learning.presets import PRESETS, default, founding, recommended
-from palpate.learning.refine import Refined, refine
-from palpate.learning.refining import Refining
-from palpate.learning.reservoir import Reservoir
-from palpate.learning.settings import Settings
-from palpate.learning.state import State, initial
-from palpate.learning.structure import Trial, grow, prune, refined_network
+from palpate.learning.refinement.laplace import Posterior
+from palpate.learning.refinement.posterior import posterior
+from palpate.learning.refinement.refine import Refined, refine
+from palpate.learning.refinement.structure import Trial, grow, prune, refined_network
+from palpate.learning.stream.learner import Learner
+from palpate.learning.stream.refining import Refining
+from palpate.learning.stream.reservoir import Reservoir
 from palpate.learning.touch import FEWEST, Refinement, hand_coordinates, learn_touch, node_outputs
 
 __all__ = [
     "FEWEST",
     "PRESETS",
     "Event",
+    "Fitted",
     "History",
     "Learned",
     "Learner",
@@ -50,7 +46,9 @@ __all__ = [
     "Settings",
     "State",
     "Trial",
+    "automatic",
     "default",
+    "fit",
     "founding",
     "freeze",
     "grow",

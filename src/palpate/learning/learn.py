@@ -9,15 +9,15 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from palpate.errors import UsageError
-from palpate.learning.automatic import automatic, check_target, relative_error, spread_of
+from palpate.learning.choosing.automatic import automatic, check_target, relative_error, spread_of
+from palpate.learning.filter.model import value
+from palpate.learning.filter.observation import Observation
+from palpate.learning.filter.presets import default
+from palpate.learning.filter.settings import Settings
+from palpate.learning.filter.state import State, initial
+from palpate.learning.filter.step import Event, observe
 from palpate.learning.history import History
-from palpate.learning.model import value
 from palpate.learning.modes import output_modes
-from palpate.learning.mran import Event, observe
-from palpate.learning.observation import Observation
-from palpate.learning.presets import default
-from palpate.learning.settings import Settings
-from palpate.learning.state import State, initial
 from palpate.network import Network, Scaling
 from palpate.units import Quantity, Range
 

@@ -1,0 +1,78 @@
+"""Between what a sensor says and what the filter learns: scaled inputs, scaled outputs or their modes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.learning.filter.observation import Observation
+from palpate.learning.filter.settings import Settings
+from palpate.learning.filter.state import State, initial
+from palpate.learning.learn import freeze
+from palpate.learning.modes import output_modes
+from palpate.network import Network, Scaling
+from palpate.units import Quantity, Range, bounds
+
+__all__ = ["Gauge", "declared"]
+
+
+@dataclass(frozen=True, eq=False)
+class Gauge:
+    """A scaling, and output modes to learn in.
+
+    Attributes
+    ----------
+    scaling : Scaling
+    directions : (m, r), optional
+        Orthonormal; the filter's outputs are the scaled ones along them.
+    """
+
+    scaling: Scaling
+    directions: np.ndarray | None = None
+
+    def observation(self, seen: Observation) -> Observation:
+        """In the filter's quantities, from SI units; the slopes' weight counts on top of the observation's."""
+        s, V = self.scaling, self.directions
+        y = s.scale_outputs(seen.y)
+        slopes = None if seen.slopes is None else seen.slopes * s.input_half / s.output_scale[:, None]
+        if V is not None:
+            y, slopes = y @ V, None if slopes is None else V.T @ slopes
+        return Observation(s.scale_inputs(seen.x), y, seen.weight, slopes, seen.slope_weight * seen.weight)
+
+    def initial(self, settings: Settings, Y: np.ndarray | None) -> State:
+        """The state to begin with; early outputs Y (N, m) in SI units decide the shared-weight rule's modes."""
+        n, m = self.scaling.input_half.size, self.scaling.output_scale.size
+        modes = None
+        if self.directions is not None:
+            m = self.directions.shape[1]  # in order of size already
+            modes = np.eye(m)[:, : settings.modes] if settings.modes < m else None
+        elif Y is not None:
+            modes = output_modes(self.scaling.scale_outputs(Y), settings.modes)
+        return initial(n, m, settings, modes if settings.update == "shared" else None)
+
+    def frozen(
+        self, state: State, settings: Settings, inputs: tuple[Range, ...], outputs: tuple[Quantity, ...]
+    ) -> Network:
+        """The state as a network value in SI units."""
+        if self.directions is None:
+            return freeze(state, settings, inputs, outputs, self.scaling)
+        of = settings.regressors(state.inputs)
+        tail = np.zeros((state.outputs, 1 + state.inputs))
+        tail[:, : of.tail_size] = state.tail
+        factors, shifts = of.form.factors(state.theta)
+        return Network(
+            *(inputs, outputs, factors.copy(), shifts.copy(), state.weights.T.copy(), tail, self.scaling),
+            radial=settings.radial,
+            basis=self.directions,
+        )
+
+
+def declared(inputs: Sequence[Range], outputs: Sequence[Quantity | Range]) -> Scaling | None:
+    """The scaling that ranges of all outputs declare: their middles, and half of the widest."""
+    ranges = [o for o in outputs if isinstance(o, Range)]
+    if len(ranges) < len(outputs):
+        return None
+    low, high = bounds(ranges)
+    return Scaling.of(inputs, (low + high)[None] / 2, scale=float((high - low).max() / 2))

@@ -1,0 +1,292 @@
+"""Learning at sensor rate: a small object around the pure `step`, with bounded refinement on retained samples.
+
+learner = Learner(inputs, outputs)
+event = learner.observe(x, y)           # SI units, as often as the sensor speaks
+learner.publish(publisher)              # a reader in another process evaluates the newest network
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from threadpoolctl import ThreadpoolController
+
+from palpate.errors import UsageError
+from palpate.learning.filter.observation import Observation
+from palpate.learning.filter.presets import default
+from palpate.learning.filter.settings import Settings
+from palpate.learning.filter.state import State, initial
+from palpate.learning.filter.step import Event, observe
+from palpate.learning.history import History
+from palpate.learning.learn import freeze
+from palpate.learning.modes import output_modes
+from palpate.learning.stream.gauge import Gauge, declared
+from palpate.learning.stream.refining import Progress, Refining, refined_state
+from palpate.learning.stream.reservoir import Reservoir
+from palpate.network import Network, Publisher, Scaling
+from palpate.units import Quantity, Range
+
+__all__ = ["Learner"]
+
+# beyond these a scaled number is a broken sensor's: its square would swamp what double precision keeps
+_FARTHEST_INPUT, _FARTHEST_OUTPUT = 10.0, 1e6
+
+
+class Learner:
+    """A network that follows a stream of observations.
+
+    Every observation goes through the filter's `step`. Besides, R samples are retained, and every k-th observation
+    also pays for one Levenberg–Marquardt iteration on them, from which the filter goes on with the Gauss–Newton
+    posterior. Without refinement the object is the fold of `step`, bit by bit.
+
+    Outputs are scaled by what is declared: a `Scaling`, or ranges for the outputs. Without either the first
+    `settle` observations decide (their mean, and their largest deviation from it); they are then learnt in the
+    order in which they came, and until then the network is their mean.
+
+    Cost of an observation, h units of p numbers, d unknowns, q observed numbers: the filter's, about 2 q d²
+    operations for the full rule and (p_t + h)² + (h p)² r for the shared one, and for every k-th one R (h p)² +
+    tries · ((h p)³/3 + 2 R (h + p_t)²), and that posterior's (h p)³ (shared) or R q d² (full). Memory: d² or
+    (p_t + h)² + (h p)² numbers of covariance, R (n + m + 3) of samples, M (n + m + 1) of the window, `remember`
+    events; none of it grows with the stream. With `basis`, m counts the modes.
+
+    Parameters
+    ----------
+    inputs : sequence of n ranges
+    outputs : sequence of m quantities or ranges
+        If all of them are ranges, these scale them.
+    settings : Settings, optional
+        `default()` if left out; `shared()` costs less for many outputs or units.
+    refining : Refining, optional
+        `None` for the filter alone.
+    scaling : Scaling, optional
+        Between SI and scaled quantities.
+    settle : int
+        Observations from which scaling and modes come where they are not declared.
+    basis : int, optional
+        Learn in at most so many output modes, found from the first `settle` observations.
+    seed : int
+        Of the reservoir.
+    remember : int
+        Events kept for `history`.
+
+    Raises
+    ------
+    UsageError
+        If the declarations do not fit together.
+    """
+
+    def __init__(
+        self,
+        inputs: Sequence[Range],
+        outputs: Sequence[Quantity | Range],
+        *,
+        settings: Settings | None = None,
+        refining: Refining | None = Refining(),  # noqa: B008 - a frozen value
+        scaling: Scaling | None = None,
+        settle: int = 50,
+        basis: int | None = None,
+        seed: int = 0,
+        remember: int = 10_000,
+    ) -> None:
+        if not inputs or not outputs or settle < 1 or remember < 1 or (basis is not None and basis < 1):
+            raise UsageError(
+                "A learner needs inputs, outputs, and positive counts.",
+                fix="Name every column, and settle on one observation at least.",
+            )
+        self.settings = settings or default()
+        self.inputs = tuple(inputs)
+        self.outputs = tuple(o if isinstance(o, Quantity) else Quantity(o.name, o.unit) for o in outputs)
+        self.refining = refining if refining is not None and refining.every else None
+        self.count = 0
+        # two rules that both add units would add too many
+        grows = self.refining is not None and self.refining.grows
+        self._filter = replace(self.settings, units_max=0) if grows else self.settings
+        self._scaling = scaling or declared(inputs, outputs)
+        self._gauge: Gauge | None = None
+        self._settle, self._basis, self._seed = settle, basis, seed
+        self._early: list[Observation] = []
+        self._state: State | None = None
+        self._kept: Reservoir | None = None
+        self._progress = Progress()
+        self._events: deque[tuple[Event, float]] = deque(maxlen=remember)
+        self._threads = ThreadpoolController()
+        by_modes = self.settings.update == "shared" and len(outputs) > self.settings.modes
+        if self._scaling is not None and basis is None and not by_modes:
+            self._start(Gauge(self._scaling))
+
+    def observe(
+        self,
+        x: np.ndarray,
+        y: np.ndarray,
+        *,
+        weight: float = 1.0,
+        slopes: np.ndarray | None = None,
+        slope_weight: float = 1.0,
+    ) -> Event:
+        """Learn one observation.
+
+        Numbers that are not finite, or far outside of what a sensor could mean, are skipped, and the event says so.
+
+        Parameters
+        ----------
+        x : (n,)
+            Inputs in SI units.
+        y : (m,)
+            Outputs in SI units.
+        weight : float
+            How many ordinary observations this one counts as.
+        slopes : (m, n), optional
+            ∂y/∂x in SI units.
+        slope_weight : float
+            How many ordinary values a scaled slope counts as.
+
+        Returns
+        -------
+        Event
+            In scaled quantities.
+
+        Raises
+        ------
+        UsageError
+            If an array has the wrong shape.
+        """
+        # copies: a loop may hand over the same buffers each time
+        x, y = np.array(x, np.float64), np.array(y, np.float64)
+        slopes = None if slopes is None else np.array(slopes, np.float64)
+        n, m = len(self.inputs), len(self.outputs)
+        if x.shape != (n,) or y.shape != (m,) or not (slopes is None or slopes.shape == (m, n)):
+            raise UsageError(
+                f"An observation of shapes {x.shape} and {y.shape} came to a learner of {n} inputs and {m} outputs.",
+                fix=f"Pass x ({n},), y ({m},) and, where they are known, slopes ({m}, {n}).",
+            )
+        self.count += 1
+        seen = Observation(x, y, weight, slopes, slope_weight)
+        with self._threads.limit(limits=1), np.errstate(all="ignore"):
+            event = (
+                self._settling(seen) if self._gauge is None else self._learnt(self._gauge.observation(seen))
+            )
+        innovation = np.nan if self._state is None else self._state.innovation
+        self._events.append((event, innovation))
+        return event
+
+    @property
+    def state(self) -> State:
+        """The filter's state, in scaled quantities.
+
+        Raises
+        ------
+        UsageError
+            While scaling is still being settled.
+        """
+        if self._state is None:
+            raise UsageError(
+                f"Nothing is learnt before {self._settle} observations have settled the scaling.",
+                fix="Observe more, or declare the scaling.",
+            )
+        return self._state
+
+    @property
+    def network(self) -> Network:
+        """What has been learnt so far, frozen.
+
+        Raises
+        ------
+        UsageError
+            Before the first observation, unless the scaling is declared.
+        """
+        if self._gauge is not None:
+            return self._gauge.frozen(self.state, self.settings, self.inputs, self.outputs)
+        if not self._early:
+            raise UsageError("Nothing has been observed yet.", fix="Observe, or declare the scaling.")
+        scaling = self._scaling or Scaling.of(self.inputs, np.array([one.y for one in self._early]))
+        mean = initial(len(self.inputs), len(self.outputs), self.settings)
+        return freeze(mean, self.settings, self.inputs, self.outputs, scaling)
+
+    def publish(self, publisher: Publisher) -> int:
+        """Publish the network to readers in other processes, atomically; returns its serial number.
+
+        Raises
+        ------
+        UsageError
+            If it is not the publisher's kind of network.
+        """
+        return publisher.publish(self.network)
+
+    @property
+    def expected(self) -> float:
+        """RMS error per scaled output on the samples that judge; not-a-number before the first refinement."""
+        return self._progress.expected
+
+    @property
+    def numbers(self) -> int:
+        """How many numbers are kept, but for events: parameters, covariance, memory and retained samples."""
+        s = self.state
+        own = s.coefficients.size + s.theta.size + s.covariance.numbers + s.seen.size + s.errors.size
+        return own + (0 if self._kept is None else self._kept.numbers)
+
+    @property
+    def history(self) -> History:
+        """What the last observations did."""
+        events, innovation = zip(*self._events, strict=True) if self._events else ((), ())
+        return History.of(events, innovation, (), 1)
+
+    def _settling(self, seen: Observation) -> Event:
+        """Before the scaling is known: collect; with the last one, learn all."""
+        if not seen.finite:
+            return _skipped(0, "not finite")
+        self._early.append(seen)
+        if len(self._early) < self._settle:
+            return _skipped(0, "settling the scaling")
+        Y = np.array([one.y for one in self._early])
+        scaling = self._scaling or Scaling.of(self.inputs, Y)
+        directions = output_modes(scaling.scale_outputs(Y), self._basis) if self._basis else None
+        gauge = self._start(Gauge(scaling, directions), Y)
+        early, self._early = self._early, []
+        return [self._learnt(gauge.observation(one)) for one in early][-1]
+
+    def _start(self, gauge: Gauge, Y: np.ndarray | None = None) -> Gauge:
+        self._gauge, self._state = gauge, gauge.initial(self.settings, Y)
+        if self.refining is not None:
+            size = self._state.inputs, self._state.outputs
+            keeping, samples = self.refining.keeping, self.refining.samples
+            self._kept = Reservoir(samples, *size, keeping=keeping, seed=self._seed)
+        return gauge
+
+    def _learnt(self, seen: Observation) -> Event:
+        state = self.state
+        if not seen.finite:
+            return _skipped(state.units, "not finite")
+        if np.abs(seen.x).max() > _FARTHEST_INPUT or np.abs(seen.targets()).max() > _FARTHEST_OUTPUT:
+            return _skipped(state.units, "far outside the declared scales")
+        try:
+            state, event = observe(state, seen, self._filter, donate=True)
+        except FloatingPointError as error:  # raised before anything is overwritten
+            return _skipped(state.units, str(error))
+        if self._kept is not None and self.refining is not None:
+            self._kept.add(
+                *(seen.x, seen.y), weight=seen.weight, slopes=seen.slopes, slope_weight=seen.slope_weight
+            )
+            if self._kept.seen % self.refining.every == 0:
+                before, state = state.units, self._refined(state, self._kept, self.refining)
+                event = replace(
+                    event, grew=event.grew or state.units > before, units=state.units, refined=True
+                )
+        self._state = state
+        return event
+
+    def _refined(self, state: State, kept: Reservoir, refining: Refining) -> State:
+        try:
+            found, progress = refined_state(state, kept, self.settings, refining, self._progress)
+        except ValueError:  # LAPACK's, for a matrix that is singular or not finite: the filter goes on alone
+            self._progress = Progress()
+            return state
+        sound = np.isfinite(found.coefficients).all() and np.isfinite(found.theta).all()
+        self._progress = progress if sound else Progress()
+        return found if sound else state
+
+
+def _skipped(units: int, why: str) -> Event:
+    return Event(np.nan, np.nan, False, False, 0, units, why)

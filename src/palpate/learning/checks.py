@@ -1,0 +1,157 @@
+"""What a user hands over, made into arrays that fit together, or refused in words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import UsageError
+
+__all__ = ["numbers", "samples"]
+
+
+def numbers(what: str, given: Any, shape: tuple[int | None, ...], *, finite: bool = True) -> np.ndarray:
+    """An array of real numbers as float64; None in `shape` is any length but zero.
+
+    Parameters
+    ----------
+    what : str
+        Its name, as the message begins.
+    given : array-like
+    shape : tuple of int or None
+    finite : bool
+        Whether infinities and not-a-number are refused.
+
+    Raises
+    ------
+    UsageError
+        If it holds anything but real numbers, has another shape, or is not finite.
+    """
+    found = _real(what, given)
+    fits = found.ndim == len(shape) and all(
+        f == w or (w is None and f > 0) for f, w in zip(found.shape, shape, strict=True)
+    )
+    if not fits:
+        wanted = ", ".join("any" if w is None else str(w) for w in shape) + ("," if len(shape) == 1 else "")
+        raise UsageError(
+            f"{what} have shape {found.shape}; ({wanted}) is needed.",
+            why="Each row is one sample, each column one input or output.",
+            fix="A single column of N numbers is an array of shape (N, 1): Y[:, None].",
+        )
+    if finite:
+        _finite(what, found)
+    return found
+
+
+def samples(
+    X: Any,
+    Y: Any,
+    weights: Any = None,
+    slopes: Any = None,
+    *,
+    slope_weight: Any = 1.0,
+    inputs: int | None = None,
+    outputs: int | None = None,
+    fewest: int = 1,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None, np.ndarray]:
+    """N samples as float64 arrays that fit together.
+
+    Samples of no weight, and slopes of no weight, count for nothing and need not be finite.
+
+    Parameters
+    ----------
+    X : (N, n)
+    Y : (N, m)
+    weights : (N,), optional
+        Not negative, one positive; ones if left out.
+    slopes : (N, m, n), optional
+        ∂Y/∂X.
+    slope_weight : float or (N,)
+        Not negative; counts only where there are slopes.
+    inputs, outputs : int, optional
+        n and m, where they are known.
+    fewest : int
+        Least N.
+
+    Returns
+    -------
+    X, Y, weights : (N, n), (N, m), (N,)
+    slopes : (N, m, n) or None
+    slope_weight : (N,)
+        Zeros without slopes.
+
+    Raises
+    ------
+    UsageError
+        If anything does not fit, or a number that counts is not finite.
+    """
+    X = numbers("Inputs X", X, (None, inputs), finite=False)
+    Y = numbers("Outputs Y", Y, (None, outputs), finite=False)
+    if len(X) != len(Y):
+        raise UsageError(
+            f"{len(X)} rows of inputs came with {len(Y)} rows of outputs.",
+            why="Row i of both is the same sample.",
+            fix="Pass X (N, n) and Y (N, m) with the same N.",
+        )
+    N = len(X)
+    w = np.ones(N) if weights is None else _weights("Weights", weights, N)
+    s = np.zeros(N) if slopes is None else _weights("Slope weights", slope_weight, N)
+    if slopes is not None:
+        slopes = numbers("Slopes", slopes, (N, Y.shape[1], X.shape[1]), finite=False)
+        _finite("Slopes", slopes[(w > 0) & (s > 0)])
+    known = w > 0
+    if not known.any():
+        raise UsageError(
+            "No sample has a positive weight.",
+            why="A weight of zero leaves its sample out.",
+            fix="Give one positive weight at least.",
+        )
+    if known.sum() < fewest:
+        raise UsageError(
+            f"{known.sum()} samples came, and {fewest} are needed.",
+            why="Fewer can't be split into some to learn from and some to judge by.",
+            fix=f"Give at least {fewest} samples.",
+        )
+    _finite("Inputs X", X[known])
+    _finite("Outputs Y", Y[known])
+    return X, Y, w, slopes, s
+
+
+def _finite(what: str, found: np.ndarray) -> None:
+    if not np.isfinite(found).all():
+        raise UsageError(
+            f"{what} hold numbers that are not finite.",
+            why="A failed solve or a broken sensor leaves not-a-number in its row.",
+            fix="Leave such rows out (`Dataset.ok` keeps the converged ones).",
+        )
+
+
+def _real(what: str, given: Any) -> np.ndarray:
+    try:
+        found = np.asarray(given)
+        if found.dtype.kind in "biufO":
+            return np.asarray(found, dtype=np.float64)
+    except (TypeError, ValueError):  # ragged lists, or objects that are no numbers
+        raise _no_numbers(what, "an object that is no array of numbers") from None
+    raise _no_numbers(what, f"an array of {found.dtype}")
+
+
+def _no_numbers(what: str, found: str) -> UsageError:
+    return UsageError(
+        f"{what} are {found}.",
+        why="Samples are real numbers, in rows of equal length.",
+        fix="Pass a float array; encode words, dates and complex numbers as columns of their own first.",
+    )
+
+
+def _weights(what: str, given: Any, N: int) -> np.ndarray:
+    given = _real(what, given)
+    found = numbers(what, np.full(N, float(given)) if given.ndim == 0 else given, (N,))
+    if (found < 0).any():
+        raise UsageError(
+            f"{what} are negative for {int((found < 0).sum())} samples.",
+            why="A weight is how many ordinary samples one counts as.",
+            fix="Give a sample that is to be left out a weight of zero.",
+        )
+    return found

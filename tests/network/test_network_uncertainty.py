@@ -117,3 +117,19 @@ def test_arrays_that_do_not_fit_are_refused():
     outside = {**network.extras, "uncertainty_pattern": network.extras["uncertainty_pattern"] + 5}
     with pytest.raises(UsageError, match="pattern"):
         Uncertainty.of(replace(network, extras=outside))
+
+
+def test_what_is_certain_is_left_out():
+    whole = learnt(0.05)
+    c = len(whole.coefficients)
+    linear = replace(whole, root=np.zeros((0, 0)), through=np.zeros((c, 0)))
+    X = sampled(40, 0.0, 4)[0]
+    # beside the whole only the units' own share is missing
+    rest = replace(whole, root=np.zeros_like(whole.root))
+    np.testing.assert_allclose(linear.deviation(X), rest.deviation(X), rtol=1e-12)
+    assert (linear.deviation(X) < whole.deviation(X)).all()
+    constant = replace(linear, coefficients=np.zeros((0, 0)), through=np.zeros((0, 0)))
+    wanted = np.sqrt(whole.noise) * whole.network.scaling.output_scale
+    np.testing.assert_allclose(constant.deviation(X), np.tile(wanted, (40, 1)), rtol=1e-12)
+    again = Uncertainty.of(constant.attached())
+    np.testing.assert_array_equal(again.deviation(X), constant.deviation(X))

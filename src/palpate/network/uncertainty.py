@@ -40,11 +40,12 @@ class Uncertainty:
     noise : (m,)
         s_j² of the scaled outputs.
     coefficients : (c, c)
-        M, tail first.
+        M, tail first; (0, 0) where all but the noise is taken as certain.
     root : (h (e + r), z)
-        U: any root of the covariance of the entries of A_k and of b_k, unit by unit.
+        U: any root of the covariance of the entries of A_k and of b_k, unit by unit; (0, 0) where the units
+        are taken as certain.
     through : (c, h (e + r))
-        B: how the coefficients follow the units.
+        B: how the coefficients follow the units; then (c, 0).
     pattern : (2, e) int
         Rows and columns of the entries of A_k that may differ from zero.
     factor : (m,)
@@ -127,16 +128,17 @@ class Uncertainty:
     def __post_init__(self) -> None:
         h, r, n = self.network.factors.shape
         m, q, c = len(self.network.outputs), self.pattern.shape[-1] + r, len(self.coefficients)
+        moved = h * q if self.root.size or self.through.size else 0  # numbers of units that are uncertain
         shapes = {
             "noise": (self.noise.shape, (m,)),
             "coefficients": (self.coefficients.shape, (c, c)),
-            "root": (self.root.shape[:1], (h * q,)),
-            "through": (self.through.shape, (c, h * q)),
+            "root": (self.root.shape[:1], (moved,)),
+            "through": (self.through.shape, (c, moved)),
             "pattern": (self.pattern.shape, (2, q - r)),
             "factor": (self.factor.shape, (m,) if self.factor.size != 1 else (1,)),
         }
         wrong = [k for k, (found, wanted) in shapes.items() if found != wanted]
-        if wrong or not h <= c <= h + 1 + n:
+        if wrong or not (c == 0 or h <= c <= h + 1 + n):
             raise UsageError(
                 f"The uncertainty's {', '.join(wrong) or 'coefficients'} do not fit the network's "
                 f"{h} units and {m} outputs.",
@@ -148,6 +150,8 @@ class Uncertainty:
 
     def _variance(self, xs: np.ndarray) -> np.ndarray:
         """Of the scaled outputs (N, m) at scaled inputs (N, n)."""
+        if not self.coefficients.size:
+            return np.tile(self.noise, (len(xs), 1))
         phi, D = _by_factors(self.network, self.pattern, xs)
         N, h, q = D.shape
         tail = np.hstack([np.ones((N, 1)), xs])[:, : len(self.coefficients) - h]
@@ -155,7 +159,7 @@ class Uncertainty:
         linear = (
             self.noise * (1.0 + np.einsum("ni,ij,nj->n", row, self.coefficients, row, optimize=True))[:, None]
         )
-        if not h:
+        if not self.root.size:
             return np.asarray(linear)
         e = D - (row @ self.through).reshape(N, h, q)
         moved = e.transpose(1, 0, 2) @ self.root.reshape(h, q, -1)  # (h, N, z)

@@ -191,8 +191,9 @@ def test_slopes_teach_what_values_do(name):
     of = settings.regressors(n)
     values = regressors_at(state, X, settings)
     slopes = np.concatenate([of.tail_slopes(20), of.slopes(X, state.theta)], axis=2)
-    F = np.vstack([values * np.sqrt(weight)[:, None], *(slopes * np.sqrt(slope_weight))])
-    T = np.vstack([Y * np.sqrt(weight)[:, None], *(S.swapaxes(1, 2) * np.sqrt(slope_weight))])
+    both = np.sqrt(weight * slope_weight)[:, None, None]
+    F = np.vstack([values * np.sqrt(weight)[:, None], *(slopes * both)])
+    T = np.vstack([Y * np.sqrt(weight)[:, None], *(S.swapaxes(1, 2) * both)])
     ridge = np.linalg.solve(F.T @ F + settings.noise * np.eye(F.shape[1]), F.T @ T)
     for i in range(20):
         seen = Observation(X[i], Y[i], weight=weight[i], slopes=S[i], slope_weight=slope_weight)

@@ -11,8 +11,9 @@ import pytest
 
 from laws.beams import INPUT, OUTPUTS, stiffening
 from palpate.errors import UsageError
-from palpate.learning import default, initial, refine, step
+from palpate.learning import Observation, default, initial, refine, step
 from palpate.learning.filter.presets import shared
+from palpate.learning.refinement.rows import Rows
 from palpate.learning.stream.learner import Learner
 from palpate.learning.stream.refining import Refining
 from palpate.learning.stream.reservoir import Reservoir
@@ -134,7 +135,7 @@ def test_bad_numbers_are_skipped_and_nothing_else_changes():
         assert bad[k % 4][2] in event.why
         assert (event.updated, event.grew, event.refined) == (False, False, False)
         assert event.units == dirty.state.units
-    assert dirty.observe(X[0], Y[0], weight=-1.0).why == "not finite"
+    assert dirty.observe(X[0], Y[0], weight=-1.0).why == "its weight is not positive and finite"
     np.testing.assert_array_equal(dirty.state.vector(), clean.state.vector())
     np.testing.assert_array_equal(dirty.state.covariance.matrix, clean.state.covariance.matrix)
     assert dirty.count == 2 * clean.count + 1
@@ -353,3 +354,37 @@ def test_a_reader_in_another_process_sees_whole_snapshots():
         out, errors = reader.communicate(timeout=60)
     assert reader.returncode == 0, errors
     assert int(out) >= 1
+
+
+def test_an_idle_sensor_does_not_settle_the_scaling():
+    """Fifty zeros say nothing of the outputs' size; nor do samples from one corner of the range."""
+    inputs, outputs = (Range("x", -1.0, 1.0, "m"),), (Quantity("y", "N"),)
+    rng = np.random.default_rng(0)
+    for idle in (np.zeros(60), -1.0 + 1e-6 * rng.uniform(size=60)):
+        learner = Learner(inputs, outputs, refining=None)
+        for x in idle:
+            why = learner.observe(np.array([x]), np.array([1e-3 * np.sin(3 * x) if idle.any() else 0.0])).why
+        assert why == "settling the scaling"
+        for x in rng.uniform(-1, 1, 600):
+            learner.observe(np.array([x]), np.array([1e-3 * np.sin(3 * x)]))
+        grid = np.linspace(-1, 1, 50)[:, None]
+        error = learner.network.predict(grid) - 1e-3 * np.sin(3 * grid)
+        assert np.abs(error).max() < 2e-4  # of 1e-3: what was learnt while idle is still remembered
+
+
+def test_a_retained_sample_counts_in_the_refinement_what_it_counts_in_the_filter():
+    inputs, outputs = (Range("x", -1.0, 1.0, "m"),), (Range("y", -1.0, 1.0, "N"),)
+    learner = Learner(inputs, outputs, refining=Refining(samples=50, every=1000))
+    learner.observe(np.array([0.5]), np.array([0.25]), weight=4.0, slopes=np.array([[1.0]]), slope_weight=0.5)
+    kept = learner._kept
+    seen = Observation(np.array([0.5]), np.array([0.25]), 4.0, np.array([[1.0]]), 0.5)
+    rows = Rows.of(
+        default().regressors(1),
+        kept.X,
+        kept.Y,
+        weights=kept.weights,
+        slopes=kept.slopes,
+        slope_weight=kept.slope_weights,
+    )
+    np.testing.assert_allclose(rows.scale**2, 1.0 / seen.variances(1.0)[:1])
+    np.testing.assert_allclose(kept.weights * kept.slope_weights, 1.0 / seen.variances(1.0)[1:])

@@ -128,12 +128,15 @@ def learn(
         If the arrays do not fit together or hold values that are not finite, or the target is not positive.
     """
     _check(X, Y, inputs, outputs)
+    _check_run(settings, passes, seed, slope_weight)
     if target is not None:
         check_target(target)
-        settings = settings or automatic(
-            X, Y, inputs, target=target, passes=passes, seed=seed, weights=weights
+        settings = (
+            settings
+            if settings is not None
+            else automatic(X, Y, inputs, target=target, passes=passes, seed=seed, weights=weights)
         )
-    settings = settings or default()
+    settings = default() if settings is None else settings
     scaling = Scaling.of(inputs, Y)
     xs, ys = scaling.scale_inputs(X), scaling.scale_outputs(Y)
     judge = _judge(heldout, scaling, settings)
@@ -204,10 +207,10 @@ def _observations(
 ) -> list[Observation]:
     """The samples as the filter takes them."""
     N, m, n = len(xs), ys.shape[1], xs.shape[1]
-    if weights is not None and (np.shape(weights) != (N,) or not (np.asarray(weights) > 0).all()):
-        raise UsageError(f"Weights must be {N} positive numbers, one per sample.")
     w = np.ones(N) if weights is None else np.asarray(weights, dtype=np.float64)
-    if slopes is None:
+    if w.shape != (N,) or not (w > 0).all() or not np.isfinite(w).all():
+        raise UsageError(f"Weights must be {N} positive numbers, one per sample.")
+    if slopes is None or slope_weight == 0:
         return [Observation(xs[i], ys[i], float(w[i])) for i in range(N)]
     if slopes.shape != (N, m, n) or not np.isfinite(slopes).all():
         raise UsageError(
@@ -215,7 +218,7 @@ def _observations(
             fix=f"Pass finite slopes of shape ({N}, {m}, {n}).",
         )
     scaled = slopes * scaling.input_half / scaling.output_scale[:, None]
-    return [Observation(xs[i], ys[i], float(w[i]), scaled[i], slope_weight * float(w[i])) for i in range(N)]
+    return [Observation(xs[i], ys[i], float(w[i]), scaled[i], slope_weight) for i in range(N)]
 
 
 def _judge(
@@ -224,14 +227,35 @@ def _judge(
     """A function from a state to its held-out RMSE over the largest held-out output."""
     if heldout is None:
         return None
-    X, Y = heldout
-    xs, full = scaling.scale_inputs(X), float(np.abs(Y).max())
+    X, Y = (np.asarray(part, dtype=np.float64) for part in heldout)
+    n, m = scaling.input_half.size, scaling.output_scale.size
+    if X.ndim != 2 or Y.ndim != 2 or X.shape[1] != n or Y.shape[1] != m or len(X) != len(Y) or not len(X):
+        raise UsageError(
+            f"Held-out samples of shapes {X.shape} and {Y.shape} do not fit {n} inputs and {m} outputs.",
+            fix=f"Pass X (N, {n}) and Y (N, {m}) with the same N ≥ 1.",
+        )
+    xs, full = scaling.scale_inputs(X), float(np.abs(Y).max()) or 1.0
 
     def judge(state: State) -> float:
         predicted = value(state, xs, settings) * scaling.output_scale + scaling.output_centre
         return float(np.sqrt(((predicted - Y) ** 2).mean())) / full
 
     return judge
+
+
+def _check_run(settings: Settings | None, passes: int, seed: int, slope_weight: float) -> None:
+    if settings is not None and not isinstance(settings, Settings):
+        raise UsageError(
+            f"Settings are {settings!r}, not a Settings record.",
+            fix='Take a preset, such as PRESETS["default"](), or Settings(…).',
+        )
+    for name, count, least in (("passes", passes, 1), ("seed", seed, 0)):
+        if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < least:
+            raise UsageError(f"{name} is {count!r}; it must be a whole number of at least {least}.")
+    if not 0 <= slope_weight < np.inf:
+        raise UsageError(
+            f"slope_weight is {slope_weight}; it must be finite and not negative; 0 ignores slopes."
+        )
 
 
 def _check(X: np.ndarray, Y: np.ndarray, inputs: Sequence[Range], outputs: Sequence[Quantity]) -> None:

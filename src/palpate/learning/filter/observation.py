@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +23,7 @@ class Observation:
     slopes : (m, n), optional
         ∂y/∂x. A force is the slope of an energy; a stiffness that of a force.
     slope_weight : float
-        The same for each slope, in the units of `slopes`.
+        How many ordinary values a slope counts as, on top of the observation's weight.
     """
 
     x: np.ndarray
@@ -32,10 +33,18 @@ class Observation:
     slope_weight: float = 1.0
 
     @property
-    def finite(self) -> bool:
-        """Whether all numbers are finite and the weights positive."""
+    def flaw(self) -> str:
+        """Why nothing can be learnt from it; empty if something can."""
         parts = [self.x, self.y] + ([] if self.slopes is None else [self.slopes])
-        return bool(all(np.isfinite(p).all() for p in parts) and self.weight > 0 and self.slope_weight > 0)
+        if not all(np.isfinite(p).all() for p in parts):
+            return "not finite"
+        weights = (self.weight, self.slope_weight)
+        return "" if all(0.0 < w < math.inf for w in weights) else "its weight is not positive and finite"
+
+    @property
+    def finite(self) -> bool:
+        """Whether something can be learnt from it."""
+        return not self.flaw
 
     def targets(self) -> np.ndarray:
         """All that was observed, (q,): y, then the slopes row by row."""
@@ -46,4 +55,4 @@ class Observation:
         value = np.full(self.y.size, r / self.weight)
         if self.slopes is None:
             return value
-        return np.concatenate([value, np.full(self.slopes.size, r / self.slope_weight)])
+        return np.concatenate([value, np.full(self.slopes.size, r / (self.weight * self.slope_weight))])

@@ -82,20 +82,23 @@ def observe(
     state: State, seen: Observation, settings: Settings, *, donate: bool = False
 ) -> tuple[State, Event]:
     """Learn one observation that may have a weight and slopes; else as `step`."""
-    if not seen.finite:
-        return state, Event(np.nan, np.nan, False, False, 0, state.units, "not finite")
-    found = predicted(state, seen, settings)
-    error = seen.y - found[0][: seen.y.size]
-    size = float(np.sqrt(error @ error))
-    state = _remembered(state, seen, error, settings)
-    grew = wants_growth(state, seen.x, error, settings)
+    if seen.flaw:
+        return state, Event(np.nan, np.nan, False, False, 0, state.units, seen.flaw)
+    old, found = state, predicted(state, seen, settings)
+    missed = seen.y - found[0][: seen.y.size]
+    size = float(np.sqrt(missed @ missed))
+    state = _remembered(state, seen, missed, settings)
+    grew = wants_growth(state, seen.x, missed, settings)
     if grew:
         # the new unit meets the observation, so the update below starts from a zero error, not twice the old one
-        state = _with_unit(state, seen.x, error, settings)
+        state = _with_unit(state, seen.x, missed, settings)
         found = predicted(state, seen, settings)
     use = settings.update_on_growth or not grew
     if use:
-        state = updated(state, seen, found, settings, donate=donate)
+        try:
+            state = updated(state, seen, found, settings, donate=donate)
+        except FloatingPointError as error:  # raised before anything of the old state is overwritten
+            return old, Event(np.nan, np.nan, False, False, 0, old.units, str(error))
     before = state.units
     # by significance: the nearest unit, once it was updated
     if settings.pruning == "contribution" or not grew:

@@ -33,13 +33,13 @@ class Gauge:
     directions: np.ndarray | None = None
 
     def observation(self, seen: Observation) -> Observation:
-        """In the filter's quantities, from SI units; the slopes' weight counts on top of the observation's."""
+        """In the filter's quantities, from SI units."""
         s, V = self.scaling, self.directions
         y = s.scale_outputs(seen.y)
         slopes = None if seen.slopes is None else seen.slopes * s.input_half / s.output_scale[:, None]
         if V is not None:
             y, slopes = y @ V, None if slopes is None else V.T @ slopes
-        return Observation(s.scale_inputs(seen.x), y, seen.weight, slopes, seen.slope_weight * seen.weight)
+        return Observation(s.scale_inputs(seen.x), y, seen.weight, slopes, seen.slope_weight)
 
     def initial(self, settings: Settings, Y: np.ndarray | None) -> State:
         """The state to begin with; early outputs Y (N, m) in SI units decide the shared-weight rule's modes."""

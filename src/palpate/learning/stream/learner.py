@@ -27,12 +27,14 @@ from palpate.learning.stream.gauge import Gauge, declared
 from palpate.learning.stream.refining import Progress, Refining, refined_state
 from palpate.learning.stream.reservoir import Reservoir
 from palpate.network import Network, Publisher, Scaling
-from palpate.units import Quantity, Range
+from palpate.units import Quantity, Range, bounds
 
 __all__ = ["Learner"]
 
 # beyond these a scaled number is a broken sensor's: its square would swamp what double precision keeps
 _FARTHEST_INPUT, _FARTHEST_OUTPUT = 10.0, 1e6
+_MOVED = 0.1  # share of an input's range over which a sensor must have moved to show how large outputs are
+_PATIENCE = 10  # times the observations asked for, after which less movement has to do
 
 
 class Learner:
@@ -64,7 +66,8 @@ class Learner:
     scaling : Scaling, optional
         Between SI and scaled quantities.
     settle : int
-        Observations from which scaling and modes come where they are not declared.
+        Observations from which scaling and modes come where they are not declared; more while the outputs do
+        not change, or the inputs keep to a tenth of their ranges (ten times as many at most, then the newest).
     basis : int, optional
         Learn in at most so many output modes, found from the first `settle` observations.
     seed : int
@@ -107,7 +110,7 @@ class Learner:
         self._scaling = scaling or declared(inputs, outputs)
         self._gauge: Gauge | None = None
         self._settle, self._basis, self._seed = settle, basis, seed
-        self._early: list[Observation] = []
+        self._early: deque[Observation] = deque(maxlen=_PATIENCE * settle)
         self._state: State | None = None
         self._kept: Reservoir | None = None
         self._progress = Progress()
@@ -235,17 +238,28 @@ class Learner:
 
     def _settling(self, seen: Observation) -> Event:
         """Before the scaling is known: collect; with the last one, learn all."""
-        if not seen.finite:
-            return _skipped(0, "not finite")
+        if seen.flaw:
+            return _skipped(0, seen.flaw)
         self._early.append(seen)
-        if len(self._early) < self._settle:
+        if not self._settled():
             return _skipped(0, "settling the scaling")
         Y = np.array([one.y for one in self._early])
         scaling = self._scaling or Scaling.of(self.inputs, Y)
         directions = output_modes(scaling.scale_outputs(Y), self._basis) if self._basis else None
         gauge = self._start(Gauge(scaling, directions), Y)
-        early, self._early = self._early, []
+        early = list(self._early)
+        self._early.clear()
         return [self._learnt(gauge.observation(one)) for one in early][-1]
+
+    def _settled(self) -> bool:
+        """Whether what came so far says something of the outputs' size: an idle sensor does not."""
+        if len(self._early) < self._settle:
+            return False
+        X = np.array([one.x for one in self._early])
+        low, high = bounds(self.inputs)
+        moved = float((np.ptp(X, axis=0) / (high - low)).max()) >= _MOVED
+        varied = any(not np.array_equal(one.y, self._early[0].y) for one in self._early)
+        return self._scaling is not None or (varied and (moved or len(self._early) == self._early.maxlen))
 
     def _start(self, gauge: Gauge, Y: np.ndarray | None = None) -> Gauge:
         self._gauge, self._state = gauge, gauge.initial(self.settings, Y)
@@ -257,14 +271,13 @@ class Learner:
 
     def _learnt(self, seen: Observation) -> Event:
         state = self.state
-        if not seen.finite:
-            return _skipped(state.units, "not finite")
+        if seen.flaw:
+            return _skipped(state.units, seen.flaw)
         if np.abs(seen.x).max() > _FARTHEST_INPUT or np.abs(seen.targets()).max() > _FARTHEST_OUTPUT:
             return _skipped(state.units, "far outside the declared scales")
-        try:
-            state, event = observe(state, seen, self._filter, donate=True)
-        except FloatingPointError as error:  # raised before anything is overwritten
-            return _skipped(state.units, str(error))
+        state, event = observe(state, seen, self._filter, donate=True)
+        if event.why:
+            return event
         if self._kept is not None and self.refining is not None:
             self._kept.add(
                 *(seen.x, seen.y), weight=seen.weight, slopes=seen.slopes, slope_weight=seen.slope_weight

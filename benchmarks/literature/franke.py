@@ -24,6 +24,7 @@ from benchmarks.literature.protocol import (
     refined,
     row,
     scores,
+    streamed,
 )
 from benchmarks.table import Table
 from palpate.learning import Settings
@@ -84,6 +85,7 @@ def table(*, quick: bool) -> Table:
     once = scores(one[:fewer], partial(ours, passes=1))
     often = scores(one[:fewer], partial(ours, passes=10))
     once_large = scores(large, partial(ours, passes=1))
+    stream = scores(one[:fewer], partial(streamed, every=1))
     best = scores(one[:fewer], partial(refined, units=40, target=1e-6))
     return Table(
         "literature-franke",
@@ -103,10 +105,12 @@ def table(*, quick: bool) -> Table:
             row("palpate, default form, 1 pass", once),
             row("palpate, default form, 10 passes", often),
             row("palpate, default form, 1 pass, 1000 samples", once_large),
+            row("palpate, a stream seen once, one refining iteration per sample", stream),
             row("palpate, refined, ≤ 40 units", best, rerun="0.0008 / 40"),
         ],
         [
             claim("default form, 1 pass over 200 samples", once, error=0.05, units=40)[0],
+            claim("stream seen once, 200 samples", stream, error=0.05, units=40)[0],
             claim("default form, 1 pass over 1000 samples", once_large, error=0.05, units=40)[0],
             claim("default form, 10 passes over 200 samples", often, error=0.01, units=40)[0],
             *claim("refined", best, error=0.001, units=40),

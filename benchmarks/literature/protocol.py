@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.table import Claim, Column
-from palpate.learning import Settings, State, default, initial, learn, refine, step
+from palpate.learning import Learner, Refining, Settings, State, default, initial, learn, refine, step
 from palpate.learning.filter.model import value
 from palpate.learning.refinement.structure import grow
 from palpate.learning.units.forms import form
@@ -38,6 +38,7 @@ __all__ = [
     "row",
     "run",
     "scores",
+    "streamed",
     "within",
 ]
 
@@ -136,6 +137,23 @@ def ours(problem: Problem, passes: int) -> Score:
     )
     seconds = time.process_time() - began
     return Score(found.network.units, problem.error(found.network.predict(problem.X_test)), seconds)
+
+
+def streamed(problem: Problem, every: int) -> Score:
+    """Show the samples once to a learner with one iteration of bounded refinement in every so many observations."""
+    began = time.process_time()
+    settings = replace(default(), form="rotated")
+    learner = Learner(
+        problem.box,
+        [Quantity("y", "1")],
+        settings=settings,
+        refining=Refining(every=every),
+        seed=problem.seed,
+    )
+    for x, y in zip(problem.X, problem.Y, strict=True):
+        learner.observe(x, y)
+    network, seconds = learner.network, time.process_time() - began
+    return Score(network.units, problem.error(network.predict(problem.X_test)), seconds)
 
 
 def refined(

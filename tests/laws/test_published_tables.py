@@ -11,7 +11,7 @@ from statistics import median
 
 import pytest
 from benchmarks.literature import franke, hermite, mackey_glass, plant
-from benchmarks.literature.protocol import filtered, linear, refined, rms, scores
+from benchmarks.literature.protocol import filtered, linear, refined, rms, scores, streamed
 
 pytestmark = pytest.mark.slow
 
@@ -51,7 +51,8 @@ def test_extended_kalman_filter_on_mackey_glass():
         filtered(p, replace(mackey_glass.SETTINGS["RAN-EKF"], error_min=error))
         for error in (0.09, 0.0975, 0.11)
     ]
-    assert min(s.error for s in found if s.units <= 26) <= 0.028
+    # the thresholds are not published: the curve over them passes the published point
+    assert min((s.error for s in found if s.units <= 26), default=1.0) <= 0.028
     assert all(s.error < 0.25 * linear(p).error for s in found)
 
 
@@ -70,6 +71,12 @@ def test_refinement_of_frankes_surface():
     )
     assert units <= 40
     assert error <= 1e-3
+
+
+def test_a_stream_over_frankes_surface_with_bounded_refinement():
+    units, error = middle(scores([franke.problem(s, 200) for s in range(5)], partial(streamed, every=1)))
+    assert units <= 40
+    assert error <= 0.05
 
 
 def test_ten_passes_over_frankes_surface():

@@ -20,7 +20,7 @@ from scipy.linalg.blas import dsymm, dsyr2k
 
 from benchmarks.runner import main
 from benchmarks.table import Claim, Column, Table
-from palpate.learning import Settings, State, initial, step
+from palpate.learning import Settings, State, default, initial, step
 from palpate.learning.filter.growth import grown
 
 __all__ = ["picture", "tables"]
@@ -51,6 +51,9 @@ def _full(quick: bool) -> Table:
     d = state.vector().size
     contenders = {
         "palpate, one step": stepping(state, PLAIN),
+        "palpate, one step with all guards": stepping(
+            filled(inputs, outputs, units, default()), replace(default(), units_max=0)
+        ),
         "dsymm + dsyr2k": bare_blas(d, outputs),
         "NumPy, Joseph form": textbook(d, outputs),
     }

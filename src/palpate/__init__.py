@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from palpate.dataset import Dataset
     from palpate.errors import PalpateError
-    from palpate.learning import Refinement, Settings
+    from palpate.learning import Learner, Refinement, Settings, fit
     from palpate.learning import learn_touch as learn
     from palpate.network import Network
     from palpate.physics import (
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from palpate.study import Study, preset_study, read_study
     from palpate.surrogates import TouchModel
     from palpate.sweeps import Space, local_cluster, sweep
+    from palpate.units import Quantity, Range
     from palpate.validation import validate, write_report
     from palpate.viewer import serve
 
@@ -42,10 +43,13 @@ _HOMES = {
     "Cantilever": "physics",
     "Circle": "physics",
     "Dataset": "dataset",
+    "Learner": "learning",
     "LinearElastic": "physics",
     "Network": "network",
     "PalpateError": "errors",
     "PointLoad": "physics",
+    "Quantity": "units",
+    "Range": "units",
     "Rectangle": "physics",
     "Refinement": "learning",
     "Section": "physics",
@@ -54,6 +58,7 @@ _HOMES = {
     "Study": "study",
     "TipLoad": "physics",
     "TouchModel": "surrogates",
+    "fit": "learning",
     "learn": "learning:learn_touch",
     "local_cluster": "sweeps",
     "named_material": "physics",
@@ -69,10 +74,13 @@ __all__ = [
     "Cantilever",
     "Circle",
     "Dataset",
+    "Learner",
     "LinearElastic",
     "Network",
     "PalpateError",
     "PointLoad",
+    "Quantity",
+    "Range",
     "Rectangle",
     "Refinement",
     "Section",
@@ -81,6 +89,7 @@ __all__ = [
     "Study",
     "TipLoad",
     "TouchModel",
+    "fit",
     "learn",
     "local_cluster",
     "named_material",

@@ -99,10 +99,13 @@ def test_noise_is_not_learnt():
 
 
 def test_constant_outputs():
-    X = samples(ridges, count=30)[0]
-    found = fit(X, np.full((30, 4), 0.1), INPUTS, OUTPUTS, seconds=2.0)
-    assert found.units == 0
-    np.testing.assert_allclose(found.network.predict(X), 0.1)
+    X, Y, X_test, _ = samples(ridges, count=30)
+    Y[:, 2] = 0.1
+    found = fit(X, Y, INPUTS, OUTPUTS, seconds=2.0)
+    np.testing.assert_allclose(found.predict(X_test)[:, 2], 0.1)
+    assert found.deviation(X_test)[:, 2].max() < 1e-9
+    with pytest.raises(UsageError, match="same outputs"):
+        fit(X, np.full((30, 4), 0.1), INPUTS, OUTPUTS)
 
 
 def test_affine_outputs_need_no_units():

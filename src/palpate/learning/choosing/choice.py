@@ -11,17 +11,22 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from palpate.learning.choosing.committee import Member, averaged, expected_error, refitted
+from palpate.learning.choosing.arrays import Samples, check_search
+from palpate.learning.choosing.calibration import Evidence
+from palpate.learning.choosing.committee import Member, expected_error, refitted
+from palpate.learning.choosing.finish import Finish
+from palpate.learning.choosing.fitted import Choice, Fitted
 from palpate.learning.choosing.kernel_layer import KernelLayer, Metric, likely_metric
 from palpate.learning.choosing.problem import Problem
 from palpate.learning.choosing.race import RIDGE, Race, Runner, Split, best_of, carried, forms_for
+from palpate.learning.refinement.refine import refine
+from palpate.learning.units.forms import form as form_of
 from palpate.learning.units.regressors import Regressors
-from palpate.network import Network
-from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction
+from palpate.network.radial import RADIAL_FUNCTIONS
 from palpate.units import Quantity, Range
 
 __all__ = ["Choice", "Fitted", "fit"]
@@ -30,95 +35,85 @@ _NUMBERS = 1500  # unknowns in the units of a full-size runner for 30 s
 _SMALL = 600  # and of one that is only looked at
 _SAMPLES = 1000  # to learn from while choosing
 _MEMBERS = 5
+_CROSSED_BELOW = 200  # samples: intervals then rest on networks of their own
 _BEHIND = 1.2  # times the best error: too far for another ten iterations
 _ROUND_OFF = 1e-9  # of the outputs: nobody asks for less
 _HOPELESS = 3.0  # times the kernel layer's error after the race: no refinement will make up for that
 
 
-@dataclass(frozen=True)
-class Choice:
-    """One thing that was tried: what, with how many units, its held-out error (scaled) and when, s."""
-
-    what: str
-    units: int
-    heldout: float
-    seconds: float
-
-
-@dataclass(frozen=True, eq=False)
-class Fitted:
-    """What was chosen.
-
-    Attributes
-    ----------
-    network : Network
-    form : str
-        Of its units: rank-1, rank-2, rotated, axis-aligned; kernel layer; or affine, without units.
-    radial : str
-    units : int
-    heldout : float
-        Error on held-out samples relative to the outputs' standard deviation, before the weights saw them.
-    trials : tuple of Choice
-    seconds : float
-    """
-
-    network: Network
-    form: str
-    radial: str
-    units: int
-    heldout: float
-    trials: tuple[Choice, ...]
-    seconds: float
-
-
 def fit(
-    X: np.ndarray,
-    Y: np.ndarray,
-    inputs: Sequence[Range],
-    outputs: Sequence[Quantity],
+    X: Any,
+    Y: Any,
+    inputs: Sequence[Range] | None = None,
+    outputs: Sequence[Quantity] | None = None,
     *,
     seconds: float = 30.0,
     seed: int = 0,
     target: float | None = None,
+    level: float = 0.9,
 ) -> Fitted:
-    """Choose and fit a network.
+    """Choose and fit a network from samples alone.
 
     Parameters
     ----------
     X : (N, n)
-        Inputs in SI units; 20 samples at least.
+        Inputs; 20 samples at least. Arrays, nested lists or tables; (N,) for a single input.
     Y : (N, m)
-        Outputs in SI units.
-    inputs, outputs : sequences of n ranges and m quantities
+        Outputs, parts of one quantity: what is small beside the others is learnt less closely relative to its own
+        size. (N,) for one output, which then comes back as (N,).
+    inputs : sequence of n ranges, optional
+        Of the data if left out, named x0, x1, … or as a table's columns are.
+    outputs : sequence of m quantities, optional
+        Named y0, y1, … if left out.
     seconds : float
         Limit on time, on one core.
     seed : int
+        Decides everything but where the clock ends the search.
     target : float, optional
         Held-out error relative to the outputs' standard deviation that is good enough.
+    level : float
+        Share of unseen samples that the intervals are to hold.
 
     Returns
     -------
     Fitted
+        Its network, intervals and trained region.
+
+    Notes
+    -----
+    A fifth of the samples (15 % of a thousand and more) is held out to choose by, and its errors, before any
+    weights saw it, set the intervals' widths. Then the weights are fitted to all samples: no sample is lost to the
+    calibration, and its guarantee is approximate (see `palpate.learning.choosing.calibration`). Below 45 samples
+    too few are held out for a 90 % quantile; there the widths rest on a normal law.
 
     Raises
     ------
     UsageError
-        If there are too few samples, shapes disagree or numbers are not finite.
+        If there are too few samples, shapes disagree, numbers are not finite or all outputs the same, or an option
+        can't be.
     """
     from threadpoolctl import threadpool_limits
 
     began = time.monotonic()
+    check_search(seconds, seed, target, level)
+    samples = Samples.of(X, Y, inputs, outputs)
     with threadpool_limits(1):  # small matrices: threads would cost more than they bring
-        problem = Problem.of(X, Y, inputs, outputs)
-        return _Chooser(problem, began, seconds, seed, target).chosen()
+        return _Chooser(samples, began, seconds, seed, target, level).chosen()
 
 
 class _Chooser:
     """The stages of a choice, and the trials so far."""
 
     def __init__(
-        self, problem: Problem, began: float, seconds: float, seed: int, target: float | None
+        self,
+        samples: Samples,
+        began: float,
+        seconds: float,
+        seed: int,
+        target: float | None,
+        level: float,
     ) -> None:
+        problem = Problem.of(samples.X, samples.Y, samples.inputs, samples.outputs)
         self.problem, self.began, self.seed = problem, began, seed
         self.X, self.Y = problem.X, problem.Y
         # errors are per latent output until they are told
@@ -129,27 +124,29 @@ class _Chooser:
         self.share = 0.15 if len(self.X) >= 1000 else 0.2
         self.split = Split.of(self.X, self.Y, share=self.share, seed=seed)
         self.trials: list[Choice] = []
+        self.finish = Finish(samples, problem, self.split, self.trials, began, seed, level)
         self.ran: list[Runner] = []
 
     def chosen(self) -> Fitted:
         tail, error = self._tail()
         if error <= self.target:
-            return tail
+            return self.finish.network([self._member(tail, self.split)], error, form="affine")
         layer, mark, scales = self._kernel()
         race = Race(self.split, scales, self.seed, self.deadline)
         winner = self._radials(race, *self._forms(race, mark))
         if winner.theta.size < 0.6 * _NUMBERS * self.size:
             winner = self._sizes(race, winner)
         if winner.heldout > _HOPELESS * mark:
-            return self._kernel_network(layer, mark)
+            return self.finish.kernel_network(layer, mark)
         began = time.monotonic()
         if winner.heldout > self.target:
             winner = race.run(winner, round(120 * self.size))
             self._note(winner)
         if winner.found is None or winner.heldout > max(mark, self.target):
-            return self._kernel_network(layer, mark)
+            return self.finish.kernel_network(layer, mark)
         spent = time.monotonic() - began
-        return self._network(*self._finalists(race, winner, spent))
+        members, error = self._finalists(race, winner, spent)
+        return self.finish.network(members, error, evidence=self._crossed(race, winner))
 
     def _kernel(self) -> tuple[Metric, float, np.ndarray]:
         """The kernel layer's metric and error, and the input scales from which units start."""
@@ -259,55 +256,54 @@ class _Chooser:
 
     def _committee(self, race: Race, winner: Runner, spent: float) -> tuple[list[Member], float]:
         """The winner, with others of its kind from other starts and folds if time allows, and the error to expect."""
-        members = [self._member(winner)]
+        members = [self._member(winner, race.split)]
         while len(members) < _MEMBERS and race.deadline - time.monotonic() > 1.3 * spent:
             began, k = time.monotonic(), len(members)
             split = Split.of(self.X, self.Y, share=self.share, seed=self.seed, fold=k)
             other = Race(split, race.scales, self.seed + k, race.deadline)
-            fresh = other.entered(winner.regressors.form.name, winner.theta.size)
-            fresh = carried(other.run(fresh, 15, samples=_SAMPLES), winner.regressors.radial)
-            fresh = other.run(fresh, max(30, winner.iterations))
+            fresh = self._fresh(other, winner)
             spent = max(spent, time.monotonic() - began)
             if fresh.found is None:
                 break
-            members.append(self._member(fresh))
+            members.append(self._member(fresh, split))
         error = expected_error(members, self.X)
         if len(members) > 1:
             self._noted(f"{len(members)} × {winner.name}", len(members) * len(winner.theta), error)
         return members, error
 
-    def _member(self, runner: Runner) -> Member:
+    def _fresh(self, race: Race, like: Runner) -> Runner:
+        """One of the same kind from another start."""
+        fresh = race.entered(like.regressors.form.name, like.theta.size)
+        fresh = carried(race.run(fresh, 15, samples=_SAMPLES), like.regressors.radial)
+        return race.run(fresh, max(30, like.iterations))
+
+    def _member(self, runner: Runner, split: Split) -> Member:
         assert runner.found is not None
-        return Member(refitted(runner.found, self.X, self.Y, RIDGE), runner.heldout)
+        return Member(refitted(runner.found, self.X, self.Y, RIDGE), runner.heldout, runner.found, split)
 
-    def _network(self, members: list[Member], error: float) -> Fitted:
-        regressors = members[0].found.regressors
-        return self._fitted(averaged(members), regressors.radial, regressors.form.name, error)
+    def _crossed(self, race: Race, winner: Runner) -> Evidence | None:
+        """What networks of the winner's kind miss on folds of which they have seen nothing; of few samples only.
 
-    def _kernel_network(self, metric: Metric, error: float) -> Fitted:
-        layer = KernelLayer.fit(metric, self.X, self.Y, seed=self.seed)
-        return self._fitted((*layer.units(), layer.weights, layer.tail), metric.radial, "kernel layer", error)
+        Each stops by other samples than those that it is judged by: on a handful the best iterate is there by luck.
+        """
+        if len(self.X) >= _CROSSED_BELOW:
+            return None
+        parts = []
+        for k in range(_MEMBERS):
+            whole = Split.of(self.X, self.Y, share=1.0 / _MEMBERS, seed=self.seed, fold=k)
+            part = Split.of(whole.X, whole.Y, share=self.share, seed=self.seed)
+            found = self._fresh(Race(part, race.scales, self.seed + k, race.deadline), winner).found
+            if found is None:
+                return None
+            parts.append(self.finish.evidence(refitted(found, whole.X, whole.Y, RIDGE), whole))
+        return Evidence.together(parts)
 
-    def _tail(self) -> tuple[Fitted, float]:
+    def _tail(self) -> tuple[Runner, float]:
         """An affine function without units, and its error."""
-        (n, k), (held, wanted) = (self.X.shape[1], self.Y.shape[1]), self.split.unseen
-        one, ahead = (np.hstack([np.ones((len(X), 1)), X]) for X in (self.split.X, held))
-        tail = np.linalg.lstsq(one, self.split.Y, rcond=None)[0]
-        error = float(np.sqrt(((ahead @ tail - wanted) ** 2).mean()))
-        arrays = (np.zeros((0, n, n)), np.zeros((0, n)), np.zeros((0, k)), tail)
-        return self._fitted(arrays, "gaussian", "affine", error), error
-
-    def _fitted(
-        self,
-        arrays: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
-        radial: RadialFunction,
-        form: str,
-        error: float,
-    ) -> Fitted:
-        heldout = error / self.problem.unit
-        network = self.problem.network(*arrays, radial, heldout=heldout)
-        spent = time.monotonic() - self.began
-        return Fitted(network, form, radial, network.units, heldout, tuple(self.trials), spent)
+        form = form_of("axis-aligned", self.X.shape[1])
+        regressors, none = Regressors(form, "gaussian"), np.zeros((0, form.size))
+        found = refine(self.split.X, self.split.Y, none, regressors, heldout=self.split.unseen)
+        return Runner(regressors, none, found.heldout, found=found), found.heldout
 
     def _note(self, runner: Runner) -> None:
         self.ran.append(runner)

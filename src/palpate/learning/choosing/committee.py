@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from palpate.learning.choosing.race import Split
 from palpate.learning.refinement.refine import Refined, refine
 
 __all__ = ["Member", "averaged", "expected_error", "refitted"]
@@ -27,10 +28,16 @@ class Member:
     found : Refined
     heldout : float
         Error per scaled output before the weights saw the held-out samples.
+    before : Refined, optional
+        The same before the weights saw them.
+    split : Split, optional
+        Which samples these are.
     """
 
     found: Refined
     heldout: float
+    before: Refined | None = None
+    split: Split | None = None
 
 
 def refitted(found: Refined, X: np.ndarray, Y: np.ndarray, ridge: float) -> Refined:

@@ -29,11 +29,15 @@ _STEEPER: dict[RadialFunction, float] = {"gaussian": 0.48, "matern-5/2": 0.6, "i
 
 @dataclass(frozen=True, eq=False)
 class Split:
-    """Samples to learn from and to be judged by, scaled: X (N, n), Y (N, k), and held-out ones."""
+    """Samples to learn from and to be judged by, scaled: X (N, n), Y (N, k), and held-out ones.
+
+    `held` (N + N',) says which of all samples these are.
+    """
 
     X: np.ndarray
     Y: np.ndarray
     unseen: tuple[np.ndarray, np.ndarray]
+    held: np.ndarray
 
     @classmethod
     def of(cls, X: np.ndarray, Y: np.ndarray, *, share: float, seed: int, fold: int = 0) -> Split:
@@ -44,7 +48,7 @@ class Split:
         held = np.zeros(len(X), bool)
         held[order[first : first + count]] = True
         kept = order[~held[order]]
-        return cls(X[kept], Y[kept], (X[held], Y[held]))
+        return cls(X[kept], Y[kept], (X[held], Y[held]), held)
 
     def first(self, count: int) -> Split:
         """The same with `count` samples to learn from at most."""

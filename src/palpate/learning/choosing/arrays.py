@@ -1,0 +1,181 @@
+"""Samples as a user has them: arrays, lists or tables, with or without names and ranges."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.learning.choosing.automatic import check_target, ranges_of
+from palpate.units import Quantity, Range
+
+__all__ = ["Samples", "check_search", "points"]
+
+FEWEST = 20
+_LARGEST = 1e100  # its square is still a number
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Checked samples.
+
+    Attributes
+    ----------
+    X, Y : (N, n), (N, m)
+    inputs, outputs : n ranges, m quantities
+    one_output : bool
+        Whether Y came as (N,).
+    """
+
+    X: np.ndarray
+    Y: np.ndarray
+    inputs: tuple[Range, ...]
+    outputs: tuple[Quantity, ...]
+    one_output: bool
+
+    @classmethod
+    def of(
+        cls, X: Any, Y: Any, inputs: Sequence[Range] | None = None, outputs: Sequence[Quantity] | None = None
+    ) -> Samples:
+        """From what a user has; see `palpate.fit`.
+
+        Raises
+        ------
+        UsageError
+            If they are no samples to learn from.
+        """
+        columns, names = _names(X, "x"), _names(Y, "y")
+        X, Y = numbers(X, "X"), numbers(Y, "Y")
+        one = Y.ndim == 1
+        X, Y = (a[:, None] if a.ndim == 1 else a for a in (X, Y))
+        _check_rows(X, Y)
+        declared = ranges_of(X, columns(X.shape[1])) if inputs is None else tuple(inputs)
+        named = tuple(map(Quantity, names(Y.shape[1]))) if outputs is None else tuple(outputs)
+        _check_declared(declared, X.shape[1], Range, "input", 'palpate.Range("force", 0.0, 5.0, "N")')
+        _check_declared(named, Y.shape[1], Quantity, "output", 'palpate.Quantity("tip", "m")')
+        return cls(X, Y, declared, named, one)
+
+
+def numbers(given: Any, name: str) -> np.ndarray:
+    """An array of doubles of what was given.
+
+    Raises
+    ------
+    UsageError
+        If it holds anything but real numbers, or rows of different length.
+    """
+    try:
+        array = np.asarray(given)
+        if array.dtype.kind in "biufO":  # text of digits is no number, complex ones would lose a part
+            return np.asarray(array, dtype=np.float64)
+        why = f"Its elements are of kind {array.dtype}."
+    except (TypeError, ValueError) as error:
+        why = f"{error}."
+    raise UsageError(
+        f"{name} is not an array of real numbers.",
+        why=why,
+        fix=f"Give {name} as an array or nested list of numbers, one row per sample.",
+    )
+
+
+def points(X: Any, inputs: Sequence[Range]) -> np.ndarray:
+    """Inputs (N, n) at which something is asked; of a single input (N,) will do.
+
+    Raises
+    ------
+    UsageError
+        If it is no such array.
+    """
+    n = len(inputs)
+    X = numbers(X, "X")
+    if X.ndim == 1 and n == 1:
+        X = X[:, None]
+    if X.ndim != 2 or X.shape[1] != n:
+        raise UsageError(
+            f"The network takes {n} inputs ({', '.join(r.name for r in inputs)}); an array of shape {X.shape} came.",
+            fix=f"Pass an array of shape (N, {n}), one row per point.",
+        )
+    return X
+
+
+def check_search(seconds: Any, seed: Any, target: Any, level: Any) -> None:
+    """Refuse what can't steer a search.
+
+    Raises
+    ------
+    UsageError
+        If seconds or target are not positive, the seed is no whole number, or the level no probability.
+    """
+    if target is not None:
+        check_target(target)
+    if not _is_number(seconds) or not 0 < seconds < np.inf:
+        raise UsageError(
+            f"A search can't take {seconds!r} seconds.",
+            why="It is the limit on time.",
+            fix="Give a positive number, such as 30.",
+        )
+    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
+        raise UsageError(f"The seed is {seed!r}.", fix="Give a whole number, 0 or more.")
+    if not _is_number(level) or not 0 < level < 1:
+        raise UsageError(
+            f"A level of {level!r} is no probability.", fix="Choose one between 0 and 1, such as 0.9."
+        )
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float, np.number)) and not isinstance(value, (bool, np.complexfloating))
+
+
+def _names(table: Any, letter: str) -> Any:
+    """Names for so many columns: the table's own where it has them, else x0, x1 and so on."""
+    own = getattr(table, "columns", None)
+
+    def of(count: int) -> list[str]:
+        if own is not None and not callable(own) and len(own) == count:
+            return [str(name) for name in own]
+        return [f"{letter}{i}" for i in range(count)]
+
+    return of
+
+
+def _check_rows(X: np.ndarray, Y: np.ndarray) -> None:
+    if X.ndim != 2 or Y.ndim != 2 or len(X) != len(Y) or not X.shape[1] or not Y.shape[1]:
+        raise UsageError(
+            f"Inputs of shape {X.shape} and outputs of shape {Y.shape} are not samples.",
+            why="Each row of X is one sample's inputs, the same row of Y its outputs.",
+            fix="Pass X (N, n) and Y (N, m), or Y (N,) for one output.",
+        )
+    if len(X) < FEWEST:
+        raise UsageError(
+            f"{len(X)} samples are too few to choose a network by.",
+            why="Some must be held out to judge by.",
+            fix=f"Give {FEWEST} at least.",
+        )
+    bad = ~(np.isfinite(X).all(axis=1) & np.isfinite(Y).all(axis=1))
+    if bad.any():
+        raise UsageError(
+            f"{bad.sum()} of {len(X)} samples hold NaN or infinity, the first in row {int(bad.argmax())}.",
+            why="A sample without a value says nothing, and would spoil the others.",
+            fix="Leave them out: ok = np.isfinite(X).all(1) & np.isfinite(Y).all(1); X[ok], Y[ok].",
+        )
+    if max(np.abs(X).max(), np.abs(Y).max()) > _LARGEST:
+        raise UsageError(
+            f"Numbers beyond {_LARGEST:.0e} can't be squared.", fix="Give the samples in other units."
+        )
+    if not (np.ptp(Y, axis=0) > 1e-13 * np.abs(Y).max()).any():
+        raise UsageError(
+            f"All {len(Y)} samples have the same outputs.",
+            why="There is nothing to learn, and no error to compare by.",
+            fix="Check which columns of the data became Y.",
+        )
+
+
+def _check_declared(given: tuple[Any, ...], count: int, kind: type, word: str, example: str) -> None:
+    if len(given) != count or not all(isinstance(one, kind) for one in given):
+        raise UsageError(
+            f"The {word}s declared do not fit the {count} {word}s of the samples: {given!r:.80}.",
+            fix=f"Give one {kind.__name__} for each column, such as {example}, or leave {word}s out.",
+        )

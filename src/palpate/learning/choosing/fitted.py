@@ -1,0 +1,209 @@
+"""What a choice came to: a network with the widths of its intervals and the region it was trained in."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import FileFormatError, UsageError
+from palpate.learning.choosing.arrays import points
+from palpate.network import Network, TrainedRegion
+from palpate.network.uncertainty import Uncertainty
+
+__all__ = ["Choice", "Fitted"]
+
+_SHOWN = 5  # of what was tried
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One thing that was tried: what, with how many units, its held-out error (scaled) and when, s."""
+
+    what: str
+    units: int
+    heldout: float
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A network chosen and fitted, n inputs and m outputs; printed, it says what was chosen and what was tried.
+
+    Attributes
+    ----------
+    network : Network
+    form : str
+        Of its units: rank-1, rank-2, rotated, axis-aligned; kernel layer; or affine, without units.
+    radial : str
+    units : int
+    heldout : float
+        Error on held-out samples relative to the outputs' standard deviation, before the weights saw them.
+    trials : tuple of Choice
+    seconds : float
+    uncertainty : Uncertainty
+        Of the network.
+    region : TrainedRegion
+        In scaled inputs.
+    level : float
+        For which the intervals were calibrated.
+    one_output : bool
+        Whether the outputs came as (N,), and so go.
+    """
+
+    network: Network
+    form: str
+    radial: str
+    units: int
+    heldout: float
+    trials: tuple[Choice, ...]
+    seconds: float
+    uncertainty: Uncertainty
+    region: TrainedRegion
+    level: float = 0.9
+    one_output: bool = False
+
+    def predict(self, X: Any) -> np.ndarray:
+        """Outputs (N, m) at inputs X (N, n); (N,) where Y was.
+
+        Raises
+        ------
+        UsageError
+            If X has the wrong shape.
+        """
+        return self._shaped(self.network.predict(points(X, self.network.inputs)))
+
+    def deviation(self, X: Any) -> np.ndarray:
+        """Standard deviation (N, m) of what would be measured at X (N, n).
+
+        Scaled so that ±1.64 of it hold nine in ten, whatever the law of the errors.
+
+        Raises
+        ------
+        UsageError
+            If X has the wrong shape.
+        """
+        return self._shaped(self.uncertainty.deviation(points(X, self.network.inputs)))
+
+    def interval(self, X: Any, level: float | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper bounds (N, m) for what would be measured at X (N, n), output by output.
+
+        At the level that was calibrated for (the default) they hold about that share of unseen samples drawn like
+        the training samples, whatever the law of the errors. Outside the trained region nothing is promised.
+
+        Parameters
+        ----------
+        X : (N, n)
+        level : float, optional
+            Another one stretches the widths by a normal law.
+
+        Raises
+        ------
+        UsageError
+            If X has the wrong shape, or the level is no probability.
+        """
+        level = self.level if level is None else level
+        low, high = self.uncertainty.interval(points(X, self.network.inputs), level)
+        return self._shaped(low), self._shaped(high)
+
+    def trusted(self, X: Any) -> np.ndarray:
+        """Whether each of X (N, n) is as near to a training sample as these are to each other, (N,) bool.
+
+        Raises
+        ------
+        UsageError
+            If X has the wrong shape.
+        """
+        X = points(X, self.network.inputs)
+        far = self.region.distances(self.network.scaling.scale_inputs(X))
+        # written so that a point that is not a number is not trusted
+        return np.asarray(far <= self.region.radius)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the network with its uncertainty and region to a network file.
+
+        `load` reads all of it back; `palpate.Network.load` reads the network, and
+        `palpate.network.Uncertainty.of(network)` the uncertainty in it.
+
+        Raises
+        ------
+        UsageError
+            If the folder does not exist or can't be written.
+        """
+        network = self.uncertainty.attached()
+        region = {"region_points": self.region.points, "region_radius": np.array([self.region.radius])}
+        kept = {
+            "form": self.form,
+            "heldout": self.heldout,
+            "level": self.level,
+            "one_output": self.one_output,
+        }
+        whole = replace(network, extras={**network.extras, **region}, meta={**network.meta, "choice": kept})
+        return whole.save(path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Fitted:
+        """Read back what `save` wrote, but for what was tried.
+
+        Raises
+        ------
+        FileFormatError
+            If the file is missing, damaged, or holds something else.
+        """
+        network = Network.load(path)
+        try:
+            return _restored(network)
+        except (KeyError, IndexError, TypeError, ValueError, UsageError) as error:
+            raise FileFormatError(
+                f"{path} holds a network, but not one that `fit` has saved.",
+                why=f"{type(error).__name__}: {error}",
+                fix="Read the network alone with palpate.Network.load.",
+            ) from error
+
+    def __str__(self) -> str:
+        n, m = len(self.network.inputs), len(self.network.outputs)
+        what = (
+            "an affine function"
+            if not self.units
+            else f"{self.units} units, {self.form}, {self.radial}"
+            if self.form != "kernel layer"
+            else f"a kernel layer of {self.units} {self.radial} units"
+        )
+        lines = [
+            f"Fitted: {n} input{'s' * (n > 1)} → {m} output{'s' * (m > 1)}, {what}",
+            f"  held-out error {self.heldout:.1e} of the outputs' spread; intervals of {self.level:.0%}",
+        ]
+        if self.trials:
+            best = sorted(self.trials, key=lambda trial: trial.heldout)[:_SHOWN]
+            lines += [f"  tried {len(self.trials)} in {self.seconds:.1f} s, the best of them:"]
+            lines += [f"    {trial.heldout:.1e}  {trial.what}" for trial in best]
+        return "\n".join(lines)
+
+    def _shaped(self, Y: np.ndarray) -> np.ndarray:
+        return Y[:, 0] if self.one_output else Y
+
+
+def _restored(network: Network) -> Fitted:
+    """What `save` put into the network's extras and meta; whatever is wrong with these raises."""
+    uncertainty, kept = Uncertainty.of(network), network.meta["choice"]
+    if uncertainty is None:
+        raise KeyError("uncertainty")
+    region = TrainedRegion(network.extras["region_points"], float(network.extras["region_radius"][0]))
+    if region.points.shape[1] != len(network.inputs):
+        raise ValueError("region of other inputs")
+    return Fitted(
+        network,
+        str(kept["form"]),
+        network.radial,
+        network.units,
+        float(kept["heldout"]),
+        (),
+        0.0,
+        uncertainty,
+        region,
+        float(kept["level"]),
+        bool(kept["one_output"]) and len(network.outputs) == 1,
+    )

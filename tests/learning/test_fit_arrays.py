@@ -1,0 +1,216 @@
+"""`palpate.fit` for someone with arrays only: what goes in, what comes out, how far it may be off, what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import palpate
+from palpate.errors import FileFormatError, UsageError
+from palpate.learning.choosing import calibration
+from palpate.learning.choosing.calibration import Evidence
+from palpate.learning.choosing.fitted import Fitted
+from palpate.learning.choosing.kernel_layer import KernelLayer, Metric
+from palpate.learning.refinement.refine import refine
+from palpate.learning.units.forms import form
+from palpate.learning.units.regressors import Regressors
+from palpate.network import Network, Uncertainty
+
+NOISE = 0.05
+
+
+def noisy(count, seed=0, noise=NOISE):
+    rng = np.random.default_rng(seed)
+    X = rng.uniform([0, 10], [2, 30], (count, 2))
+    u, v = X[:, 0] - 1, X[:, 1] / 10 - 2
+    Y = np.column_stack([np.sin(2 * u) * np.exp(-v), 1 / (1 + u * u + v * v)])
+    return X, Y + noise * rng.normal(size=Y.shape)
+
+
+@pytest.fixture(scope="module")
+def found():
+    return palpate.fit(*noisy(300), seconds=4.0)
+
+
+@pytest.fixture(scope="module")
+def single():
+    """One input, one output, both flat."""
+    x = np.linspace(-2, 2, 60)
+    return palpate.fit(x, np.sin(3 * x), seconds=2.0)
+
+
+def covered(found, X, Y, level=None):
+    low, high = found.interval(X, level)
+    return ((low <= Y) & (high >= Y)).mean(axis=0)
+
+
+def test_intervals_hold_nine_in_ten_of_unseen_samples(found):
+    share = covered(found, *noisy(4000, seed=1))
+    assert share.mean() == pytest.approx(0.9, abs=0.05)
+    # of Gaussian noise the deviation is the noise's
+    assert np.median(found.deviation(noisy(50, seed=2)[0])) == pytest.approx(NOISE, rel=0.25)
+    narrow = covered(found, *noisy(4000, seed=1), level=0.5)
+    assert narrow.mean() == pytest.approx(0.5, abs=0.1)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.2])
+def test_intervals_of_few_samples_are_rather_too_wide(noise):
+    shares = [
+        covered(palpate.fit(*noisy(40, s, noise), seconds=3.0), *noisy(2000, 9, noise)) for s in range(3)
+    ]
+    assert np.mean(shares) > 0.85
+
+
+def test_another_level_is_calibrated_for():
+    found = palpate.fit(*noisy(300), seconds=2.0, level=0.6)
+    share = covered(found, *noisy(4000, seed=1))
+    assert share.mean() == pytest.approx(0.6, abs=0.08)
+    wide = palpate.fit(*noisy(300), seconds=2.0, level=0.6).interval(noisy(5)[0], 0.9)
+    assert (wide[1] - wide[0] > np.diff(found.interval(noisy(5)[0]), axis=0)[0]).all()
+
+
+def test_a_kernel_layers_widths_are_its_gaussian_process():
+    rng = np.random.default_rng(0)
+    X, Y = rng.uniform(-1, 1, (30, 2)), rng.normal(size=(30, 1))
+    metric = Metric("gaussian", np.array([1.5, 0.7]), 1e-3)
+    layer = KernelLayer.fit(metric, X, Y)
+    Z = rng.uniform(-2, 2, (7, 2))
+    C = metric.kernel(X, X) + 1e-3 * np.eye(30)
+    k = metric.kernel(Z, X)
+    variance = 1 + 1e-3 - np.diag(k @ np.linalg.solve(C, k.T))
+    np.testing.assert_allclose(calibration.kernel_spread(layer, Z), variance / (1 + 1e-3), rtol=1e-9)
+    row = np.hstack([np.ones((7, 1)), Z, k])
+    M = calibration.kernel_covariance(layer)
+    np.testing.assert_allclose(1 + np.diag(row @ M @ row.T), variance / (1 + 1e-3), rtol=1e-8)
+
+
+def test_root_gives_the_coefficients_of_least_squares():
+    rng = np.random.default_rng(0)
+    X, Y = rng.uniform(-1, 1, (60, 2)), rng.normal(size=(60, 3))
+    r = Regressors(form("isotropic", 2), "gaussian")
+    units = np.array([r.form.unit(x, 0.3, seed=0) for x in X[:10]])
+    two = [refine(X, Y, theta, r, ridge=1e-12, iterations=0) for theta in (units[:4], units[4:])]
+    np.testing.assert_allclose(calibration.regressor_root(two[0], X) @ Y, two[0].coefficients, atol=1e-6)
+    both = calibration.committee_root(two, X) @ Y
+    np.testing.assert_allclose(both[:3], (two[0].tail + two[1].tail) / 2, atol=1e-6)
+    np.testing.assert_allclose(both[3:], np.vstack([one.weights for one in two]) / 2, atol=1e-6)
+
+
+def test_quantile_is_conformal_and_students_where_samples_are_few(found):
+    network = found.network
+    missed = np.random.default_rng(0).normal(size=(99, 2)) * [1.0, 7.0]
+    evidence = Evidence(missed, np.ones(99))
+    half = calibration.calibrated(network, None, evidence, 0.9).interval(noisy(1)[0], 0.9)
+    width = (half[1] - half[0])[0] / 2 / network.scaling.output_scale
+    np.testing.assert_allclose(width, np.sort(abs(missed), axis=0)[89], rtol=1e-9)
+    few = Evidence(missed[:5], np.ones(5))
+    from scipy.stats import t
+
+    half = calibration.calibrated(network, None, few, 0.9).interval(noisy(1)[0], 0.9)
+    width = (half[1] - half[0])[0] / 2 / network.scaling.output_scale
+    np.testing.assert_allclose(width, t.ppf(0.95, 5) * np.sqrt((missed[:5] ** 2).mean(axis=0)), rtol=1e-9)
+
+
+def test_trusted_are_places_between_samples(found):
+    X, _ = noisy(200, seed=3)
+    assert found.trusted(X).mean() > 0.9
+    away = X + np.array([0.0, 40.0])
+    assert not found.trusted(away).any()
+    assert not found.trusted(np.full((1, 2), np.nan)).any()
+
+
+def test_what_is_saved_comes_back(found, tmp_path):
+    path = found.save(tmp_path / "map.palpate")
+    again, X = Fitted.load(path), noisy(40, seed=4)[0]
+    for ours, theirs in zip(found.interval(X), again.interval(X), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    np.testing.assert_array_equal(found.predict(X), again.predict(X))
+    np.testing.assert_array_equal(found.trusted(X + 1), again.trusted(X + 1))
+    assert (again.form, again.heldout, again.level) == (found.form, found.heldout, found.level)
+    network = Network.load(path)
+    np.testing.assert_array_equal(Uncertainty.of(network).deviation(X), found.deviation(X))
+    with pytest.raises(FileFormatError, match="not one that"):
+        Fitted.load(found.network.save(tmp_path / "bare.palpate"))
+
+
+def test_flat_arrays_and_lists_do(single):
+    assert single.one_output
+    low, high = single.interval([0.1, 0.2, 0.3])
+    assert single.predict([0.1, 0.2, 0.3]).shape == low.shape == high.shape == (3,)
+    np.testing.assert_allclose(single.predict([0.5]), np.sin(1.5), atol=0.02)
+    assert single.trusted([[0.5]]).tolist() == [True]
+    X, Y = noisy(30)
+    listed = palpate.fit(X.tolist(), Y.tolist(), seconds=1.0, target=0.5)
+    assert listed.predict(X.tolist()).shape == (30, 2)
+
+
+def test_names_and_ranges():
+    X, Y = noisy(40)
+    table = pd.DataFrame(X, columns=["force", "modulus"])
+    named = palpate.fit(table, pd.DataFrame(Y, columns=["tip", "middle"]), target=0.9).network
+    assert [r.name for r in named.inputs] == ["force", "modulus"]
+    assert [q.name for q in named.outputs] == ["tip", "middle"]
+    assert (named.inputs[0].low, named.inputs[0].high) == (X[:, 0].min(), X[:, 0].max())
+    bare = palpate.fit(X, Y, target=0.9).network
+    assert [r.name for r in bare.inputs] + [q.name for q in bare.outputs] == ["x0", "x1", "y0", "y1"]
+    inputs = [palpate.Range("F", 0, 2, "N"), palpate.Range("E", 10, 30, "Pa")]
+    outputs = [palpate.Quantity("u", "m"), palpate.Quantity("v", "m")]
+    declared = palpate.fit(X, Y, inputs, outputs, target=0.9).network
+    assert declared.inputs == tuple(inputs)
+    assert declared.outputs == tuple(outputs)
+
+
+def test_printed_it_says_what_and_how_good(found):
+    text = str(found)
+    assert f"{found.units} units" in text
+    assert found.form in text
+    assert f"{found.heldout:.1e}" in text
+    assert 3 <= len(text.splitlines()) <= 9
+
+
+BAD = {
+    "few": (lambda X, Y: (X[:10], Y[:10]), "too few"),
+    "nan": (lambda X, Y: (X, np.where(np.arange(40)[:, None] == 7, np.nan, Y)), "1 of 40 .* row 7"),
+    "shapes": (lambda X, Y: (X, Y[:30]), "not samples"),
+    "text": (lambda X, Y: (X.astype(str), Y), "real numbers"),
+    "ragged": (lambda X, Y: ([[1.0, 2.0], [3.0]] * 20, Y), "real numbers"),
+    "complex": (lambda X, Y: (X + 1j, Y), "real numbers"),
+    "constant": (lambda X, Y: (X, np.full(40, 3.0)), "same outputs"),
+    "huge": (lambda X, Y: (X * 1e200, Y), "other units"),
+    "cube": (lambda X, Y: (X[:, None], Y), "not samples"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_samples_that_are_none_are_refused(name):
+    spoil, message = BAD[name]
+    with pytest.raises(UsageError, match=message) as error:
+        palpate.fit(*spoil(*noisy(40)))
+    assert error.value.fix
+
+
+@pytest.mark.parametrize(
+    "option",
+    [
+        *({"seconds": v} for v in (-1, 0, float("nan"), float("inf"), "ten", True)),
+        *({"target": v} for v in (-1, 0, float("nan"), "small")),
+        *({"seed": v} for v in (-1, 1.5, None)),
+        *({"level": v} for v in (0, 1, 90, float("nan"), "high")),
+        {"inputs": [palpate.Range("F", 0, 1)]},
+        {"inputs": [(0, 1), (10, 30)]},
+        {"outputs": ["u", "v"]},
+    ],
+    ids=str,
+)
+def test_options_that_can_not_be_are_refused(option):
+    with pytest.raises(UsageError):
+        palpate.fit(*noisy(40), **option)
+
+
+def test_questions_of_the_wrong_shape_are_refused(found):
+    for ask in (found.predict, found.deviation, found.interval, found.trusted):
+        with pytest.raises(UsageError, match="takes 2 inputs"):
+            ask([1.0, 2.0])
+    with pytest.raises(UsageError, match="level"):
+        found.interval([[1.0, 20.0]], 90)

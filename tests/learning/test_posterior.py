@@ -9,10 +9,10 @@ import pytest
 
 from laws.beams import INPUT, exact, stiffening
 from palpate.errors import UsageError
-from palpate.learning import Settings, initial, posterior, refine, step
+from palpate.learning import Observation, Settings, initial, observe, posterior, refine, step
 from palpate.learning.filter.model import value
+from palpate.learning.freezing import freeze_refined
 from palpate.learning.refinement.laplace import Posterior
-from palpate.learning.refinement.structure import freeze_refined
 from palpate.learning.units.forms import form
 from palpate.learning.units.regressors import Regressors
 from palpate.network import Scaling
@@ -137,18 +137,77 @@ def test_noise_is_found_from_the_residuals():
         Posterior.of(found, X)
 
 
-def test_posterior_of_a_linear_model_is_the_filters_own_covariance():
+@pytest.mark.parametrize("update", ["full", "decoupled", "shared"])
+@pytest.mark.parametrize("sloped", [False, True])
+@pytest.mark.parametrize("m", [1, 2])
+def test_posterior_of_a_linear_model_is_the_filters_own_covariance(update, sloped, m):
+    """Values and slopes, each sample and each slope with a weight of its own."""
     rng = np.random.default_rng(3)
-    X = rng.uniform(-1, 1, (30, 1))
-    Y = 2 * X + 1 + 0.01 * rng.normal(size=(30, 1))
-    found = refine(X, Y, np.zeros((0, 2)), LINE)
-    for update in ("full", "decoupled", "shared"):
-        settings = exact(noise=1e-2, update=update)
-        state = initial(1, 1, settings)
-        for x, y in zip(X, Y, strict=True):
-            state, _ = step(state, x, y, settings)
-        own = posterior(found, X, settings)
-        np.testing.assert_allclose(own.covariance.matrix, state.covariance.matrix, rtol=1e-8)
+    X, w, share = rng.uniform(-1, 1, (30, 1)), rng.uniform(0.2, 3.0, 30), rng.uniform(0.1, 2.0, 30)
+    Y = np.hstack([2 * X + 1, 1 - X])[:, :m] + 0.01 * rng.normal(size=(30, m))
+    slopes = np.broadcast_to(np.array([[2.0], [-1.0]])[:m], (30, m, 1))
+    more = {"slopes": slopes, "slope_weight": share} if sloped else {}
+    found = refine(X, Y, np.zeros((0, 2)), LINE, weights=w, **more)
+    # the shared rule takes no slopes; without units the full rule's covariance of one output is what it shares
+    rule = "full" if sloped and update == "shared" else update
+    state = initial(1, m, exact(noise=1e-2, update=rule))
+    for i in range(30):
+        seen = Observation(X[i], Y[i], w[i], slopes[i] if sloped else None, share[i])
+        state, _ = observe(state, seen, exact(noise=1e-2, update=rule))
+    settings = exact(noise=1e-2, update=update)
+    own = posterior(found, X, settings, weights=w, slope_weight=share if sloped else None).covariance.matrix
+    np.testing.assert_allclose(own, state.covariance.matrix[: len(own), : len(own)], rtol=1e-8)
+
+
+@pytest.mark.parametrize("update", ["full", "decoupled", "winner", "shared"])
+def test_slopes_make_every_kind_of_posterior_surer(update):
+    """Six values leave a curved network's shapes open; six slopes close them."""
+    X = np.linspace(-1, 1, 6)[:, None]
+    found = refine(
+        X, np.hstack([np.exp(-4 * X**2), X**2]), np.array([[0.1, -0.5], [0.6, 0.0]]), LINE, iterations=3
+    )
+    settings = Settings(update=update, noise=1e-2)
+    values, both = (posterior(found, X, settings, slope_weight=s).covariance.matrix for s in (None, 1.0))
+    gained = np.linalg.eigvalsh(values - both)
+    assert gained.min() > -1e-12
+    assert np.trace(both) < 0.8 * np.trace(values)
+    none = posterior(found, X, settings, slope_weight=0.0).covariance.matrix
+    np.testing.assert_allclose(none, values, rtol=1e-12)
+
+
+@pytest.mark.parametrize("update", ["full", "shared"])
+def test_what_the_data_leave_open_is_no_failure(update):
+    """Units that coincide, and a prior that says nothing: singular to working precision."""
+    X = np.linspace(-1, 1, 8)[:, None]
+    found = refine(X, np.sin(X), np.tile([[0.0, 0.0]], (3, 1)), LINE, iterations=0)
+    settings = Settings(update=update, noise=1e-14, prior=1e12, width_prior=1e12, tail_prior=1e12)
+    P = posterior(replace(found, rms=0.0), X, settings).covariance.matrix
+    assert np.isfinite(P).all()
+    assert (np.diag(P) > 0).all()
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"noise": np.array([0.1, -0.1])},
+        {"noise": np.array([0.1, 0.0])},
+        {"noise": np.array([0.1])},
+        {"prior": 0.0},
+        {"prior": np.nan},
+        {"ridge": -1.0},
+        {"Y": np.zeros(30)},
+        {"Y": np.zeros((30, 3))},
+        {"Y": np.zeros((29, 2))},
+        {"Y": np.full((30, 2), np.nan)},
+        {"weights": np.ones(29)},
+        {"slope_weight": -1.0},
+    ],
+)
+def test_what_makes_no_gaussian_is_refused(bad):
+    found, X, Y, _ = small("rotated", "gaussian", m=2)
+    with pytest.raises(UsageError) as caught:
+        Posterior.of(found, X, **({"Y": Y} | bad))
+    assert caught.value.fix
 
 
 def test_decoupled_posterior_inverts_the_diagonal_blocks():

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from palpate.errors import UsageError
+from palpate.learning.modes import every_mode
 from palpate.learning.refinement.leave_one_out import left_out, without_each
-from palpate.learning.refinement.projection import fitted, gauss_newton, project
-from palpate.learning.refinement.rows import Rows, modes
+from palpate.learning.refinement.projection import gauss_newton, leverage_of_units, project
+from palpate.learning.refinement.rows import Rows
 from palpate.learning.units.forms import form
 from palpate.learning.units.regressors import Regressors
 
@@ -128,7 +129,7 @@ def test_modes_lose_nothing(shape):
         if shape[1] != 60
         else rng.normal(size=shape)
     )
-    latent, basis = modes(Y)
+    latent, basis = every_mode(Y)
     assert latent.shape[1] == np.linalg.matrix_rank(Y)
     np.testing.assert_allclose(latent @ basis, Y, atol=1e-12 * np.linalg.norm(Y))
     np.testing.assert_allclose(basis @ basis.T, np.eye(len(basis)), atol=1e-12)
@@ -186,9 +187,9 @@ def test_leverage_of_units_is_the_diagonal_of_their_hat_matrix(slopes):
     # rows of the Jacobian mode by mode: w_kj P ∂φ_k/∂θ_k
     J = np.vstack([D * np.repeat(w, theta.shape[1]) for w in W.T])
     hat = np.diag(J @ np.linalg.pinv(J)).reshape(W.shape[1], -1)
-    found = fitted(rows, theta, fit)
+    found = leverage_of_units(rows, theta, fit)
     np.testing.assert_allclose(found, hat.T, atol=1e-6)
     assert found.sum() == pytest.approx(theta.size, rel=1e-5)
-    even = fitted(rows, theta, fit, work=0.0)
+    even = leverage_of_units(rows, theta, fit, work=0.0)
     np.testing.assert_allclose(even.sum(axis=0), found.sum(axis=0), rtol=1e-5)
     assert np.ptp(even, axis=0).max() == 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import time
 
@@ -98,6 +99,28 @@ def test_leave_one_out_in_closed_form_equals_leaving_one_out(tail):
     assert found.loo == pytest.approx(np.sqrt(np.mean(np.square(errors))), rel=1e-9)
 
 
+@pytest.mark.parametrize(("N", "finite"), [(1, False), (5, False), (6, True)])
+def test_as_many_unknowns_as_data_judge_nothing(N, finite):
+    """Two of the tail and three of a unit."""
+    rng = np.random.default_rng(0)
+    X, Y = rng.uniform(-1, 1, (N, 1)), rng.normal(size=(N, 1))
+    assert np.isfinite(refine(X, Y, line_units([0.0], [0.5]), LINE).loo) == finite
+
+
+def test_unknowns_are_counted_against_slopes_and_modes():
+    """Five samples: two coefficients per mode for tail, one and the units' shared numbers for a unit."""
+    rng = np.random.default_rng(0)
+    X, Y, unit = rng.uniform(-1, 1, (5, 1)), rng.normal(size=(5, 2)), line_units([0.0], [0.5])
+    fit = functools.partial(refine, regressors=LINE, iterations=3)
+    assert np.isfinite(fit(X, Y, unit).loo)  # 2 + 1 + 2/2 of 5
+    assert np.isinf(fit(X, Y[:, :1], unit).loo)  # 2 + 1 + 2 of 5
+    assert np.isinf(fit(X, Y[:, [0, 0, 0, 0]], unit).loo)  # copies of an output say nothing more
+    assert np.isinf(fit(X, Y[:, :1], unit, weights=[1, 1, 1, 1, 0]).loo)
+    slopes = rng.normal(size=(5, 1, 1))
+    assert np.isfinite(fit(X, Y[:, :1], unit, slopes=slopes).loo)
+    assert np.isinf(fit(X, Y[:, :1], unit, slopes=slopes, slope_weight=0.0).loo)
+
+
 def test_cost_never_rises_with_iterations():
     x, y, start = curved()
     errors = [refine(x, y, start, LINE, iterations=k).rms for k in (0, 1, 3, 10, 40)]
@@ -162,6 +185,13 @@ def test_units_that_coincide_are_survived(solver):
     assert found.rms <= alone.rms * (1 + 1e-6)
 
 
+def test_outputs_that_are_zero_leave_no_weight_and_no_error():
+    x, _, start = curved()
+    found = refine(x, np.zeros((len(x), 2)), start, LINE)
+    assert not found.predict(x).any()
+    assert found.loo == 0.0
+
+
 def test_units_that_see_no_sample_stop_nobody():
     x, y, start = curved()
     far = np.vstack([start, line_units([40.0], [0.1])])
@@ -220,3 +250,44 @@ def test_units_of_another_form_are_refused():
         refine(x, y, np.zeros((3, 5)), LINE)
     with pytest.raises(UsageError):
         refine(x, y, start * np.nan, LINE)
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"solver": "bogus"},
+        {"ridge": -1.0},
+        {"ridge": float("nan")},
+        {"iterations": -1},
+        {"tolerance": float("nan")},
+        {"patience": -1},
+        {"seconds": -1.0},
+        {"heldout": (np.zeros((4, 1)), np.zeros((4, 2)))},
+        {"heldout": (np.zeros((4, 2)), np.zeros((4, 3)))},
+        {"heldout": (np.zeros((4, 1)), np.zeros((5, 3)))},
+        {"heldout": (np.zeros((4, 1)), np.full((4, 3), np.nan))},
+        {"weights": -np.ones(26)},
+        {"slopes": np.zeros((26, 1, 3))},
+    ],
+)
+def test_options_that_are_none_are_refused(bad):
+    x, y, start = curved()
+    with pytest.raises(UsageError) as caught:
+        refine(x, y, start, LINE, **bad)
+    assert caught.value.why
+    assert caught.value.fix
+
+
+def test_lists_are_samples_too():
+    x, y, start = curved()
+    np.testing.assert_array_equal(
+        refine(x.tolist(), y.tolist(), start.tolist(), LINE, iterations=2).theta,
+        refine(x, y, start, LINE, iterations=2).theta,
+    )
+
+
+@pytest.mark.parametrize("bad", [{"tail": "bogus"}, {"radial": "bogus"}])
+def test_regressors_are_those_there_are(bad):
+    with pytest.raises(UsageError, match="bogus") as caught:
+        Regressors(form("rotated", 2), **bad)
+    assert caught.value.fix

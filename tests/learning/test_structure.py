@@ -67,6 +67,29 @@ def test_growth_stops_at_the_limit():
     assert found.loo == min(t.loo for t in trials)
 
 
+@pytest.mark.parametrize("N", [6, 12, 20])
+@pytest.mark.parametrize("n", [1, 2])
+def test_noise_is_never_learnt(N, n):
+    """Independent noise of variance one: whatever was fitted misses the next sample by one at least."""
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        X, Y = rng.uniform(-1, 1, (N, n)), rng.normal(size=(N, 1))
+        found, trials = grow(X, Y, Regressors(form("axis-aligned", n)), target=1e-3, units_max=40)
+        assert all(t.loo > 0.1 for t in trials)
+        assert found.loo > 0.1
+
+
+def test_growth_has_room_for_what_slopes_decide_as_well():
+    X = np.linspace(-1, 1, 11)[:, None]
+    r = Regressors(form("axis-aligned", 1))
+    curve, slope = np.sin(5 * X), 5 * np.cos(5 * X)
+    fit = functools.partial(refine, slopes=slope[:, :, None], iterations=20)
+    plain = grow(X, curve, r, target=0.0, units_max=40)[1]
+    sloped = grow(X, curve, r, target=0.0, units_max=40, fit=fit)[1]
+    assert max(t.units for t in plain) == (11 - 2) // 3
+    assert max(t.units for t in sloped) == (22 - 2) // 3
+
+
 def test_new_units_stand_where_the_error_is():
     X, Y = bumps(200)
     found = refine(X, Y, np.zeros((0, 3)), Regressors(form("isotropic", 2)))

@@ -9,14 +9,16 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from palpate.errors import UsageError
-from palpate.learning.choosing.automatic import automatic, check_target, relative_error, spread_of
+from palpate.learning.choosing.automatic import automatic, check_target
 from palpate.learning.filter.model import value
 from palpate.learning.filter.observation import Observation
 from palpate.learning.filter.presets import default
 from palpate.learning.filter.settings import Settings
 from palpate.learning.filter.state import State, initial
 from palpate.learning.filter.step import Event, observe
+from palpate.learning.freezing import freeze, training_record
 from palpate.learning.history import History
+from palpate.learning.measures import relative_error, spread_of
 from palpate.learning.modes import output_modes
 from palpate.network import Network, Scaling
 from palpate.units import Quantity, Range
@@ -157,7 +159,7 @@ def learn(
                     errors.append(judge(state))
             if progress:
                 progress(len(events), passes * len(xs))
-    network = freeze(state, settings, inputs, outputs, scaling)
+    network = freeze(state, settings, inputs, outputs, scaling, meta=training_record(X, Y, inputs))
     places, truth = (X, Y) if heldout is None else heldout
     error = relative_error(network.predict(places), truth, spread_of(Y))
     history = History.of(events, innovation, errors, passes)
@@ -175,26 +177,6 @@ def _limit(learned: Learned) -> str:
     if len(passes) > 1 and passes[-1].mean() < 0.7 * passes[-2].mean():
         return "The error was still falling: more passes would help."
     return "The error has settled: this is as far as one observation at a time goes here."
-
-
-def freeze(
-    state: State, settings: Settings, inputs: Sequence[Range], outputs: Sequence[Quantity], scaling: Scaling
-) -> Network:
-    """The state as a network value."""
-    of = settings.regressors(state.inputs)
-    tail = np.zeros((state.outputs, 1 + state.inputs))
-    tail[:, : of.tail_size] = state.tail
-    factors, shifts = of.form.factors(state.theta)
-    return Network(
-        tuple(inputs),
-        tuple(outputs),
-        factors=factors.copy(),
-        shifts=shifts.copy(),
-        weights=state.weights.T.copy(),
-        tail=tail,
-        scaling=scaling,
-        radial=settings.radial,
-    )
 
 
 def _observations(

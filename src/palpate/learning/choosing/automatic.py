@@ -29,8 +29,10 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.learning.checks import numbers, samples
 from palpate.learning.choosing.scatter import noise_variance, spacing
 from palpate.learning.filter.settings import Settings
+from palpate.learning.measures import relative_error, spread_of
 from palpate.network import Scaling
 from palpate.units import Quantity, Range
 
@@ -88,6 +90,9 @@ def automatic(
         If the target is not positive, a given setting is unknown, or the arrays do not fit together.
     """
     check_target(target)
+    n = None if inputs is None else len(inputs)
+    X, Y, w, _, _ = samples(X, Y, weights, inputs=n)
+    X, Y, weights = X[w > 0], Y[w > 0], None if weights is None else w[w > 0]
     inputs = ranges_of(X) if inputs is None else inputs
     scaling = Scaling.of(inputs, Y)
     xs, ys = scaling.scale_inputs(X), scaling.scale_outputs(Y)
@@ -114,7 +119,14 @@ def check_target(target: float) -> None:
 
 
 def ranges_of(X: np.ndarray, names: Sequence[str] | None = None) -> tuple[Range, ...]:
-    """Ranges that the samples X (N, n) span; an input that doesn't vary gets one of length 1 or more about it."""
+    """Ranges that the samples X (N, n) span; an input that doesn't vary gets one of length 1 or more about it.
+
+    Raises
+    ------
+    UsageError
+        If X is not a table of finite numbers.
+    """
+    X = numbers("Inputs X", X, (None, None))
     low, high = X.min(axis=0), X.max(axis=0)
     size = np.maximum(np.abs(low), np.abs(high))
     flat = high - low <= 1e-12 * size
@@ -122,16 +134,6 @@ def ranges_of(X: np.ndarray, names: Sequence[str] | None = None) -> tuple[Range,
     names = names if names is not None else [f"x{i}" for i in range(X.shape[1])]
     ends = zip(names, low - half, high + half, strict=True)
     return tuple(Range(str(name), float(a), float(b)) for name, a, b in ends)
-
-
-def spread_of(Y: np.ndarray) -> float:
-    """Root mean square deviation of the outputs Y (N, m) from their means; 1 where they do not vary."""
-    return float(np.sqrt(((Y - Y.mean(axis=0)) ** 2).mean())) or 1.0
-
-
-def relative_error(predicted: np.ndarray, Y: np.ndarray, spread: float) -> float:
-    """Root mean square error over the outputs' spread."""
-    return float(np.sqrt(((predicted - Y) ** 2).mean())) / spread
 
 
 def _ladder(

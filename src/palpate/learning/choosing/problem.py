@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-from palpate.errors import UsageError
+from palpate.learning.checks import samples
+from palpate.learning.freezing import training_record
+from palpate.learning.measures import spread_of
+from palpate.learning.modes import leading_modes
 from palpate.network import Network, Scaling
 from palpate.network.radial import RadialFunction
 from palpate.units import Quantity, Range
@@ -33,6 +37,8 @@ class Problem:
         Orthonormal.
     scaling : Scaling
         Outputs by the standard deviation of all of them together.
+    record : mapping
+        Of the samples in SI units, for the network's `meta`.
     """
 
     inputs: tuple[Range, ...]
@@ -41,6 +47,7 @@ class Problem:
     Y: np.ndarray
     basis: np.ndarray
     scaling: Scaling
+    record: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -53,13 +60,15 @@ class Problem:
         UsageError
             If there are fewer than 20 samples, shapes disagree or numbers are not finite.
         """
-        X, Y = np.asarray(X, float), np.asarray(Y, float)
-        _check(X, Y, inputs, outputs)
-        spread = float(np.sqrt(((Y - Y.mean(axis=0)) ** 2).mean()))
-        constant = spread <= 1e-13 * float(np.abs(Y).max())
+        X, Y, _, _, _ = samples(X, Y, inputs=len(inputs), outputs=len(outputs), fewest=_FEWEST)
+        spread = spread_of(Y)
+        constant = not np.ptp(Y, axis=0).any() or spread <= 1e-13 * float(np.abs(Y).max())
         scaling = Scaling.of(inputs, Y, scale=1.0 if constant else spread)
-        latent, basis = _leading(np.zeros_like(Y) if constant else scaling.scale_outputs(Y))
-        return cls(tuple(inputs), tuple(outputs), scaling.scale_inputs(X), latent, basis, scaling)
+        latent, basis = leading_modes(
+            np.zeros_like(Y) if constant else scaling.scale_outputs(Y), most=_MODES_MAX
+        )
+        record = training_record(X, Y, inputs)
+        return cls(tuple(inputs), tuple(outputs), scaling.scale_inputs(X), latent, basis, scaling, record)
 
     @property
     def unit(self) -> float:
@@ -82,36 +91,7 @@ class Problem:
         """
         k, m = self.basis.shape
         W, T, basis = weights.T, tail.T, self.basis.T
-        meta = {"heldout": heldout, "refined": True}
+        meta = {"heldout": heldout, "refined": True, **self.record}
         if m <= k:  # as many modes as outputs: no need of them
             return Network(self.inputs, self.outputs, A, b, basis @ W, basis @ T, self.scaling, meta, radial)
         return Network(self.inputs, self.outputs, A, b, W, T, self.scaling, meta, radial, basis)
-
-
-def _leading(Y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Y (N, m) ≈ L (N, k) V (k, m): the modes that carry all but 1e-8 of it, 96 at most.
-
-    A range finder with one power iteration (Halko, Martinsson & Tropp 2011). Unlike `rows.modes`, it may drop what
-    is too small or too irregular to be learnt.
-    """
-    count = min(*Y.shape, _MODES_MAX + 10)
-    sample = Y @ np.random.default_rng(0).normal(size=(Y.shape[1], count))
-    Q = np.linalg.qr(Y @ (Y.T @ np.linalg.qr(sample)[0]))[0]
-    U, s, V = np.linalg.svd(Q.T @ Y, full_matrices=False)
-    rest = np.sqrt(np.maximum(np.cumsum((s**2)[::-1])[::-1], 0.0))
-    k = int(np.clip((rest > 1e-8 * max(float(rest[0]), 1e-300)).sum(), 1, _MODES_MAX))
-    return np.ascontiguousarray(Q @ (U[:, :k] * s[:k])), np.ascontiguousarray(V[:k])
-
-
-def _check(X: np.ndarray, Y: np.ndarray, inputs: Sequence[Range], outputs: Sequence[Quantity]) -> None:
-    if X.ndim != 2 or Y.ndim != 2 or X.shape != (len(Y), len(inputs)) or Y.shape[1] != len(outputs):
-        raise UsageError(
-            f"Inputs {X.shape} and outputs {Y.shape} are not samples of {len(inputs)} inputs and {len(outputs)} "
-            "outputs.",
-            fix="Pass X (N, n) and Y (N, m) with one range for each input and one quantity for each output.",
-        )
-    if len(X) < _FEWEST or not (np.isfinite(X).all() and np.isfinite(Y).all()):
-        raise UsageError(
-            f"{len(X)} samples, or some that are not finite, are too little to choose a network by.",
-            fix=f"Give at least {_FEWEST} finite samples.",
-        )

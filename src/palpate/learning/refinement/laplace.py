@@ -21,9 +21,10 @@ from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from palpate.errors import UsageError
+from palpate.learning.checks import numbers, samples
+from palpate.learning.refinement.inverse import inverse
 from palpate.learning.refinement.refine import Refined
 from palpate.learning.refinement.rows import Rows
 from palpate.learning.units.forms import Form
@@ -101,26 +102,23 @@ class Posterior:
         Raises
         ------
         UsageError
-            If there is neither noise nor Y, or shapes disagree.
+            If there is neither noise nor Y, shapes disagree, or a variance is not positive.
         """
         r, h = refined.regressors, len(refined.theta)
         entries = Regressors(cast(Form, _Entries(r.form)), r.radial, r.tail)
-        X = np.asarray(X, float)
-        slopes = None if slope_weight is None else np.zeros((len(X), 1, X.shape[1]))
-        rows = Rows.of(
-            entries,
-            X,
-            np.zeros((len(X), 1)),
-            weights=weights,
-            slopes=slopes,
-            slope_weight=1.0 if slope_weight is None else slope_weight,
-        )
-        if noise is None:
-            noise = _noise(refined, X, Y, weights)
+        m = refined.coefficients.shape[1]
+        rows = Rows.blank(entries, X, weights=weights, slope_weight=slope_weight)
+        noise = _noise(refined, X, Y, weights) if noise is None else numbers("Noise variances", noise, (m,))
+        if not ((noise > 0).all() and _positive(prior) and (np.asarray(ridge) >= 0).all()):
+            raise UsageError(
+                f"Noise {noise}, prior {prior} and ridge {ridge} make no Gaussian.",
+                why="Variances are positive, and a ridge is not negative.",
+                fix="Leave the noise out to have it estimated from Y.",
+            )
         theta = _entries(refined)
         F, D = rows.matrix(theta), rows.derivatives(theta)
         penalty = np.maximum(np.broadcast_to(ridge, F.shape[1]), _LEAST_RIDGE * rows.total)
-        M = _inverse(F.T @ F + np.diag(penalty))
+        M = inverse(F.T @ F + np.diag(penalty))
         B = M @ (F.T @ D)
         # Dᵀ(I − Φ M Φᵀ)D as a sum of squares, so that round-off can't make it indefinite
         outside = np.vstack([D - F @ B, np.sqrt(penalty)[:, None] * B])
@@ -128,7 +126,7 @@ class Posterior:
         information = _shape_information(outside, chain, (refined.weights / noise) @ refined.weights.T)
         size = chain.shape[2]
         information += np.diag(np.tile(1.0 / np.broadcast_to(prior, size), h))
-        return cls(refined, noise, M, _inverse(information), chain, B)
+        return cls(refined, noise, M, inverse(information), chain, B)
 
     def uncertainty(self, network: Network) -> Uncertainty:
         """The predictive variance of the network value made of this refinement.
@@ -190,25 +188,16 @@ def _noise(refined: Refined, X: np.ndarray, Y: np.ndarray | None, weights: np.nd
         raise UsageError(
             "A posterior needs the noise or the outputs to find it from.", fix="Pass Y or noise."
         )
-    w = np.ones(len(X)) if weights is None else weights
-    m = Y.shape[1]
+    n, m = refined.regressors.form.inputs, refined.coefficients.shape[1]
+    X, Y, w, _, _ = samples(X, Y, weights, inputs=n, outputs=m)
+    X, Y, w = X[w > 0], Y[w > 0], w[w > 0]
     squares = (w[:, None] * (Y - refined.predict(X)) ** 2).sum(axis=0)
     fitted = len(refined.coefficients) + refined.theta.size / m
     left = max(1.0 - fitted / w.sum(), 0.02)  # a network of as many numbers as samples says nothing of noise
     return np.asarray(np.maximum(squares / (w.sum() * left), _LEAST_NOISE))
 
 
-def _inverse(information: np.ndarray) -> np.ndarray:
-    """Of a positive definite matrix, by way of its scaled self; symmetric."""
-    if not information.size:
-        return information
-    scale = 1.0 / np.sqrt(np.diag(information))
-    scaled = information * scale[:, None] * scale
-    try:
-        found = cho_solve(cho_factor(scaled), np.eye(len(scaled)))
-    except LinAlgError:
-        # directions that the data do not see to working precision get the variance of what they barely see
-        values, V = np.linalg.eigh(scaled)
-        found = (V / np.maximum(values, 1e-14 * values[-1])) @ V.T
-    found = found * scale[:, None] * scale
-    return np.asarray((found + found.T) / 2)
+def _positive(variances: float | np.ndarray) -> bool:
+    """Whether all are positive and finite."""
+    found = np.asarray(variances, float)
+    return bool(((found > 0) & np.isfinite(found)).all())

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from palpate.errors import UsageError
 from palpate.learning.filter.covariance import Blocks, Covariance, Full, Nothing, Shared
 from palpate.learning.filter.settings import Settings
 from palpate.learning.filter.state import State, initial
+from palpate.learning.refinement.inverse import inverse
 from palpate.learning.refinement.laplace import Posterior
 from palpate.learning.refinement.refine import Refined
+from palpate.learning.refinement.rows import Rows
 from palpate.learning.units.regressors import Regressors
 
 __all__ = ["posterior"]
+
+Given = dict[str, Any]  # weights and slope_weight, as `Rows.blank` takes them
 
 
 def posterior(
@@ -26,11 +30,12 @@ def posterior(
     *,
     modes: np.ndarray | None = None,
     weights: np.ndarray | None = None,
+    slope_weight: float | np.ndarray | None = None,
 ) -> State:
     """The filter's state that a refined network stands for.
 
-    With the rows H_i = ∂f(x_i)/∂z of all samples, P₀ the settings' prior and r the mean squared residual, not
-    below the settings' noise,
+    With the rows H_i = ∂f(x_i)/∂z of all samples and of their slopes, P₀ the settings' prior and r the mean
+    squared residual, not below the settings' noise,
 
     - the full filter gets P = (Σ_i H_iᵀ H_i / r + P₀⁻¹)⁻¹: for a linear model, the covariance that it reaches
       itself after the same samples;
@@ -49,6 +54,8 @@ def posterior(
         Orthonormal output directions for the shared-weight rule.
     weights : (N,), optional
         How many ordinary samples each one counts as.
+    slope_weight : float or (N,), optional
+        As in `refine`, if slopes were given there: their rows ∂²f/∂z∂x count as the values' do.
 
     Returns
     -------
@@ -57,9 +64,9 @@ def posterior(
     Raises
     ------
     UsageError
-        If the settings' units or tail are of another kind than the refined network's.
+        If the settings' units or tail are of another kind than the refined network's, or the samples do not fit.
     """
-    theta, m, n = refined.theta, refined.coefficients.shape[1], X.shape[1]
+    theta, m, n = refined.theta, refined.coefficients.shape[1], refined.regressors.form.inputs
     if _kind(settings.regressors(n)) != _kind(refined.regressors):
         r = refined.regressors
         raise UsageError(
@@ -76,17 +83,17 @@ def posterior(
         innovation=refined.rms**2,
         in_modes=None if modes is None else refined.coefficients @ modes,
     )
-    w = np.ones(len(X)) if weights is None else weights
-    return replace(mean, covariance=_COVARIANCES[settings.update](mean, refined, X, w, settings))
+    given = {"weights": weights, "slope_weight": slope_weight}
+    return replace(mean, covariance=_COVARIANCES[settings.update](mean, refined, X, given, settings))
 
 
 def _kind(r: Regressors) -> tuple[object, ...]:
     return r.form.name, r.form.inputs, getattr(r.form, "log", None), r.radial, r.tail
 
 
-def _full(mean: State, refined: Refined, X: np.ndarray, w: np.ndarray, settings: Settings) -> Covariance:
+def _full(mean: State, refined: Refined, X: np.ndarray, given: Given, settings: Settings) -> Covariance:
     m, h, a, p = mean.outputs, mean.units, mean.tail.size, mean.theta.shape[1]
-    F, D = _rows(mean, refined, X, w)
+    F, D = _rows(refined, X, given)
     FF, FD = F.T @ F, F.T @ D
     unit = a + np.arange(h)[:, None] * mean.unit_size
     by_theta = (unit + m + np.arange(p)).ravel()
@@ -99,12 +106,12 @@ def _full(mean: State, refined: Refined, X: np.ndarray, w: np.ndarray, settings:
         information[np.ix_(by_theta, by_coefficient)] = across.T
     shapes = (D.T @ D).reshape(h, p, h, p) * (mean.weights @ mean.weights.T)[:, None, :, None]
     information[np.ix_(by_theta, by_theta)] += shapes.reshape(h * p, h * p)
-    return Full(np.asfortranarray(_variance(refined, settings) * _inverse(information)), a)
+    return Full(np.asfortranarray(_variance(refined, settings) * inverse(information)), a)
 
 
-def _blocks(mean: State, refined: Refined, X: np.ndarray, w: np.ndarray, settings: Settings) -> Covariance:
+def _blocks(mean: State, refined: Refined, X: np.ndarray, given: Given, settings: Settings) -> Covariance:
     m, a, p = mean.outputs, mean.tail.size, mean.theta.shape[1]
-    F, D = _rows(mean, refined, X, w)
+    F, D = _rows(refined, X, given)
     p_t = F.shape[1] - mean.units
     tail, phi = F[:, :p_t], F[:, p_t:]
     b, prior, variance = mean.unit_size, 1.0 / _prior(mean, settings), _variance(refined, settings)
@@ -118,18 +125,17 @@ def _blocks(mean: State, refined: Refined, X: np.ndarray, w: np.ndarray, setting
                 [across.T, (weights @ weights) * (Dk.T @ Dk)],
             ]
         )
-        units[k] = _inverse(information / variance + np.diag(prior[mean.block(k)]))
-    return Blocks(_inverse(np.kron(np.eye(m), tail.T @ tail) / variance + np.diag(prior[:a])), units)
+        units[k] = inverse(information / variance + np.diag(prior[mean.block(k)]))
+    return Blocks(inverse(np.kron(np.eye(m), tail.T @ tail) / variance + np.diag(prior[:a])), units)
 
 
-def _rows(mean: State, refined: Refined, X: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Weighted regressors (N, p_t + h) and ∂φ_k/∂θ_k (N, h p)."""
-    r, root = refined.regressors, np.sqrt(w)[:, None]
-    phi, D = r.by_theta(X, mean.theta)
-    return root * np.hstack([r.tail_rows(X), phi]), root * D.reshape(len(X), -1)
+def _rows(refined: Refined, X: np.ndarray, given: Given) -> tuple[np.ndarray, np.ndarray]:
+    """Weighted regressors (R, p_t + h) and ∂φ_k/∂θ_k (R, h p) of values and slopes."""
+    rows = Rows.blank(refined.regressors, X, **given)
+    return rows.matrix(refined.theta), rows.derivatives(refined.theta)
 
 
-def _shared(mean: State, refined: Refined, X: np.ndarray, w: np.ndarray, settings: Settings) -> Covariance:
+def _shared(mean: State, refined: Refined, X: np.ndarray, given: Given, settings: Settings) -> Covariance:
     variance = _variance(refined, settings)
     prior = np.r_[
         np.full(refined.regressors.tail_size, settings.tail_prior), np.full(mean.units, settings.prior)
@@ -140,16 +146,16 @@ def _shared(mean: State, refined: Refined, X: np.ndarray, w: np.ndarray, setting
         noise=np.full(mean.outputs, variance),
         ridge=variance / prior,
         prior=_shape_prior(mean, settings),
-        weights=w,
+        **given,
     )
     return Shared(np.asfortranarray(variance * found.coefficients), np.asfortranarray(found.shapes))
 
 
-def _nothing(mean: State, refined: Refined, X: np.ndarray, w: np.ndarray, settings: Settings) -> Covariance:
+def _nothing(mean: State, refined: Refined, X: np.ndarray, given: Given, settings: Settings) -> Covariance:
     return Nothing()
 
 
-_COVARIANCES: dict[str, Callable[[State, Refined, np.ndarray, np.ndarray, Settings], Covariance]] = {
+_COVARIANCES: dict[str, Callable[[State, Refined, np.ndarray, Given, Settings], Covariance]] = {
     "full": _full,
     "decoupled": _blocks,
     "winner": _blocks,
@@ -160,13 +166,6 @@ _COVARIANCES: dict[str, Callable[[State, Refined, np.ndarray, np.ndarray, Settin
 
 def _variance(refined: Refined, settings: Settings) -> float:
     return max(settings.noise, refined.rms**2)
-
-
-def _inverse(information: np.ndarray) -> np.ndarray:
-    if not information.size:
-        return information
-    covariance = np.asarray(cho_solve(cho_factor(information), np.eye(len(information))))
-    return (covariance + covariance.T) / 2
 
 
 def _shape_prior(state: State, settings: Settings) -> np.ndarray:

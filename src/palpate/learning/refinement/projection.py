@@ -20,7 +20,7 @@ from scipy.linalg import blas, lapack
 
 from palpate.learning.refinement.rows import Rows
 
-__all__ = ["Fit", "Solver", "fitted", "gauss_newton", "project"]
+__all__ = ["Fit", "Solver", "gauss_newton", "leverage_of_units", "project"]
 
 Solver = Literal["kaufman", "full"]
 
@@ -108,7 +108,7 @@ def gauss_newton(
     return G, descent
 
 
-def fitted(rows: Rows, theta: np.ndarray, fit: Fit, *, work: float = 4e9) -> np.ndarray:
+def leverage_of_units(rows: Rows, theta: np.ndarray, fit: Fit, *, work: float = 4e9) -> np.ndarray:
     """Leverage (R, k) of each row on its own value, mode by mode, through the units' numbers.
 
     The diagonal of their part of the hat matrix of the linearised problem; it sums to h p. Modes of large weights
@@ -123,7 +123,7 @@ def fitted(rows: Rows, theta: np.ndarray, fit: Fit, *, work: float = 4e9) -> np.
     G = strict + strict.T + np.diag(np.einsum("nd,nd->d", D, D))
     joint = (G.reshape(h, p, h, p) * (W @ W.T)[:, None, :, None]).reshape(h * p, h * p)
     size = np.sqrt(np.diagonal(joint))
-    size = np.maximum(size, 1e-8 * max(float(size.max()), 1e-300))
+    size = np.maximum(size, max(1e-8 * float(size.max()), 1e-140))  # whose square has an inverse
     joint /= size[:, None] * size
     joint[np.diag_indices(h * p)] += 1e-10
     factor, failed = lapack.dpotrf(joint, lower=1)

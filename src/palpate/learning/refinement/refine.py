@@ -12,13 +12,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import get_args
 
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.learning.checks import samples
 from palpate.learning.refinement.leave_one_out import left_out, without_each
 from palpate.learning.refinement.marquardt import DAMPING, Scaled, held_back, next_damping
-from palpate.learning.refinement.projection import Fit, Solver, fitted, gauss_newton, project
+from palpate.learning.refinement.projection import Fit, Solver, gauss_newton, leverage_of_units, project
 from palpate.learning.refinement.rows import Rows
 from palpate.learning.units.regressors import Regressors
 
@@ -45,7 +47,8 @@ class Refined:
         Weighted root mean square training error per scaled output, of values only.
     loo : float
         Leave-one-out error per scaled output: in closed form for weights and tail (Allen 1974), with the
-        units' own numbers counted as leverage in the linearised problem.
+        units' own numbers counted as leverage in the linearised problem. Infinite where there are as many unknowns
+        as known numbers: what can fit anything says nothing of samples it has not seen.
     condition : float
         2-norm condition number of the regressors; large values mean that units nearly cancel.
     iterations : int
@@ -53,9 +56,11 @@ class Refined:
         Whether the last steps brought no more gain; False means that a limit came first.
     without : (h,)
         The leave-one-out error were one unit removed and the others left as they are, for each unit, with the
-        units' degrees of freedom spread over all rows alike.
+        units' degrees of freedom spread over all rows alike; it ranks them even where `loo` is infinite.
     heldout : float
         Root mean square error per scaled output on the held-out samples; not-a-number without them.
+    rows : int
+        Numbers known of each output: N values, and n slopes wherever those counted too.
     """
 
     regressors: Regressors
@@ -68,6 +73,7 @@ class Refined:
     converged: bool
     without: np.ndarray
     heldout: float = float("nan")
+    rows: int = 0
 
     @property
     def tail(self) -> np.ndarray:
@@ -143,14 +149,15 @@ def refine(
     Raises
     ------
     UsageError
-        If shapes disagree or numbers are not finite.
+        If shapes disagree, numbers are not finite, or an option is not one.
     """
+    _check_options(ridge, iterations, patience, tolerance, seconds, solver)
     deadline = np.inf if seconds is None else time.monotonic() + seconds
     theta = np.array(theta, float)
-    if theta.ndim != 2 or theta.shape[1] != regressors.form.size or not np.isfinite(theta).all():
+    p = regressors.form.size
+    if theta.ndim != 2 or theta.shape[1] != p or not np.isfinite(theta).all():
         raise UsageError(
-            f"Units of shape {theta.shape} are not finite {regressors.form.name} units of "
-            f"{regressors.form.size} numbers each.",
+            f"Units of shape {theta.shape} are not finite {regressors.form.name} units of {p} numbers each.",
             fix="Make them with the form's own `unit`.",
         )
     rows = Rows.of(regressors, X, Y, weights=weights, slopes=slopes, slope_weight=slope_weight)
@@ -230,7 +237,8 @@ def _judge(rows: Rows, heldout: tuple[np.ndarray, np.ndarray] | None) -> Callabl
     """The error of a point on held-out samples; not-a-number without them."""
     if heldout is None:
         return lambda point: float("nan")
-    X, Y = heldout
+    n, m = rows.X.shape[1], rows.modes.shape[1]
+    X, Y, _, _, _ = samples(*heldout, inputs=n, outputs=m)
     latent = Y @ rows.modes.T
     beyond = max(float((Y**2).sum() - (latent**2).sum()), 0.0)  # what no mode of the training data reaches
     tail = rows.regressors.tail_rows(X)
@@ -244,22 +252,48 @@ def _judge(rows: Rows, heldout: tuple[np.ndarray, np.ndarray] | None) -> Callabl
 
 def _result(rows: Rows, point: _Point, count: int, done: bool, error: float) -> Refined:
     fit, m = point.fit, rows.modes.shape[1]
+    # of k modes each has its coefficients, and a share in the units' numbers
+    unknowns = len(fit.tau) + point.theta.size / rows.targets.shape[1]
+    judges = unknowns < len(rows.targets)
     # units were fitted too: their h p numbers count as leverage
     even = point.theta.size / rows.targets.size
-    shared = fitted(rows, point.theta, fit) if 0 < point.theta.size <= _COUNTED else even
+    counted = judges and 0 < point.theta.size <= _COUNTED
+    shared = leverage_of_units(rows, point.theta, fit) if counted else even
     missed = left_out(rows, fit, shared=shared, most=_MOST_LEVERAGE)
     reduced = without_each(rows, fit, len(point.theta), shared=even, most=_MOST_LEVERAGE)
     F = rows.matrix(point.theta)
     squares = float((fit.residual[: len(rows.X)] ** 2).sum())
+    judged = float(np.sqrt((missed**2 * rows.scale[:, None] ** 2).sum() / (rows.total * m)))
     return Refined(
         rows.regressors,
         point.theta,
         fit.coefficients @ rows.modes,
         float(np.sqrt(squares / (rows.total * m))),
-        float(np.sqrt((missed**2 * rows.scale[:, None] ** 2).sum() / (rows.total * m))),
+        judged if judges else float("inf"),
         float(np.linalg.cond(F)) if F.size else 1.0,
         count,
         done,
         np.sqrt(reduced / (rows.total * m)),
         error,
+        len(rows.targets),
     )
+
+
+def _check_options(
+    ridge: float, iterations: int, patience: int, tolerance: float, seconds: float | None, solver: str
+) -> None:
+    if solver not in get_args(Solver):
+        raise UsageError(
+            f"There is no solver {solver!r}.",
+            why="It decides which Gauss–Newton matrix the steps are made of.",
+            fix=f"Choose one of {', '.join(get_args(Solver))}.",
+        )
+    most = {"iterations": iterations, "patience": patience, "tolerance": tolerance, "ridge": ridge}
+    for name, limit in (most | {"seconds": 0.0 if seconds is None else seconds}).items():
+        largest = np.inf if name == "ridge" else None  # a limit may be none; a penalty may not
+        if not isinstance(limit, (int, float, np.number)) or not limit >= 0 or limit == largest:
+            raise UsageError(
+                f"{name} is {limit!r}; it must be a number, not negative.",
+                why="A negative penalty rewards large weights, and a negative limit ends nothing.",
+                fix="Leave it out for its default.",
+            )

@@ -14,13 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from palpate.errors import UsageError
+from palpate.learning.checks import numbers, samples
+from palpate.learning.modes import every_mode
 from palpate.learning.units.regressors import Regressors
 from palpate.network.radial import radial
 
-__all__ = ["Rows", "modes"]
-
-_ROUND_OFF = 1e-15  # outputs' modes below this share of the largest are round-off
+__all__ = ["Rows"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,17 +74,16 @@ class Rows:
         UsageError
             If shapes disagree, or a weight is negative or a number that counts is not finite.
         """
-        N = len(X)
-        w = np.ones(N) if weights is None else np.asarray(weights, float)
-        s = w * (np.broadcast_to(slope_weight, w.shape) if slopes is not None else 0.0)
-        _check(X, Y, w, slopes, s, regressors.form.inputs)
+        n = regressors.form.inputs
+        X, Y, w, slopes, s = samples(X, Y, weights, slopes, slope_weight=slope_weight, inputs=n)
+        s = w * s
         kept = np.flatnonzero(w > 0)
         sloped = np.flatnonzero(s[kept] > 0)
         targets = Y[kept] * np.sqrt(w[kept])[:, None]
         if slopes is not None:
             part = slopes[kept][sloped] * np.sqrt(s[kept][sloped])[:, None, None]
             targets = np.vstack([targets, part.transpose(0, 2, 1).reshape(-1, Y.shape[1])])
-        latent, basis = modes(targets)
+        latent, basis = every_mode(targets)
         return cls(
             regressors,
             np.ascontiguousarray(X[kept], float),
@@ -96,6 +94,28 @@ class Rows:
             basis,
             float(w.sum()),
         )
+
+    @classmethod
+    def blank(
+        cls,
+        regressors: Regressors,
+        X: np.ndarray,
+        *,
+        weights: np.ndarray | None = None,
+        slope_weight: float | np.ndarray | None = None,
+    ) -> Rows:
+        """Rows of X (N, n) whose targets do not matter; slopes are among them if they have a weight.
+
+        Raises
+        ------
+        UsageError
+            As `of`.
+        """
+        X = numbers("Inputs X", X, (None, regressors.form.inputs), finite=False)
+        N, n = X.shape
+        slopes = None if slope_weight is None else np.zeros((N, 1, n))
+        share = 1.0 if slope_weight is None else slope_weight
+        return cls.of(regressors, X, np.zeros((N, 1)), weights=weights, slopes=slopes, slope_weight=share)
 
     def matrix(self, theta: np.ndarray, below: int = 0) -> np.ndarray:
         """Weighted regressors, tail then units (R + below, p_t + h), column by column; the last rows are zero."""
@@ -122,34 +142,6 @@ class Rows:
             part = self.regressors.slopes_by_theta(self.X[self.sloped], theta)[1]
             D[N:end] = (part * self.slope_scale[:, None, None, None]).reshape(end - N, -1)
         return D
-
-
-def modes(Y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Y (R, m) = L (R, k) V (k, m) with orthonormal V and k the rank of Y, to round-off.
-
-    A range finder with a fixed random matrix (Halko, Martinsson & Tropp 2011) where few modes carry all of Y,
-    checked against Y itself; else a singular value decomposition.
-    """
-    R, m = Y.shape
-    size = float(np.linalg.norm(Y))
-    if m == 1 or size == 0.0:
-        return Y, np.eye(m)
-    k = 32
-    while 4 * k < min(R, m):
-        sample = Y @ np.random.default_rng(k).normal(size=(m, k))
-        Q = np.linalg.qr(sample)[0]
-        B = Q.T @ Y
-        if np.linalg.norm(Y - Q @ B) <= 1e-14 * size:
-            return _sorted(Q, B)
-        k *= 2
-    return _sorted(None, Y)
-
-
-def _sorted(Q: np.ndarray | None, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    U, s, V = np.linalg.svd(B, full_matrices=False)
-    k = max(1, int((s > _ROUND_OFF * s[0]).sum()))
-    latent = U[:, :k] * s[:k]
-    return np.ascontiguousarray(latent if Q is None else Q @ latent), np.ascontiguousarray(V[:k])
 
 
 def _values_by_theta(
@@ -192,25 +184,3 @@ def _chained(
                 d = -t * v[i, k, a]
                 for j in range(p):
                     o[j] += d * chain[k, e + a, j]
-
-
-def _check(
-    X: np.ndarray, Y: np.ndarray, w: np.ndarray, slopes: np.ndarray | None, s: np.ndarray, inputs: int
-) -> None:
-    if X.ndim != 2 or Y.ndim != 2 or len(X) != len(Y) or X.shape[1] != inputs or w.shape != (len(X),):
-        raise UsageError(
-            f"Inputs {X.shape}, outputs {Y.shape} and weights {w.shape} are not N samples of {inputs} inputs.",
-            fix="Pass X (N, n), Y (N, m) and weights (N,).",
-        )
-    if slopes is not None and slopes.shape != (*Y.shape, inputs):
-        raise UsageError(
-            f"Slopes have shape {slopes.shape}; they are ∂y_j/∂x_i, {(*Y.shape, inputs)}.",
-            fix="Give samples without known slopes a slope weight of zero.",
-        )
-    known = w > 0
-    parts = [X[known], Y[known], w, s] + ([] if slopes is None else [slopes[s > 0]])
-    if not all(np.isfinite(a).all() for a in parts) or (w < 0).any() or (s < 0).any() or not known.any():
-        raise UsageError(
-            "Samples must be finite and weights not negative, and one weight positive.",
-            fix="Give a sample that is to be left out a weight of zero.",
-        )

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from palpate.learning.checks import samples
+from palpate.learning.freezing import freeze_refined, training_record
 from palpate.learning.refinement.refine import Refined, refine
 from palpate.learning.units.forms import form as form_of
 from palpate.learning.units.regressors import Regressors, Tail
@@ -81,12 +83,13 @@ def refined_network(
     UsageError
         If there is no such form, or shapes disagree.
     """
+    X, Y, _, _, _ = samples(X, Y, inputs=len(inputs), outputs=len(outputs))
     scaling = Scaling.of(inputs, Y)
     xs, ys = scaling.scale_inputs(X), scaling.scale_outputs(Y)
     regressors = Regressors(form_of(form, len(inputs)), radial, tail)
     best = refine(xs, ys, _none(regressors), regressors)
     trials = [Trial.of(best)]
-    for h in _sizes(min(units_max, _room(xs, regressors))):
+    for h in _sizes(min(units_max, _room(best))):
         if best.loo <= target:
             break
         found = [refine(xs, ys, s, regressors) for s in _starts(xs, ys, h, starts, seed, known, best)]
@@ -96,7 +99,8 @@ def refined_network(
     if best.loo <= target and len(trials) > 1 and trials[-1].units > trials[-2].units + 1:
         best, pruned = prune(xs, ys, best, target=target)
         trials += pruned
-    return freeze_refined(best, inputs, outputs, scaling), best, tuple(trials)
+    network = freeze_refined(best, inputs, outputs, scaling, meta=training_record(X, Y, inputs))
+    return network, best, tuple(trials)
 
 
 def grow(
@@ -112,6 +116,8 @@ def grow(
     fit: Refine = refine,
 ) -> tuple[Refined, tuple[Trial, ...]]:
     """Forward growth: refine, add units where the error is, and again, to the target or `units_max`.
+
+    There are never more than the samples can decide on, 1 + p unknowns each.
 
     Parameters
     ----------
@@ -137,6 +143,7 @@ def grow(
     """
     best = now = fit(X, Y, _none(regressors) if theta is None else theta, regressors)
     trials = [Trial.of(now)]
+    units_max = min(units_max, _room(now))
     while best.loo > target and len(now.theta) < units_max:
         h = len(now.theta)
         new = min(max(1, round(share * h)), units_max - h)
@@ -202,33 +209,14 @@ def spread(points: np.ndarray, count: int) -> np.ndarray:
     return np.array(chosen)
 
 
-def freeze_refined(
-    found: Refined, inputs: Sequence[Range], outputs: Sequence[Quantity], scaling: Scaling
-) -> Network:
-    """A refinement as a network value; `scaling` is what it was refined in."""
-    factors, shifts = found.regressors.form.factors(found.theta)
-    tail = np.zeros((len(outputs), 1 + len(inputs)))
-    tail[:, : len(found.tail)] = found.tail.T
-    return Network(
-        tuple(inputs),
-        tuple(outputs),
-        factors,
-        shifts,
-        np.ascontiguousarray(found.weights.T),
-        tail,
-        scaling,
-        meta={"loo": found.loo, "condition": found.condition, "refined": True},
-        radial=found.regressors.radial,
-    )
-
-
 def _none(regressors: Regressors) -> np.ndarray:
     return np.zeros((0, regressors.form.size))
 
 
-def _room(xs: np.ndarray, regressors: Regressors) -> int:
-    """As many unknowns as samples would interpolate anything and judge nothing."""
-    return max(0, (len(xs) - regressors.tail_size) // (1 + regressors.form.size))
+def _room(found: Refined) -> int:
+    """How many units its samples can decide on: as many unknowns would interpolate anything and judge nothing."""
+    r = found.regressors
+    return max(0, (found.rows - r.tail_size) // (1 + r.form.size))
 
 
 def _sizes(largest: int) -> list[int]:

@@ -10,7 +10,7 @@ import numpy as np
 from palpate.learning.filter.observation import Observation
 from palpate.learning.filter.settings import Settings
 from palpate.learning.filter.state import State, initial
-from palpate.learning.learn import freeze
+from palpate.learning.freezing import freeze
 from palpate.learning.modes import output_modes
 from palpate.network import Network, Scaling
 from palpate.units import Quantity, Range, bounds
@@ -56,17 +56,8 @@ class Gauge:
         self, state: State, settings: Settings, inputs: tuple[Range, ...], outputs: tuple[Quantity, ...]
     ) -> Network:
         """The state as a network value in SI units."""
-        if self.directions is None:
-            return freeze(state, settings, inputs, outputs, self.scaling)
-        of = settings.regressors(state.inputs)
-        tail = np.zeros((state.outputs, 1 + state.inputs))
-        tail[:, : of.tail_size] = state.tail
-        factors, shifts = of.form.factors(state.theta)
-        return Network(
-            *(inputs, outputs, factors.copy(), shifts.copy(), state.weights.T.copy(), tail, self.scaling),
-            radial=settings.radial,
-            basis=self.directions,
-        )
+        meta = {"training": {"samples": state.count}}
+        return freeze(state, settings, inputs, outputs, self.scaling, basis=self.directions, meta=meta)
 
 
 def declared(inputs: Sequence[Range], outputs: Sequence[Quantity | Range]) -> Scaling | None:

@@ -20,8 +20,8 @@ from palpate.learning.filter.presets import default
 from palpate.learning.filter.settings import Settings
 from palpate.learning.filter.state import State, initial
 from palpate.learning.filter.step import Event, observe
+from palpate.learning.freezing import freeze
 from palpate.learning.history import History
-from palpate.learning.learn import freeze
 from palpate.learning.modes import output_modes
 from palpate.learning.stream.gauge import Gauge, declared
 from palpate.learning.stream.refining import Progress, Refining, refined_state

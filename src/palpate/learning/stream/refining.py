@@ -152,7 +152,8 @@ def _continued(
     """The filter's state with other parameters and their posterior."""
     new = len(theta) - state.units
     refined = replace(_refined(state, settings, theta, coefficients), rms=progress.expected)
-    found = posterior(refined, kept.X, settings, modes=state.modes, weights=weights)
+    share = None if kept.slopes is None else kept.slope_weights
+    found = posterior(refined, kept.X, settings, modes=state.modes, weights=weights, slope_weight=share)
     state = replace(
         state,
         coefficients=coefficients,

@@ -14,12 +14,13 @@ be learnt through its energy.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
+from palpate.errors import UsageError
 from palpate.learning.units.forms import Form
-from palpate.network.radial import RadialFunction, radial
+from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction, radial
 
 __all__ = ["Regressors", "Tail"]
 
@@ -36,11 +37,28 @@ class Regressors:
     radial : {"gaussian", "inverse-multiquadric", "matern-5/2"}
     tail : {"affine", "constant", "none"}
         T·[1, x], T, or nothing.
+
+    Raises
+    ------
+    UsageError
+        If there is no such radial function or tail.
     """
 
     form: Form
     radial: RadialFunction = "gaussian"
     tail: Tail = "affine"
+
+    def __post_init__(self) -> None:
+        for what, name, known in (
+            ("radial function", self.radial, RADIAL_FUNCTIONS),
+            ("tail", self.tail, get_args(Tail)),
+        ):
+            if name not in known:
+                raise UsageError(
+                    f"There is no {what} {name!r}.",
+                    why="Units and tail are told by name.",
+                    fix=f"Choose one of {', '.join(known)}.",
+                )
 
     @property
     def tail_size(self) -> int:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -96,3 +98,54 @@ def test_printing_says_what_it_is():
     assert str(random_network(2, 5, 6)).endswith("5 outputs, 6 units (axis-aligned, gaussian)")
     text = str(any_network(3, 50, 7, form="rank 1", radial="matern-5/2", modes=4))
     assert text.endswith("50 outputs through 4 modes, 7 units (rank 1, matern-5/2)")
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+@pytest.mark.parametrize("part", ["factors", "shifts", "weights", "tail", "basis"])
+def test_numbers_that_are_none_make_no_network(part, value):
+    network = any_network(2, 5, 3, modes=2)
+    bad = np.array(getattr(network, part))
+    bad.flat[-1] = value
+    with pytest.raises(UsageError, match=f"its {part}") as caught:
+        replace(network, **{part: bad})
+    assert caught.value.why
+    assert caught.value.fix
+
+
+@pytest.mark.parametrize("value", [np.nan, 0.0, -1.0])
+@pytest.mark.parametrize("part", ["input_half", "output_scale"])
+def test_scales_of_nothing_make_no_network(part, value):
+    network = any_network(2, 3, 3)
+    bad = np.array(getattr(network.scaling, part))
+    bad[-1] = value
+    with pytest.raises(UsageError, match=r"finite|positive"):
+        replace(network, scaling=replace(network.scaling, **{part: bad}))
+
+
+@pytest.mark.parametrize(
+    "widths", [np.zeros((4, 2)), -np.ones((4, 2)), np.full((4, 2), np.nan), np.ones((4, 1))]
+)
+def test_widths_of_nothing_make_no_gaussians(widths):
+    network = any_network(2, 3, 4)
+    with pytest.raises(UsageError, match="widths"):
+        Network.axis_aligned(
+            *(network.inputs, network.outputs),
+            centres=np.zeros((4, 2)),
+            widths=widths,
+            weights=network.weights,
+            tail=network.tail,
+            scaling=network.scaling,
+        )
+
+
+@pytest.mark.parametrize("modes", [None, 2])
+def test_outputs_that_there_are_not_are_not_selected(modes):
+    network = any_network(2, 4, 3, modes=modes)
+    for bad in ([5], [-5], [0, 4]):
+        with pytest.raises(UsageError, match="There are no outputs"):
+            network.select(bad)
+    for none in ([], slice(9, 12)):
+        with pytest.raises(UsageError, match="No output"):
+            network.select(none)
+    X = np.zeros((1, 2))
+    np.testing.assert_allclose(network.select([-1]).predict(X), network.predict(X)[:, 3:], rtol=1e-12)

@@ -58,11 +58,43 @@ def test_thinning_keeps_every_sample_near_a_kept_one():
 
 def test_single_and_repeated_points_are_regions():
     assert TrainedRegion.of(np.zeros((1, 2))).inside(np.zeros(2))
-    assert TrainedRegion.of(np.ones((600, 2))).inside(np.ones(2))
+    for N in (2, 4, 600):
+        copies = TrainedRegion.of(np.ones((N, 2)))
+        assert copies.inside(np.ones(2))
+        assert not copies.inside(np.full(2, 1.1))
+    few = TrainedRegion.of(np.repeat(np.linspace(-1, 1, 5), 3)[:, None])
+    assert len(few.points) == 5
+    assert few.radius <= 0.5
+
+
+@pytest.mark.parametrize(
+    "bad", [np.zeros(2), np.zeros(4), np.zeros(0), np.zeros((1, 3)), np.zeros(()), [0.0]]
+)
+def test_points_of_another_size_are_refused(bad):
+    region = TrainedRegion.of(np.random.default_rng(0).uniform(-1, 1, (20, 3)))
+    for ask in (region.inside, region.distance, region.distances):
+        if ask == region.distances and np.shape(bad) == (1, 3):
+            continue
+        with pytest.raises(UsageError, match="3 inputs") as caught:
+            ask(bad)
+        assert caught.value.fix
+
+
+def test_lists_are_points_and_what_is_not_finite_is_outside():
+    region = TrainedRegion.of(np.zeros((4, 3)))
+    assert region.inside([0, 0, 0])
+    assert region.distance([0, 3, 4]) == 5.0
+    assert region.distances([[0, 3, 4]]).tolist() == [5.0]
+    for lost in (np.nan, np.inf):
+        assert not region.inside(np.array([0.0, 0.0, lost]))
+    strided = np.arange(6.0)[::2]
+    assert region.distance(strided) == np.sqrt(20.0)
 
 
 def test_what_is_no_region_is_refused():
-    for bad in (np.zeros((0, 2)), np.full((3, 2), np.nan)):
+    with pytest.raises(UsageError, match="Keep one"):
+        TrainedRegion.of(np.zeros((4, 2)), most=0)
+    for bad in (np.zeros((0, 2)), np.full((3, 2), np.nan), np.zeros(5), np.zeros((2, 2, 2))):
         with pytest.raises(UsageError, match="no region"):
             TrainedRegion.of(bad)
     with pytest.raises(UsageError):

@@ -128,7 +128,7 @@ def test_what_does_not_fit_is_refused():
             (any_network(3, 4, 5, modes=3), "exceed"),
             (any_network(2, 4, 5), "declared"),
             (any_network(3, 5, 5), "declared"),
-            (replace(network, weights=np.full((4, 5), np.nan)), "finite"),
+            (replace(network, weights=np.full((4, 5), 1e200)), "overflow"),
         ]:
             with pytest.raises(UsageError, match=words):
                 publisher.publish(wrong)

@@ -9,8 +9,8 @@ import pytest
 
 from palpate.errors import UsageError
 from palpate.learning import refine
+from palpate.learning.freezing import freeze_refined
 from palpate.learning.refinement.laplace import Posterior
-from palpate.learning.refinement.structure import freeze_refined
 from palpate.learning.units.forms import form
 from palpate.learning.units.regressors import Regressors
 from palpate.network import Network, Scaling
@@ -133,3 +133,33 @@ def test_what_is_certain_is_left_out():
     np.testing.assert_allclose(constant.deviation(X), np.tile(wanted, (40, 1)), rtol=1e-12)
     again = Uncertainty.of(constant.attached())
     np.testing.assert_array_equal(again.deviation(X), constant.deviation(X))
+
+
+@pytest.mark.parametrize("X", [np.zeros((5, 1)), np.zeros((5, 3)), np.zeros(2), np.zeros((5, 1, 2))])
+def test_inputs_of_another_number_are_refused(X):
+    uncertainty = learnt(0.1)
+    for ask in (uncertainty.deviation, uncertainty.interval):
+        with pytest.raises(UsageError, match="network of 2 inputs") as caught:
+            ask(X)
+        assert caught.value.fix
+
+
+@pytest.mark.parametrize("change", ["one output", "fewer rows", "a vector", "nan", "nan inputs"])
+def test_what_calibrates_nothing_is_refused(change):
+    X, Y = sampled(20, 0.1, 5)
+    lost = np.where(np.arange(20) == 3, np.nan, 0.0)[:, None]
+    X, Y = {
+        "one output": (X, Y[:, :1]),
+        "fewer rows": (X, Y[:-1]),
+        "a vector": (X, Y[:, 0]),
+        "nan": (X, Y + lost),
+        "nan inputs": (X + lost, Y),
+    }[change]
+    with pytest.raises(UsageError):
+        learnt(0.1).calibrated(X, Y)
+
+
+def test_no_width_can_not_be_calibrated():
+    uncertainty = replace(learnt(0.1), factor=np.zeros(4))
+    with pytest.raises(UsageError, match="zero"):
+        uncertainty.calibrated(*sampled(20, 0.1, 5))

@@ -17,6 +17,7 @@ from palpate.network.compiled import Precision, packed, pattern, workspace
 from palpate.network.evaluator import Evaluator, refused
 from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction
 from palpate.network.scaling import Scaling
+from palpate.network.soundness import check_shapes, unreal
 from palpate.units import Quantity, Range
 
 __all__ = ["Network"]
@@ -77,7 +78,24 @@ class Network:
         scaling: Scaling,
         meta: Mapping[str, Any] | None = None,
     ) -> Network:
-        """Network of axis-aligned Gaussians from centres (h, n) and widths σ (h, n), both scaled."""
+        """Network of axis-aligned Gaussians from centres (h, n) and widths σ (h, n), both scaled.
+
+        Raises
+        ------
+        UsageError
+            If these are not of one shape, a width is not positive, or the parts do not fit together.
+        """
+        centres, widths = np.asarray(centres, float), np.asarray(widths, float)
+        if (
+            centres.ndim != 2
+            or widths.shape != centres.shape
+            or not ((widths > 0) & np.isfinite(widths)).all()
+        ):
+            raise UsageError(
+                f"Centres of shape {centres.shape} and widths of shape {widths.shape} make no Gaussians.",
+                why="Each unit has a centre and a positive, finite width along every input.",
+                fix="Pass centres (h, n) and widths (h, n).",
+            )
         h, n = centres.shape
         factors = np.zeros((h, n, n))
         factors[:, np.arange(n), np.arange(n)] = 1.0 / widths
@@ -91,37 +109,18 @@ class Network:
                 object.__setattr__(self, name, _frozen(getattr(self, name)))
         object.__setattr__(self, "inputs", tuple(self.inputs))
         object.__setattr__(self, "outputs", tuple(self.outputs))
-        self._check_shapes()
+        check_shapes(self)
         if self.radial not in RADIAL_FUNCTIONS:
             raise UsageError(
                 f"There is no radial function {self.radial!r}.",
                 fix=f"Choose one of {', '.join(RADIAL_FUNCTIONS)}.",
             )
-
-    def _check_shapes(self) -> None:
-        if self.factors.ndim != 3 or not self.inputs or not self.outputs:
+        if fault := unreal(self):
             raise UsageError(
-                f"A network of {len(self.inputs)} inputs, {len(self.outputs)} outputs and factors of shape "
-                f"{self.factors.shape} can't be.",
-                fix="Give at least one input and output, and factors (units, rank, inputs).",
+                f"A network can't be made: {fault}.",
+                why="Every answer it gave would be not-a-number.",
+                fix="Learn it again, from finite samples over ranges that are not empty.",
             )
-        (h, r, n), m, s = self.factors.shape, len(self.outputs), self.scaling
-        latent = m if self.basis is None else len(np.atleast_1d(self.weights))
-        shapes = {
-            "inputs": ((len(self.inputs),), (n,)),
-            "factors": (self.factors.shape, (h, min(max(r, 1), n), n)),
-            "shifts": (self.shifts.shape, (h, r)),
-            "weights": (self.weights.shape, (latent, h)),
-            "tail": (self.tail.shape, (latent, 1 + n)),
-            "basis": ((m, latent) if self.basis is None else self.basis.shape, (m, max(latent, 1))),
-            "input scales": ((np.shape(s.input_centre), np.shape(s.input_half)), ((n,), (n,))),
-            "output scales": ((np.shape(s.output_centre), np.shape(s.output_scale)), ((m,), (m,))),
-        }
-        for name, (found, wanted) in shapes.items():
-            if found != wanted:
-                raise UsageError(
-                    f"A network's {name} have shape {found}; its units and outputs ask for {wanted}."
-                )
 
     def __str__(self) -> str:
         names = ", ".join(str(r) for r in self.inputs)
@@ -234,9 +233,24 @@ class Network:
         return Evaluator(self, precision=precision, jacobian=jacobian)
 
     def select(self, outputs: slice | Sequence[int]) -> Network:
-        """The network of some of the outputs, without `extras`; a basis larger than them is multiplied out."""
+        """The network of some of the outputs, without `extras`; a basis larger than them is multiplied out.
+
+        Raises
+        ------
+        UsageError
+            If there are no such outputs, or none are asked for.
+        """
         rows = outputs if isinstance(outputs, slice) else list(outputs)
-        kept = tuple(np.array(self.outputs, dtype=object)[rows])
+        try:
+            kept = tuple(np.array(self.outputs, dtype=object)[rows])
+        except IndexError as error:
+            raise UsageError(
+                f"There are no outputs {rows} in a network of {len(self.outputs)}.",
+                why=str(error),
+                fix=f"Count from 0 to {len(self.outputs) - 1}.",
+            ) from error
+        if not kept:
+            raise UsageError("No output is selected.", fix="Pick one at least: network.select([0]).")
         basis, weights, tail = self.basis, self.weights, self.tail
         if basis is None:
             weights, tail = weights[rows], tail[rows]

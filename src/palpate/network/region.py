@@ -17,6 +17,7 @@ __all__ = ["TrainedRegion"]
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
 
+_DOUBLE = np.dtype(np.float64)
 _MOST = 512  # points kept: a few microseconds per query
 _TYPICAL = 0.99  # share of the data's own nearest-neighbour distances that a radius covers
 
@@ -36,13 +37,19 @@ class TrainedRegion:
     radius: float
 
     def __post_init__(self) -> None:
-        points = np.array(self.points, dtype=np.float64, order="C", ndmin=2)
+        points = np.array(self.points, dtype=np.float64, order="C")
         points.flags.writeable = False
         object.__setattr__(self, "points", points)
-        if points.ndim != 2 or not points.size or not np.isfinite(points).all() or not self.radius >= 0:
+        if (
+            points.ndim != 2
+            or not points.size
+            or not np.isfinite(points).all()
+            or not 0 <= self.radius < np.inf
+        ):
             raise UsageError(
                 f"Points of shape {points.shape} and a radius of {self.radius} are no region.",
-                fix="Make it of the training inputs: TrainedRegion.of(X).",
+                why="It is the union of balls about finite points (S, n), one row each.",
+                fix="Make it of the training inputs (N, n), also where there is one: TrainedRegion.of(X[:, None]).",
             )
 
     @classmethod
@@ -56,25 +63,65 @@ class TrainedRegion:
         Raises
         ------
         UsageError
-            If X is empty or not finite.
+            If X is empty, not finite or no table, or no point may be kept.
         """
+        if most < 1:
+            raise UsageError(f"A region of {most} points is none.", fix="Keep one point at least.")
         everything = cls(X, 0.0).points  # checked
         kept, cover = _farthest(everything, min(most, len(everything)))
         gaps = _gaps(everything, everything[kept], kept)
-        typical = float(np.quantile(gaps, _TYPICAL)) if len(everything) > 1 else 0.0
+        gaps = gaps[np.isfinite(gaps)]  # the only point kept of one place has no other
+        typical = float(np.quantile(gaps, _TYPICAL)) if gaps.size else 0.0
         return cls(everything[kept], max(typical, float(np.sqrt(cover))))
 
     def distance(self, x: np.ndarray) -> float:
-        """From a scaled input x (n,) to the nearest point."""
-        return float(_distance(x, self.points))
+        """From a scaled input x (n,) to the nearest point; infinite where x is not finite.
+
+        Raises
+        ------
+        UsageError
+            If x has another shape.
+        """
+        return float(_distance(self._checked(x), self.points))
 
     def distances(self, X: np.ndarray) -> np.ndarray:
-        """From scaled inputs X (N, n) to the nearest points, (N,)."""
-        return np.asarray(_distances(np.ascontiguousarray(X, dtype=np.float64), self.points))
+        """From scaled inputs X (N, n) to the nearest points, (N,).
+
+        Raises
+        ------
+        UsageError
+            If X has another number of columns.
+        """
+        X = np.ascontiguousarray(X, dtype=np.float64)
+        if X.ndim != 2 or X.shape[1] != self.points.shape[1]:
+            raise self._refused(X, "(N, {n})")
+        return np.asarray(_distances(X, self.points))
 
     def inside(self, x: np.ndarray) -> bool:
-        """Whether a scaled input x (n,) is within the radius of a training input."""
-        return bool(_distance(x, self.points) <= self.radius)
+        """Whether a scaled input x (n,) is within the radius of a training input.
+
+        Raises
+        ------
+        UsageError
+            If x has another shape.
+        """
+        return bool(_distance(self._checked(x), self.points) <= self.radius)
+
+    def _checked(self, x: np.ndarray) -> np.ndarray:
+        """The point as the compiled loop takes it: that one looks at no bounds."""
+        if type(x) is not np.ndarray or x.dtype is not _DOUBLE:
+            x = np.asarray(x, dtype=np.float64)
+        if x.shape != self.points.shape[1:]:
+            raise self._refused(x, "({n},)")
+        return x
+
+    def _refused(self, x: np.ndarray, wanted: str) -> UsageError:
+        n = self.points.shape[1]
+        return UsageError(
+            f"Inputs of shape {x.shape} have no distance to points of {n} inputs.",
+            why="Distances are between scaled inputs, all of them.",
+            fix=f"Pass an array of shape {wanted.format(n=n)}, scaled as the training inputs were.",
+        )
 
 
 @_jit
@@ -123,6 +170,8 @@ def _farthest(X: np.ndarray, count: int) -> tuple[np.ndarray, float]:
             gap[i] = min(gap[i], q)
             if gap[i] > widest:
                 farthest, widest = i, gap[i]
+        if widest == 0.0:  # what is left are copies
+            return chosen[: k + 1], widest
         if k + 1 < count:
             chosen[k + 1] = farthest
     return chosen, widest

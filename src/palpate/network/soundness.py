@@ -1,4 +1,4 @@
-"""Whether a network's numbers can be evaluated: finite, with real scales, and never so large as to overflow."""
+"""Whether a network can be evaluated: parts that fit, finite numbers, real scales, and none so large as to overflow."""
 
 from __future__ import annotations
 
@@ -6,18 +6,61 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from palpate.errors import UsageError
 from palpate.units import bounds
 
 if TYPE_CHECKING:
     from palpate.network.network import Network
 
-__all__ = ["flaw"]
+__all__ = ["check_shapes", "flaw", "unreal"]
 
 LARGEST = 1e100  # its square, times any sensible number of terms, is still far below the largest double
 
 
+def check_shapes(network: Network) -> None:
+    """Refuse parts that do not fit together.
+
+    Raises
+    ------
+    UsageError
+        If a shape is not what the units and outputs ask for.
+    """
+    if network.factors.ndim != 3 or not network.inputs or not network.outputs:
+        raise UsageError(
+            f"A network of {len(network.inputs)} inputs, {len(network.outputs)} outputs and factors of shape "
+            f"{network.factors.shape} can't be.",
+            fix="Give at least one input and output, and factors (units, rank, inputs).",
+        )
+    (h, r, n), m, s = network.factors.shape, len(network.outputs), network.scaling
+    latent = m if network.basis is None else len(np.atleast_1d(network.weights))
+    shapes = {
+        "inputs": ((len(network.inputs),), (n,)),
+        "factors": (network.factors.shape, (h, min(max(r, 1), n), n)),
+        "shifts": (network.shifts.shape, (h, r)),
+        "weights": (network.weights.shape, (latent, h)),
+        "tail": (network.tail.shape, (latent, 1 + n)),
+        "basis": ((m, latent) if network.basis is None else network.basis.shape, (m, max(latent, 1))),
+        "input scales": ((np.shape(s.input_centre), np.shape(s.input_half)), ((n,), (n,))),
+        "output scales": ((np.shape(s.output_centre), np.shape(s.output_scale)), ((m,), (m,))),
+    }
+    for name, (found, wanted) in shapes.items():
+        if found != wanted:
+            raise UsageError(
+                f"A network's {name} have shape {found}; its units and outputs ask for {wanted}."
+            )
+
+
 def flaw(network: Network) -> str:
     """What makes the network unusable over its trained ranges; "" if nothing does."""
+    for name, array in network.extras.items():
+        if array.dtype.kind == "f" and not np.isfinite(array).all():
+            return f"its extra array {name!r} holds numbers that are not finite"
+    with np.errstate(all="ignore"):  # what overflows is not below the bound
+        return "" if _largest(network) < LARGEST else "its numbers are so large that they overflow"
+
+
+def unreal(network: Network) -> str:
+    """Which of the network's own numbers are not finite, or scale by nothing; "" if none."""
     s = network.scaling
     numbers = {
         "factors": network.factors,
@@ -29,15 +72,13 @@ def flaw(network: Network) -> str:
         "output centres": s.output_centre,
         "output scales": s.output_scale,
         "basis": np.zeros(0) if network.basis is None else network.basis,
-        **{f"extra array {k!r}": v for k, v in network.extras.items() if v.dtype.kind == "f"},
     }
     for name, array in numbers.items():
         if not np.isfinite(array).all():
             return f"its {name} are not all finite numbers"
-    if not ((s.input_half > 0).all() and (s.output_scale > 0).all()):
+    if not (np.greater(s.input_half, 0).all() and np.greater(s.output_scale, 0).all()):
         return "its scales are not all positive"
-    with np.errstate(all="ignore"):  # what overflows is not below the bound
-        return "" if _largest(network) < LARGEST else "its numbers are so large that they overflow"
+    return ""
 
 
 def _largest(network: Network) -> float:

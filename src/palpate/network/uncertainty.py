@@ -61,9 +61,15 @@ class Uncertainty:
     factor: np.ndarray = field(default_factory=lambda: np.ones(1))
 
     def deviation(self, X: np.ndarray) -> np.ndarray:
-        """Standard deviation (N, m) of what would be measured at X (N, n), in SI units."""
+        """Standard deviation (N, m) of what would be measured at X (N, n), in SI units.
+
+        Raises
+        ------
+        UsageError
+            If X has another number of columns.
+        """
         s = self.network.scaling
-        xs = s.scale_inputs(np.asarray(X, float))
+        xs = s.scale_inputs(_table("Inputs", X, len(self.network.inputs)))
         parts = [self._variance(xs[i : i + _CHUNK]) for i in range(0, len(xs), _CHUNK)]
         variance = np.vstack(parts) if parts else np.zeros((0, len(self.noise)))
         return np.asarray(np.sqrt(variance) * self.factor * s.output_scale)
@@ -89,15 +95,31 @@ class Uncertainty:
         Raises
         ------
         UsageError
-            If there are too few samples for the level: N must be at least level/(1 − level).
+            If there are too few samples for the level: N must be at least level/(1 − level). If X and Y do not fit
+            together or are not finite, or a deviation is zero, which no factor can widen.
         """
+        X = _table("Inputs", X, len(self.network.inputs))
+        Y = _table("Outputs", Y, len(self.network.outputs))
+        if len(X) != len(Y) or not (np.isfinite(X).all() and np.isfinite(Y).all()):
+            raise UsageError(
+                f"{len(X)} rows of inputs and {len(Y)} of outputs, or some that are not finite, calibrate nothing.",
+                why="Each row is one measurement: its error is compared with its deviation.",
+                fix="Pass finite X (N, n) and Y (N, m) with the same N.",
+            )
         z, rank = _quantile(level), _ceil((len(X) + 1) * level)
         if rank > len(X):
             raise UsageError(
                 f"{len(X)} samples are too few to calibrate intervals of {level:.0%}.",
                 fix=f"Keep at least {_ceil(level / (1.0 - level))} apart from training.",
             )
-        scores = np.abs(Y - self.network.predict(X)) / self.deviation(X)
+        deviation = self.deviation(X)
+        if not (deviation > 0).all():
+            raise UsageError(
+                "Some deviations are zero.",
+                why="No factor widens an interval of no width.",
+                fix="Make the posterior with a noise above zero.",
+            )
+        scores = np.abs(Y - self.network.predict(X)) / deviation
         return replace(self, factor=self.factor * np.sort(scores, axis=0)[rank - 1] / z)
 
     def attached(self) -> Network:
@@ -179,6 +201,18 @@ def _by_factors(network: Network, pattern: np.ndarray, xs: np.ndarray) -> tuple[
     g, g1, _ = radial(network.radial, (v * v).sum(axis=2))
     by_v = 2.0 * g1[..., None] * v
     return g, np.concatenate([by_v[..., rows] * xs[:, None, columns], -by_v], axis=2)
+
+
+def _table(what: str, given: np.ndarray, columns: int) -> np.ndarray:
+    """A table of that many columns, as doubles."""
+    found = np.asarray(given, dtype=np.float64)
+    if found.ndim != 2 or found.shape[1] != columns:
+        raise UsageError(
+            f"{what} of shape {found.shape} came to a network of {columns} {what.lower()}.",
+            why="Each row is one point, each column one of them.",
+            fix=f"Pass an array of shape (N, {columns}).",
+        )
+    return found
 
 
 def _quantile(level: float) -> float:

@@ -71,13 +71,13 @@ def run(c: Case, factor: float, seed: int) -> Run:
 
 
 def scaled(factor: float) -> Settings:
-    """The default settings with their growth thresholds multiplied."""
+    """The default settings with their growth thresholds multiplied, ε_min up to ε_max."""
     s = default()
     return replace(
         s,
         error_min=factor * s.error_min,
         error_rms_min=factor * s.error_rms_min,
-        distance_min=factor * s.distance_min,
+        distance_min=min(factor * s.distance_min, s.distance_max),
     )
 
 

@@ -40,12 +40,17 @@ def test_conventions(estimator, check):
     check(estimator)
 
 
+# a target that is met at once, so that no clock decides what is found
+CHOOSING = RBFNetworkRegressor(form="auto", target=0.9, seconds=2.0, random_state=0)
+
+
 @pytest.mark.slow
+@pytest.mark.parametrize("model", [MRANRegressor(), CHOOSING], ids=["MRAN", "auto"])
 @pytest.mark.filterwarnings(
     "ignore::sklearn.exceptions.SkipTestWarning"
 )  # the array API is switched off in SciPy
-def test_conventions_as_it_comes():
-    outcomes = check_estimator(MRANRegressor(), on_fail=None)
+def test_conventions_as_it_comes(model):
+    outcomes = check_estimator(model, on_fail=None)
     assert {o["check_name"] for o in outcomes if o["status"] != "passed"} <= {"check_array_api_input"}
     assert len(outcomes) > 50
 
@@ -219,6 +224,103 @@ def test_what_is_wrong_is_told(wave):
     for model in (MRANRegressor(target=0.0), RBFNetworkRegressor(target=-1.0)):
         with pytest.raises(UsageError, match="target"):
             model.fit(X, y)
+
+
+def interval_share(model, X, y):
+    """Share of samples within ±1.64 standard deviations."""
+    predicted, deviation = model.predict(X, return_std=True)
+    assert predicted.shape == deviation.shape == y.shape
+    assert (deviation > 0).all()
+    return (np.abs(predicted - y) <= 1.645 * deviation).mean()
+
+
+@pytest.mark.parametrize("form", [None, "auto"])
+@pytest.mark.parametrize("size", [1e-6, 1e6])
+def test_deviations_hold_nine_in_ten(form, size):
+    rng = np.random.default_rng(0)
+    X = rng.uniform(-1, 1, (2300, 2))
+    y = size * (np.sin(2 * X[:, 0]) * np.exp(-X[:, 1]) + 0.1 * rng.normal(size=2300))
+    model = RBFNetworkRegressor(form=form, seconds=3.0, random_state=0).fit(X[:300], y[:300])
+    assert interval_share(model, X[300:], y[300:]) == pytest.approx(0.9, abs=0.07)
+
+
+def test_deviations_of_few_samples_are_of_the_errors_size(wave):
+    X, y = wave
+    for form in (None, "auto"):
+        model = RBFNetworkRegressor(form=form, random_state=0).fit(X[:15], y[:15])
+        assert interval_share(model, X[15:], y[15:]) > 0.7
+        assert np.median(model.predict(X[15:], return_std=True)[1]) < 2 * np.std(y)
+
+
+@pytest.mark.parametrize("settings", [None, "shared", "emran"])
+def test_the_filter_knows_its_deviation(settings, wave):
+    X, y = wave
+    Y = np.vstack([1e3 * y, 1e-3 * X[:, 0]]).T
+    model = MRANRegressor(settings=settings, random_state=0, passes=2).fit(X[:100], Y[:100])
+    predicted, deviation = model.predict(X, return_std=True)
+    assert predicted.shape == deviation.shape == Y.shape
+    assert (deviation > 0).all()
+    # in the units of each output; blocks without what correlates them say too much, never too little
+    most = 10.0 if settings == "emran" else 0.2
+    assert (deviation.mean(axis=0) < most * np.std(Y, axis=0)).all()
+    assert (np.abs(predicted - Y).mean(axis=0) < deviation.mean(axis=0)).all()
+    if settings != "emran":  # whose units leave nothing to be unsure of where nothing was seen
+        assert (model.predict(30 * X, return_std=True)[1].mean(axis=0) > 5 * deviation.mean(axis=0)).all()
+    ran = MRANRegressor(settings="ran", passes=1).fit(X, y)
+    with pytest.raises(UsageError, match="no predictive variance"):
+        ran.predict(X, return_std=True)
+
+
+WRONG = {
+    "both": (
+        {"ranges": 3},
+        {"ranges": [(0, 1, 2), (3, 4, 5)]},
+        {"ranges": [(1, -1), (0, 1)]},
+        {"ranges": "ab"},
+        {"target": "low"},
+        {"target": None},
+        {"tail": "bogus"},
+        {"radial": "bogus"},
+        {"form": "bogus"},
+        {"form": 3},
+        {"units_max": -1},
+        {"units_max": 2.5},
+        {"units_max": "many"},
+        {"scale_outputs": None},
+        {"scale_outputs": ["each"]},
+    ),
+    "MRAN": (
+        {"settings": {}},
+        {"settings": 5},
+        {"passes": 1.5},
+        {"passes": 0},
+        {"passes": "x"},
+        {"update": "bogus"},
+    ),
+    "RBF": (
+        {"seconds": "a"},
+        {"seconds": -1.0},
+        {"seconds": float("nan")},
+        {"tail": None},
+        {"radial": None},
+        {"units_max": None},
+    ),
+}
+
+
+@pytest.mark.parametrize(
+    ("kind", "wrong"),
+    [(MRANRegressor, w) for w in (*WRONG["both"], *WRONG["MRAN"])]
+    + [(RBFNetworkRegressor, w) for w in (*WRONG["both"], *WRONG["RBF"])],
+    ids=lambda v: v.__name__ if isinstance(v, type) else str(v),
+)
+def test_parameters_that_can_not_be_are_refused(kind, wrong, wave):
+    with pytest.raises(UsageError) as error:
+        kind(**wrong).fit(*wave)
+    assert isinstance(error.value, ValueError)
+    if kind is MRANRegressor:
+        with pytest.raises(UsageError):
+            kind(**wrong).partial_fit(*wave)
 
 
 def test_settings_by_hand_and_single_ones(wave):

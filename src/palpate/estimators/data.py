@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,11 +14,53 @@ from palpate.learning.choosing.automatic import ranges_of
 from palpate.network import Network
 from palpate.units import Quantity, Range
 
-__all__ = ["BadValue", "Units", "merged", "weights_of"]
+__all__ = [
+    "BadValue",
+    "Units",
+    "check_count",
+    "check_one_of",
+    "merged",
+    "refused_as_bad_value",
+    "weights_of",
+]
 
 
 class BadValue(UsageError, ValueError):
     """A wrong value, which scikit-learn expects to be a ValueError."""
+
+
+@contextmanager
+def refused_as_bad_value() -> Iterator[None]:
+    """Turn what palpate refuses into the ValueError that scikit-learn expects."""
+    try:
+        yield
+    except UsageError as error:
+        raise BadValue(error.what, why=error.why, fix=error.fix) from error
+
+
+def check_count(name: str, value: Any, least: int) -> None:
+    """Refuse what is no whole number, or less than `least`.
+
+    Raises
+    ------
+    BadValue
+        Then.
+    """
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if not whole or value < least:
+        raise BadValue(f"{name} is {value!r}.", fix=f"Give a whole number, {least} or more.")
+
+
+def check_one_of(name: str, value: Any, known: Sequence[str]) -> None:
+    """Refuse what is none of the known names.
+
+    Raises
+    ------
+    BadValue
+        Then.
+    """
+    if not isinstance(value, str) or value not in known:
+        raise BadValue(f"{name} is {value!r}.", fix=f"Choose one of {', '.join(known)}.")
 
 
 def weights_of(sample_weight: Any, rows: int) -> np.ndarray:
@@ -86,18 +129,10 @@ class Units:
         Raises
         ------
         BadValue
-            If there are not as many ranges as inputs.
+            If there are not as many ranges as inputs, or one of them is none.
         """
         names = [f"x{i}" for i in range(X.shape[1])] if names is None else [str(name) for name in names]
-        if ranges is not None and len(ranges) != X.shape[1]:
-            raise BadValue(f"{len(ranges)} ranges were given for {X.shape[1]} inputs.")
-        inputs = (
-            ranges_of(X, names)
-            if ranges is None
-            else tuple(
-                Range(name, float(low), float(high)) for name, (low, high) in zip(names, ranges, strict=True)
-            )
-        )
+        inputs = ranges_of(X, names) if ranges is None else _declared(ranges, names)
         size = np.abs(Y - Y.mean(axis=0)).max(axis=0)
         # a column that is constant but for round-off is not blown up
         size = np.where(size > 1e-12 * np.abs(Y).max(axis=0), size, 0.0)
@@ -112,3 +147,30 @@ class Units:
             s, output_centre=s.output_centre * self.divisor, output_scale=s.output_scale * self.divisor
         )
         return replace(network, scaling=whole)
+
+
+def _declared(ranges: Any, names: Sequence[str]) -> tuple[Range, ...]:
+    """Ranges from one (low, high) for each name."""
+    try:
+        ends = np.array(ranges, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise _no_ranges(ranges, f"{error}.") from error
+    if ends.ndim != 2 or ends.shape[1] != 2:
+        raise _no_ranges(ranges, f"As an array they have shape {ends.shape}.")
+    if len(ends) != len(names):
+        raise BadValue(
+            f"{len(ends)} ranges were given for {len(names)} inputs.",
+            fix="Give one (low, high) for each input.",
+        )
+    with refused_as_bad_value():
+        return tuple(
+            Range(name, float(low), float(high)) for name, (low, high) in zip(names, ends, strict=True)
+        )
+
+
+def _no_ranges(ranges: Any, why: str) -> BadValue:
+    return BadValue(
+        f"ranges is {ranges!r:.80}.",
+        why=why,
+        fix="Give one (low, high) for each input, such as [(0, 5), (1, 2)].",
+    )

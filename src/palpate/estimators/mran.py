@@ -10,9 +10,10 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from palpate.estimators.base import RadialRegressor
-from palpate.estimators.data import BadValue, Units, merged, weights_of
+from palpate.estimators.data import BadValue, Units, check_count, refused_as_bad_value, weights_of
 from palpate.learning import PRESETS, Observation, Settings, freeze, initial, learn, observe
 from palpate.learning.choosing.automatic import UNITS_MAX, automatic
+from palpate.learning.filter.deviation import predictive_deviation
 from palpate.learning.filter.state import State
 from palpate.learning.modes import output_modes
 from palpate.network import Scaling
@@ -70,6 +71,10 @@ class MRANRegressor(RadialRegressor):
     so it should bring at least some dozens of samples that span the inputs. How the rest is cut into batches makes
     no difference to the last bit.
 
+    `predict(X, return_std=True)` tells what the filter's own covariance says, which is not calibrated: about right for
+    the full and the shared-weight rule, several times too much for the decoupled and the winner rule, whose blocks
+    know nothing of how units correlate. The gradient rule has none.
+
     Examples
     --------
     >>> import numpy as np
@@ -126,9 +131,9 @@ class MRANRegressor(RadialRegressor):
         UsageError
             If a parameter is out of its range.
         """
-        X, Y = self._checked(X, y, first=True)
-        X, Y, weights = merged(X, Y, weights_of(sample_weight, len(X)))
-        units, seed = self._units(X, Y), self._seed()
+        check_count("passes", self.passes, 1)
+        X, Y, weights, units = self._prepared(X, y, sample_weight)
+        seed = self._seed()
         settings = self._settings(X, Y / units.divisor, units, seed, weights)
         learned = learn(
             X,
@@ -179,6 +184,10 @@ class MRANRegressor(RadialRegressor):
         self._keep(state, self.settings_, self._units_, self._scaling)
         return self
 
+    def _deviation(self, X: np.ndarray) -> np.ndarray:
+        scaled = predictive_deviation(self.state_, self._scaling.scale_inputs(X), self.settings_)
+        return scaled * self._scaling.output_scale * self._units_.divisor
+
     def _begin(self, X: np.ndarray, Y: np.ndarray) -> None:
         units = self._units(X, Y)
         scaled = Y / units.divisor
@@ -199,24 +208,33 @@ class MRANRegressor(RadialRegressor):
     ) -> Settings:
         names = ("form", "radial", "tail", "update", "units_max")
         given = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
-        if self.settings is None:
-            return automatic(
-                X,
-                Y,
-                units.inputs,
-                target=self.target,
-                passes=self.passes,
-                seed=seed,
-                weights=weights,
-                **given,
-            )
+        with refused_as_bad_value():
+            if self.settings is not None:
+                settings = replace(self._named(), **given)
+            else:
+                settings = automatic(
+                    X,
+                    Y,
+                    units.inputs,
+                    target=self.target,
+                    passes=self.passes,
+                    seed=seed,
+                    weights=weights,
+                    **given,
+                )
+            settings.regressors(X.shape[1])  # whether there is such a form for so many inputs
+        return settings
+
+    def _named(self) -> Settings:
+        """The settings given, or those of the preset named."""
         if isinstance(self.settings, Settings):
-            return replace(self.settings, **given)
-        if self.settings not in PRESETS:
+            return self.settings
+        if not isinstance(self.settings, str) or self.settings not in PRESETS:
             raise BadValue(
-                f"There is no preset {self.settings!r}.", fix=f"Choose one of {', '.join(PRESETS)}."
+                f"There is no preset {self.settings!r}.",
+                fix=f"Give Settings(…), or choose one of {', '.join(PRESETS)}.",
             )
-        return replace(PRESETS[self.settings](), **given)
+        return PRESETS[self.settings]()
 
     def _keep(self, state: State, settings: Settings, units: Units, scaling: Scaling) -> None:
         self.state_, self.settings_ = state, settings

@@ -4,27 +4,32 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from palpate.estimators.base import RadialRegressor
-from palpate.estimators.data import Units, merged, weights_of
+from palpate.estimators.data import BadValue, Units, check_count, check_one_of, refused_as_bad_value
 from palpate.learning.choosing import choice
-from palpate.learning.choosing.automatic import check_target
+from palpate.learning.choosing.arrays import check_search, constant
+from palpate.learning.choosing.calibration import Evidence, calibrated, regressor_root, spread_of
+from palpate.learning.choosing.fitted import Choice
 from palpate.learning.refinement.refine import Refined, refine
 from palpate.learning.refinement.structure import Trial, freeze_refined, placed
 from palpate.learning.units.forms import form as form_of
-from palpate.learning.units.regressors import Regressors
-from palpate.network import Scaling
+from palpate.learning.units.regressors import Regressors, Tail
+from palpate.network import Scaling, Uncertainty
+from palpate.network.radial import RADIAL_FUNCTIONS
 
 __all__ = ["RBFNetworkRegressor"]
 
 _ITERATIONS = 60  # per size: the next one moves all units again
 _PATIENCE = 3  # sizes in a row that may bring nothing
 _FEWEST = 20  # samples from which a fifth of them can judge
+_LEVEL = 0.9  # at which deviations are calibrated
 _GAIN = 0.98  # what a size must lower the error to, to have brought something
 
 
@@ -66,6 +71,8 @@ class RBFNetworkRegressor(RadialRegressor):
         Its error on the samples that judged, relative as `target`.
     trials_ : tuple of Trial or Choice
         What was tried.
+    uncertainty_ : Uncertainty
+        Behind `predict(X, return_std=True)`: ±1.64 deviations hold nine in ten of the samples kept apart.
     n_features_in_ : int
     feature_names_in_ : (n,)
         Where X was a table with named columns.
@@ -85,7 +92,8 @@ class RBFNetworkRegressor(RadialRegressor):
     """
 
     error_: float
-    trials_: tuple[Trial | choice.Choice, ...]
+    trials_: tuple[Trial | Choice, ...]
+    uncertainty_: Uncertainty
 
     def __init__(
         self,
@@ -130,38 +138,57 @@ class RBFNetworkRegressor(RadialRegressor):
         UsageError
             If a parameter is out of its range.
         """
-        check_target(self.target)
-        X, Y = self._checked(X, y, first=True)
-        X, Y, weights = merged(X, Y, weights_of(sample_weight, len(X)))
-        units = self._units(X, Y)
-        if self.form == "auto" and len(X) >= _FEWEST and not np.ptp(weights):
+        self._check_parameters()
+        X, Y, weights, units = self._prepared(X, y, sample_weight)
+        if (
+            self.form == "auto"
+            and len(X) >= _FEWEST
+            and not np.ptp(weights)
+            and not constant(Y / units.divisor)
+        ):
             return self._chosen(X, Y, units)
         scaling = Scaling.of(units.inputs, Y / units.divisor)
         xs, ys = scaling.scale_inputs(X), scaling.scale_outputs(Y / units.divisor)
         spread = float(np.sqrt((ys**2).mean())) or 1.0
-        with threadpool_limits(1):
-            found, error, self.trials_ = self._grown(xs, ys, weights, self.target * spread)
-        self.error_ = error / spread
-        self.network_ = units.back(freeze_refined(found, units.inputs, units.outputs, scaling))
+        with threadpool_limits(1), refused_as_bad_value():
+            grown = self._grown(xs, ys, weights, self.target * spread)
+            root = regressor_root(grown.found, xs, weights)
+        self.error_, self.trials_ = grown.error / spread, grown.trials
+        network = freeze_refined(grown.found, units.inputs, units.outputs, scaling)
+        self.network_ = units.back(network)
+        self.uncertainty_ = calibrated(self.network_, root @ root.T, grown.evidence, _LEVEL)
         return self
+
+    def _deviation(self, X: np.ndarray) -> np.ndarray:
+        return self.uncertainty_.deviation(X)
+
+    def _check_parameters(self) -> None:
+        check_one_of("radial", self.radial, RADIAL_FUNCTIONS)
+        check_one_of("tail", self.tail, get_args(Tail))
+        check_count("units_max", self.units_max, 0)
+        if not (self.form is None or isinstance(self.form, str)):
+            raise BadValue(f"form is {self.form!r}.", fix='Give a name, such as "rotated", or "auto".')
+        with refused_as_bad_value():
+            check_search(self.seconds, 0, None, _LEVEL)
 
     def _chosen(self, X: np.ndarray, Y: np.ndarray, units: Units) -> RBFNetworkRegressor:
-        found = choice.fit(
-            X,
-            Y / units.divisor,
-            units.inputs,
-            units.outputs,
-            seconds=self.seconds,
-            seed=self._seed(),
-            target=self.target,
-        )
+        with refused_as_bad_value():
+            found = choice.fit(
+                X,
+                Y / units.divisor,
+                units.inputs,
+                units.outputs,
+                seconds=self.seconds,
+                seed=self._seed(),
+                target=self.target,
+                level=_LEVEL,
+            )
         self.error_, self.trials_ = found.heldout, found.trials
         self.network_ = units.back(found.network)
+        self.uncertainty_ = replace(found.uncertainty, network=self.network_)
         return self
 
-    def _grown(
-        self, X: np.ndarray, Y: np.ndarray, weights: np.ndarray, target: float
-    ) -> tuple[Refined, float, tuple[Trial, ...]]:
+    def _grown(self, X: np.ndarray, Y: np.ndarray, weights: np.ndarray, target: float) -> _Grown:
         """The first size that meets the target, or the best until more units bring nothing, or time is up."""
         start, seed = time.monotonic(), self._seed()
         regressors, most = self._regressors(X.shape[1], Y)
@@ -184,7 +211,8 @@ class RBFNetworkRegressor(RadialRegressor):
             if _error(now) < least:
                 best, least = now, _error(now)
         # units stay, weights learn from all samples
-        return refine(X, Y, best.theta, regressors, weights=weights, iterations=0), least, tuple(trials)
+        whole = refine(X, Y, best.theta, regressors, weights=weights, iterations=0)
+        return _Grown(whole, least, tuple(trials), _evidence(best, xs, ys, weights[learns], unseen))
 
     def _regressors(self, n: int, Y: np.ndarray) -> tuple[Regressors, int]:
         """What units are, and how many of them leave some data over."""
@@ -197,6 +225,40 @@ class RBFNetworkRegressor(RadialRegressor):
         m = Y.shape[1]
         room = max(0.0, Y.size / 1.25 - m * made.tail_size) / (m + made.form.size)
         return made, min(self.units_max, int(room), len(Y) // 2)
+
+
+@dataclass(frozen=True, eq=False)
+class _Grown:
+    """A network of all samples, its error and what it missed on those kept apart, and the sizes tried."""
+
+    found: Refined
+    error: float
+    trials: tuple[Trial, ...]
+    evidence: Evidence
+
+
+def _evidence(
+    best: Refined,
+    X: np.ndarray,
+    Y: np.ndarray,
+    weights: np.ndarray,
+    unseen: tuple[np.ndarray, np.ndarray] | None,
+) -> Evidence:
+    """What a network that learnt from X (N, n), Y (N, m) missed on samples kept apart; or its leave-one-out error.
+
+    Where so few samples say not even that, it is the outputs' own size.
+    """
+    root = regressor_root(best, X, weights)
+    if unseen is not None:
+        held, wanted = unseen
+        return Evidence(wanted - best.predict(held), spread_of(best, root, held))
+    # leaving one out divides by 1 − leverage; the whole is as large as the error that counts the units' numbers too
+    left = np.maximum(1.0 - weights * (spread_of(best, root, X) - 1.0), 0.02)
+    missed = (Y - best.predict(X)) / left[:, None]
+    size = float(np.sqrt((missed**2).mean()))
+    if not size or not np.isfinite(best.loo):
+        return Evidence(Y, np.ones(len(Y)))
+    return Evidence(missed * (best.loo / size), 1.0 / left)
 
 
 def _learns(rows: int, seed: int) -> np.ndarray:

@@ -12,7 +12,7 @@ from palpate.errors import UsageError
 from palpate.learning.choosing.automatic import check_target, ranges_of
 from palpate.units import Quantity, Range
 
-__all__ = ["Samples", "check_search", "points"]
+__all__ = ["FEWEST", "Samples", "check_search", "constant", "points"]
 
 FEWEST = 20
 _LARGEST = 1e100  # its square is still a number
@@ -101,6 +101,11 @@ def points(X: Any, inputs: Sequence[Range]) -> np.ndarray:
     return X
 
 
+def constant(Y: np.ndarray) -> bool:
+    """Whether no output of Y (N, m) changes by more than rounding."""
+    return not bool((np.ptp(Y, axis=0) > 1e-13 * np.abs(Y).max()).any())
+
+
 def check_search(seconds: Any, seed: Any, target: Any, level: Any) -> None:
     """Refuse what can't steer a search.
 
@@ -165,7 +170,7 @@ def _check_rows(X: np.ndarray, Y: np.ndarray) -> None:
         raise UsageError(
             f"Numbers beyond {_LARGEST:.0e} can't be squared.", fix="Give the samples in other units."
         )
-    if not (np.ptp(Y, axis=0) > 1e-13 * np.abs(Y).max()).any():
+    if constant(Y):
         raise UsageError(
             f"All {len(Y)} samples have the same outputs.",
             why="There is nothing to learn, and no error to compare by.",

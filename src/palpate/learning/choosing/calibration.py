@@ -27,7 +27,16 @@ from palpate.learning.refinement.refine import Refined
 from palpate.network import Network
 from palpate.network.uncertainty import Uncertainty
 
-__all__ = ["Evidence", "calibrated", "committee_root", "kernel_covariance", "kernel_spread", "regressor_root"]
+__all__ = [
+    "LARGEST",
+    "Evidence",
+    "calibrated",
+    "committee_root",
+    "kernel_covariance",
+    "kernel_spread",
+    "regressor_root",
+    "spread_of",
+]
 
 LARGEST = 1200
 """Regressors of which a covariance is kept, 12 MB; larger networks have the same width everywhere."""
@@ -58,9 +67,13 @@ class Evidence:
         return cls(np.vstack([p.missed for p in parts]) * gain, np.concatenate([p.spread for p in parts]))
 
 
-def regressor_root(found: Refined, X: np.ndarray) -> np.ndarray:
-    """G (c, N) by which the coefficients follow from outputs at X (N, n), the units as they are."""
-    U, s, Vt = np.linalg.svd(_rows(found, X), full_matrices=False)
+def regressor_root(found: Refined, X: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
+    """G (c, N) by which the coefficients follow from outputs at X (N, n), the units as they are.
+
+    With weights (N,) it is of the outputs times their roots, whose noise is then alike.
+    """
+    rows = _rows(found, X) if weights is None else _rows(found, X) * np.sqrt(weights)[:, None]
+    U, s, Vt = np.linalg.svd(rows, full_matrices=False)
     return np.asarray((Vt.T * (s / (s * s + _RIDGE * len(X)))) @ U.T)
 
 

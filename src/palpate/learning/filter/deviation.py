@@ -6,7 +6,7 @@ P is what the filter believes of its parameters: under the block rules zero betw
 rule P_φ for each output's coefficients beside P_θ for the shapes. R is the floor of the measurement noise or the
 guarded share of the running mean square of the innovation, whichever is larger, without the edge factor, which
 weighs samples and is no noise. Nothing here is calibrated: a filter is sure of itself where its linearisation is
-wrong.
+wrong, and blocks without the correlations between units that overlap say far too much.
 """
 
 from __future__ import annotations

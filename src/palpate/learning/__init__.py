@@ -8,6 +8,8 @@ choosing     form, size and thresholds from the data alone
 stream       learning while it runs: a learner, samples retained, bounded refinement
 history      what happened meanwhile, and its picture (drawing)
 modes        the few directions in which many outputs move
+checks       samples as arrays that fit together         measures     errors relative to the outputs' spread
+freezing     a network value of what was learnt, and the hash of its samples
 touch        a dataset made into a body that can be touched
 """
 

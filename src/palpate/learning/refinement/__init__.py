@@ -5,4 +5,5 @@ rows           samples, weights and slopes as rows      projection     cost and 
 marquardt      one damped step                          nudge          one such step for a stream
 leave_one_out  errors of samples and units left out
 posterior      the way back to the filter               laplace        the structured posterior
+inverse        of an information matrix, whatever the data left open
 """

@@ -101,15 +101,25 @@ def test_quantile_is_conformal_and_students_where_samples_are_few(found):
     network = found.network
     missed = np.random.default_rng(0).normal(size=(99, 2)) * [1.0, 7.0]
     evidence = Evidence(missed, np.ones(99))
-    half = calibration.calibrated(network, None, evidence, 0.9).interval(noisy(1)[0], 0.9)
+    half = calibration.calibrated(network, None, [evidence], 0.9).interval(noisy(1)[0], 0.9)
     width = (half[1] - half[0])[0] / 2 / network.scaling.output_scale
     np.testing.assert_allclose(width, np.sort(abs(missed), axis=0)[89], rtol=1e-9)
     few = Evidence(missed[:5], np.ones(5))
     from scipy.stats import t
 
-    half = calibration.calibrated(network, None, few, 0.9).interval(noisy(1)[0], 0.9)
+    half = calibration.calibrated(network, None, [few], 0.9).interval(noisy(1)[0], 0.9)
     width = (half[1] - half[0])[0] / 2 / network.scaling.output_scale
     np.testing.assert_allclose(width, t.ppf(0.95, 5) * np.sqrt((missed[:5] ** 2).mean(axis=0)), rtol=1e-9)
+
+
+def test_of_two_evidences_the_wider_counts(found):
+    rng = np.random.default_rng(0)
+    one, two = (Evidence(rng.normal(size=(99, 2)) * scale, np.ones(99)) for scale in ([1, 7], [3, 2]))
+    widths = [
+        calibration.calibrated(found.network, None, parts, 0.9).deviation(noisy(1)[0])
+        for parts in ([one], [two], [one, two])
+    ]
+    np.testing.assert_array_equal(widths[2], np.maximum(*widths[:2]))
 
 
 def test_trusted_are_places_between_samples(found):

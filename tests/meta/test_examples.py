@@ -123,6 +123,16 @@ def drifting(text: str, folder: Path) -> None:
     assert there == here
 
 
+def arrays(text: str, folder: Path) -> None:
+    errors = re.search(r"error ([\d.]+) and ([\d.]+), ([\d.]+)% inside", text).groups()
+    assert all(0.009 < float(e) < 0.015 for e in errors[:2])  # the noise itself is 0.01
+    assert 85.0 <= float(errors[2]) <= 95.0
+    assert re.search(r"force 1: .* 0\.7\d+ ± 0\.0\d+, trusted", text)
+    assert re.search(r"force 6: .*, not trusted", text)
+    assert "the same answers: True" in text
+    assert (folder / "oscillator.palpate").stat().st_size > 1000
+
+
 CHECKS: dict[str, Callable[[str, Path], None]] = {
     "01_cantilever.py": cantilever,
     "02_two_loads.py": two_loads,
@@ -131,6 +141,7 @@ CHECKS: dict[str, Callable[[str, Path], None]] = {
     "05_program_touches.py": program,
     "06_drifting_stiffness.py": drifting,
     "07_scikit_learn.py": scikit_learn,
+    "08_arrays.py": arrays,
 }
 QUICK = {"04_filter_by_hand.py"}
 

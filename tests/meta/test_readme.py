@@ -61,6 +61,23 @@ def test_the_program_runs_as_a_file_without_a_guard(tmp_path: Path):
     assert (tmp_path / "beam.palpate").is_file()
 
 
+def test_the_program_for_arrays_runs(tmp_path: Path):
+    text = re.findall(r"```python\n(.*?)```", README, re.DOTALL)[1]
+    done = subprocess.run(
+        [sys.executable, "-c", text],
+        check=False,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        env=os.environ | {"PYTHONIOENCODING": "utf-8"},
+        timeout=100,
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    assert done.stdout.startswith("Fitted: 2 inputs → 2 outputs")
+    assert (tmp_path / "model.palpate").is_file()
+
+
 def test_the_quick_start_has_the_same_program():
     assert program((ROOT / "docs" / "quickstart.md").read_text(encoding="utf-8")) == program(README)
 

@@ -156,7 +156,7 @@ class RBFNetworkRegressor(RadialRegressor):
         self.error_, self.trials_ = grown.error / spread, grown.trials
         network = freeze_refined(grown.found, units.inputs, units.outputs, scaling)
         self.network_ = units.back(network)
-        self.uncertainty_ = calibrated(self.network_, root @ root.T, grown.evidence, _LEVEL)
+        self.uncertainty_ = calibrated(self.network_, root @ root.T, [grown.evidence], _LEVEL)
         return self
 
     def _deviation(self, X: np.ndarray) -> np.ndarray:

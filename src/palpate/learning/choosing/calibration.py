@@ -10,7 +10,8 @@ were held out: of n scores |y − f|/σ of networks whose weights had not seen t
 
 The scores are not quite those of the final network. Its form and size were chosen by these samples, which makes
 the widths narrower than they should be; its weights then learn from these samples too, which makes it better than
-the widths say. The second weighs more unless there are few samples.
+the widths say. Of few samples the first weighs more. There networks of the same kind are learnt again, each without
+a fold of which it then has seen nothing, and what those miss on their folds counts where it is more.
 """
 
 from __future__ import annotations
@@ -107,7 +108,9 @@ def kernel_spread(layer: KernelLayer, X: np.ndarray) -> np.ndarray:
     return np.asarray(1.0 - (k * np.linalg.solve(C, k.T).T).sum(axis=1) / (1.0 + ridge))
 
 
-def calibrated(network: Network, M: np.ndarray | None, evidence: Evidence, level: float) -> Uncertainty:
+def calibrated(
+    network: Network, M: np.ndarray | None, evidence: Sequence[Evidence], level: float
+) -> Uncertainty:
     """The network's uncertainty, its widths set so that intervals of `level` hold what the evidence holds.
 
     Parameters
@@ -115,17 +118,26 @@ def calibrated(network: Network, M: np.ndarray | None, evidence: Evidence, level
     network : Network
     M : (c, c), optional
         Covariance of tail and weights over s²; none where widths are to be the same everywhere.
-    evidence : Evidence
-        Of m outputs.
+    evidence : sequence of Evidence
+        Of m outputs; where there are several, the widest counts, output by output.
     level : float
     """
-    spread = evidence.spread if M is not None else np.ones_like(evidence.spread)
+    found = [_noise_and_factor(one, level, constant=M is None) for one in evidence]
+    noise, factor = np.array([n for n, _ in found]), np.array([f for _, f in found])
+    widest = (noise * factor**2).argmax(axis=0)[None]
+    noise, factor = (np.take_along_axis(a, widest, axis=0)[0] for a in (noise, factor))
     M = np.zeros((0, 0)) if M is None else M
-    squares = evidence.missed**2 / spread[:, None]
-    noise = np.maximum(squares.mean(axis=0), _ROUND_OFF)
-    factor = _quantiles(np.sqrt(squares / noise), level) / NormalDist().inv_cdf((1.0 + level) / 2.0)
     none = np.zeros((2, 0), dtype=np.int64)
     return Uncertainty(network, noise, M, np.zeros((0, 0)), np.zeros((len(M), 0)), none, factor)
+
+
+def _noise_and_factor(evidence: Evidence, level: float, *, constant: bool) -> tuple[np.ndarray, np.ndarray]:
+    """s_j² and what a normal law's width is to be multiplied by, each (m,)."""
+    spread = np.ones_like(evidence.spread) if constant else evidence.spread
+    squares = evidence.missed**2 / spread[:, None]
+    noise = np.maximum(squares.mean(axis=0), _ROUND_OFF)
+    normal = NormalDist().inv_cdf((1.0 + level) / 2.0)
+    return noise, _quantiles(np.sqrt(squares / noise), level) / normal
 
 
 def _quantiles(scores: np.ndarray, level: float) -> np.ndarray:

@@ -35,7 +35,7 @@ _NUMBERS = 1500  # unknowns in the units of a full-size runner for 30 s
 _SMALL = 600  # and of one that is only looked at
 _SAMPLES = 1000  # to learn from while choosing
 _MEMBERS = 5
-_CROSSED_BELOW = 200  # samples: intervals then rest on networks of their own
+_CROSSED_BELOW = 500  # samples: intervals then rest on networks of their own
 _BEHIND = 1.2  # times the best error: too far for another ten iterations
 _ROUND_OFF = 1e-9  # of the outputs: nobody asks for less
 _HOPELESS = 3.0  # times the kernel layer's error after the race: no refinement will make up for that
@@ -83,8 +83,8 @@ def fit(
     -----
     A fifth of the samples (15 % of a thousand and more) is held out to choose by, and its errors, before any
     weights saw it, set the intervals' widths. Then the weights are fitted to all samples: no sample is lost to the
-    calibration, and its guarantee is approximate (see `palpate.learning.choosing.calibration`). Below 45 samples
-    too few are held out for a 90 % quantile; there the widths rest on a normal law.
+    calibration, and its guarantee is approximate (see `palpate.learning.choosing.calibration`). Below 500 samples,
+    where time allows, networks learnt without a fold are judged on it too, and the wider widths count.
 
     Raises
     ------
@@ -281,22 +281,22 @@ class _Chooser:
         assert runner.found is not None
         return Member(refitted(runner.found, self.X, self.Y, RIDGE), runner.heldout, runner.found, split)
 
-    def _crossed(self, race: Race, winner: Runner) -> Evidence | None:
+    def _crossed(self, race: Race, winner: Runner) -> Sequence[Evidence]:
         """What networks of the winner's kind miss on folds of which they have seen nothing; of few samples only.
 
         Each stops by other samples than those that it is judged by: on a handful the best iterate is there by luck.
         """
         if len(self.X) >= _CROSSED_BELOW:
-            return None
+            return ()
         parts = []
         for k in range(_MEMBERS):
             whole = Split.of(self.X, self.Y, share=1.0 / _MEMBERS, seed=self.seed, fold=k)
             part = Split.of(whole.X, whole.Y, share=self.share, seed=self.seed)
             found = self._fresh(Race(part, race.scales, self.seed + k, race.deadline), winner).found
-            if found is None:
-                return None
+            if found is None or time.monotonic() > race.deadline:  # cut short, it would say too much
+                return ()
             parts.append(self.finish.evidence(refitted(found, whole.X, whole.Y, RIDGE), whole))
-        return Evidence.together(parts)
+        return (Evidence.together(parts),)
 
     def _tail(self) -> tuple[Runner, float]:
         """An affine function without units, and its error."""

@@ -41,12 +41,11 @@ class Finish:
         error: float,
         *,
         form: str | None = None,
-        evidence: Evidence | None = None,
+        evidence: Sequence[Evidence] = (),
     ) -> Fitted:
-        """Of one network or the average of several, with the intervals that the evidence or their own errors set."""
+        """Of one network or the average of several; their own errors, and further evidence, set the intervals."""
         regressors, X = members[0].found.regressors, self.problem.X
-        if evidence is None:
-            evidence = self._own(members, error)
+        evidence = [self._own(members, error), *evidence]
         M = None
         if sum(len(member.found.coefficients) for member in members) <= calibration.LARGEST:
             root = calibration.committee_root([member.found for member in members], X)
@@ -62,7 +61,7 @@ class Finish:
         M, spread = None, np.ones(len(held))
         if len(layer.centres) <= calibration.LARGEST:
             M, spread = calibration.kernel_covariance(layer), calibration.kernel_spread(judged, held)
-        evidence = Evidence(self._missed(judged.predict(held), self.split), spread)
+        evidence = [Evidence(self._missed(judged.predict(held), self.split), spread)]
         arrays = (*layer.units(), layer.weights, layer.tail)
         return self._fitted(arrays, metric.radial, "kernel layer", error, M, evidence)
 
@@ -90,7 +89,7 @@ class Finish:
         form: str,
         error: float,
         M: np.ndarray | None,
-        evidence: Evidence,
+        evidence: Sequence[Evidence],
     ) -> Fitted:
         heldout = float(error / self.problem.unit)
         network = self.problem.network(*arrays, radial, heldout=heldout)

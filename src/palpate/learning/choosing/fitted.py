@@ -177,9 +177,11 @@ class Fitted:
             f"  held-out error {self.heldout:.1e} of the outputs' spread; intervals of {self.level:.0%}",
         ]
         if self.trials:
-            best = sorted(self.trials, key=lambda trial: trial.heldout)[:_SHOWN]
-            lines += [f"  tried {len(self.trials)} in {self.seconds:.1f} s, the best of them:"]
-            lines += [f"    {trial.heldout:.1e}  {trial.what}" for trial in best]
+            best: dict[str, float] = {}
+            for trial in sorted(self.trials, key=lambda trial: trial.heldout):
+                best.setdefault(trial.what, trial.heldout)
+            lines += [f"  {len(best)} tried in {self.seconds:.1f} s, among them:"]
+            lines += [f"    {error:.1e}  {what}" for what, error in list(best.items())[:_SHOWN]]
         return "\n".join(lines)
 
     def _shaped(self, Y: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from palpate.errors import UsageError
+from palpate.learning.checks import samples
 from palpate.learning.choosing.automatic import automatic, check_target
 from palpate.learning.filter.model import value
 from palpate.learning.filter.observation import Observation
@@ -110,7 +111,7 @@ def learn(
     seed : int
         Decides the order of presentation.
     weights : (N,), optional
-        How many ordinary samples each one counts as.
+        How many ordinary samples each one counts as; one of no weight is left out.
     slopes : (N, m, n), optional
         ∂Y/∂X in SI units; the filter learns them as well.
     slope_weight : float
@@ -129,20 +130,26 @@ def learn(
     UsageError
         If the arrays do not fit together or hold values that are not finite, or the target is not positive.
     """
-    _check(X, Y, inputs, outputs)
-    _check_run(settings, passes, seed, slope_weight)
+    X, Y, w, slopes, s = samples(
+        X, Y, weights, slopes, slope_weight=slope_weight, inputs=len(inputs), outputs=len(outputs)
+    )
+    slopes = None if slopes is None else slopes[w > 0]
+    X, Y, s, w = X[w > 0], Y[w > 0], s[w > 0], w[w > 0]
+    _check_run(settings, passes, seed)
     if target is not None:
         check_target(target)
         settings = (
             settings
             if settings is not None
-            else automatic(X, Y, inputs, target=target, passes=passes, seed=seed, weights=weights)
+            else automatic(X, Y, inputs, target=target, passes=passes, seed=seed, weights=w)
         )
     settings = default() if settings is None else settings
     scaling = Scaling.of(inputs, Y)
     xs, ys = scaling.scale_inputs(X), scaling.scale_outputs(Y)
+    if heldout is not None:
+        heldout = samples(*heldout, inputs=len(inputs), outputs=len(outputs))[:2]
     judge = _judge(heldout, scaling, settings)
-    shown = _observations(xs, ys, scaling, weights, slopes, slope_weight)
+    shown = _observations(xs, ys, scaling, w, slopes, s)
     modes = output_modes(ys, settings.modes) if settings.update == "shared" else None
     state = initial(len(inputs), len(outputs), settings, modes)
     rng = np.random.default_rng(seed)
@@ -183,24 +190,18 @@ def _observations(
     xs: np.ndarray,
     ys: np.ndarray,
     scaling: Scaling,
-    weights: np.ndarray | None,
+    weights: np.ndarray,
     slopes: np.ndarray | None,
-    slope_weight: float,
+    slope_weights: np.ndarray,
 ) -> list[Observation]:
     """The samples as the filter takes them."""
-    N, m, n = len(xs), ys.shape[1], xs.shape[1]
-    w = np.ones(N) if weights is None else np.asarray(weights, dtype=np.float64)
-    if w.shape != (N,) or not (w > 0).all() or not np.isfinite(w).all():
-        raise UsageError(f"Weights must be {N} positive numbers, one per sample.")
-    if slopes is None or slope_weight == 0:
-        return [Observation(xs[i], ys[i], float(w[i])) for i in range(N)]
-    if slopes.shape != (N, m, n) or not np.isfinite(slopes).all():
-        raise UsageError(
-            f"Slopes of shape {slopes.shape} do not fit {N} samples of {m} outputs and {n} inputs.",
-            fix=f"Pass finite slopes of shape ({N}, {m}, {n}).",
-        )
+    if slopes is None:
+        return [Observation(*one) for one in zip(xs, ys, weights, strict=True)]
     scaled = slopes * scaling.input_half / scaling.output_scale[:, None]
-    return [Observation(xs[i], ys[i], float(w[i]), scaled[i], slope_weight) for i in range(N)]
+    return [
+        Observation(x, y, w, slope, s) if s > 0 else Observation(x, y, w)
+        for x, y, w, slope, s in zip(xs, ys, weights, scaled, slope_weights, strict=True)
+    ]
 
 
 def _judge(
@@ -209,13 +210,7 @@ def _judge(
     """A function from a state to its held-out RMSE over the largest held-out output."""
     if heldout is None:
         return None
-    X, Y = (np.asarray(part, dtype=np.float64) for part in heldout)
-    n, m = scaling.input_half.size, scaling.output_scale.size
-    if X.ndim != 2 or Y.ndim != 2 or X.shape[1] != n or Y.shape[1] != m or len(X) != len(Y) or not len(X):
-        raise UsageError(
-            f"Held-out samples of shapes {X.shape} and {Y.shape} do not fit {n} inputs and {m} outputs.",
-            fix=f"Pass X (N, {n}) and Y (N, {m}) with the same N ≥ 1.",
-        )
+    X, Y = heldout
     xs, full = scaling.scale_inputs(X), float(np.abs(Y).max()) or 1.0
 
     def judge(state: State) -> float:
@@ -225,7 +220,7 @@ def _judge(
     return judge
 
 
-def _check_run(settings: Settings | None, passes: int, seed: int, slope_weight: float) -> None:
+def _check_run(settings: Settings | None, passes: int, seed: int) -> None:
     if settings is not None and not isinstance(settings, Settings):
         raise UsageError(
             f"Settings are {settings!r}, not a Settings record.",
@@ -234,27 +229,3 @@ def _check_run(settings: Settings | None, passes: int, seed: int, slope_weight: 
     for name, count, least in (("passes", passes, 1), ("seed", seed, 0)):
         if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < least:
             raise UsageError(f"{name} is {count!r}; it must be a whole number of at least {least}.")
-    if not 0 <= slope_weight < np.inf:
-        raise UsageError(
-            f"slope_weight is {slope_weight}; it must be finite and not negative; 0 ignores slopes."
-        )
-
-
-def _check(X: np.ndarray, Y: np.ndarray, inputs: Sequence[Range], outputs: Sequence[Quantity]) -> None:
-    if X.ndim != 2 or Y.ndim != 2 or len(X) != len(Y) or not len(X):
-        raise UsageError(
-            f"Inputs of shape {X.shape} and outputs of shape {Y.shape} are not N samples.",
-            fix="Pass X (N, n) and Y (N, m) with the same N ≥ 1.",
-        )
-    if X.shape[1] != len(inputs) or Y.shape[1] != len(outputs):
-        raise UsageError(
-            f"{X.shape[1]} input and {Y.shape[1]} output columns came with {len(inputs)} ranges and "
-            f"{len(outputs)} quantities.",
-            fix="Name every column.",
-        )
-    if not (np.isfinite(X).all() and np.isfinite(Y).all()):
-        raise UsageError(
-            "Some samples hold values that are not finite.",
-            why="A failed solve leaves not-a-number in its row.",
-            fix="Keep the converged rows only (`Dataset.ok`).",
-        )

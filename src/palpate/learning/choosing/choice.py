@@ -193,10 +193,28 @@ class _Chooser:
             if len(r.theta) > 1.5 * len(old.theta)
         ]
         if not grown:
+            best = self._ahead(race, looks)
             return best, best
         least = best_of(grown).heldout
         pairs = [(self._ran(race, r, 15, _SAMPLES), r) for r in grown if r.heldout <= _BEHIND * least]
         return min([*pairs, (best, best)], key=lambda pair: pair[0].heldout)
+
+    def _ahead(self, race: Race, looks: list[Runner]) -> Runner:
+        """Of small networks, which are soon refined, the one whose form does best on two further folds as well."""
+        best = best_of(looks)
+        close = [r for r in looks if r.heldout <= 1.5 * best.heldout]
+        if len(close) == 1 or best.heldout <= self.target:
+            return best
+        squares = {}
+        for runner in close:
+            errors = [runner.heldout]
+            for k in (1, 2):
+                split = Split.of(self.X, self.Y, share=self.share, seed=self.seed, fold=k)
+                other = Race(split, race.scales, self.seed + k, race.deadline)
+                fresh = other.entered(runner.regressors.form.name, runner.theta.size)
+                errors.append(other.run(fresh, 20, samples=_SAMPLES).heldout)
+            squares[runner] = sum(error**2 for error in errors)
+        return min(close, key=squares.__getitem__)
 
     def _radials(self, race: Race, winner: Runner, before: Runner) -> Runner:
         """The same units with each radial function; those not far behind go on to all samples."""

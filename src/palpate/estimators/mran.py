@@ -186,7 +186,7 @@ class MRANRegressor(RadialRegressor):
 
     def _deviation(self, X: np.ndarray) -> np.ndarray:
         scaled = predictive_deviation(self.state_, self._scaling.scale_inputs(X), self.settings_)
-        return scaled * self._scaling.output_scale * self._units_.divisor
+        return np.asarray(scaled * self._scaling.output_scale * self._units_.divisor)
 
     def _begin(self, X: np.ndarray, Y: np.ndarray) -> None:
         units = self._units(X, Y)

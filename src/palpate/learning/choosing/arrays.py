@@ -98,7 +98,7 @@ def points(X: Any, inputs: Sequence[Range]) -> np.ndarray:
             f"The network takes {n} inputs ({', '.join(r.name for r in inputs)}); an array of shape {X.shape} came.",
             fix=f"Pass an array of shape (N, {n}), one row per point.",
         )
-    return X
+    return np.asarray(X)
 
 
 def constant(Y: np.ndarray) -> bool:

@@ -49,7 +49,7 @@ def refitted(found: Refined, X: np.ndarray, Y: np.ndarray, ridge: float) -> Refi
     best = fit(ridge)
     for penalty in (r for r in _RIDGES if r > ridge):
         other = fit(penalty)
-        if other.loo > best.loo:
+        if not other.loo < best.loo:  # as many unknowns as samples judge nothing: both are infinite
             break
         best = other
     return best

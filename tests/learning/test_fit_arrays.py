@@ -65,7 +65,8 @@ def test_intervals_of_few_samples_are_rather_too_wide(noise):
 def test_another_level_is_calibrated_for():
     found = palpate.fit(*noisy(300), seconds=2.0, level=0.6)
     share = covered(found, *noisy(4000, seed=1))
-    assert share.mean() == pytest.approx(0.6, abs=0.08)
+    # sixty samples are held out, and how many of sixty fall inside scatters by √(0.6 · 0.4/60) = 0.063
+    assert share.mean() == pytest.approx(0.6, abs=3 * 0.063)
     wide = palpate.fit(*noisy(300), seconds=2.0, level=0.6).interval(noisy(5)[0], 0.9)
     assert (wide[1] - wide[0] > np.diff(found.interval(noisy(5)[0]), axis=0)[0]).all()
 

@@ -9,9 +9,8 @@ from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-from linear_bodies import history, plane_data, plane_model, tip_data, tip_model
+from linear_bodies import history, nonsense, plane_data, plane_model, tip_data, tip_model
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from palpate.errors import UsageError
@@ -176,7 +175,7 @@ def test_the_same_data_give_the_same_page(tmp_path: Path) -> None:
 def test_a_network_that_answers_nonsense_can_be_reported(tmp_path: Path) -> None:
     """Not-a-number everywhere: the page comes, and says that limits were missed."""
     touch, data = tip_model(), tip_data()
-    broken = {k: dataclasses.replace(n, tail=np.full_like(n.tail, np.nan)) for k, n in touch.networks.items()}
+    broken = {k: nonsense(n) for k, n in touch.networks.items()}
     touch = dataclasses.replace(touch, networks=broken)
     validation = validate(touch, data, limits=Limits())
     page = write_report(tmp_path / "nan.html", [chapter(touch=touch, validation=validation)])

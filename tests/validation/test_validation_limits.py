@@ -10,7 +10,7 @@ import sys
 
 import numpy as np
 import pytest
-from linear_bodies import dataset, history, plane_data, plane_model, tip_data, tip_model
+from linear_bodies import dataset, history, nonsense, plane_data, plane_model, tip_data, tip_model
 
 from palpate.dataset import Dataset
 from palpate.errors import AccuracyError, UsageError
@@ -64,7 +64,7 @@ def test_grades(key: str) -> None:
 
 def test_not_a_number_never_passes() -> None:
     model = tip_model()
-    broken = dataclasses.replace(model.networks["nodes"], tail=np.full((5, 2), np.nan))
+    broken = nonsense(model.networks["nodes"])
     v = validate(dataclasses.replace(model, networks={**model.networks, "nodes": broken}), tip_data())
     assert [c.criterion.key for c in v.failures] == ["rmse"]
     assert json.loads(json.dumps(v.as_dict(), allow_nan=False))["networks"]["refined"]["rmse"] is None

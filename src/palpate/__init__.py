@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from palpate.dataset import Dataset
     from palpate.errors import PalpateError
-    from palpate.learning import Learner, Refinement, Settings, fit
+    from palpate.learning import Fitted, Learner, Refinement, Settings, fit
     from palpate.learning import learn_touch as learn
     from palpate.network import Network
     from palpate.physics import (
@@ -43,6 +43,7 @@ _HOMES = {
     "Cantilever": "physics",
     "Circle": "physics",
     "Dataset": "dataset",
+    "Fitted": "learning",
     "Learner": "learning",
     "LinearElastic": "physics",
     "Network": "network",
@@ -74,6 +75,7 @@ __all__ = [
     "Cantilever",
     "Circle",
     "Dataset",
+    "Fitted",
     "Learner",
     "LinearElastic",
     "Network",

@@ -225,3 +225,22 @@ def test_questions_of_the_wrong_shape_are_refused(found):
             ask([1.0, 2.0])
     with pytest.raises(UsageError, match="level"):
         found.interval([[1.0, 20.0]], 90)
+
+
+def test_copies_of_samples_do_not_judge_what_was_learnt_from_them():
+    """Twenty-five noisy places, four times each: memorising them tells nothing of the noise in between."""
+    rng = np.random.default_rng(0)
+    X = rng.uniform(-1, 1, (25, 2))
+    y = np.sin(5 * X[:, 0]) * np.exp(X[:, 1]) + 0.2 * rng.normal(size=25)
+    found = palpate.fit(np.tile(X, (4, 1)), np.tile(y, 4), seconds=2.0)
+    Z = rng.uniform(-1, 1, (1000, 2))
+    truth = np.sin(5 * Z[:, 0]) * np.exp(Z[:, 1])
+    error = np.sqrt(((found.predict(Z) - truth) ** 2).mean()) / truth.std()
+    assert found.heldout > 0.2 * error
+
+
+def test_masked_numbers_are_missing_numbers():
+    X = np.random.default_rng(0).uniform(-1, 1, (60, 1))
+    Y = np.ma.masked_array(np.where(X > 0.8, 9999.0, X), mask=X > 0.8)
+    with pytest.raises(palpate.PalpateError, match="finite"):
+        palpate.fit(X, Y, seconds=1.0)

@@ -388,3 +388,25 @@ def test_a_retained_sample_counts_in_the_refinement_what_it_counts_in_the_filter
     )
     np.testing.assert_allclose(rows.scale**2, 1.0 / seen.variances(1.0)[:1])
     np.testing.assert_allclose(kept.weights * kept.slope_weights, 1.0 / seen.variances(1.0)[1:])
+
+
+def test_what_is_declared_wrongly_is_refused_at_once():
+    inputs, outputs = (Range("x", -1.0, 1.0, "m"),), (Quantity("y", "N"),)
+    with pytest.raises(UsageError, match="Settings record"):
+        Learner(inputs, outputs, settings="emran")
+    with pytest.raises(UsageError, match="ranges"):
+        Learner(["x"], outputs)
+    with pytest.raises(UsageError, match="quantities"):
+        Learner(inputs, ["y"])
+    with pytest.raises(UsageError, match="newest"):
+        Refining(keeping="newest")
+
+
+def test_a_reading_far_outside_the_declared_range_changes_nothing():
+    inputs, outputs = (Range("x", -1.0, 1.0, "m"),), (Range("y", -1.0, 1.0, "N"),)
+    learner = Learner(inputs, outputs, refining=None)
+    for x in np.random.default_rng(0).uniform(-1, 1, 100):
+        learner.observe(np.array([x]), np.array([np.sin(x)]))
+    before = learner.state
+    assert "far outside" in learner.observe(np.array([5.0]), np.array([1.0])).why
+    assert learner.state is before

@@ -5,7 +5,7 @@ Errors put into a model are then known in closed form.
 
 from __future__ import annotations
 
-import dataclasses
+import copy
 from typing import Any
 
 import numpy as np
@@ -143,6 +143,6 @@ def history(heldout: tuple[float, ...] = (1e-1, 1e-2, 2e-2, 1e-3)) -> History:
 
 def nonsense(network: Network) -> Network:
     """A network whose every answer is not-a-number: none can be made so, but memory and files can rot."""
-    rotten = dataclasses.replace(network)
+    rotten = copy.copy(network)
     object.__setattr__(rotten, "tail", np.full_like(network.tail, np.nan))
     return rotten

@@ -129,6 +129,8 @@ def _finite(what: str, found: np.ndarray) -> None:
 
 def _real(what: str, given: Any) -> np.ndarray:
     try:
+        if isinstance(given, np.ma.MaskedArray):  # what is masked is missing, whatever number stands there
+            given = np.ma.filled(given.astype(np.float64), np.nan)
         found = np.asarray(given)
         if found.dtype.kind in "biufO":
             return np.asarray(found, dtype=np.float64)

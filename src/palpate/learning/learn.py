@@ -62,8 +62,16 @@ class Learned:
         """Whether the error is within the target; True where none was set."""
         return self.target is None or self.error <= self.target
 
+    def __repr__(self) -> str:
+        return str(self)
+
     def __str__(self) -> str:
         text = f"{self.history}\nError {self.error:.1e} of the outputs' spread"
+        if not self.error < 1.0:
+            text += (
+                "\nThat is no better than the outputs' means. The papers' forms have no guards, and thresholds for "
+                "their own experiments; `default` and `shared` are guarded."
+            )
         if self.target is None:
             return text
         if self.reached:

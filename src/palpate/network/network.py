@@ -122,6 +122,9 @@ class Network:
                 fix="Learn it again, from finite samples over ranges that are not empty.",
             )
 
+    def __repr__(self) -> str:
+        return str(self)
+
     def __str__(self) -> str:
         names = ", ".join(str(r) for r in self.inputs)
         modes = "" if self.basis is None else f" through {self.basis.shape[1]} modes"

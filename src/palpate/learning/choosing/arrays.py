@@ -68,6 +68,8 @@ def numbers(given: Any, name: str) -> np.ndarray:
         If it holds anything but real numbers, or rows of different length.
     """
     try:
+        if isinstance(given, np.ma.MaskedArray):  # what is masked is missing, whatever number stands there
+            given = np.ma.filled(given.astype(np.float64), np.nan)
         array = np.asarray(given)
         if array.dtype.kind in "biufO":  # text of digits is no number, complex ones would lose a part
             return np.asarray(array, dtype=np.float64)

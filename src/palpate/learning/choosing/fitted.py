@@ -163,6 +163,9 @@ class Fitted:
                 fix="Read the network alone with palpate.Network.load.",
             ) from error
 
+    def __repr__(self) -> str:
+        return str(self)
+
     def __str__(self) -> str:
         n, m = len(self.network.inputs), len(self.network.outputs)
         what = (

@@ -41,12 +41,31 @@ class Split:
 
     @classmethod
     def of(cls, X: np.ndarray, Y: np.ndarray, *, share: float, seed: int, fold: int = 0) -> Split:
-        """Hold out the fold-th share of a shuffle that the seed decides; folds beyond the last begin again."""
+        """Hold out the fold-th share of a shuffle that the seed decides; folds beyond the last begin again.
+
+        Samples at one place stay together, as far as two parts can be made: a copy of what was learnt judges nothing.
+        """
         order = np.random.default_rng(seed).permutation(len(X))
+        group = np.unique(X, axis=0, return_inverse=True)[1].ravel()
+        if group.max() + 1 < len(X):
+            return cls._by_groups(X, Y, order, group, share, fold)
         count = max(2, round(share * len(X)))
         first = (fold * count) % max(1, len(X) - count + 1)
         held = np.zeros(len(X), bool)
         held[order[first : first + count]] = True
+        kept = order[~held[order]]
+        return cls(X[kept], Y[kept], (X[held], Y[held]), held)
+
+    @classmethod
+    def _by_groups(
+        cls, X: np.ndarray, Y: np.ndarray, order: np.ndarray, group: np.ndarray, share: float, fold: int
+    ) -> Split:
+        places = group[order][
+            np.sort(np.unique(group[order], return_index=True)[1])
+        ]  # in order of appearance
+        count = max(1, round(share * len(places)))
+        first = (fold * count) % max(1, len(places) - count + 1)
+        held = np.isin(group, places[first : first + count])
         kept = order[~held[order]]
         return cls(X[kept], Y[kept], (X[held], Y[held]), held)
 

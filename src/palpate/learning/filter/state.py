@@ -60,6 +60,15 @@ class State:
     in_modes: np.ndarray | None = None
     least: float = float("inf")
 
+    def __repr__(self) -> str:
+        return str(self)
+
+    def __str__(self) -> str:
+        return (
+            f"State: {self.inputs} inputs, {self.outputs} outputs, {self.units} units "
+            f"after {self.count} observations"
+        )
+
     @property
     def inputs(self) -> int:
         """Number of inputs n."""

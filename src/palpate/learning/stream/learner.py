@@ -32,7 +32,7 @@ from palpate.units import Quantity, Range, bounds
 __all__ = ["Learner"]
 
 # beyond these a scaled number is a broken sensor's: its square would swamp what double precision keeps
-_FARTHEST_INPUT, _FARTHEST_OUTPUT = 10.0, 1e6
+_FARTHEST_INPUT, _FARTHEST_OUTPUT = 2.0, 1e6
 _MOVED = 0.1  # share of an input's range over which a sensor must have moved to show how large outputs are
 _PATIENCE = 10  # times the observations asked for, after which less movement has to do
 
@@ -99,7 +99,7 @@ class Learner:
                 "A learner needs inputs, outputs, and positive counts.",
                 fix="Name every column, and settle on one observation at least.",
             )
-        self.settings = settings or default()
+        self.settings = _checked(inputs, outputs, settings)
         self.inputs = tuple(inputs)
         self.outputs = tuple(o if isinstance(o, Quantity) else Quantity(o.name, o.unit) for o in outputs)
         self.refining = refining if refining is not None and refining.every else None
@@ -119,6 +119,14 @@ class Learner:
         by_modes = self.settings.update == "shared" and len(outputs) > self.settings.modes
         if self._scaling is not None and basis is None and not by_modes:
             self._start(Gauge(self._scaling))
+
+    def __repr__(self) -> str:
+        return str(self)
+
+    def __str__(self) -> str:
+        state = "settling the scaling" if self._state is None else f"{self._state.units} units"
+        sizes = f"{len(self.inputs)} inputs → {len(self.outputs)} outputs"
+        return f"Learner: {sizes}, {state} after {self.count} observations"
 
     def observe(
         self,
@@ -299,6 +307,22 @@ class Learner:
         sound = np.isfinite(found.coefficients).all() and np.isfinite(found.theta).all()
         self._progress = progress if sound else Progress()
         return found if sound else state
+
+
+def _checked(
+    inputs: Sequence[Range], outputs: Sequence[Quantity | Range], settings: Settings | None
+) -> Settings:
+    """The settings, once the declarations are what they are taken for."""
+    if not all(isinstance(i, Range) for i in inputs):
+        raise UsageError("Inputs must be ranges.", fix='Declare them: Range("force", 0.0, 5.0, "N").')
+    if not all(isinstance(o, (Quantity, Range)) for o in outputs):
+        raise UsageError("Outputs must be quantities or ranges.", fix='Declare them: Quantity("tip", "m").')
+    if settings is not None and not isinstance(settings, Settings):
+        raise UsageError(
+            f"Settings are {settings!r}, not a Settings record.",
+            fix='Take a preset, such as PRESETS["shared"](), or Settings(…).',
+        )
+    return default() if settings is None else settings
 
 
 def _skipped(units: int, why: str) -> Event:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import get_args
 
 import numpy as np
 
@@ -61,6 +62,8 @@ class Refining:
     patience: int = 20
 
     def __post_init__(self) -> None:
+        if self.keeping not in get_args(Keeping):
+            raise UsageError(f"keeping is {self.keeping!r}; it is one of {', '.join(get_args(Keeping))}.")
         if (
             self.samples < 1
             or self.every < 0

@@ -204,3 +204,13 @@ def test_committee_is_the_mean_of_its_members_and_errs_no_more_than_they_on_aver
     squares = np.mean([((m.found.predict(xt) - yt) ** 2).mean() for m in members])
     assert ((together - yt) ** 2).mean() <= squares
     assert expected_error(members, xs) <= np.sqrt(np.mean([m.heldout**2 for m in members]))
+
+
+def test_what_is_handed_over_is_about_as_good_as_the_best_that_was_tried():
+    """A committee must not be spoilt by members that were caught in another minimum."""
+    X = np.random.default_rng(0).uniform(-1, 1, (60, 2))
+    names = [Range(c, -1.0, 1.0) for c in "ab"], [Quantity(c) for c in "uv"]
+    found = fit(X, np.sin(X), *names, seconds=5.0)
+    Z = np.random.default_rng(1).uniform(-1, 1, (500, 2))
+    error = np.sqrt(((found.network.predict(Z) - np.sin(Z)) ** 2).mean()) / np.sin(Z).std()
+    assert error < 5.0 * min(trial.heldout for trial in found.trials)

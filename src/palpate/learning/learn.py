@@ -143,7 +143,7 @@ def learn(
     )
     slopes = None if slopes is None else slopes[w > 0]
     X, Y, s, w = X[w > 0], Y[w > 0], s[w > 0], w[w > 0]
-    _check_run(settings, passes, seed)
+    _check_run(inputs, outputs, settings, passes, seed)
     if target is not None:
         check_target(target)
         settings = (
@@ -228,7 +228,14 @@ def _judge(
     return judge
 
 
-def _check_run(settings: Settings | None, passes: int, seed: int) -> None:
+def _check_run(
+    inputs: Sequence[Range], outputs: Sequence[Quantity], settings: Settings | None, passes: int, seed: int
+) -> None:
+    if not all(isinstance(i, Range) for i in inputs) or not all(isinstance(o, Quantity) for o in outputs):
+        raise UsageError(
+            "Inputs must be declared as ranges, outputs as quantities.",
+            fix='Pass Range("force", 0.0, 5.0, "N") and Quantity("tip", "m"); `palpate.fit` takes arrays alone.',
+        )
     if settings is not None and not isinstance(settings, Settings):
         raise UsageError(
             f"Settings are {settings!r}, not a Settings record.",

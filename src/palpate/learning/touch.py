@@ -96,6 +96,12 @@ def learn_touch(
     UsageError
         If there are too few converged solves to learn from.
     """
+    if not isinstance(train, Dataset):
+        raise UsageError(
+            f"A body is learnt from a Dataset of solves; a {type(train).__name__} came.",
+            why="Which node is held, and which loads act on it, stands in the dataset.",
+            fix="Pass what `palpate.sweep` returns; for arrays X and Y use `palpate.fit`.",
+        )
     with threadpool_limits(1):  # small matrices: more BLAS threads cost time and the bits of the result
         return _learn_touch(train.ok, heldout, name, settings, refinement, passes, seed, coupling, progress)
 

@@ -219,7 +219,11 @@ def _check_header(path: Path, header: Mapping[str, str], kind: str | None) -> No
             f"{path} has file version {version}; this palpate reads up to {VERSION}.", fix="Upgrade palpate."
         )
     if kind is not None and header["palpate"] != kind:
-        raise FileFormatError(f"{path} holds {header['palpate']!r}; {kind!r} is needed here.")
+        raise FileFormatError(
+            f"{path} holds {header['palpate']!r}; {kind!r} is needed here.",
+            why="A touch model is a body with several networks; a file of networks is what was learnt of arrays.",
+            fix="`palpate learn` makes touch models; `palpate.Network.load` and `palpate.Fitted.load` read networks.",
+        )
 
 
 def _digest(tensors: Mapping[str, np.ndarray], header: Mapping[str, str]) -> str:

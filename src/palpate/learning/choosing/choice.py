@@ -38,6 +38,7 @@ _MEMBERS = 5
 _CROSSED_BELOW = 500  # samples: intervals then rest on networks of their own
 _BEHIND = 1.2  # times the best error: too far for another ten iterations
 _ROUND_OFF = 1e-9  # of the outputs: nobody asks for less
+_ASTRAY = 3.0  # times the best member's error: not of its kind
 _HOPELESS = 3.0  # times the kernel layer's error after the race: no refinement will make up for that
 
 
@@ -259,6 +260,11 @@ class _Chooser:
                 if len(other[0]) == _MEMBERS and other[1] < best[1]:
                     best = other
         members, error = best
+        least = min(member.heldout for member in members)
+        # folds differ, but not so much: such a member was caught in another minimum, and would spoil the average
+        near = [member for member in members if member.heldout <= _ASTRAY * least]
+        if len(near) < len(members):
+            members, error = near, expected_error(near, self.X)
         single = float(np.sqrt(np.mean([member.heldout**2 for member in members])))
         if len(members) == 1 or error > 0.9 * single:
             return members[:1], single

@@ -22,19 +22,18 @@ from benchmarks.runner import main
 from benchmarks.table import Claim, Column, Table
 from palpate.learning import Settings, State, default, initial, step
 from palpate.learning.filter.growth import grown
+from palpate.learning.filter.presets import ran_ekf
 
 __all__ = ["picture", "tables"]
 
 # no guards and no growth: what is timed is one linearisation and one update
-PLAIN = Settings(
+PLAIN = replace(
+    ran_ekf(),
+    form="axis-aligned",
+    tail="affine",
+    widths="log",
+    update_on_growth=True,
     noise=1e-2,
-    noise_share=0.0,
-    gate=0.0,
-    edge_weight=1.0,
-    iterations=1,
-    step_bound=0.0,
-    relapse_limit=0.0,
-    prune_after=0,
     error_min=1e9,
 )
 LARGE = 0.02  # s: calls that take longer are repeated less

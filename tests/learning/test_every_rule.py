@@ -16,6 +16,19 @@ from palpate.learning.filter.model import value
 from palpate.learning.filter.pruning import without
 from palpate.learning.filter.updates import predicted, updated
 
+# priors far above the noise, and thresholds at which units come and go
+RECKLESS = {
+    "prior": 100.0,
+    "width_prior": 100.0,
+    "tail_prior": 100.0,
+    "noise": 1e-4,
+    "error_min": 1e-2,
+    "error_rms_min": 1e-2,
+    "distance_min": 0.2,
+    "prune_below": 0.1,
+    "prune_after": 20,
+    "units_max": 5,
+}
 every_rule = pytest.mark.parametrize("rule", RULES)
 
 
@@ -104,19 +117,7 @@ def test_a_new_unit_meets_its_observation(rule):
 @pytest.mark.parametrize("update", COVARIANT)
 def test_covariance_stays_symmetric_positive_definite(update):
     """10⁵ random steps at P₀ = 100 and R = 1e-4, with growth and pruning, no guard."""
-    settings = exact(
-        update=update,
-        prior=100.0,
-        width_prior=100.0,
-        tail_prior=100.0,
-        noise=1e-4,
-        error_min=1e-2,
-        error_rms_min=1e-2,
-        distance_min=0.2,
-        prune_below=0.1,
-        prune_after=20,
-        units_max=5,
-    )
+    settings = exact(update=update, **RECKLESS)
     rng = np.random.default_rng(0)
     state, grew, pruned = initial(1, 1, settings), 0, 0
     for t in range(100_000):
@@ -136,20 +137,7 @@ def test_covariance_stays_symmetric_positive_definite(update):
 @pytest.mark.parametrize("update", COVARIANT)
 def test_covariance_stays_positive_definite_for_every_form(name, update):
     """The same for two inputs and outputs and every form, through fewer steps."""
-    settings = exact(
-        form=name,
-        update=update,
-        prior=100.0,
-        width_prior=100.0,
-        tail_prior=100.0,
-        noise=1e-4,
-        error_min=1e-2,
-        error_rms_min=1e-2,
-        distance_min=0.2,
-        prune_below=0.1,
-        prune_after=20,
-        units_max=5,
-    )
+    settings = exact(form=name, update=update, **RECKLESS)
     rng = np.random.default_rng(0)
     state, changed = initial(2, 2, settings), 0
     for _ in range(500):

@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 
-__all__ = ["numbers", "samples"]
+__all__ = ["numbers", "real", "samples"]
 
 
 def numbers(what: str, given: Any, shape: tuple[int | None, ...], *, finite: bool = True) -> np.ndarray:
@@ -28,7 +28,7 @@ def numbers(what: str, given: Any, shape: tuple[int | None, ...], *, finite: boo
     UsageError
         If it holds anything but real numbers, has another shape, or is not finite.
     """
-    found = _real(what, given)
+    found = real(what, given)
     fits = found.ndim == len(shape) and all(
         f == w or (w is None and f > 0) for f, w in zip(found.shape, shape, strict=True)
     )
@@ -127,7 +127,14 @@ def _finite(what: str, found: np.ndarray) -> None:
         )
 
 
-def _real(what: str, given: Any) -> np.ndarray:
+def real(what: str, given: Any) -> np.ndarray:
+    """An array of any shape as float64; masked numbers are not-a-number.
+
+    Raises
+    ------
+    UsageError
+        If it holds anything but real numbers, or rows of different length.
+    """
     try:
         if isinstance(given, np.ma.MaskedArray):  # what is masked is missing, whatever number stands there
             given = np.ma.filled(given.astype(np.float64), np.nan)
@@ -148,7 +155,7 @@ def _no_numbers(what: str, found: str) -> UsageError:
 
 
 def _weights(what: str, given: Any, N: int) -> np.ndarray:
-    given = _real(what, given)
+    given = real(what, given)
     found = numbers(what, np.full(N, float(given)) if given.ndim == 0 else given, (N,))
     if (found < 0).any():
         raise UsageError(

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.learning.checks import real
 from palpate.learning.choosing.automatic import check_target, ranges_of
 from palpate.units import Quantity, Range
 
@@ -48,7 +49,7 @@ class Samples:
             If they are no samples to learn from.
         """
         columns, names = _names(X, "x"), _names(Y, "y")
-        X, Y = numbers(X, "X"), numbers(Y, "Y")
+        X, Y = real("Inputs X", X), real("Outputs Y", Y)
         one = Y.ndim == 1
         X, Y = (a[:, None] if a.ndim == 1 else a for a in (X, Y))
         _check_rows(X, Y)
@@ -57,30 +58,6 @@ class Samples:
         _check_declared(declared, X.shape[1], Range, "input", 'palpate.Range("force", 0.0, 5.0, "N")')
         _check_declared(named, Y.shape[1], Quantity, "output", 'palpate.Quantity("tip", "m")')
         return cls(X, Y, declared, named, one)
-
-
-def numbers(given: Any, name: str) -> np.ndarray:
-    """An array of doubles of what was given.
-
-    Raises
-    ------
-    UsageError
-        If it holds anything but real numbers, or rows of different length.
-    """
-    try:
-        if isinstance(given, np.ma.MaskedArray):  # what is masked is missing, whatever number stands there
-            given = np.ma.filled(given.astype(np.float64), np.nan)
-        array = np.asarray(given)
-        if array.dtype.kind in "biufO":  # text of digits is no number, complex ones would lose a part
-            return np.asarray(array, dtype=np.float64)
-        why = f"Its elements are of kind {array.dtype}."
-    except (TypeError, ValueError) as error:
-        why = f"{error}."
-    raise UsageError(
-        f"{name} is not an array of real numbers.",
-        why=why,
-        fix=f"Give {name} as an array or nested list of numbers, one row per sample.",
-    )
 
 
 def points(X: Any, inputs: Sequence[Range]) -> np.ndarray:
@@ -92,15 +69,16 @@ def points(X: Any, inputs: Sequence[Range]) -> np.ndarray:
         If it is no such array.
     """
     n = len(inputs)
-    X = numbers(X, "X")
-    if X.ndim == 1 and n == 1:
-        X = X[:, None]
-    if X.ndim != 2 or X.shape[1] != n:
+    asked = real("Inputs X", X)
+    if asked.ndim == 1 and n == 1:
+        asked = asked[:, None]
+    if asked.ndim != 2 or asked.shape[1] != n:
+        names = ", ".join(r.name for r in inputs)
         raise UsageError(
-            f"The network takes {n} inputs ({', '.join(r.name for r in inputs)}); an array of shape {X.shape} came.",
+            f"The network takes {n} inputs ({names}); an array of shape {asked.shape} came.",
             fix=f"Pass an array of shape (N, {n}), one row per point.",
         )
-    return np.asarray(X)
+    return asked
 
 
 def constant(Y: np.ndarray) -> bool:

@@ -4,6 +4,7 @@ kalman     extended Kalman filter over everything (RAN-EKF, MRAN) or unit by uni
 winner     the same for the nearest unit alone (EMRAN)
 shared     one covariance for the linear parameters of all outputs, one for the units' shapes
 gradient   least mean squares (RAN)
+bound      how far one update may move a unit
 """
 
 from palpate.learning.filter.updates.rule import predicted, updated

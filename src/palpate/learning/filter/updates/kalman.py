@@ -26,11 +26,9 @@ from palpate.learning.filter.noise import variance
 from palpate.learning.filter.observation import Observation
 from palpate.learning.filter.settings import Settings
 from palpate.learning.filter.state import State
+from palpate.learning.filter.updates.bound import TRIES, excess
 
 __all__ = ["updated"]
-
-# a step that is still too long after so many enlargements of R is not taken
-_TRIES = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,14 +58,14 @@ def updated(
     spoils = spoils or (lambda z: forgets(state, z, settings))
     error = (seen.targets() - first[0])[: seen.y.size]
     r = variance(seen.x, error, state.innovation, settings)
-    for _ in range(_TRIES + 1):
+    for _ in range(TRIES):
         found = _iterate(state, seen, r, first, settings)
-        excess = _excess(state, found.z, settings)
-        if excess <= 1.0 and not spoils(found.z):
+        far = excess(state, state.split(found.z)[1] - state.theta, settings)
+        if far <= 1.0 and not spoils(found.z):
             K = dpotrs(found.factor, found.PH.T, lower=1)[0].T
             return _taken(state, found.z, K, found.PH - 0.5 * K @ found.S, settings, donate=donate)
         # a smaller step by more measurement noise keeps estimate and covariance consistent
-        r += max(excess - 1.0, 1.0) * float(np.trace(found.S)) / len(found.S)
+        r += max(far - 1.0, 1.0) * float(np.trace(found.S)) / len(found.S)
     # no step, so nothing was learnt and nothing is surer than before
     nothing = np.zeros_like(found.PH)
     return _taken(state, state.vector(), nothing, nothing, settings, donate=donate)
@@ -133,11 +131,3 @@ def _iterate(
     if best is None:
         raise FloatingPointError("the innovation covariance is not positive definite")
     return best
-
-
-def _excess(state: State, z: np.ndarray, settings: Settings) -> float:
-    """Longest move of a unit over the bound."""
-    if not settings.step_bound or not state.units:
-        return 0.0
-    step = state.split(z)[1] - state.theta
-    return settings.regressors(state.inputs).form.stride(state.theta, step) / settings.step_bound

@@ -27,10 +27,9 @@ from palpate.learning.filter.noise import variance
 from palpate.learning.filter.observation import Observation
 from palpate.learning.filter.settings import Settings
 from palpate.learning.filter.state import State
+from palpate.learning.filter.updates.bound import TRIES, excess
 
 __all__ = ["updated"]
-
-_TRIES = 4
 
 
 def updated(
@@ -56,7 +55,7 @@ def updated(
     M, spread = H @ PH, float(row @ gain)
     led = error if state.modes is None else state.modes.T @ error
     r = variance(seen.x, error, state.innovation, settings) / seen.weight
-    for _ in range(_TRIES + 1):
+    for _ in range(TRIES):
         s = r + spread
         S = M + s * np.eye(len(M))
         factor, flaw = dpotrf(S, lower=1)
@@ -65,11 +64,11 @@ def updated(
         lam = dpotrs(factor, led, lower=1)[0]
         step = (PH @ lam).reshape(state.theta.shape)
         led_after = state.led + np.outer(gain, lam)
-        excess = _excess(state, step, settings)
-        if excess <= 1.0 and not spoils(state, led_after, state.theta + step, settings):
+        far = excess(state, step, settings)
+        if far <= 1.0 and not spoils(state, led_after, state.theta + step, settings):
             break
         # a smaller step by more measurement noise keeps estimate and covariance consistent
-        r += max(excess - 1.0, 1.0) * (s + float(np.trace(M)) / max(len(M), 1))
+        r += max(far - 1.0, 1.0) * (s + float(np.trace(M)) / max(len(M), 1))
     else:
         # no step, so nothing was learnt and nothing is surer than before
         return replace(
@@ -93,12 +92,6 @@ def _linearised(state: State, x: np.ndarray, settings: Settings) -> tuple[np.nda
     weights = state.led_weights
     H = weights.T[:, :, None] * by_theta
     return np.concatenate([of.tail_rows(x[None])[0], phi[0]]), H.reshape(weights.shape[1], -1)
-
-
-def _excess(state: State, step: np.ndarray, settings: Settings) -> float:
-    if not settings.step_bound or not state.units:
-        return 0.0
-    return settings.regressors(state.inputs).form.stride(state.theta, step) / settings.step_bound
 
 
 def _reduced(

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate.physics.solution import Solution, Stop
+from palpate.physics.beam.solution import Solution
+from palpate.physics.equilibrium.stop import Stop
 from palpate.units import Range
 
 

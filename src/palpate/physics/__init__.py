@@ -1,16 +1,28 @@
 """What the body does under load: geometry, materials, loads and the solve.
 
-A `Cantilever` and its loads make a `BeamProblem`, a plain value. `BeamProblem.open` builds the finite
-elements and gives a solver. Its `solve` returns a `Solution`, a plain value also where there is no equilibrium.
+    materials    what a body is made of, as energies
+    beam         plane cantilevers
+    equilibrium  finding a minimum of an energy, whatever body it belongs to
+
+A body and its loads make a problem, a plain value. The problem's `open` builds the finite elements and gives a solver,
+whose `solve` returns a solution, a plain value also where there is no equilibrium.
 """
 
-from palpate.physics.beam import Cantilever
-from palpate.physics.loads import PointLoad, TipLoad
-from palpate.physics.material import MATERIALS, LinearElastic, named_material
-from palpate.physics.presets import PRESETS, Preset, preset
-from palpate.physics.problem import BeamProblem
-from palpate.physics.section import Circle, Rectangle, Section
-from palpate.physics.solution import Solution, Stop
+from palpate.physics.beam import (
+    PRESETS,
+    BeamProblem,
+    Cantilever,
+    Circle,
+    PointLoad,
+    Preset,
+    Rectangle,
+    Section,
+    Solution,
+    TipLoad,
+    preset,
+)
+from palpate.physics.equilibrium import Stop
+from palpate.physics.materials import MATERIALS, LinearElastic, named_material
 
 __all__ = [
     "MATERIALS",

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from palpate.errors import UsageError
 from palpate.physics import Cantilever, Circle
-from palpate.physics.presets import PRESETS, preset
+from palpate.physics.beam.presets import PRESETS, preset
 from palpate.study.models import Study
 
 __all__ = ["named", "preset_names", "preset_study"]

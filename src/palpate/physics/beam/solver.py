@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from palpate.physics.loadpath import LoadPath, follow
-from palpate.physics.newton import Equilibrium
-from palpate.physics.problem import BeamProblem
-from palpate.physics.reissner import ReissnerBeam, Stiffness
-from palpate.physics.solution import Solution, Stop
+from palpate.physics.beam.problem import BeamProblem
+from palpate.physics.beam.reissner import ReissnerBeam, Stiffness
+from palpate.physics.beam.solution import Solution
+from palpate.physics.equilibrium.newton import Equilibrium
+from palpate.physics.equilibrium.path import LoadPath, follow
+from palpate.physics.equilibrium.stop import Stop
 
 __all__ = ["STANDARD_GRAVITY", "BeamSolver"]
 

@@ -12,10 +12,10 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_number
-from palpate.physics.loads import PointLoad, as_loads
-from palpate.physics.material import LinearElastic
-from palpate.physics.problem import BeamProblem
-from palpate.physics.section import CrossSection
+from palpate.physics.beam.loads import PointLoad, as_loads
+from palpate.physics.beam.problem import BeamProblem
+from palpate.physics.beam.section import CrossSection
+from palpate.physics.materials.linear import LinearElastic
 
 __all__ = ["Cantilever"]
 

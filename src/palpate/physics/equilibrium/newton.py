@@ -19,7 +19,7 @@ from typing import Protocol
 
 import numpy as np
 
-from palpate.physics.solution import Stop
+from palpate.physics.equilibrium.stop import Stop
 
 __all__ = ["Equilibrium", "Model", "Tangent", "minimise"]
 

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.physics.loads import PointLoad
+from palpate.physics.beam.loads import PointLoad
 from palpate.units import Range
 
 if TYPE_CHECKING:
-    from palpate.physics.beam import Cantilever
-    from palpate.physics.solution import Solution
-    from palpate.physics.solver import BeamSolver
+    from palpate.physics.beam.cantilever import Cantilever
+    from palpate.physics.beam.solution import Solution
+    from palpate.physics.beam.solver import BeamSolver
 
 __all__ = ["BeamProblem"]
 
@@ -79,7 +79,7 @@ class BeamProblem:
 
     def open(self) -> BeamSolver:
         """Build the finite elements; the solver that comes back is good for many solves."""
-        from palpate.physics.solver import BeamSolver
+        from palpate.physics.beam.solver import BeamSolver
 
         return BeamSolver(self)
 

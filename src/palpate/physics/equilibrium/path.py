@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.physics.newton import Equilibrium, Model, minimise
-from palpate.physics.solution import Stop
+from palpate.physics.equilibrium.newton import Equilibrium, Model, minimise
+from palpate.physics.equilibrium.stop import Stop
 
 __all__ = ["LoadPath", "follow"]
 

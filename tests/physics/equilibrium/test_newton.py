@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from palpate.physics.loadpath import LoadPath, follow
-from palpate.physics.newton import minimise
-from palpate.physics.solution import Stop
+from palpate.physics.equilibrium.newton import minimise
+from palpate.physics.equilibrium.path import LoadPath, follow
+from palpate.physics.equilibrium.stop import Stop
 
 
 class Dense:

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 from palpate.errors import UsageError
-from palpate.physics.beam import Cantilever
-from palpate.physics.loads import PointLoad, TipLoad
-from palpate.physics.material import named_material
-from palpate.physics.problem import BeamProblem
-from palpate.physics.section import Circle
+from palpate.physics.beam.cantilever import Cantilever
+from palpate.physics.beam.loads import PointLoad, TipLoad
+from palpate.physics.beam.problem import BeamProblem
+from palpate.physics.beam.section import Circle
+from palpate.physics.materials.linear import named_material
 
 __all__ = ["PRESETS", "Preset", "preset"]
 

@@ -1,0 +1,187 @@
+"""How the flow stress of a metal rises with accumulated plastic strain.
+
+A hardening law is a curve σ_y(α) over the accumulated (equivalent) plastic strain α ≥ 0. What a return mapping asks of
+it is the plastic increment Δ ≥ 0 that brings the stress back to the curve,
+
+    stiffness · Δ + σ_y(α + Δ) − σ_y(α) = excess,
+
+where the excess is the trial stress less σ_y(α), and the stiffness is E in a fibre and 3G in a solid (Simo & Hughes
+1998, Computational Inelasticity, ch. 1 and 3).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.physics.arguments import require_number
+
+__all__ = ["Hardening", "LinearHardening", "VoceHardening"]
+
+
+class Hardening(Protocol):
+    """What plasticity asks of a hardening law; α is a number or an array of any shape."""
+
+    @property
+    def yield_stress(self) -> float:
+        """Flow stress of the virgin material in Pa."""
+
+    def flow_stress(self, accumulated: Any) -> Any:
+        """σ_y(α) in Pa."""
+
+    def slope(self, accumulated: Any) -> Any:
+        """dσ_y/dα in Pa."""
+
+    def work(self, accumulated: Any) -> Any:
+        """Plastic work ∫σ_y dα from 0 to α, in J/m³."""
+
+    def increment(self, excess: Any, stiffness: float, accumulated: Any) -> Any:
+        """Plastic increment Δ ≥ 0 of the return mapping; 0 where the excess is not positive."""
+
+
+@dataclass(frozen=True)
+class LinearHardening:
+    """σ_y = σ_0 + h α.
+
+    Attributes
+    ----------
+    yield_stress : float
+        σ_0 in Pa, positive.
+    modulus : float
+        Plastic modulus h in Pa, not negative; 0 is perfect plasticity.
+
+    Raises
+    ------
+    UsageError
+        For a material that softens or has no strength.
+    """
+
+    yield_stress: float
+    modulus: float = 0.0
+
+    def __post_init__(self) -> None:
+        _require_positive("The yield stress", self.yield_stress)
+        _require_not_negative("The plastic modulus", self.modulus)
+
+    def flow_stress(self, accumulated: Any) -> Any:
+        """σ_0 + h α, in Pa."""
+        return self.yield_stress + self.modulus * accumulated
+
+    def slope(self, accumulated: Any) -> Any:
+        """h in Pa, in the shape of α."""
+        return self.modulus + 0 * accumulated
+
+    def work(self, accumulated: Any) -> Any:
+        """σ_0 α + ½ h α², in J/m³."""
+        return (self.yield_stress + 0.5 * self.modulus * accumulated) * accumulated
+
+    def increment(self, excess: Any, stiffness: float, accumulated: Any) -> Any:
+        """Excess over the sum of both moduli."""
+        return _positive(excess) / (stiffness + self.modulus)
+
+
+@dataclass(frozen=True)
+class VoceHardening:
+    """σ_y = σ_0 + Q (1 − exp(−b α)) + h α (Voce 1955, Metallurgia 51, 219-226).
+
+    Attributes
+    ----------
+    yield_stress : float
+        σ_0 in Pa, positive.
+    saturation : float
+        Q in Pa, not negative: what the flow stress gains in the end.
+    rate : float
+        b, a pure number, positive: α = 1/b brings 63 % of Q.
+    modulus : float
+        Linear part h in Pa, not negative.
+
+    Raises
+    ------
+    UsageError
+        For a material that softens or has no strength.
+    """
+
+    yield_stress: float
+    saturation: float
+    rate: float
+    modulus: float = 0.0
+
+    def __post_init__(self) -> None:
+        _require_positive("The yield stress", self.yield_stress)
+        _require_not_negative("The saturation stress", self.saturation)
+        _require_positive("The saturation rate", self.rate)
+        _require_not_negative("The plastic modulus", self.modulus)
+
+    def flow_stress(self, accumulated: Any) -> Any:
+        """σ_0 + Q (1 − exp(−b α)) + h α, in Pa."""
+        gained = self.saturation * (1 - _exp(-self.rate * accumulated))
+        return self.yield_stress + gained + self.modulus * accumulated
+
+    def slope(self, accumulated: Any) -> Any:
+        """Q b exp(−b α) + h, in Pa."""
+        return self.saturation * self.rate * _exp(-self.rate * accumulated) + self.modulus
+
+    def work(self, accumulated: Any) -> Any:
+        """(σ_0 + Q) α − Q (1 − exp(−b α))/b + ½ h α², in J/m³."""
+        exponential = self.saturation / self.rate * (1 - _exp(-self.rate * accumulated))
+        linear = self.yield_stress + self.saturation + 0.5 * self.modulus * accumulated
+        return linear * accumulated - exponential
+
+    def increment(self, excess: Any, stiffness: float, accumulated: Any) -> Any:
+        """Root of stiffness Δ + σ_y(α + Δ) − σ_y(α) = excess, by Newton iteration."""
+        both = stiffness + self.modulus
+        target = _positive(excess) * self.rate / both
+        share = self.saturation * self.rate / both * _exp(-self.rate * accumulated)
+        return saturating_root(target, share) / self.rate
+
+
+def saturating_root(target: Any, share: Any) -> Any:
+    """x ≥ 0 with x + share (1 − exp(−x)) = target, for share ≥ 0 and target ≥ 0.
+
+    The left side is concave and rises, so Newton's method climbs to the root from any point below it and needs no
+    safeguard. Two points below it are target/(1 + share), as 1 − exp(−x) ≤ x, and target − share.
+    """
+    lower, upper = target / (1 + share), target - share
+    x = np.where(np.real(upper) > np.real(lower), upper, lower)
+    for _ in range(_STEPS):
+        x = _newton_step(x, target, share)
+    return x
+
+
+_STEPS = 8
+"""Enough for double precision at a share up to 1e3; that of a metal is below 1."""
+
+
+def _newton_step(x: Any, target: Any, share: Any) -> Any:
+    remaining = share * _exp(-x)
+    return (target - share + remaining * (1 + x)) / (1 + remaining)
+
+
+def _exp(x: Any) -> Any:
+    return np.exp(x)
+
+
+def _positive(x: Any) -> Any:
+    return np.where(np.real(x) > 0, x, 0 * x)
+
+
+def _require_positive(what: str, value: float) -> None:
+    require_number(what, value, "SI units")
+    if not (math.isfinite(value) and value > 0):
+        raise _refusal(what, value, "positive and finite")
+
+
+def _require_not_negative(what: str, value: float) -> None:
+    require_number(what, value, "SI units")
+    if not (math.isfinite(value) and value >= 0):
+        raise _refusal(what, value, "finite and not negative: a flow stress that falls has no unique answer")
+
+
+def _refusal(what: str, value: float, rule: str) -> UsageError:
+    return UsageError(
+        f"{what} is {value}.", why=f"It must be {rule}.", fix="Check the number and its unit (Pa)."
+    )

@@ -1,0 +1,113 @@
+"""A Prony series: how a stress relaxes at a held strain.
+
+The share of the instantaneous modulus that is left at time t is g(t) = γ_∞ + Σ γ_i exp(−t/τ_i), with γ_∞ + Σ γ_i = 1.
+Under a sinusoidal strain of angular frequency ω it has the storage and loss shares (Ferry 1980, Viscoelastic Properties
+of Polymers, 3rd ed., ch. 3)
+
+    g'(ω) = γ_∞ + Σ γ_i ω²τ_i²/(1 + ω²τ_i²)        g''(ω) = Σ γ_i ωτ_i/(1 + ω²τ_i²)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.physics.arguments import require_number
+
+__all__ = ["Prony"]
+
+
+@dataclass(frozen=True)
+class Prony:
+    """Shares and relaxation times.
+
+    Attributes
+    ----------
+    terms : tuple of (float, float)
+        (γ_i, τ_i): share of the instantaneous modulus that relaxes, in (0, 1], and relaxation time in s, positive.
+
+    Raises
+    ------
+    UsageError
+        For a share or time that is not positive, or shares that sum to more than 1.
+    """
+
+    terms: tuple[tuple[float, float], ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "terms", tuple((share, time) for share, time in self.terms))
+        for share, time in self.terms:
+            _require_positive("A Prony share", share, "a pure number")
+            _require_positive("A relaxation time", time, "s")
+        if math.fsum(self.shares) > 1 + 1e-12:
+            raise UsageError(
+                f"The Prony shares sum to {math.fsum(self.shares):g}.",
+                why="They are shares of the instantaneous modulus; above 1 the equilibrium modulus is negative.",
+                fix="Divide each modulus by the instantaneous one, G_∞ + ΣG_i: Prony.of_moduli does it.",
+            )
+
+    @classmethod
+    def of_moduli(cls, equilibrium: float, branches: Sequence[tuple[float, float]]) -> Prony:
+        """Series of an equilibrium modulus (Pa) and of branches (modulus in Pa, relaxation time in s)."""
+        whole = equilibrium + math.fsum(modulus for modulus, _ in branches)
+        return cls(tuple((modulus / whole, time) for modulus, time in branches))
+
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """γ_i, pure numbers."""
+        return tuple(share for share, _ in self.terms)
+
+    @property
+    def times(self) -> tuple[float, ...]:
+        """τ_i in s."""
+        return tuple(time for _, time in self.terms)
+
+    @property
+    def equilibrium(self) -> float:
+        """γ_∞, the share that never relaxes."""
+        return max(0.0, 1 - math.fsum(self.shares))
+
+    def relaxation(self, time: Any) -> Any:
+        """g(t) for times in s of any shape."""
+        time = np.asarray(time, dtype=float)
+        return self.equilibrium + sum(share * np.exp(-time / tau) for share, tau in self.terms)
+
+    def storage(self, frequency: Any) -> Any:
+        """g'(ω) for angular frequencies in rad/s of any shape."""
+        ratio = [np.square(np.asarray(frequency, dtype=float) * tau) for tau in self.times]
+        return self.equilibrium + sum(g * r / (1 + r) for g, r in zip(self.shares, ratio, strict=True))
+
+    def loss(self, frequency: Any) -> Any:
+        """g''(ω) for angular frequencies in rad/s of any shape."""
+        ratio = [np.asarray(frequency, dtype=float) * tau for tau in self.times]
+        return sum(
+            (g * r / (1 + r * r) for g, r in zip(self.shares, ratio, strict=True)), 0 * np.asarray(frequency)
+        )
+
+    def decay(self, dt: float | None) -> tuple[float, ...]:
+        """e_i = exp(−Δ/τ_i): what is left of an overstress after a step of dt seconds; None is an instant."""
+        return tuple(math.exp(-(dt or 0.0) / tau) for tau in self.times)
+
+    def gain(self, dt: float | None) -> tuple[float, ...]:
+        """a_i = (1 − exp(−Δ/τ_i))/(Δ/τ_i): what is left of a stress that grew evenly over the step."""
+        return tuple(mean_decay((dt or 0.0) / tau) for tau in self.times)
+
+
+def mean_decay(ratio: float) -> float:
+    """(1 − exp(−x))/x, which is 1 at x = 0 and 0 at infinity."""
+    return -math.expm1(-ratio) / ratio if ratio > 0 else 1.0
+
+
+def _require_positive(what: str, value: float, unit: str) -> None:
+    require_number(what, value, unit)
+    if not (math.isfinite(value) and value > 0):
+        raise UsageError(
+            f"{what} is {value}.",
+            why=f"It must be positive and finite, in {unit}.",
+            fix="Leave the term out, or check its unit.",
+        )

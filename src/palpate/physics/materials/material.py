@@ -1,0 +1,259 @@
+"""What a finite-element model asks of a material, and what every elastic law shares."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, ClassVar, Literal, Protocol
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.physics.materials.moduli import poisson_ratio, young_modulus
+from palpate.physics.materials.tensors import Scalar, Tensor, determinant, is_symbolic, log, trace
+
+__all__ = [
+    "NO_STATE",
+    "Elastic",
+    "Material",
+    "StateVariable",
+    "Volumetric",
+    "incompressible",
+    "initial_state",
+    "log_volume",
+    "small_volume",
+    "volume_change",
+]
+
+NO_STATE: Mapping[str, Any] = MappingProxyType({})
+"""The state of a material that has none."""
+
+
+def log_volume(F: Tensor) -> Scalar:
+    """ln J with J = det F."""
+    return log(determinant(F))
+
+
+def volume_change(F: Tensor) -> Scalar:
+    """J − 1 with J = det F."""
+    return determinant(F) - 1
+
+
+def small_volume(F: Tensor) -> Scalar:
+    """The trace of ε = sym(F − I), the change of volume at small strain."""
+    return trace(F) - 3
+
+
+@dataclass(frozen=True)
+class Volumetric:
+    """The volumetric part ½ · modulus · measure(F)² of an energy.
+
+    Attributes
+    ----------
+    modulus : float
+        In Pa, positive; infinite for an incompressible material, which only a mixed formulation can solve.
+    measure : callable
+        From F to a pure number that vanishes at F = I with slope 1 in the volume: `log_volume`, `volume_change`,
+        `small_volume`, or another module-level function.
+    """
+
+    modulus: float
+    measure: Callable[[Tensor], Scalar]
+
+    def energy(self, F: Tensor) -> Scalar:
+        """½ · modulus · measure(F)², in J/m³."""
+        return 0.5 * self.modulus * self.measure(F) ** 2
+
+
+@dataclass(frozen=True)
+class StateVariable:
+    """One internal variable, kept at every quadrature point.
+
+    Attributes
+    ----------
+    name : str
+        Its key in the state.
+    shape : tuple
+        () for a scalar, (3, 3) for a tensor.
+    initial : tuple or float
+        Its value in the undeformed body: a number, or three rows of three.
+    """
+
+    name: str
+    shape: tuple[()] | tuple[int, int] = ()
+    initial: float | tuple[tuple[float, ...], ...] = 0.0
+
+
+class Material(Protocol):
+    """An energy density per reference volume, and what a model must know about it.
+
+    Materials are frozen, hashable, picklable values. `F` is the deformation gradient: a coefficient function of NGSolve
+    or a NumPy array (..., 3, 3).
+    """
+
+    @property
+    def name(self) -> str:
+        """What the material is called."""
+
+    @property
+    def source(self) -> str:
+        """Where its constants are from."""
+
+    @property
+    def density(self) -> float:
+        """Reference density in kg/m³."""
+
+    @property
+    def kinematics(self) -> Literal["large", "small"]:
+        """``"small"`` if the law depends on ε = sym(F − I) alone."""
+
+    @property
+    def young(self) -> float:
+        """Initial Young's modulus in Pa (viscoelastic: instantaneous)."""
+
+    @property
+    def poisson(self) -> float:
+        """Initial Poisson's ratio."""
+
+    @property
+    def shear_modulus(self) -> float:
+        """Initial shear modulus in Pa."""
+
+    @property
+    def bulk_modulus(self) -> float:
+        """Initial bulk modulus in Pa."""
+
+    @property
+    def states(self) -> tuple[StateVariable, ...]:
+        """Internal variables; empty for an elastic material."""
+
+    @property
+    def volumetric(self) -> Volumetric | None:
+        """The volumetric part of the energy, if it is separate from the rest."""
+
+    def energy(self, F: Tensor, state: Mapping[str, Any] = NO_STATE, dt: Any = None) -> Scalar:
+        """Energy density in J/m³; its gradient in F is the first Piola–Kirchhoff stress.
+
+        For a material with a history, the incremental energy of a step of `dt` seconds that starts from `state`.
+        """
+
+    def distortion(self, F: Tensor, state: Mapping[str, Any] = NO_STATE, dt: Any = None) -> Scalar:
+        """The energy without its volumetric part, in J/m³."""
+
+    def advance(self, F: Tensor, state: Mapping[str, Any], dt: Any) -> dict[str, Any]:
+        """Internal variables at the end of the step; empty for an elastic material."""
+
+    def describe(self) -> dict[str, Any]:
+        """Plain data for JSON: the law's name and its constants."""
+
+
+class Elastic:
+    """What elastic laws share: the sum of distortion and volumetric part, derived moduli, description.
+
+    A law is a frozen dataclass with `name`, `source` and `density`, that gives `law` (its name in words), `shear_modulus`,
+    `bulk_modulus`, `volumetric` and `distortion`; or `energy` where it has no separate volumetric part.
+    """
+
+    name: str
+    source: str
+    density: float
+    law: ClassVar[str] = "elastic"
+    kinematics: ClassVar[Literal["large", "small"]] = "large"
+    states: ClassVar[tuple[StateVariable, ...]] = ()
+
+    @property
+    def shear_modulus(self) -> float:
+        """Initial shear modulus in Pa."""
+        raise NotImplementedError
+
+    @property
+    def bulk_modulus(self) -> float:
+        """Initial bulk modulus in Pa."""
+        raise NotImplementedError
+
+    @property
+    def volumetric(self) -> Volumetric | None:
+        """The volumetric part of the energy, if it is separate from the rest."""
+        return None
+
+    # derived here for the laws whose constants are others
+    @property
+    def young(self) -> float:
+        """Initial Young's modulus in Pa."""
+        return young_modulus(self.shear_modulus, self.bulk_modulus)
+
+    @property
+    def poisson(self) -> float:
+        """Initial Poisson's ratio."""
+        return poisson_ratio(self.shear_modulus, self.bulk_modulus)
+
+    def energy(self, F: Tensor, state: Mapping[str, Any] = NO_STATE, dt: Any = None) -> Scalar:
+        """Energy density in J/m³ at the deformation gradient F.
+
+        Raises
+        ------
+        UsageError
+            If the material is incompressible: then only `distortion` has a value.
+        """
+        volumetric = self.volumetric
+        if volumetric is None:
+            return self.distortion(F, state, dt)
+        if np.isinf(volumetric.modulus):
+            raise incompressible(self.name)
+        return self.distortion(F, state, dt) + volumetric.energy(F)
+
+    def distortion(self, F: Tensor, state: Mapping[str, Any] = NO_STATE, dt: Any = None) -> Scalar:
+        """The energy density without its volumetric part, in J/m³."""
+        raise NotImplementedError
+
+    def advance(self, F: Tensor, state: Mapping[str, Any], dt: Any) -> dict[str, Any]:
+        """Nothing: an elastic material has no history."""
+        return {}
+
+    def describe(self) -> dict[str, Any]:
+        """Plain data for JSON: the law's name and its constants."""
+        fields = dataclasses.fields(self)  # type: ignore[arg-type]  # a law is a dataclass, this base is none
+        constants = {f.name: _plain(getattr(self, f.name)) for f in fields}
+        return {"law": type(self).__name__, **constants}
+
+    def __str__(self) -> str:
+        """The law, the initial moduli and the source, in words."""
+        named = self.name if self.name.lower() == self.law.lower() else f"{self.name}, {self.law}"
+        origin = f" ({self.source})" if self.source else ""
+        return (
+            f"{named}: E = {self.young:.4g} Pa, ν = {self.poisson:.5g}, ρ = {self.density:.4g} kg/m³{origin}"
+        )
+
+
+def initial_state(material: Material, like: Tensor) -> dict[str, Any]:
+    """The state of the undeformed body, of the kind of `like` and, in NumPy, one value for every F (..., 3, 3)."""
+    if is_symbolic(like):
+        import ngsolve
+
+        return {
+            s.name: ngsolve.CF(tuple(np.ravel(s.initial).tolist()), dims=s.shape)
+            if s.shape
+            else ngsolve.CF(float(np.asarray(s.initial)))
+            for s in material.states
+        }
+    leading = np.shape(like)[:-2]
+    return {s.name: np.broadcast_to(np.asarray(s.initial, float), leading + s.shape) for s in material.states}
+
+
+def incompressible(name: str) -> UsageError:
+    """The error for an energy that does not exist because the volume can't change."""
+    return UsageError(
+        f"{name} is incompressible: its energy density has no value away from det F = 1.",
+        why="Its bulk modulus is infinite (Poisson's ratio 0.5).",
+        fix='Use formulation="mixed", or a Poisson\'s ratio such as 0.4999.',
+    )
+
+
+def _plain(value: Any) -> Any:
+    if callable(getattr(value, "describe", None)):
+        return value.describe()
+    if isinstance(value, tuple | list):
+        return [_plain(v) for v in value]
+    return value.item() if isinstance(value, np.generic) else value

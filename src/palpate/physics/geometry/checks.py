@@ -1,0 +1,90 @@
+"""Arguments that all shapes check alike."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable
+from typing import Any
+
+from palpate.errors import UsageError
+from palpate.physics.arguments import require_number
+
+__all__ = ["LARGEST", "SMALLEST", "require_known", "require_positive", "require_size", "require_triple"]
+
+LARGEST, SMALLEST = 10.0, 1e-3  # m, longest side of a body that a hand or a tool would press
+
+
+def require_positive(what: str, value: Any, unit: str = "m") -> None:
+    """Refuse what is no positive, finite number."""
+    require_number(what, value, unit)
+    if not (math.isfinite(value) and value > 0):
+        raise UsageError(
+            f"{what} is {value:g} {unit}.",
+            why="It must be positive and finite.",
+            fix=f"Pass a positive number in {unit}.",
+        )
+
+
+def require_triple(what: str, value: Any) -> tuple[float, float, float]:
+    """Three finite numbers as a tuple of floats."""
+    try:
+        x, y, z = value
+    except (TypeError, ValueError):
+        raise UsageError(
+            f"{what} is {value!r}.",
+            why="It needs three numbers, along x, y and z.",
+            fix="Pass (x, y, z) in m.",
+        ) from None
+    for number in (x, y, z):
+        require_number(what, number, "m")
+        if not math.isfinite(number):
+            raise UsageError(
+                f"{what} is {value!r}.",
+                why="It must be finite.",
+                fix="Pass finite numbers in m, as (x, y, z).",
+            )
+    return float(x), float(y), float(z)
+
+
+def require_size(what: str, longest: float, unit: str = "") -> None:
+    """Refuse a body whose longest side in m tells of mistaken units.
+
+    Parameters
+    ----------
+    what : str
+        The body.
+    longest : float
+        Its longest side in m.
+    unit : str
+        The unit in which its lengths were read from a file; empty where they are given in m by the user.
+    """
+    if SMALLEST <= longest <= LARGEST:
+        return
+    taken = f"Its lengths were taken as {unit}" if unit else "Lengths are in m"
+    guess = "mm" if longest > LARGEST else "m"
+    advice = f'Pass unit="{guess}" if the file is in {guess}' if unit else "Pass 0.1 for 100 mm"
+    raise UsageError(
+        f"{what} would be {longest:.4g} m long.",
+        why=f"{taken}, and a body to be touched measures between {SMALLEST:g} and {LARGEST:g} m.",
+        fix=f"{advice}.",
+    )
+
+
+def require_known(kind: str, name: str, known: Iterable[str]) -> None:
+    """Refuse a name that is not among the known ones, and offer the nearest.
+
+    Parameters
+    ----------
+    kind : str
+        For example ``"surface"``.
+    """
+    names = tuple(known)
+    if name in names:
+        return
+    near = difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
+    raise UsageError(
+        f"There is no {kind} {name!r}.",
+        why=f"The body's {kind}s are {', '.join(names)}.",
+        fix=f"Did you mean {near[0]!r}?" if near else f"Choose one of these {kind}s.",
+    )

@@ -1,0 +1,213 @@
+"""The mesh of a body as plain arrays, and the way from and to NGSolve."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from palpate.physics.geometry.quality import MeshQuality, mesh_quality, tetrahedron_volumes
+
+__all__ = ["UNNAMED", "BodyMesh", "body_mesh", "outer_faces", "to_ngsolve"]
+
+UNNAMED = "unnamed"
+# the faces of a right-handed tetrahedron, each counter-clockwise as seen from outside
+FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+
+
+@dataclass(frozen=True, eq=False)
+class BodyMesh:
+    """A body at rest as straight tetrahedra and the triangles of its outer surface.
+
+    The arrays are read-only.
+
+    Attributes
+    ----------
+    points : (node, 3) array
+        Positions of the vertices in m. Node k is vertex k of the NGSolve mesh.
+    tetrahedra : (e, 4) int array
+        Nodes, right-handed: (p1 - p0) × (p2 - p0) · (p3 - p0) > 0.
+    triangles : (t, 3) int array
+        Nodes of the outer surface, counter-clockwise as seen from outside.
+    surface_of : (t,) int array
+        Index into `surfaces` for each triangle.
+    region_of : (e,) int array
+        Index into `regions` for each tetrahedron.
+    surfaces, regions : tuple of str
+        Names; each has at least one triangle or tetrahedron.
+    """
+
+    points: np.ndarray
+    tetrahedra: np.ndarray
+    triangles: np.ndarray
+    surface_of: np.ndarray
+    region_of: np.ndarray
+    surfaces: tuple[str, ...]
+    regions: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        for name in ("points", "tetrahedra", "triangles", "surface_of", "region_of"):
+            array = np.array(getattr(self, name), dtype=float if name == "points" else np.int64)
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+
+    def __repr__(self) -> str:
+        return (
+            f"BodyMesh({len(self.points)} nodes, {len(self.tetrahedra)} tetrahedra, "
+            f"surfaces {', '.join(self.surfaces)}, regions {', '.join(self.regions)})"
+        )
+
+    @property
+    def corners(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper corner of the box around the body in m, each (3,)."""
+        return self.points.min(axis=0), self.points.max(axis=0)
+
+    @cached_property
+    def volumes(self) -> np.ndarray:
+        """Volume of each tetrahedron in m³, shape (e,)."""
+        return tetrahedron_volumes(self.points, self.tetrahedra)
+
+    @property
+    def volume(self) -> float:
+        """Volume of the body in m³, between straight faces."""
+        return float(self.volumes.sum())
+
+    @property
+    def region_volumes(self) -> dict[str, float]:
+        """Volume of each region in m³."""
+        sums = np.bincount(self.region_of, self.volumes, minlength=len(self.regions))
+        return dict(zip(self.regions, sums.tolist(), strict=True))
+
+    @cached_property
+    def area_vectors(self) -> np.ndarray:
+        """Outward normal times area of each triangle in m², shape (t, 3)."""
+        a, b, c = np.moveaxis(self.points[self.triangles], 1, 0)
+        return np.cross(b - a, c - a) / 2
+
+    @property
+    def areas(self) -> dict[str, float]:
+        """Area of each surface in m²."""
+        size = np.linalg.norm(self.area_vectors, axis=1)
+        sums = np.bincount(self.surface_of, size, minlength=len(self.surfaces))
+        return dict(zip(self.surfaces, sums.tolist(), strict=True))
+
+    @property
+    def normals(self) -> np.ndarray:
+        """Outward unit normal of each triangle, shape (t, 3)."""
+        return np.asarray(self.area_vectors / np.linalg.norm(self.area_vectors, axis=1, keepdims=True))
+
+    @cached_property
+    def quality(self) -> MeshQuality:
+        """Shape of the worst elements."""
+        return mesh_quality(self.points, self.tetrahedra)
+
+    def triangles_of(self, surface: str) -> np.ndarray:
+        """Nodes of the triangles of one surface, shape (t, 3); `ValueError` if there is no such surface."""
+        return np.asarray(self.triangles[self.surface_of == self.surfaces.index(surface)])
+
+    def ngsolve(self) -> Any:
+        """The same mesh for NGSolve, as `to_ngsolve` gives it."""
+        return to_ngsolve(self)
+
+
+def outer_faces(tetrahedra: np.ndarray) -> np.ndarray:
+    """Faces that belong to one tetrahedron only, in the order of the tetrahedra.
+
+    Parameters
+    ----------
+    tetrahedra : (e, 4) int array
+        Right-handed.
+
+    Returns
+    -------
+    (t, 3) int array
+        Counter-clockwise as seen from outside.
+    """
+    faces = tetrahedra[:, FACES].reshape(-1, 3)
+    _, inverse, count = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True, return_counts=True)
+    return np.asarray(faces[count[inverse.ravel()] == 1])
+
+
+def body_mesh(mesh: Any, surfaces: tuple[str, ...] = (), regions: tuple[str, ...] = ()) -> BodyMesh:
+    """Plain arrays of a mesh of tetrahedra.
+
+    Parameters
+    ----------
+    mesh : ngsolve.Mesh or netgen.meshing.Mesh
+        Three-dimensional, in m. Curved elements are taken by their vertices.
+    surfaces, regions : tuple of str
+        Names in the order wanted; others follow in the order of the mesh.
+
+    Returns
+    -------
+    BodyMesh
+        Its nodes are numbered as the mesh's vertices. Boundaries between regions are left out.
+    """
+    netgen = getattr(mesh, "ngmesh", mesh)
+    points = netgen.Coordinates()
+    solid, skin = netgen.Elements3D().NumPy(), netgen.Elements2D().NumPy()
+    tetrahedra = solid["nodes"][:, :4].astype(np.int64) - 1
+    left_handed = tetrahedron_volumes(points, tetrahedra) < 0
+    tetrahedra[left_handed] = tetrahedra[left_handed][:, [0, 2, 1, 3]]
+    triangles = outer_faces(tetrahedra)
+    names = [netgen.FaceDescriptor(i + 1).bcname for i in range(netgen.GetNFaceDescriptors())]
+    found = _look_up(skin["nodes"][:, :3].astype(np.int64) - 1, skin["index"].astype(np.int64) - 1, triangles)
+    outer, surface_of = _compact([*names, UNNAMED], found, surfaces)
+    materials = [netgen.GetMaterial(i + 1) for i in range(netgen.GetNDomains())]
+    inner, region_of = _compact(materials, solid["index"].astype(np.int64) - 1, regions)
+    return BodyMesh(points, tetrahedra, triangles, surface_of, region_of, outer, inner)
+
+
+def _look_up(known: np.ndarray, value: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """The value that belongs to each wanted triangle among the known ones; -1 where there is none."""
+    table = {tuple(key): int(v) for key, v in zip(np.sort(known, axis=1).tolist(), value, strict=True)}
+    return np.array([table.get(tuple(key), -1) for key in np.sort(wanted, axis=1).tolist()], dtype=np.int64)
+
+
+def _compact(
+    names: list[str], index: np.ndarray, first: tuple[str, ...]
+) -> tuple[tuple[str, ...], np.ndarray]:
+    """Names that occur, each once, those wanted `first` before the others; and the index into them."""
+    every = [names[i] for i in index]
+    present = set(every)
+    used = tuple(dict.fromkeys(name for name in (*first, *names) if name in present))
+    position = {name: i for i, name in enumerate(used)}
+    return used, np.array([position[name] for name in every], dtype=np.int64)
+
+
+def to_ngsolve(mesh: BodyMesh) -> Any:
+    """The mesh for NGSolve: straight elements, names of surfaces and regions set.
+
+    Vertices keep their numbers. Elements are sorted by region.
+
+    Returns
+    -------
+    ngsolve.Mesh
+    """
+    import ngsolve
+    from netgen.meshing import FaceDescriptor, Mesh
+
+    ngsolve.SetNumThreads(1)
+    netgen = Mesh(dim=3)
+    netgen.AddPoints(np.ascontiguousarray(mesh.points))
+    for i, name in enumerate(mesh.regions):
+        # Netgen numbers a tetrahedron the other way round
+        nodes = mesh.tetrahedra[mesh.region_of == i][:, [0, 2, 1, 3]]
+        netgen.AddElements(dim=3, index=i + 1, data=np.ascontiguousarray(nodes, dtype=np.int32), base=0)
+        netgen.SetMaterial(i + 1, name)
+    behind = _region_behind(mesh)
+    for s, name in enumerate(mesh.surfaces):
+        for r in np.unique(behind[mesh.surface_of == s]).tolist():
+            index = netgen.Add(FaceDescriptor(surfnr=s + 1, domin=r + 1, domout=0, bc=s + 1))
+            nodes = mesh.triangles[(mesh.surface_of == s) & (behind == r)]
+            netgen.AddElements(dim=2, index=index, data=np.ascontiguousarray(nodes, dtype=np.int32), base=0)
+        netgen.SetBCName(s, name)
+    return ngsolve.Mesh(netgen)
+
+
+def _region_behind(mesh: BodyMesh) -> np.ndarray:
+    """Index of the region that each outer triangle bounds, shape (t,)."""
+    faces = mesh.tetrahedra[:, FACES].reshape(-1, 3)
+    return _look_up(faces, np.repeat(mesh.region_of, 4), mesh.triangles)

@@ -152,7 +152,7 @@ class Material(Protocol):
 class Elastic:
     """What elastic laws share: the sum of distortion and volumetric part, derived moduli, description.
 
-    A law is a frozen dataclass with `name`, `source` and `density`, that gives `law` (its name in words), `shear_modulus`,
+    A law is a frozen dataclass with `name`, `source` and `density`, that gives `law` (in words), `shear_modulus`,
     `bulk_modulus`, `volumetric` and `distortion`; or `energy` where it has no separate volumetric part.
     """
 

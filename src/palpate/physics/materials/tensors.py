@@ -1,8 +1,8 @@
 """Tensor functions that read a finite element's coefficient function and a NumPy array alike.
 
 A law is written once with these functions. In NumPy a scalar has shape (...) and a second-order tensor (..., 3, 3),
-real or complex; in NGSolve both are coefficient functions. Python's ``+``, ``-``, ``*``, ``/`` work between scalars, and
-``+``, ``-`` between tensors; everything else has its function here, because the two worlds write it differently.
+real or complex; in NGSolve both are coefficient functions. Python's ``+``, ``-``, ``*``, ``/`` work between scalars,
+and ``+``, ``-`` between tensors; everything else has its function here, because the two worlds write it differently.
 
 Derivatives: NGSolve differentiates the expression itself; in NumPy `gradient` takes a complex step (Squire & Trapp
 1998, SIAM Review 40, 110-112), exact to rounding. A law must therefore stay analytic: no ``abs``, no ``max``, no

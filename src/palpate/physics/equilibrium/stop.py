@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
 
-__all__ = ["Stop"]
+__all__ = ["Stop", "Verdict"]
 
 
 class Stop(StrEnum):
@@ -14,7 +16,31 @@ class Stop(StrEnum):
     ITERATION_LIMIT = "the iteration limit was reached before equilibrium"
     STEP_TOO_SMALL = "no step along the load path, however small, led to an equilibrium"
     NOT_FINITE = "the energy or its derivatives are not finite"
-    UNSTABLE = "the equilibrium is unstable (the beam buckles): the tangent has a negative direction"
+    UNSTABLE = "the equilibrium is unstable (the body buckles): the tangent has a negative direction"
     STRAIN_LIMIT = "the strain is beyond the reach of the material law"
     COARSE_MESH = "one element bends by more than a radian: the load is beyond the reach of this mesh"
+    ELEMENT_INVERTED = "an element is turned inside out: det F is not positive at a quadrature point"
+    PAST_STOP = "the surface is pressed past the stop of the pad"
+    THROUGH_SURFACE = "the probe has gone through the surface: its centre is on the inner side"
+    NO_APPROACH = "no free way leads from outside to these inputs"
+    SINGULAR = "the tangent can't be factorised accurately"
     BAD_INPUT = "the loads are not finite numbers"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a check says of a state that Newton's method has accepted.
+
+    Attributes
+    ----------
+    stop : Stop
+        `Stop.CONVERGED`, or why the state is not admissible.
+    detail : str
+        Figures that belong to the reason.
+    figures : mapping of str to float
+        What was measured, for example ``{"penetration": 1e-3}``.
+    """
+
+    stop: Stop = Stop.CONVERGED
+    detail: str = ""
+    figures: Mapping[str, float] = field(default_factory=dict)

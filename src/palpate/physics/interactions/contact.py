@@ -1,0 +1,130 @@
+"""Frictionless contact of a rigid sphere with a surface, as an energy of a pad with a stop.
+
+On the penetration p = R - |X + u - c| the pad between sphere and surface stores per undeformed area
+
+    φ(p) = ½ k p² / (1 - p/p_m)   for 0 < p < p_m,   else 0 (p ≤ 0) or not admissible.
+
+Without the stop p_m a soft pad has a limit point: beyond it the surface passes the sphere's centre, the gap
+turns inside out, and states with a pulling force satisfy Newton's equations. So trial states beyond 0.98 p_m
+are rejected, and `inspect` looks at each accepted state anew, in ways that do not depend on the energy.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palpate.physics.equilibrium.stop import Stop, Verdict
+from palpate.physics.geometry.mesh import BodyMesh
+from palpate.physics.interactions.interaction import BEYOND, Field
+from palpate.physics.interactions.patch import winding_number
+
+__all__ = ["REACH", "Contact", "pad_energy"]
+
+REACH = 0.98  # share of the stop up to which states are admissible
+BONUS = 6  # orders of quadrature beyond the elements' own: contact has an edge within elements
+TINY = 1e-9  # m; keeps the distance to the sphere's centre differentiable
+FACING_AWAY = -0.1  # cosine; less than a right angle by more than a fold of the surface takes
+
+
+def pad_energy(penetration: Any, pad: float, stop: float | None) -> Any:
+    """φ(p) in J/m² as an NGSolve coefficient function.
+
+    Parameters
+    ----------
+    penetration : ngsolve.CoefficientFunction
+        p in m.
+    pad : float
+        k in N/m³.
+    stop : float or None
+        p_m in m; None for a pad without a stop, which has a limit point.
+    """
+    from ngsolve import IfPos
+
+    if stop is None:
+        return IfPos(penetration, pad / 2 * penetration**2, 0)
+    pressed = pad / 2 * penetration**2 / (1 - penetration / stop)
+    return IfPos(penetration, IfPos(penetration - REACH * stop, BEYOND, pressed), 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """A sphere and the quadrature points of the surface that it may touch.
+
+    Attributes
+    ----------
+    field : Field
+    mesh : BodyMesh
+        Of the body, its nodes those of the field's mesh.
+    surface : str
+    radius : float
+        In m.
+    stop : float or None
+        In m.
+    """
+
+    field: Field
+    mesh: BodyMesh
+    surface: str
+    radius: float
+    stop: float | None
+
+    def measure(self) -> Any:
+        """The surface's differential symbol."""
+        import ngsolve
+
+        return ngsolve.ds(definedon=self.field.surface(self.surface), bonus_intorder=BONUS)
+
+    def penetration(self, displacement: Any, centre: Any) -> Any:
+        """P = R - |X + u - c| as a coefficient function, positive in contact."""
+        import ngsolve as ngs
+
+        to_surface = ngs.CF((ngs.x, ngs.y, ngs.z)) + displacement - centre
+        return self.radius - ngs.sqrt(ngs.InnerProduct(to_surface, to_surface) + TINY**2)
+
+    def inspect(self, centre: np.ndarray) -> Verdict:
+        """Whether the state in `field.displacement` is one that a sphere at (3,) m can be in.
+
+        The surface must not be pressed past the pad's stop; where it is pressed it must face the centre, so that
+        the pad pushes and never pulls; and the centre must be outside the deformed body.
+        """
+        places, normals = self._deformed()
+        towards = centre - places
+        distance = np.linalg.norm(towards, axis=1)
+        penetration = self.radius - distance
+        figures = {"penetration": max(0.0, float(penetration.max()))}
+        if self.stop is not None and figures["penetration"] > REACH * self.stop:
+            detail = f"{1e3 * figures['penetration']:.3g} mm of {1e3 * self.stop:.3g} mm"
+            return Verdict(Stop.PAST_STOP, detail, figures)
+        pressed = penetration > 0
+        cosines = np.einsum("ni,ni->n", towards[pressed], normals[pressed]) / distance[pressed]
+        if cosines.size and cosines.min() < FACING_AWAY:
+            return Verdict(Stop.THROUGH_SURFACE, "a pressed part of the surface faces away from it", figures)
+        if self._inside(centre):
+            return Verdict(Stop.THROUGH_SURFACE, "the deformed body encloses it", figures)
+        return Verdict(figures=figures)
+
+    def _deformed(self) -> tuple[np.ndarray, np.ndarray]:
+        """Positions (N, 3) in m and outward unit normals (N, 3) of the deformed surface."""
+        import ngsolve as ngs
+
+        points = self._points()
+        u = self.field.displacement
+        # Nanson's formula: n da = cof F N dA, for which the tangential part of F is enough
+        gradient = ngs.Id(3) + ngs.grad(u).Trace()
+        places = np.asarray((ngs.CF((ngs.x, ngs.y, ngs.z)) + u)(points))
+        normals = np.asarray((ngs.Cof(gradient) * ngs.specialcf.normal(3))(points))
+        return places, normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+    def _points(self) -> Any:
+        import ngsolve as ngs
+
+        order = 2 * self.field.displacement.space.globalorder + BONUS
+        rule = ngs.IntegrationRule(ngs.ET.TRIG, order)
+        return self.field.mesh.MapToAllElements(rule, self.field.surface(self.surface))
+
+    def _inside(self, centre: np.ndarray) -> bool:
+        points = self.mesh.points + self.field.at_nodes()
+        return winding_number(points, self.mesh.triangles, centre) > 0.5

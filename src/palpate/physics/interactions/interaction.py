@@ -1,0 +1,180 @@
+"""What acts on a body and varies from solve to solve, as terms of its energy.
+
+One law serves all interactions. With inputs q, state z (displacement and, in mixed form, pressure) and
+
+    Π(z; q) = W(z) + Σ ∫ φ(u; q) - Σ qᵢ lᵢ·z,    z = z_free + z_base + Σ qᵢ Lᵢ on constrained unknowns,
+
+the energy is U(q) = min Π - Π without the interaction, its generalised force -∂U/∂q = -∂Π/∂q by the envelope
+theorem, and the derivative of that force -(D - Bᵀ K⁻¹ B) with B = ∂²Π/∂z∂q, D = ∂²Π/∂q², K = ∂²Π/∂z². So an
+interaction has only to give its densities φ, its load vectors l or its lifts L: the derivatives follow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from palpate.physics.equilibrium.stop import Verdict
+
+if TYPE_CHECKING:
+    from palpate.physics.geometry.mesh import BodyMesh
+    from palpate.physics.geometry.refinement import Refinement
+    from palpate.units import Range
+
+__all__ = ["Attached", "Energy", "Field", "Held", "Interaction", "Planned"]
+
+
+class Field(Protocol):
+    """The opened displacement field of a body: what an interaction attaches to.
+
+    Attributes
+    ----------
+    mesh : ngsolve.Mesh
+    rest : BodyMesh
+        The same mesh as plain arrays, its nodes the mesh's vertices.
+    space : ngsolve.FESpace
+        Of all unknowns z, displacement first; its second component, where there is one, is the pressure.
+    trial : ngsolve.CoefficientFunction
+        The displacement u (3,) as the unknown, for use in a density.
+    displacement : ngsolve.GridFunction
+        u (3,) in m of the state under inspection.
+    base : ngsolve.GridFunction
+        u (3,) in m of the body under its constant loads alone: zero while attaching, filled in afterwards.
+    """
+
+    mesh: Any
+    rest: BodyMesh
+    space: Any
+    trial: Any
+    displacement: Any
+    base: Any
+
+    @property
+    def size(self) -> int:
+        """Number of all unknowns."""
+
+    def surface(self, name: str) -> Any:
+        """NGSolve region of a named surface; `UsageError` if there is none."""
+
+    def surface_dofs(self, name: str) -> np.ndarray:
+        """Which unknowns are displacements on a named surface, bool of shape (dof,)."""
+
+    def at_nodes(self, field: Any = None) -> np.ndarray:
+        """Values (node, 3) in m of `displacement`, or of another such grid function, at the mesh's vertices."""
+
+    def interpolate(self, displacement: Any) -> np.ndarray:
+        """Unknowns (dof,) of a displacement given as a coefficient function (3,), on the whole body."""
+
+    def load(self, integrand: Callable[[Any], Any]) -> np.ndarray:
+        """Load vector l (dof,) of a linear form, from a test displacement v to its integral: ``t * v * ds(...)``."""
+
+
+@dataclass(frozen=True, eq=False)
+class Energy:
+    """A term ∫ φ of the energy.
+
+    Attributes
+    ----------
+    density : ngsolve.CoefficientFunction
+        φ in J/m² or J/m³ of `Field.trial` and of the interaction's parameters. Where a state is not admissible it
+        is to be `BEYOND`.
+    measure : ngsolve.comp.DifferentialSymbol
+        ``ds(definedon=..., bonus_intorder=...)`` or ``dx(...)``.
+    """
+
+    density: Any
+    measure: Any
+
+
+BEYOND = 1e200  # J/m²: a density that no line search accepts, finite so that sums and derivatives stay so
+
+
+def _nothing(_: np.ndarray) -> Verdict:
+    return Verdict()
+
+
+@dataclass(frozen=True, eq=False)
+class Attached:
+    """An interaction on an opened body.
+
+    Attributes
+    ----------
+    parameters : tuple of ngsolve.Parameter
+        One per input, read by the densities; the solver sets them.
+    energies : tuple of Energy
+    loads : (n, dof) array, optional
+        Vectors lᵢ: the energy is less by qᵢ lᵢ·z.
+    lifts : (n, dof) array, optional
+        What one unit of each input adds to the constrained unknowns.
+    held : (dof,) bool array, optional
+        Which unknowns it constrains, to their base state plus lifts.
+    inspect : callable
+        Verdict on the state in `Field.displacement` under inputs (n,), independent of how it was found.
+    approach : callable
+        From inputs (n,) to inputs (n,) at which the interaction leaves the body alone and from which a straight
+        line leads to the former: the path along which the equilibrium is followed. None where there is none.
+    distance : callable, optional
+        From two inputs (n,) to a length that says how dear it is to go from one to the other, on the scale of
+        going straight from `approach`; by default the Euclidean length.
+    """
+
+    parameters: tuple[Any, ...]
+    energies: tuple[Energy, ...] = ()
+    loads: np.ndarray | None = None
+    lifts: np.ndarray | None = None
+    held: np.ndarray | None = None
+    inspect: Callable[[np.ndarray], Verdict] = _nothing
+    approach: Callable[[np.ndarray], np.ndarray | None] = np.zeros_like
+    distance: Callable[[np.ndarray, np.ndarray], float] | None = None
+
+
+@runtime_checkable
+class Interaction(Protocol):
+    """What acts on a body, with n inputs: a frozen value that can be hashed and pickled."""
+
+    def ranges(self, geometry: Any) -> tuple[Range, ...]:
+        """Name, range and unit of each input on a body of this geometry."""
+
+    def describe(self) -> dict[str, Any]:
+        """Everything that decides what it does, as plain data for a JSON file, with a ``"type"``."""
+
+    def refinements(self, geometry: Any) -> tuple[Refinement, ...]:
+        """Where it needs a fine mesh."""
+
+    def attach(self, field: Field) -> Attached:
+        """Its terms on an opened body.
+
+        Raises
+        ------
+        UsageError
+            If the body has no such surface.
+        """
+
+
+@runtime_checkable
+class Planned(Protocol):
+    """An interaction that knows in which order its inputs are solved best."""
+
+    def design(self, geometry: Any, samples: int, seed: int) -> np.ndarray:
+        """Inputs (samples, n) in an order of good chains."""
+
+    def chains(self, geometry: Any, points: np.ndarray) -> list[np.ndarray]:
+        """Rows of `points` (N, n) to be solved one after the other, chain by chain."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """An interaction that is always there, such as a pre-stress.
+
+    Attributes
+    ----------
+    interaction : Interaction
+    values : tuple of float
+        Its inputs.
+    """
+
+    interaction: Interaction
+    values: tuple[float, ...]

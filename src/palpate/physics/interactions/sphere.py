@@ -1,0 +1,266 @@
+"""The sphere probe: a rigid ball that presses a surface without friction."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.physics.arguments import require_number
+from palpate.physics.geometry.refinement import Refinement
+from palpate.physics.interactions import columns
+from palpate.physics.interactions.interaction import Attached, Energy, Field
+from palpate.physics.interactions.patch import Patch
+from palpate.units import Range
+
+if TYPE_CHECKING:
+    from palpate.physics.geometry.shape import Geometry
+
+__all__ = ["SphereProbe"]
+
+ELEMENT = 0.6  # element size under the probe over its radius: the force then ripples by less than 0.1 %
+MARGIN = 1.3  # how far beyond the footprint of its centres the probe may touch, over its radius
+INSET = 3.0  # distance of the footprint from the surface's rim over the radius, unless it is given
+MOST_INSET = 0.4  # the same, at most, over the surface's width
+SIDEWAYS = 3.0  # how much dearer a move across is than one along the normal
+MOST_STEPS = 50  # of the search for a place outside
+
+Corner = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class SphereProbe:
+    """A rigid sphere with a compliant skin (the pad), whose centre c = (c_x, c_y, c_z) is the input.
+
+    The response is the force on the probe, -∂U/∂c in N. The equilibrium meant is the one that is reached along a
+    straight line: the centre comes from outside along the outward normal at the nearest point of the surface.
+
+    Attributes
+    ----------
+    radius : float
+        R in m.
+    touches : str
+        Name of the surface that it presses.
+    pad : float
+        Stiffness k of the pad in N/m³. A modelling choice: the probe's own skin, in series with the body.
+    stop : float or None
+        Penetration p_m in m at which the pad is fully pressed. None for a pad without a stop, which swallows
+        the sphere beyond some depth: such solves fail then.
+    depth : tuple of two floats
+        Least and largest depth of the sphere's tip below the surface at rest, in m.
+    over : tuple of two corners, optional
+        Box of the footprints on the surface in m: ((x0, y0), (x1, y1)) or with z as well. By default the surface
+        less a margin of 3 R, at most 0.4 of its width, in the directions along it.
+
+    Raises
+    ------
+    UsageError
+        For sizes that are not positive, or a depth or box whose ends are not in order.
+    """
+
+    radius: float
+    touches: str = "top"
+    pad: float = 2e6
+    stop: float | None = 0.004
+    depth: tuple[float, float] = (0.0, 0.015)
+    over: tuple[Corner, Corner] | None = None
+
+    def __post_init__(self) -> None:
+        for what, value in (("radius", self.radius), ("pad stiffness", self.pad), ("stop", self.stop)):
+            if value is not None:
+                _require_positive(f"The probe's {what}", value)
+        object.__setattr__(self, "depth", _pair("depth", self.depth))
+        if self.over is not None:
+            object.__setattr__(self, "over", _corners(self.over))
+
+    def describe(self) -> dict[str, Any]:
+        """Everything that decides what it does, as plain data for a JSON file."""
+        return {"type": "SphereProbe", **asdict(self)}
+
+    def ranges(self, geometry: Geometry) -> tuple[Range, ...]:
+        """Ranges of c_x, c_y and c_z in m: the box around all its positions."""
+        patch = self._patch(geometry)
+        feet, normals, _ = self._feet(patch, _GRID)
+        ends = [feet + normals * (self.radius - d) for d in self.depth]
+        low, high = np.concatenate(ends).min(axis=0), np.concatenate(ends).max(axis=0)
+        pairs = zip("xyz", low.tolist(), high.tolist(), strict=True)
+        return tuple(Range(f"c_{axis}", a, b, "m") for axis, a, b in pairs)
+
+    def refinements(self, geometry: Geometry) -> tuple[Refinement, ...]:
+        """Small elements wherever it may touch."""
+        low, high = self._footprint(Patch.of(geometry.rest(), self._surface(geometry)))
+        low, high = low - MARGIN * self.radius, high + MARGIN * self.radius
+        return (Refinement(self.touches, ELEMENT * self.radius, tuple(low.tolist()), tuple(high.tolist())),)
+
+    def design(self, geometry: Geometry, samples: int, seed: int) -> np.ndarray:
+        """Positions (samples, 3) in m in columns, each from shallow to deep.
+
+        The footprints are a scrambled Sobol sequence (Sobol 1967; Owen 1998) over the footprint of the touched
+        surface; the depths of a column are evenly spaced, all shifted by a random share of their distance.
+        """
+        from scipy.stats import qmc
+
+        count = columns.per_column(samples)
+        number = -(-samples // count)
+        engine = qmc.Sobol(3, scramble=True, rng=np.random.default_rng(seed))
+        unit, feet = np.empty((0, 3)), np.empty((0, 3))
+        while len(feet) < number:  # a surface need not fill its box
+            unit = np.concatenate([unit, engine.random(1 << max(3, int(np.ceil(np.log2(number)))))])
+            feet, normals, hit = self._feet(self._patch(geometry), unit[:, :2])
+        lines = zip(feet[:number], normals, unit[hit, 2], strict=False)
+        points = [self._column(foot, normal, count, shift) for foot, normal, shift in lines]
+        return np.concatenate(points)[:samples]
+
+    def chains(self, geometry: Geometry, points: np.ndarray) -> list[np.ndarray]:
+        """Rows of positions (N, 3) in chains: columns of one footprint, else neighbours, from shallow to deep."""
+        feet, distance = columns.footprints_of(self._patch(geometry), np.asarray(points, dtype=float))
+        return columns.group(feet, distance, self.radius)
+
+    def attach(self, field: Field) -> Attached:
+        """Its contact energy on an opened body."""
+        import ngsolve
+
+        from palpate.physics.interactions.contact import Contact, pad_energy
+
+        contact = Contact(field, field.rest, self.touches, self.radius, self.stop)
+        centre = tuple(ngsolve.Parameter(0.0) for _ in range(3))
+        penetration = contact.penetration(field.trial, ngsolve.CF(centre))
+        energy = Energy(pad_energy(penetration, self.pad, self.stop), contact.measure())
+        approach = _Approach(self, field)
+        return Attached(
+            centre, (energy,), inspect=contact.inspect, approach=approach, distance=approach.distance
+        )
+
+    def _surface(self, geometry: Geometry) -> str:
+        if self.touches in geometry.surfaces:
+            return self.touches
+        raise UsageError(
+            f"The probe touches {self.touches!r}, which the body does not have.",
+            why=f"Its surfaces are {', '.join(geometry.surfaces)}.",
+            fix='Name one of them, for example touches="top".',
+        )
+
+    def _patch(self, geometry: Geometry) -> Patch:
+        return Patch.of(geometry.rest(self.refinements(geometry)), self.touches)
+
+    def _footprint(self, patch: Patch) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper corner (3,) of the box of footprints in m."""
+        low, high = (corner.copy() for corner in patch.box)
+        if self.over is not None:
+            for axis, (a, b) in enumerate(zip(*self.over, strict=True)):
+                low[axis], high[axis] = a, b
+            return low, high
+        # along the surface only: a closed one faces nowhere in the mean and has no rim
+        along = (np.abs(patch.facing) < 0.5) & (np.linalg.norm(patch.facing) > 0.5)
+        inset = np.minimum(INSET * self.radius, MOST_INSET * (high - low)) * along
+        return low + inset, high - inset
+
+    def _feet(self, patch: Patch, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Footprints (M, 3) in m, outward normals (M, 3) there, and which places (N, 2) of the unit square have one."""
+        low, high = self._footprint(patch)
+        axis = int(np.argmax(np.abs(patch.facing)))
+        if np.linalg.norm(patch.facing) > 0.5:
+            across = [i for i in range(3) if i != axis]
+            places = low[across] + unit * (high - low)[across]
+            feet = patch.cast(axis, float(np.sign(patch.facing[axis])), places)
+        else:
+            feet = _within(patch, low, high).spread(unit)
+        hit = np.isfinite(feet).all(axis=1)
+        feet = feet[hit]
+        if not len(feet):
+            raise UsageError(
+                f"The probe's footprint misses the surface {self.touches!r}.",
+                why=f"The footprint is {low} … {high} m, the surface {patch.box[0]} … {patch.box[1]} m.",
+                fix="Give `over` within the surface, in m.",
+            )
+        return feet, np.array([patch.nearest(foot)[1] for foot in feet]), hit
+
+    def _column(self, foot: np.ndarray, normal: np.ndarray, count: int, shift: float) -> np.ndarray:
+        """Centres (count, 3) in m above one footprint."""
+        depths = columns.stratified(self.depth, count, shift)
+        return np.asarray(foot + normal * (self.radius - depths)[:, None])
+
+
+class _Approach:
+    """The straight line along which a sphere comes to a position from outside."""
+
+    def __init__(self, probe: SphereProbe, field: Field) -> None:
+        self._probe, self._field = probe, field
+        self._known: Patch | None = None
+
+    @property
+    def _patch(self) -> Patch:
+        """The touched surface under the constant loads alone."""
+        if self._known is None:
+            displacement = self._field.at_nodes(self._field.base)
+            self._known = Patch.of(self._field.rest, self._probe.touches, displacement)
+        return self._known
+
+    def __call__(self, centre: np.ndarray) -> np.ndarray | None:
+        """First position (3,) on the line from `centre` along the outward normal that is clear of the surface."""
+        radius, patch = self._probe.radius, self._patch
+        _, normal, distance = patch.nearest(centre)
+        place = np.array(centre, dtype=float)
+        for _ in range(MOST_STEPS):
+            if distance >= radius * (1 - 1e-9):
+                return place
+            place = place + (radius - distance) * normal
+            distance = patch.nearest(place)[2]
+        return None
+
+    def distance(self, here: np.ndarray, there: np.ndarray) -> float:
+        """Length in m of a way between two positions, its part along the surface counted several times."""
+        normal = self._patch.nearest(there)[1]
+        step = there - here
+        along = float(step @ normal)
+        return float(np.hypot(along, SIDEWAYS * np.linalg.norm(step - along * normal)))
+
+
+_GRID = np.stack(np.meshgrid(np.linspace(0, 1, 9), np.linspace(0, 1, 9)), axis=-1).reshape(-1, 2)
+
+
+def _within(patch: Patch, low: np.ndarray, high: np.ndarray) -> Patch:
+    """The triangles whose middle is in a box."""
+    middle = patch.corners.mean(axis=1)
+    inside = ((middle >= low) & (middle <= high)).all(axis=1)
+    return Patch(patch.points, patch.triangles[inside] if inside.any() else patch.triangles)
+
+
+def _require_positive(what: str, value: Any) -> None:
+    require_number(what, value)
+    if not (np.isfinite(value) and value > 0):
+        raise UsageError(
+            f"{what} is {value}.",
+            why="It must be positive and finite.",
+            fix="Check the number and its unit (m, N/m³).",
+        )
+
+
+def _pair(what: str, value: Any) -> tuple[float, float]:
+    low, high = (float(end) for end in value)
+    if not (np.isfinite([low, high]).all() and low < high):
+        raise UsageError(
+            f"The probe's {what} is {value}.",
+            why="It needs two finite ends, the lower one first.",
+            fix="For example depth=(0, 0.015) for 0 to 15 mm.",
+        )
+    return low, high
+
+
+def _corners(value: Any) -> tuple[Corner, Corner]:
+    corners = np.asarray(value, dtype=float)
+    if (
+        corners.ndim != 2
+        or corners.shape[0] != 2
+        or corners.shape[1] not in {2, 3}
+        or (corners[0] > corners[1]).any()
+    ):
+        raise UsageError(
+            f"The probe's footprint is {value}.",
+            why="It needs a lower and an upper corner, each of two or three coordinates in m.",
+            fix="For example over=((0.03, 0.03), (0.07, 0.07)).",
+        )
+    lower, upper = corners.tolist()
+    return tuple(lower), tuple(upper)

@@ -105,7 +105,9 @@ def test_explicit_steps_are_stable_just_below_their_limit_and_not_above(solver):
         )
         for _ in range(150):
             motion.explicit(AT, share * longest)
-        moved = np.abs(motion.x - solver.x).max()
+            moved = np.abs(motion.x - solver.x).max()
+            if moved > 1e-4:
+                break
         assert (moved < 1e-6) == stable
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from palpate.dataset import Layout, beam_fields
 from palpate.physics.beam.solution import Solution
 from palpate.physics.equilibrium.stop import Stop
 from palpate.units import Range
@@ -28,16 +29,14 @@ class Spring:
     log: str = ""
     seconds: float = 0.0
     ranges: tuple[Range, ...] = (Range("P", 0.0, 10.0, "N"),)
-    load_nodes: tuple[int, ...] = (0,)
-    load_directions: tuple[tuple[float, float], ...] = ((0.0, -1.0),)
 
     @property
-    def rest(self):
-        return np.array([[1.0, 0.0]])
+    def layout(self):
+        return Layout(np.array([[1.0, 0.0]]), None, (0,), ((0.0, -1.0),))
 
     @property
-    def of_interest(self):
-        return np.array([True])
+    def schema(self):
+        return beam_fields(1)
 
     def describe(self):
         return {"body": {"type": "Spring", "raises": self.raises, "fails": self.fails}}

@@ -109,14 +109,14 @@ def test_loads_beyond_the_solvers_reach_are_a_solver_error(cluster):
 @pytest.mark.parametrize(
     "arguments",
     [
-        {"body": BODY, "loads": TipLoad(0, 1)},
-        {"body": BODY, "loads": TipLoad(0, 1), "samples": 3, "points": [1.0]},
+        {"body": BODY, "interactions": TipLoad(0, 1)},
+        {"body": BODY, "interactions": TipLoad(0, 1), "samples": 3, "points": [1.0]},
         {"body": BODY, "samples": 3},
-        {"body": "beam", "loads": TipLoad(0, 1), "samples": 3},
-        {"body": BODY, "loads": TipLoad(0, 1), "samples": 0},
-        {"body": BODY, "loads": TipLoad(0, 1), "points": []},
-        {"body": BODY, "loads": TipLoad(0, 1), "samples": 3, "design": "spiral"},
-        {"body": BODY, "loads": TipLoad(0, 1), "samples": 3, "workers": 0},
+        {"body": "beam", "interactions": TipLoad(0, 1), "samples": 3},
+        {"body": BODY, "interactions": TipLoad(0, 1), "samples": 0},
+        {"body": BODY, "interactions": TipLoad(0, 1), "points": []},
+        {"body": BODY, "interactions": TipLoad(0, 1), "samples": 3, "design": "spiral"},
+        {"body": BODY, "interactions": TipLoad(0, 1), "samples": 3, "workers": 0},
     ],
 )
 def test_wrong_arguments(arguments):

@@ -3,53 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from palpate.dataset.dataset import FORMAT, FORMAT_VERSION, Dataset
+from palpate.dataset.fields import Field, beam_fields, complete
+from palpate.dataset.layout import Layout
+from palpate.errors import UsageError
 from palpate.units import Range
 
-__all__ = ["ANSWERS", "Layout", "assemble"]
-
-
-@dataclass(frozen=True)
-class Layout:
-    """Where a body's nodes are and which of them the inputs act on.
-
-    Attributes
-    ----------
-    rest : (node, 2) array
-        Positions at rest in m.
-    of_interest : (node,) array of bool
-    load_nodes : sequence of int
-        For each input the index of the node that it acts on.
-    load_directions : (n, 2) array
-        For each input its direction (x, y).
-    """
-
-    rest: np.ndarray
-    of_interest: np.ndarray
-    load_nodes: Sequence[int]
-    load_directions: Sequence[tuple[float, float]]
-
-
-# name: dimensions after "sample", unit of each component, meaning
-ANSWERS: dict[str, tuple[tuple[str, ...], str, str]] = {
-    "displacement": (("node", "component"), "m, m, rad", "offset from the rest position and rotation"),
-    "root_reaction": (("reaction",), "N, N, N m", "force and moment of the clamp on the body"),
-    "strain_energy": ((), "J", "energy stored in the body"),
-    "potential_energy": ((), "J", "strain energy less the potential of the loads"),
-    "largest_strain": ((), "", "largest strain of a fibre along the body"),
-    "converged": ((), "", "whether this row is an equilibrium"),
-    "iterations": ((), "", "Newton iterations"),
-    "residual": ((), "", "relative error left, in the energy norm"),
-    "message": ((), "", "why the solver stopped"),
-    "solve_seconds": ((), "s", "wall-clock time of the solve"),
-}
-OPTIONAL = frozenset({"largest_strain"})  # not every body has it, nor had earlier versions
+__all__ = ["assemble", "check_schema"]
 
 
 def assemble(
@@ -59,6 +24,7 @@ def assemble(
     answers: Mapping[str, np.ndarray],
     provenance: Mapping[str, Any],
     samples: np.ndarray | None = None,
+    schema: Iterable[Field] | None = None,
 ) -> Dataset:
     """Label inputs and answers.
 
@@ -69,27 +35,43 @@ def assemble(
     inputs : (sample, n) array
         In the units of `ranges`.
     answers : mapping
-        An array for each name in `ANSWERS`, samples first; ``"largest_strain"`` may be missing.
+        An array for each field of the schema and of the bookkeeping, samples first; optional fields may be
+        missing.
     provenance : mapping
         Plain data for a JSON file: where the answers come from.
     samples : (sample,) array of int, optional
         Number of each sample; by default they count from 0.
+    schema : fields, optional
+        What the solver answers; by default what a plane beam does.
 
     Returns
     -------
     Dataset
+
+    Raises
+    ------
+    UsageError
+        If an answer is missing, or the schema does not fit the layout.
     """
     import xarray
 
+    schema = beam_fields(len(layout.rest)) if schema is None else tuple(schema)
+    check_schema(schema, layout, len(ranges))
+    units = ", ".join(r.unit for r in ranges)
     variables: dict[str, Any] = {
-        "inputs": (("sample", "input"), np.asarray(inputs, dtype=float), _attrs(_units(ranges), "inputs")),
+        "inputs": (("sample", "input"), np.asarray(inputs, dtype=float), _attrs(units, "inputs")),
     }
-    for name, (dims, unit, meaning) in ANSWERS.items():
-        if name in OPTIONAL and name not in answers:
-            continue
-        values = np.asarray(answers[name], dtype=np.dtypes.StringDType() if name == "message" else None)
-        variables[name] = (("sample", *dims), values, _attrs(unit, meaning))
-    coords = _coords(ranges, layout)
+    for field in complete(schema):
+        if field.name in answers:
+            values = np.asarray(answers[field.name], dtype=_text_type(field))
+            variables[field.name] = (("sample", *field.dims), values, _attrs(field.unit, field.meaning))
+        elif not field.optional:
+            raise UsageError(
+                f"The answers lack {field.name!r}.",
+                why="The schema says that each solve answers it.",
+                fix="Answer it, or mark the field as optional.",
+            )
+    coords = _coords(ranges, layout, schema)
     coords["sample"] = ("sample", np.arange(len(inputs)) if samples is None else np.asarray(samples))
     attrs = {
         "format": FORMAT,
@@ -99,21 +81,75 @@ def assemble(
     return Dataset(xarray.Dataset(variables, coords, attrs))
 
 
-def _coords(ranges: Sequence[Range], layout: Layout) -> dict[str, Any]:
-    return {
+def check_schema(schema: Iterable[Field], layout: Layout, inputs: int) -> None:
+    """Make sure that every field's dimensions have the sizes that the layout and the inputs give them.
+
+    Raises
+    ------
+    UsageError
+        If one has not.
+    """
+    sizes = {
+        "node": len(layout.rest),
+        "axis": len(layout.axes),
+        "component": len(layout.components),
+        "input": inputs,
+        "along": inputs,
+        **{dim: len(names) for dim, names in (layout.labels or {}).items()},
+    }
+    for field in complete(schema):
+        for dim, size in zip(field.dims, field.shape, strict=True):
+            if sizes.setdefault(dim, size) != size:
+                raise UsageError(
+                    f"The field {field.name!r} has {size} values along {dim!r}.",
+                    why=f"The layout, or a field before it, has {sizes[dim]}.",
+                    fix="Give equal sizes, or call the dimension otherwise.",
+                )
+
+
+def _coords(ranges: Sequence[Range], layout: Layout, schema: Iterable[Field]) -> dict[str, Any]:
+    dims = {dim for field in schema for dim in field.dims}
+    coords = _input_coords(ranges, layout)
+    coords |= {
+        "axis": ("axis", _text(layout.axes)),
+        "component": ("component", _text(layout.components)),
+        "node": ("node", np.arange(len(layout.rest))),
+        "rest": (("node", "axis"), layout.rest, _attrs("m", "position at rest")),
+        "of_interest": ("node", layout.of_interest),
+    }
+    if "along" in dims:
+        coords["along"] = ("along", _text(r.name for r in ranges))
+    labels = (layout.labels or {}).items()
+    coords |= {dim: (dim, _text(names)) for dim, names in labels if dim in dims}
+    return coords | _surface_coords(layout)
+
+
+def _input_coords(ranges: Sequence[Range], layout: Layout) -> dict[str, Any]:
+    coords: dict[str, Any] = {
         "input": ("input", _text(r.name for r in ranges)),
         "input_unit": ("input", _text(r.unit for r in ranges)),
         "input_low": ("input", np.array([r.low for r in ranges])),
         "input_high": ("input", np.array([r.high for r in ranges])),
-        "input_node": ("input", np.array(layout.load_nodes, dtype=np.int64)),
-        "input_direction": (("input", "axis"), np.asarray(layout.load_directions, dtype=float)),
-        "axis": ("axis", _text("xy")),
-        "component": ("component", _text(("u_x", "u_y", "rotation"))),
-        "reaction": ("reaction", _text(("F_x", "F_y", "M"))),
-        "node": ("node", np.arange(len(layout.rest))),
-        "rest": (("node", "axis"), np.asarray(layout.rest, dtype=float), _attrs("m", "position at rest")),
-        "of_interest": ("node", np.asarray(layout.of_interest, dtype=bool)),
     }
+    if len(layout.load_nodes):
+        coords["input_node"] = ("input", np.array(layout.load_nodes, dtype=np.int64))
+        coords["input_direction"] = (("input", "axis"), np.asarray(layout.load_directions, dtype=float))
+    return coords
+
+
+def _surface_coords(layout: Layout) -> dict[str, Any]:
+    if layout.triangles is None:
+        return {}
+    meaning = _attrs("", "nodes of the surface's triangles, counter-clockwise from outside")
+    coords: dict[str, Any] = {"triangles": (("triangle", "corner"), layout.triangles, meaning)}
+    if layout.surface_of is not None:
+        coords["surface"] = ("surface", _text(layout.surfaces))
+        coords["surface_of"] = ("triangle", np.asarray(layout.surface_of, dtype=np.int64))
+    return coords
+
+
+def _text_type(field: Field) -> Any:
+    return np.dtypes.StringDType() if isinstance(field.fill, str) else None
 
 
 def _text(words: Any) -> np.ndarray:
@@ -123,7 +159,3 @@ def _text(words: Any) -> np.ndarray:
 
 def _attrs(unit: str, meaning: str) -> dict[str, str]:
     return {"units": unit, "long_name": meaning}
-
-
-def _units(ranges: Sequence[Range]) -> str:
-    return ", ".join(r.unit for r in ranges)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["FORMAT", "FORMAT_VERSION", "Dataset"]
 
 FORMAT = "palpate dataset"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2  # 1: plane beams only, otherwise the same
 TIMINGS = frozenset({"solve_seconds"})  # differ from run to run: no part of a dataset's identity
 
 
@@ -33,11 +33,15 @@ class Dataset:
     Attributes
     ----------
     data : xarray.Dataset
-        Variables ``inputs`` (sample, input), ``displacement`` (sample, node, component), ``root_reaction``
-        (sample, reaction), ``strain_energy``, ``potential_energy``, ``largest_strain``, ``converged``,
-        ``iterations``, ``residual``, ``message`` and ``solve_seconds`` (sample); units stand in each variable's
-        attributes. ``largest_strain`` may be missing.
-        Rows that did not converge hold NaN and a message.
+        ``inputs`` (sample, input) and a variable for each answer, samples first: of every body ``converged``,
+        ``iterations``, ``residual``, ``message`` and ``solve_seconds``; of most ``displacement``
+        (sample, node, component) and energies; the rest depends on the body. Units stand in each variable's
+        attributes. Rows without an admissible answer hold NaN and a message.
+
+    Notes
+    -----
+    Every array is also an item, ``dataset["strain_energy"]``, read-only. A property or an item that the body
+    does not answer raises `UsageError`.
     """
 
     data: xarray.Dataset
@@ -72,6 +76,12 @@ class Dataset:
     def __len__(self) -> int:
         return int(self.data.sizes["sample"])
 
+    def __contains__(self, name: object) -> bool:
+        return name in self.data.variables
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self._values(name)
+
     @property
     def ranges(self) -> tuple[Range, ...]:
         """Name, range and unit of each of the n inputs."""
@@ -88,12 +98,12 @@ class Dataset:
 
     @property
     def displacement(self) -> np.ndarray:
-        """Displacement (u_x, u_y) in m and rotation in rad of each node, shape (sample, node, 3)."""
+        """Displacement of each node, shape (sample, node, 3): (u_x, u_y, u_z) in m; of a beam (u_x, u_y), rotation."""
         return self._values("displacement")
 
     @property
     def root_reaction(self) -> np.ndarray:
-        """Force (x, y) in N and moment in N·m of the clamp on the body, shape (sample, 3)."""
+        """Force (x, y) in N and moment in N·m of a beam's clamp on it, shape (sample, 3)."""
         return self._values("root_reaction")
 
     @property
@@ -103,12 +113,44 @@ class Dataset:
 
     @property
     def potential_energy(self) -> np.ndarray:
-        """Strain energy less the potential of the loads in J, shape (sample,)."""
+        """Energy U in J whose slope is the response: body, pad and loads together, shape (sample,)."""
         return self._values("potential_energy")
 
     @property
+    def response(self) -> np.ndarray:
+        """−∂U/∂input, shape (sample, n): forces in N for positions, displacements in m for forces."""
+        return self._values("response")
+
+    @property
+    def response_gradient(self) -> np.ndarray:
+        """∂response_i/∂input_j, shape (sample, n, n); symmetric."""
+        return self._values("response_gradient")
+
+    @property
+    def force(self) -> np.ndarray:
+        """Force on what touches the body, −∂U/∂position, in N, shape (sample, n)."""
+        self._require_positions()
+        return self.response
+
+    @property
+    def force_gradient(self) -> np.ndarray:
+        """∂force_i/∂position_j in N/m, shape (sample, n, n): the stiffness felt, with a minus sign."""
+        self._require_positions()
+        return self.response_gradient
+
+    @property
+    def penetration(self) -> np.ndarray:
+        """Largest penetration of the pad in m, shape (sample,)."""
+        return self._values("penetration")
+
+    @property
+    def least_volume_ratio(self) -> np.ndarray:
+        """Least determinant of the deformation gradient, shape (sample,)."""
+        return self._values("least_volume_ratio")
+
+    @property
     def largest_strain(self) -> np.ndarray:
-        """Largest strain of a fibre along the body, shape (sample,); NaN where it isn't known."""
+        """Largest strain, of a beam's fibres or of a solid, shape (sample,); NaN where it isn't known."""
         if "largest_strain" in self.data:
             return self._values("largest_strain")
         return np.full(len(self), np.nan)
@@ -119,9 +161,19 @@ class Dataset:
         return self._values("converged")
 
     @property
+    def message(self) -> np.ndarray:
+        """Why each solve stopped, text of shape (sample,)."""
+        return self._values("message")
+
+    @property
     def rest(self) -> np.ndarray:
-        """Positions of the nodes at rest in m, shape (node, 2)."""
+        """Positions of the nodes at rest in m, shape (node, 2) or (node, 3)."""
         return self._values("rest")
+
+    @property
+    def triangles(self) -> np.ndarray:
+        """Nodes of the surface's triangles, counter-clockwise seen from outside, shape (t, 3)."""
+        return self._values("triangles")
 
     @property
     def nodes_of_interest(self) -> np.ndarray:
@@ -135,7 +187,7 @@ class Dataset:
 
     @property
     def load_directions(self) -> np.ndarray:
-        """Direction (x, y) of each input, shape (n, 2)."""
+        """Direction of each input, shape (n, 2) or (n, 3)."""
         return self._values("input_direction")
 
     @functools.cached_property
@@ -190,33 +242,11 @@ class Dataset:
         Raises
         ------
         UsageError
-            If there are none, or they are of different bodies or inputs.
+            If there are none, or they are of different bodies, meshes or inputs.
         """
-        import xarray
+        from palpate.dataset.join import joined
 
-        if not parts:
-            raise UsageError("There are no datasets to put together.", fix="Give at least one.")
-        first = parts[0]
-        for other in parts[1:]:
-            if other.provenance["problem"] != first.provenance["problem"] or other.ranges != first.ranges:
-                raise UsageError(
-                    "These datasets are not of the same body and loads.",
-                    why="Rows of different problems would be learnt as if they were of one.",
-                    fix="Keep them apart, or sweep again with one study.",
-                )
-        rows = xarray.concat(
-            [p.data for p in parts],
-            "sample",
-            data_vars="minimal",
-            coords="minimal",
-            compat="override",
-            join="override",
-            combine_attrs="override",
-        )
-        # row numbers of different sweeps mean nothing together
-        return cls(
-            rows.assign_coords(sample=np.arange(rows.sizes["sample"])) if "sample" in rows.coords else rows
-        )
+        return cls(joined(parts))
 
     def every(self, k: int, start: int = 0) -> Dataset:
         """Each k-th row, from `start` on."""
@@ -260,27 +290,28 @@ class Dataset:
         return self.take(np.sort(shuffled[count:])), self.take(np.sort(shuffled[:count]))
 
     def __str__(self) -> str:
-        failed = len(self) - int(self.converged.sum())
-        tail = f"{failed} did not converge" if failed else "all converged"
-        body = self.provenance.get("problem", {}).get("body", {}).get("type", "a body")
-        nodes, of_interest = len(self.rest), self.nodes_of_interest.size
-        return "\n".join(
-            [
-                f"Dataset of {len(self)} solves of {body}, {tail}",
-                *(f"  input   {r}" for r in self.ranges),
-                f"  answers displacement of {nodes} nodes ({of_interest} of interest), reaction, energies",
-                *self._strain_line(),
-                f"  hash    {self.hash[:12]}",
-            ]
-        )
+        from palpate.dataset.words import in_words
 
-    def _strain_line(self) -> list[str]:
-        known = self.largest_strain[np.isfinite(self.largest_strain)]
-        return [f"  largest fibre strain {100 * known.max():.2g} %"] if known.size else []
+        return in_words(self)
 
     __repr__ = __str__
 
+    def _require_positions(self) -> None:
+        units = {r.unit for r in self.ranges}
+        if units != {"m"}:
+            raise UsageError(
+                "This dataset has no force.",
+                why=f"Its inputs are in {', '.join(sorted(units))}; a force is the response to positions in m.",
+                fix="Ask for `response`, minus the slope of the energy over the inputs.",
+            )
+
     def _values(self, name: str) -> np.ndarray:
+        if name not in self.data.variables:
+            raise UsageError(
+                f"This dataset has no {name!r}.",
+                why=f"It holds {', '.join(sorted(map(str, self.data.data_vars)))}.",
+                fix="Ask for one of these; what a body answers depends on its kind.",
+            )
         values: np.ndarray = self.data[name].values.view()
         values.flags.writeable = False
         return values

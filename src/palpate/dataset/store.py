@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 __all__ = ["read", "write"]
 
+CHUNK_BYTES = 4_000_000  # some 50 samples of 3,000 nodes; a file each
+
 
 def write(dataset: Dataset, path: Path, *, overwrite: bool) -> Path:
     """Write `dataset` to `path`; the store appears whole or not at all."""
@@ -35,7 +37,7 @@ def write(dataset: Dataset, path: Path, *, overwrite: bool) -> Path:
     try:
         data = dataset.data.assign_attrs(checksum=_checksum(dataset))
         # consolidated metadata is no part of Zarr's format 3
-        data.to_zarr(staging, mode="w-", zarr_format=3, consolidated=False)
+        data.to_zarr(staging, mode="w-", zarr_format=3, consolidated=False, encoding=_chunks(data))
         if path.exists():
             _remove(path)
         os.replace(staging, path)
@@ -61,6 +63,16 @@ def read(path: Path) -> xarray.Dataset:
             fix="Open it with a newer palpate.",
         )
     return _load(path)
+
+
+def _chunks(data: xarray.Dataset) -> dict[str, dict[str, Any]]:
+    """Chunks of whole samples for large fields, so that a reader of a few samples decodes no others."""
+    encoding = {}
+    for name, variable in data.data_vars.items():
+        if variable.nbytes > CHUNK_BYTES and variable.dims[0] == "sample":
+            row = variable.nbytes // variable.sizes["sample"]
+            encoding[str(name)] = {"chunks": (max(1, CHUNK_BYTES // row), *variable.shape[1:])}
+    return encoding
 
 
 def _attributes(path: Path) -> dict[str, Any]:

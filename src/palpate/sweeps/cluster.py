@@ -26,7 +26,7 @@ _ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
 )
 _GRACE = 1.0  # s to end by themselves; a worker in the midst of a solve does not
-_SPARE_LIVES = 12  # workers started again after a crash, per cluster
+_SPARE_LIVES = 16  # workers started again after a crash, per cluster
 
 
 class LocalCluster:

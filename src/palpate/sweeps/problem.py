@@ -1,25 +1,32 @@
-"""The contract between a sweep and whatever it asks."""
+"""The contract between a sweep and whatever it asks.
+
+A problem of one's own has the five members of `Problem`, and a solver the one of `Solver`. Where that is more
+than needed, `ExternalProblem` makes a problem of one function.
+"""
 
 from __future__ import annotations
 
+import inspect
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from palpate.dataset import Field, Layout
 from palpate.units import Range
 
-__all__ = ["Answer", "Problem", "Solver"]
+__all__ = ["Answer", "Chained", "Designed", "Problem", "Resettable", "Solver", "is_problem"]
 
 
 class Answer(Protocol):
     """One solve's answer, a value also where the solve failed.
 
-    It may have a `largest_strain` too, a float, which then goes into the dataset.
+    Besides these it has an attribute for each field of the problem's schema, of that field's shape; they are
+    only read where `converged`.
     """
 
     @property
     def converged(self) -> bool:
-        """Whether the rest means anything."""
+        """Whether the rest means anything: an equilibrium within the model's reach."""
 
     @property
     def message(self) -> str:
@@ -33,22 +40,6 @@ class Answer(Protocol):
     def residual(self) -> float:
         """Relative error left."""
 
-    @property
-    def displacement(self) -> np.ndarray:
-        """(u_x, u_y) in m and rotation in rad of each node, shape (node, 3)."""
-
-    @property
-    def root_reaction(self) -> np.ndarray:
-        """Force (x, y) in N and moment in N·m of the support on the body, shape (3,)."""
-
-    @property
-    def strain_energy(self) -> float:
-        """In J."""
-
-    @property
-    def potential_energy(self) -> float:
-        """In J."""
-
 
 class Solver(Protocol):
     """An opened problem, which may keep what helps the next solve."""
@@ -58,31 +49,60 @@ class Solver(Protocol):
 
 
 @runtime_checkable
+class Resettable(Protocol):
+    """A solver that a worker keeps open from one chain to the next."""
+
+    def solve(self, x: np.ndarray) -> Answer:
+        """Answer for the inputs `x`, shape (n,)."""
+
+    def reset(self) -> None:
+        """Forget all earlier solves: what follows has the same bits as after opening."""
+
+
 class Problem(Protocol):
-    """A question with n inputs, which can be pickled. Opening it may be dear: it is done once per chunk."""
+    """A question with n inputs: a value that can be pickled. Opening it may be dear: it is done once per chain."""
 
     @property
     def ranges(self) -> tuple[Range, ...]:
         """Name, range and unit of each input."""
 
     @property
-    def rest(self) -> np.ndarray:
-        """Positions of the nodes at rest in m, shape (node, 2)."""
+    def layout(self) -> Layout:
+        """Nodes at rest, axes, surface: what all answers have in common."""
 
     @property
-    def of_interest(self) -> np.ndarray:
-        """Which nodes are of interest, bool of shape (node,)."""
-
-    @property
-    def load_nodes(self) -> tuple[int, ...]:
-        """Index of the node that each input acts on."""
-
-    @property
-    def load_directions(self) -> tuple[tuple[float, float], ...]:
-        """Direction (x, y) of each input."""
+    def schema(self) -> tuple[Field, ...]:
+        """What each solve answers, such as `beam_fields` or `solid_fields` of `palpate.dataset`."""
 
     def describe(self) -> dict[str, Any]:
         """Everything that decides the answers, as plain data for a JSON file."""
 
     def open(self) -> Solver:
         """Get ready to solve."""
+
+
+@runtime_checkable
+class Chained(Protocol):
+    """A problem that knows in which order its samples are solved well."""
+
+    def chains(self, points: np.ndarray) -> list[np.ndarray]:
+        """Rows of `points` (N, n), each in one chain that one solver solves in order.
+
+        A chain starts from a solver just opened or reset. The chains may depend on nothing but the problem and
+        the points.
+        """
+
+
+@runtime_checkable
+class Designed(Protocol):
+    """A problem that knows where it is sampled well. It may have a `design_name`."""
+
+    def design(self, samples: int, seed: int) -> np.ndarray:
+        """At most `samples` points, shape (N, n)."""
+
+
+def is_problem(thing: object) -> bool:
+    """Whether `thing` has the members of a `Problem`; none is evaluated, for a layout may take a mesh."""
+    members = ("ranges", "layout", "schema", "describe", "open")
+    missing = object()
+    return all(inspect.getattr_static(thing, name, missing) is not missing for name in members)

@@ -1,15 +1,18 @@
-"""Running the chunks of a sweep on Dask, through failures of samples and of workers."""
+"""Running the chains of a sweep on Dask, through failures of samples and of workers."""
 
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import queue
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.sweeps.answers import Columns, failed_row, solve_chunk
+from palpate.dataset import Field
+from palpate.sweeps.answers import Columns, empty, failed_row, put, solve_chain
 from palpate.sweeps.cluster import LocalCluster, local_cluster
 from palpate.sweeps.interrupt import deferred_interrupt
 from palpate.sweeps.problem import Problem
@@ -21,7 +24,10 @@ __all__ = ["connect", "run"]
 
 PATIENCE = 0.5  # s between looks at the workers
 FETCH = 5.0  # s; Dask's client may wait for ever for a result whose worker died just after it
-TRIES = 3  # a sample whose worker died may have died of its neighbour
+TRIES = 3  # a worker may die of something else than its sample
+CHAIN_TRIES = (
+    2  # samples solved apart differ from those of a chain in their last bits: no accident should do it
+)
 
 
 @contextlib.contextmanager
@@ -45,18 +51,43 @@ def connect(cluster: Any, workers: int | None) -> Iterator[tuple[distributed.Cli
             yield client, revive
 
 
+@dataclass
+class _Chain:
+    """A chain under way: its rows, their answers as they come, and how many are missing."""
+
+    rows: np.ndarray
+    answers: Columns
+    missing: int
+
+
+@dataclass(frozen=True)
+class _Task:
+    """Some places of a chain, given to a worker."""
+
+    chain: _Chain
+    places: np.ndarray
+    tries: int = 0
+
+    def may_be_tried_again(self, error: BaseException | None) -> bool:
+        """Whether a lost answer (no error) or a death is worth another try; other errors would come again."""
+        if error is not None and not _is_death(error):
+            return False
+        return self.tries + 1 < (TRIES if self.places.size == 1 else CHAIN_TRIES)
+
+
 def run(
     client: distributed.Client,
     revive: Callable[[], None],
     problem: Problem,
+    schema: Sequence[Field],
     points: np.ndarray,
-    chunks: Sequence[np.ndarray],
+    chains: Sequence[np.ndarray],
     accept: Callable[[np.ndarray, Columns], None],
 ) -> None:
-    """Solve the chunks and hand over each one's rows and answers as they come in.
+    """Solve the chains and hand over each one's rows and answers when it is whole.
 
-    A chunk that raises, or whose worker dies, is solved again sample by sample; a sample that then still does
-    so becomes a row with the error's words. The sweep goes on.
+    A chain that raises, or whose worker dies again and again, is solved sample by sample, each by a new solver;
+    a sample that then still does so becomes a row with the error's words. The sweep goes on.
 
     Parameters
     ----------
@@ -64,23 +95,33 @@ def run(
     revive : callable
         Starts dead workers again.
     problem : Problem
+    schema : sequence of Field
+        What is recorded, with the bookkeeping.
     points : (N, n) array
-    chunks : sequence of int arrays
+    chains : sequence of int arrays
         Rows of `points`.
     accept : callable
         Takes rows and their answers.
     """
     finished: queue.SimpleQueue[Any] = queue.SimpleQueue()
-    pending: dict[Any, tuple[np.ndarray, int]] = {}
+    pending: dict[Any, _Task] = {}
+    identity = _identity(problem)
 
-    def submit(rows: np.ndarray, tries: int = 0) -> None:
-        future = client.submit(solve_chunk, problem, points[rows], pure=False)
-        pending[future] = (rows, tries)
+    def submit(task: _Task) -> None:
+        rows = task.chain.rows[task.places]
+        future = client.submit(solve_chain, problem, identity, schema, points[rows], pure=False)
+        pending[future] = task
         future.add_done_callback(finished.put)
 
+    def settle(task: _Task, answers: Columns) -> None:
+        put(task.chain.answers, task.places, answers)
+        task.chain.missing -= task.places.size
+        if not task.chain.missing:
+            accept(task.chain.rows, task.chain.answers)
+
     with deferred_interrupt() as check_interrupt:
-        for rows in chunks:
-            submit(rows)
+        for rows in chains:
+            submit(_Task(_Chain(rows, empty(rows.size, schema), rows.size), np.arange(rows.size)))
         while pending:
             check_interrupt()
             try:
@@ -88,17 +129,24 @@ def run(
             except queue.Empty:
                 revive()
                 continue
-            rows, tries = pending.pop(future)
+            task = pending.pop(future)
             answers, error = _outcome(future)
             if answers is not None:
-                accept(rows, answers)
-            elif tries + 1 < TRIES and (error is None or (rows.size == 1 and _is_death(error))):
-                submit(rows, tries + 1)
-            elif rows.size > 1:
-                for row in rows:
-                    submit(row[None])
+                settle(task, answers)
+            elif task.may_be_tried_again(error):
+                submit(_Task(task.chain, task.places, task.tries + 1))
+            elif task.places.size > 1:
+                for place in task.places:
+                    submit(_Task(task.chain, place[None]))
             else:
-                accept(rows, failed_row(len(problem.rest), _words(error)))
+                settle(task, failed_row(schema, _words(error)))
+
+
+def _identity(problem: Problem) -> str:
+    """Digest of the problem as it is sent to a worker, its functions included: what `describe` says may not do."""
+    from distributed.protocol.pickle import dumps
+
+    return hashlib.sha256(dumps(problem)).hexdigest()
 
 
 def _outcome(future: Any) -> tuple[Columns | None, BaseException | None]:

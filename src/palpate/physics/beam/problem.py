@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate.dataset import Field, Layout, beam_fields
 from palpate.errors import UsageError
 from palpate.physics.beam.loads import PointLoad
 from palpate.units import Range
@@ -63,6 +64,16 @@ class BeamProblem:
     def load_directions(self) -> tuple[tuple[float, float], ...]:
         """Direction (x, y) of each load."""
         return tuple(load.direction for load in self.loads)
+
+    @property
+    def layout(self) -> Layout:
+        """Nodes, axes and loads: what all answers have in common."""
+        return Layout(self.rest, self.of_interest, self.load_nodes, self.load_directions)
+
+    @property
+    def schema(self) -> tuple[Field, ...]:
+        """What each solve answers."""
+        return beam_fields(len(self.rest))
 
     @property
     def hash(self) -> str:

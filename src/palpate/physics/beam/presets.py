@@ -12,7 +12,8 @@ from palpate.physics.beam.cantilever import Cantilever
 from palpate.physics.beam.loads import PointLoad, TipLoad
 from palpate.physics.beam.problem import BeamProblem
 from palpate.physics.beam.section import Circle
-from palpate.physics.materials.linear import named_material
+from palpate.physics.materials.library import named_material
+from palpate.physics.materials.linear import LinearElastic
 
 __all__ = ["PRESETS", "Preset", "preset"]
 
@@ -60,7 +61,9 @@ def founding_beam(material: str) -> Cantilever:
     UsageError
         If the material is not known.
     """
-    return Cantilever(length=1.0, section=Circle(radius=0.005), material=named_material(material))
+    return Cantilever(
+        length=1.0, section=Circle(radius=0.005), material=named_material(material, LinearElastic)
+    )
 
 
 def _tip(material: str, newton: int, samples: int) -> Callable[[], Preset]:

@@ -1,5 +1,36 @@
-"""What a body is made of: energies and their constants."""
+"""What a body is made of: energies and their constants.
 
-from palpate.physics.materials.linear import MATERIALS, LinearElastic, named_material
+tensors        functions that read coefficient functions and arrays alike, and derivatives
+stretches      sums of powers of the principal stretches
+material       what a material is; state variables; the volumetric part
+moduli         isotropic moduli from one another, checks on constants
+linear, st_venant, neo_hooke, mooney_rivlin, ogden, yeoh    elastic laws, one a file
+isochoric      what the laws of constant volume share
+library        materials by name, with sources
 
-__all__ = ["MATERIALS", "LinearElastic", "named_material"]
+A law is one expression, a function of the deformation gradient, that NumPy and NGSolve both read.
+"""
+
+from palpate.physics.materials.library import MATERIALS, named_material
+from palpate.physics.materials.linear import LinearElastic
+from palpate.physics.materials.material import Elastic, Material, StateVariable, Volumetric
+from palpate.physics.materials.mooney_rivlin import MooneyRivlin
+from palpate.physics.materials.neo_hooke import NeoHookean
+from palpate.physics.materials.ogden import Ogden
+from palpate.physics.materials.st_venant import StVenantKirchhoff
+from palpate.physics.materials.yeoh import Yeoh
+
+__all__ = [
+    "MATERIALS",
+    "Elastic",
+    "LinearElastic",
+    "Material",
+    "MooneyRivlin",
+    "NeoHookean",
+    "Ogden",
+    "StVenantKirchhoff",
+    "StateVariable",
+    "Volumetric",
+    "Yeoh",
+    "named_material",
+]

@@ -1,20 +1,23 @@
-"""Linear elastic materials and the presets of the founding case."""
+"""The linear elastic law of small strain."""
 
 from __future__ import annotations
 
-import difflib
-import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
 
-from palpate.errors import UsageError
-from palpate.physics.arguments import require_number
+from palpate.physics.materials.material import NO_STATE, Elastic, Volumetric, small_volume
+from palpate.physics.materials.moduli import bulk_from_young, require_moduli, shear_from_young
+from palpate.physics.materials.tensors import Scalar, Tensor, deviator, identity, inner, sym
 
-__all__ = ["MATERIALS", "LinearElastic", "named_material"]
+__all__ = ["MATERIALS", "LinearElastic"]
 
 
 @dataclass(frozen=True)
-class LinearElastic:
-    """An isotropic linear elastic material.
+class LinearElastic(Elastic):
+    """Isotropic and linear: W = μ dev ε : dev ε + ½ K (tr ε)², with ε = sym(F − I).
+
+    For strains of a few percent without large rotations; a beam takes its moduli and has its own kinematics.
 
     Attributes
     ----------
@@ -39,29 +42,31 @@ class LinearElastic:
     name: str = "linear elastic"
     source: str = ""
 
+    law: ClassVar[str] = "linear elastic"
+    kinematics: ClassVar[Literal["large", "small"]] = "small"
+
     def __post_init__(self) -> None:
-        require_number("Young's modulus", self.young, "Pa")
-        require_number("Poisson's ratio", self.poisson)
-        require_number("The density", self.density, "kg/m³")
-        if not (math.isfinite(self.young) and self.young > 0):
-            raise _unphysical("Young's modulus", self.young, "positive and finite, in Pa")
-        if not -1 < self.poisson <= 0.5:
-            raise _unphysical("Poisson's ratio", self.poisson, "above -1 and at most 0.5")
-        if not (math.isfinite(self.density) and self.density >= 0):
-            raise _unphysical("The density", self.density, "not negative, in kg/m³")
+        require_moduli(self.young, self.poisson, self.density)
 
     @property
     def shear_modulus(self) -> float:
         """G = E/(2(1 + ν)) in Pa."""
-        return self.young / (2 * (1 + self.poisson))
+        return shear_from_young(self.young, self.poisson)
 
+    @property
+    def bulk_modulus(self) -> float:
+        """K = E/(3(1 − 2ν)) in Pa."""
+        return bulk_from_young(self.young, self.poisson)
 
-def _unphysical(what: str, value: float, rule: str) -> UsageError:
-    return UsageError(
-        f"{what} is {value}.",
-        why=f"It must be {rule}: otherwise the strain energy has no minimum.",
-        fix="Check the number and its unit.",
-    )
+    @property
+    def volumetric(self) -> Volumetric:
+        """½ K (tr ε)²."""
+        return Volumetric(self.bulk_modulus, small_volume)
+
+    def distortion(self, F: Tensor, state: Mapping[str, Any] = NO_STATE, dt: Any = None) -> Scalar:
+        """The energy of the change of shape, μ dev ε : dev ε, in J/m³."""
+        shear = deviator(sym(F - identity(F)))
+        return self.shear_modulus * inner(shear, shear)
 
 
 _FOUNDING = "Narayanan, Singla, Garimella, Waz & Krovi 2011, ASME DSCC"
@@ -73,25 +78,4 @@ MATERIALS: dict[str, LinearElastic] = {
         LinearElastic(2e9, 0.43, 1150.0, "nylon", _FOUNDING),
     )
 }
-"""Materials that can be asked for by name."""
-
-
-def named_material(name: str) -> LinearElastic:
-    """Look a material up by name.
-
-    Raises
-    ------
-    UsageError
-        If the name is not known; the message lists the names that are.
-    """
-    key = name.strip().lower()
-    if key in MATERIALS:
-        return MATERIALS[key]
-    close = difflib.get_close_matches(key, MATERIALS, n=1)
-    raise UsageError(
-        f"There is no material called {name!r}.",
-        why=f"Known materials: {', '.join(sorted(MATERIALS))}.",
-        fix=f"Did you mean {close[0]!r}?"
-        if close
-        else "Or give its Young's modulus, Poisson's ratio and density.",
-    )
+"""The linear materials of the founding case, part of the library."""

@@ -6,12 +6,11 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, ClassVar, Literal, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol
 
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.physics.materials.moduli import poisson_ratio, young_modulus
 from palpate.physics.materials.tensors import Scalar, Tensor, determinant, is_symbolic, log, trace
 
 __all__ = [
@@ -152,8 +151,8 @@ class Material(Protocol):
 class Elastic:
     """What elastic laws share: the sum of distortion and volumetric part, derived moduli, description.
 
-    A law is a frozen dataclass with `name`, `source` and `density`, that gives `law` (in words), `shear_modulus`,
-    `bulk_modulus`, `volumetric` and `distortion`; or `energy` where it has no separate volumetric part.
+    A law is a frozen dataclass with `name`, `source` and `density`, that gives `law` (in words), the four moduli,
+    `volumetric` and `distortion`; or `energy` where it has no separate volumetric part.
     """
 
     name: str
@@ -163,31 +162,21 @@ class Elastic:
     kinematics: ClassVar[Literal["large", "small"]] = "large"
     states: ClassVar[tuple[StateVariable, ...]] = ()
 
-    @property
-    def shear_modulus(self) -> float:
-        """Initial shear modulus in Pa."""
-        raise NotImplementedError
+    if TYPE_CHECKING:  # fields in some laws, properties in others
 
-    @property
-    def bulk_modulus(self) -> float:
-        """Initial bulk modulus in Pa."""
-        raise NotImplementedError
+        @property
+        def young(self) -> float: ...  # noqa: D102
+        @property
+        def poisson(self) -> float: ...  # noqa: D102
+        @property
+        def shear_modulus(self) -> float: ...  # noqa: D102
+        @property
+        def bulk_modulus(self) -> float: ...  # noqa: D102
 
     @property
     def volumetric(self) -> Volumetric | None:
         """The volumetric part of the energy, if it is separate from the rest."""
         return None
-
-    # derived here for the laws whose constants are others
-    @property
-    def young(self) -> float:
-        """Initial Young's modulus in Pa."""
-        return young_modulus(self.shear_modulus, self.bulk_modulus)
-
-    @property
-    def poisson(self) -> float:
-        """Initial Poisson's ratio."""
-        return poisson_ratio(self.shear_modulus, self.bulk_modulus)
 
     def energy(self, F: Tensor, state: Mapping[str, Any] = NO_STATE, dt: Any = None) -> Scalar:
         """Energy density in J/m³ at the deformation gradient F.

@@ -13,10 +13,13 @@ __all__ = [
     "bulk_from_young",
     "lame_modulus",
     "poisson_ratio",
+    "require_density",
     "require_moduli",
     "require_numbers",
+    "require_poisson",
     "require_positive",
     "shear_from_young",
+    "unphysical",
     "young_modulus",
 ]
 
@@ -59,13 +62,22 @@ def require_moduli(young: float, poisson: float, density: float) -> None:
     UsageError
         Unless E > 0, −1 < ν ≤ 0.5 and ρ ≥ 0, all finite.
     """
-    require_number("Young's modulus", young, "Pa")
+    require_positive("Young's modulus", young)
+    require_poisson(poisson)
+    require_density(density)
+
+
+def require_poisson(poisson: float) -> None:
+    """Refuse a Poisson's ratio that no stable material has.
+
+    Raises
+    ------
+    UsageError
+        Unless −1 < ν ≤ 0.5.
+    """
     require_number("Poisson's ratio", poisson)
-    if not (math.isfinite(young) and young > 0):
-        raise unphysical("Young's modulus", young, "positive and finite, in Pa")
     if not -1 < poisson <= 0.5:
         raise unphysical("Poisson's ratio", poisson, "above -1 and at most 0.5")
-    require_density(density)
 
 
 def require_density(density: float) -> None:

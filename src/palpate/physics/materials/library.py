@@ -1,0 +1,97 @@
+"""Materials that can be asked for by name, with their sources and the strains they were fitted over.
+
+The silicones' and the fat's tests tell nothing of compressibility: a Poisson's ratio of 0.499 is set here, near enough
+to incompressible for their forces and far enough for a solver (`dataclasses.replace` gives another `bulk`). Densities
+are the manufacturer's (silicones) and that of adipose tissue in ICRU Report 44 (1989).
+"""
+
+from __future__ import annotations
+
+import difflib
+from typing import TypeVar, overload
+
+from palpate.errors import UsageError
+from palpate.physics.materials.linear import MATERIALS as LINEAR
+from palpate.physics.materials.material import Elastic
+from palpate.physics.materials.neo_hooke import NeoHookean
+from palpate.physics.materials.ogden import Ogden
+
+__all__ = ["MATERIALS", "named_material"]
+
+L = TypeVar("L", bound=Elastic)
+
+_NEARLY = 0.499
+_MARECHAL = "fitted to Marechal et al. 2020, doi 10.1089/soro.2019.0115, uniaxial tension, strain 5 to 100 %"
+_SIMS = "Sims et al. 2010, porcine subdermal fat, instantaneous shear modulus of its viscoelastic law"
+
+# name, density, C10 and Ogden's μ and α, in SI units
+_ECOFLEX = (
+    ("ecoflex 00-10", 1040.0, 3.98e3, 5.54e3, 2.52),
+    ("ecoflex 00-30", 1070.0, 8.07e3, 11.99e3, 2.42),
+    ("ecoflex 00-50", 1070.0, 11.21e3, 16.00e3, 2.48),
+)
+_DRAGON_SKIN = (("dragon skin 20", 1080.0, 68.2e3, 3.29), ("dragon skin 30", 1080.0, 110e3, 3.06))
+
+
+def _gaussian(name: str, density: float, c10: float, source: str) -> NeoHookean:
+    return NeoHookean.from_c10(
+        c10, poisson=_NEARLY, density=density, form="isochoric", name=name, source=source
+    )
+
+
+def _ogden(name: str, density: float, mu: float, alpha: float) -> Ogden:
+    return Ogden.with_poisson(_NEARLY, mu=mu, alpha=alpha, density=density, name=name, source=_MARECHAL)
+
+
+MATERIALS: dict[str, Elastic] = {
+    material.name: material
+    for material in (
+        *LINEAR.values(),
+        *(_ogden(name, rho, mu, alpha) for name, rho, _, mu, alpha in _ECOFLEX),
+        *(_gaussian(f"{name} neo-hookean", rho, c10, _MARECHAL) for name, rho, c10, _, _ in _ECOFLEX),
+        *(_ogden(*row) for row in _DRAGON_SKIN),
+        _gaussian("porcine fat", 950.0, 0.53e3 / 2, _SIMS),
+    )
+}
+"""Materials that can be asked for by name."""
+
+
+@overload
+def named_material(name: str) -> Elastic: ...
+@overload
+def named_material(name: str, law: type[L]) -> L: ...
+def named_material(name: str, law: type[Elastic] = Elastic) -> Elastic:
+    """Look a material up by name.
+
+    Parameters
+    ----------
+    name : str
+        In any case, such as ``"nylon"`` or ``"Ecoflex 00-30"``.
+    law : type, optional
+        The law that the body needs, such as `LinearElastic` for a beam.
+
+    Raises
+    ------
+    UsageError
+        If the name is not known, or the material is one of another law; the message lists the names that fit.
+    """
+    key = name.strip().lower()
+    found = MATERIALS.get(key)
+    if isinstance(found, law):
+        return found
+    fitting = [known for known, material in MATERIALS.items() if isinstance(material, law)]
+    known = f"Known materials: {', '.join(sorted(fitting))}."
+    if found is not None:
+        raise UsageError(
+            f"{key} is a material of the law {found.law}; here {law.law} is needed.",
+            why=known,
+            fix=f"Take one of these, or {law.__name__} with your own constants.",
+        )
+    close = difflib.get_close_matches(key, fitting, n=1)
+    raise UsageError(
+        f"There is no material called {name!r}.",
+        why=known,
+        fix=f"Did you mean {close[0]!r}?"
+        if close
+        else "Or give its constants, for example LinearElastic(young=70e9, poisson=0.33, density=2700.0).",
+    )

@@ -84,7 +84,8 @@ class MassSpringBody:
         triangles = self._surface(probe.touches)
         areas = point_areas(self.mesh.points, triangles)
         nodes = np.flatnonzero((areas > 0) & self.free())
-        return PointPad(nodes, areas[nodes], probe.radius, probe.pad, probe.stop)
+        stop = np.inf if probe.stop is None else probe.stop
+        return PointPad(nodes, areas[nodes], probe.radius, probe.pad, stop)
 
     def open(self, probe: Any) -> MassSpringSolver:
         """A solver for a `SphereProbe`, at rest and out of contact."""

@@ -38,7 +38,7 @@ class PointPad:
     stiffness : float
         k, N/m³.
     stop : float
-        p_m, m.
+        p_m, m; infinite for a pad without a stop.
     """
 
     nodes: np.ndarray

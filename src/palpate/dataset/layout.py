@@ -67,16 +67,16 @@ class Layout:
             fix(self, "labels", {"reaction": ("F_x", "F_y", "M")} if plane else {})
         if self.triangles is not None:
             fix(self, "triangles", np.asarray(self.triangles, dtype=np.int64))
+            _check_triangles(self.triangles, len(rest))
         fix(self, "of_interest", self._interest())
         self._check()
 
     def _interest(self) -> np.ndarray:
         if self.of_interest is not None:
             return np.asarray(self.of_interest, dtype=bool)
-        if self.triangles is None:
-            return np.ones(len(self.rest), dtype=bool)
-        marked = np.zeros(len(self.rest), dtype=bool)
-        marked[self.triangles] = True
+        marked = np.full(len(self.rest), self.triangles is None)
+        if self.triangles is not None:
+            marked[self.triangles] = True
         return marked
 
     def _check(self) -> None:
@@ -87,16 +87,18 @@ class Layout:
         _require(
             len(self.axes) == self.rest.shape[1], f"axes are {self.axes} in {self.rest.shape[1]} dimensions"
         )
-        if self.triangles is None:
-            _require(self.surface_of is None, "surface_of is given without triangles")
-            return
-        shape = self.triangles.shape
-        _require(len(shape) == 2 and shape[1] == 3, f"triangles has the shape {shape}")
-        inside = self.triangles.size == 0 or (self.triangles.min() >= 0 and self.triangles.max() < nodes)
-        _require(inside, f"triangles names nodes outside 0 … {nodes - 1}")
         if self.surface_of is not None:
-            of = np.shape(self.surface_of)
-            _require(of == shape[:1], f"surface_of has the shape {of} for {shape[0]} triangles")
+            of, count = np.asarray(self.surface_of), 0 if self.triangles is None else len(self.triangles)
+            _require(of.shape == (count,), f"surface_of has the shape {of.shape} for {count} triangles")
+            named = not of.size or (of.min() >= 0 and of.max() < len(self.surfaces))
+            _require(named, f"surface_of counts beyond the {len(self.surfaces)} surfaces")
+
+
+def _check_triangles(triangles: np.ndarray, nodes: int) -> None:
+    shape = triangles.shape
+    _require(len(shape) == 2 and shape[1] == 3, f"triangles has the shape {shape}")
+    inside = triangles.size == 0 or (triangles.min() >= 0 and triangles.max() < nodes)
+    _require(inside, f"triangles names nodes outside 0 … {nodes - 1}")
 
 
 def _require(fits: bool, why: str) -> None:

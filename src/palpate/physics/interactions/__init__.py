@@ -2,12 +2,41 @@
 
 interaction  what an interaction offers, and what it hands over when it is attached
 sphere       a rigid sphere that presses a surface
-contact      its contact energy, and whether a state is admissible
-columns      in which order its positions are solved
+glued        a pad that is glued to a surface and moved
+prescribed   a surface, or a part of it, that is moved by given amounts
+loads        dead loads: a point force, a traction, a body force
+pressure     a pressure that follows its surface
+
+contact      a sphere's contact energy, and whether a state is admissible
+columns      in which order a sphere's positions are solved
 patch        a touched surface as triangles
+footprint    the bump under a glued pad or a point force
+rigid        whether a body is held
+arguments    directions and ranges, checked
 """
 
+from palpate.physics.interactions.glued import GluedPad
 from palpate.physics.interactions.interaction import Attached, Energy, Field, Held, Interaction, Planned
+from palpate.physics.interactions.loads import BodyForce, PointForce, SurfaceTraction
+from palpate.physics.interactions.prescribed import PrescribedDisplacement
+from palpate.physics.interactions.pressure import Pressure
+from palpate.physics.interactions.rigid import free_motions, require_held
 from palpate.physics.interactions.sphere import SphereProbe
 
-__all__ = ["Attached", "Energy", "Field", "Held", "Interaction", "Planned", "SphereProbe"]
+__all__ = [
+    "Attached",
+    "BodyForce",
+    "Energy",
+    "Field",
+    "GluedPad",
+    "Held",
+    "Interaction",
+    "Planned",
+    "PointForce",
+    "PrescribedDisplacement",
+    "Pressure",
+    "SphereProbe",
+    "SurfaceTraction",
+    "free_motions",
+    "require_held",
+]

@@ -1,0 +1,204 @@
+"""The footprint of a pad or of a spread force on a named surface: a smooth bump of compact support.
+
+Seen along an axis that the surface faces, the bump around the point p is
+
+    ρ(X) = (1 - |X⊥ - p|²/a²)³  for |X⊥ - p| < a,  else 0,
+
+with a radius a and X⊥ the two coordinates across the axis. It has two continuous derivatives, so energies with ρ
+have a continuous stiffness also where p is an input. Its integral over a plane is πa²/4.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.physics.geometry.checks import require_known
+from palpate.physics.geometry.mesh import BodyMesh
+from palpate.physics.geometry.refinement import Refinement
+from palpate.physics.interactions.arguments import AXES, axis_of
+from palpate.physics.interactions.patch import Patch
+
+__all__ = ["QUADRATURE", "Chart", "bump", "chart_at", "chart_of", "footprint_area", "require_on_surface"]
+
+QUADRATURE = (
+    6  # orders of quadrature beyond the elements' own: the bump is no polynomial on an element it cuts
+)
+MARGIN = 1.2  # a fine mesh reaches that many radii from the footprint's centre
+PLAIN = 0.1  # a surface has a mean direction if its area vectors add up to more than this share of its area
+ON_SURFACE = 0.02  # share of the body's size by which a point may miss a curved surface's triangles
+COVERED = (
+    0.98  # share of a footprint that must lie on the surface; the rest is for the triangles of a round edge
+)
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A surface seen along an axis: two coordinates tell its points.
+
+    Attributes
+    ----------
+    surface : str
+    axis : int
+        Index of the axis that the surface faces.
+    sign : float
+        1 or -1: whether it faces along or against the axis.
+    """
+
+    surface: str
+    axis: int
+    sign: float
+
+    @property
+    def across(self) -> tuple[int, int]:
+        """Indices of the two coordinates."""
+        first, second = (i for i in range(3) if i != self.axis)
+        return first, second
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Names of the two coordinates, such as x and y."""
+        return AXES[self.across[0]], AXES[self.across[1]]
+
+    def refinement(self, mesh: BodyMesh, lower: np.ndarray, upper: np.ndarray, element: float) -> Refinement:
+        """Fine elements between two corners (2,) in m, all along the axis."""
+        low, high = (corner.copy() for corner in mesh.corners)
+        low[list(self.across)], high[list(self.across)] = lower, upper
+        return Refinement(self.surface, element, _triple(low), _triple(high))
+
+
+def bump(chart: Chart, centre: tuple[Any, Any], radius: float) -> Any:
+    """ρ as a coefficient function on the surface.
+
+    Parameters
+    ----------
+    chart : Chart
+    centre : tuple of two floats or ngsolve.Parameter
+        p in m.
+    radius : float
+        a in m.
+    """
+    import ngsolve as ng
+
+    here = (ng.x, ng.y, ng.z)
+    off = sum((here[i] - p) ** 2 for i, p in zip(chart.across, centre, strict=True))
+    inside = 1 - off / radius**2
+    # a body may end in a surface that closes on itself: its far side faces away
+    faces = chart.sign * ng.specialcf.normal(3)[chart.axis]
+    return ng.IfPos(faces, ng.IfPos(inside, inside**3, 0), 0)
+
+
+def footprint_area(radius: float) -> float:
+    """∫ρ dA = πa²/4 on a plane, in m²."""
+    return math.pi * radius**2 / 4
+
+
+def chart_of(mesh: BodyMesh, surface: str, facing: str | None = None) -> Chart:
+    """Chart of a whole surface, along `facing` or the axis nearest to its mean normal.
+
+    Raises
+    ------
+    UsageError
+        If there is no such surface, or it has no mean normal and `facing` is not given.
+    """
+    require_known("surface", surface, mesh.surfaces)
+    if facing is not None:
+        return Chart(surface, *axis_of("The direction that the surface faces", facing))
+    mean = Patch.of(mesh, surface).facing
+    if np.linalg.norm(mean) < PLAIN:
+        raise UsageError(
+            f"The surface {surface!r} faces all ways.",
+            why="Its normals cancel, so two coordinates can't tell its points.",
+            fix='Say which side is meant, for example facing="+z".',
+        )
+    return _along(surface, mean)
+
+
+def chart_at(mesh: BodyMesh, surface: str, point: tuple[float, float, float]) -> Chart:
+    """Chart along the axis that the surface faces at a point (3,) in m.
+
+    Raises
+    ------
+    UsageError
+        If there is no such surface, or the point is not on it.
+    """
+    require_known("surface", surface, mesh.surfaces)
+    nearest, normal, distance = Patch.of(mesh, surface).nearest(np.asarray(point))
+    size = float(np.linalg.norm(mesh.corners[1] - mesh.corners[0]))
+    if abs(distance) > ON_SURFACE * size:
+        raise UsageError(
+            f"The point {_words(point)} m is not on the surface {surface!r}.",
+            why=f"The nearest point of that surface is {_words(nearest)} m, {abs(distance):.3g} m away.",
+            fix="Give a point of the surface at rest, in m.",
+        )
+    return _along(surface, normal)
+
+
+def _along(surface: str, normal: np.ndarray) -> Chart:
+    axis = int(np.argmax(np.abs(normal)))
+    return Chart(surface, axis, float(np.sign(normal[axis])))
+
+
+def require_on_surface(
+    mesh: BodyMesh, chart: Chart, lower: np.ndarray, upper: np.ndarray, radius: float
+) -> None:
+    """Refuse footprints that hang over the edge of the surface.
+
+    Parameters
+    ----------
+    lower, upper : (2,) array
+        Corners in m of the rectangle in which the centre of the footprint may be.
+    radius : float
+        Of the footprint in m.
+
+    Raises
+    ------
+    UsageError
+        If more than a fiftieth of any footprint is off the surface.
+    """
+    facing = chart.sign * mesh.area_vectors[:, chart.axis] > 0
+    mine = facing & (mesh.surface_of == mesh.surfaces.index(chart.surface))
+    triangles = mesh.points[mesh.triangles[mine]][:, :, list(chart.across)]
+    offsets, weight = _disc(radius)
+    for corner in np.unique([[x, y] for x in (lower[0], upper[0]) for y in (lower[1], upper[1])], axis=0):
+        share = float(weight @ _inside(triangles, corner + offsets))
+        if share < COVERED:
+            raise UsageError(
+                f"The pad around {_words(corner)} m hangs over the edge of the surface {chart.surface!r}.",
+                why=f"Only {share:.0%} of its footprint, of radius {radius:g} m, lies on the surface.",
+                fix="Keep its centre a radius away from the edge, or make it smaller.",
+            )
+
+
+def _disc(radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points (400, 2) spread evenly over a disc, and their share of the bump, adding up to 1."""
+    i = np.arange(400) + 0.5
+    r, angle = np.sqrt(i / len(i)), math.pi * (1 + 5**0.5) * i  # Vogel's (1979) spiral
+    weight = (1 - r**2) ** 3
+    return radius * np.column_stack([r * np.cos(angle), r * np.sin(angle)]), weight / weight.sum()
+
+
+def _inside(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Whether each point (n, 2) lies in one of the triangles (t, 3, 2), shape (n,)."""
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    sides = np.stack([_cross(q - p, points[:, None] - p) for p, q in ((a, b), (b, c), (c, a))])
+    slack = 1e-9 * np.abs(_cross(b - a, c - a))
+    found = (sides >= -slack).all(axis=0) | (sides <= slack).all(axis=0)
+    return np.asarray(found.any(axis=1), dtype=float)
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
+def _words(point: Any) -> str:
+    return "(" + ", ".join(f"{value:.4g}" for value in point) + ")"
+
+
+def _triple(values: np.ndarray) -> tuple[float, float, float]:
+    x, y, z = map(float, values)
+    return x, y, z

@@ -1,0 +1,209 @@
+"""A pad that is glued to a surface: what grasps, or holds by suction."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.physics.geometry.checks import require_known, require_positive, require_triple
+from palpate.physics.interactions.arguments import AXES, Interval, interval, tag
+from palpate.physics.interactions.footprint import (
+    MARGIN,
+    QUADRATURE,
+    Chart,
+    bump,
+    chart_at,
+    chart_of,
+    require_on_surface,
+)
+from palpate.physics.interactions.interaction import Attached, Energy
+from palpate.units import Range
+
+if TYPE_CHECKING:
+    from palpate.physics.geometry.mesh import BodyMesh
+    from palpate.physics.geometry.refinement import Refinement
+
+__all__ = ["GluedPad"]
+
+Corner = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class GluedPad:
+    """A soft pad glued to a surface, moved by a displacement d without turning.
+
+    Its energy is ½ ∫ k ρ |d - u|² dA, with the bump ρ of radius a around a point p of the surface; u counts from
+    the body under its constant loads. The force on the hand is -∂U/∂d = ∫ k ρ (u - d) dA.
+
+    Attributes
+    ----------
+    touches : str
+        Name of the surface.
+    radius : float, optional
+        a in m. Without it the pad covers all of the surface evenly: ρ = 1.
+    at : tuple of three floats, optional
+        p in m, a point of the surface at rest.
+    over : pair of corners, optional
+        ((low, low), (high, high)) in m: p becomes an input in this rectangle of the two coordinates that tell the
+        surface's points, x and y on top. Instead of `at`.
+    pad : float
+        Stiffness k in N/m³.
+    displacement : three of range or zero
+        Along x, y and z, in m: a range is an input, a component of 0 stays there.
+    facing : str, optional
+        Axis such as ``"+z"`` along which a surface is seen that faces all ways; for `over`.
+    element : float, optional
+        Size in m of the elements under the pad; by default a third of the radius.
+    name : str
+        Put before the names of the inputs, to tell several pads apart.
+
+    Raises
+    ------
+    UsageError
+        For an empty range, a size that is not positive, or a pad without a place.
+    """
+
+    touches: str = "top"
+    radius: float | None = None
+    at: tuple[float, float, float] | None = None
+    over: tuple[Corner, Corner] | None = None
+    pad: float = 2e6
+    displacement: tuple[Interval, Interval, Interval] = ((-0.005, 0.005),) * 3
+    facing: str | None = None
+    element: float | None = None
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        require_positive("The stiffness of a glued pad", self.pad, "N/m³")
+        for what, size in (("radius of a glued pad", self.radius), ("element under a pad", self.element)):
+            if size is not None:
+                require_positive(f"The {what}", size, "m")
+        self._require_place()
+        if self.at is not None:
+            object.__setattr__(self, "at", require_triple("The point of a glued pad", self.at))
+        if self.over is not None:
+            object.__setattr__(self, "over", _rectangle(self.over))
+        object.__setattr__(self, "displacement", _three(self.displacement))
+
+    def _require_place(self) -> None:
+        places = (self.at is not None) + (self.over is not None)
+        if places == (0 if self.radius is None else 1):
+            return
+        raise UsageError(
+            "A glued pad of a given radius needs one place, a pad without a radius none.",
+            why=f"It has the radius {self.radius}, at = {self.at} and over = {self.over}.",
+            fix="Give radius and either at=(x, y, z) or over=((low, low), (high, high)), or none of them for a pad "
+            "that covers all of the surface.",
+        )
+
+    def ranges(self, geometry: Any) -> tuple[Range, ...]:
+        """Inputs: the place's two coordinates if it varies, then the components of d that vary.
+
+        Raises
+        ------
+        UsageError
+            If the body has no such surface, the point is not on it, or the pad hangs over its edge.
+        """
+        chart = _placed(self, geometry.rest())[0]
+        found = []
+        if self.over is not None and chart is not None:
+            for axis, low, high in zip(chart.names, *self.over, strict=True):
+                found.append(Range(tag(self.name, f"p_{axis}"), low, high, "m"))
+        for axis, ends in zip(AXES, self.displacement, strict=True):
+            if isinstance(ends, tuple):
+                found.append(Range(tag(self.name, f"d_{axis}"), *ends, "m"))
+        return tuple(found)
+
+    def describe(self) -> dict[str, Any]:
+        """Its fields, with ``"type": "GluedPad"``."""
+        return {"type": "GluedPad", **asdict(self)}
+
+    def refinements(self, geometry: Any) -> tuple[Refinement, ...]:
+        """Fine elements wherever the footprint may be."""
+        chart, lower, upper = _placed(self, geometry.rest())
+        if chart is None or self.radius is None:
+            return ()
+        margin = MARGIN * self.radius
+        element = self.element if self.element is not None else self.radius / 3
+        return (chart.refinement(geometry.rest(), lower - margin, upper + margin, element),)
+
+    def attach(self, field: Any) -> Attached:
+        """The pad's energy on an opened body."""
+        import ngsolve as ng
+
+        chart, centre, _ = _placed(self, field.rest)
+        place = [ng.Parameter(0.0) for _ in range(2)] if self.over is not None else []
+        weight: Any = 1.0
+        if chart is not None and self.radius is not None:
+            p = tuple(place) if place else tuple(map(float, centre))
+            weight = bump(chart, (p[0], p[1]), self.radius)
+        moves = [ng.Parameter(0.0) if isinstance(ends, tuple) else ends for ends in self.displacement]
+        strain = ng.CF(tuple(moves)) - (field.trial - field.base)
+        surface = ng.ds(definedon=field.surface(self.touches), bonus_intorder=QUADRATURE)
+        energy = Energy(self.pad / 2 * weight * ng.InnerProduct(strain, strain), surface)
+        inputs = (*place, *(m for m in moves if isinstance(m, ng.Parameter)))
+        fixed = len(place)
+
+        def approach(q: np.ndarray) -> np.ndarray | None:
+            return np.concatenate([q[:fixed], np.zeros(len(q) - fixed)])
+
+        return Attached(parameters=inputs, energies=(energy,), approach=approach)
+
+
+def _placed(pad: GluedPad, mesh: BodyMesh) -> tuple[Chart | None, np.ndarray, np.ndarray]:
+    """Chart of the touched surface, and the corners (2,) in m between which the pad's place is.
+
+    No chart, and corners that mean nothing, for a pad that covers all of the surface.
+    """
+    nowhere = np.zeros(2)
+    if pad.radius is None:
+        require_known("surface", pad.touches, mesh.surfaces)
+        return None, nowhere, nowhere
+    if pad.at is not None:
+        chart = chart_at(mesh, pad.touches, pad.at)
+        lower = upper = np.asarray(pad.at)[list(chart.across)]
+    else:
+        chart = chart_of(mesh, pad.touches, pad.facing)
+        lower, upper = (np.asarray(corner) for corner in pad.over or (nowhere, nowhere))
+    require_on_surface(mesh, chart, lower, upper, pad.radius)
+    return chart, lower, upper
+
+
+def _rectangle(value: Any) -> tuple[Corner, Corner]:
+    corners = np.asarray(value, dtype=float)
+    if corners.shape != (2, 2) or not np.isfinite(corners).all() or (corners[0] >= corners[1]).any():
+        raise UsageError(
+            f"The places of a glued pad are {value!r}.",
+            why="They are a rectangle that is not empty: a lower and an upper corner, of two coordinates each.",
+            fix="For example over=((0.03, 0.03), (0.07, 0.07)), in m; or at=(x, y, z) for a fixed place.",
+        )
+    (a, b), (c, d) = corners.tolist()
+    return (a, b), (c, d)
+
+
+def _three(value: Any) -> tuple[Interval, Interval, Interval]:
+    parts = tuple(value) if isinstance(value, Iterable) else (value,)
+    if len(parts) != 3:
+        raise UsageError(
+            f"The displacement of a glued pad is {value!r}.",
+            why="It has three components, along x, y and z.",
+            fix="Give a range or a number for each, for example (0.0, 0.0, (-0.005, 0.005)).",
+        )
+    names = [f"The displacement of a glued pad along {axis}" for axis in AXES]
+    x, y, z = (_from_rest(name, interval(name, part, "m")) for name, part in zip(names, parts, strict=True))
+    return x, y, z
+
+
+def _from_rest(what: str, ends: Interval) -> Interval:
+    """A pad is glued to a body at rest, so a component that is no input is zero."""
+    if isinstance(ends, tuple) or ends == 0.0:
+        return ends
+    raise UsageError(
+        f"{what} is fixed at {ends:g} m.",
+        why="The pad is glued to a body that it does not move yet; a component that stays, stays at 0.",
+        fix="Give a range that contains the value, and hold that input of the solve.",
+    )

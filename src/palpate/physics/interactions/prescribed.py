@@ -1,0 +1,196 @@
+"""A part of a surface that is moved by given amounts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.physics.geometry.checks import require_known, require_triple
+from palpate.physics.interactions.arguments import AXES, direction_of, interval, tag
+from palpate.physics.interactions.interaction import Attached
+from palpate.units import Range
+
+if TYPE_CHECKING:
+    from palpate.physics.geometry.refinement import Refinement
+
+__all__ = ["PrescribedDisplacement"]
+
+Point = tuple[float, float, float]
+Ends = tuple[float, float]
+SLACK = 1e-6  # share of the body's size by which a node may miss the box that tells a part of a surface
+
+
+@dataclass(frozen=True)
+class PrescribedDisplacement:
+    """Points of a surface moved by u = Σ qᵢ eᵢ from where they are under the constant loads alone.
+
+    The response is the force with which the body resists, -∂U/∂qᵢ: the sum of the reactions along eᵢ.
+
+    Attributes
+    ----------
+    surface : str
+    directions : direction, or tuple of directions
+        The eᵢ, each an axis such as ``"-z"`` or three numbers, taken to length 1.
+    travel : range, or tuple of ranges
+        (low, high) in m of each qᵢ.
+    sliding : bool
+        Whether displacements across all eᵢ, which must then be axes, are left free; they are held at zero
+        otherwise.
+    within : pair of points, optional
+        Corners in m of an upright box: only elements of the surface that lie in it are moved. The edge of the
+        part is the mesh's.
+    name : str
+        Put before the names of the inputs.
+
+    Raises
+    ------
+    UsageError
+        For an empty range, a direction without length, directions that depend on each other, or a sliding
+        direction that is no axis.
+    """
+
+    surface: str
+    directions: Any = "z"
+    travel: Any = (-0.005, 0.005)
+    sliding: bool = False
+    within: tuple[Point, Point] | None = None
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        directions = _directions(self.directions)
+        object.__setattr__(self, "directions", directions)
+        object.__setattr__(self, "travel", _travel(self.travel, len(directions)))
+        if np.linalg.matrix_rank(np.array(directions), tol=1e-9) < len(directions):
+            raise UsageError(
+                f"The directions {directions} depend on each other.",
+                why="The same displacement could be had in several ways, so forces along them are not defined.",
+                fix="Give at most three directions, none a combination of the others.",
+            )
+        if self.sliding and any(max(map(abs, e)) < 1.0 for e in directions):
+            raise UsageError(
+                f"The surface {self.surface!r} can't slide across {directions}.",
+                why="Free sliding is a matter of single displacement components, so directions must be axes.",
+                fix="Give axes such as 'z', or sliding=False to hold the displacement across at zero.",
+            )
+        if self.within is not None:
+            object.__setattr__(self, "within", _box(self.within))
+
+    def ranges(self, geometry: Any) -> tuple[Range, ...]:
+        """One input for each direction, in m.
+
+        Raises
+        ------
+        UsageError
+            If the body has no such surface.
+        """
+        require_known("surface", self.surface, geometry.surfaces)
+        names = [_word(e, i, len(self.directions)) for i, e in enumerate(self.directions)]
+        pairs = zip(names, self.travel, strict=True)
+        return tuple(Range(tag(self.name, name), low, high, "m") for name, (low, high) in pairs)
+
+    def describe(self) -> dict[str, Any]:
+        """Everything that decides what it does, as plain data for a JSON file."""
+        return {"type": "PrescribedDisplacement", **asdict(self)}
+
+    def refinements(self, geometry: Any) -> tuple[Refinement, ...]:
+        """None: how fine the mesh must be depends on the question."""
+        return ()
+
+    def attach(self, field: Any) -> Attached:
+        """Its constraints on an opened body.
+
+        Raises
+        ------
+        UsageError
+            If no element of the surface lies in the box.
+        """
+        import ngsolve as ng
+
+        held = self._held(field)
+        lifts = np.array([field.interpolate(ng.CF(e)) * held for e in self.directions])
+        inputs = tuple(ng.Parameter(0.0) for _ in self.directions)
+        return Attached(parameters=inputs, lifts=lifts, held=held)
+
+    def _held(self, field: Any) -> np.ndarray:
+        """Which unknowns are constrained, bool of shape (dof,)."""
+        found = field.surface_dofs(self.surface) if self.within is None else self._in_box(field)
+        if self.sliding:
+            space, across = field.displacement.space, np.zeros(field.size, dtype=bool)
+            for axis in np.argmax(np.abs(np.array(self.directions)), axis=1).tolist():
+                component = space.Range(axis)
+                across[component.start : component.stop] = True
+            found = found & across
+        return np.asarray(found)
+
+    def _in_box(self, field: Any) -> np.ndarray:
+        mesh, space = field.rest, field.displacement.space
+        lower, upper = (np.asarray(corner) for corner in self.within or mesh.corners)
+        slack = SLACK * float(np.linalg.norm(mesh.corners[1] - mesh.corners[0]))
+        inside = ((mesh.points >= lower - slack) & (mesh.points <= upper + slack)).all(axis=1)
+        found = np.zeros(field.size, dtype=bool)
+        for element in field.surface(self.surface).Elements():
+            if all(inside[vertex.nr] for vertex in element.vertices):
+                found[list(space.GetDofNrs(element))] = True
+        if not found.any():
+            raise UsageError(
+                f"No element of the surface {self.surface!r} lies in the box {self.within} m.",
+                why="Only elements whose corners are all in the box are moved.",
+                fix="Make the box larger, or the elements smaller there.",
+            )
+        return found
+
+
+def _word(direction: Point, index: int, count: int) -> str:
+    if max(direction) == 1.0:
+        return f"d_{AXES[direction.index(1.0)]}"
+    return f"d_{index + 1}" if count > 1 else "d"
+
+
+def _directions(value: Any) -> tuple[Point, ...]:
+    parts = (value,) if isinstance(value, str) else tuple(value) if isinstance(value, Iterable) else ()
+    single = len(parts) == 3 and not any(isinstance(part, str | Iterable) for part in parts)
+    several = (parts,) if single else parts
+    if not several:
+        raise UsageError(
+            f"The directions of a prescribed displacement are {value!r}.",
+            why="At least one is needed.",
+            fix="For example 'z', or ('x', 'z'), or (0, 0, -1).",
+        )
+    return tuple(direction_of("The direction of a prescribed displacement", part) for part in several)
+
+
+def _travel(value: Any, count: int) -> tuple[Ends, ...]:
+    parts = tuple(value) if isinstance(value, Iterable) else ()
+    several = parts if parts and all(isinstance(part, Iterable) for part in parts) else (parts,)
+    if len(several) != count:
+        raise UsageError(
+            f"There are {count} directions and {len(several)} ranges of a prescribed displacement.",
+            why="Each direction needs a range of its own.",
+            fix="Give one pair (low, high) in m for each direction.",
+        )
+    found = tuple(interval("A prescribed displacement", part, "m") for part in several)
+    return tuple(ends for ends in found if isinstance(ends, tuple))
+
+
+def _box(value: Any) -> tuple[Point, Point]:
+    try:
+        low, high = value
+    except (TypeError, ValueError):
+        raise UsageError(
+            f"The box of a prescribed displacement is {value!r}.",
+            why="It needs a lower and an upper corner.",
+            fix="For example within=((0, 0, 0.05), (0.02, 0.02, 0.05)), in m.",
+        ) from None
+    lower = require_triple("The lower corner of a box", low)
+    upper = require_triple("The upper corner of a box", high)
+    if any(a > b for a, b in zip(lower, upper, strict=True)):
+        raise UsageError(
+            f"The box {lower} … {upper} m is empty.",
+            why="Each coordinate of the lower corner must be at most that of the upper one.",
+            fix="Swap the coordinates that are in the wrong order.",
+        )
+    return lower, upper

@@ -11,20 +11,20 @@ where the excess is the trial stress less σ_y(α), and the stiffness is E in a 
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-import numpy as np
-
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_number
+from palpate.physics.materials.tensors import exp, positive_part, where
 
 __all__ = ["Hardening", "LinearHardening", "VoceHardening"]
 
 
 class Hardening(Protocol):
-    """What plasticity asks of a hardening law; α is a number or an array of any shape."""
+    """What plasticity asks of a hardening law; α is a number, an array or a coefficient function of NGSolve."""
 
     @property
     def yield_stress(self) -> float:
@@ -41,6 +41,9 @@ class Hardening(Protocol):
 
     def increment(self, excess: Any, stiffness: float, accumulated: Any) -> Any:
         """Plastic increment Δ ≥ 0 of the return mapping; 0 where the excess is not positive."""
+
+    def describe(self) -> dict[str, Any]:
+        """Plain data for JSON: the law's name and its constants in SI units."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +84,11 @@ class LinearHardening:
 
     def increment(self, excess: Any, stiffness: float, accumulated: Any) -> Any:
         """Excess over the sum of both moduli."""
-        return _positive(excess) / (stiffness + self.modulus)
+        return positive_part(excess) / (stiffness + self.modulus)
+
+    def describe(self) -> dict[str, Any]:
+        """Plain data for JSON: the law's name and its constants in SI units."""
+        return {"law": "linear hardening", **dataclasses.asdict(self)}
 
 
 @dataclass(frozen=True)
@@ -118,55 +125,49 @@ class VoceHardening:
 
     def flow_stress(self, accumulated: Any) -> Any:
         """σ_0 + Q (1 − exp(−b α)) + h α, in Pa."""
-        gained = self.saturation * (1 - _exp(-self.rate * accumulated))
+        gained = self.saturation * (1 - exp(-self.rate * accumulated))
         return self.yield_stress + gained + self.modulus * accumulated
 
     def slope(self, accumulated: Any) -> Any:
         """Q b exp(−b α) + h, in Pa."""
-        return self.saturation * self.rate * _exp(-self.rate * accumulated) + self.modulus
+        return self.saturation * self.rate * exp(-self.rate * accumulated) + self.modulus
 
     def work(self, accumulated: Any) -> Any:
         """(σ_0 + Q) α − Q (1 − exp(−b α))/b + ½ h α², in J/m³."""
-        exponential = self.saturation / self.rate * (1 - _exp(-self.rate * accumulated))
+        exponential = self.saturation / self.rate * (1 - exp(-self.rate * accumulated))
         linear = self.yield_stress + self.saturation + 0.5 * self.modulus * accumulated
         return linear * accumulated - exponential
 
     def increment(self, excess: Any, stiffness: float, accumulated: Any) -> Any:
         """Root of stiffness Δ + σ_y(α + Δ) − σ_y(α) = excess, by Newton iteration."""
         both = stiffness + self.modulus
-        target = _positive(excess) * self.rate / both
-        share = self.saturation * self.rate / both * _exp(-self.rate * accumulated)
-        return saturating_root(target, share) / self.rate
+        target = positive_part(excess) * self.rate / both
+        share = self.saturation * self.rate / both * exp(-self.rate * accumulated)
+        return saturating_root(target, share, self.saturation * self.rate / both) / self.rate
+
+    def describe(self) -> dict[str, Any]:
+        """Plain data for JSON: the law's name and its constants in SI units."""
+        return {"law": "Voce hardening", **dataclasses.asdict(self)}
 
 
-def saturating_root(target: Any, share: Any) -> Any:
-    """x ≥ 0 with x + share (1 − exp(−x)) = target, for share ≥ 0 and target ≥ 0.
+def saturating_root(target: Any, share: Any, largest: float) -> Any:
+    """x ≥ 0 with x + share (1 − exp(−x)) = target, for target ≥ 0 and 0 ≤ share ≤ largest.
 
     The left side is concave and rises, so Newton's method climbs to the root from any point below it and needs no
-    safeguard. Two points below it are target/(1 + share), as 1 − exp(−x) ≤ x, and target − share.
+    safeguard. Two points below it are target/(1 + share), as 1 − exp(−x) ≤ x, and target − share. The number of steps
+    is fixed by `largest`: an expression of finite elements can't stop when it has converged.
     """
     lower, upper = target / (1 + share), target - share
-    x = np.where(np.real(upper) > np.real(lower), upper, lower)
-    for _ in range(_STEPS):
-        x = _newton_step(x, target, share)
+    x = where(upper - lower, upper, lower)
+    for _ in range(_steps(largest)):
+        remaining = share * exp(-x)
+        x = (target - share + remaining * (1 + x)) / (1 + remaining)
     return x
 
 
-_STEPS = 8
-"""Enough for double precision at a share up to 1e3; that of a metal is below 1."""
-
-
-def _newton_step(x: Any, target: Any, share: Any) -> Any:
-    remaining = share * _exp(-x)
-    return (target - share + remaining * (1 + x)) / (1 + remaining)
-
-
-def _exp(x: Any) -> Any:
-    return np.exp(x)
-
-
-def _positive(x: Any) -> Any:
-    return np.where(np.real(x) > 0, x, 0 * x)
+def _steps(share: float) -> int:
+    """Newton steps to double precision: 3 for metals; far below a large share's saturation each step gains about 1."""
+    return 3 + int(math.log1p(10 * share))
 
 
 def _require_positive(what: str, value: float) -> None:

@@ -18,6 +18,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_number
+from palpate.physics.materials.tensors import exp, is_symbolic, where
 
 __all__ = ["Prony"]
 
@@ -89,18 +90,29 @@ class Prony:
             (g * r / (1 + r * r) for g, r in zip(self.shares, ratio, strict=True)), 0 * np.asarray(frequency)
         )
 
-    def decay(self, dt: float | None) -> tuple[float, ...]:
-        """e_i = exp(−Δ/τ_i): what is left of an overstress after a step of dt seconds; None is an instant."""
-        return tuple(math.exp(-(dt or 0.0) / tau) for tau in self.times)
+    def decay(self, dt: Any) -> tuple[Any, ...]:
+        """e_i = exp(−Δ/τ_i): what is left of an overstress after a step of Δ seconds.
 
-    def gain(self, dt: float | None) -> tuple[float, ...]:
+        `dt` is a number, None for an instant, infinity for ever, or a parameter of NGSolve.
+        """
+        return tuple(exp(-ratio) for ratio in self._ratios(dt))
+
+    def gain(self, dt: Any) -> tuple[Any, ...]:
         """a_i = (1 − exp(−Δ/τ_i))/(Δ/τ_i): what is left of a stress that grew evenly over the step."""
-        return tuple(mean_decay((dt or 0.0) / tau) for tau in self.times)
+        return tuple(mean_decay(ratio) for ratio in self._ratios(dt))
+
+    def _ratios(self, dt: Any) -> list[Any]:
+        return [(0.0 if dt is None else dt) / tau for tau in self.times]
 
 
-def mean_decay(ratio: float) -> float:
-    """(1 − exp(−x))/x, which is 1 at x = 0 and 0 at infinity."""
-    return -math.expm1(-ratio) / ratio if ratio > 0 else 1.0
+def mean_decay(ratio: Any) -> Any:
+    """(1 − exp(−x))/x, which is 1 at x = 0 and 0 at infinity, for a number or a parameter of NGSolve."""
+    if not is_symbolic(ratio):
+        return -math.expm1(-ratio) / ratio if ratio > 0 else 1.0
+    # below 0.01 the difference would lose digits and five terms of the series are exact
+    series = 1 - ratio / 2 * (1 - ratio / 3 * (1 - ratio / 4 * (1 - ratio / 5)))
+    safe = where(ratio - 0.01, ratio, 1.0)
+    return where(ratio - 0.01, (1 - exp(-safe)) / safe, series)
 
 
 def _require_positive(what: str, value: float, unit: str) -> None:

@@ -1,0 +1,240 @@
+"""Viscoelasticity of any strain over any elastic law, as an incremental energy.
+
+Finite linear viscoelasticity (Taylor, Pister & Goudreau 1970, Int. J. Numer. Methods Eng. 2, 45-59; Simo 1987, Comput.
+Methods Appl. Mech. Eng. 60, 153-173; Govindjee & Simo 1992, J. Mech. Phys. Solids 40, 213-233; Holzapfel 1996, Int. J.
+Numer. Methods Eng. 39, 3903-3926): each Prony term carries an overstress H_i of its own,
+
+    S = γ_∞ S_0 + Σ H_i,     Ḣ_i + H_i/τ_i = γ_i Ṡ_0,     S_0 = 2 ∂W/∂C = F⁻¹ ∂W/∂F,
+
+with W the part of the elastic law's energy that relaxes. If S_0 grows evenly over a step of length Δ, the update is
+
+    H_i ← e_i H_i + γ_i a_i (S_0 − S_0,old),     e_i = exp(−Δ/τ_i),     a_i = (1 − e_i) τ_i/Δ,
+
+and the stress at the step's end is the gradient of the incremental energy
+
+    (γ_∞ + Σ γ_i a_i) W(F) + M : ½(FᵀF − I) + volumetric part,     M = Σ e_i H_i − γ_i a_i S_0,old,
+
+as M is constant during the step. A law of small strain has ε in place of ½(FᵀF − I).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
+
+from palpate.errors import UsageError
+from palpate.physics.materials.dashpots import dashpot_loss, spring_energy
+from palpate.physics.materials.material import NO_STATE, Elastic, Material, StateVariable, Volumetric
+from palpate.physics.materials.prony import Prony
+from palpate.physics.materials.scaled import Part, Scaled, kept_bulk, part_of
+from palpate.physics.materials.tensors import (
+    Scalar,
+    Tensor,
+    gradient,
+    identity,
+    inner,
+    inverse,
+    matmul,
+    scale,
+    sym,
+    transpose,
+)
+
+__all__ = ["Viscoelastic"]
+
+_ZERO = ((0.0, 0.0, 0.0),) * 3
+
+
+@dataclass(frozen=True)
+class Viscoelastic(Elastic):
+    """An elastic law that relaxes by a Prony series.
+
+    The base law is the instantaneous one: what a sudden deformation meets. A separate volumetric part stays elastic
+    unless `part` is "all"; a law that has none relaxes as a whole.
+
+    Attributes
+    ----------
+    base : Material
+        An elastic law.
+    terms : tuple of (float, float)
+        (γ_i, τ_i): share of the instantaneous law that relaxes, and relaxation time in s; a `Prony` is taken too.
+        They are shares of the shear modulus, and of Young's modulus only where the volume can't change or relaxes too.
+    part : "distortion" or "all"
+        What relaxes. If the volumetric part does, there is no mixed formulation.
+    name, source : str
+        By default those of the base law.
+
+    Raises
+    ------
+    UsageError
+        For a base law with a history of its own, or terms that are no Prony series.
+    """
+
+    base: Material
+    terms: tuple[tuple[float, float], ...]
+    part: Part = "distortion"
+    name: str = ""
+    source: str = ""
+
+    law: ClassVar[str] = "viscoelastic"
+
+    def __post_init__(self) -> None:
+        if self.base.states:
+            raise UsageError(
+                f"{self.base.name} has a history of its own and can't be the base of a viscoelastic material.",
+                why="The Prony series relaxes an elastic law's stress.",
+                fix="Pass an elastic law, for example NeoHookean(young=9e3, poisson=0.45).",
+            )
+        series = self.terms if isinstance(self.terms, Prony) else Prony(self.terms)
+        object.__setattr__(self, "terms", series.terms)
+        for key in ("name", "source"):
+            object.__setattr__(self, key, getattr(self, key) or getattr(self.base, key))
+
+    @classmethod
+    def from_relaxed(cls, law: Material, terms: Prony | tuple[tuple[float, float], ...]) -> Viscoelastic:
+        """The material that relaxes to `law`, by the same shares of the instantaneous law.
+
+        Raises
+        ------
+        UsageError
+            If the series relaxes to nothing.
+        """
+        series = terms if isinstance(terms, Prony) else Prony(terms)
+        if series.equilibrium <= 0:
+            raise UsageError(
+                "A series whose shares sum to 1 relaxes to nothing.",
+                why="The instantaneous law is the relaxed one over γ_∞ = 1 − Σγ_i.",
+                fix="Give the instantaneous law: Viscoelastic(law, terms).",
+            )
+        return cls(Scaled(law, 1 / series.equilibrium), series.terms, name=law.name, source=law.source)
+
+    @property
+    def prony(self) -> Prony:
+        """The series."""
+        return Prony(self.terms)
+
+    @property
+    def density(self) -> float:  # type: ignore[override]
+        """In kg/m³."""
+        return self.base.density
+
+    @property
+    def kinematics(self) -> Literal["large", "small"]:  # type: ignore[override]
+        """Those of the base law."""
+        return self.base.kinematics
+
+    @property
+    def young(self) -> float:
+        """Instantaneous E in Pa."""
+        return self.base.young
+
+    @property
+    def poisson(self) -> float:
+        """Instantaneous ν."""
+        return self.base.poisson
+
+    @property
+    def shear_modulus(self) -> float:
+        """Instantaneous G in Pa."""
+        return self.base.shear_modulus
+
+    @property
+    def bulk_modulus(self) -> float:
+        """Instantaneous K in Pa."""
+        return self.base.bulk_modulus
+
+    @property
+    def volumetric(self) -> Volumetric | None:
+        """That of the base law where it does not relax: then a mixed formulation works."""
+        return self.base.volumetric if self.part == "distortion" else None
+
+    @property
+    def states(self) -> tuple[StateVariable, ...]:  # type: ignore[override]
+        """The base law's stress S_0 at the end of the last step and each term's overstress H_i, in Pa."""
+        names = ("stress", *self._overstresses)
+        return tuple(StateVariable(name, (3, 3), _ZERO) for name in names)
+
+    def relaxed(self) -> Scaled:
+        """The elastic law that is left in the end, with the equilibrium moduli.
+
+        Raises
+        ------
+        UsageError
+            If nothing is left, as the shares sum to 1.
+        """
+        return Scaled(self.base, self.prony.equilibrium, self.part)
+
+    def storage_modulus(self, frequency: Any) -> Any:
+        """G'(ω) in Pa at small strain, for angular frequencies in rad/s."""
+        return self.shear_modulus * self.prony.storage(frequency)
+
+    def loss_modulus(self, frequency: Any) -> Any:
+        """G''(ω) in Pa at small strain: a cycle of shear of amplitude γ loses π γ² G'' (J/m³)."""
+        return self.shear_modulus * self.prony.loss(frequency)
+
+    def distortion(self, F: Tensor, state: Mapping[str, Any] = NO_STATE, dt: Any = None) -> Scalar:
+        """Incremental energy without the elastic volumetric part, in J/m³.
+
+        Its gradient is the stress; its value is no stored energy. `dt` in s; None is an instant, infinity for ever.
+        """
+        series = self.prony
+        gains = [share * gain for share, gain in zip(series.shares, series.gain(dt), strict=True)]
+        energy = (series.equilibrium + sum(gains)) * part_of(self.base, self.part, F)
+        if not state:
+            return energy
+        memory = -scale(sum(gains), state["stress"])
+        for name, decay in zip(self._overstresses, series.decay(dt), strict=True):
+            memory = memory + scale(decay, state[name])
+        return energy + inner(memory, self._strain(F))
+
+    def advance(self, F: Tensor, state: Mapping[str, Any], dt: Any) -> dict[str, Any]:
+        """S_0 and H_i (..., 3, 3) in Pa at the end of the step."""
+        stress = self._stress(F)
+        series, change = self.prony, stress - state["stress"]
+        after = {"stress": stress}
+        terms = zip(self._overstresses, series.shares, series.decay(dt), series.gain(dt), strict=True)
+        for name, share, decay, gain in terms:
+            after[name] = scale(decay, state[name]) + scale(share * gain, change)
+        return after
+
+    def stored(self, F: Tensor, state: Mapping[str, Any]) -> Scalar:
+        """Free energy in J/m³ at F, with the state after the step: relaxed law and springs of the terms."""
+        series, bulk = self.prony, self._bulk
+        springs = sum(
+            spring_energy(state[name], share * self.shear_modulus, share * bulk)
+            for name, share in zip(self._overstresses, series.shares, strict=True)
+        )
+        relaxed = series.equilibrium * part_of(self.base, self.part, F) + springs
+        return relaxed if self.volumetric is None else relaxed + self.volumetric.energy(F)
+
+    def dissipated(self, F: Tensor, state: Mapping[str, Any], dt: float) -> Scalar:
+        """What the dashpots turn into heat in a step from `state` to F, in J/m³, never negative."""
+        change, bulk = self._stress(F) - state["stress"], self._bulk
+        return sum(
+            dashpot_loss(
+                state[name], scale(share, change), dt / time, share * self.shear_modulus, share * bulk
+            )
+            for name, (share, time) in zip(self._overstresses, self.terms, strict=True)
+        )
+
+    @property
+    def _overstresses(self) -> tuple[str, ...]:
+        return tuple(f"overstress_{i}" for i in range(1, len(self.terms) + 1))
+
+    @property
+    def _bulk(self) -> float:
+        """Bulk modulus in Pa of the part that relaxes."""
+        kept = kept_bulk(self.base, self.part)
+        return 0.0 if kept == self.bulk_modulus else self.bulk_modulus - kept
+
+    def _strain(self, F: Tensor) -> Tensor:
+        """The strain that the law's stress works on: ε, or Green's strain."""
+        if self.kinematics == "small":
+            return sym(F - identity(F))
+        return 0.5 * (matmul(transpose(F), F) - identity(F))
+
+    def _stress(self, F: Tensor) -> Tensor:
+        """S_0 of the part that relaxes (second Piola–Kirchhoff; Cauchy at small strain), in Pa."""
+        first = gradient(lambda A: part_of(self.base, self.part, A), F)
+        return sym(first) if self.kinematics == "small" else sym(matmul(inverse(F), first))

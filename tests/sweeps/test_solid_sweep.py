@@ -1,5 +1,10 @@
 """Sweeps of bodies in space: their own design and chains, the same bits on whatever workers."""
 
+import re
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from solid_problems import REST, TRIANGLES, Ground, answer, outside
@@ -191,3 +196,32 @@ def test_a_schema_has_to_fit_the_layout():
     )
     with pytest.raises(UsageError, match="'node'"):
         sweep(odd, samples=4)
+
+
+def test_the_guides_own_solver_runs(tmp_path):
+    guide = Path(__file__).parents[2] / "docs" / "guide" / "datasets-and-files.md"
+    (program,) = re.findall(r"```python\n(.*?)```", guide.read_text(encoding="utf-8"), re.DOTALL)
+    (tmp_path / "program.py").write_text(program, encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "program.py"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Dataset of 32 solves of spring, all converged" in done.stdout
+
+
+def test_what_a_problem_lacks_is_named():
+    class Half:
+        ranges = SPRING.ranges
+
+        def open(self):
+            return None
+
+    with pytest.raises(UsageError) as caught:
+        sweep(Half(), samples=4)
+    assert "layout, schema, describe" in caught.value.why

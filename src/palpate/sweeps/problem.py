@@ -14,7 +14,7 @@ import numpy as np
 from palpate.dataset import Field, Layout
 from palpate.units import Range
 
-__all__ = ["Answer", "Chained", "Designed", "Problem", "Resettable", "Solver", "is_problem"]
+__all__ = ["Answer", "Chained", "Designed", "Problem", "Resettable", "Solver", "missing_members"]
 
 
 class Answer(Protocol):
@@ -101,8 +101,8 @@ class Designed(Protocol):
         """At most `samples` points, shape (N, n)."""
 
 
-def is_problem(thing: object) -> bool:
-    """Whether `thing` has the members of a `Problem`; none is evaluated, for a layout may take a mesh."""
+def missing_members(thing: object) -> list[str]:
+    """What `thing` lacks of a `Problem`; no member is evaluated, for a layout may take a mesh."""
     members = ("ranges", "layout", "schema", "describe", "open")
-    missing = object()
-    return all(inspect.getattr_static(thing, name, missing) is not missing for name in members)
+    nothing = object()
+    return [name for name in members if inspect.getattr_static(thing, name, nothing) is nothing]

@@ -3,29 +3,22 @@
 from __future__ import annotations
 
 import contextlib
-import functools
 import os
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from palpate.dataset import Dataset, Field, Layout, assemble
-from palpate.dataset.assemble import check_schema
-from palpate.dataset.fields import complete
-from palpate.errors import SolverError, UsageError
+from palpate.dataset import Dataset
+from palpate.errors import SolverError
 from palpate.sweeps.answers import Columns, empty, put
-from palpate.sweeps.chunks import chunks
-from palpate.sweeps.designs import Design, design_points
+from palpate.sweeps.designs import Design
 from palpate.sweeps.ledger import Ledger
-from palpate.sweeps.problem import Chained, Designed, Problem, is_problem
+from palpate.sweeps.plan import Plan, make_plan
 from palpate.sweeps.progress import Report, reporter
-from palpate.sweeps.provenance import config_hash, provenance
 from palpate.sweeps.runner import connect, run
-from palpate.sweeps.space import Space
 
 __all__ = ["sweep"]
 
@@ -92,7 +85,7 @@ def sweep(
     SolverError
         If more than `max_failed` of the samples failed.
     """
-    plan = _plan(body, interactions, samples, seed, design, points)
+    plan = make_plan(body, interactions, samples, seed, design, points)
     ledger = Ledger(Path(path), plan.config) if path is not None else None
     data = ledger.complete() if ledger else None
     if data is None:
@@ -101,108 +94,8 @@ def sweep(
     return data
 
 
-@dataclass(frozen=True)
-class _Plan:
-    """What is to be solved, and the labels of the answers."""
-
-    problem: Problem
-    space: Space
-    points: np.ndarray
-    design: str
-    seed: int
-
-    @functools.cached_property
-    def config(self) -> str:
-        return config_hash(self.problem, self.points)
-
-    @functools.cached_property
-    def layout(self) -> Layout:
-        return self.problem.layout  # a solid is meshed for it
-
-    @functools.cached_property
-    def fields(self) -> tuple[Field, ...]:
-        schema = tuple(self.problem.schema)
-        check_schema(schema, self.layout, len(self.space))
-        return schema
-
-    @property
-    def schema(self) -> tuple[Field, ...]:
-        """Every column, the bookkeeping among them."""
-        return complete(self.fields)
-
-    @functools.cached_property
-    def origin(self) -> dict[str, Any]:
-        return provenance(self.problem, self.points, self.design, self.seed)
-
-    def chains(self) -> list[np.ndarray]:
-        """Rows in the order in which one solver solves them."""
-        if isinstance(self.problem, Chained):
-            return _checked([np.asarray(rows) for rows in self.problem.chains(self.points)], len(self.points))
-        rest = self.space.to_unit(np.clip(0.0, self.space.low, self.space.high))
-        return chunks(self.space.to_unit(self.points), rest)
-
-    def label(self, columns: Columns, rows: np.ndarray) -> Dataset:
-        """Dataset of some rows."""
-        return assemble(
-            self.space.ranges, self.layout, self.points[rows], columns, self.origin, rows, self.fields
-        )
-
-
-def _plan(
-    body: Any, interactions: Any, samples: int | None, seed: int, design: str | Design | None, points: Any
-) -> _Plan:
-    problem = _problem(body, interactions)
-    space = Space(problem.ranges)
-    if (samples is None) == (points is None):
-        raise UsageError(
-            "A sweep needs either samples or points.",
-            why=f"Given were samples={samples} and points={'None' if points is None else 'an array'}.",
-            fix="For example sweep(body, loads, samples=256).",
-        )
-    if points is not None:
-        return _Plan(problem, space, _some(space.points(points)), "points", seed)
-    own = getattr(problem, "design_name", "the problem's own")
-    if isinstance(problem, Designed) and (design is None or design == own):
-        return _Plan(problem, space, _some(space.points(problem.design(samples or 0, seed))), own, seed)
-    design = "sobol" if design is None else design
-    name = design if isinstance(design, str) else getattr(design, "__name__", type(design).__name__)
-    return _Plan(problem, space, _some(design_points(design, space, samples or 0, seed)), name, seed)
-
-
-def _problem(body: Any, interactions: Any) -> Problem:
-    if interactions is None and is_problem(body):
-        problem: Problem = body
-    elif interactions is None or not hasattr(body, "problem"):
-        raise UsageError(
-            "A sweep needs a body and what varies: loads or an interaction.",
-            why=f"Given were {type(body).__name__} and {type(interactions).__name__}.",
-            fix="For example sweep(Cantilever(...), TipLoad(0, 5), samples=256).",
-        )
-    else:
-        problem = body.problem(interactions)
-    return problem
-
-
-def _checked(chains: list[np.ndarray], count: int) -> list[np.ndarray]:
-    """The chains, if each row is in just one."""
-    rows = np.sort(np.concatenate([np.empty(0, dtype=np.int64), *(rows.ravel() for rows in chains)]))
-    if not np.array_equal(rows, np.arange(count)):
-        raise UsageError(
-            "The problem's chains don't hold each sample once.",
-            why=f"They hold {rows.size} rows of {count} samples, {np.unique(rows).size} different ones.",
-            fix="Let chains(points) part the rows 0 … N − 1.",
-        )
-    return [rows for rows in chains if rows.size]
-
-
-def _some(points: np.ndarray) -> np.ndarray:
-    if not len(points):
-        raise UsageError("A sweep needs at least one point.", why="There is none.", fix="Give some.")
-    return points
-
-
 def _solve(
-    plan: _Plan, ledger: Ledger | None, workers: int | None, cluster: Any, progress: bool | Report
+    plan: Plan, ledger: Ledger | None, workers: int | None, cluster: Any, progress: bool | Report
 ) -> Dataset:
     columns = empty(len(plan.points), plan.schema)
     chains = plan.chains()
@@ -225,7 +118,7 @@ def _solve(
 
 
 @contextlib.contextmanager
-def _keeping(plan: _Plan, ledger: Ledger | None, columns: Columns) -> Iterator[Callable[[np.ndarray], None]]:
+def _keeping(plan: Plan, ledger: Ledger | None, columns: Columns) -> Iterator[Callable[[np.ndarray], None]]:
     """Yield what to call with rows as they are finished; on an interruption all of them are in the ledger."""
     fresh: list[np.ndarray] = []
     begun = time.monotonic()
@@ -250,7 +143,7 @@ def _keeping(plan: _Plan, ledger: Ledger | None, columns: Columns) -> Iterator[C
         raise
 
 
-def _take_up(plan: _Plan, ledger: Ledger | None, columns: Columns, chains: list[np.ndarray]) -> np.ndarray:
+def _take_up(plan: Plan, ledger: Ledger | None, columns: Columns, chains: list[np.ndarray]) -> np.ndarray:
     """Fill in what an earlier run finished; which rows these are, bool of shape (N,).
 
     A chain counts only as a whole: a solver that entered one in its midst would have another past, and answer

@@ -119,6 +119,8 @@ class Attached:
     distance : callable, optional
         From two inputs (n,) to a length that says how dear it is to go from one to the other, on the scale of
         going straight from `approach`; by default the Euclidean length.
+    first_step : float
+        Longest first step along a path, as such a length; later ones adapt.
     """
 
     parameters: tuple[Any, ...]
@@ -129,6 +131,7 @@ class Attached:
     inspect: Callable[[np.ndarray], Verdict] = _nothing
     approach: Callable[[np.ndarray], np.ndarray | None] = np.zeros_like
     distance: Callable[[np.ndarray, np.ndarray], float] | None = None
+    first_step: float = np.inf
 
 
 @runtime_checkable

@@ -25,6 +25,7 @@ MARGIN = 1.3  # how far beyond the footprint of its centres the probe may touch,
 INSET = 3.0  # distance of the footprint from the surface's rim over the radius, unless it is given
 MOST_INSET = 0.4  # the same, at most, over the surface's width
 SIDEWAYS = 3.0  # how much dearer a move across is than one along the normal
+FIRST = 0.25  # first step along the approach over the radius
 MOST_STEPS = 50  # of the search for a place outside
 
 Corner = tuple[float, ...]

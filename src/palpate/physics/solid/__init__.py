@@ -1,0 +1,24 @@
+"""Solid bodies in three dimensions, at small and large strain.
+
+body       shape, materials, supports and constant loads
+problem    a body and what varies: what a sweep asks
+solver     many solves, each from the nearest answer before
+solution   what a solve returns
+opening    building the finite elements of a problem
+field      the unknowns: displacement, and pressure in mixed form
+density    the energy of the material
+history    internal variables at the quadrature points
+model      the equations as functions of the inputs
+system     energy, residual and factorised tangent
+newton     one equilibrium
+path       equilibria along a line of inputs
+response   forces and stiffness that an interaction feels
+stability  whether a tangent can be trusted, and the equilibrium is stable
+measures   strains and stresses
+"""
+
+from palpate.physics.solid.body import Body
+from palpate.physics.solid.problem import SolidProblem
+from palpate.physics.solid.solution import SolidSolution
+
+__all__ = ["Body", "SolidProblem", "SolidSolution"]

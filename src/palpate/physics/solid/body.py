@@ -1,0 +1,188 @@
+"""A solid body: its shape, what it is made of, where it is held and what always acts on it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+from palpate.errors import UsageError
+from palpate.physics.geometry.checks import require_known, require_triple
+from palpate.physics.interactions.interaction import Held, Interaction
+
+if TYPE_CHECKING:
+    from palpate.physics.geometry.shape import Geometry
+    from palpate.physics.materials.material import Material
+    from palpate.physics.solid.problem import SolidProblem
+
+__all__ = ["Body", "Formulation"]
+
+Formulation = Literal["auto", "displacement", "mixed"]
+# From here on displacements of second order give a contact force more than 1 % too large on meshes of usual
+# size; a region that goes mixed needlessly costs a tenth more unknowns and twice the assembly.
+NEARLY_INCOMPRESSIBLE = 0.48
+
+
+@dataclass(frozen=True)
+class Body:
+    """A solid body.
+
+    A plain value: it can be compared, hashed, pickled and sent to another process.
+
+    Attributes
+    ----------
+    geometry : Geometry
+    material : Material or {region: Material}
+        Kept as a tuple of (region, material) in the order of the geometry's regions.
+    fixed : str or tuple of str
+        Surfaces whose displacement is zero.
+    gravity : (3,) tuple
+        Acceleration in m/s² that acts on the material's density.
+    held : tuple of Held
+        Interactions that always act, with their inputs: pre-stress.
+    formulation : {"auto", "displacement", "mixed"}
+        ``"auto"`` takes the mixed form in regions whose initial Poisson's ratio is 0.48 or more and whose
+        material has a separate volumetric energy; `describe` and `formulation_of` tell which.
+    order : int
+        Polynomial order of the displacement, at least 2.
+
+    Raises
+    ------
+    UsageError
+        For names that the geometry does not have, regions without a material, or a formulation that the material
+        does not allow.
+    """
+
+    geometry: Geometry
+    material: Any
+    fixed: Any = "bottom"
+    gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    held: tuple[Held, ...] = ()
+    formulation: Formulation = "auto"
+    order: int = 2
+
+    def __post_init__(self) -> None:
+        fixed = (self.fixed,) if isinstance(self.fixed, str) else tuple(self.fixed)
+        for name in fixed:
+            require_known("surface", name, self.geometry.surfaces)
+        held = (self.held,) if isinstance(self.held, Held) else tuple(self.held)
+        object.__setattr__(self, "fixed", fixed)
+        object.__setattr__(self, "held", held)
+        object.__setattr__(self, "gravity", require_triple("Gravity", self.gravity))
+        object.__setattr__(self, "material", self._by_region())
+        if self.order < 2:
+            raise UsageError(
+                f"The order of a solid is {self.order}.",
+                why="Displacements of first order lock in bending and pair with no stable pressure.",
+                fix="Use order=2, or 3 on a coarse mesh.",
+            )
+        for region in self.materials:
+            self.formulation_of(region)
+
+    @property
+    def materials(self) -> dict[str, Material]:
+        """Material of each region."""
+        return dict(self.material)
+
+    @property
+    def has_history(self) -> bool:
+        """Whether the answer depends on what was before: some material has internal variables."""
+        return any(material.states for material in self.materials.values())
+
+    def formulation_of(self, region: str) -> tuple[Literal["displacement", "mixed"], str]:
+        """Form of a region, and why.
+
+        Raises
+        ------
+        UsageError
+            If the form asked for does not exist for the material.
+        """
+        material = self.materials[region]
+        nu, volumetric = material.poisson, material.volumetric
+        if self.formulation == "mixed" and volumetric is None:
+            raise _no_mixed_form(material)
+        if volumetric is not None and math.isinf(volumetric.modulus):
+            if self.formulation == "displacement":
+                raise _incompressible(material)
+            return "mixed", "the material is incompressible"
+        if self.formulation != "auto":
+            return self.formulation, "as asked for"
+        if volumetric is None:
+            return "displacement", "the material has no separate volumetric energy"
+        if nu >= NEARLY_INCOMPRESSIBLE:
+            return "mixed", f"Poisson's ratio {nu:.4g} is {NEARLY_INCOMPRESSIBLE} or more"
+        return "displacement", f"Poisson's ratio {nu:.4g} is less than {NEARLY_INCOMPRESSIBLE}"
+
+    @property
+    def mixed_regions(self) -> tuple[str, ...]:
+        """Regions of mixed form."""
+        return tuple(region for region in self.materials if self.formulation_of(region)[0] == "mixed")
+
+    def describe(self) -> dict[str, Any]:
+        """Everything that decides the answers, as plain data for a JSON file."""
+        return {
+            "type": "Body",
+            "geometry": self.geometry.describe(),
+            "material": {region: material.describe() for region, material in self.material},
+            "fixed": list(self.fixed),
+            "gravity": list(self.gravity),
+            "held": [{**held.interaction.describe(), "values": list(held.values)} for held in self.held],
+            "formulation": {region: list(self.formulation_of(region)) for region in self.materials},
+            "order": self.order,
+        }
+
+    def problem(self, *interactions: Interaction, element: float | None = None) -> SolidProblem:
+        """The body under interactions whose inputs vary.
+
+        Parameters
+        ----------
+        *interactions : Interaction
+            At least one; their inputs follow each other in this order.
+        element : float, optional
+            Element size in m where the interactions need a fine mesh, in place of their own.
+        """
+        from palpate.physics.solid.problem import SolidProblem
+
+        return SolidProblem(self, _flat(interactions), element)
+
+    def _by_region(self) -> tuple[tuple[str, Any], ...]:
+        given = self.material
+        regions = self.geometry.regions
+        if isinstance(given, tuple):
+            given = dict(given)  # a copy of a body brings its material along as kept
+        if not isinstance(given, Mapping):
+            return tuple((region, given) for region in regions)
+        for name in given:
+            require_known("region", name, regions)
+        missing = [region for region in regions if region not in given]
+        if missing:
+            raise UsageError(
+                f"The region {missing[0]!r} has no material.",
+                why=f"The body's regions are {', '.join(regions)}; given were {', '.join(given)}.",
+                fix="Name a material for each region.",
+            )
+        return tuple((region, given[region]) for region in regions)
+
+
+def _flat(interactions: Sequence[Any]) -> tuple[Interaction, ...]:
+    flat: list[Interaction] = []
+    for entry in interactions:
+        flat += entry if isinstance(entry, tuple | list) else [entry]
+    return tuple(flat)
+
+
+def _no_mixed_form(material: Material) -> UsageError:
+    return UsageError(
+        f"{material.name} has no mixed form.",
+        why="Its energy does not part into distortion and ½ κ θ².",
+        fix='Use formulation="displacement", or a law with a volumetric part.',
+    )
+
+
+def _incompressible(material: Material) -> UsageError:
+    return UsageError(
+        f"{material.name} is incompressible and has no displacement form.",
+        why="Its bulk modulus is infinite.",
+        fix='Use formulation="mixed" or "auto".',
+    )

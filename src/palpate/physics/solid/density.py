@@ -1,0 +1,83 @@
+"""The energy of the material, region by region, and what is measured of it.
+
+Displacement form: ∫ W(F) dV. Mixed form, where the volumetric part of W is ½ κ θ(F)²: that part is replaced by
+
+    ∫ p θ(F) - p²/(2κ) dV,
+
+stationary in p at p = κ θ(F); between displacements of second and pressures of first order it does not lock as
+κ grows, and it has a limit for κ → ∞ (Herrmann 1965, AIAA J. 3, 1896-1900; Sussman & Bathe 1987, Comput. Struct.
+26, 357-409).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from palpate.physics.interactions.interaction import BEYOND, Energy
+
+if TYPE_CHECKING:
+    from palpate.physics.materials.material import Material
+    from palpate.physics.solid.field import SolidField
+    from palpate.physics.solid.history import History
+
+__all__ = ["cauchy_stress", "deformation_gradient", "material_energies"]
+
+
+def deformation_gradient(displacement: Any) -> Any:
+    """F = I + ∂u/∂X as a coefficient function."""
+    import ngsolve
+
+    return ngsolve.Id(3) + ngsolve.Grad(displacement)
+
+
+def material_energies(
+    field: SolidField, materials: Mapping[str, Material], histories: Mapping[str, History]
+) -> list[Energy]:
+    """Energy of each region; beyond all bounds where an element is turned inside out."""
+    return [
+        _region_energy(field, region, material, histories.get(region))
+        for region, material in materials.items()
+    ]
+
+
+def _region_energy(field: SolidField, region: str, material: Material, history: History | None) -> Energy:
+    import ngsolve
+
+    F = deformation_gradient(field.trial)
+    past = history.arguments if history else ()
+    if region in field.pressure_trial:
+        density = mixed_density(material, F, field.pressure_trial[region], past)
+    else:
+        density = material.energy(F, *past)
+    if material.kinematics == "large":
+        density = density + ngsolve.IfPos(ngsolve.Det(F), 0, BEYOND)
+    rules = {"intrules": history.rules} if history else {}
+    return Energy(density, ngsolve.dx(definedon=field.region(region), **rules))
+
+
+def mixed_density(material: Material, F: Any, pressure: Any, past: tuple[Any, ...] = ()) -> Any:
+    """Distortion and p θ(F) - p²/(2κ), in J/m³."""
+    volumetric = material.volumetric
+    assert volumetric is not None  # `Body` lets no other material go mixed
+    density = material.distortion(F, *past) + pressure * volumetric.measure(F)
+    if math.isinf(volumetric.modulus):
+        return density
+    return density - pressure**2 / (2 * volumetric.modulus)
+
+
+def cauchy_stress(field: SolidField, region: str, material: Material, history: History | None) -> Any:
+    """σ = P Fᵀ / det F in Pa of the state under inspection; at small strain σ = P."""
+    import ngsolve
+
+    F = deformation_gradient(field.displacement).MakeVariable()
+    past = history.arguments if history else ()
+    if region in field.pressure:
+        density = mixed_density(material, F, field.pressure[region], past)
+    else:
+        density = material.energy(F, *past)
+    nominal = density.Diff(F)
+    if material.kinematics == "small":
+        return nominal
+    return nominal * F.trans / ngsolve.Det(F)

@@ -1,0 +1,132 @@
+"""The unknowns of an opened body: displacement of order k and, in regions of mixed form, pressure of order k - 1.
+
+The pair is that of Taylor & Hood (1973, Comput. Fluids 1, 73-100), stable for k ≥ 2. Each mixed region has a
+pressure of its own, so that it may jump between materials.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from palpate.physics.geometry.checks import require_known
+from palpate.physics.geometry.mesh import BodyMesh
+
+__all__ = ["SolidField"]
+
+
+class SolidField:
+    """Finite-element space of a body, and the state under inspection (an `interactions.Field`).
+
+    Parameters
+    ----------
+    mesh : ngsolve.Mesh
+    rest : BodyMesh
+        The same mesh as plain arrays.
+    order : int
+        Polynomial order of the displacement.
+    fixed : sequence of str
+        Surfaces whose displacement is zero.
+    mixed : sequence of str
+        Regions of mixed form.
+    """
+
+    def __init__(
+        self, mesh: Any, rest: BodyMesh, order: int, fixed: Sequence[str], mixed: Sequence[str] = ()
+    ) -> None:
+        import ngsolve
+
+        ngsolve.SetNumThreads(1)
+        self.mesh, self.rest, self.order = mesh, rest, order
+        for name in fixed:
+            require_known("surface", name, rest.surfaces)
+        motion = ngsolve.VectorH1(mesh, order=order, dirichlet=pattern(fixed))
+        pressures = [
+            ngsolve.Compress(ngsolve.H1(mesh, order=order - 1, definedon=mesh.Materials(pattern([region]))))
+            for region in mixed
+        ]
+        self.space = ngsolve.FESpace([motion, *pressures]) if mixed else motion
+        trial = self.space.TrialFunction()
+        self.trial = trial[0] if mixed else trial
+        self.pressure_trial = dict(zip(mixed, trial[1:], strict=True)) if mixed else {}
+        self.state = ngsolve.GridFunction(self.space)
+        parts = self.state.components if mixed else (self.state,)
+        self.displacement = parts[0]
+        self.pressure = dict(zip(mixed, parts[1:], strict=True))
+        self.base = ngsolve.GridFunction(motion)
+        self.motion_size = int(motion.ndof)
+        self.free = np.fromiter(self.space.FreeDofs(), dtype=bool, count=self.space.ndof)
+
+    @property
+    def size(self) -> int:
+        """Number of all unknowns."""
+        return int(self.space.ndof)
+
+    @property
+    def moving(self) -> np.ndarray:
+        """Which unknowns are displacements, bool of shape (dof,)."""
+        return np.arange(self.size) < self.motion_size
+
+    def show(self, z: np.ndarray) -> None:
+        """Make unknowns (dof,) the state under inspection."""
+        self.state.vec.FV().NumPy()[:] = z
+
+    def settle(self, z: np.ndarray) -> None:
+        """Make the displacement in unknowns (dof,) the body's base state."""
+        self.base.vec.FV().NumPy()[:] = z[: self.motion_size]
+
+    def surface(self, name: str) -> Any:
+        """NGSolve region of a named surface.
+
+        Raises
+        ------
+        UsageError
+            If there is none.
+        """
+        require_known("surface", name, self.rest.surfaces)
+        return self.mesh.Boundaries(pattern([name]))
+
+    def region(self, name: str) -> Any:
+        """NGSolve region of a named part of the volume."""
+        return self.mesh.Materials(pattern([name]))
+
+    def surface_dofs(self, name: str) -> np.ndarray:
+        """Which unknowns are displacements on a named surface, bool of shape (dof,)."""
+        dofs = np.fromiter(self.space.GetDofs(self.surface(name)), dtype=bool, count=self.size)
+        return np.asarray(dofs & self.moving)
+
+    def at_nodes(self, field: Any = None) -> np.ndarray:
+        """Values (node, 3) in m of `displacement`, or of another such grid function, at the mesh's vertices."""
+        values = (self.displacement if field is None else field).vec.FV().NumPy()
+        # the components one after the other, each beginning with the vertices
+        return np.asarray(values.reshape(3, -1)[:, : len(self.rest.points)].T)
+
+    def interpolate(self, displacement: Any) -> np.ndarray:
+        """Unknowns (dof,) of a displacement given as a coefficient function (3,), on the whole body."""
+        import ngsolve
+
+        image = ngsolve.GridFunction(self.base.space)
+        image.Set(displacement)
+        return self._embedded(image.vec.FV().NumPy())
+
+    def load(self, integrand: Callable[[Any], Any]) -> np.ndarray:
+        """Load vector l (dof,) of a linear form, from a test displacement v to its integral: ``t * v * ds(...)``."""
+        import ngsolve
+
+        form = ngsolve.LinearForm(self.base.space)
+        form += integrand(self.base.space.TestFunction())
+        form.Assemble()
+        return self._embedded(form.vec.FV().NumPy())
+
+    def _embedded(self, motion: np.ndarray) -> np.ndarray:
+        unknowns = np.zeros(self.size)
+        unknowns[: self.motion_size] = motion
+        return unknowns
+
+
+def pattern(names: Sequence[str]) -> str:
+    """Regular expression that matches these names only, as NGSolve reads regions."""
+    return "|".join(re.escape(name) for name in names)

@@ -1,0 +1,68 @@
+"""Internal variables of one region, kept at the quadrature points."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.physics.solid.density import deformation_gradient
+
+if TYPE_CHECKING:
+    from palpate.physics.materials.material import Material
+    from palpate.physics.solid.field import SolidField
+
+__all__ = ["History"]
+
+
+class History:
+    """The state of a material with a history, at the points at which its energy is integrated.
+
+    Parameters
+    ----------
+    field : SolidField
+    region : str
+    material : Material
+    step : ngsolve.Parameter
+        Length of the time step in s.
+    """
+
+    def __init__(self, field: SolidField, region: str, material: Material, step: Any) -> None:
+        import ngsolve
+        from ngsolve.comp import IntegrationRuleSpace
+
+        points = IntegrationRuleSpace(field.mesh, order=2 * field.order)
+        self.rules = points.GetIntegrationRules()
+        self._region = field.region(region)
+        self._variables = material.states
+        spaces = {v.name: ngsolve.MatrixValued(points) if v.shape else points for v in self._variables}
+        self._values = {name: ngsolve.GridFunction(space) for name, space in spaces.items()}
+        self._next = {name: ngsolve.GridFunction(space) for name, space in spaces.items()}
+        self.arguments = (dict(self._values), step)
+        self._advance = material.advance(deformation_gradient(field.displacement), *self.arguments)
+        self.reset()
+
+    def reset(self) -> None:
+        """Back to the undeformed body."""
+        import ngsolve
+
+        for variable in self._variables:
+            initial = tuple(np.ravel(variable.initial).tolist())
+            value = ngsolve.CF(initial, dims=variable.shape) if variable.shape else ngsolve.CF(initial[0])
+            self._values[variable.name].Interpolate(value, definedon=self._region)
+
+    def advance(self) -> None:
+        """Take over the internal variables at the end of the step that led to the field's displacement."""
+        for name, value in self._advance.items():  # all from the old values, before any is replaced
+            self._next[name].Interpolate(value, definedon=self._region)
+        for name in self._advance:
+            self._values[name].vec.data = self._next[name].vec
+
+    def snapshot(self) -> dict[str, np.ndarray]:
+        """Copies of all values."""
+        return {name: np.array(value.vec.FV().NumPy()) for name, value in self._values.items()}
+
+    def restore(self, snapshot: dict[str, np.ndarray]) -> None:
+        """Put former values back."""
+        for name, values in snapshot.items():
+            self._values[name].vec.FV().NumPy()[:] = values

@@ -1,0 +1,100 @@
+"""What is measured of a state at the quadrature points and at the nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.physics.solid.density import cauchy_stress, deformation_gradient
+
+if TYPE_CHECKING:
+    from palpate.physics.materials.material import Material
+    from palpate.physics.solid.field import SolidField
+    from palpate.physics.solid.history import History
+
+__all__ = ["Measures"]
+
+
+class Measures:
+    """Strains and stresses of the state that a field shows.
+
+    Parameters
+    ----------
+    field : SolidField
+    materials : mapping of str to Material
+        By region.
+    histories : mapping of str to History
+        By region, of materials with a history.
+    """
+
+    def __init__(
+        self, field: SolidField, materials: Mapping[str, Material], histories: Mapping[str, History]
+    ) -> None:
+        self._field, self._materials, self._histories = field, dict(materials), dict(histories)
+        self.volume = field.rest.volume
+        self.shear_modulus = min(material.shear_modulus for material in materials.values())
+        self._gradient = deformation_gradient(field.displacement)
+
+    def least_volume_ratio(self) -> float:
+        """Least det F at the quadrature points of regions of large strain, 1 if there are none."""
+        gradients = self._gradients(large=True)
+        return float(np.linalg.det(gradients).min()) if len(gradients) else 1.0
+
+    def largest_strain(self) -> float:
+        """Largest |λ - 1| of a principal stretch λ at the quadrature points; at small strain, of a principal strain."""
+        large, small = self._gradients(large=True), self._gradients(large=False)
+        squares = np.linalg.eigvalsh(np.swapaxes(large, 1, 2) @ large)
+        strains = np.linalg.eigvalsh((small + np.swapaxes(small, 1, 2)) / 2) - 1
+        both = np.concatenate([np.sqrt(np.maximum(squares, 0)) - 1, strains])
+        return float(np.abs(both).max())
+
+    def von_mises(self) -> np.ndarray:
+        """von Mises' equivalent of the Cauchy stress in Pa at the nodes, shape (node,)."""
+        import ngsolve
+
+        def equivalent(stress: Any) -> Any:
+            deviator = stress - ngsolve.Trace(stress) / 3 * ngsolve.Id(3)
+            return ngsolve.sqrt(1.5 * ngsolve.InnerProduct(deviator, deviator))
+
+        return self._at_nodes(
+            {
+                region: equivalent(cauchy_stress(self._field, region, material, self._histories.get(region)))
+                for region, material in self._materials.items()
+            }
+        )
+
+    def largest_stretch(self) -> np.ndarray:
+        """Largest principal stretch at the nodes, shape (node,)."""
+        gradients = np.stack(
+            [
+                self._at_nodes(dict.fromkeys(self._materials, self._gradient[i, j]))
+                for i in range(3)
+                for j in range(3)
+            ],
+            axis=1,
+        ).reshape(-1, 3, 3)
+        squares = np.linalg.eigvalsh(np.swapaxes(gradients, 1, 2) @ gradients)
+        return np.asarray(np.sqrt(squares[:, -1]))
+
+    def _gradients(self, *, large: bool) -> np.ndarray:
+        """F at the quadrature points of all regions of large or of small strain, shape (N, 3, 3)."""
+        import ngsolve
+
+        # the rule of the energy itself: twice the order of the displacement
+        rule = ngsolve.IntegrationRule(ngsolve.ET.TET, 2 * self._field.order)
+        found = [np.empty((0, 9))]
+        for region, material in self._materials.items():
+            if (material.kinematics == "large") == large:
+                points = self._field.mesh.MapToAllElements(rule, self._field.region(region))
+                found.append(np.asarray(self._gradient(points)))
+        return np.concatenate(found).reshape(-1, 3, 3)
+
+    def _at_nodes(self, values: Mapping[str, Any]) -> np.ndarray:
+        """A field given by region, averaged over the elements around each node, shape (node,)."""
+        import ngsolve
+
+        image = ngsolve.GridFunction(ngsolve.H1(self._field.mesh, order=1))
+        image.Set(self._field.mesh.MaterialCF(dict(values)))
+        return np.array(image.vec.FV().NumPy())

@@ -1,0 +1,107 @@
+"""Building the finite elements of a problem."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.physics.interactions.interaction import Attached
+from palpate.physics.solid.density import material_energies
+from palpate.physics.solid.field import SolidField
+from palpate.physics.solid.history import History
+from palpate.physics.solid.measures import Measures
+from palpate.physics.solid.model import Constant, SolidModel
+from palpate.physics.solid.path import Followed, Known, follow
+
+if TYPE_CHECKING:
+    from palpate.physics.solid.body import Body
+    from palpate.physics.solid.problem import SolidProblem
+
+__all__ = ["Opened", "open_problem"]
+
+SETTLED = 1e9  # s that constant loads have acted before an interaction comes: all relaxation is over
+
+
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """The finite elements of a problem.
+
+    Attributes
+    ----------
+    model : SolidModel
+    time_step : ngsolve.Parameter
+        Duration of a step in s.
+    settled : Followed or None
+        How the base state was found, if the body has constant loads.
+    """
+
+    model: SolidModel
+    time_step: Any
+    settled: Followed | None
+
+
+def open_problem(problem: SolidProblem, solver: str, tolerance: float) -> Opened:
+    """Mesh, spaces, energies and the base state."""
+    import ngsolve
+
+    body = problem.body
+    mesh = body.geometry.mesh(problem.refinements)
+    field = SolidField(mesh, problem.mesh, body.order, body.fixed, body.mixed_regions)
+    time_step = ngsolve.Parameter(SETTLED)
+    histories = {
+        region: History(field, region, material, time_step)
+        for region, material in body.materials.items()
+        if material.states
+    }
+    energies = material_energies(field, body.materials, histories)
+    measures = Measures(field, body.materials, histories)
+    constants = _constants(field, body)
+    rest = np.zeros(field.size)
+    base, settled = rest, None
+
+    def model(constants: list[Constant], varied: list[Attached], base: np.ndarray) -> SolidModel:
+        return SolidModel(field, energies, histories, constants, varied, base, solver, tolerance, measures)
+
+    if constants:
+        settled = _settle(
+            model([], [constant.attached for constant in constants], rest), constants, histories
+        )
+        base = settled.last.z
+        field.settle(base)
+    varied = [interaction.attach(field) for interaction in problem.interactions]
+    return Opened(model(constants, varied, base), time_step, settled)
+
+
+def _settle(model: SolidModel, constants: list[Constant], histories: Mapping[str, History]) -> Followed:
+    """The body under its constant loads, brought up from nothing."""
+    target = np.concatenate([constant.values for constant in constants])
+    start = model.approach(target)
+    start = np.zeros_like(target) if start is None else start
+    found = follow(model, Known(start, model.impose(model.base, start)), target)
+    model.field.show(found.last.z)
+    for history in histories.values():
+        history.advance()
+    return found
+
+
+def _constants(field: SolidField, body: Body) -> list[Constant]:
+    """Gravity and the interactions that always act."""
+    constants = [
+        Constant(held.interaction.attach(field), np.asarray(held.values, dtype=float)) for held in body.held
+    ]
+    if any(body.gravity):
+        constants.append(Constant(_gravity(field, body), np.ones(1)))
+    return constants
+
+
+def _gravity(field: SolidField, body: Body) -> Attached:
+    """The weight as a dead load, whose one input is the share of it that acts."""
+    import ngsolve
+
+    weights = {region: material.density for region, material in body.materials.items()}
+    force = field.mesh.MaterialCF(weights) * ngsolve.CF(body.gravity)
+    load = field.load(lambda v: force * v * ngsolve.dx)
+    return Attached((ngsolve.Parameter(0.0),), loads=load[None, :])

@@ -1,0 +1,175 @@
+"""A solid and what acts on it: the question that a sweep asks many times."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.physics.interactions.interaction import Interaction, Planned
+from palpate.units import Range
+
+if TYPE_CHECKING:
+    from palpate.physics.geometry.mesh import BodyMesh
+    from palpate.physics.geometry.refinement import Refinement
+    from palpate.physics.solid.body import Body
+    from palpate.physics.solid.solution import SolidSolution
+    from palpate.physics.solid.solver import SolidSolver
+
+__all__ = ["SolidProblem"]
+
+
+@dataclass(frozen=True)
+class SolidProblem:
+    """A body under interactions, whose inputs q (n,) vary from solve to solve.
+
+    A plain value: it can be compared, hashed, pickled and sent to another process.
+
+    Attributes
+    ----------
+    body : Body
+    interactions : tuple of Interaction
+    element : float or None
+        Element size in m where the interactions need a fine mesh, in place of their own.
+    """
+
+    body: Body
+    interactions: tuple[Interaction, ...]
+    element: float | None = None
+
+    def __post_init__(self) -> None:
+        if not self.interactions:
+            raise UsageError(
+                "The problem has no interaction.",
+                why="Without one there is nothing to vary.",
+                fix='Give one, for example body.problem(SphereProbe(radius=0.01, touches="top")).',
+            )
+        for interaction in self.interactions:
+            if not isinstance(interaction, Interaction):
+                raise UsageError(
+                    f"{interaction!r} is no interaction.",
+                    why="An interaction has ranges, describe, refinements and attach.",
+                    fix="Pass for example a SphereProbe.",
+                )
+
+    @property
+    def ranges(self) -> tuple[Range, ...]:
+        """Name, range and unit of each input; names that occur twice are numbered."""
+        found = [r for interaction in self.interactions for r in interaction.ranges(self.body.geometry)]
+        names = [r.name for r in found]
+        numbered = [
+            f"{name}_{names[:i].count(name) + 1}" if names.count(name) > 1 else name
+            for i, name in enumerate(names)
+        ]
+        return tuple(replace(r, name=name) for r, name in zip(found, numbered, strict=True))
+
+    @property
+    def refinements(self) -> tuple[Refinement, ...]:
+        """Where the mesh is fine."""
+        parts = (*self.interactions, *(held.interaction for held in self.body.held))
+        wanted = [r for part in parts for r in part.refinements(self.body.geometry)]
+        if self.element is not None:
+            wanted = [replace(r, element=self.element) for r in wanted]
+        return tuple(wanted)
+
+    @property
+    def mesh(self) -> BodyMesh:
+        """The body at rest as plain arrays."""
+        return self.body.geometry.rest(self.refinements)
+
+    def describe(self) -> dict[str, Any]:
+        """Everything that decides the answers, as plain data for a JSON file."""
+        return {
+            "type": "SolidProblem",
+            "body": self.body.describe(),
+            "interactions": [interaction.describe() for interaction in self.interactions],
+            "element": self.element,
+        }
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 of the description: equal for equal problems, in any process."""
+        text = json.dumps(self.describe(), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def open(self, *, solver: str = "auto", tolerance: float = 1e-9) -> SolidSolver:
+        """Build the finite elements; the solver that comes back is good for many solves.
+
+        Parameters
+        ----------
+        solver : str
+            ``"auto"``, or NGSolve's name of a sparse solver.
+        tolerance : float
+            Relative error in the energy norm at which an iteration ends.
+        """
+        from palpate.physics.solid.solver import SolidSolver
+
+        return SolidSolver(self, solver=solver, tolerance=tolerance)
+
+    def solve(self, x: Any, *, dt: float | None = None, fields: bool = False) -> SolidSolution:
+        """Solve for inputs x (n,), from the body without interaction.
+
+        Parameters
+        ----------
+        x : (n,) array
+        dt : float, optional
+            Duration of the step in s, for materials with a history.
+        fields : bool
+            Whether to give stress and stretch at the nodes.
+
+        Raises
+        ------
+        UsageError
+            If `x` has not one number per input, or a material with a history no `dt`.
+        """
+        return self.open().solve(x, dt=dt, fields=fields)
+
+    def design(self, samples: int, seed: int = 0) -> np.ndarray:
+        """Inputs (samples, n) that this problem solves well, in the order of its chains.
+
+        Raises
+        ------
+        UsageError
+            If the interactions leave the design to the caller.
+        """
+        planned = self._planned()
+        if planned is None:
+            raise UsageError(
+                "This problem has no design of its own.",
+                why="Only a single interaction such as a probe knows the order in which it is solved well.",
+                fix="Choose a design such as sobol over its ranges.",
+            )
+        return planned.design(self.body.geometry, samples, seed)
+
+    def chains(self, points: Any) -> list[np.ndarray]:
+        """Rows of `points` (N, n) to be solved one after the other by one solver, chain by chain."""
+        points = np.asarray(points, dtype=float)
+        planned = self._planned()
+        if planned is None:
+            return [np.arange(len(points))]
+        return planned.chains(self.body.geometry, points)
+
+    def inputs(self, x: Any) -> np.ndarray:
+        """Inputs as an array (n,).
+
+        Raises
+        ------
+        UsageError
+            If `x` has not one number per input.
+        """
+        values = np.atleast_1d(np.asarray(x, dtype=float))
+        if values.shape != (len(self.ranges),):
+            raise UsageError(
+                f"The inputs given have the shape {values.shape}.",
+                why=f"This problem has {len(self.ranges)}: {', '.join(r.name for r in self.ranges)}.",
+                fix="Give one number per input, in this order.",
+            )
+        return values
+
+    def _planned(self) -> Any:
+        only = self.interactions[0]
+        return only if len(self.interactions) == 1 and isinstance(only, Planned) else None

@@ -1,0 +1,105 @@
+"""What a solve of a solid returns: always a value, also where it failed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.physics.equilibrium.stop import Stop
+from palpate.physics.geometry.mesh import BodyMesh
+
+if TYPE_CHECKING:
+    from palpate.physics.solid.path import LoadStep
+
+__all__ = ["SolidSolution"]
+
+
+@dataclass(frozen=True, eq=False)
+class SolidSolution:
+    """Equilibrium of a solid, or the reason why there is none.
+
+    Attributes
+    ----------
+    stop : Stop
+        Why the solver stopped.
+    iterations : int
+        Newton iterations (tangents assembled and factorised) over all load steps.
+    residual : float
+        √(|rᵀK⁻¹r|/energy): about the relative error left, in the energy norm, before the last correction.
+    log : tuple of LoadStep
+        The load steps, also those that were cut back.
+    mesh : BodyMesh
+        The body at rest.
+    inputs : (n,) array
+        What was asked.
+    displacement : (node, 3) array
+        In m at the mesh's vertices. NaN unless converged, as are all the fields below but `state`.
+    potential_energy : float
+        U in J: the least potential energy less that without the interaction.
+    strain_energy : float
+        ∫ W dV in J, without the interactions' energies.
+    response : (n,) array
+        -∂U/∂q: for a probe's position the force on the probe in N.
+    response_gradient : (n, n) array
+        ∂response/∂q, symmetric.
+    penetration : float
+        Largest penetration of a probe's pad in m; 0 where there is none.
+    least_volume_ratio : float
+        Least det F at the quadrature points.
+    largest_strain : float
+        Largest |λ - 1| of a principal stretch λ at the quadrature points.
+    von_mises : (node,) array or None
+        von Mises' equivalent of the Cauchy stress in Pa, if fields were asked for.
+    largest_stretch : (node,) array or None
+        Largest principal stretch, if fields were asked for.
+    detail : str
+        Figures that belong to the reason.
+    reached : (n,) array
+        Inputs of the last equilibrium on the way; those asked, if converged.
+    state : (dof,) array
+        All unknowns of that equilibrium.
+    """
+
+    stop: Stop
+    iterations: int
+    residual: float
+    log: tuple[LoadStep, ...]
+    mesh: BodyMesh = field(repr=False)
+    inputs: np.ndarray
+    displacement: np.ndarray = field(repr=False)
+    response: np.ndarray
+    response_gradient: np.ndarray
+    potential_energy: float = np.nan
+    strain_energy: float = np.nan
+    penetration: float = np.nan
+    least_volume_ratio: float = np.nan
+    largest_strain: float = np.nan
+    von_mises: np.ndarray | None = field(default=None, repr=False)
+    largest_stretch: np.ndarray | None = field(default=None, repr=False)
+    detail: str = ""
+    reached: np.ndarray = field(default_factory=lambda: np.empty(0))
+    state: np.ndarray = field(default_factory=lambda: np.empty(0), repr=False)
+
+    @property
+    def converged(self) -> bool:
+        """Whether this is a stable, admissible equilibrium."""
+        return self.stop is Stop.CONVERGED
+
+    @property
+    def message(self) -> str:
+        """The reason in words, with its figures."""
+        return f"{self.stop} ({self.detail})" if self.detail else str(self.stop)
+
+    def plot(self, *args: Any, **kwargs: Any) -> Any:
+        """Draw the deformed body; see `palpate.physics.pictures.plot_solution`."""
+        from palpate.physics.pictures import plot_solution
+
+        return plot_solution(self, *args, **kwargs)
+
+    def to_vtu(self, path: Any, **kwargs: Any) -> Any:
+        """Write the deformed body as a VTU file; see `palpate.physics.pictures.write_vtu`."""
+        from palpate.physics.pictures import write_vtu
+
+        return write_vtu(self, path, **kwargs)

@@ -13,6 +13,9 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.physics.materials.tensors import Scalar, Tensor, determinant, is_symbolic, log, trace
 
+if TYPE_CHECKING:
+    from palpate.physics.materials.stability import Stability
+
 __all__ = [
     "NO_STATE",
     "Elastic",
@@ -200,6 +203,20 @@ class Elastic:
     def advance(self, F: Tensor, state: Mapping[str, Any], dt: Any) -> dict[str, Any]:
         """Nothing: an elastic material has no history."""
         return {}
+
+    def stability(
+        self, strain: tuple[float, float] = (-0.5, 1.0), volume: tuple[float, float] = (-0.2, 0.2)
+    ) -> Stability:
+        """Drucker's criterion over ranges of strain; see `palpate.physics.materials.stability.stability`.
+
+        Raises
+        ------
+        UsageError
+            If a range is empty, does not hold 0, or begins at −1 or below.
+        """
+        from palpate.physics.materials.stability import stability  # it builds on this file
+
+        return stability(self, strain, volume)
 
     def describe(self) -> dict[str, Any]:
         """Plain data for JSON: the law's name and its constants."""

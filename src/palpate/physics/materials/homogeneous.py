@@ -1,0 +1,256 @@
+"""Response of a material whose deformation is the same everywhere: what a test specimen tells.
+
+The load acts along the first axis (and the second). Unloaded directions find the stretch, and an anisotropic material
+also the shear, at which they carry no stress, by minimising the energy. F is upper triangular: every F is, up to a
+rotation, and energies do not feel rotations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from palpate.errors import UsageError
+from palpate.physics.materials.material import NO_STATE, Material
+from palpate.physics.materials.tensors import Scalar, Tensor, gradient, second_gradient
+
+__all__ = ["Response", "equibiaxial", "planar", "simple_shear", "uniaxial", "volumetric"]
+
+_ITERATIONS = 60
+_TOLERANCE = 1e-10  # of the last Newton step, whose square is the error left
+_STIFF = (
+    1e8  # bulk over shear modulus that stands for infinity: the stress is off by that share of itself over μ
+)
+
+_PLANE = ((0, 2), (1, 2), (2, 2))  # free where the first two axes are given
+_LATERAL = ((0, 1), (1, 1), *_PLANE)
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """States of one kind of test.
+
+    Attributes
+    ----------
+    amount : ndarray (n,)
+        What was prescribed: stretches, or shear strains, or volume ratios.
+    deformation : ndarray (n, 3, 3)
+        Deformation gradients F.
+    nominal : ndarray (n, 3, 3)
+        First Piola–Kirchhoff stresses ∂W/∂F in Pa: force per undeformed area.
+    energy : ndarray (n,)
+        Densities per undeformed volume, in J/m³.
+    converged : ndarray of bool (n,)
+        Whether the free directions found a stress-free state; the rest is NaN where they did not.
+    stress : ndarray (n,)
+        The nominal stress of the test in Pa: along the first axis, of the shear, or the mean one.
+    """
+
+    amount: np.ndarray
+    deformation: np.ndarray
+    nominal: np.ndarray
+    energy: np.ndarray
+    converged: np.ndarray
+    stress: np.ndarray
+
+    @property
+    def cauchy(self) -> np.ndarray:
+        """True stresses P Fᵀ/J (n, 3, 3) in Pa."""
+        J = np.linalg.det(self.deformation)
+        stress: np.ndarray = self.nominal @ np.swapaxes(self.deformation, -1, -2) / J[..., None, None]
+        return stress
+
+
+def uniaxial(
+    material: Material, stretch: ArrayLike, *, state: Mapping[str, Any] = NO_STATE, dt: Any = None
+) -> Response:
+    """Tension (stretch > 1) or compression along the first axis, the sides free.
+
+    Parameters
+    ----------
+    material : Material
+        Any; an incompressible one is taken with a bulk modulus of 1e8 shear moduli.
+    stretch : array_like (n,)
+        λ = length over undeformed length, positive.
+    state, dt : optional
+        Internal variables at the beginning of the step (n, …) and its length in s, for materials with a history.
+
+    Raises
+    ------
+    UsageError
+        For stretches that are not positive and finite.
+    """
+    loaded = _amounts(stretch, "stretch")
+    F = _unit(loaded)
+    F[:, 0, 0] = loaded
+    F[:, 1, 1] = F[:, 2, 2] = _side(material, loaded, 1)
+    return _test(material, loaded, F, _LATERAL, (0, 0), state, dt)
+
+
+def equibiaxial(
+    material: Material, stretch: ArrayLike, *, state: Mapping[str, Any] = NO_STATE, dt: Any = None
+) -> Response:
+    """The same stretch λ along the first two axes, the third free; arguments as of `uniaxial`.
+
+    Raises
+    ------
+    UsageError
+        For stretches that are not positive and finite.
+    """
+    loaded = _amounts(stretch, "stretch")
+    F = _unit(loaded)
+    F[:, 0, 0] = F[:, 1, 1] = loaded
+    F[:, 2, 2] = _side(material, loaded, 2)
+    return _test(material, loaded, F, _PLANE, (0, 0), state, dt)
+
+
+def planar(
+    material: Material, stretch: ArrayLike, *, state: Mapping[str, Any] = NO_STATE, dt: Any = None
+) -> Response:
+    """Stretch λ along the first axis, none along the second, the third free ("pure shear"); arguments as of `uniaxial`.
+
+    Raises
+    ------
+    UsageError
+        For stretches that are not positive and finite.
+    """
+    loaded = _amounts(stretch, "stretch")
+    F = _unit(loaded)
+    F[:, 0, 0] = loaded
+    F[:, 2, 2] = np.sqrt(_side(material, loaded, 2))
+    return _test(material, loaded, F, _PLANE, (0, 0), state, dt)
+
+
+def simple_shear(
+    material: Material, shear: ArrayLike, *, state: Mapping[str, Any] = NO_STATE, dt: Any = None
+) -> Response:
+    """F = I + γ e₁ ⊗ e₂ for shear strains γ (n,); `state` and `dt` as of `uniaxial`.
+
+    Raises
+    ------
+    UsageError
+        For strains that are not finite.
+    """
+    loaded = _amounts(shear, "shear strain", positive=False)
+    F = _unit(loaded)
+    F[:, 0, 1] = loaded
+    return _test(material, loaded, F, (), (0, 1), state, dt)
+
+
+def volumetric(
+    material: Material, ratio: ArrayLike, *, state: Mapping[str, Any] = NO_STATE, dt: Any = None
+) -> Response:
+    """F = J^(1/3) I for volume ratios J (n,); `state` and `dt` as of `uniaxial`.
+
+    Raises
+    ------
+    UsageError
+        For ratios that are not positive and finite.
+    """
+    loaded = _amounts(ratio, "volume ratio")
+    sides = 1 + (loaded - 1) / 3 if material.kinematics == "small" else np.cbrt(loaded)
+    F = sides[:, None, None] * np.eye(3)
+    return _test(material, loaded, F, (), None, state, dt)
+
+
+def density_of_energy(
+    material: Material, state: Mapping[str, Any] = NO_STATE, dt: Any = None
+) -> Callable[[Tensor], Scalar]:
+    """The material's energy as a function of F alone, with a stiff volume in place of an incompressible one."""
+    part = material.volumetric
+    if part is None or np.isfinite(part.modulus):
+        return lambda F: material.energy(F, state, dt)
+    modulus = _STIFF * material.shear_modulus
+    return lambda F: material.distortion(F, state, dt) + 0.5 * modulus * part.measure(F) ** 2
+
+
+def _test(
+    material: Material,
+    amount: np.ndarray,
+    F: np.ndarray,
+    free: tuple[tuple[int, int], ...],
+    component: tuple[int, int] | None,
+    state: Mapping[str, Any],
+    dt: Any,
+) -> Response:
+    energy = density_of_energy(material, state, dt)
+    F, converged = _relax(energy, F, free) if free else (F, np.ones(len(F), dtype=bool))
+    P, W = gradient(energy, F), np.broadcast_to(energy(F), amount.shape).copy()
+    for values in (F, P, W):
+        values[~converged] = np.nan
+    stress = np.trace(P, axis1=1, axis2=2) / 3 if component is None else P[:, component[0], component[1]]
+    return Response(amount, F, P, W, converged, stress)
+
+
+def _relax(
+    energy: Callable[[Tensor], Scalar], F: np.ndarray, free: tuple[tuple[int, int], ...]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Minimise the energy of each state over the free components, by Newton steps that may only descend."""
+    index = np.array([3 * i + j for i, j in free])
+    F, done = F.copy(), np.zeros(len(F), dtype=bool)
+    for _ in range(_ITERATIONS):
+        slope = gradient(energy, F).reshape(-1, 9)[:, index]
+        tangent = second_gradient(energy, F).reshape(-1, 9, 9)[:, index][:, :, index]
+        step = _descent(tangent, slope)
+        move = np.zeros((len(F), 9))
+        move[:, index] = step
+        taken = _shorten(energy, F, move.reshape(F.shape), np.einsum("ni,ni->n", step, slope))
+        F = F + taken[:, None, None] * move.reshape(F.shape)
+        done = (taken > 0) & (np.abs(step).max(axis=1) < _TOLERANCE)
+        if done.all():
+            break
+    volume = np.linalg.det(F)
+    # an energy without a minimum lets the body vanish or grow without bound
+    return F, done & (volume > 1e-3) & (volume < 1e3)
+
+
+def _descent(tangent: np.ndarray, slope: np.ndarray) -> np.ndarray:
+    """The Newton step, with the tangent's negative curvatures turned round; NaN states stay where they are."""
+    bad = ~(np.isfinite(tangent).all(axis=(1, 2)) & np.isfinite(slope).all(axis=1))
+    values, vectors = np.linalg.eigh(np.where(bad[:, None, None], np.eye(slope.shape[1]), tangent))
+    least = 1e-12 * np.abs(values).max(axis=1, keepdims=True)
+    along = np.einsum("nji,nj->ni", vectors, np.where(bad[:, None], 0.0, slope))
+    step = -np.einsum("nij,nj->ni", vectors, along / np.maximum(np.abs(values), least))
+    return np.where(bad[:, None], 1.0, step)  # a step that the energy, NaN there, refuses
+
+
+def _shorten(
+    energy: Callable[[Tensor], Scalar], F: np.ndarray, move: np.ndarray, slope: np.ndarray
+) -> np.ndarray:
+    """The share of each step that lowers the energy and keeps its volume; 0 where none does."""
+    start = energy(F)
+    share, found = np.ones(len(F)), np.zeros(len(F), dtype=bool)
+    for _ in range(40):
+        trial = F + share[:, None, None] * move
+        value = energy(trial)
+        rounding = 1e-12 * (np.abs(start) + np.abs(slope)) + 1e-300
+        found = (np.linalg.det(trial) > 0) & (value <= start + 1e-4 * share * slope + rounding)
+        if found.all():
+            break
+        share = np.where(found, share, share / 2)
+    return np.where(found, share, 0.0)
+
+
+def _amounts(values: ArrayLike, what: str, *, positive: bool = True) -> np.ndarray:
+    amounts = np.atleast_1d(np.asarray(values, dtype=float)).ravel()
+    if not np.isfinite(amounts).all() or (positive and (amounts <= 0).any()):
+        raise UsageError(
+            f"The {what}s run from {amounts.min()} to {amounts.max()}.",
+            why=f"A {what} is {'positive and ' if positive else ''}finite{'; 1 is undeformed' if positive else ''}.",
+            fix="Pass 1 + strain, for example 1.2 for 20 % tension." if positive else "Correct the values.",
+        )
+    return amounts
+
+
+def _unit(amounts: np.ndarray) -> np.ndarray:
+    return np.tile(np.eye(3), (len(amounts), 1, 1))
+
+
+def _side(material: Material, stretch: np.ndarray, loaded: int) -> np.ndarray:
+    """A first guess of the free stretch: that of the initial Poisson's ratio ν."""
+    ratio = material.poisson if loaded == 1 else 2 * material.poisson / (1 - material.poisson)
+    return 1 - ratio * (stretch - 1) if material.kinematics == "small" else stretch**-ratio

@@ -1,0 +1,78 @@
+"""Outlines of a body, and which part of a line the body hides."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from palpate.physics.pictures.camera import Camera
+from palpate.physics.pictures.skin import CREASE
+
+__all__ = ["border", "hatching", "outline", "split_hidden"]
+
+PIECES = 12  # of an edge, each of which is hidden or not
+
+
+def _edges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Edges (s, 2) that two triangles share, and those two triangles (s, 2); free edges name one twice."""
+    ends = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    owner = np.repeat(np.arange(len(triangles)), 3)
+    edges, inverse = np.unique(ends, axis=0, return_inverse=True)
+    inverse = inverse.ravel()
+    order = np.argsort(inverse, kind="stable")
+    starts = np.searchsorted(inverse[order], np.arange(len(edges)))
+    last = np.append(starts[1:], len(order)) - 1
+    return edges, np.stack([owner[order][starts], owner[order][last]], axis=1)
+
+
+def outline(points: np.ndarray, triangles: np.ndarray, towards: np.ndarray) -> np.ndarray:
+    """Edges (s, 2) that draw a surface: creases, and the silhouette seen from direction `towards` (3,)."""
+    edges, sides = _edges(triangles)
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
+    normals = np.cross(b - a, c - a)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    one, two = normals[sides[:, 0]], normals[sides[:, 1]]
+    crease = np.einsum("si,si->s", one, two) < CREASE
+    facing = (normals @ towards) > 0
+    rim = facing[sides[:, 0]] != facing[sides[:, 1]]
+    return np.asarray(edges[crease | rim | (sides[:, 0] == sides[:, 1])])
+
+
+def border(triangles: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Edges (s, 2) around the `chosen` (t,) triangles of a surface."""
+    edges, sides = _edges(triangles)
+    return np.asarray(edges[chosen[sides[:, 0]] != chosen[sides[:, 1]]])
+
+
+def hatching(points: np.ndarray, edges: np.ndarray, spacing: float, offset: np.ndarray) -> np.ndarray:
+    """Short strokes (n, 2, 3) that leave edges at even distances: the draughtsman's mark of a fixed surface."""
+    if not len(edges):
+        return np.empty((0, 2, 3))
+    a, b = points[edges[:, 0]], points[edges[:, 1]]
+    lengths = np.linalg.norm(b - a, axis=1)
+    strokes = []
+    for start, end, length in zip(a, b, lengths, strict=True):
+        count = max(round(length / spacing), 1)
+        along = start + (end - start) * ((np.arange(count) + 0.5) / count)[:, None]
+        strokes.append(np.stack([along, along + offset], axis=1))
+    return np.concatenate(strokes)
+
+
+def split_hidden(
+    segments: np.ndarray, camera: Camera, depth: np.ndarray, slack: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pieces (n, 2, 2) of segments (s, 2, 3) in pixels: those in front of the depth buffer, and those behind.
+
+    `slack` in m is how far a line may lie behind what covers it and still be seen: its own surface must not hide it.
+    """
+    if not len(segments):
+        return np.empty((0, 2, 2)), np.empty((0, 2, 2))
+    share = np.linspace(0, 1, PIECES + 1)[None, :, None]
+    ends = camera.project(segments)
+    knots = ends[:, :1] + share * (ends[:, 1:] - ends[:, :1])
+    middle = (knots[:, 1:] + knots[:, :-1]) / 2
+    height, width = depth.shape
+    column = np.clip(middle[..., 0].astype(int), 0, width - 1)
+    row = np.clip(middle[..., 1].astype(int), 0, height - 1)
+    seen = (middle[..., 2] >= depth[row, column] - slack).ravel()
+    pieces = np.stack([knots[:, :-1, :2], knots[:, 1:, :2]], axis=2).reshape(-1, 2, 2)
+    return pieces[seen], pieces[~seen]

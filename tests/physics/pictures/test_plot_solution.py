@@ -1,0 +1,156 @@
+"""Pictures: what they show can be read back from their pixels."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib.image
+import numpy as np
+import pytest
+from drawn import Made
+
+from palpate.errors import UsageError
+from palpate.physics.pictures import plot_solution
+from palpate.physics.pictures.camera import Camera
+from palpate.physics.pictures.fields import largest_stretch_strain, nodal_field
+from palpate.physics.pictures.raster import draw_triangles
+from palpate.physics.pictures.render import body_layer, palette
+from palpate.physics.pictures.scales import round125, scaled
+from palpate.physics.pictures.skin import ball, clip, corner_normals, section, section_lines
+
+
+def area(triangles: np.ndarray) -> float:
+    a, b, c = np.moveaxis(triangles[:, :, :3], 1, 0)
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+
+
+@pytest.mark.parametrize("place", [0.0123, 0.05, 0.071])
+def test_a_cut_keeps_the_areas_that_geometry_says(mesh, place: float):
+    heights = mesh.points[:, 0] - place
+    faces = section(mesh.points[mesh.tetrahedra], heights[mesh.tetrahedra])
+    assert area(faces) == pytest.approx(0.10 * 0.05, rel=1e-9)
+    assert np.allclose(faces[:, :, 0], place, rtol=0, atol=1e-12)
+    left = clip(mesh.points[mesh.triangles], heights[mesh.triangles])
+    assert area(left) == pytest.approx(0.10 * 0.05 + 2 * place * (0.10 + 0.05), rel=1e-9)
+    rim = section_lines(mesh.points[mesh.triangles], heights[mesh.triangles])
+    assert np.linalg.norm(rim[:, 1] - rim[:, 0], axis=1).sum() == pytest.approx(2 * (0.10 + 0.05), rel=1e-9)
+
+
+def test_values_on_a_cut_are_interpolated(mesh):
+    linear = np.concatenate([mesh.points, mesh.points @ [[1.0], [2.0], [-3.0]]], axis=1)
+    faces = section(linear[mesh.tetrahedra], (mesh.points[:, 1] - 0.043)[mesh.tetrahedra])
+    assert np.allclose(faces[:, :, 3], faces[:, :, :3] @ [1.0, 2.0, -3.0], rtol=0, atol=1e-12)
+
+
+def test_the_nearer_triangle_hides_the_farther_and_covers_its_area():
+    far = [[10.0, 10.0, 0.0], [90.0, 10.0, 0.0], [10.0, 90.0, 0.0]]
+    near = [[10.0, 10.0, 1.0], [50.0, 10.0, 1.0], [10.0, 50.0, 1.0]]
+    for order in ((0, 1), (1, 0)):
+        depth, image = np.full((100, 100), -np.inf), np.zeros((100, 100, 1))
+        screen = np.array([far, near])[list(order)]
+        draw_triangles(screen, np.array([[[5.0]] * 3, [[7.0]] * 3])[list(order)], depth, image)
+        # a pixel counts where its centre is inside: the error is at most the edge's length
+        assert np.sum(np.isclose(image, 7.0)) == pytest.approx(40**2 / 2, abs=60)
+        assert np.sum(np.isfinite(depth)) == pytest.approx(80**2 / 2, abs=120)
+
+
+def test_normals_are_smooth_on_a_ball_and_sharp_on_a_block(mesh):
+    corners, normals = ball(np.zeros(3), 0.01)
+    points, triangles = np.unique(np.round(corners.reshape(-1, 3), 12), axis=0, return_inverse=True)
+    triangles = triangles.reshape(-1, 3)
+    flat = (np.diff(np.sort(triangles, axis=1), axis=1) == 0).any(axis=1)  # at the poles
+    found = corner_normals(points, triangles[~flat])
+    assert np.einsum("tci,tci->tc", found, normals[~flat]).min() > np.cos(np.radians(4.5))  # a ring's width
+    on_block = corner_normals(mesh.points, mesh.triangles)
+    assert np.allclose(on_block, mesh.normals[:, None], rtol=0, atol=1e-12)
+
+
+def test_a_body_fills_the_picture_as_the_projection_says(made: Made):
+    mesh = made.mesh
+    camera = Camera.around(mesh.points, (0.0, 0.0), (600, 600))
+    columns = (mesh.points[mesh.triangles], corner_normals(mesh.points, mesh.triangles))
+    soup = np.concatenate([*columns, np.zeros((len(mesh.triangles), 3, 1))], axis=2)
+    layer = body_layer(soup, camera, None)
+    seen = np.isfinite(layer.depth).sum() / camera.scale**2
+    assert seen == pytest.approx(0.10 * 0.05, rel=0.01)
+
+
+def test_strain_of_a_uniform_stretch_is_uniform(mesh):
+    u = mesh.points * [0.1, -0.02, 0.03]
+    strain = largest_stretch_strain(mesh.points, mesh.tetrahedra, u)
+    assert np.allclose(strain, 0.1, rtol=0, atol=1e-12)
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    turned = (mesh.points + u) @ turn.T - mesh.points
+    assert np.allclose(largest_stretch_strain(mesh.points, mesh.tetrahedra, turned), 0.1, rtol=0, atol=1e-12)
+
+
+def pixels(picture) -> np.ndarray:
+    import io
+
+    return matplotlib.image.imread(io.BytesIO(picture._repr_png_()))[:, :, :3]
+
+
+def test_the_probe_the_cut_and_the_colours_change_the_picture_where_they_should(made: Made):
+    plain = pixels(plot_solution(made, None, probe=False, fixed=(), outline=False))
+    with_probe = pixels(plot_solution(made, None, fixed=(), outline=False))
+    assert plain.shape == with_probe.shape == (680, 1000, 3)
+    assert 0.01 < np.mean(np.abs(plain - with_probe).max(axis=2) > 0.05) < 0.6
+    whole = pixels(plot_solution(made, probe=False))
+    half = pixels(plot_solution(made, probe=False, cut="y"))
+    brightest = np.array(palette()[-1])
+    share = [np.mean(np.abs(p[:, :800] - brightest).max(axis=2) < 0.15) for p in (whole, half)]
+    assert min(share) > 1e-4  # the dent's bottom is in the scale's last colour
+
+
+def test_a_picture_is_saved_where_asked(made: Made, tmp_path: Path):
+    picture = plot_solution(
+        made, "von_mises", path=tmp_path / "one.png", edges=True, title="block", scale=1.5
+    )
+    assert matplotlib.image.imread(tmp_path / "one.png").shape[:2] == (680, 1000)
+    assert picture.save(tmp_path / "two.pdf").read_bytes().startswith(b"%PDF")
+    with pytest.raises(UsageError, match="Could not write"):
+        picture.save(tmp_path / "three.xyz")
+    with pytest.raises(UsageError, match="no display"):
+        picture.show()
+
+
+def test_what_cannot_be_drawn_is_said(made: Made):
+    with pytest.raises(UsageError, match="heat"):
+        plot_solution(made, "heat")
+    with pytest.raises(UsageError, match="no stresses"):
+        nodal_field(made.with_(von_mises=None), "von_mises")
+    with pytest.raises(UsageError, match="plane 'w'"):
+        plot_solution(made, cut="w")
+    with pytest.raises(UsageError, match="no probe"):
+        plot_solution(made, probe="here")
+
+
+@pytest.mark.parametrize(
+    ("largest", "unit", "expected"),
+    [
+        (0.05, "m", (1e-3, "mm")),
+        (0.5, "m", (1.0, "m")),
+        (4e-5, "m", (1e-6, "µm")),
+        (9e3, "Pa", (1e3, "kPa")),
+        (1.1e11, "Pa", (1e9, "GPa")),
+        (0.02, "", (1e-2, "%")),
+        (0.0, "m", (1.0, "m")),
+        (3.0, "K", (1.0, "K")),
+    ],
+)
+def test_multiples_that_read_well(largest, unit, expected):
+    assert scaled(largest, unit) == expected
+
+
+def test_round_numbers():
+    assert [round125(x) for x in (0.0213, 0.05, 1.0, 9.9)] == pytest.approx([0.02, 0.05, 1.0, 5.0])
+
+
+def test_importing_pictures_is_light():
+    probe = (
+        "import palpate.physics.pictures, sys; print([m for m in ('matplotlib', 'vtk') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

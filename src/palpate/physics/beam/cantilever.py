@@ -12,14 +12,17 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_number
-from palpate.physics.beam.loads import PointLoad, as_loads
+from palpate.physics.beam.histories import LoadAndUnload, StepAndHold
+from palpate.physics.beam.loads import Load, as_loads
 from palpate.physics.beam.problem import BeamProblem
 from palpate.physics.beam.section import CrossSection
-from palpate.physics.materials.linear import LinearElastic
+from palpate.physics.beam.sections import BeamMaterial, Kind, kind_of
 
 __all__ = ["Cantilever"]
 
 Kinematics = Literal["large", "small"]
+FIBRES = 24  # with them the moment of a half-plastic section is right to some 1e-3
+TOLERANCE = 1e-5
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,9 @@ class Cantilever:
         In m.
     section : CrossSection
         For example ``Circle(radius=0.005)``.
-    material : LinearElastic
+    material : LinearElastic, Plastic or Viscoelastic
+        It decides how the beam answers: always the same, or according to its history. A viscoelastic one is over a
+        LinearElastic, and its series is that of Young's modulus as of the shear modulus: Poisson's ratio stays.
     elements : int
         About how many finite elements; every load and node of interest gets a vertex of its own.
     order : int
@@ -44,7 +49,12 @@ class Cantilever:
     nodes : tuple of float
         Positions of interest in m; by default six, evenly spaced from clamp to tip.
     strain_limit : float
-        Largest fibre strain for which the linear elastic law is believed; beyond it a solve fails.
+        Largest fibre strain for which the material's law is believed; beyond it a solve fails.
+    fibres : int, optional
+        Into how many layers a section that yields is cut, by default 24; only for such beams.
+    tolerance : float, optional
+        Largest error of a step of a history, relative to the deflection and the energy, by default 1e-5; only for
+        beams that remember.
 
     Raises
     ------
@@ -54,13 +64,15 @@ class Cantilever:
 
     length: float
     section: CrossSection
-    material: LinearElastic
+    material: BeamMaterial
     elements: int = 20
     order: int = 3
     kinematics: Kinematics = "large"
     self_weight: bool = False
     nodes: tuple[float, ...] = field(default=())
     strain_limit: float = 0.5
+    fibres: int | None = None
+    tolerance: float | None = None
 
     def __post_init__(self) -> None:
         self._check_kinds()
@@ -69,30 +81,49 @@ class Cantilever:
         _check(2 <= self.order <= 8, "order", self.order, "between 2 and 8: linear elements lock in shear")
         _check(self.kinematics in {"large", "small"}, "kinematics", self.kinematics, "'large' or 'small'")
         _check(self.strain_limit > 0, "strain_limit", self.strain_limit, "positive")
+        self._check_memory()
         nodes = tuple(self.nodes) or tuple(float(x) for x in np.linspace(0, self.length, 6))
         for x in nodes:
             _check(0 <= x <= self.length, "node of interest", x, f"on the beam, 0 … {self.length} m")
         object.__setattr__(self, "nodes", tuple(sorted({float(x) for x in nodes})))
 
-    def problem(self, loads: PointLoad | Sequence[PointLoad]) -> BeamProblem:
+    @property
+    def kind(self) -> Kind:
+        """Whether the beam is elastic, yields ("plastic") or creeps ("viscous"), by its material."""
+        kind = kind_of(self.material)
+        assert kind is not None  # checked when the beam was made
+        return kind
+
+    @property
+    def fibre_count(self) -> int:
+        """Layers of a section that yields."""
+        return FIBRES if self.fibres is None else self.fibres
+
+    @property
+    def step_tolerance(self) -> float:
+        """Largest relative error of a step of a history."""
+        return TOLERANCE if self.tolerance is None else self.tolerance
+
+    def problem(self, loads: Load | Sequence[Load]) -> BeamProblem:
         """Put loads on the beam: what comes back can be solved.
 
         Raises
         ------
         UsageError
-            If a load is off the beam, or two loads share a name.
+            If a load is off the beam, two loads share a name, or a load has a history that the beam does not remember.
         """
         several = as_loads(loads)
+        _check_histories(self.kind, several)
         for load in several:
             on_beam = 1e-6 * self.length < self.position(load) <= self.length
             _check(on_beam, f"load {load.name!r}", load.at, "beyond the clamp, on the beam")
         return BeamProblem(self, several)
 
-    def position(self, load: PointLoad) -> float:
+    def position(self, load: Load) -> float:
         """Where a load acts, in m along the beam."""
         return self.length if load.at is None else float(load.at)
 
-    def vertices(self, loads: Sequence[PointLoad] = ()) -> np.ndarray:
+    def vertices(self, loads: Sequence[Load] = ()) -> np.ndarray:
         """Positions of the mesh's vertices in m, shape (node,), those of loads and of interest among them."""
         wanted = np.array([0.0, self.length, *self.nodes, *(self.position(load) for load in loads)])
         # positions closer than a billionth of the length are one
@@ -112,6 +143,18 @@ class Cantilever:
         _check_section(self.section)
         _check_material(self.material)
 
+    def _check_memory(self) -> None:
+        for name, value in (("fibres", self.fibres), ("tolerance", self.tolerance)):
+            if value is None:
+                continue
+            require_number(f"The cantilever's {name}", value)
+            useful = self.kind == "plastic" or (name == "tolerance" and self.kind == "viscous")
+            _check(useful, name, value, f"left out: {self.material.name} has no use for it")
+        if self.kind == "plastic":
+            _check(2 <= self.fibre_count <= 1000, "fibres", self.fibres, "a whole number from 2 to 1000")
+            _check(hasattr(self.section, "fibres"), "section", self.section, _FIBRED)
+        _check(1e-9 <= self.step_tolerance <= 0.1, "tolerance", self.tolerance, "between 1e-9 and 0.1")
+
     def _cuts(self, span: float) -> int:
         return max(1, round(self.elements * span / self.length))
 
@@ -125,15 +168,41 @@ def _check_section(section: object) -> None:
         )
 
 
+_FIBRED = "a Circle or a Rectangle: one that yields is cut into fibres, and bare numbers have no shape"
+
+
 def _check_material(material: object) -> None:
-    if isinstance(material, LinearElastic):
+    if kind_of(material) is not None:
         return
     by_name = f"named_material({material!r})" if isinstance(material, str) else 'named_material("nylon")'
     raise UsageError(
         f"The cantilever's material is {material!r}, of type {type(material).__name__}.",
-        why="It must be a LinearElastic; names are looked up by named_material.",
+        why="It must be a LinearElastic, a Plastic or a Viscoelastic over a LinearElastic; names: named_material.",
         fix=f"Pass {by_name}, or LinearElastic(young=70e9, poisson=0.33, density=2700.0).",
     )
+
+
+def _check_histories(kind: Kind, loads: Sequence[Load]) -> None:
+    for load, wanted in ((load, _memory_of(load)) for load in loads):
+        if wanted not in {"", kind}:
+            raise UsageError(
+                f"The load {load.name!r} is a {type(load).__name__}, and the beam is {kind}.",
+                why=f"Only a {wanted} beam answers to such a history.",
+                fix="Take a load without a history, such as TipLoad(0, 5), or another material.",
+            )
+    if sum(isinstance(load, StepAndHold) for load in loads) > 1:
+        raise UsageError(
+            "Two loads are held for times of their own.",
+            why="The answer is that at the end of one such time.",
+            fix="Give one StepAndHold, and the other loads as TipLoad or PointLoad, which act from the beginning.",
+        )
+
+
+def _memory_of(load: Load) -> str:
+    """Which kind of beam a load with a history is for; empty for one without."""
+    if isinstance(load, LoadAndUnload):
+        return "plastic"
+    return "viscous" if isinstance(load, StepAndHold) else ""
 
 
 def _check(holds: bool, what: str, value: object, rule: str) -> None:

@@ -5,12 +5,36 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_number
 from palpate.units import Range
 
-__all__ = ["PointLoad", "TipLoad"]
+__all__ = ["Load", "PointLoad", "TipLoad"]
+
+
+class Load(Protocol):
+    """What a beam asks of a load."""
+
+    @property
+    def name(self) -> str:
+        """Name of its size."""
+
+    @property
+    def at(self) -> float | None:
+        """Where it acts, in m along the undeformed beam; ``None`` is the tip."""
+
+    @property
+    def direction(self) -> tuple[float, float]:
+        """Direction (x, y), of length 1."""
+
+    @property
+    def inputs(self) -> tuple[Range, ...]:
+        """Names, ranges and units of its inputs."""
+
+    def knots(self, values: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
+        """Times in s and sizes in N that it runs through, of its inputs."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +86,15 @@ class PointLoad:
         """The input's name, range and unit."""
         return Range(self.name, self.low, self.high, "N")
 
+    @property
+    def inputs(self) -> tuple[Range, ...]:
+        """The one input: its size."""
+        return (self.range,)
+
+    def knots(self, values: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
+        """A load without a history is put on first of all and stays."""
+        return ((0.0, values[0]),)
+
 
 def _pair(name: str, direction: object) -> tuple[float, float]:
     parts = tuple(direction) if isinstance(direction, Iterable) else (direction,)
@@ -87,7 +120,7 @@ def TipLoad(
     return PointLoad(name, None, low, high, direction)
 
 
-def as_loads(loads: PointLoad | Sequence[PointLoad]) -> tuple[PointLoad, ...]:
+def as_loads(loads: Load | Sequence[Load]) -> tuple[Load, ...]:
     """One load or several, as a tuple with distinct names.
 
     Raises
@@ -97,13 +130,13 @@ def as_loads(loads: PointLoad | Sequence[PointLoad]) -> tuple[PointLoad, ...]:
     """
     several = tuple(loads) if isinstance(loads, Iterable) else (loads,)
     for load in several:
-        if not isinstance(load, PointLoad):
+        if not (hasattr(load, "inputs") and hasattr(load, "knots")):
             raise UsageError(
                 f"{load!r} is no load.",
                 why=f"It is of type {type(load).__name__}.",
                 fix="Pass loads such as TipLoad(0, 5), with their ranges in N.",
             )
-    names = [load.name for load in several]
+    names = [one.name for load in several for one in load.inputs]
     if not names or len(set(names)) < len(names):
         raise UsageError(
             "A sweep needs at least one load, each with a name of its own.",

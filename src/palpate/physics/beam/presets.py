@@ -1,4 +1,4 @@
-"""The cantilevers of the founding study, and two with several loads, by name."""
+"""The cantilevers of the founding study, two with several loads and two that remember, by name."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ from typing import Literal
 
 from palpate.errors import UsageError
 from palpate.physics.beam.cantilever import Cantilever
-from palpate.physics.beam.loads import PointLoad, TipLoad
+from palpate.physics.beam.histories import LoadAndUnload, StepAndHold
+from palpate.physics.beam.loads import Load, PointLoad, TipLoad
 from palpate.physics.beam.problem import BeamProblem
 from palpate.physics.beam.section import Circle
 from palpate.physics.materials.library import named_material
 from palpate.physics.materials.linear import LinearElastic
 
-__all__ = ["PRESETS", "Preset", "preset"]
+__all__ = ["HISTORY_PRESETS", "PRESETS", "Preset", "preset"]
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ class Preset:
     ----------
     name, summary : str
     body : Cantilever
-    loads : tuple of PointLoad
+    loads : tuple of loads
     design : "grid" or "sobol"
         How the ranges of the loads are sampled.
     samples : int
@@ -36,7 +37,7 @@ class Preset:
     name: str
     summary: str
     body: Cantilever
-    loads: tuple[PointLoad, ...]
+    loads: tuple[Load, ...]
     design: Literal["grid", "sobol"]
     samples: int
 
@@ -96,6 +97,39 @@ def beam_three_loads() -> Preset:
     return Preset("beam-three-loads", summary, founding_beam("nylon"), loads, "sobol", 768)
 
 
+def beam_plastic() -> Preset:
+    """The founding copper beam, annealed, loaded past yield and unloaded.
+
+    Its outer fibres yield at the clamp from π r³ σ_y/4L = 12.3 N on, and without hardening it would collapse at
+    4 r³ σ_y/3L = 20.9 N.
+    """
+    from palpate.physics.materials.metals import METALS
+
+    body = Cantilever(length=1.0, section=Circle(radius=0.005), material=METALS["annealed copper"])
+    loads = (LoadAndUnload("P", peak=(0.0, 25.0)),)
+    summary = "annealed copper cantilever, tip loaded to P_max = 0 … 25 N, then to P = 0 … 25 N, 256 solves"
+    return Preset("beam-plastic", summary, body, loads, "sobol", 256)
+
+
+def beam_viscoelastic() -> Preset:
+    """The founding nylon beam with an illustrative creep, under a load that is put on at once and held.
+
+    The Prony series is an illustration, no measurement: nylon's depends on its kind, moisture and temperature.
+    """
+    from palpate.physics.materials.viscous import Viscoelastic
+
+    material = Viscoelastic(
+        named_material("nylon", LinearElastic),
+        ((0.3, 0.1), (0.2, 2.0)),
+        name="creeping nylon",
+        source="elastic constants of the founding case; the Prony series is an illustration, not measured",
+    )
+    body = Cantilever(length=1.0, section=Circle(radius=0.005), material=material)
+    loads = (StepAndHold("P", 0.0, 5.0, held=(0.0, 10.0)),)
+    summary = "nylon cantilever with illustrative creep, tip load 0 … 5 N held for 0 … 10 s, 256 solves"
+    return Preset("beam-viscoelastic", summary, body, loads, "sobol", 256)
+
+
 PRESETS: dict[str, Callable[[], Preset]] = {
     "beam-copper": _tip("copper", 5, 501),
     "beam-nylon": _tip("nylon", 5, 501),
@@ -104,7 +138,13 @@ PRESETS: dict[str, Callable[[], Preset]] = {
     "beam-plane": beam_plane,
     "beam-three-loads": beam_three_loads,
 }
-"""Every preset by its name."""
+"""Every preset of an elastic beam by its name; studies of these can be named."""
+
+HISTORY_PRESETS: dict[str, Callable[[], Preset]] = {
+    "beam-plastic": beam_plastic,
+    "beam-viscoelastic": beam_viscoelastic,
+}
+"""Every preset of a beam that remembers by its name."""
 
 
 def preset(name: str) -> Preset:
@@ -115,11 +155,12 @@ def preset(name: str) -> Preset:
     UsageError
         If the name is not known; the message lists the names that are.
     """
-    if name in PRESETS:
-        return PRESETS[name]()
-    close = difflib.get_close_matches(name, PRESETS, n=1)
+    known = PRESETS | HISTORY_PRESETS
+    if name in known:
+        return known[name]()
+    close = difflib.get_close_matches(name, known, n=1)
     raise UsageError(
         f"There is no preset called {name!r}.",
-        why=f"Known presets: {', '.join(PRESETS)}.",
+        why=f"Known presets: {', '.join(known)}.",
         fix=f"Did you mean {close[0]!r}?" if close else "Choose one of these.",
     )

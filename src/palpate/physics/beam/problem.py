@@ -11,36 +11,39 @@ import numpy as np
 
 from palpate.dataset import Field, Layout, beam_fields
 from palpate.errors import UsageError
-from palpate.physics.beam.loads import PointLoad
+from palpate.physics.beam.loads import Load, PointLoad
 from palpate.units import Range
 
 if TYPE_CHECKING:
     from palpate.physics.beam.cantilever import Cantilever
+    from palpate.physics.beam.history_solver import HistorySolver
     from palpate.physics.beam.solution import Solution
     from palpate.physics.beam.solver import BeamSolver
 
 __all__ = ["BeamProblem"]
 
+_DISSIPATED = Field("dissipated", unit="J", meaning="energy lost for good since the virgin beam")
+
 
 @dataclass(frozen=True)
 class BeamProblem:
-    """A cantilever under point loads, whose sizes in N are the inputs.
+    """A cantilever under loads, whose sizes in N, or what they ran through, are the inputs.
 
     A plain value: it can be compared, hashed, pickled and sent to another process.
 
     Attributes
     ----------
     body : Cantilever
-    loads : tuple of PointLoad
+    loads : tuple of loads
     """
 
     body: Cantilever
-    loads: tuple[PointLoad, ...]
+    loads: tuple[Load, ...]
 
     @property
     def ranges(self) -> tuple[Range, ...]:
         """Name, range and unit of each input."""
-        return tuple(load.range for load in self.loads)
+        return tuple(one for load in self.loads for one in load.inputs)
 
     @property
     def rest(self) -> np.ndarray:
@@ -57,13 +60,19 @@ class BeamProblem:
 
     @property
     def load_nodes(self) -> tuple[int, ...]:
-        """Index of the node that each load acts on."""
-        return tuple(self._nodes_at(self.body.position(load) for load in self.loads))
+        """Index of the node that each input's load acts on."""
+        nodes = zip(self.loads, self.nodes_of_loads, strict=True)
+        return tuple(node for load, node in nodes for _ in load.inputs)
 
     @property
     def load_directions(self) -> tuple[tuple[float, float], ...]:
-        """Direction (x, y) of each load."""
-        return tuple(load.direction for load in self.loads)
+        """Direction (x, y) of each input's load."""
+        return tuple(load.direction for load in self.loads for _ in load.inputs)
+
+    @property
+    def nodes_of_loads(self) -> tuple[int, ...]:
+        """Index of the node that each load acts on."""
+        return tuple(self._nodes_at(self.body.position(load) for load in self.loads))
 
     @property
     def layout(self) -> Layout:
@@ -72,8 +81,9 @@ class BeamProblem:
 
     @property
     def schema(self) -> tuple[Field, ...]:
-        """What each solve answers."""
-        return beam_fields(len(self.rest))
+        """What each solve answers; a sweep asks for it."""
+        fields = beam_fields(len(self.rest))
+        return fields if self.body.kind == "elastic" else (*fields, _DISSIPATED)
 
     @property
     def hash(self) -> str:
@@ -84,39 +94,82 @@ class BeamProblem:
         """Everything that decides the answers, as plain data for a JSON file."""
         body = {"type": "Cantilever", **asdict(self.body)}
         body["section"] = {"type": type(self.body.section).__name__, **body["section"]}
+        if self.body.kind == "elastic":
+            # an elastic beam has no use for them, and is described as ever
+            del body["fibres"], body["tolerance"]
+        else:
+            body["material"] = self.body.material.describe()  # type: ignore[attr-defined]
         # what a viewer needs to draw the body, whatever its section is called
         body["half_height"] = self.body.section.half_height
-        return {"body": body, "loads": [asdict(load) for load in self.loads]}
+        return {"body": body, "loads": [_described(load) for load in self.loads]}
 
-    def open(self) -> BeamSolver:
+    def open(self) -> BeamSolver | HistorySolver:
         """Build the finite elements; the solver that comes back is good for many solves."""
-        from palpate.physics.beam.solver import BeamSolver
+        if self.body.kind == "elastic":
+            from palpate.physics.beam.solver import BeamSolver
 
-        return BeamSolver(self)
+            return BeamSolver(self)
+        from palpate.physics.beam.history_solver import HistorySolver
+
+        return HistorySolver(self)
 
     def solve(self, x: Any) -> Solution:
-        """Solve for loads `x` in N, shape (n,) or one number.
+        """Solve for inputs `x`, shape (n,) or one number; most are loads in N.
+
+        A beam that remembers runs through the history that the inputs mean, from its virgin state.
 
         Raises
         ------
         UsageError
-            If `x` has not one number per load.
+            If `x` has not one number per input.
         """
         return self.open().solve(x)
 
-    def sizes(self, x: Any) -> np.ndarray:
-        """Loads as an array of shape (n,), in N.
+    def solve_path(self, loads: Any, times: Any = None) -> list[Solution]:
+        """Follow a history of loads from the virgin beam.
+
+        Parameters
+        ----------
+        loads : (N, n) or (N,) array
+            Sizes of the n loads in N; between two rows they change evenly.
+        times : (N,) array, optional
+            In s, not falling; a viscoelastic beam needs them.
+
+        Returns
+        -------
+        list of Solution
+            One for each row.
 
         Raises
         ------
         UsageError
-            If `x` has not one number per load.
+            If the arrays do not fit.
+        """
+        return self.open().march(loads, times)
+
+    def program(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Times (N,) and loads (N, n) in N that the inputs `x` stand for."""
+        values = iter(x.tolist())
+        runs = [load.knots(tuple(next(values) for _ in load.inputs)) for load in self.loads]
+        times = np.unique([time for run in runs for time, _ in run])
+        # before its first knot a load grows from nothing
+        columns = [np.interp(times, *np.transpose([(-1e-300, 0.0), *run])) for run in runs]
+        return times, np.stack(columns, axis=-1)
+
+    def sizes(self, x: Any) -> np.ndarray:
+        """Inputs as an array of shape (n,); most are loads in N.
+
+        Raises
+        ------
+        UsageError
+            If `x` has not one number per input.
         """
         sizes = np.atleast_1d(np.asarray(x, dtype=float))
-        if sizes.shape != (len(self.loads),):
+        names = [one.name for one in self.ranges]
+        if sizes.shape != (len(names),):
             raise UsageError(
                 f"The loads given have the shape {sizes.shape}.",
-                why=f"This problem has {len(self.loads)}: {', '.join(load.name for load in self.loads)}.",
+                why=f"This problem has {len(names)}: {', '.join(names)}.",
                 fix="Give one number per load, in this order.",
             )
         return sizes
@@ -124,3 +177,8 @@ class BeamProblem:
     def _nodes_at(self, positions: Any) -> list[int]:
         x = self.rest[:, 0]
         return [int(np.argmin(np.abs(x - position))) for position in positions]
+
+
+def _described(load: Load) -> dict[str, Any]:
+    plain = asdict(load)  # type: ignore[call-overload]
+    return plain if isinstance(load, PointLoad) else {"type": type(load).__name__, **plain}

@@ -2,6 +2,9 @@
 
 The shear factors are those of Cowper 1966 (The shear coefficient in Timoshenko's beam theory, J. Appl. Mech.
 33, 335-340, table 1).
+
+Sections that are cut into fibres give the heights and areas of a Gauss rule over their height, so that area and second
+moment are exact with any number of fibres from two on.
 """
 
 from __future__ import annotations
@@ -10,10 +13,12 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_number
 
-__all__ = ["Circle", "CrossSection", "Rectangle", "Section"]
+__all__ = ["Circle", "CrossSection", "FibreSection", "Rectangle", "Section"]
 
 
 class CrossSection(Protocol):
@@ -33,6 +38,13 @@ class CrossSection(Protocol):
 
     def shear_factor(self, poisson: float) -> float:
         """Share k of the area that carries shear, a pure number."""
+
+
+class FibreSection(CrossSection, Protocol):
+    """A cross-section that can be cut into fibres."""
+
+    def fibres(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Heights y in m above the centre line, ascending, and areas in m², both of shape (count,)."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +80,12 @@ class Circle:
     def shear_factor(self, poisson: float) -> float:
         """6(1 + ν)/(7 + 6ν), Cowper 1966."""
         return 6 * (1 + poisson) / (7 + 6 * poisson)
+
+    def fibres(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Heights in m and areas in m² of the Gauss-Chebyshev rule of the second kind, weighted by the width."""
+        angles = np.arange(count, 0, -1) * math.pi / (count + 1)
+        # ∫ f(y) 2√(r² - y²) dy = 2r² ∫ f(r cos φ) sin²φ dφ (Abramowitz & Stegun 1964, 25.4.40)
+        return self.radius * np.cos(angles), 2 * self.radius**2 * np.sin(angles) ** 2 * math.pi / (count + 1)
 
 
 @dataclass(frozen=True)
@@ -105,6 +123,11 @@ class Rectangle:
     def shear_factor(self, poisson: float) -> float:
         """10(1 + ν)/(12 + 11ν), Cowper 1966."""
         return 10 * (1 + poisson) / (12 + 11 * poisson)
+
+    def fibres(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Heights in m and areas in m² of the Gauss-Legendre rule."""
+        points, weights = np.polynomial.legendre.leggauss(count)
+        return self.half_height * points, self.width * self.half_height * weights
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +30,8 @@ class Solution:
     root_reaction : (3,) array
         Force (x, y) in N and moment in N·m that the clamp exerts on the beam.
     strain_energy, potential_energy : float
-        In J; the potential energy is the strain energy less the work potential of loads and weight.
+        In J; the potential energy is the strain energy, that is what can be had back, less the work potential of loads
+        and weight.
     largest_strain : float
         Largest strain of a fibre along the beam, |ε| + |κ| times the section's half height: what tells whether a
         linear elastic material could bear the load.
@@ -37,6 +39,13 @@ class Solution:
         Figures that belong to the reason.
     state : (dof,) array
         All unknowns, for a warm start.
+    time : float
+        In s, of a beam that follows a history; else NaN.
+    dissipated : float
+        Energy in J lost for good since the virgin beam: plastic work, or what dashpots took. The work of loads and
+        weight is strain energy plus this.
+    history : value
+        All that the future of a beam that remembers depends on, to march on from; else None.
     """
 
     stop: Stop
@@ -49,6 +58,9 @@ class Solution:
     largest_strain: float = np.nan
     detail: str = ""
     state: np.ndarray = field(default_factory=lambda: np.empty(0), repr=False)
+    time: float = np.nan
+    dissipated: float = 0.0
+    history: Any = field(default=None, repr=False)
 
     @property
     def converged(self) -> bool:

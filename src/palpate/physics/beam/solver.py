@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from palpate.errors import UsageError
 from palpate.physics.beam.problem import BeamProblem
-from palpate.physics.beam.reissner import ReissnerBeam, Stiffness
+from palpate.physics.beam.reissner import ReissnerBeam
+from palpate.physics.beam.sections import stiffness_of
 from palpate.physics.beam.solution import Solution
 from palpate.physics.equilibrium.newton import Equilibrium
 from palpate.physics.equilibrium.path import LoadPath, follow
@@ -45,11 +47,7 @@ class BeamSolver:
         body = problem.body
         self._problem = problem
         material, section = body.material, body.section
-        stiffness = Stiffness(
-            axial=material.young * section.area,
-            shear=section.shear_factor(material.poisson) * material.shear_modulus * section.area,
-            bending=material.young * section.second_moment,
-        )
+        stiffness = stiffness_of(body)
         large = body.kinematics == "large"
         self._model = ReissnerBeam(body.vertices(problem.loads), body.order, stiffness, large=large)
         self._directions = self._load_vectors()
@@ -93,6 +91,24 @@ class BeamSolver:
             return self._failure(found)
         self._last, self._before = _Known(load, found.z), self._last
         return self._answer(load, found)
+
+    def march(self, loads: Any, times: Any = None) -> list[Solution]:
+        """Solve for one row of loads (N, n) or (N,) after the other; their times (N,) in s are only noted.
+
+        Raises
+        ------
+        UsageError
+            If a row has not one number per load, or there are not as many times as rows.
+        """
+        rows = list(np.asarray(loads, dtype=float))
+        clock = np.full(len(rows), np.nan) if times is None else np.asarray(times, dtype=float)
+        if clock.shape != (len(rows),):
+            raise UsageError(
+                f"There are {clock.size} times for {len(rows)} loads.",
+                why="Each row of loads has one.",
+                fix="Leave the times out: an elastic beam does not need them.",
+            )
+        return [replace(self.solve(row), time=float(time)) for row, time in zip(rows, clock, strict=True)]
 
     def _search(self, load: np.ndarray) -> Equilibrium:
         """From the last answer; where that fails, once more from the undeformed beam."""

@@ -1,0 +1,145 @@
+"""Loads with a history: what a sweep asks of bodies that remember.
+
+A load says which values of its size it runs through, as knots (time in s, size in N) between which it changes evenly,
+from nothing at the time 0. Bodies that yield know no time: for them the time only counts the knots.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from palpate.errors import UsageError
+from palpate.physics.arguments import require_number
+from palpate.physics.beam.loads import PointLoad
+from palpate.units import Range
+
+__all__ = ["LoadAndUnload", "StepAndHold"]
+
+
+@dataclass(frozen=True)
+class LoadAndUnload:
+    """A dead force that grows to a peak and then goes to its final size: what a body that yields remembers.
+
+    Its two inputs are ``<name>_max`` and ``<name>``, both in N. A final size beyond the peak is a load that goes on
+    growing.
+
+    Attributes
+    ----------
+    name : str
+    peak : tuple of two floats
+        Range of the peak in N.
+    final : tuple of two floats, optional
+        Range of the final size in N; by default from 0 to the highest peak.
+    at : float or None
+        Where it acts, in m along the undeformed beam; ``None`` is the tip.
+    direction : tuple of two floats
+        Direction in the plane (x, y), normalised to length 1; the default pushes down.
+
+    Raises
+    ------
+    UsageError
+        For an empty range or a direction without length.
+    """
+
+    name: str
+    peak: tuple[float, float]
+    final: tuple[float, float] | None = None
+    at: float | None = None
+    direction: tuple[float, float] = (0.0, -1.0)
+
+    def __post_init__(self) -> None:
+        peak = _ends(f"The range of the peak of {self.name!r}", self.peak, "N")
+        final = self.final if self.final is not None else tuple(sorted((0.0, max(peak, key=abs))))
+        object.__setattr__(self, "peak", peak)
+        object.__setattr__(self, "final", _ends(f"The final range of {self.name!r}", final, "N"))
+        object.__setattr__(self, "direction", _checked(self.name, self.at, self.direction).direction)
+        _ = self.inputs  # raises for an empty range
+
+    @property
+    def inputs(self) -> tuple[Range, ...]:
+        """Names, ranges and units of the inputs."""
+        assert self.final is not None
+        return Range(f"{self.name}_max", *self.peak, "N"), Range(self.name, *self.final, "N")
+
+    def knots(self, values: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
+        """Times and sizes that the load runs through, of its inputs."""
+        peak, final = values
+        return (1.0, peak), (2.0, final)
+
+
+@dataclass(frozen=True)
+class StepAndHold:
+    """A dead force that is put on and then held: what a viscoelastic body creeps under.
+
+    Its two inputs are ``<name>`` in N and ``<name>_held``, the time in s since it has had its full size.
+
+    Attributes
+    ----------
+    name : str
+    low, high : float
+        Range of its size in N.
+    held : tuple of two floats
+        Range of the time for which it is held, in s, not negative.
+    rise : float
+        Time in s over which it grows evenly to its size; 0 puts it on at once.
+    at : float or None
+        Where it acts, in m along the undeformed beam; ``None`` is the tip.
+    direction : tuple of two floats
+        Direction in the plane (x, y), normalised to length 1; the default pushes down.
+
+    Raises
+    ------
+    UsageError
+        For an empty range, a negative time or a direction without length.
+    """
+
+    name: str
+    low: float
+    high: float
+    held: tuple[float, float]
+    rise: float = 0.0
+    at: float | None = None
+    direction: tuple[float, float] = (0.0, -1.0)
+
+    def __post_init__(self) -> None:
+        held = _ends(f"The range of the time for which {self.name!r} is held", self.held, "s")
+        require_number(f"The time in which {self.name!r} rises", self.rise, "s")
+        if held[0] < 0 or not 0 <= self.rise < float("inf"):
+            raise UsageError(
+                f"The load {self.name!r} rises in {self.rise} s and is held for {held[0]} … {held[1]} s.",
+                why="Times are finite and not negative.",
+                fix="Give for example rise=0.5 and held=(0, 10).",
+            )
+        object.__setattr__(self, "held", held)
+        checked = _checked(self.name, self.at, self.direction)
+        object.__setattr__(self, "direction", checked.direction)
+        _ = self.inputs  # raises for an empty range
+
+    @property
+    def inputs(self) -> tuple[Range, ...]:
+        """Names, ranges and units of the inputs."""
+        for what, end in (("lower", self.low), ("upper", self.high)):
+            require_number(f"The {what} end of the load {self.name!r}", end, "N")
+        return Range(self.name, self.low, self.high, "N"), Range(f"{self.name}_held", *self.held, "s")
+
+    def knots(self, values: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
+        """Times and sizes that the load runs through, of its inputs."""
+        size, held = values
+        return (self.rise, size), (self.rise + held, size)
+
+
+def _ends(what: str, pair: object, unit: str) -> tuple[float, float]:
+    if not (isinstance(pair, tuple | list) and len(pair) == 2):
+        raise UsageError(
+            f"{what} is {pair!r}.",
+            why=f"It must be two numbers in {unit}.",
+            fix="Give for example (0.0, 10.0).",
+        )
+    for end in pair:
+        require_number(what, end, unit)
+    return float(pair[0]), float(pair[1])
+
+
+def _checked(name: str, at: float | None, direction: tuple[float, float]) -> PointLoad:
+    """A point load of this place and direction, for its checks."""
+    return PointLoad(name, at, 0.0, 1.0, direction)

@@ -7,8 +7,6 @@ normal at places ("footprints") on the touched surface, with depths from shallow
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from palpate.physics.interactions.patch import Patch
@@ -75,7 +73,7 @@ def _columns(keys: np.ndarray) -> list[np.ndarray]:
     return [np.array(rows) for rows in found.values()]
 
 
-def _halved(feet: np.ndarray, rows: np.ndarray) -> Sequence[np.ndarray]:
+def _halved(feet: np.ndarray, rows: np.ndarray) -> list[np.ndarray]:
     pending, done = [rows], []
     while pending:
         part = pending.pop()

@@ -131,7 +131,12 @@ class SphereProbe:
         energy = Energy(pad_energy(penetration, self.pad, self.stop), contact.measure())
         approach = _Approach(self, field)
         return Attached(
-            centre, (energy,), inspect=contact.inspect, approach=approach, distance=approach.distance
+            centre,
+            (energy,),
+            inspect=contact.inspect,
+            approach=approach,
+            distance=approach.distance,
+            first_step=FIRST * self.radius,
         )
 
     def _surface(self, geometry: Geometry) -> str:

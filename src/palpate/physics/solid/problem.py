@@ -143,7 +143,7 @@ class SolidProblem:
                 why="Only a single interaction such as a probe knows the order in which it is solved well.",
                 fix="Choose a design such as sobol over its ranges.",
             )
-        return planned.design(self.body.geometry, samples, seed)
+        return np.asarray(planned.design(self.body.geometry, samples, seed))
 
     def chains(self, points: Any) -> list[np.ndarray]:
         """Rows of `points` (N, n) to be solved one after the other by one solver, chain by chain."""
@@ -151,7 +151,7 @@ class SolidProblem:
         planned = self._planned()
         if planned is None:
             return [np.arange(len(points))]
-        return planned.chains(self.body.geometry, points)
+        return list(planned.chains(self.body.geometry, points))
 
     def inputs(self, x: Any) -> np.ndarray:
         """Inputs as an array (n,).

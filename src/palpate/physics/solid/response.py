@@ -63,7 +63,7 @@ class Inputs:
     def sensitivity(self, system: System, z: np.ndarray) -> np.ndarray:
         """∂z/∂q (n, dof) with the system's present tangent."""
         coupling = self._coupling(z) + self._lifted(system)
-        return self.lifts - self._solved(system, coupling)
+        return np.asarray(self.lifts - self._solved(system, coupling))
 
     def hessian(self, system: System, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """∂²U/∂q∂q (n, n) and ∂z/∂q (n, dof), with the system's present tangent, which is to be that at z."""

@@ -53,7 +53,7 @@ class System:
 
     def residual(self, z: np.ndarray) -> np.ndarray:
         """∂Π/∂z (dof,), zero on given unknowns."""
-        return self.gradient(z) * self.free
+        return np.asarray(self.gradient(z) * self.free)
 
     def factorise(self, z: np.ndarray) -> None:
         """Make ∂²Π/∂z² at z the tangent that `solve` and `multiply` use."""

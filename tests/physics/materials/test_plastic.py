@@ -23,7 +23,7 @@ from palpate.physics.materials.uniaxial import UniaxialPlastic
 
 ELASTIC = LinearElastic(110e9, 0.35)
 LAWS = [LinearHardening(70e6), LinearHardening(70e6, 2e9), VoceHardening(70e6, 150e6, 18.0, 0.4e9)]
-I = np.eye(3)
+UNIT = np.eye(3)
 
 
 def stress(material, F, state):
@@ -31,7 +31,7 @@ def stress(material, F, state):
 
 
 def strained(seed, size=0.005):
-    return I + size * np.random.default_rng(seed).normal(size=(3, 3))
+    return UNIT + size * np.random.default_rng(seed).normal(size=(3, 3))
 
 
 def flowed(material, seed=5):
@@ -45,7 +45,7 @@ def flowed(material, seed=5):
 def test_a_bar_pulled_and_pushed_is_a_fibre(law):
     """Uniaxial stress: plastic strain along the bar, minus half of it across, no stress across."""
     material, fibre = Plastic(ELASTIC, law), UniaxialPlastic(110e9, law)
-    state, own = initial_state(material, I), fibre.rest()
+    state, own = initial_state(material, UNIT), fibre.rest()
     for strain in (0.0004, 0.01, 0.009, -0.008, 0.02):
         sigma, _, energy, own = fibre.stress(np.asarray(strain), own)
         across = -0.35 * sigma / 110e9 - own.strain / 2
@@ -67,14 +67,14 @@ def test_linear_hardening_in_shear():
     slope = G * h / (3 * G + h)
     top = 70e6 / math.sqrt(3) + slope * (0.01 - first)
     turned = 0.01 - 2 * top / G
-    state = initial_state(material, I)
+    state = initial_state(material, UNIT)
     for size, wanted in (
         (first, G * first),
         (0.01, top),
         (turned, -top),
         (turned - 0.003, -top - slope * 0.003),
     ):
-        F = I + size * np.outer(I[0], I[1])
+        F = UNIT + size * np.outer(UNIT[0], UNIT[1])
         P = stress(material, F, state)
         np.testing.assert_allclose([P[0, 1], P[1, 0]], wanted, rtol=1e-10)
         state = material.advance(F, state)
@@ -85,8 +85,8 @@ def test_the_second_derivative_is_the_consistent_tangent(law):
     """C = K 1⊗1 + 2Gθ(𝕀 − ⅓ 1⊗1) − 2Gθ' n⊗n (Simo & Hughes 1998, box 3.2)."""
     material, F = Plastic(ELASTIC, law), strained(7)
     state, G, K = flowed(material), ELASTIC.shear_modulus, ELASTIC.bulk_modulus
-    shape = (F + F.T) / 2 - I
-    shape = shape - np.trace(shape) / 3 * I - state["plastic_strain"]
+    shape = (F + F.T) / 2 - UNIT
+    shape = shape - np.trace(shape) / 3 * UNIT - state["plastic_strain"]
     trial = math.sqrt(6) * G * np.linalg.norm(shape)
     after = material.advance(F, state)["accumulated"]
     flow = after - state["accumulated"]
@@ -94,14 +94,13 @@ def test_the_second_derivative_is_the_consistent_tangent(law):
     theta = 1 - 3 * G * flow / trial
     second = 1 / (1 + law.slope(after) / (3 * G)) - (1 - theta)
     n = shape / np.linalg.norm(shape)
-    sym4 = (np.einsum("ik,jl->ijkl", I, I) + np.einsum("il,jk->ijkl", I, I)) / 2
-    ones = np.einsum("ij,kl->ijkl", I, I)
+    sym4 = (np.einsum("ik,jl->ijkl", UNIT, UNIT) + np.einsum("il,jk->ijkl", UNIT, UNIT)) / 2
+    ones = np.einsum("ij,kl->ijkl", UNIT, UNIT)
     tangent = K * ones + 2 * G * theta * (sym4 - ones / 3) - 2 * G * second * np.einsum("ij,kl->ijkl", n, n)
     for direction in np.random.default_rng(3).normal(size=(3, 3, 3)):
         step = 1e-7 * direction
         rate = (stress(material, F + step, state) - stress(material, F - step, state)) / 2e-7
-        # the stress is known to 1e-16 K of strain, divided by the step; the difference has a third derivative
-        np.testing.assert_allclose(rate, np.einsum("ijkl,kl->ij", tangent, direction), atol=1e-6 * K)
+        np.testing.assert_allclose(rate, np.einsum("ijkl,kl->ij", tangent, direction), atol=1e-7 * K)
 
 
 @pytest.mark.parametrize("law", LAWS, ids=str)
@@ -109,14 +108,13 @@ def test_stress_is_elastic_in_what_is_not_plastic(law):
     material, F = Plastic(ELASTIC, law), strained(11)
     state = flowed(material)
     after = material.advance(F, state)
-    strain = (F + F.T) / 2 - I
+    strain = (F + F.T) / 2 - UNIT
     elastic = strain - after["plastic_strain"]
-    wanted = ELASTIC.bulk_modulus * np.trace(strain) * I + 2 * ELASTIC.shear_modulus * (
-        elastic - np.trace(elastic) / 3 * I
-    )
+    shape = elastic - np.trace(elastic) / 3 * UNIT
+    wanted = ELASTIC.bulk_modulus * np.trace(strain) * UNIT + 2 * ELASTIC.shear_modulus * shape
     found = stress(material, F, state)
     np.testing.assert_allclose(found, wanted, atol=1e-12 * ELASTIC.young)
-    deviator = found - np.trace(found) / 3 * I
+    deviator = found - np.trace(found) / 3 * UNIT
     mises = math.sqrt(1.5) * np.linalg.norm(deviator)
     assert mises == pytest.approx(float(law.flow_stress(after["accumulated"])), rel=1e-10)
     assert abs(np.trace(after["plastic_strain"])) < 1e-16
@@ -127,8 +125,8 @@ def test_the_energy_is_the_least_over_plastic_strains(law):
     material, F = Plastic(ELASTIC, law), strained(13)
     state = flowed(material)
     least = material.distortion(F, state)
-    shape = (F + F.T) / 2 - I
-    shape = shape - np.trace(shape) / 3 * I - state["plastic_strain"]
+    shape = (F + F.T) / 2 - UNIT
+    shape = shape - np.trace(shape) / 3 * UNIT - state["plastic_strain"]
     best = material.advance(F, state)["plastic_strain"] - state["plastic_strain"]
 
     def candidate(change):
@@ -138,7 +136,7 @@ def test_the_energy_is_the_least_over_plastic_strains(law):
 
     assert candidate(best) == pytest.approx(float(least), rel=1e-12)
     for other in np.random.default_rng(1).normal(size=(50, 3, 3)):
-        trial = best + 1e-4 * ((other + other.T) / 2 - np.trace(other) / 3 * I)
+        trial = best + 1e-4 * ((other + other.T) / 2 - np.trace(other) / 3 * UNIT)
         assert candidate(trial) > least
 
 
@@ -158,19 +156,22 @@ def test_energy_goes_on_without_a_jump_when_the_state_is_kept(law):
 def test_work_is_stored_or_lost():
     material, steps = Plastic(ELASTIC, LAWS[2]), 300
     path = np.concatenate([np.linspace(0, 1, steps), np.linspace(1, -1, 2 * steps)[1:]])
-    F = I + path[:, None, None] * (strained(19) - I)
-    states, stresses, losses, stored = march(material, F, 1.0)
+    F = UNIT + path[:, None, None] * (strained(19) - UNIT)
+    _, stresses, losses, stored = march(material, F, 1.0)
     work = np.cumsum(np.sum((stresses[1:] + stresses[:-1]) / 2 * np.diff(F, axis=0), axis=(1, 2)))
     assert np.all(losses >= 0)
-    # the trapezoid errs where the stress kinks, by a step's share of a step's work
-    np.testing.assert_allclose(stored[1:] + np.cumsum(losses)[1:], work, atol=2 * np.max(work) / steps**1.5)
+    # the trapezoid errs in a step in which the stress kinks, by up to half the step's elastic energy; there are three
+    step = np.linalg.norm(F[1] - F[0])
+    np.testing.assert_allclose(
+        stored[1:] + np.cumsum(losses)[1:], work, atol=3 * ELASTIC.shear_modulus * step**2
+    )
 
 
 def test_at_rest_there_is_no_stress_and_no_kink():
     material = Plastic(ELASTIC, LAWS[2])
-    state = initial_state(material, I)
-    assert np.all(stress(material, I, state) == 0)
-    assert np.all(material.advance(I, state)["plastic_strain"] == 0)
+    state = initial_state(material, UNIT)
+    assert np.all(stress(material, UNIT, state) == 0)
+    assert np.all(material.advance(UNIT, state)["plastic_strain"] == 0)
     # without a state: the virgin material
     assert float(material.energy(strained(5))) == float(material.energy(strained(5), state))
 
@@ -178,7 +179,7 @@ def test_at_rest_there_is_no_stress_and_no_kink():
 def test_flow_does_not_touch_the_volume_even_where_it_can_not_change():
     material = Plastic(LinearElastic(1e9, 0.5), LinearHardening(1e6))
     F = strained(5)
-    swollen = F + 0.01 * I
+    swollen = F + 0.01 * UNIT
     state = initial_state(material, F)
     assert float(material.distortion(F, state)) == pytest.approx(
         float(material.distortion(swollen, state)), rel=1e-9

@@ -69,11 +69,17 @@ def test_the_response_to_forces_is_no_force():
             getattr(data, name)
 
 
-@pytest.mark.parametrize("name", ["root_reaction", "load_nodes", "load_directions"])
-def test_what_a_body_does_not_answer_is_named(name):
-    with pytest.raises(UsageError, match="This dataset has no") as caught:
-        getattr(make(), name)
+def test_what_a_body_does_not_answer_is_named():
+    with pytest.raises(UsageError, match="no 'root_reaction'") as caught:
+        _ = make().root_reaction
     assert "response_gradient" in caught.value.why
+
+
+@pytest.mark.parametrize("name", ["load_nodes", "load_directions"])
+def test_positions_are_no_loads(name):
+    with pytest.raises(UsageError, match="no loads at nodes") as caught:
+        getattr(make(), name)
+    assert "c_x, c_y, c_z" in caught.value.why
 
 
 def test_a_solid_in_words():

@@ -183,11 +183,13 @@ class Dataset:
     @property
     def load_nodes(self) -> np.ndarray:
         """Index of the node that each input acts on, shape (n,)."""
+        self._require_loads()
         return self._values("input_node")
 
     @property
     def load_directions(self) -> np.ndarray:
         """Direction of each input, shape (n, 2) or (n, 3)."""
+        self._require_loads()
         return self._values("input_direction")
 
     @functools.cached_property
@@ -303,6 +305,15 @@ class Dataset:
                 "This dataset has no force.",
                 why=f"Its inputs are in {', '.join(sorted(units))}; a force is the response to positions in m.",
                 fix="Ask for `response`, minus the slope of the energy over the inputs.",
+            )
+
+    def _require_loads(self) -> None:
+        if "input_node" not in self:
+            names = ", ".join(r.name for r in self.ranges)
+            raise UsageError(
+                "The inputs of this dataset are no loads at nodes.",
+                why=f"{names}: they say where something touches the body, or how much acts on a surface.",
+                fix="Use `response`, minus the slope of the energy over the inputs.",
             )
 
     def _values(self, name: str) -> np.ndarray:

@@ -131,7 +131,7 @@ def solid_fields(nodes: int, ranges: Sequence[Range]) -> tuple[Field, ...]:
         Field("response_gradient", ("input", "along"), (n, n), slope, "∂response/∂input"),
         Field("penetration", unit="m", meaning="largest penetration of the pad"),
         Field("least_volume_ratio", meaning="least det F of the body"),
-        Field("largest_strain", meaning="largest principal strain of the body", optional=True),
+        Field("largest_strain", meaning="largest |λ − 1| of a principal stretch λ", optional=True),
     )
 
 

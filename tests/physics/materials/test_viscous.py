@@ -101,6 +101,16 @@ def test_stress_of_the_energy_is_the_overstresses_sum(material):
     np.testing.assert_allclose(stress(material, PULLED, state, 0.7), inner, rtol=1e-11, atol=1e-9)
 
 
+@pytest.mark.parametrize("material", MATERIALS, ids=named)
+def test_a_prepared_state_serves_as_the_state(material):
+    state = material.advance(TURNED, initial_state(material, TURNED), 0.4)
+    prepared = material.prepare(state, 0.7)
+    assert float(material.energy(PULLED, prepared, 0.7)) == pytest.approx(
+        float(material.energy(PULLED, state, 0.7))
+    )
+    np.testing.assert_allclose(stress(material, PULLED, prepared, 0.7), stress(material, PULLED, state, 0.7))
+
+
 @pytest.mark.parametrize("material", MATERIALS[1:], ids=named)
 def test_a_superposed_rotation_changes_nothing(material):
     Q = rotation([0.3, -1.1, 0.7])

@@ -178,15 +178,24 @@ class Viscoelastic(Elastic):
 
         Its gradient is the stress; its value is no stored energy. `dt` in s; None is an instant, infinity for ever.
         """
-        series = self.prony
-        gains = [share * gain for share, gain in zip(series.shares, series.gain(dt), strict=True)]
-        energy = (series.equilibrium + sum(gains)) * part_of(self.base, self.part, F)
+        energy = self._weight(dt) * part_of(self.base, self.part, F)
         if not state:
             return energy
-        memory = -scale(sum(gains), state["stress"])
+        memory = state["memory"] if "memory" in state else self.prepare(state, dt)["memory"]
+        return energy + inner(memory, self._strain(F))
+
+    def prepare(self, state: Mapping[str, Any], dt: Any) -> dict[str, Any]:
+        """What `energy` and `distortion` need of the state in a step of `dt` seconds: M (..., 3, 3) in Pa.
+
+        They take it in place of the state. A solver that keeps it at quadrature points saves its evaluation, once per
+        pair of strain components and Newton iteration.
+        """
+        series = self.prony
+        lost = sum(share * gain for share, gain in zip(series.shares, series.gain(dt), strict=True))
+        memory = -scale(lost, state["stress"])
         for name, decay in zip(self._overstresses, series.decay(dt), strict=True):
             memory = memory + scale(decay, state[name])
-        return energy + inner(memory, self._strain(F))
+        return {"memory": memory}
 
     def advance(self, F: Tensor, state: Mapping[str, Any], dt: Any) -> dict[str, Any]:
         """S_0 and H_i (..., 3, 3) in Pa at the end of the step."""
@@ -227,6 +236,12 @@ class Viscoelastic(Elastic):
         """Bulk modulus in Pa of the part that relaxes."""
         kept = kept_bulk(self.base, self.part)
         return 0.0 if kept == self.bulk_modulus else self.bulk_modulus - kept
+
+    def _weight(self, dt: Any) -> Any:
+        """γ_∞ + Σ γ_i a_i."""
+        series = self.prony
+        gains = zip(series.shares, series.gain(dt), strict=True)
+        return series.equilibrium + sum(share * gain for share, gain in gains)
 
     def _strain(self, F: Tensor) -> Tensor:
         """The strain that the law's stress works on: ε, or Green's strain."""

@@ -4,13 +4,23 @@ from __future__ import annotations
 
 import difflib
 import math
+import re
 from collections.abc import Iterable
 from typing import Any
 
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_number
 
-__all__ = ["LARGEST", "SMALLEST", "require_known", "require_positive", "require_size", "require_triple"]
+__all__ = [
+    "LARGEST",
+    "SMALLEST",
+    "plain_name",
+    "require_known",
+    "require_name",
+    "require_positive",
+    "require_size",
+    "require_triple",
+]
 
 LARGEST, SMALLEST = 10.0, 1e-3  # m, longest side of a body that a hand or a tool would press
 
@@ -88,3 +98,20 @@ def require_known(kind: str, name: str, known: Iterable[str]) -> None:
         why=f"The body's {kind}s are {', '.join(names)}.",
         fix=f"Did you mean {near[0]!r}?" if near else f"Choose one of these {kind}s.",
     )
+
+
+def require_name(what: str, name: Any) -> None:
+    """Refuse a name that NGSolve would read as a pattern."""
+    if isinstance(name, str) and re.fullmatch(r"\w[\w \-]*", name):
+        return
+    raise UsageError(
+        f"{what} is {name!r}.",
+        why="A name is made of letters, digits, spaces, - and _; other signs have a meaning in patterns of names.",
+        fix="Choose a plain name such as 'skin'.",
+    )
+
+
+def plain_name(name: str) -> str:
+    """A name from a file with the signs that NGSolve reads as patterns replaced by ``_``."""
+    plain = re.sub(r"[^\w \-]+", "_", name).strip(" -")
+    return plain or "unnamed"

@@ -10,6 +10,7 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.physics.geometry.mesh import body_mesh
 from palpate.physics.geometry.refinement import GRADING, Refinement, require_budget
+from palpate.physics.geometry.sampling import points_on
 
 __all__ = ["mesh_solid"]
 
@@ -20,7 +21,7 @@ SHORTEST = 1e-5  # shortest edge over the body's length that is meshed as such; 
 def mesh_solid(solid: Any, coarse: float, refinements: tuple[Refinement, ...]) -> Any:
     """Mesh a solid whose faces and solids carry names.
 
-    The fine part of an upright plane face is cut out of it as a face of its own, so that the size of its
+    The fine part of an upright plane rectangle is cut out of it as a face of its own, so that the size of its
     elements is even; on other faces the element size is restricted at points.
 
     Parameters
@@ -42,9 +43,7 @@ def mesh_solid(solid: Any, coarse: float, refinements: tuple[Refinement, ...]) -
     """
     from netgen.occ import OCCGeometry
 
-    flat = [
-        r for r in refinements if all(_upright(f) is not None for f in solid.faces if f.name == r.surface)
-    ]
+    flat = [r for r in refinements if all(_is_rectangle(f) for f in solid.faces if f.name == r.surface)]
     solid = _imprinted(solid, flat)
     fine = _restricted_faces(solid, flat)
     points = []
@@ -53,7 +52,7 @@ def mesh_solid(solid: Any, coarse: float, refinements: tuple[Refinement, ...]) -
             at, area = points_on(body_mesh(_generate(OCCGeometry(solid), solid, coarse)), refinement)
             points.append((at, refinement.element))
             fine.append((area, refinement.element))
-    require_budget(sum(s.mass for s in solid.solids), coarse, fine)
+    require_budget([(s.mass, min(coarse, s.maxh)) for s in solid.solids], fine)
     geometry = OCCGeometry(solid)
     for at, element in points:
         _restrict(geometry, at, element)
@@ -75,6 +74,18 @@ def _generate(geometry: Any, solid: Any, coarse: float, **options: Any) -> Any:
             why="Its faces may intersect or leave gaps, or a detail is far smaller than the elements.",
             fix=f"Check the shape, or choose elements smaller than {coarse:.3g} m.",
         ) from error
+
+
+def _is_rectangle(face: Any) -> bool:
+    """Whether a face is an upright plane rectangle.
+
+    In others a cut may run close to an edge, where only flat elements would fit.
+    """
+    if _upright(face) is None:
+        return False
+    low, high = face.bounding_box
+    extent = sorted(high[i] - low[i] for i in range(3))
+    return bool(abs(face.mass - extent[1] * extent[2]) < 10 * FLAT * face.mass)
 
 
 def _upright(face: Any) -> int | None:

@@ -61,7 +61,7 @@ class Refinement:
             )
 
 
-def require_budget(volume: float, coarse: float, fine: Iterable[tuple[float, float]]) -> None:
+def require_budget(volumes: Iterable[tuple[float, float]], fine: Iterable[tuple[float, float]]) -> None:
     """Refuse a mesh of more than `MOST_ELEMENTS` elements before it is made.
 
     A size h grows with the distance d from a fine surface as h + grading · d, and a tetrahedron of edge h fills
@@ -69,10 +69,8 @@ def require_budget(volume: float, coarse: float, fine: Iterable[tuple[float, flo
 
     Parameters
     ----------
-    volume : float
-        Of the body in m³.
-    coarse : float
-        Largest element size in m.
+    volumes : iterable of (float, float)
+        Volume in m³ and element size in m of each region.
     fine : iterable of (float, float)
         Area in m² and element size in m of each refined part.
 
@@ -82,11 +80,11 @@ def require_budget(volume: float, coarse: float, fine: Iterable[tuple[float, flo
         With the estimate.
     """
     per_volume = 6 * 2**0.5
-    count = per_volume * volume / coarse**3
+    count = sum(per_volume * volume / h**3 for volume, h in volumes)
     count += sum(per_volume * area / (2 * GRADING * h**2) for area, h in fine)
     if count > MOST_ELEMENTS:
         raise UsageError(
             f"The mesh would have about {count:.2g} elements, more than {MOST_ELEMENTS}.",
-            why=f"The coarse size is {coarse:.3g} m in a volume of {volume:.3g} m³; a halved size takes 8 times more.",
+            why="Halving the size takes 8 times the elements in a volume, 4 times at a surface.",
             fix="Choose larger elements, or refine a smaller part of the surface.",
         )

@@ -7,7 +7,7 @@ import numpy as np
 from palpate.physics.geometry.mesh import BodyMesh
 from palpate.physics.geometry.refinement import Refinement, require_budget
 
-__all__ = ["points_on"]
+__all__ = ["points_on", "scattered"]
 
 
 def points_on(mesh: BodyMesh, refinement: Refinement) -> tuple[np.ndarray, float]:
@@ -40,7 +40,7 @@ def points_on(mesh: BodyMesh, refinement: Refinement) -> tuple[np.ndarray, float
     small = []
     while len(corners):
         corners = corners[_meets(corners, refinement)]
-        require_budget(0.0, refinement.element, [(_areas(corners).sum(), refinement.element)])
+        require_budget([], [(_areas(corners).sum(), refinement.element)])
         fits = _longest(corners)[1] <= refinement.element
         small.append(corners[fits])
         corners = _halved(corners[~fits])
@@ -48,6 +48,18 @@ def points_on(mesh: BodyMesh, refinement: Refinement) -> tuple[np.ndarray, float
     centres = triangles.mean(axis=1)
     kept = _within(centres, refinement)
     return centres[kept], float(_areas(triangles[kept]).sum())
+
+
+def scattered(corners: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (t, 3, 3) halved until no edge is longer than `size` m; and the index of the triangle of each."""
+    origin = np.arange(len(corners))
+    small, origins = [], []
+    while len(corners):
+        fits = _longest(corners)[1] <= size
+        small.append(corners[fits])
+        origins.append(origin[fits])
+        corners, origin = _halved(corners[~fits]), np.tile(origin[~fits], 2)
+    return np.concatenate(small), np.concatenate(origins)
 
 
 def _areas(corners: np.ndarray) -> np.ndarray:

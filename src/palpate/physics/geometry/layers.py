@@ -1,0 +1,127 @@
+"""The layered block: slabs of different tissue on each other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+from palpate.errors import UsageError
+from palpate.physics.geometry.block import name_upright_faces
+from palpate.physics.geometry.checks import require_name, require_positive, require_size
+from palpate.physics.geometry.shape import Solid
+
+__all__ = ["LayeredBlock"]
+
+FLATTEST = 3.0  # element size over thickness of its layer: flatter tetrahedra condition the system badly
+
+
+@dataclass(frozen=True)
+class LayeredBlock(Solid):
+    """A box of layers, with a corner at the origin: x in 0 … extent[0], y in 0 … extent[1], the base at z = 0.
+
+    Surfaces are ``top`` (the first layer's), ``bottom`` and ``side``; each layer is a region of its own. Layers
+    share the nodes of the face between them, so they don't slide.
+
+    Attributes
+    ----------
+    extent : tuple of two floats
+        Extent along x and y in m.
+    layers : tuple of (str, float)
+        Name and thickness in m of each layer, from the surface down.
+    element : float, optional
+        Largest element size in m, by default a third of the least extent. In a thin layer elements have at most
+        3 times its thickness.
+
+    Raises
+    ------
+    UsageError
+        If a size is not positive, two layers share a name, or the sizes tell of mistaken units.
+    """
+
+    extent: tuple[float, float] = (0.10, 0.10)
+    layers: tuple[tuple[str, float], ...] = (("skin", 0.003), ("fat", 0.012), ("muscle", 0.035))
+    element: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "extent", _pair(self.extent))
+        object.__setattr__(self, "layers", _layers(self.layers))
+        require_size("The layered block", max(self.size))
+        self._check_element()
+
+    @property
+    def surfaces(self) -> tuple[str, ...]:
+        """``top``, ``bottom`` and ``side``."""
+        return ("top", "bottom", "side")
+
+    @property
+    def regions(self) -> tuple[str, ...]:
+        """Names of the layers, from the surface down."""
+        return tuple(name for name, _ in self.layers)
+
+    @property
+    def levels(self) -> tuple[float, ...]:
+        """Heights z in m of the faces between the layers, from the top to 0."""
+        thickness = [t for _, t in self.layers]
+        return tuple(sum(thickness[i:]) for i in range(len(thickness) + 1))
+
+    @property
+    def size(self) -> tuple[float, float, float]:
+        """Extent along x, y and z in m."""
+        return (*self.extent, self.levels[0])
+
+    def solid(self) -> Any:
+        """The layers, glued; their faces named."""
+        from netgen.occ import Box, Glue, Pnt
+
+        slabs = []
+        for (name, thickness), (high, low) in zip(self.layers, pairwise(self.levels), strict=True):
+            slab = Box(Pnt(0, 0, low), Pnt(*self.extent, high))
+            slab.mat(name)
+            slab.solids.maxh = min(self.coarse, FLATTEST * thickness)
+            slabs.append(slab)
+        block = Glue(slabs)
+        name_upright_faces(block, self.size[2])
+        for face in block.faces:
+            low, high = face.bounding_box
+            if face.name == "side" and high[2] - low[2] < 1e-5 * self.size[2]:
+                face.name = "between layers"
+        return block
+
+
+def _pair(value: Any) -> tuple[float, float]:
+    try:
+        x, y = value
+    except (TypeError, ValueError):
+        raise UsageError(
+            f"The size of a layered block is {value!r}.",
+            why="It is the extent along x and y; the height is the sum of the layers.",
+            fix="Pass (0.10, 0.10) for 100 mm by 100 mm.",
+        ) from None
+    require_positive("The layered block's extent along x", x)
+    require_positive("The layered block's extent along y", y)
+    return float(x), float(y)
+
+
+def _layers(value: Any) -> tuple[tuple[str, float], ...]:
+    try:
+        layers = tuple((name, thickness) for name, thickness in value)
+    except (TypeError, ValueError):
+        layers = ()
+    if not layers:
+        raise UsageError(
+            f"The layers of a block are {value!r}.",
+            why="Each is a name and a thickness in m, from the surface down; at least one is needed.",
+            fix='Pass layers=(("skin", 0.002), ("fat", 0.010), ("muscle", 0.030)).',
+        )
+    for name, thickness in layers:
+        require_name("A layer's name", name)
+        require_positive(f"The thickness of the layer {name!r}", thickness)
+    names = [name for name, _ in layers]
+    if len(set(names)) < len(names):
+        raise UsageError(
+            f"Two layers have the same name: {', '.join(names)}.",
+            why="The name tells which material a layer is made of.",
+            fix="Number them, for example fat 1 and fat 2.",
+        )
+    return tuple((name, float(thickness)) for name, thickness in layers)

@@ -1,0 +1,84 @@
+"""The tube: a hollow cylinder."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from palpate.errors import UsageError
+from palpate.physics.geometry.block import name_upright_faces
+from palpate.physics.geometry.checks import require_positive, require_size
+from palpate.physics.geometry.shape import Solid
+
+__all__ = ["Tube"]
+
+
+@dataclass(frozen=True)
+class Tube(Solid):
+    """A round tube that stands on the plane z = 0; its axis is z.
+
+    Surfaces are ``top``, ``bottom``, ``inside`` and ``outside``; the region is ``body``. Elements are curved.
+
+    Attributes
+    ----------
+    inner_radius, outer_radius, height : float
+        In m.
+    element : float, optional
+        Largest element size in m, by default half the wall's thickness or a third of the height.
+
+    Raises
+    ------
+    UsageError
+        If a size is not positive, the wall has no thickness, or the sizes tell of mistaken units.
+    """
+
+    curved: ClassVar[bool] = True
+
+    inner_radius: float = 0.015
+    outer_radius: float = 0.025
+    height: float = 0.10
+    element: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("inner_radius", "outer_radius", "height"):
+            require_positive(f"The tube's {name}", getattr(self, name))
+        if self.inner_radius >= self.outer_radius:
+            raise UsageError(
+                f"The tube's inner radius is {self.inner_radius:g} m, its outer radius {self.outer_radius:g} m.",
+                why="The wall would have no thickness.",
+                fix="Give the inner radius first, smaller than the outer one.",
+            )
+        require_size("The tube", max(self.size))
+        self._check_element()
+
+    @property
+    def surfaces(self) -> tuple[str, ...]:
+        """``top``, ``bottom``, ``inside`` and ``outside``."""
+        return ("top", "bottom", "inside", "outside")
+
+    @property
+    def size(self) -> tuple[float, float, float]:
+        """Extent along x, y and z in m."""
+        return (2 * self.outer_radius, 2 * self.outer_radius, self.height)
+
+    @property
+    def coarse(self) -> float:
+        """Largest element size in m."""
+        wall = self.outer_radius - self.inner_radius
+        return self.element if self.element is not None else min(wall / 2, self.height / 3)
+
+    def solid(self) -> Any:
+        """The tube, its faces named."""
+        from netgen.occ import Cylinder, Pnt, Z
+
+        outer = Cylinder(Pnt(0, 0, 0), Z, r=self.outer_radius, h=self.height)
+        inner = Cylinder(Pnt(0, 0, 0), Z, r=self.inner_radius, h=self.height)
+        wall = outer - inner
+        wall.mat("body")
+        name_upright_faces(wall, self.height)
+        between = (self.inner_radius + self.outer_radius) / 2
+        for face in wall.faces:
+            if face.name == "side":
+                high = face.bounding_box[1]
+                face.name = "inside" if high[0] < between else "outside"
+        return wall

@@ -15,17 +15,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from palpate.errors import UsageError
-from palpate.physics.materials.material import NO_STATE, Material
-from palpate.physics.materials.tensors import Scalar, Tensor, gradient, second_gradient
+from palpate.physics.materials.material import NO_STATE, Material, incompressible
+from palpate.physics.materials.tensors import (
+    Scalar,
+    Tensor,
+    determinant,
+    gradient,
+    second_gradient,
+    trace,
+)
 
 __all__ = ["Response", "equibiaxial", "planar", "simple_shear", "uniaxial", "volumetric"]
 
 _ITERATIONS = 60
+_ROUNDING = 1e-14  # of the stiffest direction: what is left of a sum of large terms
 _TOLERANCE = 1e-10  # of the last Newton step, whose square is the error left
-_STIFF = (
-    1e8  # bulk over shear modulus that stands for infinity: the stress is off by that share of itself over μ
-)
-
 _PLANE = ((0, 2), (1, 2), (2, 2))  # free where the first two axes are given
 _LATERAL = ((0, 1), (1, 1), *_PLANE)
 
@@ -73,7 +77,7 @@ def uniaxial(
     Parameters
     ----------
     material : Material
-        Any; an incompressible one is taken with a bulk modulus of 1e8 shear moduli.
+        Any, also an incompressible one.
     stretch : array_like (n,)
         λ = length over undeformed length, positive.
     state, dt : optional
@@ -149,23 +153,43 @@ def volumetric(
     Raises
     ------
     UsageError
-        For ratios that are not positive and finite.
+        For ratios that are not positive and finite, or an incompressible material.
     """
     loaded = _amounts(ratio, "volume ratio")
+    if is_incompressible(material):
+        raise incompressible(material.name)
     sides = 1 + (loaded - 1) / 3 if material.kinematics == "small" else np.cbrt(loaded)
     F = sides[:, None, None] * np.eye(3)
     return _test(material, loaded, F, (), None, state, dt)
 
 
-def density_of_energy(
+def energy_of(
     material: Material, state: Mapping[str, Any] = NO_STATE, dt: Any = None
 ) -> Callable[[Tensor], Scalar]:
-    """The material's energy as a function of F alone, with a stiff volume in place of an incompressible one."""
-    part = material.volumetric
-    if part is None or np.isfinite(part.modulus):
-        return lambda F: material.energy(F, state, dt)
-    modulus = _STIFF * material.shear_modulus
-    return lambda F: material.distortion(F, state, dt) + 0.5 * modulus * part.measure(F) ** 2
+    """The material's energy as a function of F alone; of an incompressible one, the distortion."""
+    whole = material.distortion if is_incompressible(material) else material.energy
+    return lambda F: whole(F, state, dt)
+
+
+def is_incompressible(material: Material) -> bool:
+    """Whether only deformations at constant volume are possible."""
+    return material.volumetric is not None and bool(np.isinf(material.volumetric.modulus))
+
+
+def _at_constant_volume(F: np.ndarray, small: bool) -> np.ndarray:
+    """F with the third diagonal component that keeps the volume.
+
+    The third axis bears no load, so that the slope of the energy along the constraint is the nominal stress, pressure
+    included.
+    """
+    F = F.copy()
+    F[..., 2, 2] = 0
+    if small:
+        F[..., 2, 2] = 3 - trace(F)
+    else:
+        minor = F[..., 0, 0] * F[..., 1, 1] - F[..., 0, 1] * F[..., 1, 0]
+        F[..., 2, 2] = (1 - determinant(F)) / minor
+    return F
 
 
 def _test(
@@ -177,8 +201,14 @@ def _test(
     state: Mapping[str, Any],
     dt: Any,
 ) -> Response:
-    energy = density_of_energy(material, state, dt)
-    F, converged = _relax(energy, F, free) if free else (F, np.ones(len(F), dtype=bool))
+    energy, small = energy_of(material, state, dt), material.kinematics == "small"
+    if is_incompressible(material):
+        distortion = energy
+        free = tuple(entry for entry in free if entry != (2, 2))
+        F, energy = _at_constant_volume(F, small), lambda G: distortion(_at_constant_volume(G, small))
+    F, converged = _relax(energy, F, free, small) if free else (F, np.ones(len(F), dtype=bool))
+    if is_incompressible(material):
+        F = _at_constant_volume(F, small)
     P, W = gradient(energy, F), np.broadcast_to(energy(F), amount.shape).copy()
     for values in (F, P, W):
         values[~converged] = np.nan
@@ -187,7 +217,7 @@ def _test(
 
 
 def _relax(
-    energy: Callable[[Tensor], Scalar], F: np.ndarray, free: tuple[tuple[int, int], ...]
+    energy: Callable[[Tensor], Scalar], F: np.ndarray, free: tuple[tuple[int, int], ...], small: bool
 ) -> tuple[np.ndarray, np.ndarray]:
     """Minimise the energy of each state over the free components, by Newton steps that may only descend."""
     index = np.array([3 * i + j for i, j in free])
@@ -195,15 +225,18 @@ def _relax(
     for _ in range(_ITERATIONS):
         slope = gradient(energy, F).reshape(-1, 9)[:, index]
         tangent = second_gradient(energy, F).reshape(-1, 9, 9)[:, index][:, :, index]
-        step = _descent(tangent, slope)
+        step, stiffest = _descent(tangent, slope), np.abs(tangent).max(axis=(1, 2))
         move = np.zeros((len(F), 9))
         move[:, index] = step
-        taken = _shorten(energy, F, move.reshape(F.shape), np.einsum("ni,ni->n", step, slope))
+        gain = np.einsum("ni,ni->n", step, slope)
+        taken = _shorten(energy, F, move.reshape(F.shape), gain, _ROUNDING * stiffest, small)
         F = F + taken[:, None, None] * move.reshape(F.shape)
-        done = (taken > 0) & (np.abs(step).max(axis=1) < _TOLERANCE)
+        settled = np.abs(step).max(axis=1) < _TOLERANCE
+        balanced = np.abs(slope).max(axis=1) < _ROUNDING * stiffest
+        done = (taken > 0) & (settled | balanced)
         if done.all():
             break
-    volume = np.linalg.det(F)
+    volume = _volume(F, small)
     # an energy without a minimum lets the body vanish or grow without bound
     return F, done & (volume > 1e-3) & (volume < 1e3)
 
@@ -219,20 +252,30 @@ def _descent(tangent: np.ndarray, slope: np.ndarray) -> np.ndarray:
 
 
 def _shorten(
-    energy: Callable[[Tensor], Scalar], F: np.ndarray, move: np.ndarray, slope: np.ndarray
+    energy: Callable[[Tensor], Scalar],
+    F: np.ndarray,
+    move: np.ndarray,
+    slope: np.ndarray,
+    rounding: np.ndarray,
+    small: bool,
 ) -> np.ndarray:
-    """The share of each step that lowers the energy and keeps its volume; 0 where none does."""
+    """The share of each step that lowers the energy, up to rounding, and keeps its volume; 0 where none does."""
     start = energy(F)
+    rounding = rounding + 1e-12 * np.abs(start)
     share, found = np.ones(len(F)), np.zeros(len(F), dtype=bool)
     for _ in range(40):
         trial = F + share[:, None, None] * move
         value = energy(trial)
-        rounding = 1e-12 * (np.abs(start) + np.abs(slope)) + 1e-300
-        found = (np.linalg.det(trial) > 0) & (value <= start + 1e-4 * share * slope + rounding)
+        found = (_volume(trial, small) > 0) & (value <= start + 1e-4 * share * slope + rounding)
         if found.all():
             break
         share = np.where(found, share, share / 2)
     return np.where(found, share, 0.0)
+
+
+def _volume(F: np.ndarray, small: bool) -> np.ndarray:
+    """Volume ratios (n,); a small-strain law has none that could vanish."""
+    return np.ones(len(F)) if small else np.linalg.det(F)
 
 
 def _amounts(values: ArrayLike, what: str, *, positive: bool = True) -> np.ndarray:

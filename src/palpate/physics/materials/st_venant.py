@@ -7,7 +7,13 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from palpate.physics.materials.material import NO_STATE, Elastic, Volumetric
-from palpate.physics.materials.moduli import bulk_from_young, lame_modulus, require_moduli, shear_from_young
+from palpate.physics.materials.moduli import (
+    bulk_from_young,
+    lame_modulus,
+    require_moduli,
+    shear_from_young,
+    unphysical,
+)
 from palpate.physics.materials.tensors import Scalar, Tensor, identity, inner, matmul, trace, transpose
 
 __all__ = ["StVenantKirchhoff"]
@@ -25,7 +31,7 @@ class StVenantKirchhoff(Elastic):
     young : float
         Initial Young's modulus E in Pa, positive.
     poisson : float
-        Initial Poisson's ratio ν, in (-1, 0.5].
+        Initial Poisson's ratio ν, in (-1, 0.5): the trace of E is no volume that could be kept.
     density : float
         In kg/m³.
     name, source : str
@@ -47,6 +53,8 @@ class StVenantKirchhoff(Elastic):
 
     def __post_init__(self) -> None:
         require_moduli(self.young, self.poisson, self.density)
+        if self.poisson == 0.5:
+            raise unphysical("Poisson's ratio of a St. Venant–Kirchhoff law", 0.5, "below 0.5")
 
     @property
     def shear_modulus(self) -> float:

@@ -4,6 +4,7 @@ At each state the Kirchhoff stress must grow with every further stretch and shea
 and each rate of strain D (Drucker 1959, J. Appl. Mech. 26, 101-106; Hill 1968, J. Mech. Phys. Solids 16, 229-242). That
 is the positive definiteness of the symmetric 6 × 6 matrix of second derivatives of W(exp(H) F) at H = 0, whose least
 eigenvalue is reported as the least incremental modulus. At F = I it is twice the shear modulus, or 3K if that is less.
+An incompressible material is asked for the rates that keep its volume.
 """
 
 from __future__ import annotations
@@ -17,8 +18,9 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.physics.materials.homogeneous import (
     Response,
-    density_of_energy,
+    energy_of,
     equibiaxial,
+    is_incompressible,
     planar,
     simple_shear,
     uniaxial,
@@ -39,6 +41,9 @@ _MODES: tuple[tuple[str, Callable[..., Response], float], ...] = (
     ("simple shear", simple_shear, 0.0),
     ("volumetric", volumetric, 1.0),
 )
+
+# two orthonormal stretches of constant volume
+_TRACELESS = np.array([[2.0, -1.0, -1.0], [0.0, np.sqrt(3), -np.sqrt(3)]]) / np.sqrt(6)
 
 
 @dataclass(frozen=True)
@@ -150,6 +155,8 @@ def stability(
     _check(volume)
     verdicts = []
     for mode, test, undeformed in _MODES:
+        if mode == "volumetric" and is_incompressible(material):
+            continue
         strains = _spaced(volume if mode == "volumetric" else strain)
         state = initial_state(material, _unit(strains)) if material.states else NO_STATE
         moduli = _least_moduli(material, test(material, undeformed + strains, state=state, dt=dt), state, dt)
@@ -159,13 +166,17 @@ def stability(
 
 def _least_moduli(material: Material, response: Response, state: Any, dt: Any) -> np.ndarray:
     """Least eigenvalue of the incremental moduli at each state, in Pa; NaN where there is no state."""
-    energy = density_of_energy(material, state, dt)
+    energy = energy_of(material, state, dt)
     known = response.converged
     F = np.where(known[:, None, None], response.deformation, np.eye(3))
     P, A = gradient(energy, F), second_gradient(energy, F)
     H = _symmetric_basis()
+    if is_incompressible(
+        material
+    ):  # rates of strain that keep the volume, on which the pressure does no work
+        H = np.concatenate([np.einsum("ab,bij->aij", _TRACELESS, H[:3]), H[3:]])
     small = material.kinematics == "small"
-    moved = np.broadcast_to(H, (len(F), 6, 3, 3)) if small else np.einsum("aij,njk->naik", H, F)
+    moved = np.broadcast_to(H, (len(F), *H.shape)) if small else np.einsum("aij,njk->naik", H, F)
     moduli = np.einsum("naij,nijkl,nbkl->nab", moved, A, moved)
     if not small:
         twice = np.einsum("aij,bjk->abik", H, H)

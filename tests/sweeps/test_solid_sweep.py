@@ -180,6 +180,21 @@ def test_answers_that_break_the_schema_are_named(cluster, function, why):
     assert why in caught.value.why
 
 
+class Unplanned(Ground):
+    design_name = None
+
+    def design(self, samples, seed):
+        raise AssertionError
+
+    chains = design
+
+
+def test_a_problem_may_leave_design_and_chains_to_the_sweep(cluster):
+    data = sweep(Unplanned(), samples=16, cluster=cluster)
+    assert data.provenance["design"] == "sobol"
+    assert len(np.unique(data.X[:, 0])) == 16
+
+
 class Careless(Ground):
     def chains(self, points):
         return [np.array([0, 1, 1])]

@@ -15,7 +15,7 @@ from palpate.errors import UsageError
 from palpate.sweeps.answers import Columns
 from palpate.sweeps.chunks import chunks
 from palpate.sweeps.designs import Design, design_points
-from palpate.sweeps.problem import Chained, Designed, Problem, missing_members
+from palpate.sweeps.problem import Designed, Problem, has_chains, missing_members, own_design
 from palpate.sweeps.provenance import config_hash, provenance
 from palpate.sweeps.space import Space
 
@@ -71,7 +71,7 @@ class Plan:
 
     def chains(self) -> list[np.ndarray]:
         """Rows in the order in which one solver solves them."""
-        if isinstance(self.problem, Chained):
+        if has_chains(self.problem):
             return _checked([np.asarray(rows) for rows in self.problem.chains(self.points)], len(self.points))
         rest = self.space.to_unit(np.clip(0.0, self.space.low, self.space.high))
         return chunks(self.space.to_unit(self.points), rest)
@@ -103,8 +103,8 @@ def make_plan(
         )
     if points is not None:
         return Plan(problem, space, _some(space.points(points)), "points", seed)
-    own = getattr(problem, "design_name", "the problem's own")
-    if isinstance(problem, Designed) and (design is None or design == own):
+    own = own_design(problem)
+    if isinstance(problem, Designed) and own is not None and (design is None or design == own):
         return Plan(problem, space, _some(space.points(problem.design(samples or 0, seed))), own, seed)
     design = "sobol" if design is None else design
     name = design if isinstance(design, str) else getattr(design, "__name__", type(design).__name__)

@@ -7,14 +7,24 @@ than needed, `ExternalProblem` makes a problem of one function.
 from __future__ import annotations
 
 import inspect
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol, TypeGuard, runtime_checkable
 
 import numpy as np
 
 from palpate.dataset import Field, Layout
 from palpate.units import Range
 
-__all__ = ["Answer", "Chained", "Designed", "Problem", "Resettable", "Solver", "missing_members"]
+__all__ = [
+    "Answer",
+    "Chained",
+    "Designed",
+    "Problem",
+    "Resettable",
+    "Solver",
+    "has_chains",
+    "missing_members",
+    "own_design",
+]
 
 
 class Answer(Protocol):
@@ -95,10 +105,26 @@ class Chained(Protocol):
 
 @runtime_checkable
 class Designed(Protocol):
-    """A problem that knows where it is sampled well. It may have a `design_name`."""
+    """A problem that knows where it is sampled well.
+
+    It may have a `design_name`; None says that just this problem leaves design and chains to the sweep.
+    """
 
     def design(self, samples: int, seed: int) -> np.ndarray:
         """At most `samples` points, shape (N, n)."""
+
+
+def own_design(problem: Problem) -> str | None:
+    """Name of the problem's own design, or None."""
+    if not isinstance(problem, Designed):
+        return None
+    name: str | None = getattr(problem, "design_name", "the problem's own")
+    return name
+
+
+def has_chains(problem: Problem) -> TypeGuard[Chained]:
+    """Whether the problem parts its points into chains itself."""
+    return isinstance(problem, Chained) and getattr(problem, "design_name", "") is not None
 
 
 def missing_members(thing: object) -> list[str]:

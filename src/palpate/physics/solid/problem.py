@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate.dataset import Field, Layout, solid_fields
 from palpate.errors import UsageError
 from palpate.physics.interactions.interaction import Interaction, Planned
 from palpate.units import Range
@@ -81,6 +82,42 @@ class SolidProblem:
         """The body at rest as plain arrays."""
         return self.body.geometry.rest(self.refinements)
 
+    @property
+    def layout(self) -> Layout:
+        """Nodes and surface: what all answers have in common."""
+        mesh = self.mesh
+        return Layout(
+            mesh.points, triangles=mesh.triangles, surfaces=mesh.surfaces, surface_of=mesh.surface_of
+        )
+
+    @property
+    def schema(self) -> tuple[Field, ...]:
+        """What each solve answers; a sweep asks for it."""
+        return solid_fields(len(self.mesh.points), self.ranges)
+
+    @property
+    def design_name(self) -> str | None:
+        """What `design` makes; None where design and chains are left to the sweep."""
+        return None if self._planned() is None else "columns"
+
+    @property
+    def layout(self) -> Layout:
+        """Nodes at rest and the surface's triangles; a sweep asks for it."""
+        mesh = self.mesh
+        return Layout(
+            mesh.points, triangles=mesh.triangles, surfaces=mesh.surfaces, surface_of=mesh.surface_of
+        )
+
+    @property
+    def schema(self) -> tuple[Field, ...]:
+        """What each solve answers; a sweep asks for it."""
+        return solid_fields(len(self.mesh.points), self.ranges)
+
+    @property
+    def design_name(self) -> str | None:
+        """Name of the problem's own design, None where it has none."""
+        return None if self._planned() is None else "columns"
+
     def describe(self) -> dict[str, Any]:
         """Everything that decides the answers, as plain data for a JSON file."""
         return {
@@ -117,14 +154,14 @@ class SolidProblem:
         ----------
         x : (n,) array
         dt : float, optional
-            Duration of the step in s, for materials with a history.
+            Duration of the step in s, for materials with a history; by default an instant.
         fields : bool
             Whether to give stress and stretch at the nodes.
 
         Raises
         ------
         UsageError
-            If `x` has not one number per input, or a material with a history no `dt`.
+            If `x` has not one number per input, or `dt` is not positive.
         """
         return self.open().solve(x, dt=dt, fields=fields)
 

@@ -62,13 +62,3 @@ def test_one_worker_or_two_and_an_interruption_change_no_bit(data, cluster, tmp_
     again = sweep(PROBLEM, samples=SAMPLES, cluster=cluster, path=tmp_path / "a.zarr")
     assert again.hash == data.hash
     assert Dataset.open(tmp_path / "a.zarr").hash == data.hash
-
-
-@pytest.mark.slow
-def test_a_position_within_the_body_is_a_row_with_its_reason(cluster):
-    found = sweep(PROBLEM, points=[[0.03, 0.03, 0.038], [0.03, 0.03, 0.02]], cluster=cluster)
-    np.testing.assert_array_equal(found.converged, [True, False])
-    assert found.message[1] != "converged"
-    assert np.isnan(found.force[1]).all()
-    assert found["iterations"][1] > 0
-    assert found["solve_seconds"][1] > 0

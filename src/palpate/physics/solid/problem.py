@@ -84,24 +84,6 @@ class SolidProblem:
 
     @property
     def layout(self) -> Layout:
-        """Nodes and surface: what all answers have in common."""
-        mesh = self.mesh
-        return Layout(
-            mesh.points, triangles=mesh.triangles, surfaces=mesh.surfaces, surface_of=mesh.surface_of
-        )
-
-    @property
-    def schema(self) -> tuple[Field, ...]:
-        """What each solve answers; a sweep asks for it."""
-        return solid_fields(len(self.mesh.points), self.ranges)
-
-    @property
-    def design_name(self) -> str | None:
-        """What `design` makes; None where design and chains are left to the sweep."""
-        return None if self._planned() is None else "columns"
-
-    @property
-    def layout(self) -> Layout:
         """Nodes at rest and the surface's triangles; a sweep asks for it."""
         mesh = self.mesh
         return Layout(

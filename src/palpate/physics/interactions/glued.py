@@ -142,7 +142,10 @@ class GluedPad:
             p = tuple(place) if place else tuple(map(float, centre))
             weight = bump(chart, (p[0], p[1]), self.radius)
         moves = [ng.Parameter(0.0) if isinstance(ends, tuple) else ends for ends in self.displacement]
-        strain = ng.CF(tuple(moves)) - (field.trial - field.base)
+        # a pad that always acts was glued before the body settled: each keeps the state in which it was glued
+        glued = ng.GridFunction(field.base.space)
+        glued.vec.data = field.base.vec
+        strain = ng.CF(tuple(moves)) - (field.trial - glued)
         surface = ng.ds(definedon=field.surface(self.touches), bonus_intorder=QUADRATURE)
         energy = Energy(self.pad / 2 * weight * ng.InnerProduct(strain, strain), surface)
         inputs = (*place, *(m for m in moves if isinstance(m, ng.Parameter)))

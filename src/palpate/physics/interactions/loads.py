@@ -74,7 +74,7 @@ class PointForce:
         An axis such as ``"-z"``, or three numbers, taken to length 1.
     surface : str
     element : float, optional
-        Size in m of the elements under the footprint; by default half the radius.
+        Size in m of the elements under the footprint; by default a third of the radius.
     name : str
         Name of the input.
 
@@ -121,7 +121,7 @@ class PointForce:
         mesh = geometry.rest()
         chart = self._chart(mesh)
         centre, margin = np.asarray(self.at)[list(chart.across)], MARGIN * self.radius
-        element = self.element if self.element is not None else self.radius / 2
+        element = self.element if self.element is not None else self.radius / 3
         return (chart.refinement(mesh, centre - margin, centre + margin, element),)
 
     def attach(self, field: Any) -> Attached:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.physics.geometry.checks import require_known, require_triple
+from palpate.physics.geometry.checks import require_known, require_positive, require_triple
 from palpate.physics.interactions.arguments import AXES, direction_of, interval, tag
 from palpate.physics.interactions.interaction import Attached
 from palpate.units import Range
@@ -41,8 +41,10 @@ class PrescribedDisplacement:
         Whether displacements across all eᵢ, which must then be axes, are left free; they are held at zero
         otherwise.
     within : pair of points, optional
-        Corners in m of an upright box: only elements of the surface that lie in it are moved. The edge of the
-        part is the mesh's.
+        Corners in m of an upright box: only elements of the surface that lie in it are moved.
+    element : float, optional
+        Size in m of the elements on the part that is moved. With it the mesh follows the edges of the box on plane
+        upright faces; without it the edge of the part is where the elements happen to end.
     name : str
         Put before the names of the inputs.
 
@@ -58,6 +60,7 @@ class PrescribedDisplacement:
     travel: Any = (-0.005, 0.005)
     sliding: bool = False
     within: tuple[Point, Point] | None = None
+    element: float | None = None
     name: str = ""
 
     def __post_init__(self) -> None:
@@ -78,6 +81,8 @@ class PrescribedDisplacement:
             )
         if self.within is not None:
             object.__setattr__(self, "within", _box(self.within))
+        if self.element is not None:
+            require_positive("The element on a moved surface", self.element)
 
     def ranges(self, geometry: Any) -> tuple[Range, ...]:
         """One input for each direction, in m.
@@ -97,8 +102,14 @@ class PrescribedDisplacement:
         return {"type": "PrescribedDisplacement", **asdict(self)}
 
     def refinements(self, geometry: Any) -> tuple[Refinement, ...]:
-        """None: how fine the mesh must be depends on the question."""
-        return ()
+        """Fine elements on the moved part, if their size is given."""
+        from palpate.physics.geometry.refinement import Refinement
+
+        if self.element is None:
+            return ()
+        lower, upper = self.within or (None, None)
+        require_known("surface", self.surface, geometry.surfaces)
+        return (Refinement(self.surface, self.element, lower, upper),)
 
     def attach(self, field: Any) -> Attached:
         """Its constraints on an opened body.
@@ -139,7 +150,7 @@ class PrescribedDisplacement:
             raise UsageError(
                 f"No element of the surface {self.surface!r} lies in the box {self.within} m.",
                 why="Only elements whose corners are all in the box are moved.",
-                fix="Make the box larger, or the elements smaller there.",
+                fix="Give `element`, so that the mesh follows the box, or make the box larger.",
             )
         return found
 

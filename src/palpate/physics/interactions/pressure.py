@@ -110,7 +110,9 @@ class Pressure:
             self._require_potential(field)
         origin = self.symmetry or (0.0, 0.0, 0.0)
         q = ng.Parameter(0.0)
-        volume = volume_density(field.trial, origin) - volume_density(field.base, origin)
+        start = ng.GridFunction(field.base.space)
+        start.vec.data = field.base.vec
+        volume = volume_density(field.trial, origin) - volume_density(start, origin)
         surface = ng.ds(definedon=field.surface(self.surface))
         return Attached(parameters=(q,), energies=(Energy(q * volume, surface),))
 

@@ -30,7 +30,8 @@ def free_motions(field: Any, attached: Iterable[Attached]) -> np.ndarray:
     ----------
     field : Field
     attached : iterable of Attached
-        Interactions at work, their parameters where they leave the body alone.
+        Interactions at work. The stiffness of those counts that leave the body alone where all inputs are zero, as
+        a glued pad does; a sphere holds nothing before it touches.
 
     Returns
     -------
@@ -99,11 +100,17 @@ def _null_space(rows: np.ndarray) -> np.ndarray:
     return np.asarray(right[rank:])
 
 
+def _idle_at_zero(term: Attached) -> bool:
+    zero = np.zeros(len(term.parameters))
+    start = term.approach(zero)
+    return start is not None and not start.any()
+
+
 def _stiffness(field: Any, attached: list[Attached], motions: np.ndarray) -> np.ndarray:
     """Second derivative of the interactions' energies along the motions, at rest, shape (6, 6)."""
     import ngsolve as ng
 
-    energies = [energy for term in attached for energy in term.energies]
+    energies = [energy for term in attached if _idle_at_zero(term) for energy in term.energies]
     if not energies:
         return np.zeros((6, 6))
     form = ng.BilinearForm(field.space, symmetric=True)

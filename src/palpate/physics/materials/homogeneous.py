@@ -234,11 +234,12 @@ def _relax(
         settled = np.abs(step).max(axis=1) < _TOLERANCE
         balanced = np.abs(slope).max(axis=1) < _ROUNDING * stiffest
         done = (taken > 0) & (settled | balanced)
-        if done.all():
+        volume = _volume(F, small)
+        # an energy without a minimum lets the body vanish or grow without bound
+        lost = (taken == 0) | (volume < 1e-3) | (volume > 1e3)
+        if (done | lost).all():
             break
-    volume = _volume(F, small)
-    # an energy without a minimum lets the body vanish or grow without bound
-    return F, done & (volume > 1e-3) & (volume < 1e3)
+    return F, done & ~lost
 
 
 def _descent(tangent: np.ndarray, slope: np.ndarray) -> np.ndarray:

@@ -136,9 +136,9 @@ def test_many_points_at_once_equal_one_by_one():
 
 def test_cycles_of_shear_lose_the_loss_modulus():
     """π γ² G'' per cycle at small strain;"""
-    material, frequency, steps, size = Viscoelastic(BASES[1], TERMS[:1]), 2.0, 200, 1e-3
+    material, frequency, steps, size = Viscoelastic(BASES[1], TERMS[:1]), 2.0, 160, 1e-3
     dt = 2 * math.pi / frequency / steps
-    strains = size * np.sin(frequency * dt * np.arange(6 * steps + 1))
+    strains = size * np.sin(frequency * dt * np.arange(3 * steps + 1))
     _, stresses, losses, _ = march(material, shear(strains), dt)
     last = slice(-steps - 1, None)
     shear_stress, strain = stresses[last, 0, 1], strains[last]
@@ -195,11 +195,11 @@ def test_large_cycles_of_tissue_lose_energy():
     """No theorem at large strain; over these cycles of 60 % shear and stretch the loop's work is positive."""
     material = MATERIALS[1]
     for frequency in (0.05, 1.0, 20.0):
-        phase = np.linspace(0, 8 * math.pi, 481)
+        phase = np.linspace(0, 4 * math.pi, 161)
         F = shear(0.6 * np.sin(phase))
         F[:, 0, 0] = np.exp(0.4 * np.sin(2 * phase))
         _, stresses, _, _ = march(material, F, (phase[1] - phase[0]) / frequency)
-        work = np.sum((stresses[-120:] + stresses[-121:-1]) / 2 * np.diff(F[-121:], axis=0))
+        work = np.sum((stresses[-80:] + stresses[-81:-1]) / 2 * np.diff(F[-81:], axis=0))
         assert work > 0
 
 

@@ -21,7 +21,7 @@ from palpate.physics.beam.sections import BeamMaterial, Kind, kind_of
 __all__ = ["Cantilever"]
 
 Kinematics = Literal["large", "small"]
-FIBRES = 24  # with them the moment of a half-plastic section is right to some 1e-3
+FIBRES = 48  # with them the plastic moment of a circle is right to 5e-4
 TOLERANCE = 1e-5
 
 
@@ -51,7 +51,7 @@ class Cantilever:
     strain_limit : float
         Largest fibre strain for which the material's law is believed; beyond it a solve fails.
     fibres : int, optional
-        Into how many layers a section that yields is cut, by default 24; only for such beams.
+        Into how many layers a section that yields is cut, by default 48; only for such beams.
     tolerance : float, optional
         Largest error of a step of a history, relative to the deflection and the energy, by default 1e-5; only for
         beams that remember.
@@ -153,6 +153,9 @@ class Cantilever:
         if self.kind == "plastic":
             _check(2 <= self.fibre_count <= 1000, "fibres", self.fibres, "a whole number from 2 to 1000")
             _check(hasattr(self.section, "fibres"), "section", self.section, _FIBRED)
+        if self.kind == "viscous":
+            left = self.material.prony.equilibrium  # type: ignore[attr-defined]
+            _check(left > 1e-9, "Prony series", self.material.prony, _FLOWS)  # type: ignore[attr-defined]
         _check(1e-9 <= self.step_tolerance <= 0.1, "tolerance", self.tolerance, "between 1e-9 and 0.1")
 
     def _cuts(self, span: float) -> int:
@@ -168,6 +171,7 @@ def _check_section(section: object) -> None:
         )
 
 
+_FLOWS = "one that leaves a share of the modulus in the end: the sum of the others below 1, else the beam flows away"
 _FIBRED = "a Circle or a Rectangle: one that yields is cut into fibres, and bare numbers have no shape"
 
 

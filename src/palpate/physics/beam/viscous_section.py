@@ -7,6 +7,8 @@ step, and so for held ones whatever the step.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from palpate.physics.beam.reissner import Stiffness
@@ -73,10 +75,14 @@ class ViscousSection:
 def _squared_decay(start: np.ndarray, end: np.ndarray, grown: np.ndarray, ratio: float) -> np.ndarray:
     """∫ q² ds over 0 … ratio, for q' = grown/ratio - q from `start` to `end`."""
     if ratio < SHORT:
-        return ratio * (start**2 + start * end + end**2) / 3
-    if not np.isfinite(ratio):
-        return start**2 / 2  # the strain grows so slowly that only what was there is lost
+        even: np.ndarray = ratio * (start**2 + start * end + end**2) / 3
+        return even
+    if math.isinf(ratio):
+        # the strain grows so slowly that only what was there is lost
+        faded: np.ndarray = start**2 / 2
+        return faded
     steady = grown / ratio
     fading = start - steady
-    decay = np.exp(-ratio)
-    return fading**2 * (1 - decay**2) / 2 + 2 * fading * steady * (1 - decay) + steady**2 * ratio
+    decay = math.exp(-ratio)
+    lost: np.ndarray = fading**2 * (1 - decay**2) / 2 + 2 * fading * steady * (1 - decay) + steady**2 * ratio
+    return lost

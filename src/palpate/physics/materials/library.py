@@ -1,8 +1,9 @@
 """Materials that can be asked for by name, with their sources and the strains they were fitted over.
 
-The silicones' and the fat's tests tell nothing of compressibility: a Poisson's ratio of 0.499 is set here, near enough
-to incompressible for their forces and far enough for a solver (`dataclasses.replace` gives another `bulk`). Densities
-are the manufacturer's (silicones) and that of adipose tissue in ICRU Report 44 (1989).
+The silicones' constants are those of W = μ/α (λ₁^α + λ₂^α + λ₃^α − 3). Their tests and the fat's tell nothing of
+compressibility: a Poisson's ratio of 0.499 is set here, near enough to incompressible for their forces and far enough
+for a solver (`dataclasses.replace` gives another `bulk`, or `poisson`). Densities are the manufacturer's (silicones)
+and that of adipose tissue in ICRU Report 44 (1989).
 """
 
 from __future__ import annotations
@@ -13,8 +14,12 @@ from typing import TypeVar, overload
 from palpate.errors import UsageError
 from palpate.physics.materials.linear import MATERIALS as LINEAR
 from palpate.physics.materials.material import Elastic
+from palpate.physics.materials.metals import METALS
+from palpate.physics.materials.metals import METALS
 from palpate.physics.materials.neo_hooke import NeoHookean
 from palpate.physics.materials.ogden import Ogden
+from palpate.physics.materials.viscous import Viscoelastic
+from palpate.physics.materials.viscous import Viscoelastic
 
 __all__ = ["MATERIALS", "named_material"]
 
@@ -22,7 +27,7 @@ L = TypeVar("L", bound=Elastic)
 
 _NEARLY = 0.499
 _MARECHAL = "fitted to Marechal et al. 2020, doi 10.1089/soro.2019.0115, uniaxial tension, strain 5 to 100 %"
-_SIMS = "Sims et al. 2010, porcine subdermal fat, instantaneous shear modulus of its viscoelastic law"
+_SIMS = "Sims et al. 2010: shear modulus 0.53 kPa, taken as the instantaneous one; one Prony term of 0.39 and 700 s"
 
 # name, density, C10 and Ogden's μ and α, in SI units
 _ECOFLEX = (
@@ -43,6 +48,10 @@ def _ogden(name: str, density: float, mu: float, alpha: float) -> Ogden:
     return Ogden.with_poisson(_NEARLY, mu=mu, alpha=alpha, density=density, name=name, source=_MARECHAL)
 
 
+_FAT = _gaussian("porcine fat", 950.0, 0.53e3 / 2, _SIMS)
+
+_FAT = _gaussian("porcine fat", 950.0, 0.53e3 / 2, _SIMS)
+
 MATERIALS: dict[str, Elastic] = {
     material.name: material
     for material in (
@@ -50,7 +59,9 @@ MATERIALS: dict[str, Elastic] = {
         *(_ogden(name, rho, mu, alpha) for name, rho, _, mu, alpha in _ECOFLEX),
         *(_gaussian(f"{name} neo-hookean", rho, c10, _MARECHAL) for name, rho, c10, _, _ in _ECOFLEX),
         *(_ogden(*row) for row in _DRAGON_SKIN),
-        _gaussian("porcine fat", 950.0, 0.53e3 / 2, _SIMS),
+        _FAT,
+        Viscoelastic(_FAT, ((0.39, 700.0),), name="porcine fat viscoelastic"),
+        *METALS.values(),
     )
 }
 """Materials that can be asked for by name."""

@@ -11,6 +11,7 @@ contact      a sphere's contact energy, and whether a state is admissible
 columns      in which order a sphere's positions are solved
 patch        a touched surface as triangles
 footprint    the bump under a glued pad or a point force
+pads         how much of what a hand feels is the pad
 rigid        whether a body is held
 arguments    directions and ranges, checked
 """
@@ -18,6 +19,7 @@ arguments    directions and ranges, checked
 from palpate.physics.interactions.glued import GluedPad
 from palpate.physics.interactions.interaction import Attached, Energy, Field, Held, Interaction, Planned
 from palpate.physics.interactions.loads import BodyForce, PointForce, SurfaceTraction
+from palpate.physics.interactions.pads import PadShare, pad_share
 from palpate.physics.interactions.prescribed import PrescribedDisplacement
 from palpate.physics.interactions.pressure import Pressure
 from palpate.physics.interactions.rigid import free_motions, require_held
@@ -31,6 +33,7 @@ __all__ = [
     "GluedPad",
     "Held",
     "Interaction",
+    "PadShare",
     "Planned",
     "PointForce",
     "PrescribedDisplacement",
@@ -38,5 +41,6 @@ __all__ = [
     "SphereProbe",
     "SurfaceTraction",
     "free_motions",
+    "pad_share",
     "require_held",
 ]

@@ -7,6 +7,9 @@
     linear, st_venant, neo_hooke, mooney_rivlin, ogden, yeoh, fibres    elastic laws, one a file
     isochoric      what the laws of constant volume share
     user           one's own law, from one function
+    viscous, prony, dashpots, scaled    Prony viscoelasticity over an elastic law
+    plastic, hardening, metals          J2 plasticity, how a metal hardens, metals by name
+    uniaxial       laws of single fibres, for beams
     homogeneous    uniaxial, equibiaxial, planar, shear and volumetric tests
     stability      Drucker's criterion over a range of strains
     library        materials by name, with sources
@@ -15,15 +18,19 @@ A law is one expression, a function of the deformation gradient, that NumPy and 
 """
 
 from palpate.physics.materials.fibres import FibreFamily, FibreReinforced
+from palpate.physics.materials.hardening import LinearHardening, VoceHardening
 from palpate.physics.materials.library import MATERIALS, named_material
 from palpate.physics.materials.linear import LinearElastic
 from palpate.physics.materials.material import Elastic, Material, StateVariable, Volumetric
 from palpate.physics.materials.mooney_rivlin import MooneyRivlin
 from palpate.physics.materials.neo_hooke import NeoHookean
 from palpate.physics.materials.ogden import Ogden
+from palpate.physics.materials.plastic import Plastic
+from palpate.physics.materials.prony import Prony
 from palpate.physics.materials.st_venant import StVenantKirchhoff
 from palpate.physics.materials.stability import ModeStability, Stability
 from palpate.physics.materials.user import UserMaterial
+from palpate.physics.materials.viscous import Viscoelastic
 from palpate.physics.materials.yeoh import Yeoh
 
 __all__ = [
@@ -32,15 +39,20 @@ __all__ = [
     "FibreFamily",
     "FibreReinforced",
     "LinearElastic",
+    "LinearHardening",
     "Material",
     "ModeStability",
     "MooneyRivlin",
     "NeoHookean",
     "Ogden",
+    "Plastic",
+    "Prony",
     "StVenantKirchhoff",
     "Stability",
     "StateVariable",
     "UserMaterial",
+    "Viscoelastic",
+    "VoceHardening",
     "Volumetric",
     "Yeoh",
     "named_material",

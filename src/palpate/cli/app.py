@@ -202,6 +202,21 @@ def view(
 
 
 @app.command()
+def show(
+    file: Annotated[
+        Path, typer.Argument(help="A .vtu or .pvd file, or the .zarr folder of a solid's sweep.")
+    ],
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the page.")] = 8080,
+    strict_port: Annotated[bool, typer.Option("--strict-port", help="Fail where the port is busy.")] = False,
+    browser: Browser = True,
+) -> None:
+    """Serve a page on which solved bodies are looked at: deformed, coloured, state by state."""
+    from palpate.viewer import show as show_body
+
+    show_body(file, port=port, strict_port=strict_port, open_browser=browser and sys.stdout.isatty())
+
+
+@app.command()
 def run(
     model: ModelFile,
     seconds: Annotated[float, typer.Option(min=0.1, help="How long.")] = 5.0,

@@ -1,4 +1,4 @@
-"""In the eye: one page that shows the body deform and lets a hand pull on it.
+"""In the eye: a page that shows the body deform and lets a hand pull on it, and one to look at solved bodies.
 
 ==============  ====================================================================================
 `server`        `serve` and `Viewer`: the page, its websocket and the real-time process behind them
@@ -8,6 +8,9 @@
 `hands`         which of several pages holds the hand
 `picture`       from a published tick to a frame, including the spring-back after release
 `session`       the pages of one server: credits, frames, heartbeats
+`showing`       `show` and `BodyViewer`: the page of a solved body
+`bodies`        from solutions to plain arrays; `files`: from VTU, PVD and datasets; `surfaces`: their skin
+`running`       a web application in a thread of its own
 `guard`         Host, Origin and content-security rules
 `ports`         a free port on this machine
 ``client/``     the page's sources (TypeScript, three.js); ``static/`` is what they build to
@@ -25,8 +28,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from palpate.viewer.ports import free_port
     from palpate.viewer.server import Viewer, serve
+    from palpate.viewer.showing import BodyViewer, show
 
-__all__ = ["Viewer", "free_port", "serve"]
+__all__ = ["BodyViewer", "Viewer", "free_port", "serve", "show"]
 
 
 def __getattr__(name: str) -> Any:
@@ -35,6 +39,10 @@ def __getattr__(name: str) -> Any:
         from palpate.viewer import server
 
         return getattr(server, name)
+    if name in {"BodyViewer", "show"}:
+        from palpate.viewer import showing
+
+        return getattr(showing, name)
     if name == "free_port":
         from palpate.viewer.ports import free_port
 

@@ -11,6 +11,9 @@ The conversation, over one websocket at ``/touch``:
 4. Only one page holds the hand at a time; `Frame.hold` tells each page where it stands.
 5. Rare events in plain words are `Notice` (JSON).
 
+A body that is only looked at needs no conversation: its page asks for `Shown` (JSON) at ``/shown``, for `Surface` at
+``/surface`` and for each `Step` when it is wanted at ``/steps/N``. There z is up.
+
 Frames, signs and units: x along the beam, y up, z towards the viewer; metres, newtons, seconds;
 displacements are offsets from rest; force is the force *on the hand*.
 
@@ -31,6 +34,7 @@ from palpate.viewer.wire import Binary, Json, Wire
 __all__ = [
     "PROTOCOL",
     "Credit",
+    "FieldInfo",
     "Frame",
     "Hand",
     "Hello",
@@ -38,6 +42,10 @@ __all__ = [
     "Loop",
     "Notice",
     "RangeInfo",
+    "Shown",
+    "Step",
+    "StepInfo",
+    "Surface",
 ]
 
 PROTOCOL = 1  # a page of another protocol reloads itself
@@ -119,6 +127,34 @@ class Credit(Binary):
     frames: Annotated[int, Wire("u16", "how many more")]
 
 
+@dataclass(frozen=True, eq=False)
+class Surface(Binary):
+    """The surface of a body at rest, server to page. Points are split along sharp edges."""
+
+    KIND: ClassVar[int] = 4
+
+    rest: Annotated[np.ndarray, Wire("floats", "m, x y z of each point")]
+    triangles: Annotated[np.ndarray, Wire("floats", "three points each; exact up to 16 million")]
+    creases: Annotated[np.ndarray, Wire("floats", "two points for each sharp edge")]
+    fixed: Annotated[np.ndarray, Wire("floats", "two points for each edge around the fixed surfaces")]
+
+
+@dataclass(frozen=True, eq=False)
+class Step(Binary):
+    """One state of a body, server to page."""
+
+    KIND: ClassVar[int] = 5
+
+    index: Annotated[int, Wire("u32", "place in Shown.steps")]
+    probed: Annotated[bool, Wire("flag", "a probe touches the body")]
+    centre: Annotated[Vec3, Wire("vec3", "m, of the probe")]
+    radius: Annotated[float, Wire("f32", "m, of the probe")]
+    displacement: Annotated[np.ndarray, Wire("floats", "m, x y z of each point of the surface")]
+    values: Annotated[
+        np.ndarray, Wire("floats", "all points' values of the first of Shown.fields, then the next")
+    ]
+
+
 @dataclass(frozen=True)
 class RangeInfo:
     """A named interval."""
@@ -178,6 +214,45 @@ class Hello(Json):
     rate: float
     faults: tuple[str, ...]
     meta: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class FieldInfo:
+    """A quantity that colours a body, and its range over all steps."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class StepInfo:
+    """What is known of a state in words and figures."""
+
+    label: str
+    figures: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Shown(Json):
+    """A body to look at, server to page.
+
+    Attributes
+    ----------
+    protocol : int
+    name : str
+    fields : quantities to colour by; the first is the displacement
+    steps : its states, in order
+    reach : float
+        Largest displacement of all states, m.
+    """
+
+    protocol: int
+    name: str
+    fields: tuple[FieldInfo, ...]
+    steps: tuple[StepInfo, ...]
+    reach: float
 
 
 @dataclass(frozen=True)

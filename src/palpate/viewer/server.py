@@ -12,34 +12,27 @@ import asyncio
 import contextlib
 import functools
 import os
-import signal
 import sys
 import tempfile
-import threading
 import webbrowser
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-import uvicorn
 from starlette.applications import Starlette
 from starlette.middleware import Middleware
 from starlette.routing import Mount, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 
-from palpate.errors import DeviceError
 from palpate.runtime import LoopProcess
 from palpate.surrogates import TouchModel
 from palpate.viewer.guard import Guard
 from palpate.viewer.ports import listen
+from palpate.viewer.running import STATIC, Running, address, termination_interrupts
 from palpate.viewer.session import Session
 
 __all__ = ["Viewer", "application", "serve"]
-
-STATIC = Path(__file__).parent / "static"
-LARGEST_MESSAGE = 4096  # bytes from a page; a Hand with eight parameters has 79
-START = 10.0  # s until the server must listen
 
 
 def application(session: Session) -> Starlette:
@@ -116,7 +109,7 @@ class Viewer:
     @property
     def url(self) -> str:
         """The page's address."""
-        return f"http://{f'[{self.host}]' if ':' in self.host else self.host}:{self.port}/"
+        return address(self.host, self.port)
 
     def start(self) -> Self:
         """Start the real-time process and the server; the page can be opened when this returns.
@@ -136,13 +129,8 @@ class Viewer:
             self.port = int(socket.getsockname()[1])
             path = self._written() if self._path is None else self._path
             self.loop = self._closing.enter_context(self._loop(path))
-            server = _server(Session(self.model, self.loop))
-            self._thread = threading.Thread(
-                target=server.run, args=([socket],), name="palpate viewer", daemon=True
-            )
-            self._thread.start()
-            self._closing.callback(self._end, server)
-            self._await(server)
+            page = application(Session(self.model, self.loop))
+            self._running = self._closing.enter_context(Running(page, socket))
         except BaseException:
             self.stop()
             raise
@@ -154,31 +142,12 @@ class Viewer:
 
     def wait(self) -> None:
         """Return when the server has ended."""
-        while self._thread.is_alive():
-            self._thread.join(0.5)  # in steps: a join without end can't be interrupted on every system
+        self._running.wait()
 
     def _written(self) -> Path:
         """A file of the model, which the real-time process can read."""
         folder = self._closing.enter_context(tempfile.TemporaryDirectory(prefix="palpate-"))
         return self.model.save(Path(folder) / "model.palpate")
-
-    def _await(self, server: uvicorn.Server) -> None:
-        deadline = threading.Event()
-        for _ in range(int(START / 0.01)):
-            if server.started:
-                return
-            if not self._thread.is_alive():
-                break
-            deadline.wait(0.01)
-        raise DeviceError(
-            "The viewer's server did not start.",
-            why="Its thread ended or hangs; the log of 'uvicorn.error' says more.",
-            fix="Try another port, or see `palpate doctor`.",
-        )
-
-    def _end(self, server: uvicorn.Server) -> None:
-        server.should_exit = True
-        self._thread.join()
 
     def __enter__(self) -> Self:
         return self.start()
@@ -216,7 +185,7 @@ def serve(
     viewer = Viewer(
         model, port=port, host=host, device=device, rate=rate, max_force=max_force, strict_port=strict_port
     )
-    with _termination_interrupts(), contextlib.suppress(KeyboardInterrupt), viewer:
+    with termination_interrupts(), contextlib.suppress(KeyboardInterrupt), viewer:
         (on_ready or _announce)(viewer)
         if open_browser:
             webbrowser.open(viewer.url)
@@ -226,31 +195,3 @@ def serve(
 def _announce(viewer: Viewer) -> None:
     sys.stderr.write(f"{viewer.url} shows {viewer.model.name}. Pull the tip; Ctrl-C ends it.\n")
     sys.stderr.flush()
-
-
-@contextlib.contextmanager
-def _termination_interrupts() -> Iterator[None]:
-    """SIGTERM ends like Ctrl-C: in good order, with the real-time process stopped and its memory freed."""
-    if threading.current_thread() is not threading.main_thread():
-        yield  # only the main thread may set signal handlers
-        return
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
-
-
-def _server(session: Session) -> uvicorn.Server:
-    return uvicorn.Server(
-        uvicorn.Config(
-            application(session),
-            log_config=None,  # the program that embeds us decides on logging
-            access_log=False,
-            ws="websockets-sansio",
-            ws_max_size=LARGEST_MESSAGE,
-            ws_per_message_deflate=False,  # frames are small, and packing them would cost more than sending
-            timeout_graceful_shutdown=1,
-            server_header=False,
-        )
-    )

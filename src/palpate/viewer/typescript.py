@@ -13,9 +13,15 @@ from palpate.viewer.wire import CODES, Binary, Json, Wire
 
 __all__ = ["generate"]
 
-BINARY: tuple[type[Binary], ...] = (messages.Frame, messages.Hand, messages.Credit)
-JSON: tuple[type[Json], ...] = (messages.Hello, messages.Notice)
-RECORDS: tuple[type, ...] = (messages.RangeInfo,)
+BINARY: tuple[type[Binary], ...] = (
+    messages.Frame,
+    messages.Hand,
+    messages.Credit,
+    messages.Surface,
+    messages.Step,
+)
+JSON: tuple[type[Json], ...] = (messages.Hello, messages.Notice, messages.Shown)
+RECORDS: tuple[type, ...] = (messages.RangeInfo, messages.FieldInfo, messages.StepInfo)
 ENUMS: tuple[type[IntEnum], ...] = (messages.Loop, messages.Hold)
 
 # wire type → TypeScript type, DataView suffix, bytes of one number

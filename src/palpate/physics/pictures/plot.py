@@ -15,7 +15,7 @@ from palpate.physics.pictures.picture import Picture
 from palpate.physics.pictures.render import SMOOTHING, Layer, body_layer, composed, palette
 from palpate.physics.pictures.scales import round125, scaled
 from palpate.physics.pictures.skin import clip, corner_normals, section, section_lines, with_flat_normals
-from palpate.physics.pictures.tool import Ball, ball_of, fixed_of
+from palpate.physics.pictures.tool import Ball, ball_of, fixed_of, require_state
 
 __all__ = ["plot_solution"]
 
@@ -33,7 +33,7 @@ def plot_solution(
     *,
     scale: float = 1.0,
     path: str | os.PathLike[str] | None = None,
-    probe: bool | tuple[Any, float] = True,
+    probe: Any = True,
     fixed: tuple[str, ...] | None = None,
     cut: str | Plane | None = None,
     limits: tuple[float, float] | None = None,
@@ -57,7 +57,7 @@ def plot_solution(
         Displacement as drawn over true displacement.
     path : path, optional
         File to write at once.
-    probe : bool or ((x, y, z), radius)
+    probe : bool, SphereProbe or ((x, y, z), radius)
         Whether the solution's probe is drawn where it is, or which sphere.
     fixed : tuple of str, optional
         Surfaces to mark as fixed, by default those that the solution knows of.
@@ -82,8 +82,9 @@ def plot_solution(
     Raises
     ------
     UsageError
-        For an unknown colour or plane, or stresses that were not computed.
+        For an unknown colour or plane, stresses that were not computed, or a solution that did not converge.
     """
+    require_state(solution)
     shown = nodal_field(solution, colour) if colour is not None else None
     sphere = ball_of(solution, probe)
     body = _Body(solution, scale, shown, _plane(solution.mesh, cut))

@@ -19,7 +19,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.physics.pictures.fields import largest_stretch_strain
-from palpate.physics.pictures.tool import ball_of
+from palpate.physics.pictures.tool import ball_of, require_state
 
 __all__ = ["write_pvd", "write_vtu"]
 
@@ -50,8 +50,9 @@ def write_vtu(solution: Any, path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     UsageError
-        If the file can't be written.
+        If the solution did not converge, or the file can't be written.
     """
+    require_state(solution)
     mesh = solution.mesh
     sections = [
         _section("FieldData", _metadata(solution)),

@@ -45,17 +45,18 @@ export function outline(extent: Extent, low: Vector3, high: Vector3): Vector3[] 
   return points;
 }
 
-/** Place the camera so that the points fill the free part of the canvas; where it looks. */
+/** Place the camera in direction `from` so that the points fill the free part of the canvas; where it looks. */
 export function fit(
   camera: PerspectiveCamera,
   size: Size,
   room: Free,
   points: Vector3[],
+  from = FRONT,
 ): { centre: Vector3; distance: number } {
   const centre = points.reduce((sum, p) => sum.add(p), new Vector3()).divideScalar(points.length);
   let distance = 3 * Math.max(...points.map((p) => p.distanceTo(centre)));
   const look = (): Free => {
-    camera.position.copy(centre).addScaledVector(FRONT, distance);
+    camera.position.copy(centre).addScaledVector(from, distance);
     camera.lookAt(centre);
     camera.updateMatrixWorld();
     return around(points.map((point) => project(camera, size, point)));

@@ -27,6 +27,20 @@ export interface RangeInfo {
   unit: string;
 }
 
+/** A quantity that colours a body, and its range over all steps. */
+export interface FieldInfo {
+  name: string;
+  unit: string;
+  low: number;
+  high: number;
+}
+
+/** What is known of a state in words and figures. */
+export interface StepInfo {
+  label: string;
+  figures: Record<string, unknown>;
+}
+
 /** The body and the loop, once per connection, server to page. */
 export interface Hello {
   protocol: number;
@@ -54,12 +68,25 @@ export interface Notice {
   fix: string;
 }
 
+/** A body to look at, server to page. */
+export interface Shown {
+  protocol: number;
+  name: string;
+  fields: FieldInfo[];
+  steps: StepInfo[];
+  reach: number;
+}
+
 export function isHello(message: { kind: string }): message is Hello & { kind: string } {
   return message.kind === "Hello";
 }
 
 export function isNotice(message: { kind: string }): message is Notice & { kind: string } {
   return message.kind === "Notice";
+}
+
+export function isShown(message: { kind: string }): message is Shown & { kind: string } {
+  return message.kind === "Shown";
 }
 
 export const FRAME = 1;
@@ -264,5 +291,127 @@ export function decodeCredit(buffer: ArrayBuffer): Credit {
   const view = new DataView(buffer);
   return {
     frames: view.getUint16(1, true),
+  };
+}
+
+export const SURFACE = 4;
+
+/** The surface of a body at rest, server to page. Points are split along sharp edges. */
+export interface Surface {
+  /** m, x y z of each point */
+  rest: Float32Array;
+  /** three points each; exact up to 16 million */
+  triangles: Float32Array;
+  /** two points for each sharp edge */
+  creases: Float32Array;
+  /** two points for each edge around the fixed surfaces */
+  fixed: Float32Array;
+}
+
+export function encodeSurface(m: Surface): ArrayBuffer {
+  const view = new DataView(new ArrayBuffer(1 + 4 + 4 * m.rest.length + 4 + 4 * m.triangles.length + 4 + 4 * m.creases.length + 4 + 4 * m.fixed.length));
+  view.setUint8(0, 4);
+  let at = 1;
+  view.setUint32(at, m.rest.length, true);
+  at += 4;
+  for (const value of m.rest) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
+  view.setUint32(at, m.triangles.length, true);
+  at += 4;
+  for (const value of m.triangles) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
+  view.setUint32(at, m.creases.length, true);
+  at += 4;
+  for (const value of m.creases) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
+  view.setUint32(at, m.fixed.length, true);
+  at += 4;
+  for (const value of m.fixed) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
+  return view.buffer;
+}
+
+export function decodeSurface(buffer: ArrayBuffer): Surface {
+  const view = new DataView(buffer);
+  const restAt = 1;
+  const restEnd = restAt + 4 + 4 * view.getUint32(restAt, true);
+  const trianglesAt = restEnd;
+  const trianglesEnd = trianglesAt + 4 + 4 * view.getUint32(trianglesAt, true);
+  const creasesAt = trianglesEnd;
+  const creasesEnd = creasesAt + 4 + 4 * view.getUint32(creasesAt, true);
+  const fixedAt = creasesEnd;
+  const fixedEnd = fixedAt + 4 + 4 * view.getUint32(fixedAt, true);
+  return {
+    rest: new Float32Array(buffer.slice(restAt + 4, restEnd)),
+    triangles: new Float32Array(buffer.slice(trianglesAt + 4, trianglesEnd)),
+    creases: new Float32Array(buffer.slice(creasesAt + 4, creasesEnd)),
+    fixed: new Float32Array(buffer.slice(fixedAt + 4, fixedEnd)),
+  };
+}
+
+export const STEP = 5;
+
+/** One state of a body, server to page. */
+export interface Step {
+  /** place in Shown.steps */
+  index: number;
+  /** a probe touches the body */
+  probed: boolean;
+  /** m, of the probe */
+  centre: Vec3;
+  /** m, of the probe */
+  radius: number;
+  /** m, x y z of each point of the surface */
+  displacement: Float32Array;
+  /** all points' values of the first of Shown.fields, then the next */
+  values: Float32Array;
+}
+
+export function encodeStep(m: Step): ArrayBuffer {
+  const view = new DataView(new ArrayBuffer(22 + 4 + 4 * m.displacement.length + 4 + 4 * m.values.length));
+  view.setUint8(0, 5);
+  view.setUint32(1, m.index, true);
+  view.setUint8(5, m.probed ? 1 : 0);
+  view.setFloat32(6, m.centre[0], true);
+  view.setFloat32(10, m.centre[1], true);
+  view.setFloat32(14, m.centre[2], true);
+  view.setFloat32(18, m.radius, true);
+  let at = 22;
+  view.setUint32(at, m.displacement.length, true);
+  at += 4;
+  for (const value of m.displacement) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
+  view.setUint32(at, m.values.length, true);
+  at += 4;
+  for (const value of m.values) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
+  return view.buffer;
+}
+
+export function decodeStep(buffer: ArrayBuffer): Step {
+  const view = new DataView(buffer);
+  const displacementAt = 22;
+  const displacementEnd = displacementAt + 4 + 4 * view.getUint32(displacementAt, true);
+  const valuesAt = displacementEnd;
+  const valuesEnd = valuesAt + 4 + 4 * view.getUint32(valuesAt, true);
+  return {
+    index: view.getUint32(1, true),
+    probed: view.getUint8(5) !== 0,
+    centre: [view.getFloat32(6, true), view.getFloat32(10, true), view.getFloat32(14, true)],
+    radius: view.getFloat32(18, true),
+    displacement: new Float32Array(buffer.slice(displacementAt + 4, displacementEnd)),
+    values: new Float32Array(buffer.slice(valuesAt + 4, valuesEnd)),
   };
 }

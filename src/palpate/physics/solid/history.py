@@ -25,21 +25,42 @@ class History:
     material : Material
     step : ngsolve.Parameter
         Length of the time step in s.
+
+    Attributes
+    ----------
+    arguments : tuple
+        State and time step, as the material's energy takes them.
+    rules : mapping
+        The quadrature, by element type.
+    stored : ngsolve.CoefficientFunction or None
+        Free energy density in J/m³ with the present state, where the law tells it.
     """
 
     def __init__(self, field: SolidField, region: str, material: Material, step: Any) -> None:
         import ngsolve
         from ngsolve.comp import IntegrationRuleSpace
 
-        points = IntegrationRuleSpace(field.mesh, order=2 * field.order)
-        self.rules = points.GetIntegrationRules()
+        # its rule is exact to twice this order, as is that of a body without a history
+        points = IntegrationRuleSpace(field.mesh, order=field.order - 1)
         self._region = field.region(region)
         self._variables = material.states
         spaces = {v.name: ngsolve.MatrixValued(points) if v.shape else points for v in self._variables}
         self._values = {name: ngsolve.GridFunction(space) for name, space in spaces.items()}
         self._next = {name: ngsolve.GridFunction(space) for name, space in spaces.items()}
-        self.arguments = (dict(self._values), step)
-        self._advance = material.advance(deformation_gradient(field.displacement), *self.arguments)
+        self.rules = points.GetIntegrationRules()
+        known = (dict(self._values), step)
+        self._advance = material.advance(deformation_gradient(field.displacement), *known)
+        # what a law can make of its state before a step is kept too, instead of evaluated in each iteration
+        prepare = getattr(material, "prepare", None)
+        self._recipes = prepare(*known) if prepare is not None else {}
+        self._prepared = {
+            name: ngsolve.GridFunction(ngsolve.MatrixValued(points) if value.dim == 9 else points)
+            for name, value in self._recipes.items()
+        }
+        self.arguments = (dict(self._prepared), step) if self._recipes else known
+        stored = getattr(material, "stored", None)
+        gradient = deformation_gradient(field.displacement)
+        self.stored = None if stored is None else stored(gradient, dict(self._values))
         self.reset()
 
     def reset(self) -> None:
@@ -50,6 +71,11 @@ class History:
             initial = tuple(np.ravel(variable.initial).tolist())
             value = ngsolve.CF(initial, dims=variable.shape) if variable.shape else ngsolve.CF(initial[0])
             self._values[variable.name].Interpolate(value, definedon=self._region)
+
+    def begin(self) -> None:
+        """Get ready for a step of the present length."""
+        for name, value in self._recipes.items():
+            self._prepared[name].Interpolate(value, definedon=self._region)
 
     def advance(self) -> None:
         """Take over the internal variables at the end of the step that led to the field's displacement."""

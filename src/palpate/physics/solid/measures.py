@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.physics.solid.density import cauchy_stress, deformation_gradient
+from palpate.physics.solid.density import cauchy_stress, deformation_gradient, mixed_density
 
 if TYPE_CHECKING:
     from palpate.physics.materials.material import Material
@@ -50,6 +50,29 @@ class Measures:
         both = np.concatenate([np.sqrt(np.maximum(squares, 0)) - 1, strains])
         return float(np.abs(both).max())
 
+    def stored_energy(self) -> float:
+        """Free energy in J, with the internal variables as they are."""
+        import ngsolve
+
+        total = 0.0
+        for region, material in self._materials.items():
+            history = self._histories.get(region)
+            if history is not None and history.stored is not None:
+                symbol = ngsolve.dx(definedon=self._field.region(region), intrules=history.rules)
+                total += ngsolve.Integrate(history.stored * symbol, self._field.mesh)
+            else:
+                density = self._density(region, material)
+                symbol = ngsolve.dx(definedon=self._field.region(region))
+                total += ngsolve.Integrate(density * symbol, self._field.mesh)
+        return float(total)
+
+    def _density(self, region: str, material: Material) -> Any:
+        """Energy density in J/m³ of the state under inspection."""
+        pressure = self._field.pressure.get(region)
+        if pressure is None:
+            return material.energy(self._gradient)
+        return mixed_density(material, self._gradient, pressure)
+
     def von_mises(self) -> np.ndarray:
         """von Mises' equivalent of the Cauchy stress in Pa at the nodes, shape (node,)."""
         import ngsolve
@@ -82,8 +105,8 @@ class Measures:
         """F at the quadrature points of all regions of large or of small strain, shape (N, 3, 3)."""
         import ngsolve
 
-        # the rule of the energy itself: twice the order of the displacement
-        rule = ngsolve.IntegrationRule(ngsolve.ET.TET, 2 * self._field.order)
+        # NGSolve's rule for the energy itself, exact for products of two strains
+        rule = ngsolve.IntegrationRule(ngsolve.ET.TET, 2 * (self._field.order - 1))
         found = [np.empty((0, 9))]
         for region, material in self._materials.items():
             if (material.kinematics == "large") == large:

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 __all__ = ["Constant", "SolidModel"]
 
 FLOOR = 1e-14  # J that count as nothing, over shear modulus times volume
+SMALL = 1e-6  # share of the largest energy on the way that still counts
+INSTANT = 1e-9  # s; so short that nothing relaxes
 STEP_LIMIT = 12  # factorisations in one load step: more are cheaper in two halves
 
 
@@ -50,6 +52,15 @@ class SolidModel:
     tolerance : float
         Relative error in the energy norm.
     measures : Measures
+    time_step : ngsolve.Parameter
+        Duration of a load step in s.
+
+    Attributes
+    ----------
+    duration : float
+        Of the whole path that is followed, in s.
+    base_energy : float
+        What `energies` gives of the base state, in J.
     """
 
     def __init__(
@@ -63,7 +74,9 @@ class SolidModel:
         solver: str,
         tolerance: float,
         measures: Measures,
+        time_step: Any,
     ) -> None:
+        self.duration, self._time_step = 0.0, time_step
         self.field, self.base, self.histories, self.measures = field, base, histories, measures
         self.inputs = Inputs(field, varied)
         self._tolerance = tolerance
@@ -76,25 +89,51 @@ class SolidModel:
         self._materials = System(field, materials, ~self._given, solver)
         energies = [*materials, *(energy for part in parts for energy in part.energies)]
         self.system = System(field, energies, ~self._given, solver)
-        self.scale = Scale(0.0, FLOOR * measures.shear_modulus * measures.volume)
+        self.base_energy = 0.0
+        self._floor = FLOOR * measures.shear_modulus * measures.volume
+        self.scale = Scale(0.0, self._floor)
         self._tangent = False
 
     def measure_from_base(self) -> None:
         """Measure energies from the base state; the inputs must leave the body alone."""
-        self.scale = Scale(self.system.potential(self.base), self.scale.floor)
+        self.begin(0.0)
+        self.scale = Scale(self.system.potential(self.base), self._floor)
+        self.base_energy = self.energies(self.base)[1]
 
     def set(self, q: np.ndarray) -> None:
         """Make q (n,) the inputs."""
         self.inputs.set(q)
         self.system.load = self._load + q @ self.inputs.loads
 
+    def begin(self, share: float) -> None:
+        """Get ready for a load step that takes a share of the duration."""
+        if self.histories:
+            self._time_step.Set(max(share * self.duration, INSTANT))
+            for history in self.histories.values():
+                history.begin()
+
+    def commit(self, z: np.ndarray) -> None:
+        """Take over the internal variables at the end of a step that led to z (dof,)."""
+        self.field.show(z)
+        for history in self.histories.values():
+            history.advance()
+
     def impose(self, z: np.ndarray, q: np.ndarray) -> np.ndarray:
         """Unknowns z (dof,) with the given ones as the inputs want them."""
         return np.where(self._given, self.base + q @ self.inputs.lifts, z)
 
-    def strain_energy(self, z: np.ndarray) -> float:
-        """∫ W dV in J."""
-        return self._materials.potential(z)
+    def energies(self, z: np.ndarray) -> tuple[float, float]:
+        """Strain energy ∫ W dV in J, and that plus the interactions' energies less the loads' potential.
+
+        For a material with a history W is the free energy, with the internal variables as they are now: the
+        density that is minimised in a step is no stored energy.
+        """
+        self.field.show(z)
+        least, strain = self.system.potential(z), self._materials.potential(z)
+        if not any(history.stored is not None for history in self.histories.values()):
+            return strain, least
+        stored = self.measures.stored_energy()
+        return stored, least - strain + stored
 
     def search(self, q: np.ndarray, guess: np.ndarray) -> Found:
         """Equilibrium under inputs q near a guess (dof,)."""
@@ -103,6 +142,10 @@ class SolidModel:
             self.system, guess, self.scale, self._tolerance, STEP_LIMIT, fresh=not self._tangent
         )
         self._tangent = self._tangent or found.iterations > 0
+        if found.stop is Stop.CONVERGED:
+            # where the energy passes zero, it is measured by what it was before
+            reached = SMALL * abs(self.system.potential(found.z) - self.scale.reference)
+            self.scale = Scale(self.scale.reference, max(self.scale.floor, reached))
         return found
 
     def sensitivity(self, z: np.ndarray) -> np.ndarray | None:

@@ -32,7 +32,7 @@ CHORDS = 12  # chord steps with one tangent
 
 @dataclass(frozen=True)
 class Scale:
-    """What energies are measured by: J above `reference`, at least `floor`."""
+    """What energies are measured by: J from `reference`, at least `floor`."""
 
     reference: float
     floor: float
@@ -127,9 +127,11 @@ class _Iteration:
         point = _Point(start, potential, residual, np.zeros(0), math.inf)
         if not fresh:
             point = self._chord_steps(self._measured(point))
-        while point.error > self._tolerance:
+        last = math.inf
+        while point.error > self._tolerance and not 0.25 * last < point.error < ROUND_OFF:
             if self._iterations == limit:
                 return self._end(point.z, Stop.ITERATION_LIMIT, point.error)
+            last = point.error
             advanced = self._newton_step(point)
             if isinstance(advanced, Stop):
                 return self._end(point.z, advanced, point.error)

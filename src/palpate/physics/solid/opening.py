@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -32,14 +31,11 @@ class Opened:
     Attributes
     ----------
     model : SolidModel
-    time_step : ngsolve.Parameter
-        Duration of a step in s.
     settled : Followed or None
         How the base state was found, if the body has constant loads.
     """
 
     model: SolidModel
-    time_step: Any
     settled: Followed | None
 
 
@@ -63,27 +59,26 @@ def open_problem(problem: SolidProblem, solver: str, tolerance: float) -> Opened
     base, settled = rest, None
 
     def model(constants: list[Constant], varied: list[Attached], base: np.ndarray) -> SolidModel:
-        return SolidModel(field, energies, histories, constants, varied, base, solver, tolerance, measures)
+        return SolidModel(
+            field, energies, histories, constants, varied, base, solver, tolerance, measures, time_step
+        )
 
     if constants:
-        settled = _settle(
-            model([], [constant.attached for constant in constants], rest), constants, histories
-        )
+        settled = _settle(model(constants=[], varied=[c.attached for c in constants], base=rest), constants)
         base = settled.last.z
         field.settle(base)
     varied = [interaction.attach(field) for interaction in problem.interactions]
-    return Opened(model(constants, varied, base), time_step, settled)
+    return Opened(model(constants, varied, base), settled)
 
 
-def _settle(model: SolidModel, constants: list[Constant], histories: Mapping[str, History]) -> Followed:
+def _settle(model: SolidModel, constants: list[Constant]) -> Followed:
     """The body under its constant loads, brought up from nothing."""
     target = np.concatenate([constant.values for constant in constants])
     start = model.approach(target)
     start = np.zeros_like(target) if start is None else start
+    model.duration = SETTLED
     found = follow(model, Known(start, model.impose(model.base, start)), target)
-    model.field.show(found.last.z)
-    for history in histories.values():
-        history.advance()
+    model.commit(found.last.z)
     return found
 
 

@@ -99,6 +99,9 @@ class Followed:
 def follow(model: SolidModel, start: Known, target: np.ndarray) -> Followed:
     """Follow the equilibrium from `start` along a straight line of inputs to `target` (n,).
 
+    Internal variables are taken over after each step but the last: what belongs to the last one can then still be
+    asked of the model.
+
     Parameters
     ----------
     model : SolidModel
@@ -116,6 +119,7 @@ def follow(model: SolidModel, start: Known, target: np.ndarray) -> Followed:
     while True:
         end = _stretched(position, step)
         q = start.q + end * (target - start.q)
+        model.begin(end - position)
         found = model.search(q, predict(model, here, q))
         verdict = model.judge(found.z, q) if found.stop is Stop.CONVERGED else model.why(found, q)
         log.append(_record(end, end - position, verdict.stop, found))
@@ -123,6 +127,7 @@ def follow(model: SolidModel, start: Known, target: np.ndarray) -> Followed:
             if end == 1.0:
                 return Followed(Known(q, found.z, None, here.alone()), verdict, tuple(log))
             here = Known(q, found.z, model.sensitivity(found.z), here.alone())
+            model.commit(found.z)
             step = (end - position) * _pace(found.iterations)
             position = end
         else:

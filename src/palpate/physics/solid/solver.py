@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.errors import SolverError
+from palpate.errors import SolverError, UsageError
 from palpate.physics.equilibrium.stop import Stop, Verdict
+from palpate.physics.geometry.checks import require_positive
 from palpate.physics.solid.opening import open_problem
 from palpate.physics.solid.path import Followed, Known, follow
 from palpate.physics.solid.solution import SolidSolution
@@ -46,7 +47,7 @@ class SolidSolver:
         self._problem = problem
         self._mesh = problem.mesh
         opened = open_problem(problem, sparse_solver(solver), tolerance)
-        self._model, self._time_step = opened.model, opened.time_step
+        self._model = opened.model
         settled = opened.settled
         if settled is not None and settled.verdict.stop is not Stop.CONVERGED:
             raise SolverError(
@@ -54,15 +55,14 @@ class SolidSolver:
                 why=f"{settled.verdict.stop}. {settled.verdict.detail}".strip(),
                 fix="Check gravity, density and pre-stress against the material's stiffness.",
             )
-        self._settled = {region: history.snapshot() for region, history in self._model.histories.items()}
+        self._settled = self._remembered()
         self.reset()
 
     def reset(self) -> None:
         """Forget former answers and history: the next solve starts from the body without interaction."""
         self._known: list[Known] = []
         self._measured = False
-        for region, snapshot in self._settled.items():
-            self._model.histories[region].restore(snapshot)
+        self._recall(self._settled)
 
     def solve(self, x: Any, *, dt: float | None = None, fields: bool = False) -> SolidSolution:
         """Find the equilibrium under inputs x (n,).
@@ -71,19 +71,22 @@ class SolidSolver:
         ----------
         x : (n,) array
         dt : float, optional
-            Duration of the step in s; needed where the material has a history, which then goes on by it.
+            Only for materials with a history: goes on from the last equilibrium by a step of this many seconds.
+            Without it, such a body is loaded from rest, in an instant, along the approach path, and what it
+            remembers of other solves is left as it was.
         fields : bool
             Whether to give stress and stretch at the nodes.
 
         Returns
         -------
         SolidSolution
-            `SolidSolution.converged` tells whether there is one, `SolidSolution.message` why not.
+            `SolidSolution.converged` tells whether there is one, `SolidSolution.message` why not. After a failed
+            step the body's history is what it was before.
 
         Raises
         ------
         UsageError
-            If `x` has not one number per input, or a material with a history no `dt`.
+            If `x` has not one number per input, or `dt` is not positive.
         """
         q = self._problem.inputs(x)
         if not np.isfinite(q).all():
@@ -92,10 +95,75 @@ class SolidSolver:
         if outside is None:
             return self._failure(q, Followed(self._rest(q), Verdict(Stop.NO_APPROACH), ()))
         self._measure_energies(outside)
-        followed = self._search(q, outside)
-        if followed.verdict.stop is not Stop.CONVERGED:
-            return self._failure(q, followed)
-        return self._answer(q, followed, fields=fields)
+        if dt is not None:
+            require_positive("The time step", dt, "s")
+        if not self._model.histories:
+            return self._concluded(q, self._search(q, outside), fields=fields)
+        return self._instant(q, outside, fields) if dt is None else self._march(q, outside, dt, fields)
+
+    def march(self, times: Any, inputs: Any, *, fields: bool = False) -> list[SolidSolution]:
+        """Solve for inputs that follow each other in time, from where the body is.
+
+        Parameters
+        ----------
+        times : (m,) array
+            In s, ascending from above 0: the body is at time 0.
+        inputs : (m, n) array
+            At these times.
+        fields : bool
+            Whether to give stress and stretch at the nodes.
+
+        Returns
+        -------
+        list of SolidSolution
+            Up to the first one that failed.
+
+        Raises
+        ------
+        UsageError
+            If the times don't ascend, or there is not one row of inputs for each.
+        """
+        times, inputs = np.atleast_1d(np.asarray(times, dtype=float)), np.atleast_2d(inputs)
+        steps = np.diff(times, prepend=0.0)
+        if times.shape != (len(inputs),) or not (steps > 0).all():
+            raise UsageError(
+                f"The times have the shape {times.shape} for {len(inputs)} rows of inputs.",
+                why="They must ascend from above 0, one for each row.",
+                fix="For example times=[0.1, 0.2], inputs=[[0.05, 0.05, 0.058], [0.05, 0.05, 0.056]].",
+            )
+        solutions: list[SolidSolution] = []
+        for step, row in zip(steps.tolist(), inputs, strict=True):
+            solutions.append(self.solve(row, dt=step, fields=fields))
+            if not solutions[-1].converged:
+                break
+        return solutions
+
+    def _instant(self, q: np.ndarray, outside: np.ndarray, fields: bool) -> SolidSolution:
+        """Load a body with a history from rest, and forget it again."""
+        remembered, known = self._remembered(), self._known
+        self._recall(self._settled)
+        self._model.duration = 0.0
+        solution = self._concluded(q, follow(self._model, self._rest(outside), q), fields=fields)
+        self._recall(remembered)
+        self._known = known
+        return solution
+
+    def _march(self, q: np.ndarray, outside: np.ndarray, dt: float, fields: bool) -> SolidSolution:
+        """Go on from the last equilibrium in time."""
+        remembered = self._remembered()
+        self._model.duration = dt
+        start = self._known[-1] if self._known else self._rest(outside)
+        solution = self._concluded(q, follow(self._model, start, q), fields=fields)
+        if not solution.converged:
+            self._recall(remembered)
+        return solution
+
+    def _remembered(self) -> dict[str, dict[str, np.ndarray]]:
+        return {region: history.snapshot() for region, history in self._model.histories.items()}
+
+    def _recall(self, remembered: dict[str, dict[str, np.ndarray]]) -> None:
+        for region, snapshot in remembered.items():
+            self._model.histories[region].restore(snapshot)
 
     def _search(self, q: np.ndarray, outside: np.ndarray) -> Followed:
         """From the nearest known equilibrium; where that fails, once more from outside."""
@@ -122,20 +190,30 @@ class SolidSolver:
         """The body under its constant loads alone, for inputs that leave it alone."""
         return Known(q, self._model.impose(self._model.base, q))
 
+    def _concluded(self, q: np.ndarray, followed: Followed, *, fields: bool) -> SolidSolution:
+        """The solution, after a look at the tangent at the equilibrium found."""
+        if followed.verdict.stop is not Stop.CONVERGED:
+            return self._failure(q, followed)
+        system = self._model.system
+        self._model.set(q)
+        system.factorise(followed.last.z)
+        doubt = Stop.CONVERGED if is_accurate(system) else Stop.SINGULAR
+        if doubt is Stop.CONVERGED and not is_stable(system):
+            doubt = Stop.UNSTABLE
+        if doubt is not Stop.CONVERGED:
+            return self._failure(q, Followed(followed.last, Verdict(doubt), followed.log))
+        return self._answer(q, followed, fields=fields)
+
     def _answer(self, q: np.ndarray, followed: Followed, *, fields: bool) -> SolidSolution:
         """Response and stiffness from the tangent at the equilibrium, and what is measured there."""
         model, z = self._model, followed.last.z
-        model.set(q)
-        model.system.factorise(z)
-        if not is_accurate(model.system):
-            return self._failure(q, Followed(followed.last, Verdict(Stop.SINGULAR), followed.log))
-        if not is_stable(model.system):
-            return self._failure(q, Followed(followed.last, Verdict(Stop.UNSTABLE), followed.log))
-        reactions = model.system.gradient(z)
+        response = -model.inputs.gradient(z, model.system.gradient(z))
         hessian, slope = model.inputs.hessian(model.system, z)
         known = Known(q, z, slope, followed.last.before)
         self._known = [*(k.alone() for k in self._known[-KEPT + 1 :]), known]
-        model.field.show(z)
+        # only now: the step's own potential and tangent are those with the internal variables before it
+        model.commit(z)
+        strain_energy, energy = model.energies(z)
         figures = followed.verdict.figures
         return SolidSolution(
             stop=Stop.CONVERGED,
@@ -145,10 +223,10 @@ class SolidSolver:
             mesh=self._mesh,
             inputs=q,
             displacement=model.field.at_nodes(),
-            response=-model.inputs.gradient(z, reactions),
+            response=response,
             response_gradient=-hessian,
-            potential_energy=model.system.potential(z) - model.scale.reference,
-            strain_energy=model.strain_energy(z),
+            potential_energy=energy - model.base_energy,
+            strain_energy=strain_energy,
             penetration=figures.get("penetration", 0.0),
             least_volume_ratio=figures["least_volume_ratio"],
             largest_strain=model.measures.largest_strain(),

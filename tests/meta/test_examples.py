@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -133,6 +134,41 @@ def arrays(text: str, folder: Path) -> None:
     assert (folder / "oscillator.palpate").stat().st_size > 1000
 
 
+def copper(text: str, folder: Path) -> None:
+    rows = re.findall(r"(\d+) N +([\d.]+) mm +([\d.]+) mm +([\d.]+) J", text)
+    load, tip, left, lost = np.array(rows, dtype=float).T
+    first = float(re.search(r"first yield at the clamp: ([\d.]+) N", text)[1])
+    assert np.all(left[load < first] == 0.0)
+    assert np.all(np.diff(left[load > first]) > 0)
+    assert np.all(np.diff(lost[load > first]) > 0)
+    stiffness = 3 * 110e9 * np.pi * 0.005**4 / 4
+    # what springs back is elastic; at 25 N the tip has turned by 0.37 rad, so levers are shorter by up to its cosine
+    spring = (tip - left) / (1000 * load / stiffness)
+    assert np.all(spring < 1.0)
+    assert np.all(spring > np.cos(0.38) ** 2)
+    assert spring[0] > 0.998
+    assert "the same shape to 0 nm" in text
+    assert text.count(f"{tip[-1]:.2f} mm") == 2
+    after, before = (float(v) for v in re.findall(r"5 N: ([\d.]+) mm", text)[-2:])
+    assert after > before + 10.0
+    assert "no step along the load path" in text
+
+
+def nylon(text: str, folder: Path) -> None:
+    rows = np.array(re.findall(r"([\d.]+) s  (\d) N +([\d.]+) mm +([\d.]+) J +([\d.]+) J", text), dtype=float)
+    tip, stored, lost = rows[:, 2], rows[:, 3], rows[:, 4]
+    assert np.all(np.diff(tip[:4]) > 0)
+    assert np.all(np.diff(tip[3:]) < 0)
+    assert np.all(np.diff(lost) >= 0)
+    # what was put in while 3 N lay on it: at once, then by the way that it sank
+    np.testing.assert_allclose(stored[1:4] + lost[1:4], stored[0] + 3e-3 * (tip[1:4] - tip[0]), atol=3e-4)
+    once, ever = (float(v) for v in re.findall(r"with the modulus .*: ([\d.]+) mm", text))
+    assert once == tip[0]
+    assert tip[3] < ever < 1.01 * tip[3]
+    ramps = [float(v) for v in re.findall(r"within .* s: ([\d.]+) mm", text)]
+    assert once < ramps[0] < ramps[1] < ramps[2] < ever
+
+
 CHECKS: dict[str, Callable[[str, Path], None]] = {
     "01_cantilever.py": cantilever,
     "02_two_loads.py": two_loads,
@@ -142,6 +178,8 @@ CHECKS: dict[str, Callable[[str, Path], None]] = {
     "06_drifting_stiffness.py": drifting,
     "07_scikit_learn.py": scikit_learn,
     "08_arrays.py": arrays,
+    "09_bend_copper_past_yield.py": copper,
+    "10_creeping_nylon.py": nylon,
 }
 QUICK = {"04_filter_by_hand.py"}
 

@@ -103,9 +103,10 @@ def beam_plastic() -> Preset:
     Its outer fibres yield at the clamp from π r³ σ_y/4L = 12.3 N on, and without hardening it would collapse at
     4 r³ σ_y/3L = 20.9 N.
     """
-    from palpate.physics.materials.metals import METALS
+    from palpate.physics.materials.plastic import Plastic
 
-    body = Cantilever(length=1.0, section=Circle(radius=0.005), material=METALS["annealed copper"])
+    copper = named_material("annealed copper", Plastic)
+    body = Cantilever(length=1.0, section=Circle(radius=0.005), material=copper)
     loads = (LoadAndUnload("P", peak=(0.0, 25.0)),)
     summary = "annealed copper cantilever, tip loaded to P_max = 0 … 25 N, then to P = 0 … 25 N, 256 solves"
     return Preset("beam-plastic", summary, body, loads, "sobol", 256)

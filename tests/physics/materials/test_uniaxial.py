@@ -106,6 +106,8 @@ def test_prony_shares_and_times_are_checked():
         Prony(((0.7, 1.0), (0.5, 2.0)))
     with pytest.raises(UsageError):
         Prony(((0.5, 0.0),))
+    with pytest.raises(UsageError, match="pair"):
+        Prony((0.5, 3.0))
     series = Prony.of_moduli(2.0, ((1.0, 3.0), (1.0, 5.0)))
     assert series == Prony(((0.25, 3.0), (0.25, 5.0)))
     assert series.equilibrium == 0.5

@@ -41,7 +41,7 @@ class Prony:
     terms: tuple[tuple[float, float], ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "terms", tuple((share, time) for share, time in self.terms))
+        object.__setattr__(self, "terms", tuple(_pair(term) for term in self.terms))
         for share, time in self.terms:
             _require_positive("A Prony share", share, "a pure number")
             _require_positive("A relaxation time", time, "s")
@@ -113,6 +113,16 @@ def mean_decay(ratio: Any) -> Any:
     series = 1 - ratio / 2 * (1 - ratio / 3 * (1 - ratio / 4 * (1 - ratio / 5)))
     safe = where(ratio - 0.01, ratio, 1.0)
     return where(ratio - 0.01, (1 - exp(-safe)) / safe, series)
+
+
+def _pair(term: Any) -> tuple[float, float]:
+    if isinstance(term, Sequence) and not isinstance(term, str) and len(term) == 2:
+        return term[0], term[1]
+    raise UsageError(
+        f"A Prony term is {term!r}.",
+        why="It must be a pair: the share that relaxes and its relaxation time in s.",
+        fix="Pass a tuple of pairs, for example terms=((0.39, 700.0),).",
+    )
 
 
 def _require_positive(what: str, value: float, unit: str) -> None:

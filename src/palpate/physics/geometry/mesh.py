@@ -200,10 +200,12 @@ def to_ngsolve(mesh: BodyMesh) -> Any:
     behind = _region_behind(mesh)
     for s, name in enumerate(mesh.surfaces):
         for r in np.unique(behind[mesh.surface_of == s]).tolist():
-            index = netgen.Add(FaceDescriptor(surfnr=s + 1, domin=r + 1, domout=0, bc=s + 1))
+            # a name belongs to a number of its own: Netgen gives it to the first face of a shared one only
+            number = netgen.GetNFaceDescriptors() + 1
+            index = netgen.Add(FaceDescriptor(surfnr=s + 1, domin=r + 1, domout=0, bc=number))
+            netgen.SetBCName(number - 1, name)
             nodes = mesh.triangles[(mesh.surface_of == s) & (behind == r)]
             netgen.AddElements(dim=2, index=index, data=np.ascontiguousarray(nodes, dtype=np.int32), base=0)
-        netgen.SetBCName(s, name)
     return ngsolve.Mesh(netgen)
 
 

@@ -134,6 +134,8 @@ def _cells(source: Any, kind: str, corners: int, word: str) -> tuple[np.ndarray,
         int(v[0]): plain_name(n) for n, v in source.field_data.items() if len(v) == 2 and v[1] == dimension
     }
     numbers, index = np.unique(tag, return_inverse=True)
+    if word == "region" and len(numbers) == 1 and not given:
+        return nodes, (), np.zeros(len(nodes), dtype=np.int64)
     return nodes, tuple(given.get(int(k), f"{word} {k}") for k in numbers), index.ravel()
 
 
@@ -166,7 +168,9 @@ def _with_surfaces(bare: BodyMesh, source: Any, used: np.ndarray, shape: Importe
         new = np.full(len(source.points), -1)
         new[used] = np.arange(len(used))
         keys = np.sort(new[labelled], axis=1).tolist()
-        known = {tuple(key): int(g) for key, g in zip(keys, group, strict=True)}
+        # 0 is what writers put where nothing was said
+        named = [names[g] != "surface 0" for g in group]
+        known = {tuple(k): int(g) for k, g, told in zip(keys, group, named, strict=True) if told}
     index = np.array([known.get(tuple(key), -1) for key in np.sort(outer, axis=1).tolist()])
     parts = segments(surface)
     part_of = np.unique(parts[index < 0], return_inverse=True)[1]

@@ -11,7 +11,7 @@ __all__ = ["points_on", "scattered"]
 
 
 def points_on(mesh: BodyMesh, refinement: Refinement) -> tuple[np.ndarray, float]:
-    """Points of the refined part of a surface, at most one element size apart.
+    """Points of the refined part of a surface, at most half an element size apart.
 
     The triangles are halved across their longest edges until they are small enough. Where the box holds no point,
     the refinement asks for nothing.
@@ -41,7 +41,7 @@ def points_on(mesh: BodyMesh, refinement: Refinement) -> tuple[np.ndarray, float
     while len(corners):
         corners = corners[_meets(corners, refinement)]
         require_budget([], [(_areas(corners).sum(), refinement.element)])
-        fits = _longest(corners)[1] <= refinement.element
+        fits = _longest(corners)[1] <= refinement.element / 2
         small.append(corners[fits])
         corners = _halved(corners[~fits])
     triangles = np.concatenate(small) if small else np.empty((0, 3, 3))

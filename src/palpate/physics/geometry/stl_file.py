@@ -108,14 +108,17 @@ def _geometry(corners: np.ndarray) -> Any:
 
 def _filled(geometry: Any, coarse: float, fine: list[tuple[np.ndarray, float]]) -> Any:
     import ngsolve
-    from netgen.meshing import NgException, Pnt
+    from netgen.meshing import NgException
 
     ngsolve.SetNumThreads(1)
-    for points, size in fine:
-        for point in points.tolist():
-            geometry.RestrictH(Pnt(*point), size)
+    rows = [(*point, size) for points, size in fine for point in points.tolist()]
     try:
-        return geometry.GenerateMesh(maxh=coarse, grading=GRADING)
+        with tempfile.TemporaryDirectory() as folder:
+            # Netgen takes sizes at points of such a geometry from a file only
+            sizes = Path(folder) / "sizes.txt"
+            lines = [str(len(rows)), *(" ".join(map(repr, row)) for row in rows), "0"]
+            sizes.write_text("\n".join(lines) + "\n", encoding="ascii")
+            return geometry.GenerateMesh(maxh=coarse, grading=GRADING, meshsizefilename=str(sizes))
     except NgException as error:
         raise UsageError(
             f"Netgen could not mesh the surface: {str(error).strip()}.",

@@ -1,0 +1,260 @@
+"""Files of solids, surfaces and meshes: what comes back is what was written, and faults are named."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+
+import meshio
+import ngsolve
+import numpy as np
+import pytest
+
+from palpate.errors import FileFormatError, UsageError
+from palpate.physics.geometry import (
+    Block,
+    ImportedMesh,
+    ImportedSolid,
+    LayeredBlock,
+    Refinement,
+    SurfacePatch,
+)
+
+PLATE = 0.1 * 0.06 * 0.04 - np.pi * 0.015**2 * 0.04  # m³, a block with a round hole
+CUBE = np.array([[x, y, z] for x in (0.0, 0.1) for y in (0.0, 0.1) for z in (0.0, 0.1)])
+SIDES = np.array(
+    [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]]
+    + [[2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]  # two rows of six
+)
+
+
+def write_plate(path: Path, *, names: bool = True) -> None:
+    """A plate of 100 x 60 x 40 mm with a hole of 15 mm radius."""
+    from netgen.occ import Box, Cylinder, Pnt, Z
+
+    plate = Box(Pnt(0, 0, 0), Pnt(100, 60, 40)) - Cylinder(Pnt(50, 30, 0), Z, r=15, h=40)
+    if names:
+        plate.faces.name = "outer (rough)"
+        plate.faces.Max(Z).name = "lid"
+        plate.faces.Max(Z).col = (1, 0, 0)
+        plate.solids.name = "steel"
+    plate.WriteStep(str(path))
+
+
+def write_stl(path: Path, points: np.ndarray, triangles: np.ndarray) -> ImportedSolid:
+    meshio.Mesh(points, [("triangle", triangles)]).write(path, binary=True)
+    return ImportedSolid(path)
+
+
+def write_tetrahedra(path: Path, mesh, **extra) -> None:
+    meshio.Mesh(mesh.points, [("tetra", mesh.tetrahedra)], **extra).write(path)
+
+
+def failure(attempt, kind=UsageError) -> str:
+    with pytest.raises(kind) as caught:
+        attempt()
+    assert caught.value.what
+    assert caught.value.why
+    assert caught.value.fix
+    return str(caught.value)
+
+
+def test_step_keeps_names_and_is_read_in_metres(tmp_path: Path):
+    write_plate(tmp_path / "plate.step")
+    plate = ImportedSolid(tmp_path / "plate.step")
+    assert set(plate.surfaces) == {"outer _rough_", "lid"}
+    assert plate.regions == ("steel",)
+    mesh = plate.mesh()
+    assert ngsolve.Integrate(1, mesh) == pytest.approx(PLATE, rel=1e-3)
+    lid = ngsolve.Integrate(1, mesh, definedon=mesh.Boundaries("lid"))
+    assert lid == pytest.approx(PLATE / 0.04, rel=1e-3)
+    assert pickle.loads(pickle.dumps(plate)).rest() is plate.rest()
+    assert len(plate.describe()["sha256"]) == 64
+    fine = plate.rest((Refinement("lid", 0.004, (0, 0, 0), (0.03, 0.06, 1)),))
+    assert len(fine.points) > 1.5 * len(plate.rest().points)
+
+
+def test_step_without_names_has_numbers_and_takes_patches(tmp_path: Path):
+    write_plate(tmp_path / "plate.stp", names=False)
+    plate = ImportedSolid(
+        tmp_path / "plate.stp", patches=(SurfacePatch("hole", (0.045, 0.025, 0.015), (0.055, 0.035, 0.025)),)
+    )
+    assert plate.regions == ("body",)
+    assert "hole" in plate.surfaces
+    assert sum(name.startswith("face ") for name in plate.surfaces) == 6
+    mesh = plate.mesh()
+    hole = ngsolve.Integrate(1, mesh, definedon=mesh.Boundaries("hole"))
+    assert hole == pytest.approx(2 * np.pi * 0.015 * 0.04, rel=2e-3)
+
+
+def test_stl_becomes_a_body_split_along_its_edges(tmp_path: Path):
+    block = Block(size=(0.1, 0.08, 0.05)).rest()
+    path = tmp_path / "block.stl"
+    write_stl(path, block.points * 1000, block.triangles)
+    solid = ImportedSolid(
+        path,
+        unit="mm",
+        patches=(SurfacePatch("top", where=above), SurfacePatch("low", (-1, -1, -1), (1, 1, 0.001))),
+    )
+    assert solid.surfaces == ("top", "low", "face 3", "face 4", "face 5", "face 6")
+    mesh = solid.rest()
+    assert mesh.volume == pytest.approx(0.1 * 0.08 * 0.05, rel=1e-9)
+    areas = {"top": 0.008, "low": 0.008, "face 3": 0.005, "face 4": 0.005, "face 5": 0.004, "face 6": 0.004}
+    assert mesh.areas == pytest.approx(areas, rel=1e-9)
+    assert np.allclose(mesh.normals[mesh.surface_of == 0], [0, 0, 1])
+    fine = solid.rest((Refinement("top", 0.006, (0.03, 0.02, 0), (0.07, 0.06, 1)),))
+    assert fine.areas == pytest.approx(areas, rel=1e-9)
+    assert len(fine.triangles_of("top")) > 2 * len(mesh.triangles_of("top"))
+
+
+def above(centres: np.ndarray) -> np.ndarray:
+    return centres[:, 2] > 0.0499
+
+
+@pytest.mark.parametrize("ending", ["vtu", "msh", "mesh", "inp"])
+def test_volume_meshes_come_back(tmp_path: Path, ending: str):
+    block = Block().rest()
+    path = tmp_path / f"block.{ending}"
+    write_tetrahedra(path, block)
+    mesh = ImportedMesh(path).rest()
+    assert np.allclose(mesh.points, block.points, atol=1e-9)
+    assert np.array_equal(mesh.tetrahedra, block.tetrahedra)
+    assert mesh.regions == ("body",)
+    assert mesh.surfaces == tuple(f"face {i}" for i in range(1, 7))
+    assert sorted(mesh.areas.values()) == pytest.approx([0.005] * 4 + [0.01] * 2, rel=1e-6)
+
+
+def test_groups_of_a_gmsh_file_are_regions_and_surfaces(tmp_path: Path):
+    layers = LayeredBlock(extent=(0.05, 0.05), layers=(("fat", 0.01), ("muscle", 0.02)))
+    mesh = layers.rest()
+    tags = [mesh.region_of + 1, mesh.surface_of + 11]
+    source = meshio.Mesh(
+        mesh.points * 1e3,
+        [("tetra", mesh.tetrahedra), ("triangle", mesh.triangles)],
+        cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags},
+        field_data={"fat": [1, 3], "muscle": [2, 3], "top": [11, 2], "bottom": [12, 2], "side": [13, 2]},
+    )
+    source.write(tmp_path / "layers.msh", file_format="gmsh22", binary=False)
+    read = ImportedMesh(tmp_path / "layers.msh", unit="mm")
+    assert read.regions == ("fat", "muscle")
+    assert read.surfaces == ("top", "bottom", "side")
+    assert read.rest().areas == pytest.approx(mesh.areas)
+    assert read.rest().region_volumes == pytest.approx(mesh.region_volumes)
+    assert set(read.mesh().GetMaterials()) == {"fat", "muscle"}
+
+
+def test_second_order_and_numbered_regions(tmp_path: Path):
+    block = Block().rest()
+    pairs = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]
+    middles = np.stack([block.points[block.tetrahedra[:, list(p)]].mean(axis=1) for p in pairs], axis=1)
+    nodes = len(block.points) + np.arange(middles[..., 0].size).reshape(-1, 6)
+    upper = block.points[block.tetrahedra].mean(axis=1)[:, 2] > 0.025
+    meshio.Mesh(
+        np.concatenate([block.points, middles.reshape(-1, 3)]),
+        [("tetra10", np.hstack([block.tetrahedra, nodes]))],
+        cell_data={"region": [upper.astype(int) + 4]},
+    ).write(tmp_path / "ten.vtu")
+    read = ImportedMesh(tmp_path / "ten.vtu").rest()
+    assert len(read.points) == len(block.points)
+    assert read.volume == pytest.approx(block.volume)
+    assert read.regions == ("region 4", "region 5")
+
+
+def test_left_handed_meshes_are_turned(tmp_path: Path):
+    block = Block().rest()
+    path = tmp_path / "left.vtu"
+    meshio.Mesh(block.points, [("tetra", block.tetrahedra[:, [0, 2, 1, 3]])]).write(path)
+    assert ImportedMesh(path).rest().volume == pytest.approx(5e-4)
+
+
+def test_imported_meshes_are_bisected_where_asked(tmp_path: Path):
+    write_tetrahedra(tmp_path / "block.vtu", Block().rest())
+    body = ImportedMesh(tmp_path / "block.vtu", patches=(SurfacePatch("top", where=above),))
+    patch = Refinement("top", 0.008, (0.04, 0.04, 0.0), (0.06, 0.06, 1.0))
+    mesh = body.rest((patch,))
+    assert mesh.volume == pytest.approx(5e-4, rel=1e-9)
+    corners = mesh.points[mesh.triangles_of("top")]
+    centres = corners.mean(axis=1)
+    inside = ((centres >= patch.lower) & (centres <= patch.upper)).all(axis=1)
+    assert np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)[inside].max() <= 1.5 * patch.element
+    assert "more than" in failure(lambda: body.mesh((Refinement("top", 1e-4),)))
+
+
+def test_faults_of_surfaces(tmp_path: Path):
+    stl = tmp_path / "cube.stl"
+    assert write_stl(stl, CUBE, SIDES).rest().volume == pytest.approx(1e-3)
+    said = failure(lambda: write_stl(stl, CUBE, SIDES[:-2]).mesh())
+    assert "open: 4 edges" in said
+    assert "around (0.05, 0.05, 0.1) m" in said
+    assert "inside out" in failure(lambda: write_stl(stl, CUBE, SIDES[:, ::-1]).mesh())
+    turned = np.concatenate([SIDES[:1, ::-1], SIDES[1:]])
+    assert "inverted" in failure(lambda: write_stl(stl, CUBE, turned).mesh())
+    both = np.concatenate([SIDES, SIDES + 8])
+    beside = np.concatenate([CUBE, CUBE + np.array([0.1, 0.1, 0.0])])
+    assert "not a manifold: 1 edge" in failure(lambda: write_stl(stl, beside, both).mesh())
+    overlap = np.concatenate([CUBE, CUBE * 0.9 + [0.05, 0.03, 0.02]])
+    assert "cuts itself" in failure(lambda: write_stl(stl, overlap, both).mesh())
+    assert 'unit="mm"' in failure(lambda: write_stl(stl, CUBE * 1000, SIDES).mesh())
+    assert 'unit="m"' in failure(lambda: ImportedSolid(write_stl(stl, CUBE, SIDES).path, unit="um").mesh())
+
+
+def test_faults_of_files(tmp_path: Path):
+    (tmp_path / "empty.stl").touch()
+    (tmp_path / "wrong.stl").write_text("solid nothing of this kind\nendsolid\n")
+    (tmp_path / "wrong.step").write_text("ISO-10303-21;\nnonsense")
+    (tmp_path / "wrong.vtu").write_text("<VTKFile><Unstr")
+    (tmp_path / "wrong.msh").write_bytes(b"\x00\x01\x02" * 40)
+    assert "No such file" in failure(lambda: ImportedSolid(tmp_path / "none.step"))
+    assert "No such file" in failure(lambda: ImportedMesh(tmp_path / "none.vtu"))
+    assert "is empty" in failure(lambda: ImportedSolid(tmp_path / "empty.stl"), FileFormatError)
+    for name in ("wrong.stl", "wrong.step"):
+        failure(lambda name=name: ImportedSolid(tmp_path / name).mesh(), FileFormatError)
+    for name in ("wrong.vtu", "wrong.msh"):
+        failure(lambda name=name: ImportedMesh(tmp_path / name).mesh(), FileFormatError)
+    assert "neither a STEP nor an STL" in failure(lambda: ImportedSolid(tmp_path / "wrong.vtu"))
+    assert "Units of length" in failure(lambda: ImportedMesh(tmp_path / "wrong.vtu", unit="mile"))
+    write_plate(tmp_path / "plate.step")
+    assert "states its own unit" in failure(lambda: ImportedSolid(tmp_path / "plate.step", unit="mm"))
+    plate = ImportedSolid(tmp_path / "plate.step")
+    with (tmp_path / "plate.step").open("a") as file:
+        file.write("\n")
+    assert "has changed" in failure(plate.mesh)
+
+
+def test_a_step_file_without_a_solid_is_open(tmp_path: Path):
+    from netgen.occ import Box, Pnt, Sew
+
+    Sew(list(Box(Pnt(0, 0, 0), Pnt(50, 50, 50)).faces)[:5]).WriteStep(str(tmp_path / "open.step"))
+    said = failure(lambda: ImportedSolid(tmp_path / "open.step").mesh())
+    assert "open, 4 edges" in said
+
+
+def test_faults_of_volume_meshes(tmp_path: Path):
+    block = Block().rest()
+    path = tmp_path / "block.vtu"
+    meshio.Mesh(block.points, [("triangle", block.triangles)]).write(path)
+    assert "It holds triangle" in failure(lambda: ImportedMesh(path).mesh())
+    write_tetrahedra(path, Block(size=(0.1, 0.1, 0.1)).rest())
+    assert "Did you mean 'face 1'" in failure(lambda: ImportedMesh(path).mesh((Refinement("face1", 0.01),)))
+    far = SurfacePatch("tip", (5, 5, 5), (6, 6, 6))
+    assert "contains no part" in failure(lambda: ImportedMesh(path, patches=(far,)).mesh())
+    tetrahedra = block.tetrahedra.copy()
+    tetrahedra[7] = tetrahedra[7][[0, 2, 1, 3]]
+    meshio.Mesh(block.points, [("tetra", tetrahedra)]).write(path)
+    said = failure(lambda: ImportedMesh(path).mesh())
+    assert f"1 of {len(tetrahedra)} tetrahedra" in said
+    assert "inverted" in said
+    assert "element 7" in said
+    meshio.Mesh(block.points * 1000, [("tetra", block.tetrahedra)]).write(path)
+    assert 'Pass unit="mm"' in failure(lambda: ImportedMesh(path).mesh())
+    # two tetrahedra that share nothing but an edge
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 0], [0, 0, -1]]) * 0.1
+    meshio.Mesh(points, [("tetra", np.array([[0, 1, 2, 3], [0, 1, 4, 5]]))]).write(path)
+    assert "not a manifold: 1 edge" in failure(lambda: ImportedMesh(path).mesh())
+
+
+def test_patches_need_a_place():
+    assert "no clear place" in failure(lambda: SurfacePatch("tip"))
+    assert "no clear place" in failure(lambda: SurfacePatch("tip", lower=(0, 0, 0)))
+    assert "no clear place" in failure(lambda: SurfacePatch("tip", (0, 0, 0), (1, 1, 1), above))
+    assert "patterns" in failure(lambda: SurfacePatch("tip|top", (0, 0, 0), (1, 1, 1)))

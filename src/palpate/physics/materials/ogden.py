@@ -11,7 +11,7 @@ from palpate.physics.materials.isochoric import Isochoric
 from palpate.physics.materials.material import NO_STATE
 from palpate.physics.materials.moduli import require_numbers
 from palpate.physics.materials.stretches import stretch_sums
-from palpate.physics.materials.tensors import Scalar, Tensor, determinant, matmul, power, transpose
+from palpate.physics.materials.tensors import Scalar, Tensor, determinant, exp, log, matmul, transpose
 
 __all__ = ["Ogden"]
 
@@ -77,6 +77,6 @@ class Ogden(Isochoric):
 
     def distortion(self, F: Tensor, state: Mapping[str, Any] = NO_STATE, dt: Any = None) -> Scalar:
         """The sum over the terms, in J/m³."""
-        J, sums = determinant(F), stretch_sums(matmul(transpose(F), F), self._alpha)
+        volume, sums = log(determinant(F)), stretch_sums(matmul(transpose(F), F), self._alpha)
         terms = zip(self._mu, self._alpha, sums, strict=True)
-        return sum(m / a * (power(J, -a / 3) * value - 3) for m, a, value in terms)
+        return sum(m / a * (exp(-a / 3 * volume) * value - 3) for m, a, value in terms)

@@ -21,8 +21,9 @@ from palpate.physics.materials.tensors import (
     Tensor,
     determinant,
     deviator,
+    exp,
     inner,
-    power,
+    log,
     sqrt,
     trace,
     where,
@@ -49,12 +50,14 @@ def stretch_sums(C: Tensor, exponents: Sequence[float]) -> list[Scalar]:
         Any real numbers.
     """
     m, D = trace(C) / 3, deviator(C)
-    J2, J3 = inner(D, D) / 2 / m**2, determinant(D) / m**3  # of the deviator of C/m
+    J2, J3 = inner(D, D) / 2 / (m * m), determinant(D) / (m * m * m)  # of the deviator of C/m
     small = _SMALL_DEVIATOR - J2
     apart = _roots(where(small, 0.03, J2), where(small, 0.0, J3))  # any regular values where the series holds
     powers = _power_sums(where(small, J2, 0.0), where(small, J3, 0.0))
+    size = log(m)
     return [
-        power(m, a / 2) * where(small, _series(a / 2, powers), _sum_of_roots(a / 2, apart)) for a in exponents
+        exp(a / 2 * size) * where(small, _series(a / 2, powers), _sum_of_roots(a / 2, apart))
+        for a in exponents
     ]
 
 
@@ -74,30 +77,32 @@ def _series(s: float, sums: list[Scalar]) -> Scalar:
     return total
 
 
-def _roots(J2: Scalar, J3: Scalar) -> tuple[Scalar, Scalar, Scalar]:
-    """1 + d₁ of the lone root, the mean p of the other two eigenvalues of C/m, and their (q/p)²."""
+def _roots(J2: Scalar, J3: Scalar) -> tuple[Scalar, ...]:
+    """What `_sum_of_roots` needs of the eigenvalues of C/m: see there."""
     r = sqrt(J2 / 3)
     side = where(J3, 1.0, -1.0)
-    w = side * J3 / (2 * r**3)
+    w = side * J3 / (2 * r * r * r)
     g: Any = _START[-1]
     for coefficient in _START[-2::-1]:
         g = g * w + coefficient
     for _ in range(2):
-        g = g - (4 * g**3 - 3 * g - w) / (12 * g**2 - 3)
+        g = (8 * g * g * g + w) / (12 * g * g - 3)
     d = 2 * side * r * g
     p = 1 - d / 2
-    return 1 + d, p, (J2 - 0.75 * d**2) / p**2
-
-
-def _sum_of_roots(s: float, roots: tuple[Scalar, Scalar, Scalar]) -> Scalar:
-    """Σ x^s over the lone eigenvalue and the pair p(1 ± √z)."""
-    lone, p, z = roots
+    z = (J2 - 0.75 * d * d) / (p * p)
     close = _SMALL_GAP - z
+    q = sqrt(where(close, 0.25, z))
+    return log(1 + d), log(p), log(1 + q), log(1 - q), z, close
+
+
+def _sum_of_roots(s: float, roots: tuple[Scalar, ...]) -> Scalar:
+    """Σ x^s over the lone eigenvalue and the pair p(1 ± q), from their logarithms and z = q², small where close > 0."""
+    lone, p, above, below, z, close = roots
     series: Any = 0.0
     for k in range(_PAIRS, -1, -1):
         series = series * z + 2 * _binomial(s, 2 * k)
-    q = sqrt(where(close, 0.25, z))
-    return power(lone, s) + power(p, s) * where(close, series, power(1 + q, s) + power(1 - q, s))
+    pair = where(close, series, exp(s * above) + exp(s * below))
+    return exp(s * lone) + exp(s * p) * pair
 
 
 def _binomial(s: float, k: int) -> float:

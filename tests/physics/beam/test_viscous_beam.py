@@ -19,7 +19,7 @@ SMALL = 1e-3  # N: the beam bends by 7e-4 of its length
 
 
 def beam(terms=TWO, **changes):
-    return Cantilever(1.0, Circle(0.005), Viscoelastic(NYLON, terms), **changes)
+    return Cantilever(1.0, Circle(0.005), Viscoelastic(NYLON, terms, part="all"), **changes)
 
 
 def elastic(share=1.0, **changes):
@@ -285,6 +285,7 @@ def test_a_history_can_be_taken_up_again():
         lambda: Prony(((0.3, 0.0),)),
         lambda: beam(((0.6, 1.0), (0.4, 2.0))),
         lambda: beam(fibres=24),
+        lambda: Cantilever(1.0, Circle(0.005), Viscoelastic(NYLON, TWO)),
         lambda: beam().problem(LoadAndUnload("P", peak=(0, 5))),
         lambda: beam().problem([StepAndHold("P", 0, 5, held=(0, 1)), StepAndHold("Q", 0, 5, held=(0, 1))]),
         lambda: elastic().problem(StepAndHold("P", 0, 5, held=(0, 1))),

@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -36,8 +36,8 @@ class Cantilever:
     section : CrossSection
         For example ``Circle(radius=0.005)``.
     material : LinearElastic, Plastic or Viscoelastic
-        It decides how the beam answers: always the same, or according to its history. A viscoelastic one is over a
-        LinearElastic, and its series is that of Young's modulus as of the shear modulus: Poisson's ratio stays.
+        It decides how the beam answers: always the same, or according to its history. A Viscoelastic one is over a
+        LinearElastic and relaxes as a whole (``part="all"``), so that its Poisson's ratio stays.
     elements : int
         About how many finite elements; every load and node of interest gets a vertex of its own.
     order : int
@@ -154,8 +154,9 @@ class Cantilever:
             _check(2 <= self.fibre_count <= 1000, "fibres", self.fibres, "a whole number from 2 to 1000")
             _check(hasattr(self.section, "fibres"), "section", self.section, _FIBRED)
         if self.kind == "viscous":
-            left = self.material.prony.equilibrium  # type: ignore[attr-defined]
-            _check(left > 1e-9, "Prony series", self.material.prony, _FLOWS)  # type: ignore[attr-defined]
+            material: Any = self.material
+            _check(material.prony.equilibrium > 1e-9, "Prony series", material.prony, _FLOWS)
+            _check(getattr(material, "part", "all") == "all", "material", material, _WHOLE)
         _check(1e-9 <= self.step_tolerance <= 0.1, "tolerance", self.tolerance, "between 1e-9 and 0.1")
 
     def _cuts(self, span: float) -> int:
@@ -172,6 +173,7 @@ def _check_section(section: object) -> None:
 
 
 _FLOWS = "one that leaves a share of the modulus in the end: the sum of the others below 1, else the beam flows away"
+_WHOLE = "Viscoelastic(..., part='all'): stretching and shear relax alike in a beam, so Poisson's ratio has to stay"
 _FIBRED = "a Circle or a Rectangle: one that yields is cut into fibres, and bare numbers have no shape"
 
 

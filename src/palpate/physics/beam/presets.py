@@ -122,6 +122,7 @@ def beam_viscoelastic() -> Preset:
     material = Viscoelastic(
         named_material("nylon", LinearElastic),
         ((0.3, 0.1), (0.2, 2.0)),
+        part="all",
         name="creeping nylon",
         source="elastic constants of the founding case; the Prony series is an illustration, not measured",
     )

@@ -102,9 +102,9 @@ class ShownBody:
         for name in self.names:
             columns = [np.asarray(step.values[name])[parts.nodes] for step in self.steps]
             low, high = min(float(c.min()) for c in columns), max(float(c.max()) for c in columns)
-            fields.append(
-                FieldInfo(name, self.units.get(name, ""), min(low, 0.0), high if high > low else low + 1.0)
-            )
+            # from zero, where the values allow; smoothed stresses dip a little below
+            low = low if low < -0.05 * abs(high) else 0.0
+            fields.append(FieldInfo(name, self.units.get(name, ""), low, high if high > low else low + 1.0))
         steps = tuple(StepInfo(s.label or f"{i + 1}", dict(s.figures)) for i, s in enumerate(self.steps))
         return Shown(PROTOCOL, self.name, tuple(fields), steps, reach)
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 
 import numpy as np
 import pytest
-from lattice import Elastic, kuhn_block, kuhn_points
+from lattice import Elastic, Sphere, kuhn_block, kuhn_points
 
 from palpate.errors import UsageError
-from palpate.physics.massspring import MassSpringBody, spring_network
+from palpate.physics.massspring import MassSpringBody, MassSpringMotion, spring_network
 from palpate.physics.massspring.kernels import springs_gradient, volumes_gradient
 from palpate.physics.massspring.springs import LLOYD
 
@@ -93,3 +94,14 @@ def test_a_body_sums_its_mass_and_mixes_materials():
         MassSpringBody(mesh, Elastic(), fixed="lid")
     with pytest.raises(UsageError, match="'body'"):
         MassSpringBody(mesh, {"bone": Elastic()})
+
+
+def test_a_point_that_belongs_to_nothing_stays():
+    mesh = kuhn_block((2, 2, 2))
+    points = np.concatenate([mesh.points, [[0.03, 0.03, 0.06]]])
+    stray = dataclasses.replace(mesh, points=points)
+    solver = MassSpringBody(stray, Elastic()).open(Sphere())
+    answer = solver.solve((0.03, 0.03, 0.047))
+    assert answer.converged
+    assert not answer.displacement[-1].any()
+    assert MassSpringMotion(solver).costs((0.03, 0.03, 0.047), repeats=1).explicit_longest > 0

@@ -73,8 +73,9 @@ class MassSpringBody:
         return np.bincount(corners.ravel(), np.repeat(quarter, 4), minlength=len(self.mesh.points))
 
     def free(self) -> np.ndarray:
-        """Which points may move, bool of shape (node,)."""
-        moves = np.ones(len(self.mesh.points), dtype=bool)
+        """Which points may move, bool of shape (node,): those of the tetrahedra that are not fixed."""
+        moves = np.zeros(len(self.mesh.points), dtype=bool)
+        moves[self.mesh.tetrahedra] = True
         for surface in self.fixed_surfaces:
             moves[self._surface(surface)] = False
         return moves

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
-__all__ = ["springs_apply", "springs_gradient", "volumes_apply", "volumes_gradient"]
+__all__ = ["diagonal_blocks", "springs_apply", "springs_gradient", "volumes_apply", "volumes_gradient"]
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
 
@@ -125,3 +125,41 @@ def volumes_apply(
                 f = growing * g[i, j] + turning * (first[j] + second[j])
                 out[tets[t, i + 1], j] += f
                 out[tets[t, 0], j] -= f
+
+
+@_jit
+def diagonal_blocks(
+    x: np.ndarray,
+    edges: np.ndarray,
+    k: np.ndarray,
+    tets: np.ndarray,
+    rest: np.ndarray,
+    bulk: np.ndarray,
+    out: np.ndarray,
+) -> None:
+    """Add to `out` (node, 3, 3) k n nᵀ of each spring and κ g gᵀ/V₀ of each volume with its gradient g."""
+    for s in range(len(edges)):
+        a, b = edges[s, 0], edges[s, 1]
+        r = x[b] - x[a]
+        square = (r * r).sum()
+        if square == 0.0:
+            continue
+        for i in range(3):
+            for j in range(3):
+                share = k[s] * r[i] * r[j] / square
+                out[a, i, j] += share
+                out[b, i, j] += share
+    e, g = np.empty((3, 3)), np.empty((4, 3))
+    for t in range(len(tets)):
+        if bulk[t] == 0.0:
+            continue
+        _edges_of(x, tets[t], e)
+        for i in range(3):
+            _cross(e[(i + 1) % 3], e[(i + 2) % 3], g[i + 1])
+        for j in range(3):
+            g[0, j] = -(g[1, j] + g[2, j] + g[3, j])
+        scale = bulk[t] / (36.0 * rest[t])
+        for corner in range(4):
+            for i in range(3):
+                for j in range(3):
+                    out[tets[t, corner], i, j] += scale * g[corner, i] * g[corner, j]

@@ -67,7 +67,8 @@ class MassSpringMotion:
 
     def __init__(self, solver: MassSpringSolver, damping: float = 0.0) -> None:
         self.energy, self.damping = solver.energy, damping
-        self.masses = solver.body.masses()
+        masses = solver.body.masses()
+        self.masses = np.where(masses > 0, masses, 1.0)  # points of no tetrahedron don't move
         self.x, self.v = solver.x.copy(), np.zeros_like(solver.x)
 
     def explicit(self, centre: Any, dt: float) -> None:

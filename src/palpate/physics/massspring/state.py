@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from palpate.physics.massspring.kernels import (
+    diagonal_blocks,
     springs_apply,
     springs_gradient,
     volumes_apply,
@@ -96,29 +97,11 @@ class Tangent:
         volumes: κ g gᵀ/V₀ with the gradient g of each tetrahedron's volume.
         """
         n, pad = self.energy.network, self.energy.pad
-        along = self.x[n.edges[:, 1]] - self.x[n.edges[:, 0]]
-        square = np.einsum("si,si->s", along, along)
-        k = (n.stiffness / square)[:, None, None] * along[:, :, None] * along[:, None, :]
         blocks = np.zeros((len(self.x), 3, 3))
-        np.add.at(blocks, n.edges[:, 0], k)
-        np.add.at(blocks, n.edges[:, 1], k)
-        self._add_volumes(blocks)
+        diagonal_blocks(self.x, n.edges, n.stiffness, n.tetrahedra, n.volumes, n.bulk, blocks)
         normal = np.trace(self.blocks, axis1=1, axis2=2)
         blocks[pad.nodes] += np.maximum(normal, 0.0)[:, None, None] * np.eye(3) / 3
         if self.mass is not None:
             blocks += self.mass[:, None, None] * np.eye(3)
         blocks += 1e-9 * np.trace(blocks, axis1=1, axis2=2).max() * np.eye(3)
         return blocks
-
-    def _add_volumes(self, blocks: np.ndarray) -> None:
-        n = self.energy.network
-        a, b, c, d = np.moveaxis(self.x[n.tetrahedra], 1, 0)
-        corners = [
-            np.cross(c - d, b - d),
-            np.cross(c - a, d - a),
-            np.cross(d - a, b - a),
-            np.cross(b - a, c - a),
-        ]
-        scale = n.bulk / (36 * n.volumes)
-        for corner, g in enumerate(corners):
-            np.add.at(blocks, n.tetrahedra[:, corner], scale[:, None, None] * g[:, :, None] * g[:, None, :])

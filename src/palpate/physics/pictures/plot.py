@@ -159,9 +159,9 @@ class _Body:
         return np.concatenate([clip(soup, self.heights[skin]), with_flat_normals(faces)])
 
     def span(self) -> tuple[float, float]:
-        """Ends of the colour scale: from zero, where the values allow."""
-        drawn = self.soup[:, :, 6]
-        return min(0.0, float(drawn.min())), float(drawn.max()) or 1.0
+        """Ends of the colour scale: from zero, where the values allow; smoothed stresses dip a little below."""
+        low, high = float(self.soup[:, :, 6].min()), float(self.soup[:, :, 6].max())
+        return (low if low < -0.05 * abs(high) else 0.0), high or 1.0
 
     def seen(self, sphere: Ball | None, scale: float) -> np.ndarray:
         """Points that must be in the picture."""

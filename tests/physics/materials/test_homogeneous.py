@@ -17,6 +17,7 @@ from palpate.physics.materials import (
     NeoHookean,
     Ogden,
     StVenantKirchhoff,
+    Viscoelastic,
     Yeoh,
 )
 from palpate.physics.materials.homogeneous import equibiaxial, planar, simple_shear, uniaxial, volumetric
@@ -188,6 +189,18 @@ def test_small_strain_at_constant_volume():
     law = LinearElastic(9e3, 0.5)
     np.testing.assert_allclose(uniaxial(law, STRETCH).stress, 9e3 * (STRETCH - 1), rtol=1e-9)
     np.testing.assert_allclose(equibiaxial(law, STRETCH).stress, 18e3 * (STRETCH - 1), rtol=1e-9)
+
+
+def test_a_material_with_a_history_starts_undeformed():
+    base = NeoHookean(9e3, 0.49, form="isochoric")
+    fat = Viscoelastic(base, ((0.4, 10.0),))
+    np.testing.assert_allclose(uniaxial(fat, STRETCH).stress, uniaxial(base, STRETCH).stress, rtol=1e-8)
+    # a step of one relaxation time at constant rate keeps γ∞ + γ(1 − 1/e) of the distortion's stiffness
+    share = 0.6 + 0.4 * (1 - np.exp(-1))
+    np.testing.assert_allclose(
+        simple_shear(fat, SHEAR, dt=10.0).stress, share * base.shear_modulus * SHEAR, rtol=1e-9
+    )
+    assert fat.stability()
 
 
 def test_impossible_amounts_are_refused():

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from palpate.errors import UsageError
-from palpate.physics.materials.material import NO_STATE, Material, incompressible
+from palpate.physics.materials.material import NO_STATE, Material, incompressible, initial_state
 from palpate.physics.materials.tensors import (
     Scalar,
     Tensor,
@@ -81,7 +81,8 @@ def uniaxial(
     stretch : array_like (n,)
         λ = length over undeformed length, positive.
     state, dt : optional
-        Internal variables at the beginning of the step (n, …) and its length in s, for materials with a history.
+        Internal variables at the beginning of the step (n, …), by default the undeformed body's, and its length in s,
+        for materials with a history.
 
     Raises
     ------
@@ -201,6 +202,8 @@ def _test(
     state: Mapping[str, Any],
     dt: Any,
 ) -> Response:
+    if material.states and not state:
+        state = initial_state(material, F)
     energy, small = energy_of(material, state, dt), material.kinematics == "small"
     if is_incompressible(material):
         distortion = energy

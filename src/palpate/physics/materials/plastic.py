@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 from palpate.errors import UsageError
+from palpate.physics.materials.compiling import compiled
 from palpate.physics.materials.hardening import Hardening
 from palpate.physics.materials.linear import LinearElastic
 from palpate.physics.materials.material import NO_STATE, Elastic, StateVariable, Volumetric, initial_state
@@ -125,10 +126,8 @@ class Plastic(Elastic):
         """Plastic strain (..., 3, 3) and accumulated plastic strain (...) after the step."""
         shape, _, trial, flow = self._return(F, state)
         change = scale(3 * self.shear_modulus * flow / trial, shape)
-        return {
-            "plastic_strain": state["plastic_strain"] + change,
-            "accumulated": state["accumulated"] + flow,
-        }
+        strain, accumulated = state["plastic_strain"] + change, state["accumulated"] + flow
+        return compiled({"plastic_strain": strain, "accumulated": accumulated})
 
     def stored(self, F: Tensor, state: Mapping[str, Any]) -> Scalar:
         """Elastic energy in J/m³ at F, with the state after the step: what unloading gives back."""
@@ -140,7 +139,8 @@ class Plastic(Elastic):
         """Plastic work of a step from `state` to F in J/m³, never negative."""
         *_, flow = self._return(F, state)
         work = self.hardening.work
-        return work(state["accumulated"] + flow) - work(state["accumulated"])
+        heat = work(state["accumulated"] + flow) - work(state["accumulated"])
+        return compiled({"heat": heat})["heat"]
 
     def describe(self) -> dict[str, Any]:
         """Plain data for JSON: the law, its parts and their constants."""

@@ -24,6 +24,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 from palpate.errors import UsageError
+from palpate.physics.materials.compiling import compiled
 from palpate.physics.materials.dashpots import dashpot_loss, spring_energy
 from palpate.physics.materials.material import NO_STATE, Elastic, Material, StateVariable, Volumetric
 from palpate.physics.materials.prony import Prony
@@ -205,7 +206,7 @@ class Viscoelastic(Elastic):
         terms = zip(self._overstresses, series.shares, series.decay(dt), series.gain(dt), strict=True)
         for name, share, decay, gain in terms:
             after[name] = scale(decay, state[name]) + scale(share * gain, change)
-        return after
+        return compiled(after)
 
     def stored(self, F: Tensor, state: Mapping[str, Any]) -> Scalar:
         """Free energy in J/m³ at F, with the state after the step: relaxed law and springs of the terms."""

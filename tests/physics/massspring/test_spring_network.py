@@ -105,3 +105,9 @@ def test_a_point_that_belongs_to_nothing_stays():
     assert answer.converged
     assert not answer.displacement[-1].any()
     assert MassSpringMotion(solver).costs((0.03, 0.03, 0.047), repeats=1).explicit_longest > 0
+
+
+def test_points_without_mass_are_not_marched():
+    solver = MassSpringBody(kuhn_block((2, 2, 2)), Elastic(density=0.0)).open(Sphere())
+    with pytest.raises(UsageError, match="density"):
+        MassSpringMotion(solver)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate.errors import UsageError
 from palpate.physics.massspring.conjugate import conjugate_gradients
 from palpate.physics.massspring.state import Tangent
 
@@ -59,6 +60,11 @@ class MassSpringMotion:
     damping : float
         Force per momentum, 1/s.
 
+    Raises
+    ------
+    UsageError
+        If a material's density is zero.
+
     Attributes
     ----------
     x, v : (node, 3) array
@@ -68,6 +74,12 @@ class MassSpringMotion:
     def __init__(self, solver: MassSpringSolver, damping: float = 0.0) -> None:
         self.energy, self.damping = solver.energy, damping
         masses = solver.body.masses()
+        if not np.all(masses[solver.energy.free] > 0):
+            raise UsageError(
+                "Points without mass can't be marched through time.",
+                why="The material's density is zero.",
+                fix="Give it one: NeoHookean(young=9e3, poisson=0.45, density=1000.0).",
+            )
         self.masses = np.where(masses > 0, masses, 1.0)  # points of no tetrahedron don't move
         self.x, self.v = solver.x.copy(), np.zeros_like(solver.x)
 

@@ -1,6 +1,7 @@
 """Beams that yield, against the closed forms of plastic bending."""
 
 import itertools
+import pickle
 
 import numpy as np
 import pytest
@@ -8,7 +9,16 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from palpate.errors import UsageError
-from palpate.physics.beam import Cantilever, Circle, LoadAndUnload, Rectangle, Section, TipLoad, preset
+from palpate.physics.beam import (
+    HISTORY_PRESETS,
+    Cantilever,
+    Circle,
+    LoadAndUnload,
+    Rectangle,
+    Section,
+    TipLoad,
+    preset,
+)
 from palpate.physics.beam.plastic_section import PlasticSection
 from palpate.physics.equilibrium import Stop
 from palpate.physics.materials.hardening import LinearHardening, VoceHardening
@@ -339,6 +349,27 @@ def test_a_failed_load_ends_the_history():
     assert "an earlier load" in path[2].message
     bad = beam().problem(TipLoad(0, 100)).solve(np.nan)
     assert bad.stop is Stop.BAD_INPUT
+
+
+@pytest.mark.parametrize("name", list(HISTORY_PRESETS))
+def test_presets_with_a_history_converge_at_their_corners_and_refuse_pointless_loads(name):
+    problem = preset(name).problem()
+    solver = problem.open()
+    for corner in itertools.product(*((r.low, r.high) for r in problem.ranges)):
+        solution = solver.solve(corner)
+        assert solution.converged, (corner, solution.message)
+        assert solution.residual < 1e-9
+    plain = problem.body.problem(TipLoad(0, 5)).open()
+    for load, reasons in (
+        (1e9, {Stop.STRAIN_LIMIT, Stop.STEP_TOO_SMALL, Stop.COARSE_MESH}),
+        (1e300, {Stop.STEP_TOO_SMALL, Stop.NOT_FINITE}),
+        (np.inf, {Stop.BAD_INPUT}),
+    ):
+        failed = plain.solve(load)
+        assert failed.stop in reasons
+        assert np.isnan(failed.dissipated)
+        assert failed.history is None
+    assert pickle.loads(pickle.dumps(problem)) == problem
 
 
 def test_problems_with_a_history_are_described():

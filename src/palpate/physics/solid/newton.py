@@ -120,6 +120,7 @@ class _Iteration:
     def run(self, start: np.ndarray, limit: int, *, fresh: bool) -> Found:
         potential = self._system.potential(start)
         if not math.isfinite(potential):
+            self._rejected = start
             return self._end(start, Stop.NOT_FINITE, math.inf)
         residual = self._system.residual(start)
         if not residual.any():

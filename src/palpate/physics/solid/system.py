@@ -7,10 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from palpate.errors import UsageError
 from palpate.physics.interactions.interaction import BEYOND, Energy
 from palpate.physics.solid.field import SolidField
 
 __all__ = ["System", "sparse_solver"]
+
+SOLVERS = ("auto", "sparsecholesky", "pardiso", "umfpack")
 
 
 class System:
@@ -82,5 +85,27 @@ class System:
 
 
 def sparse_solver(name: str = "auto") -> str:
-    """NGSolve's name of the sparse solver to use: PARDISO where it is to be had, else its own Cholesky."""
-    return "sparsecholesky" if name == "auto" else name
+    """NGSolve's name of the sparse solver to use.
+
+    Parameters
+    ----------
+    name : {"auto", "sparsecholesky", "pardiso", "umfpack"}
+        ``"auto"`` takes MKL's PARDISO where the package `mkl` is installed, which NGSolve then makes its default, else
+        NGSolve's own Cholesky factorisation.
+
+    Raises
+    ------
+    UsageError
+        For another name.
+    """
+    from ngsolve.la import BaseMatrix
+
+    if name not in SOLVERS:
+        raise UsageError(
+            f"There is no sparse solver {name!r}.",
+            why=f"Known are {', '.join(SOLVERS)}.",
+            fix='Use solver="auto".',
+        )
+    if name != "auto":
+        return name
+    return "pardiso" if BaseMatrix.GetDefaultInverseType() == "pardiso" else "sparsecholesky"

@@ -1,0 +1,98 @@
+"""Designs and chains of a probe's positions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from solids import PROBE, RADIUS, SIZE, pressed
+
+from palpate.errors import UsageError
+from palpate.physics.geometry import Block
+from palpate.physics.interactions import PointForce, SphereProbe
+from palpate.physics.interactions.patch import Patch
+from palpate.physics.materials import NeoHookean
+from palpate.physics.solid import Body
+
+PROBLEM = pressed()
+
+
+def depths(points):
+    return SIZE[2] + RADIUS - points[:, 2]
+
+
+@pytest.mark.parametrize("samples", [1, 7, 64])
+def test_a_design_has_as_many_samples_as_asked_for_within_the_ranges(samples):
+    points = PROBLEM.design(samples, seed=3)
+    assert points.shape == (samples, 3)
+    for column, r in zip(points.T, PROBLEM.ranges, strict=True):
+        assert (column >= r.low - 1e-12).all()
+        assert (column <= r.high + 1e-12).all()
+    np.testing.assert_array_equal(points, PROBLEM.design(samples, seed=3))
+    if samples > 1:
+        assert not np.array_equal(points, PROBLEM.design(samples, seed=4))
+
+
+def test_chains_are_columns_from_shallow_to_deep():
+    points = PROBLEM.design(64, seed=0)
+    chains = PROBLEM.chains(points)
+    assert sorted(np.concatenate(chains)) == list(range(64))
+    for chain in chains:
+        np.testing.assert_allclose(np.ptp(points[chain, :2], axis=0), 0, atol=1e-12)
+        assert (np.diff(depths(points[chain])) > 0).all()
+
+
+def test_scattered_points_are_grouped_with_their_neighbours_from_shallow_to_deep():
+    rng = np.random.default_rng(0)
+    low, high = (np.array(ends) for ends in zip(*((r.low, r.high) for r in PROBLEM.ranges), strict=True))
+    points = low + rng.random((50, 3)) * (high - low)
+    chains = PROBLEM.chains(points)
+    assert sorted(np.concatenate(chains)) == list(range(50))
+    assert 4 < len(chains) < 25
+    for chain in chains:
+        assert (np.diff(depths(points[chain])) >= 0).all()
+    # a group is narrower than the whole
+    widths = [np.ptp(points[chain, :2], axis=0).max() for chain in chains]
+    assert max(widths) < 0.8 * np.ptp(points[:, :2], axis=0).max()
+
+
+def test_the_default_footprint_keeps_three_radii_from_the_rim():
+    x, y, z = SphereProbe(radius=0.01).ranges(Block((0.1, 0.1, 0.05)))
+    assert (x.low, x.high) == pytest.approx((0.03, 0.07))
+    assert (y.low, y.high) == pytest.approx((0.03, 0.07))
+    assert (z.low, z.high) == pytest.approx((0.045, 0.06))
+
+
+@pytest.mark.parametrize("surface", ["bottom", "side"])
+def test_any_surface_can_be_touched_from_outside(surface):
+    block = Block(SIZE)
+    points = SphereProbe(radius=RADIUS, touches=surface, depth=(0.0, 0.005)).design(block, 16, 0)
+    patch = Patch.of(block.rest(), surface)
+    distance = [patch.nearest(point)[2] for point in points]
+    assert min(distance) >= RADIUS - 0.005 - 1e-9
+    assert max(distance) <= RADIUS + 1e-9
+
+
+def test_a_surface_that_is_not_there_is_named():
+    body = Body(Block(SIZE), NeoHookean(9e3, 0.45))
+    with pytest.raises(UsageError, match="top, bottom, side"):
+        body.problem(SphereProbe(RADIUS, touches="lid")).design(4)
+
+
+def test_a_problem_is_a_value():
+    import pickle
+
+    again = pickle.loads(pickle.dumps(PROBLEM))
+    assert again == PROBLEM
+    assert again.hash == PROBLEM.hash
+    assert hash(again) == hash(PROBLEM)
+    assert pressed(poisson=0.44).hash != PROBLEM.hash
+    assert PROBE.describe()["radius"] == RADIUS
+
+
+def test_other_interactions_leave_the_design_to_the_caller():
+    force = PointForce(at=(0.03, 0.03, 0.03), radius=0.01, force=(0.0, 1.0))
+    problem = Body(Block(SIZE), NeoHookean(9e3, 0.45)).problem(force)
+    assert problem.design_name is None
+    with pytest.raises(UsageError):
+        problem.design(4)
+    assert [list(chain) for chain in problem.chains(np.zeros((3, 1)))] == [[0, 1, 2]]

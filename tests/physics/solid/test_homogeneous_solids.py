@@ -1,0 +1,75 @@
+"""States whose deformation is the same everywhere are found exactly, in both forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from solids import SIZE, Stretched, gel
+
+from palpate.physics.geometry import Block
+from palpate.physics.materials import LinearElastic
+from palpate.physics.materials.tensors import gradient
+from palpate.physics.solid import Body
+
+MATRIX = ((-0.1, 0.2, 0.05), (0.0, 0.15, -0.1), (0.1, 0.0, -0.2))
+VOLUME = float(np.prod(SIZE))
+
+
+def patch(material, formulation):
+    body = Body(Block(SIZE, element=0.02), material, fixed=(), formulation=formulation)
+    return body.problem(Stretched(MATRIX)).open()
+
+
+@pytest.mark.parametrize("formulation", ["displacement", "mixed"])
+@pytest.mark.parametrize("material", [gel(0.4), LinearElastic(9e3, 0.4)], ids=lambda m: type(m).__name__)
+def test_the_patch_test_is_exact(material, formulation):
+    """Energy, its derivative and the displacement inside are those of the homogeneous state."""
+    solver = patch(material, formulation)
+    found = solver.solve(0.8)
+    assert found.converged, found.message
+    F = np.eye(3) + 0.8 * np.array(MATRIX)
+    expected = found.mesh.points @ (F - np.eye(3)).T
+    np.testing.assert_allclose(found.displacement, expected, atol=1e-10 * np.abs(expected).max())
+    assert found.potential_energy == pytest.approx(VOLUME * material.energy(F), rel=1e-10)
+    slope = VOLUME * np.sum(gradient(material.energy, F) * np.array(MATRIX))
+    np.testing.assert_allclose(-found.response, slope, rtol=1e-9)
+    if material.kinematics == "large":
+        assert found.least_volume_ratio == pytest.approx(np.linalg.det(F), rel=1e-10)
+        stretches = np.sqrt(np.linalg.eigvalsh(F.T @ F))
+        assert found.largest_strain == pytest.approx(np.abs(stretches - 1).max(), rel=1e-10)
+
+
+def test_fields_are_those_of_the_homogeneous_state():
+    material = gel(0.4)
+    found = patch(material, "displacement").solve(0.8, fields=True)
+    F = np.eye(3) + 0.8 * np.array(MATRIX)
+    stress = gradient(material.energy, F) @ F.T / np.linalg.det(F)
+    deviator = stress - np.trace(stress) / 3 * np.eye(3)
+    np.testing.assert_allclose(found.von_mises, np.sqrt(1.5 * np.sum(deviator**2)), rtol=1e-7)
+    np.testing.assert_allclose(found.largest_stretch, np.linalg.norm(F, 2), rtol=1e-8)
+
+
+def test_an_inverted_body_is_called_so():
+    """With q A = -1.05 e₃⊗e₃ the block is turned inside out, however small the steps."""
+    turned = Stretched(((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, -1.0)))
+    body = Body(Block(SIZE, element=0.02), gel(0.4), fixed=())
+    solver = body.problem(turned).open()
+    found = solver.solve(1.05)
+    assert not found.converged
+    assert "inside out" in found.message or "not finite" in found.message
+    # the last good state is an equilibrium: one may go there, and on from it
+    assert 0.5 < found.reached[0] < 1.0
+    assert np.isnan(found.displacement).all()
+    assert solver.solve(0.5).converged
+
+
+def test_a_long_step_is_cut_back():
+    """Half the height is lost in one step that must be parted, as the log tells."""
+    squeezed = Stretched(((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, -1.0)))
+    found = Body(Block(SIZE, element=0.02), gel(0.4), fixed=()).problem(squeezed).open().solve(0.9)
+    assert found.converged
+    assert next(step.stop.name for step in found.log) != "CONVERGED"
+    assert found.log[-1].position == 1.0
+    assert found.iterations == sum(step.iterations for step in found.log)
+    F = np.diag([1.0, 1.0, 0.1])
+    assert found.potential_energy == pytest.approx(VOLUME * gel(0.4).energy(F), rel=1e-9)

@@ -8,6 +8,8 @@ import io
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from palpate.errors import FileFormatError, UsageError
 
 __all__ = ["UNITS", "digest_of", "read_with_meshio", "require_same", "require_unit"]
@@ -78,8 +80,14 @@ def read_with_meshio(path: str) -> Any:
     import meshio
 
     try:
-        # where no reader takes the file, meshio prints and ends the program
-        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        # Where no reader takes the file, meshio prints and ends the program. Its reader of STL takes four letters
+        # of an ASCII file for a count, which may overflow: no harm.
+        silent = io.StringIO()
+        with (
+            contextlib.redirect_stdout(silent),
+            contextlib.redirect_stderr(silent),
+            np.errstate(over="ignore"),
+        ):
             return meshio.read(path)
     except (meshio.ReadError, SystemExit, struct.error, ParseError) as error:
         raise _unreadable(path, error) from error

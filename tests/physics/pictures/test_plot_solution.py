@@ -15,6 +15,7 @@ from palpate.errors import UsageError
 from palpate.physics.pictures import plot_solution
 from palpate.physics.pictures.camera import Camera
 from palpate.physics.pictures.fields import largest_stretch_strain, nodal_field
+from palpate.physics.pictures.lines import cut_off, hatching
 from palpate.physics.pictures.raster import draw_triangles
 from palpate.physics.pictures.render import body_layer, palette
 from palpate.physics.pictures.scales import round125, scaled
@@ -158,3 +159,14 @@ def test_importing_pictures_is_light():
     )
     done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_lines_end_at_the_plane():
+    segments = np.array([[[0.0, 0, 0], [1, 0, 0]], [[0, 0, 0], [0, 1, 0]], [[2, 0, 0], [0.5, 0, 0]]])
+    heights = segments[:, :, 0] - 0.75  # the plane x = 0.75
+    assert cut_off(segments, heights) == pytest.approx(
+        np.array([[[0, 0, 0], [0.75, 0, 0]], [[0, 0, 0], [0, 1, 0]], [[0.75, 0, 0], [0.5, 0, 0]]])
+    )
+    assert len(cut_off(segments, heights + 5)) == 0
+    strokes = hatching(segments[:1], 0.25, np.array([0.0, 0.0, 0.1]))
+    assert strokes[:, 0, 0].tolist() == [0.125, 0.375, 0.625, 0.875]

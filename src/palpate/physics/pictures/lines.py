@@ -7,7 +7,7 @@ import numpy as np
 from palpate.physics.pictures.camera import Camera
 from palpate.physics.pictures.skin import CREASE
 
-__all__ = ["border", "hatching", "outline", "split_hidden"]
+__all__ = ["border", "cut_off", "hatching", "outline", "split_hidden"]
 
 PIECES = 12  # of an edge, each of which is hidden or not
 
@@ -43,15 +43,23 @@ def border(triangles: np.ndarray, chosen: np.ndarray) -> np.ndarray:
     return np.asarray(edges[chosen[sides[:, 0]] != chosen[sides[:, 1]]])
 
 
-def hatching(points: np.ndarray, edges: np.ndarray, spacing: float, offset: np.ndarray) -> np.ndarray:
-    """Short strokes (n, 2, 3) that leave edges at even distances: the draughtsman's mark of a fixed surface."""
-    if not len(edges):
-        return np.empty((0, 2, 3))
-    a, b = points[edges[:, 0]], points[edges[:, 1]]
-    lengths = np.linalg.norm(b - a, axis=1)
-    strokes = []
-    for start, end, length in zip(a, b, lengths, strict=True):
-        count = max(round(length / spacing), 1)
+def cut_off(segments: np.ndarray, heights: np.ndarray) -> np.ndarray:
+    """The parts of segments (s, 2, 3) below a plane; `heights` (s, 2) of their ends above it."""
+    above = heights > 0
+    cut = segments.copy()
+    for one, other in ((0, 1), (1, 0)):
+        crossing = above[:, one] & ~above[:, other]
+        share = heights[crossing, one] / (heights[crossing, one] - heights[crossing, other])
+        start, end = segments[crossing, one], segments[crossing, other]
+        cut[crossing, one] = start + share[:, None] * (end - start)
+    return np.asarray(cut[~above.all(axis=1)])
+
+
+def hatching(segments: np.ndarray, spacing: float, offset: np.ndarray) -> np.ndarray:
+    """Short strokes (n, 2, 3) off segments (s, 2, 3) at even distances: the draughtsman's mark of a fixed surface."""
+    strokes = [np.empty((0, 2, 3))]
+    for start, end in segments:
+        count = max(round(float(np.linalg.norm(end - start)) / spacing), 1)
         along = start + (end - start) * ((np.arange(count) + 0.5) / count)[:, None]
         strokes.append(np.stack([along, along + offset], axis=1))
     return np.concatenate(strokes)

@@ -14,7 +14,7 @@ from palpate.physics.pictures.fields import NodalField, nodal_field
 from palpate.physics.pictures.picture import Picture
 from palpate.physics.pictures.render import SMOOTHING, Layer, body_layer, composed, palette
 from palpate.physics.pictures.scales import round125, scaled
-from palpate.physics.pictures.skin import clip, corner_normals, section, section_lines, with_flat_normals
+from palpate.physics.pictures.skin import clip, corner_normals, section, section_lines
 from palpate.physics.pictures.tool import Ball, ball_of, fixed_of, require_state
 
 __all__ = ["plot_solution"]
@@ -24,7 +24,7 @@ Plane = tuple[Any, Any]
 
 INK, SOFT, GHOST = "#1d2730", "#5d6b76", "#7d8b96"
 DPI = 110
-BAR = 0.17  # of the width, for the colour bar
+BAR, TITLE = 172, 36  # px that colour bar and title take
 
 
 def plot_solution(
@@ -88,17 +88,17 @@ def plot_solution(
     shown = nodal_field(solution, colour) if colour is not None else None
     sphere = ball_of(solution, probe)
     body = _Body(solution, scale, shown, _plane(solution.mesh, cut))
-    width = int(size[0] * (1 - BAR)) if shown is not None else size[0]
-    pixels = (SMOOTHING * width, SMOOTHING * size[1])
+    room = (size[0] - (BAR if shown is not None else 0), size[1] - (TITLE if title else 0))
+    pixels = (SMOOTHING * room[0], SMOOTHING * room[1])
     camera = Camera.around(body.seen(sphere, scale), view, pixels)
     span = limits or body.span()
     layer = body_layer(body.soup, camera, span if shown is not None else None)
-    figure, axes = _canvas(size, width, composed(layer, sphere, camera))
+    figure, axes = _canvas(size, room, composed(layer, sphere, camera))
     pen = _Pen(axes, camera, layer, body)
     pen.strokes(body.outlines(camera.axes[2], body.moved), INK, 0.7, hidden=0.0)
     pen.strokes(body.cut_rim(), INK, 0.7, hidden=0.0)
     if edges:
-        pen.strokes(body.moved[body.wires()], INK, 0.25, hidden=0.0)
+        pen.strokes(body.wires(), INK, 0.25, hidden=0.0)
     if outline:
         pen.strokes(body.outlines(camera.axes[2], body.points), GHOST, 0.9, hidden=0.25)
     _mark_fixed(pen, body, fixed_of(solution) if fixed is None else fixed)
@@ -156,7 +156,10 @@ class _Body:
             return soup
         inside = np.concatenate([self.moved, values], axis=1)[self.mesh.tetrahedra]
         faces = section(inside, self.heights[self.mesh.tetrahedra])
-        return np.concatenate([clip(soup, self.heights[skin]), with_flat_normals(faces)])
+        # no normals: a cut is shown in its true colours, without light and shade
+        bare = np.zeros((*faces.shape[:2], 3))
+        cut = np.concatenate([faces[:, :, :3], bare, faces[:, :, 3:]], axis=2)
+        return np.concatenate([clip(soup, self.heights[skin]), cut])
 
     def span(self) -> tuple[float, float]:
         """Ends of the colour scale: from zero, where the values allow; smoothed stresses dip a little below."""
@@ -173,8 +176,7 @@ class _Body:
 
     def outlines(self, towards: np.ndarray, points: np.ndarray) -> np.ndarray:
         """Segments (s, 2, 3) that draw the skin at `points`, what the plane takes left out."""
-        ends = lines.outline(points, self.mesh.triangles, towards)
-        return np.asarray(points[self._kept(ends)])
+        return self._kept(points, lines.outline(points, self.mesh.triangles, towards))
 
     def cut_rim(self) -> np.ndarray:
         """Segments (s, 2, 3) in which the plane cuts the skin as drawn."""
@@ -183,17 +185,18 @@ class _Body:
         return section_lines(self.moved[self.mesh.triangles], self.heights[self.mesh.triangles])
 
     def wires(self) -> np.ndarray:
-        """Edges (s, 2) of the skin's triangles."""
+        """Edges of the skin's triangles as drawn, segments (s, 2, 3)."""
         ends = self.mesh.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-        return self._kept(np.unique(np.sort(ends, axis=1), axis=0))
+        return self._kept(self.moved, np.unique(np.sort(ends, axis=1), axis=0))
 
     def rim(self, surfaces: tuple[str, ...]) -> np.ndarray:
-        """Edges (s, 2) around named surfaces."""
+        """Edges around named surfaces as drawn, segments (s, 2, 3)."""
         chosen = np.isin(self.mesh.surface_of, [self.mesh.surfaces.index(name) for name in surfaces])
-        return self._kept(lines.border(self.mesh.triangles, chosen))
+        return self._kept(self.moved, lines.border(self.mesh.triangles, chosen))
 
-    def _kept(self, ends: np.ndarray) -> np.ndarray:
-        return np.asarray(ends[np.all(self.heights[ends] <= 0, axis=1)])
+    def _kept(self, points: np.ndarray, ends: np.ndarray) -> np.ndarray:
+        """Segments (s, 2, 3) of edges (n, 2), cut off at the plane."""
+        return lines.cut_off(points[ends], self.heights[ends])
 
 
 class _Pen:
@@ -223,26 +226,27 @@ def _mark_fixed(pen: _Pen, body: _Body, surfaces: tuple[str, ...]) -> None:
     if not surfaces:
         return
     rim, length = body.rim(surfaces), float(np.linalg.norm(np.ptp(body.points, axis=0)))
-    pen.strokes(body.moved[rim], INK, 1.8, hidden=0.0)
+    pen.strokes(rim, INK, 1.8, hidden=0.0)
     chosen = np.isin(body.mesh.surface_of, [body.mesh.surfaces.index(name) for name in surfaces])
     a, b, c = np.moveaxis(body.points[body.mesh.triangles[chosen]], 1, 0)
     outward = np.cross(b - a, c - a).sum(axis=0)
     outward = outward / max(float(np.linalg.norm(outward)), 1e-300)
     slant = outward - 0.8 * pen.camera.axes[0]
-    strokes = lines.hatching(body.moved, rim, 0.022 * length, 0.016 * length * slant)
+    strokes = lines.hatching(rim, 0.022 * length, 0.016 * length * slant)
     pen.strokes(strokes, SOFT, 0.8, hidden=0.0)
 
 
-def _canvas(size: tuple[int, int], width: int, image: np.ndarray) -> tuple[Any, Any]:
+def _canvas(size: tuple[int, int], room: tuple[int, int], image: np.ndarray) -> tuple[Any, Any]:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(size[0] / DPI, size[1] / DPI), dpi=DPI, facecolor="white")
     FigureCanvasAgg(figure)
-    axes = figure.add_axes((0, 0, width / size[0], 1))
-    axes.imshow(image, extent=(0, width, size[1], 0), interpolation="none")
+    width, height = room
+    axes = figure.add_axes((0, 0, width / size[0], height / size[1]))
+    axes.imshow(image, extent=(0, width, height, 0), interpolation="none")
     axes.set_xlim(0, width)
-    axes.set_ylim(size[1], 0)
+    axes.set_ylim(height, 0)
     axes.set_axis_off()
     return figure, axes
 
@@ -283,7 +287,8 @@ def _colour_bar(figure: Any, shown: NodalField, span: tuple[float, float]) -> No
 
     size, unit = scaled(max(map(abs, span)), shown.unit)
     colours = ScalarMappable(Normalize(span[0] / size, span[1] / size), ListedColormap(palette()))
-    axes = figure.add_axes((1 - 0.77 * BAR, 0.22, 0.017, 0.54))
+    width = figure.get_size_inches()[0] * DPI
+    axes = figure.add_axes((1 - 0.77 * BAR / width, 0.22, 17 / width, 0.54))
     bar = figure.colorbar(colours, cax=axes)
     bar.outline.set_visible(False)
     bar.ax.tick_params(labelsize=9, length=3, color=SOFT, labelcolor=INK)

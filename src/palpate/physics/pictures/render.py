@@ -86,13 +86,18 @@ def _drawn(corners: np.ndarray, attributes: np.ndarray, camera: Camera) -> tuple
 
 
 def _lit(base: np.ndarray, normals: np.ndarray, camera: Camera, shine: float) -> np.ndarray:
-    """Colours under a lamp over the observer's left shoulder (Blinn 1977), both sides of a surface alike."""
+    """Colours under a lamp over the observer's left shoulder (Blinn 1977), both sides of a surface alike.
+
+    Where there is no normal there is no shading.
+    """
     n = normals @ camera.axes.T
-    n = n / np.maximum(np.linalg.norm(n, axis=-1, keepdims=True), 1e-12)
+    size = np.linalg.norm(n, axis=-1, keepdims=True)
+    n = n / np.maximum(size, 1e-12)
     n = np.where(n[..., 2:] < 0, -n, n)
     lamp = LIGHT / np.linalg.norm(LIGHT)
     half = lamp + np.array([0.0, 0.0, 1.0])
     half = half / np.linalg.norm(half)
     diffuse = np.clip(n @ lamp, 0, 1)[..., None]
     glint = np.clip(n @ half, 0, 1)[..., None] ** 40
-    return np.asarray(np.clip(base * (0.62 + 0.46 * diffuse) + shine * glint, 0, 1))
+    shaded = base * (0.62 + 0.46 * diffuse) + shine * glint
+    return np.asarray(np.clip(np.where(size > 0, shaded, base), 0, 1))

@@ -12,7 +12,7 @@ import numpy as np
 
 from palpate.physics.pictures.raster import smooth_normals
 
-__all__ = ["CREASE", "ball", "clip", "corner_normals", "section", "section_lines", "with_flat_normals"]
+__all__ = ["CREASE", "ball", "clip", "corner_normals", "section", "section_lines"]
 
 CREASE = math.cos(math.radians(40.0))  # edges sharper than this stay edges
 
@@ -92,15 +92,6 @@ def _between(corners: np.ndarray, heights: np.ndarray, i: int, j: int) -> np.nda
     """Attributes where the edge from corner i to corner j meets the plane."""
     share = heights[:, i] / (heights[:, i] - heights[:, j])
     return np.asarray(corners[:, i] + share[:, None] * (corners[:, j] - corners[:, i]))
-
-
-def with_flat_normals(soup: np.ndarray) -> np.ndarray:
-    """Triangles (t, 3, 3 + k) of position and more, with a normal (3) put in after the position."""
-    a, b, c = np.moveaxis(soup[:, :, :3], 1, 0)
-    n = np.cross(b - a, c - a)
-    size = np.linalg.norm(n, axis=1, keepdims=True)
-    n = np.broadcast_to((n / np.where(size > 0, size, 1.0))[:, None], soup[:, :, :3].shape)
-    return np.concatenate([soup[:, :, :3], n, soup[:, :, 3:]], axis=2)
 
 
 def ball(centre: np.ndarray, radius: float, rings: int = 40) -> tuple[np.ndarray, np.ndarray]:

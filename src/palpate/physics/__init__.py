@@ -1,43 +1,144 @@
-"""What the body does under load: geometry, materials, loads and the solve.
+"""What the body does under load: geometry, materials, what acts on it, and the solve.
 
-    materials    what a body is made of, as energies
-    beam         plane cantilevers
-    equilibrium  finding a minimum of an energy, whatever body it belongs to
+    geometry      shapes and their meshes, made or imported
+    materials     what a body is made of, as energies
+    interactions  what acts on it, as energies with inputs
+    solid         solid bodies in three dimensions
+    beam          plane cantilevers
+    equilibrium   finding a minimum of an energy, whatever body it belongs to
+    massspring    points and springs on the same mesh, to compare with
+    pictures      drawing what was solved
 
-A body and its loads make a problem, a plain value. The problem's `open` builds the finite elements and gives a solver,
-whose `solve` returns a solution, a plain value also where there is no equilibrium.
+A body and what acts on it make a problem, a plain value. The problem's `open` builds the finite elements and gives a
+solver, whose `solve` returns a solution, a plain value also where there is no equilibrium.
 """
 
 from palpate.physics.beam import (
+    HISTORY_PRESETS,
     PRESETS,
     BeamProblem,
     Cantilever,
     Circle,
+    LoadAndUnload,
     PointLoad,
     Preset,
     Rectangle,
     Section,
     Solution,
+    StepAndHold,
     TipLoad,
     preset,
 )
-from palpate.physics.equilibrium import Stop
-from palpate.physics.materials import MATERIALS, LinearElastic, named_material
+from palpate.physics.equilibrium import (
+    Stop,
+)
+from palpate.physics.geometry import (
+    Block,
+    BodyMesh,
+    Cylinder,
+    Dome,
+    Geometry,
+    ImportedMesh,
+    ImportedSolid,
+    Inclusion,
+    LayeredBlock,
+    Organ,
+    Refinement,
+    SurfacePatch,
+    Tube,
+)
+from palpate.physics.interactions import (
+    BodyForce,
+    GluedPad,
+    Interaction,
+    PointForce,
+    PrescribedDisplacement,
+    Pressure,
+    SphereProbe,
+    SurfaceTraction,
+    pad_share,
+)
+from palpate.physics.materials import (
+    MATERIALS,
+    FibreFamily,
+    FibreReinforced,
+    LinearElastic,
+    LinearHardening,
+    Material,
+    MooneyRivlin,
+    NeoHookean,
+    Ogden,
+    Plastic,
+    Prony,
+    StVenantKirchhoff,
+    UserMaterial,
+    Viscoelastic,
+    VoceHardening,
+    Yeoh,
+    named_material,
+)
+from palpate.physics.solid import (
+    Body,
+    SolidProblem,
+    SolidSolution,
+)
 
 __all__ = [
+    "HISTORY_PRESETS",
     "MATERIALS",
     "PRESETS",
     "BeamProblem",
+    "Block",
+    "Body",
+    "BodyForce",
+    "BodyMesh",
     "Cantilever",
     "Circle",
+    "Cylinder",
+    "Dome",
+    "FibreFamily",
+    "FibreReinforced",
+    "Geometry",
+    "GluedPad",
+    "ImportedMesh",
+    "ImportedSolid",
+    "Inclusion",
+    "Interaction",
+    "LayeredBlock",
     "LinearElastic",
+    "LinearHardening",
+    "LoadAndUnload",
+    "Material",
+    "MooneyRivlin",
+    "NeoHookean",
+    "Ogden",
+    "Organ",
+    "Plastic",
+    "PointForce",
     "PointLoad",
+    "PrescribedDisplacement",
     "Preset",
+    "Pressure",
+    "Prony",
     "Rectangle",
+    "Refinement",
     "Section",
+    "SolidProblem",
+    "SolidSolution",
     "Solution",
+    "SphereProbe",
+    "StVenantKirchhoff",
+    "StepAndHold",
     "Stop",
+    "SurfacePatch",
+    "SurfaceTraction",
     "TipLoad",
+    "Tube",
+    "UserMaterial",
+    "Viscoelastic",
+    "VoceHardening",
+    "Yeoh",
     "named_material",
+    "pad_share",
     "preset",
 ]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import difflib
 from typing import Any
 
 from pydantic import ValidationError
 
 from palpate.errors import UsageError
-from palpate.physics import Cantilever, Circle
+from palpate.physics import Cantilever, Circle, PointLoad
 from palpate.physics.beam.presets import PRESETS, preset
 from palpate.study.models import Study
 
@@ -51,8 +52,10 @@ def preset_study(name: str) -> Study:
     UsageError
         If the name is not known; the message lists the names that are.
     """
+    if name not in PRESETS:
+        raise _no_study(name)
     found = preset(name)
-    body = found.body
+    body, loads = found.body, [load for load in found.loads if isinstance(load, PointLoad)]
     content: dict[str, Any] = {
         "name": found.name,
         "body": {
@@ -64,19 +67,28 @@ def preset_study(name: str) -> Study:
         },
         "loads": [
             {"name": p.name, "at": p.at, "low": p.low, "high": p.high, "direction": p.direction}
-            for p in found.loads
+            for p in loads
         ],
         "sweep": {"design": found.design, "samples": found.samples},
     }
-    if len(found.loads) > 1:
+    if len(loads) > 1:
         content |= _SEVERAL
     elif body.material.name == "copper":
         # stiffer, so nearly linear over these loads: more can be asked of the filter
         content["target"] = {"filter_rmse": 1e-4}
-    elif found.loads[0].high > 5.0:
+    elif loads[0].high > 5.0:
         # at 10 N nylon is at P L²/EI = 10, where the tip has turned by 80°: the filter alone comes this far
         content["target"] = {"filter_rmse": 2e-3}
     return Study.model_validate(content)
+
+
+def _no_study(name: str) -> UsageError:
+    close = difflib.get_close_matches(name, PRESETS, n=1)
+    return UsageError(
+        f"There is no study called {name!r}.",
+        why=f"Known studies: {', '.join(PRESETS)}.",
+        fix=f"Did you mean {close[0]!r}?" if close else "Choose one of these, or write a study file.",
+    )
 
 
 def _radius_of(body: Cantilever) -> float:

@@ -9,6 +9,8 @@ expressions, each accurate to rounding in its range and all equal where they mee
 * else the root that stands farthest from the others is a simple one, d₁ = ± 2 √(J₂/3) g(w), where g is the root of
   4g³ − 3g = w, w = |J₃|/2 (3/J₂)^(3/2) (Viète), smooth on 0 ≤ w ≤ 1 though the arc cosine that usually gives it is not;
 * and the other two, p ± q, enter by q² alone: as a series where q is small beside p, by the root of q² where it isn't.
+
+Intermediate values are used many times: an NGSolve expression of these sums must be compiled before it is evaluated.
 """
 
 from __future__ import annotations

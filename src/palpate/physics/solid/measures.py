@@ -83,7 +83,9 @@ class Measures:
 
         return self._at_nodes(
             {
-                region: equivalent(cauchy_stress(self._field, region, material, self._histories.get(region)))
+                region: equivalent(
+                    cauchy_stress(self._field, region, material, self._histories.get(region))
+                ).Compile()
                 for region, material in self._materials.items()
             }
         )

@@ -119,3 +119,46 @@ def test_files_of_other_programs_are_shown(tmp_path: Path):
     for path in ("bad.vtu", "missing.vtu"):
         with pytest.raises(FileFormatError, match="can't be shown"):
             body_of(tmp_path / path)
+
+
+def solid_dataset(samples: int):
+    """Dents of rising depth in the block as a dataset, the last row not converged."""
+    from palpate.dataset import Layout, assemble, solid_fields
+    from palpate.units import Range
+
+    mesh = block_mesh()
+    ranges = tuple(Range(name, 0.0, 0.1, "m") for name in ("c_x", "c_y", "c_z"))
+    schema = solid_fields(len(mesh.points), ranges)
+    answers = {field.name: np.zeros((samples, *field.shape)) for field in schema}
+    made = [dent(mesh, depth) for depth in np.linspace(0.001, 0.010, samples)]
+    answers["displacement"] = np.array([one.displacement for one in made])
+    answers["response"] = np.array([one.response for one in made])
+    said = {"converged": True, "iterations": 3, "residual": 0.0, "message": "", "solve_seconds": 1.0}
+    answers |= {name: np.full(samples, value) for name, value in said.items()}
+    answers["converged"][-1] = False
+    layout = Layout(
+        mesh.points, triangles=mesh.triangles, surfaces=mesh.surfaces, surface_of=mesh.surface_of.astype(int)
+    )
+    problem = {
+        "body": {"type": "Body", "fixed": ["bottom"]},
+        "interactions": [{"type": "SphereProbe", "radius": 0.010}],
+    }
+    centres = np.array([one.centre for one in made])
+    return made, assemble(ranges, layout, centres, answers, {"problem": problem}, schema=schema)
+
+
+def test_a_dataset_is_shown_sample_by_sample(tmp_path: Path):
+    made, data = solid_dataset(4)
+    for body in (body_of(data), body_of(data.save(tmp_path / "dents.zarr"))):
+        assert [s.label for s in body.steps] == ["sample 0", "sample 1", "sample 2"]
+        assert np.array_equal(body.steps[1].displacement, made[1].displacement)
+        assert body.steps[1].ball[0] == pytest.approx(made[1].centre)
+        assert body.steps[1].ball[1] == 0.010
+        assert np.array_equal(body.fixed, made[0].mesh.surface_of == 0)
+    assert body.name == "dents"
+
+
+def test_a_long_dataset_is_thinned_from_end_to_end(monkeypatch):
+    monkeypatch.setattr("palpate.viewer.files.MOST_STEPS", 3)
+    _, data = solid_dataset(8)
+    assert [s.label for s in body_of(data).steps] == ["sample 0", "sample 3", "sample 6"]

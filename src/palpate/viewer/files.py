@@ -54,10 +54,11 @@ def body_of_dataset(dataset: Any, name: str) -> ShownBody:
     rows = np.flatnonzero(data["converged"].values)
     if len(rows) > MOST_STEPS:
         rows = rows[np.linspace(0, len(rows) - 1, MOST_STEPS).astype(int)]
-    radius = _radius(getattr(dataset, "provenance", {}))
+    origin = dataset.provenance
+    radius = _radius(origin)
     rest = np.asarray(data["rest"].values, dtype=float)
     steps = [_sample(data, int(row), radius) for row in rows]
-    return ShownBody(name, rest, np.asarray(data["triangles"].values), steps)
+    return ShownBody(name, rest, np.asarray(data["triangles"].values), steps, fixed=_fixed(data, origin))
 
 
 def _sample(data: Any, row: int, radius: float | None) -> ShownStep:
@@ -72,6 +73,16 @@ def _sample(data: Any, row: int, radius: float | None) -> ShownStep:
         label=f"sample {row}",
         figures=figures(response, energy, ball),
     )
+
+
+def _fixed(data: Any, origin: Any) -> np.ndarray | None:
+    """Which triangles belong to the surfaces that the body is fixed at, as far as the dataset tells."""
+    names = origin.get("problem", {}).get("body", {}).get("fixed", ())
+    if "surface" not in data or "surface_of" not in data:
+        return None
+    known = [str(name) for name in data["surface"].values]
+    numbers = [known.index(name) for name in ([names] if isinstance(names, str) else names) if name in known]
+    return np.isin(data["surface_of"].values, numbers)
 
 
 def _radius(record: Any) -> float | None:

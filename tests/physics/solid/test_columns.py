@@ -7,7 +7,7 @@ import pytest
 from solids import PROBE, RADIUS, SIZE, pressed
 
 from palpate.errors import UsageError
-from palpate.physics.geometry import Block
+from palpate.physics.geometry import Block, Dome
 from palpate.physics.interactions import PointForce, SphereProbe
 from palpate.physics.interactions.patch import Patch
 from palpate.physics.materials import NeoHookean
@@ -53,6 +53,18 @@ def test_scattered_points_are_grouped_with_their_neighbours_from_shallow_to_deep
     # a group is narrower than the whole
     widths = [np.ptp(points[chain, :2], axis=0).max() for chain in chains]
     assert max(widths) < 0.8 * np.ptp(points[:, :2], axis=0).max()
+
+
+def test_columns_on_a_dome_are_chains_too():
+    dome, probe = Dome(radius=0.06), SphereProbe(radius=RADIUS, depth=(0.0, 0.008))
+    points = probe.design(dome, 36, 0)
+    chains = probe.chains(dome, points)
+    assert [len(chain) for chain in chains] == [4] * 9
+    np.testing.assert_array_equal(np.concatenate(chains), np.arange(36))
+    # three radii from the rim, and on the normal through the centre, but for the facets' slopes
+    height = np.linalg.norm(points, axis=1)
+    assert np.abs(points[:, :2]).max() < 0.03 * 1.2
+    assert height.max() == pytest.approx(0.06 + RADIUS, rel=0.02)
 
 
 def test_the_default_footprint_keeps_three_radii_from_the_rim():

@@ -15,6 +15,8 @@ __all__ = ["footprints_of", "group", "per_column", "stratified"]
 
 LONGEST = 16  # depths in a column: finer ones cost as much as they save
 SAME = 1e-3  # share of the radius within which two footprints are one
+STEEP = 0.95  # share of a step that must lead into the surface
+STRAIGHT = 1 - 1e-9  # cosine from which on two steps are on one line
 NEAR = 8  # scattered points in a chain
 
 
@@ -38,16 +40,17 @@ def footprints_of(patch: Patch, centres: np.ndarray) -> tuple[np.ndarray, np.nda
     return np.array([foot for foot, _, _ in found]), np.array([distance for _, _, distance in found])
 
 
-def group(feet: np.ndarray, distance: np.ndarray, radius: float) -> list[np.ndarray]:
+def group(centres: np.ndarray, feet: np.ndarray, distance: np.ndarray, radius: float) -> list[np.ndarray]:
     """Parts positions into chains, each from shallow to deep.
 
-    Positions of one footprint make a chain. Footprints that stand alone are parted into groups of neighbours by
-    halving them across their widest side.
+    Positions that follow each other on a straight line into the surface make a chain, and so do those of one
+    footprint. Those that stand alone are parted into groups of neighbours, by halving them across their widest
+    side.
 
     Parameters
     ----------
-    feet : (N, 3) array
-        Footprints in m.
+    centres, feet : (N, 3) array
+        Positions and their footprints in m.
     distance : (N,) array
         Signed distances of the centres from the surface in m.
     radius : float
@@ -58,18 +61,39 @@ def group(feet: np.ndarray, distance: np.ndarray, radius: float) -> list[np.ndar
     list of int arrays
         Row indices; every row occurs once. They depend on the positions alone.
     """
-    columns = _columns(np.round(feet / (SAME * radius)).astype(np.int64))
-    whole = [rows for rows in columns if rows.size > 1]
+    runs = _runs(centres, distance)
+    whole = [rows for rows in runs if rows.size > 1]
+    others = np.array([rows[0] for rows in runs if rows.size == 1], dtype=int)
+    columns = _columns(others, np.round(feet / (SAME * radius)).astype(np.int64))
+    whole += [rows for rows in columns if rows.size > 1]
     single = np.array([rows[0] for rows in columns if rows.size == 1], dtype=int)
-    chains = whole + _halved(feet, single)
-    return [rows[np.argsort(-distance[rows], kind="stable")] for rows in chains]
+    return [rows[np.argsort(-distance[rows], kind="stable")] for rows in [*whole, *_halved(feet, single)]]
 
 
-def _columns(keys: np.ndarray) -> list[np.ndarray]:
-    """Rows of equal keys (N, 3), in the order in which each key first occurs."""
+def _runs(centres: np.ndarray, distance: np.ndarray) -> list[np.ndarray]:
+    """Rows (N,) parted where the next position is not straight ahead into the surface.
+
+    On a curved surface the positions of a column have footprints that differ by the facets' slopes, but they stay
+    on one line.
+    """
+    steps = np.diff(centres, axis=0)
+    lengths = np.linalg.norm(steps, axis=1)
+    inward = (lengths > 0) & (distance[:-1] - distance[1:] > STEEP * lengths)
+    units = steps / np.where(lengths > 0, lengths, 1.0)[:, None]
+    parted = []
+    for row in range(1, len(centres)):
+        directed = row > 1 and (not parted or parted[-1] != row - 1)  # a line has two rows at least
+        turned = directed and units[row - 1] @ units[row - 2] < STRAIGHT
+        if not inward[row - 1] or turned:
+            parted.append(row)
+    return np.split(np.arange(len(centres)), parted)
+
+
+def _columns(rows: np.ndarray, keys: np.ndarray) -> list[np.ndarray]:
+    """Those rows parted by equal keys (N, 3), in the order in which each key first occurs."""
     found: dict[tuple[int, ...], list[int]] = {}
-    for row, key in enumerate(keys.tolist()):
-        found.setdefault(tuple(key), []).append(row)
+    for row in rows.tolist():
+        found.setdefault(tuple(keys[row].tolist()), []).append(row)
     return [np.array(rows) for rows in found.values()]
 
 

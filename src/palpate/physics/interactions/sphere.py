@@ -26,6 +26,7 @@ INSET = 3.0  # distance of the footprint from the surface's rim over the radius,
 MOST_INSET = 0.4  # the same, at most, over the surface's width
 SIDEWAYS = 3.0  # how much dearer a move across is than one along the normal
 FIRST = 0.25  # first step along the approach over the radius
+OPEN = 0.3  # length of a surface's mean normal from which on it is looked at along one axis
 MOST_STEPS = 50  # of the search for a place outside
 
 Corner = tuple[float, ...]
@@ -116,8 +117,9 @@ class SphereProbe:
 
     def chains(self, geometry: Geometry, points: np.ndarray) -> list[np.ndarray]:
         """Rows of positions (N, 3) in chains: columns of one footprint, else neighbours, from shallow to deep."""
-        feet, distance = columns.footprints_of(self._patch(geometry), np.asarray(points, dtype=float))
-        return columns.group(feet, distance, self.radius)
+        centres = np.asarray(points, dtype=float)
+        feet, distance = columns.footprints_of(self._patch(geometry), centres)
+        return columns.group(centres, feet, distance, self.radius)
 
     def attach(self, field: Field) -> Attached:
         """Its contact energy on an opened body."""
@@ -159,7 +161,7 @@ class SphereProbe:
                 low[axis], high[axis] = a, b
             return low, high
         # along the surface only: a closed one faces nowhere in the mean and has no rim
-        along = (np.abs(patch.facing) < 0.5) & (np.linalg.norm(patch.facing) > 0.5)
+        along = (np.abs(patch.facing) < 0.5 * np.linalg.norm(patch.facing)) & _is_open(patch)
         inset = np.minimum(INSET * self.radius, MOST_INSET * (high - low)) * along
         return low + inset, high - inset
 
@@ -167,7 +169,7 @@ class SphereProbe:
         """Footprints (M, 3) in m, outward normals (M, 3) there, and which places (N, 2) of the unit square have one."""
         low, high = self._footprint(patch)
         axis = int(np.argmax(np.abs(patch.facing)))
-        if np.linalg.norm(patch.facing) > 0.5:
+        if _is_open(patch):
             across = [i for i in range(3) if i != axis]
             places = low[across] + unit * (high - low)[across]
             feet = patch.cast(axis, float(np.sign(patch.facing[axis])), places)
@@ -225,6 +227,11 @@ class _Approach:
 
 
 _GRID = np.stack(np.meshgrid(np.linspace(0, 1, 9), np.linspace(0, 1, 9)), axis=-1).reshape(-1, 2)
+
+
+def _is_open(patch: Patch) -> bool:
+    """Whether a surface faces one way in the mean, as a face or a dome does; a hemisphere's mean normal is ½ long."""
+    return bool(np.linalg.norm(patch.facing) > OPEN)
 
 
 def _within(patch: Patch, low: np.ndarray, high: np.ndarray) -> Patch:

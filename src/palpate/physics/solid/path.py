@@ -19,7 +19,7 @@ from palpate.physics.solid.newton import Found
 __all__ = ["Followed", "Known", "LoadStep", "follow"]
 
 SMALLEST_STEP = 2.0**-10  # of the whole path
-MOST_ITERATIONS = 400  # over a whole path: bounds the time that pointless inputs cost
+MOST_ITERATIONS = 200  # over a whole path: bounds the time that pointless inputs cost
 EASY, HARD = 3, 6  # factorisations up to which steps grow, beyond which they shrink
 GROWTH, SHRINKAGE = 1.6, 0.7
 STRAIGHT = 0.999  # cosine from which on two steps are on one line

@@ -66,3 +66,17 @@ def dents(count: int = 6, deepest: float = 0.010) -> list[Any]:
     """A probe pressed in steps."""
     mesh = block_mesh()
     return [dent(mesh, depth) for depth in np.linspace(0.0, deepest, count)]
+
+
+def ball(rings: int) -> tuple[np.ndarray, np.ndarray]:
+    """Points and outward triangles of a sphere of 50 mm."""
+    n = rings
+    polar = np.pi * np.arange(n + 1)[:, None] / n
+    around = np.pi * np.arange(2 * n)[None, :] / n
+    unit = [np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar) + 0 * around]
+    points = 0.05 * np.stack(unit, axis=-1).reshape(-1, 3)
+    number = np.arange(len(points)).reshape(n + 1, 2 * n)
+    number[0], number[-1] = 0, number[-1, 0]
+    a, b, c, d = number[:-1], number[1:], np.roll(number[1:], -1, axis=1), np.roll(number[:-1], -1, axis=1)
+    triangles = np.concatenate([np.stack(w, axis=-1).reshape(-1, 3) for w in ((a, b, c), (a, c, d))])
+    return points, triangles[(np.diff(np.sort(triangles, axis=1), axis=1) > 0).all(axis=1)]

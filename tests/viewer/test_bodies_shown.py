@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import httpx
 import numpy as np
 import pytest
-from blocks import SIZE, block_mesh, dent, dents
+from blocks import SIZE, ball, block_mesh, dent, dents
 
 from palpate.errors import FileFormatError, UsageError
 from palpate.viewer import BodyViewer
@@ -34,19 +34,8 @@ def test_a_block_is_split_into_six_faces():
 
 
 def test_a_ball_stays_whole():
-    n = 24
-    polar, around = np.meshgrid(
-        np.pi * np.arange(n + 1) / n, 2 * np.pi * np.arange(2 * n) / (2 * n), indexing="ij"
-    )
-    points = np.stack(
-        [np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)], axis=-1
-    )
-    number = np.arange(points[..., 0].size).reshape(n + 1, 2 * n)
-    number[0], number[-1] = 0, number[-1, 0]
-    a, b, c, d = number[:-1], number[1:], np.roll(number[1:], -1, axis=1), np.roll(number[:-1], -1, axis=1)
-    triangles = np.concatenate([np.stack(w, axis=-1).reshape(-1, 3) for w in ((a, b, c), (a, c, d))])
-    triangles = triangles[(np.diff(np.sort(triangles, axis=1), axis=1) > 0).all(axis=1)]
-    parts = split(points.reshape(-1, 3), triangles, np.zeros(len(triangles), bool))
+    points, triangles = ball(24)
+    parts = split(points, triangles, np.zeros(len(triangles), bool))
     assert len(parts.nodes) == len(np.unique(triangles))
     assert len(parts.creases) == 0
 

@@ -8,11 +8,12 @@ from collections.abc import Iterator
 import matplotlib.image
 import numpy as np
 import pytest
-from blocks import dents
+from blocks import ball, dents
 from chromium_page import assert_no
 from playwright.sync_api import Browser, Page, expect
 
 from palpate.viewer import BodyViewer
+from palpate.viewer.bodies import ShownBody, ShownStep
 
 pytestmark = pytest.mark.timeout(120)
 
@@ -136,5 +137,23 @@ def test_one_state_on_small_and_dark_screens(
         assert page.is_hidden("#states")
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
         keep(page, f"body-{width}-{scheme}")
+        page.context.close()
+    assert_no(complaints)
+
+
+def test_shading_is_smooth_across_the_facets_of_a_ball(browser: Browser, complaints: list[str], keep):
+    points, triangles = ball(8)
+    with BodyViewer(ShownBody("ball", points, triangles, [ShownStep(0 * points)]), port=0) as viewer:
+        page = open_body(browser, viewer, complaints)
+        page.locator("#show-ghost").uncheck()
+        page.wait_for_timeout(100)
+        keep(page, "body-ball")
+        pixels = canvas_pixels(page).mean(axis=2)
+        dark = pixels < 0.6
+        row = pixels[int(np.mean(np.flatnonzero(dark.any(axis=1))))]
+        inside = np.flatnonzero(row < 0.6)
+        middle = row[inside[0] + len(inside) // 5 : inside[-1] - len(inside) // 5]
+        # neighbouring facets of 22 degrees, each in one shade, would differ by more than this
+        assert np.abs(np.diff(middle)).max() < 0.015
         page.context.close()
     assert_no(complaints)

@@ -20,7 +20,7 @@ from palpate.viewer.surfaces import Split, split
 
 __all__ = ["ShownBody", "ShownStep", "body_of"]
 
-VON_MISES = "von Mises stress"
+VON_MISES, STRETCH = "von Mises stress", "largest principal stretch"
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +103,7 @@ class ShownBody:
             columns = [np.asarray(step.values[name])[parts.nodes] for step in self.steps]
             low, high = min(float(c.min()) for c in columns), max(float(c.max()) for c in columns)
             # from zero, where the values allow; smoothed stresses dip a little below
-            low = low if low < -0.05 * abs(high) else 0.0
+            low = low if low < -0.05 * abs(high) or low > 0.5 * high else 0.0
             fields.append(FieldInfo(name, self.units.get(name, ""), low, high if high > low else low + 1.0))
         steps = tuple(StepInfo(s.label or f"{i + 1}", dict(s.figures)) for i, s in enumerate(self.steps))
         return Shown(PROTOCOL, self.name, tuple(fields), steps, reach)
@@ -193,11 +193,12 @@ def _body_of_solutions(solutions: list[Any], name: str) -> ShownBody:
 
 
 def _step_of(solution: Any) -> ShownStep:
-    stress = getattr(solution, "von_mises", None)
+    fields = {VON_MISES: "von_mises", STRETCH: "largest_stretch"}
+    known = {name: getattr(solution, attribute, None) for name, attribute in fields.items()}
     ball = _ball_of(solution)
     return ShownStep(
         displacement=solution.displacement,
-        values={} if stress is None else {VON_MISES: stress},
+        values={name: values for name, values in known.items() if values is not None},
         ball=ball,
         figures=figures(
             getattr(solution, "response", None), getattr(solution, "potential_energy", None), ball
@@ -218,7 +219,8 @@ def figures(response: Any, energy: Any, ball: tuple[np.ndarray, float] | None) -
     """Figures of a state in words, as far as they are known."""
     found: dict[str, str] = {}
     if ball is not None:
-        found["probe"] = f"{', '.join(f'{1e3 * c:.1f}' for c in ball[0])} mm"
+        places = ", ".join(f"{1e3 * c + 0.0:.1f}" for c in ball[0].round(6))
+        found["probe"] = f"{places} mm".replace("-", "−")
     if response is not None and np.size(response) == 3 and ball is not None:
         size = float(np.linalg.norm(response))
         found["force on the probe"] = f"{size:.3g} N"

@@ -73,6 +73,7 @@ export class SolidView {
     this.geometry.setAttribute("position", this.position);
     this.geometry.setAttribute("color", this.colour);
     this.geometry.setIndex(Array.from(triangles));
+    this.geometry.computeVertexNormals(); // a material that first sees a geometry without normals stays flat
     this.body = new Mesh(
       this.geometry,
       new MeshPhongMaterial({ vertexColors: true, side: DoubleSide, shininess: 24, specular: 0x1c1c1c }),

@@ -80,7 +80,7 @@ def _runs(centres: np.ndarray, distance: np.ndarray) -> list[np.ndarray]:
     lengths = np.linalg.norm(steps, axis=1)
     inward = (lengths > 0) & (distance[:-1] - distance[1:] > STEEP * lengths)
     units = steps / np.where(lengths > 0, lengths, 1.0)[:, None]
-    parted = []
+    parted: list[int] = []
     for row in range(1, len(centres)):
         directed = row > 1 and (not parted or parted[-1] != row - 1)  # a line has two rows at least
         turned = directed and units[row - 1] @ units[row - 2] < STRAIGHT

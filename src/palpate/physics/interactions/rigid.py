@@ -95,7 +95,8 @@ def _null_space(rows: np.ndarray) -> np.ndarray:
     """Orthonormal rows spanning what the matrix (k, n) maps to nothing, shape (m, n)."""
     if not rows.size:
         return np.eye(rows.shape[1])
-    _, values, right = np.linalg.svd(rows)
+    # by way of R, since the full left factor of many rows would fill the memory
+    _, values, right = np.linalg.svd(np.linalg.qr(rows, mode="r"))
     rank = int((values > NOTHING * max(values[0], np.finfo(float).tiny)).sum())
     return np.asarray(right[rank:])
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.physics.interactions.interaction import Attached
+from palpate.physics.interactions.rigid import require_held
 from palpate.physics.solid.density import material_energies
 from palpate.physics.solid.field import SolidField
 from palpate.physics.solid.history import History
@@ -40,7 +41,13 @@ class Opened:
 
 
 def open_problem(problem: SolidProblem, solver: str, tolerance: float) -> Opened:
-    """Mesh, spaces, energies and the base state."""
+    """Mesh, spaces, energies and the base state.
+
+    Raises
+    ------
+    UsageError
+        If nothing holds the body.
+    """
     import ngsolve
 
     body = problem.body
@@ -64,10 +71,13 @@ def open_problem(problem: SolidProblem, solver: str, tolerance: float) -> Opened
         )
 
     if constants:
+        require_held(field, [constant.attached for constant in constants])
         settled = _settle(model(constants=[], varied=[c.attached for c in constants], base=rest), constants)
         base = settled.last.z
         field.settle(base)
     varied = [interaction.attach(field) for interaction in problem.interactions]
+    if not constants:
+        require_held(field, varied)
     return Opened(model(constants, varied, base), settled)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -57,7 +58,7 @@ class SolidProblem:
                     fix="Pass for example a SphereProbe.",
                 )
 
-    @property
+    @cached_property
     def ranges(self) -> tuple[Range, ...]:
         """Name, range and unit of each input; names that occur twice are numbered."""
         found = [r for interaction in self.interactions for r in interaction.ranges(self.body.geometry)]
@@ -68,7 +69,7 @@ class SolidProblem:
         ]
         return tuple(replace(r, name=name) for r, name in zip(found, numbered, strict=True))
 
-    @property
+    @cached_property
     def refinements(self) -> tuple[Refinement, ...]:
         """Where the mesh is fine."""
         parts = (*self.interactions, *(held.interaction for held in self.body.held))

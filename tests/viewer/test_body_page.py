@@ -153,7 +153,7 @@ def test_shading_is_smooth_across_the_facets_of_a_ball(browser: Browser, complai
         row = pixels[int(np.mean(np.flatnonzero(dark.any(axis=1))))]
         inside = np.flatnonzero(row < 0.6)
         middle = row[inside[0] + len(inside) // 5 : inside[-1] - len(inside) // 5]
-        # neighbouring facets of 22 degrees, each in one shade, would differ by more than this
-        assert np.abs(np.diff(middle)).max() < 0.015
+        # facets of 22 degrees, each in one shade, would jump by 0.02 within three pixels
+        assert np.abs(middle[3:] - middle[:-3]).max() < 0.01
         page.context.close()
     assert_no(complaints)

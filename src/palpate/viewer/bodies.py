@@ -98,7 +98,7 @@ class ShownBody:
     def shown(self, parts: Split) -> Shown:
         """What the page is told first."""
         reach = max(float(np.linalg.norm(s.displacement[parts.nodes], axis=1).max()) for s in self.steps)
-        fields = [FieldInfo("displacement", "m", 0.0, reach or 1e-9)]
+        fields = [FieldInfo("displacement", "m", 0.0, reach or 1e-3)]
         for name in self.names:
             columns = [np.asarray(step.values[name])[parts.nodes] for step in self.steps]
             low, high = min(float(c.min()) for c in columns), max(float(c.max()) for c in columns)

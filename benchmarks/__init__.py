@@ -9,7 +9,10 @@ online      a stream with bounded refinement beside refining all of it at once
 stability   relapses of the pure filter over many orders of presentation and thresholds
 runtime     the 1 kHz loop in its own process: CPU time of a tick, and lateness
 sweep       solves per second, serial and on the local Dask cluster
+touching    a sphere on a block: a sweep beside a plain NGSolve script, the mesh's imprint, nearly incompressible tissue
+touching_cost  time and memory of one Newton iteration over the number of unknowns
 
+plain_touch the plain NGSolve script, and how long its load steps may be
 cases       the solves that all of them learn from     rivals   interpolation and regression by others
 table       a table as a value                         machine  where the figures come from
 runner      options, printing, and the blocks of docs/benchmarks.md

@@ -63,12 +63,13 @@ if TYPE_CHECKING:
         Yeoh,
         named_material,
     )
+    from palpate.physics.massspring import MassSpringBody
     from palpate.study import Study, preset_study, read_study
     from palpate.surrogates import TouchModel
     from palpate.sweeps import ExternalProblem, Space, local_cluster, sweep
     from palpate.units import Quantity, Range
     from palpate.validation import validate, write_report
-    from palpate.viewer import serve
+    from palpate.viewer import serve, show
 
 __version__ = "0.1.0"
 
@@ -96,6 +97,7 @@ _HOMES = {
     "LinearElastic": "physics",
     "LinearHardening": "physics",
     "LoadAndUnload": "physics",
+    "MassSpringBody": "physics.massspring",
     "MooneyRivlin": "physics",
     "NeoHookean": "physics",
     "Network": "network",
@@ -135,6 +137,7 @@ _HOMES = {
     "preset_study": "study",
     "read_study": "study",
     "serve": "viewer",
+    "show": "viewer",
     "sweep": "sweeps",
     "validate": "validation",
     "write_report": "validation",
@@ -164,6 +167,7 @@ __all__ = [
     "LinearElastic",
     "LinearHardening",
     "LoadAndUnload",
+    "MassSpringBody",
     "MooneyRivlin",
     "NeoHookean",
     "Network",
@@ -203,6 +207,7 @@ __all__ = [
     "preset_study",
     "read_study",
     "serve",
+    "show",
     "sweep",
     "validate",
     "write_report",

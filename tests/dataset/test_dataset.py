@@ -65,7 +65,8 @@ def test_a_store_gives_back_what_was_saved(stored):
 
 
 def test_others_can_read_the_store(stored):
-    xarray = pytest.importorskip("xarray")
+    import xarray
+
     data = xarray.open_zarr(stored, consolidated=False, chunks=None)
     assert data["displacement"].dims == ("sample", "node", "component")
     assert data["displacement"].attrs["units"] == "m, m, rad"
@@ -246,7 +247,8 @@ def test_a_missing_store_is_named(tmp_path):
 def test_foreign_things_are_refused(tmp_path):
     (tmp_path / "a.txt").write_text("hello", encoding="utf-8")
     (tmp_path / "folder").mkdir()
-    zarr = pytest.importorskip("zarr")
+    import zarr
+
     zarr.create_group(tmp_path / "foreign.zarr")
     for name in ("a.txt", "folder", "foreign.zarr"):
         with pytest.raises(FileFormatError, match="no dataset of palpate"):

@@ -106,7 +106,8 @@ def test_two_meshes_are_not_joined():
 
 
 def test_large_fields_are_stored_by_whole_samples(tmp_path):
-    zarr = pytest.importorskip("zarr")
+    import zarr
+
     nodes = 20_000
     data = make(20, rest=np.random.default_rng(0).random((nodes, 3)))
     data.save(tmp_path / "a.zarr")

@@ -18,7 +18,6 @@ from palpate.viewer.messages import Shown
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of a terminal are POSIX")
 def test_a_series_is_served_until_interrupted(tmp_path: Path):
-    pytest.importorskip("meshio", reason="needs meshio to read VTU")
     solutions = dents(2)
     mesh = solutions[0].mesh
     mesh.tetrahedra, mesh.regions, mesh.region_of = mesh.triangles[:0, [0, 1, 2, 2]], (), mesh.surface_of[:0]

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from solids import PROBE, above, gel, pressed
 
+from palpate.errors import UsageError
 from palpate.physics.equilibrium.stop import Stop
 
 STEP = 1e-6  # m; so short that hardly a quadrature point comes into contact, where stiffness jumps
@@ -145,3 +146,13 @@ def test_an_incompressible_body_is_solved():
     near = pressed(0.49999).solve(above(0.003))
     assert limit.converged
     np.testing.assert_allclose(limit.response, near.response, rtol=1e-3, atol=1e-5)
+
+
+def test_sparse_solvers_are_known_by_name():
+    from ngsolve.la import BaseMatrix
+
+    with pytest.raises(UsageError, match="sparsecholesky"):
+        pressed().open(solver="lu")
+    if BaseMatrix.GetDefaultInverseType() != "pardiso":
+        with pytest.raises(UsageError, match="mkl"):
+            pressed().open(solver="pardiso")

@@ -96,7 +96,7 @@ def sparse_solver(name: str = "auto") -> str:
     Raises
     ------
     UsageError
-        For another name.
+        For another name, or PARDISO where it is not installed.
     """
     from ngsolve.la import BaseMatrix
 
@@ -106,6 +106,14 @@ def sparse_solver(name: str = "auto") -> str:
             why=f"Known are {', '.join(SOLVERS)}.",
             fix='Use solver="auto".',
         )
+    # NGSolve makes PARDISO its default where it has found the package
+    found = BaseMatrix.GetDefaultInverseType() == "pardiso"
+    if name == "pardiso" and not found:
+        raise UsageError(
+            "PARDISO is not to be had.",
+            why="It belongs to MKL, and the Python package mkl is not installed.",
+            fix='Install mkl, or use solver="auto".',
+        )
     if name != "auto":
         return name
-    return "pardiso" if BaseMatrix.GetDefaultInverseType() == "pardiso" else "sparsecholesky"
+    return "pardiso" if found else "sparsecholesky"

@@ -241,9 +241,9 @@ def _slid(size: float, depths: Sequence[float], places: int) -> list[dict[str, A
                 "size": 1e3 * size,
                 "unknowns": found[0].state.size,
                 "depth": 1e3 * depth,
-                "force": mean,
-                "ripple": 100 * _off(along, force[:, 2], 2) / mean,
-                "spurious": 100 * _off(along, force[:, 0], 3) / mean,
+                "force": float(mean),
+                "ripple": float(100 * _off(along, force[:, 2], 2) / mean),
+                "spurious": float(100 * _off(along, force[:, 0], 3) / mean),
             }
         )
     return rows

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -73,6 +74,14 @@ class Measures:
             return material.energy(self._gradient)
         return mixed_density(material, self._gradient, pressure)
 
+    def at_nodes(self) -> dict[str, np.ndarray]:
+        """All fields at the nodes, by their names in a solution."""
+        return {
+            "stress": self.stress(),
+            "von_mises": self.von_mises(),
+            "largest_stretch": self.largest_stretch(),
+        }
+
     def von_mises(self) -> np.ndarray:
         """von Mises' equivalent of the Cauchy stress in Pa at the nodes, shape (node,)."""
         import ngsolve
@@ -81,14 +90,24 @@ class Measures:
             deviator = stress - ngsolve.Trace(stress) / 3 * ngsolve.Id(3)
             return ngsolve.sqrt(1.5 * ngsolve.InnerProduct(deviator, deviator))
 
-        return self._at_nodes(
-            {
-                region: equivalent(
-                    cauchy_stress(self._field, region, material, self._histories.get(region))
-                ).Compile()
-                for region, material in self._materials.items()
-            }
-        )
+        known = self._stresses()
+        return self._at_nodes({region: equivalent(stress).Compile() for region, stress in known.items()})
+
+    def stress(self) -> np.ndarray:
+        """Cauchy stress in Pa at the nodes, shape (node, 3, 3)."""
+        known = self._stresses()
+        result = np.empty((len(self._field.rest.points), 3, 3))
+        for i, j in itertools.combinations_with_replacement(range(3), 2):
+            component = {region: stress[i, j].Compile() for region, stress in known.items()}
+            result[:, i, j] = result[:, j, i] = self._at_nodes(component)
+        return result
+
+    def _stresses(self) -> dict[str, Any]:
+        """Cauchy stress of each region, a coefficient function (3, 3)."""
+        return {
+            region: cauchy_stress(self._field, region, material, self._histories.get(region))
+            for region, material in self._materials.items()
+        }
 
     def largest_stretch(self) -> np.ndarray:
         """Largest principal stretch at the nodes, shape (node,)."""

@@ -50,6 +50,8 @@ class SolidSolution:
         Least det F at the quadrature points.
     largest_strain : float
         Largest |λ - 1| of a principal stretch λ at the quadrature points.
+    stress : (node, 3, 3) array or None
+        Cauchy stress in Pa, averaged over the elements around each node, if fields were asked for.
     von_mises : (node,) array or None
         von Mises' equivalent of the Cauchy stress in Pa, if fields were asked for.
     largest_stretch : (node,) array or None
@@ -76,6 +78,7 @@ class SolidSolution:
     penetration: float = np.nan
     least_volume_ratio: float = np.nan
     largest_strain: float = np.nan
+    stress: np.ndarray | None = field(default=None, repr=False)
     von_mises: np.ndarray | None = field(default=None, repr=False)
     largest_stretch: np.ndarray | None = field(default=None, repr=False)
     detail: str = ""

@@ -211,7 +211,9 @@ class SolidSolver:
         hessian, slope = model.inputs.hessian(model.system, z)
         known = Known(q, z, slope, followed.last.before)
         self._known = [*(k.alone() for k in self._known[-KEPT + 1 :]), known]
-        # only now: the step's own potential and tangent are those with the internal variables before it
+        model.field.show(z)
+        measured: dict[str, Any] = model.measures.at_nodes() if fields else {}
+        # only now: the step's own potential, tangent and stress are those with the internal variables before it
         model.commit(z)
         strain_energy, energy = model.energies(z)
         figures = followed.verdict.figures
@@ -230,10 +232,9 @@ class SolidSolver:
             penetration=figures.get("penetration", 0.0),
             least_volume_ratio=figures["least_volume_ratio"],
             largest_strain=model.measures.largest_strain(),
-            von_mises=model.measures.von_mises() if fields else None,
-            largest_stretch=model.measures.largest_stretch() if fields else None,
             reached=q,
             state=z,
+            **measured,
         )
 
     def _failure(self, q: np.ndarray, followed: Followed) -> SolidSolution:

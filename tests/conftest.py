@@ -28,3 +28,9 @@ def require_program(*names: str) -> str:
 def chromium() -> str:
     """Path of a Chromium executable."""
     return require_program("chromium", "chromium-browser", "google-chrome")
+
+
+@pytest.fixture(scope="session")
+def ccx() -> str:
+    """Path of CalculiX's solver."""
+    return require_program("ccx")

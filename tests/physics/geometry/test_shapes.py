@@ -153,6 +153,16 @@ def test_the_fine_rectangle_of_the_block():
     assert np.median(lengths[~inside]) > 0.009
 
 
+@pytest.mark.parametrize("size", [0.003, 0.0065])
+def test_a_rectangle_of_a_few_millimetres_is_fine_too(size):
+    """The CAD kernel's boxes around faces are 1e-7 m larger than these, which is much for a small one."""
+    patch = Refinement("top", size / 6, (0.0, 0.0, 0.0), (size, size, 1.0))
+    mesh = Block((0.03, 0.03, 0.01)).rest((patch,))
+    middle = mesh.points[mesh.triangles_of("top")].mean(axis=1)
+    count = ((middle <= size) & (middle >= 0)).all(axis=1, where=[True, True, False]).sum()
+    assert 2 * 36 < count < 6 * 36  # equilateral ones would be 4/√3 for each square of that edge
+
+
 @pytest.mark.parametrize(
     "shape",
     [

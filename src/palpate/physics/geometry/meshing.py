@@ -15,6 +15,7 @@ from palpate.physics.geometry.sampling import points_on
 __all__ = ["mesh_solid"]
 
 FLAT = 1e-5  # thickness over length below which a face counts as upright and plane
+PADDING = 1e-7  # m by which the CAD kernel's boxes are larger than the faces within
 SHORTEST = 1e-5  # shortest edge over the body's length that is meshed as such; Netgen's own default is in mm
 
 
@@ -93,7 +94,7 @@ def _upright(face: Any) -> int | None:
     low, high = face.bounding_box
     extent = np.array([high[i] - low[i] for i in range(3)])
     axis = int(extent.argmin())
-    return axis if extent[axis] < FLAT * extent.max() else None
+    return axis if extent[axis] < FLAT * extent.max() + 2 * PADDING else None
 
 
 def _imprinted(solid: Any, refinements: list[Refinement]) -> Any:
@@ -120,7 +121,7 @@ def _patch(face: Any, lower: np.ndarray, upper: np.ndarray) -> list[Any]:
 
     axis = _upright(face)
     low, high = (np.array([p[i] for i in range(3)]) for p in face.bounding_box)
-    slack = FLAT * (high - low).max()
+    slack = FLAT * (high - low).max() + 2 * PADDING
     level = (low[axis] + high[axis]) / 2
     if axis is None or not lower[axis] - slack <= level <= upper[axis] + slack:
         return []
@@ -154,7 +155,7 @@ def _inside(face: Any, refinement: Refinement) -> bool:
     if refinement.lower is None or refinement.upper is None:
         return True
     low, high = face.bounding_box
-    slack = FLAT * max(high[i] - low[i] for i in range(3))
+    slack = FLAT * max(high[i] - low[i] for i in range(3)) + 2 * PADDING
     return all(
         refinement.lower[i] - slack <= low[i] and high[i] <= refinement.upper[i] + slack for i in range(3)
     )

@@ -86,6 +86,14 @@ def test_the_patch_test_is_exact(law, form):
     np.testing.assert_allclose(-found.response, slope, rtol=1e-9)
 
 
+@pytest.mark.parametrize("form", FORMS)
+def test_the_stress_is_that_of_the_homogeneous_state(form):
+    material, F = LAWS["isochoric neo-Hooke"], np.eye(3) + 0.7 * MATRIX
+    found = cube(material, form).problem(Moved(stretch)).solve(0.7, fields=True)
+    cauchy = gradient(material.energy, F) @ F.T / np.linalg.det(F)
+    np.testing.assert_allclose(found.stress, np.tile(cauchy, (27, 1, 1)), atol=1e-6 * np.abs(cauchy).max())
+
+
 def differences(system, z):
     """Relative errors of gradient and tangent along a random direction at unknowns z (dof,).
 

@@ -7,6 +7,7 @@ and (3.25, 2.75) m, of steel (210 GPa, 0.3); D is the inner ellipse's end on x.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,7 +39,7 @@ class Plate:
         ring = ellipse(3.25, 2.75) - ellipse(2.0, 1.0)
         edges = (0.0, *self.heights)
         parts = [
-            ring * Box(Pnt(0, 0, low), Pnt(4, 4, high)) for low, high in zip(edges, edges[1:], strict=False)
+            ring * Box(Pnt(0, 0, low), Pnt(4, 4, high)) for low, high in itertools.pairwise(edges)
         ]
         solid = Glue(parts) if len(parts) > 1 else parts[0]
         for part in solid.solids:

@@ -13,7 +13,7 @@
 
 from palpate.dataset.assemble import assemble
 from palpate.dataset.dataset import Dataset
-from palpate.dataset.fields import Field, beam_fields, solid_fields
+from palpate.dataset.fields import Field, beam_fields, conjugate_unit, solid_fields
 from palpate.dataset.layout import Layout
 
-__all__ = ["Dataset", "Field", "Layout", "assemble", "beam_fields", "solid_fields"]
+__all__ = ["Dataset", "Field", "Layout", "assemble", "beam_fields", "conjugate_unit", "solid_fields"]

@@ -209,7 +209,9 @@ def _step_of(solution: Any) -> ShownStep:
 def _ball_of(solution: Any) -> tuple[np.ndarray, float] | None:
     """The sphere that pressed a solution: its probe's, at its own centre or, failing that, at its inputs."""
     radius = getattr(getattr(solution, "probe", None), "radius", None)
-    centre = getattr(solution, "centre", getattr(solution, "inputs", None))
+    centre = getattr(solution, "centre", None)
+    if centre is None:
+        centre = getattr(solution, "inputs", None)
     if radius is None or centre is None or np.shape(centre) != (3,):
         return None
     return np.asarray(centre, dtype=float), float(radius)

@@ -34,7 +34,9 @@ def ball_of(solution: Any, probe: Any) -> Ball | None:
     if isinstance(own, tuple | list):
         return _given(own)
     radius = getattr(own, "radius", None)
-    centre = getattr(solution, "centre", getattr(solution, "inputs", None))
+    centre = getattr(solution, "centre", None)
+    if centre is None:
+        centre = getattr(solution, "inputs", None)
     if probe is not True and radius is None:
         raise _no_probe(probe)
     if radius is None or centre is None or np.shape(centre) != (3,):

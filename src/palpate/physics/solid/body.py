@@ -132,6 +132,16 @@ class Body:
             "order": self.order,
         }
 
+    def __str__(self) -> str:
+        lines = [f"Body of {self.geometry}, fixed at {', '.join(self.fixed) or 'nothing'}"]
+        for region, material in self.material:
+            form, why = self.formulation_of(region)
+            lines += [f"  {region:8s} {material}", f"           {form} form: {why}"]
+        if any(self.gravity):
+            lines.append(f"  gravity  {', '.join(f'{g:g}' for g in self.gravity)} m/s²")
+        lines += [f"  held     {held.interaction} at {held.values}" for held in self.held]
+        return "\n".join(lines)
+
     def problem(self, *interactions: Interaction, element: float | None = None) -> SolidProblem:
         """The body under interactions whose inputs vary.
 

@@ -13,6 +13,7 @@ import numpy as np
 from palpate.dataset import Field, Layout, solid_fields
 from palpate.errors import UsageError
 from palpate.physics.interactions.interaction import Interaction, Planned
+from palpate.physics.interactions.sphere import SphereProbe
 from palpate.units import Range
 
 if TYPE_CHECKING:
@@ -172,6 +173,20 @@ class SolidProblem:
         if planned is None:
             return [np.arange(len(points))]
         return list(planned.chains(self.body.geometry, points))
+
+    def probe_at(self, x: np.ndarray) -> tuple[SphereProbe | None, np.ndarray | None]:
+        """The first sphere among the interactions, and where inputs x (n,) put its centre, (3,) in m."""
+        first = 0
+        for interaction in self.interactions:
+            if isinstance(interaction, SphereProbe):
+                return interaction, np.asarray(x[first : first + 3])
+            first += len(interaction.ranges(self.body.geometry))
+        return None, None
+
+    def __str__(self) -> str:
+        acting = ", ".join(str(interaction) for interaction in self.interactions)
+        inputs = ", ".join(map(str, self.ranges))
+        return f"{self.body}\n  under    {acting}\n  inputs   {inputs}"
 
     def inputs(self, x: Any) -> np.ndarray:
         """Inputs as an array (n,).

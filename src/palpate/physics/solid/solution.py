@@ -7,16 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate.dataset import conjugate_unit
 from palpate.physics.equilibrium.stop import Stop
 from palpate.physics.geometry.mesh import BodyMesh
+from palpate.units import Range
 
 if TYPE_CHECKING:
+    from palpate.physics.interactions.sphere import SphereProbe
     from palpate.physics.solid.path import LoadStep
 
 __all__ = ["SolidSolution"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SolidSolution:
     """Equilibrium of a solid, or the reason why there is none.
 
@@ -32,6 +35,8 @@ class SolidSolution:
         The load steps, also those that were cut back.
     mesh : BodyMesh
         The body at rest.
+    ranges : tuple of Range
+        Name and unit of each of the n inputs.
     inputs : (n,) array
         What was asked.
     displacement : (node, 3) array
@@ -62,15 +67,22 @@ class SolidSolution:
         Inputs of the last equilibrium on the way; those asked, if converged.
     state : (dof,) array
         All unknowns of that equilibrium.
+    fixed : tuple of str
+        Surfaces that are held.
+    probe : SphereProbe or None
+        The sphere among the interactions, if there is one.
+    centre : (3,) array or None
+        Where its centre is, in m.
     """
 
     stop: Stop
     iterations: int
     residual: float
     log: tuple[LoadStep, ...]
-    mesh: BodyMesh = field(repr=False)
+    mesh: BodyMesh
+    ranges: tuple[Range, ...]
     inputs: np.ndarray
-    displacement: np.ndarray = field(repr=False)
+    displacement: np.ndarray
     response: np.ndarray
     response_gradient: np.ndarray
     potential_energy: float = np.nan
@@ -78,12 +90,15 @@ class SolidSolution:
     penetration: float = np.nan
     least_volume_ratio: float = np.nan
     largest_strain: float = np.nan
-    stress: np.ndarray | None = field(default=None, repr=False)
-    von_mises: np.ndarray | None = field(default=None, repr=False)
-    largest_stretch: np.ndarray | None = field(default=None, repr=False)
+    stress: np.ndarray | None = None
+    von_mises: np.ndarray | None = None
+    largest_stretch: np.ndarray | None = None
     detail: str = ""
     reached: np.ndarray = field(default_factory=lambda: np.empty(0))
-    state: np.ndarray = field(default_factory=lambda: np.empty(0), repr=False)
+    state: np.ndarray = field(default_factory=lambda: np.empty(0))
+    fixed: tuple[str, ...] = ()
+    probe: SphereProbe | None = None
+    centre: np.ndarray | None = None
 
     @property
     def converged(self) -> bool:
@@ -94,6 +109,28 @@ class SolidSolution:
     def message(self) -> str:
         """The reason in words, with its figures."""
         return f"{self.stop} ({self.detail})" if self.detail else str(self.stop)
+
+    def __str__(self) -> str:
+        asked = ", ".join(f"{r.name} = {x:g} {r.unit}" for r, x in zip(self.ranges, self.inputs, strict=True))
+        lines = [f"Solid of {len(self.mesh.points)} nodes: {self.message}", f"  inputs       {asked}"]
+        if self.converged:
+            lines += [
+                f"  response     {self._responses()}",
+                f"  energy       {self.potential_energy:.6g} J, {self.strain_energy:.6g} J of it in the body",
+                f"  penetration  {1e3 * self.penetration:.3g} mm into the pad" if self.probe else "",
+                f"  least det F  {self.least_volume_ratio:.3g}, largest strain {self.largest_strain:.3g}",
+            ]
+        else:
+            at = ", ".join(f"{r.name} = {x:g}" for r, x in zip(self.ranges, self.reached, strict=False))
+            lines.append(f"  reached      {at or 'nothing'}")
+        lines.append(f"  cost         {self.iterations} Newton iterations in {len(self.log)} load steps")
+        return "\n".join(line for line in lines if line)
+
+    __repr__ = __str__
+
+    def _responses(self) -> str:
+        pairs = zip(self.ranges, self.response, strict=True)
+        return ", ".join(f"{x:.6g} {conjugate_unit(r.unit)}" for r, x in pairs)
 
     def plot(self, *args: Any, **kwargs: Any) -> Any:
         """Draw the deformed body; see `palpate.physics.pictures.plot_solution`."""

@@ -223,6 +223,7 @@ class SolidSolver:
             residual=followed.log[-1].residual,
             log=followed.log,
             mesh=self._mesh,
+            ranges=self._problem.ranges,
             inputs=q,
             displacement=model.field.at_nodes(),
             response=response,
@@ -234,6 +235,7 @@ class SolidSolver:
             largest_strain=model.measures.largest_strain(),
             reached=q,
             state=z,
+            **self._surroundings(q),
             **measured,
         )
 
@@ -245,6 +247,7 @@ class SolidSolver:
             residual=followed.log[-1].residual if followed.log else np.inf,
             log=followed.log,
             mesh=self._mesh,
+            ranges=self._problem.ranges,
             inputs=q,
             displacement=np.full((len(self._mesh.points), 3), np.nan),
             response=np.full(n, np.nan),
@@ -252,4 +255,10 @@ class SolidSolver:
             detail=followed.verdict.detail,
             reached=last.q,
             state=last.z,
+            **self._surroundings(q),
         )
+
+    def _surroundings(self, q: np.ndarray) -> dict[str, Any]:
+        """What a picture shows beside the body."""
+        probe, centre = self._problem.probe_at(q)
+        return {"fixed": self._problem.body.fixed, "probe": probe, "centre": centre}

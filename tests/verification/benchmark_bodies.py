@@ -15,7 +15,7 @@ import numpy as np
 
 from palpate.physics.geometry.mesh import BodyMesh, outer_faces, to_ngsolve
 from palpate.physics.geometry.shape import Shape
-from palpate.physics.interactions import Attached, Held, PrescribedDisplacement
+from palpate.physics.interactions import Attached
 from palpate.units import Range
 
 BOX = ("left", "right", "front", "back", "bottom", "top")  # x, y, z: low and high
@@ -92,11 +92,6 @@ class Drawn(Shape):
         return mesh
 
 
-def roller(surface: str, axis: str) -> Held:
-    """A surface slides in its plane, which is across an axis: a plane of symmetry."""
-    return Held(PrescribedDisplacement(surface, axis, (-1.0, 1.0), sliding=True), (0.0,))
-
-
 @dataclass(frozen=True)
 class Moved:
     """Surfaces moved by q times a displacement field, given as a function of the coordinates.
@@ -152,8 +147,3 @@ class Loaded:
 
         load = field.load(lambda v: self.work(field, v))
         return Attached((ng.Parameter(0.0),), loads=load[None, :])
-
-
-def order(errors: Any) -> float:
-    """Observed order of convergence between the last two of errors on meshes whose elements are halved."""
-    return float(np.log2(errors[-2] / errors[-1]))

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from benchmark_bodies import Boxes, roller
+from benchmark_bodies import Boxes
 
-from palpate.physics.interactions import SurfaceTraction
+from palpate.physics.interactions import SurfaceTraction, roller
 from palpate.physics.materials import LinearElastic, NeoHookean
 from palpate.physics.solid import Body
 

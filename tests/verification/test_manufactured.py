@@ -15,8 +15,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from benchmark_bodies import Boxes, Loaded, Moved, roller
+from benchmark_bodies import Boxes, Loaded, Moved
 
+from palpate.physics.interactions import roller
 from palpate.physics.materials import LinearElastic, NeoHookean
 from palpate.physics.solid import Body
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from benchmark_bodies import Drawn, roller
+from benchmark_bodies import Drawn
 
-from palpate.physics.interactions import Attached, Held, PrescribedDisplacement, SurfaceTraction
+from palpate.physics.interactions import Attached, Held, PrescribedDisplacement, SurfaceTraction, roller
 from palpate.physics.materials import LinearElastic
 from palpate.physics.solid import Body
 
@@ -38,9 +38,7 @@ class Plate:
 
         ring = ellipse(3.25, 2.75) - ellipse(2.0, 1.0)
         edges = (0.0, *self.heights)
-        parts = [
-            ring * Box(Pnt(0, 0, low), Pnt(4, 4, high)) for low, high in itertools.pairwise(edges)
-        ]
+        parts = [ring * Box(Pnt(0, 0, low), Pnt(4, 4, high)) for low, high in itertools.pairwise(edges)]
         solid = Glue(parts) if len(parts) > 1 else parts[0]
         for part in solid.solids:
             part.mat("body")

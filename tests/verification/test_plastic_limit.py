@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from benchmark_bodies import Boxes, Moved, roller
+from benchmark_bodies import Boxes, Moved
 
 from laws.histories import tube_limit_pressure
-from palpate.physics.interactions import SurfaceTraction
+from palpate.physics.interactions import SurfaceTraction, roller
 from palpate.physics.materials import LinearElastic, LinearHardening, Plastic
 from palpate.physics.solid import Body
 

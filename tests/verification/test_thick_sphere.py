@@ -16,9 +16,9 @@ import math
 
 import numpy as np
 import pytest
-from benchmark_bodies import Drawn, roller
+from benchmark_bodies import Drawn
 
-from palpate.physics.interactions import Pressure, SurfaceTraction
+from palpate.physics.interactions import Pressure, SurfaceTraction, roller
 from palpate.physics.materials import LinearElastic, NeoHookean
 from palpate.physics.solid import Body
 

@@ -4,6 +4,7 @@ interaction  what an interaction offers, and what it hands over when it is attac
 sphere       a rigid sphere that presses a surface
 glued        a pad that is glued to a surface and moved
 prescribed   a surface, or a part of it, that is moved by given amounts
+support      rollers: planes of symmetry
 loads        dead loads: a point force, a traction, a body force
 pressure     a pressure that follows its surface
 
@@ -24,6 +25,7 @@ from palpate.physics.interactions.prescribed import PrescribedDisplacement
 from palpate.physics.interactions.pressure import Pressure
 from palpate.physics.interactions.rigid import free_motions, require_held
 from palpate.physics.interactions.sphere import SphereProbe
+from palpate.physics.interactions.support import roller
 
 __all__ = [
     "Attached",
@@ -43,4 +45,5 @@ __all__ = [
     "free_motions",
     "pad_share",
     "require_held",
+    "roller",
 ]

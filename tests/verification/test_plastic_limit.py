@@ -110,6 +110,16 @@ def test_displacements_alone_never_reach_a_limit():
     assert 1e-4 < mild[-1] - mild[-2] < 2e-3
 
 
+def test_all_of_a_tube_at_its_limit_is_at_yield():
+    """von Mises' stress at the nodes, through the whole wall."""
+    material = metal(0.4999)
+    solver = tube(material, Moved(radial, surfaces=("left",)), "mixed", 3).open()
+    found = solver.march([1.0, 2.0, 3.0], [[bore(material, front)] for front in (0.9, 1.6, 4.0)], fields=True)
+    assert found[-1].converged
+    np.testing.assert_allclose(found[-1].von_mises, YIELD, rtol=1e-3)
+    assert found[0].von_mises.max() < YIELD
+
+
 def test_hardening_fades_linearly():
     """What a plastic modulus h adds to the limit is proportional to it."""
     fronts = (1.0, 1.6, 2.6)

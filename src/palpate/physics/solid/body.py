@@ -40,7 +40,7 @@ class Body:
     gravity : (3,) tuple
         Acceleration in m/s² that acts on the material's density.
     held : tuple of Held
-        Interactions that always act, with their inputs: pre-stress.
+        Interactions that always act, with their inputs: pre-stress, and supports that slide (`roller`).
     formulation : {"auto", "displacement", "mixed"}
         ``"auto"`` takes the mixed form in regions whose initial Poisson's ratio is 0.48 or more and whose
         material has a separate volumetric energy; `describe` and `formulation_of` tell which.

@@ -169,6 +169,26 @@ def nylon(text: str, folder: Path) -> None:
     assert once < ramps[0] < ramps[1] < ramps[2] < ever
 
 
+def tissue(text: str, folder: Path) -> None:
+    rows = re.findall(r"(\d) mm +([\d.]+) N +([\d.]+) N/m +([\d.]+) mm", text)
+    depth, force, stiffness, pad = np.array(rows, dtype=float).T
+    assert list(depth) == [2, 4, 6]
+    # a ball that sinks in touches more and more of a body that stiffens: both grow, the pad stays within its stop
+    assert np.all(np.diff(force) > 0)
+    assert np.all(np.diff(stiffness) > 0)
+    assert np.all(pad < np.minimum(depth, 4.0))
+    # a force that grows convexly lies below its chord: between the trapezoid of the slopes and nothing
+    steps = np.diff(force) / 2e-3
+    assert np.all((stiffness[:-1] < steps) & (steps < stiffness[1:]))
+    assert float(re.search(r"differences of the energy: ([\d.]+) N", text)[1]) == pytest.approx(
+        force[-1], abs=2e-4
+    )
+    assert "Dataset of 8 solves of Body, all converged" in text
+    assert (folder / "tissue.png").read_bytes().startswith(b"\x89PNG")
+    assert (folder / "tissue.vtu").stat().st_size > 10000
+    assert (folder / "tissue.zarr" / "zarr.json").is_file()
+
+
 CHECKS: dict[str, Callable[[str, Path], None]] = {
     "01_cantilever.py": cantilever,
     "02_two_loads.py": two_loads,
@@ -180,6 +200,7 @@ CHECKS: dict[str, Callable[[str, Path], None]] = {
     "08_arrays.py": arrays,
     "09_bend_copper_past_yield.py": copper,
     "10_creeping_nylon.py": nylon,
+    "11_press_soft_tissue.py": tissue,
 }
 QUICK = {"04_filter_by_hand.py"}
 

@@ -50,6 +50,7 @@ from palpate.physics.geometry import (
 from palpate.physics.interactions import (
     BodyForce,
     GluedPad,
+    Held,
     Interaction,
     PointForce,
     PrescribedDisplacement,
@@ -100,6 +101,7 @@ __all__ = [
     "FibreReinforced",
     "Geometry",
     "GluedPad",
+    "Held",
     "ImportedMesh",
     "ImportedSolid",
     "Inclusion",

@@ -63,6 +63,7 @@ if TYPE_CHECKING:
         VoceHardening,
         Yeoh,
         named_material,
+        roller,
     )
     from palpate.physics.massspring import MassSpringBody
     from palpate.study import Study, preset_study, read_study
@@ -138,6 +139,7 @@ _HOMES = {
     "named_material": "physics",
     "preset_study": "study",
     "read_study": "study",
+    "roller": "physics",
     "serve": "viewer",
     "show": "viewer",
     "sweep": "sweeps",
@@ -209,6 +211,7 @@ __all__ = [
     "named_material",
     "preset_study",
     "read_study",
+    "roller",
     "serve",
     "show",
     "sweep",

@@ -58,6 +58,7 @@ from palpate.physics.interactions import (
     SphereProbe,
     SurfaceTraction,
     pad_share,
+    roller,
 )
 from palpate.physics.materials import (
     MATERIALS,
@@ -143,4 +144,5 @@ __all__ = [
     "named_material",
     "pad_share",
     "preset",
+    "roller",
 ]

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["PlainAnswer", "PlainTouch", "Setting", "largest_step"]
+__all__ = ["Balance", "PlainAnswer", "PlainTouch", "Setting", "hardest", "largest_step"]
 
 REJECTED = 1e6  # J/m² or J/m³ where a state is not admissible: the line search turns back from it
 
@@ -50,6 +50,17 @@ class PlainAnswer:
     energy: float
 
 
+@dataclass(frozen=True)
+class Balance:
+    """The script's own residual and force (3,) in N at a given state.
+
+    The residual is its norm on the free unknowns over that of the contact's part.
+    """
+
+    residual: float
+    force: np.ndarray
+
+
 class PlainTouch:
     """The script: forms and unknowns are built once, each sample starts from zero displacement.
 
@@ -78,6 +89,7 @@ class PlainTouch:
         self.contact += contact
         self.displacement = GridFunction(space)
         self.newton = NewtonSolver(self.total, self.displacement, inverse="sparsecholesky")
+        self._free = np.fromiter(space.FreeDofs(), dtype=bool, count=space.ndof)
         self._translations = _translations(space)
         self._outside = self._trespass(mesh)
 
@@ -129,6 +141,19 @@ class PlainTouch:
                 break
         return self._answer(converged, spent)
 
+    def balance(self, state: np.ndarray, centre: np.ndarray) -> Balance:
+        """Residual and force at displacement unknowns (dof,) of somebody else's with the sphere at (3,) m."""
+        for parameter, value in zip(self.centre, centre, strict=True):
+            parameter.Set(float(value))
+        vector = self.displacement.vec.CreateVector()
+        vector.FV().NumPy()[:] = state
+        total, pressed = vector.CreateVector(), vector.CreateVector()
+        self.total.Apply(vector, total)
+        self.contact.Apply(vector, pressed)
+        size = float(np.linalg.norm(pressed.FV().NumPy()))
+        left = float(np.linalg.norm(total.FV().NumPy()[self._free]))
+        return Balance(left / size if size else left, self._translations @ pressed.FV().NumPy())
+
     def _equilibrium(self, centre: tuple[float, float, float], tolerance: float) -> tuple[bool, int]:
         for parameter, value in zip(self.centre, centre, strict=True):
             parameter.Set(value)
@@ -162,29 +187,33 @@ def _translations(space: Any) -> np.ndarray:
     return np.array(found)
 
 
-def largest_step(
-    problem: Any, points: np.ndarray, sizes: tuple[float, ...] = (1e-3, 7.5e-4, 6e-4, 5e-4)
-) -> float:
-    """Largest size in m of load steps with which no more than 1 % of the samples fail.
+def hardest(problem: Any, points: np.ndarray, count: int = 12) -> np.ndarray:
+    """Rows of the hardest samples: of the deepest of each column those farthest off the middle."""
+    deepest = np.array([chain[-1] for chain in problem.chains(points)])
+    low, high = problem.mesh.corners
+    off = np.linalg.norm((points[deepest] - (low + high) / 2)[:, :2], axis=1)
+    return np.asarray(deepest[np.argsort(-off)[:count]])
 
-    Asked of the deepest sample of each column, where failures are: on 256 samples at most two of these may fail.
-    Takes an hour or so; prints as it goes.
+
+def largest_step(
+    problem: Any, points: np.ndarray, sizes: tuple[float, ...] = (2e-3, 1.5e-3, 1e-3, 7.5e-4, 6e-4, 5e-4)
+) -> float:
+    """Largest size in m of load steps with which all of the hardest samples end in admissible states.
+
+    Takes a quarter of an hour; prints as it goes.
     """
-    deepest = [chain[-1] for chain in problem.chains(points)]
-    allowed = len(points) // 100
     script = PlainTouch(problem.body.geometry.mesh(problem.refinements), Setting(between=1e-3), sizes[0])
-    height = problem.mesh.corners[1][2]
+    height, rows = float(problem.mesh.corners[1][2]), hardest(problem, points)
     for script.step in sizes:
-        failed = 0
-        for row in deepest:
-            answer = script.solve(points[row], float(height))
-            failed += not answer.admissible
-            print(f"steps of {1e3 * script.step:g} mm, sample {row}: {answer.admissible}", flush=True)
-            if failed > allowed:
-                break
-        else:
+        if all(_serves(script, row, points[row], height) for row in rows):
             return script.step
     raise RuntimeError(f"the script fails with all of {sizes}")
+
+
+def _serves(script: PlainTouch, row: int, point: np.ndarray, height: float) -> bool:
+    answer = script.solve(point, height)
+    print(f"steps of {1e3 * script.step:g} mm, sample {row}: {answer}", flush=True)
+    return answer.admissible
 
 
 if __name__ == "__main__":

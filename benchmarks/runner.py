@@ -30,6 +30,10 @@ BENCHMARKS = (
     "runtime",
     "stability",
     "sweep",
+    "touching",
+    "touching_cost",
+    "touching_feel",
+    "touching_mesh",
 )
 
 

@@ -1,7 +1,6 @@
-"""Time and memory of one Newton iteration over the number of unknowns.
+"""Time and memory of a solve over the number of unknowns.
 
 python -m benchmarks.touching_cost [--quick] [--json | --markdown]
-python -m benchmarks.touching_cost docs/images/touching-cost.png      the picture, and nothing else
 """
 
 from __future__ import annotations
@@ -19,37 +18,43 @@ import numpy as np
 
 from benchmarks.runner import main
 from benchmarks.table import Claim, Column, Table
+from benchmarks.touching import HEIGHT, RADIUS, block, probe
+from palpate.physics.solid.opening import open_problem
+from palpate.physics.solid.system import sparse_solver
 
-__all__ = ["measured", "plot", "tables"]
+__all__ = ["measured", "tables"]
 
-SIZES = (
-    0.010,
-    0.0075,
-    0.006,
-    0.005,
-    0.0042,
-    0.0037,
-)  # m, elements under the probe: up to about 60,000 unknowns
+SIZES = {  # m, elements under the probe: up to 60,000 unknowns and more
+    "displacement": (0.010, 0.0075, 0.006, 0.0048, 0.0038, 0.003),
+    "mixed": (0.010, 0.0075, 0.006, 0.0048, 0.0038),
+}
+COARSE = 2.5  # size of the elements elsewhere over that
+DEPTHS = (0.002, 0.004, 0.006)  # m, of the samples: one column
 GIGABYTES = 24.0
 REPEATS = 3
+FITTED = {"residual": "the residual", "tangent": "the tangent", "sample": "a sample", "memory": "memory"}
 
 
 def tables(*, quick: bool = False) -> list[Table]:
     """The table; `quick` measures one small mesh."""
-    forms = ("displacement",) if quick else ("displacement", "mixed")
-    rows = [row for form in forms for row in _rows(form, (0.02,) if quick else SIZES)]
+    sizes = {"displacement": (0.025,)} if quick else SIZES
+    rows = [_in_own_process(form, size, quick) for form, each in sizes.items() for size in each]
     largest = max(rows, key=lambda row: row["unknowns"])
+    laws = [_law([row for row in rows if row["form"] == form], form) for form in sizes if not quick]
     return [
         Table(
             "touching-cost",
-            f"One Newton iteration over the number of unknowns{' (quick)' if quick else ''}",
+            f"A solve over the number of unknowns{' (quick)' if quick else ''}",
             (
                 Column("form", "form"),
                 Column("size", "elements under the probe, mm", ".1f"),
                 Column("unknowns", "unknowns"),
                 Column("residual", "energy and residual, s", ".3f"),
                 Column("tangent", "tangent assembled and factorised, s", ".2f"),
+                Column("factor", "of it the factorisation, s", ".2f"),
                 Column("solve", "back-substitution, s", ".3f"),
+                Column("sample", "a sample, s", ".1f"),
+                Column("tangents", "tangents a sample", ".1f"),
                 Column("memory", "peak memory, GB", ".2f"),
             ),
             rows,
@@ -60,107 +65,114 @@ def tables(*, quick: bool = False) -> list[Table]:
                     GIGABYTES,
                     ".1f",
                 ),
+                Claim("memory swapped out in GB, most", (max(row["swap"] for row in rows),), 0.0, ".1f"),
+                Claim(
+                    "share of samples that did not converge",
+                    (1 - min(row["converged"] for row in rows),),
+                    0.0,
+                    ".0%",
+                ),
             ),
             notes=(
-                *(_law(rows, form) for form in forms if not quick),
-                "CPU times with one thread, each the least of three; memory is the largest resident size of a process "
-                "that does nothing else; factorisation without its symbolic part, which is done once",
+                *laws,
+                "CPU times with one thread, of single operations the least of three, factorisation without its "
+                "symbolic part, which is done once; a sample: the mean of "
+                "2, 4, 6 mm in the middle of the block, one after the other, with the "
+                "tangents for the stiffness",
+                "memory is the largest resident size of a process that does nothing else; ν = 0.45 in displacement "
+                "form, 0.499 in mixed form; the mesh of the whole footprint, elements elsewhere up to "
+                f"{COARSE:g} times as large",
             ),
         )
     ]
 
 
 def _law(rows: Sequence[dict[str, Any]], form: str) -> str:
-    mine = [row for row in rows if row["form"] == form]
-    unknowns = np.log([row["unknowns"] for row in mine])
+    unknowns = np.log([row["unknowns"] for row in rows])
     slopes = {
-        key: float(np.polyfit(unknowns, np.log([row[key] for row in mine]), 1)[0])
-        for key in ("residual", "tangent", "memory")
+        word: float(np.polyfit(unknowns, np.log([row[key] for row in rows]), 1)[0])
+        for key, word in FITTED.items()
     }
-    return (
-        f"{form} form: the residual grows as N^{slopes['residual']:.2f}, the tangent as N^{slopes['tangent']:.2f}, "
-        f"memory as N^{slopes['memory']:.2f}"
+    return f"{form} form, over N unknowns: " + ", ".join(
+        f"{word} N^{slope:.2f}" for word, slope in slopes.items()
     )
 
 
-def _rows(form: str, sizes: Sequence[float]) -> list[dict[str, Any]]:
-    return [_in_own_process(form, size) for size in sizes]
-
-
-def _in_own_process(form: str, size: float) -> dict[str, Any]:
+def _in_own_process(form: str, size: float, quick: bool) -> dict[str, Any]:
     """Memory that one measurement has taken would count for the next."""
-    command = [sys.executable, "-m", "benchmarks.touching_cost", "--measure", form, str(size)]
-    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    depths = DEPTHS[:1] if quick else DEPTHS
+    arguments = ["--measure", form, str(size), *map(str, depths)]
+    done = subprocess.run(
+        [sys.executable, "-m", "benchmarks.touching_cost", *arguments],
+        check=True,
+        capture_output=True,
+        text=True,
+    )
     row: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
     return row
 
 
-def measured(form: str, size: float) -> dict[str, Any]:
+def measured(form: str, size: float, depths: Sequence[float]) -> dict[str, Any]:
     """Times in s and peak memory in GB with elements of `size` m under the probe."""
-    from benchmarks.touching import block, probe
-    from palpate.physics.solid.opening import open_problem
-    from palpate.physics.solid.system import sparse_solver
-
     poisson = 0.45 if form == "displacement" else 0.499
-    problem = block(poisson, form).problem(probe(), element=size)
-    model = open_problem(problem, sparse_solver(), 1e-9).model
-    system, z = model.system, model.base
-    model.set(np.array((0.05, 0.05, 0.06)))
-    system.factorise(z)  # the symbolic part is done once, and left out below
-    times = [_iteration(system, z) for _ in range(REPEATS)]
-    residual, tangent, solve = np.min(times, axis=0)
+    problem = block(poisson, form, coarse=COARSE * size).problem(probe(), element=size)
     return {
         "form": form,
         "size": 1e3 * size,
-        "unknowns": z.size,
-        "residual": float(residual),
-        "tangent": float(tangent),
-        "solve": float(solve),
+        **_operations(problem),
+        **_samples(problem, depths),
         "memory": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6,  # kB on Linux
+        "swap": _swapped(),
     }
 
 
-def _iteration(system: Any, z: np.ndarray) -> tuple[float, float, float]:
-    """CPU seconds of energy and residual, of the tangent with its numeric factorisation, of one back-substitution."""
+def _operations(problem: Any) -> dict[str, float]:
+    """The least CPU seconds of each operation at rest, the sphere 2 mm deep."""
+    model = open_problem(problem, sparse_solver(), 1e-9).model
+    system, z = model.system, model.base
+    model.set(np.array((0.05, 0.05, HEIGHT + RADIUS - 0.002)))
+    system.factorise(z)  # the symbolic part is done once, and left out below
+    ones = np.ones(z.size)
+    return {
+        "unknowns": z.size,
+        "residual": _least(lambda: (system.potential(z), system.residual(z))),
+        "tangent": _least(lambda: system.factorise(z)),
+        "factor": _least(system._inverse.Update),
+        "solve": _least(lambda: system.solve(ones)),
+    }
+
+
+def _least(operation: Any) -> float:
+    seconds = []
+    for _ in range(REPEATS):
+        began = time.process_time()
+        operation()
+        seconds.append(time.process_time() - began)
+    return min(seconds)
+
+
+def _samples(problem: Any, depths: Sequence[float]) -> dict[str, float]:
+    solver = problem.open()
+    solver.solve((0.05, 0.05, HEIGHT + RADIUS + 0.001))  # off the body: what is done once is left out
+    solver.reset()
     began = time.process_time()
-    system.potential(z)
-    system.residual(z)
-    evaluated = time.process_time()
-    system.factorise(z)
-    factorised = time.process_time()
-    system.solve(np.ones(z.size))
-    return evaluated - began, factorised - evaluated, time.process_time() - factorised
+    found = [solver.solve((0.05, 0.05, HEIGHT + RADIUS - depth)) for depth in depths]
+    return {
+        "sample": (time.process_time() - began) / len(depths),
+        "tangents": float(np.mean([solution.iterations + 1 for solution in found])),
+        "converged": float(np.mean([solution.converged for solution in found])),
+    }
 
 
-def plot(rows: Sequence[dict[str, Any]], path: Path) -> None:
-    """Seconds and memory over unknowns, both axes logarithmic, as a PNG."""
-    import matplotlib as mpl
-
-    mpl.use("agg")
-    from matplotlib import pyplot
-
-    figure, (left, right) = pyplot.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
-    for form, marker in (("displacement", "o"), ("mixed", "s")):
-        mine = [row for row in rows if row["form"] == form]
-        unknowns = [row["unknowns"] for row in mine]
-        for key, word, line in (("tangent", "tangent", "-"), ("residual", "residual", ":")):
-            left.loglog(unknowns, [row[key] for row in mine], line, marker=marker, label=f"{form}, {word}")
-        right.loglog(unknowns, [row["memory"] for row in mine], marker=marker, label=form)
-    left.set(xlabel="unknowns", ylabel="CPU seconds, one thread", title="One Newton iteration")
-    right.set(xlabel="unknowns", ylabel="GB", title="Peak memory")
-    for axes in (left, right):
-        axes.grid(visible=True, which="both", alpha=0.3)
-        axes.legend()
-    figure.savefig(path, dpi=120)
-    pyplot.close(figure)
+def _swapped() -> float:
+    """Memory of this process that has been swapped out, GB."""
+    lines = Path("/proc/self/status").read_text(encoding="utf-8").splitlines()
+    return next((float(line.split()[1]) / 1e6 for line in lines if line.startswith("VmSwap")), 0.0)
 
 
 def _run(arguments: Sequence[str]) -> int:
     if arguments[:1] == ["--measure"]:
-        print(json.dumps(measured(arguments[1], float(arguments[2]))))
-        return 0
-    if arguments and arguments[0].endswith(".png"):
-        plot([row for form in ("displacement", "mixed") for row in _rows(form, SIZES)], Path(arguments[0]))
+        print(json.dumps(measured(arguments[1], float(arguments[2]), [float(a) for a in arguments[3:]])))
         return 0
     return main(arguments, only="touching_cost")
 

@@ -113,6 +113,28 @@ def test_sweep_is_set_against_a_plain_loop(tables):
     assert all(math.isfinite(row["rate"]) and row["rate"] > 0 for row in table["rows"])
 
 
+def test_touches_are_equilibria_of_the_plain_script_too(tables):
+    sweep = tables["touching-sweep"]
+    assert all(row["converged"] == row["admissible"] == 1.0 for row in sweep["rows"])
+    found = {claim["what"]: claim["values"][0] for claim in sweep["claims"]}
+    assert found["the plain script's residual at palpate's states"] < 1e-6
+    assert found["its force there, off by, of the largest force"] < 1e-10
+    assert found["its own answer's force, off by, of the largest force"] < 1e-6
+
+
+def test_touching_is_measured_in_all_respects(tables):
+    (spring,) = tables["touching-springs"]["rows"]
+    assert 0 < spring["springs"] < spring["force"]  # points leave gaps that elements don't
+    (pad,) = tables["touching-pad"]["rows"]
+    assert 0 < pad["share"] < 1
+    (cost,) = tables["touching-cost"]["rows"]
+    assert cost["converged"] == 1.0
+    assert 0 < cost["factor"] < cost["tangent"]
+    (size,) = tables["touching-sizes"]["rows"]
+    assert size["displacement"] > size["mixed"] > 0  # it locks
+    assert tables["touching-imprint"]["rows"][0]["stiffness"] < 0
+
+
 def test_documentation_holds_a_block_for_every_table(tables):
     pages = (ROOT / "docs" / "benchmarks.md", ROOT / "docs" / "method" / "published-tables.md")
     text = "".join(page.read_text(encoding="utf-8") for page in pages)

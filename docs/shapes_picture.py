@@ -12,9 +12,9 @@ from palpate.physics.geometry import (
     BodyMesh,
     Cylinder,
     Dome,
+    FineMesh,
     LayeredBlock,
     Organ,
-    Refinement,
     Tube,
 )
 
@@ -30,7 +30,7 @@ def main() -> None:
     mpl.use("Agg")
     from matplotlib import pyplot as plt
 
-    fine = Refinement("top", 0.006, (0.03, 0.03, 0.0), (0.07, 0.07, 1.0))
+    fine = FineMesh("top", 0.006, (0.03, 0.03, 0.0), (0.07, 0.07, 1.0))
     shapes = {
         "Block, refined": Block(element=0.02).rest((fine,)),
         "Cylinder": Cylinder(element=0.01).rest(),

@@ -10,7 +10,7 @@ import pytest
 from bonded_layer import FARTHEST, dimitriadis, exact, garcia, ground, hertz
 from scipy.integrate import quad
 
-from palpate.physics.geometry import Block, Refinement
+from palpate.physics.geometry import Block, FineMesh
 from palpate.physics.interactions import Held, PrescribedDisplacement, SphereProbe
 from palpate.physics.materials import LinearElastic
 from palpate.physics.solid import Body
@@ -30,7 +30,7 @@ class Corner(SphereProbe):
 
     def refinements(self, geometry):
         height, end = geometry.size[2], 1.3 * CONTACT
-        return (Refinement(self.touches, CONTACT / ACROSS, (0.0, 0.0, height), (end, end, height)),)
+        return (FineMesh(self.touches, CONTACT / ACROSS, (0.0, 0.0, height), (end, end, height)),)
 
 
 def mirror(axis):

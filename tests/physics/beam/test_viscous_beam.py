@@ -9,7 +9,7 @@ from palpate.physics.beam.history_beam import HistoryBeam
 from palpate.physics.beam.reissner import Stiffness
 from palpate.physics.beam.viscous_section import ViscousSection
 from palpate.physics.materials.linear import LinearElastic
-from palpate.physics.materials.prony import Prony
+from palpate.physics.materials.prony import PronySeries
 from palpate.physics.materials.viscous import Viscoelastic
 
 NYLON = LinearElastic(2e9, 0.43, 1150.0)
@@ -55,7 +55,7 @@ def creep(terms, time):
 
 
 def section(terms=TWO):
-    return ViscousSection(Stiffness(3.0, 5.0, 7.0), Prony(terms))
+    return ViscousSection(Stiffness(3.0, 5.0, 7.0), PronySeries(terms))
 
 
 @pytest.mark.parametrize("steps", [1, 2, 7])
@@ -65,7 +65,7 @@ def test_a_held_strain_relaxes_exactly_whatever_the_step(steps):
     for _ in range(steps):
         answer = law.answer(strain, internal, 3.0 / steps)
         internal = answer.internal
-    expected = strain * (3.0, 5.0, 7.0) * Prony(TWO).relaxation(3.0)
+    expected = strain * (3.0, 5.0, 7.0) * PronySeries(TWO).relaxation(3.0)
     np.testing.assert_allclose(answer.force, expected, rtol=1e-14)
 
 
@@ -137,7 +137,9 @@ def test_a_held_tip_relaxes():
 
     def drift(count):
         times = np.concatenate([[0.0], np.geomspace(1e-3, 10.0, count)])
-        found = [tip(s) for s in march(beam(tolerance=1e-3), SMALL * Prony(TWO).relaxation(times), times)]
+        found = [
+            tip(s) for s in march(beam(tolerance=1e-3), SMALL * PronySeries(TWO).relaxation(times), times)
+        ]
         return max(abs(np.array(found) / found[0] - 1))
 
     coarse, fine = drift(16), drift(32)
@@ -197,7 +199,7 @@ def test_what_came_before_is_forgotten():
 @pytest.mark.slow
 def test_a_cycles_loss_is_that_of_the_loss_compliance():
     """π P² J''(ω) u_0/P a cycle, with J* = 1/g*, for a small sine made of straight pieces."""
-    frequency, prony = 1.5, Prony(ONE)
+    frequency, prony = 1.5, PronySeries(ONE)
     first = tip(march(beam(ONE), [SMALL], [0.0])[0])
     modulus = prony.storage(frequency) + 1j * prony.loss(frequency)
     exact = np.pi * SMALL * first * -(1 / modulus).imag
@@ -281,8 +283,8 @@ def test_a_history_can_be_taken_up_again():
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: Prony(((0.6, 1.0), (0.6, 2.0))),
-        lambda: Prony(((0.3, 0.0),)),
+        lambda: PronySeries(((0.6, 1.0), (0.6, 2.0))),
+        lambda: PronySeries(((0.3, 0.0),)),
         lambda: beam(((0.6, 1.0), (0.4, 2.0))),
         lambda: beam(fibres=24),
         lambda: Cantilever(1.0, Circle(0.005), Viscoelastic(NYLON, TWO)),

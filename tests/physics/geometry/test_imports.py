@@ -13,10 +13,10 @@ import pytest
 from palpate.errors import FileFormatError, UsageError
 from palpate.physics.geometry import (
     Block,
+    FineMesh,
     ImportedMesh,
     ImportedSolid,
     LayeredBlock,
-    Refinement,
     SurfacePatch,
 )
 
@@ -72,7 +72,7 @@ def test_step_keeps_names_and_is_read_in_metres(tmp_path: Path):
     assert lid == pytest.approx(PLATE / 0.04, rel=1e-3)
     assert pickle.loads(pickle.dumps(plate)).rest() is plate.rest()
     assert len(plate.describe()["sha256"]) == 64
-    fine = plate.rest((Refinement("lid", 0.004, (0, 0, 0), (0.03, 0.06, 1)),))
+    fine = plate.rest((FineMesh("lid", 0.004, (0, 0, 0), (0.03, 0.06, 1)),))
     assert len(fine.points) > 1.5 * len(plate.rest().points)
 
 
@@ -104,7 +104,7 @@ def test_stl_becomes_a_body_split_along_its_edges(tmp_path: Path):
     areas = {"top": 0.008, "low": 0.008, "face 3": 0.005, "face 4": 0.005, "face 5": 0.004, "face 6": 0.004}
     assert mesh.areas == pytest.approx(areas, rel=1e-9)
     assert np.allclose(mesh.normals[mesh.surface_of == 0], [0, 0, 1])
-    fine = solid.rest((Refinement("top", 0.006, (0.03, 0.02, 0), (0.07, 0.06, 1)),))
+    fine = solid.rest((FineMesh("top", 0.006, (0.03, 0.02, 0), (0.07, 0.06, 1)),))
     assert fine.areas == pytest.approx(areas, rel=1e-9)
     assert len(fine.triangles_of("top")) > 2 * len(mesh.triangles_of("top"))
 
@@ -172,14 +172,14 @@ def test_left_handed_meshes_are_turned(tmp_path: Path):
 def test_imported_meshes_are_bisected_where_asked(tmp_path: Path):
     write_tetrahedra(tmp_path / "block.vtu", Block().rest())
     body = ImportedMesh(tmp_path / "block.vtu", patches=(SurfacePatch("top", where=above),))
-    patch = Refinement("top", 0.008, (0.04, 0.04, 0.0), (0.06, 0.06, 1.0))
+    patch = FineMesh("top", 0.008, (0.04, 0.04, 0.0), (0.06, 0.06, 1.0))
     mesh = body.rest((patch,))
     assert mesh.volume == pytest.approx(5e-4, rel=1e-9)
     corners = mesh.points[mesh.triangles_of("top")]
     centres = corners.mean(axis=1)
     inside = ((centres >= patch.lower) & (centres <= patch.upper)).all(axis=1)
     assert np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)[inside].max() <= 1.5 * patch.element
-    assert "more than" in failure(lambda: body.mesh((Refinement("top", 1e-4),)))
+    assert "more than" in failure(lambda: body.mesh((FineMesh("top", 1e-4),)))
 
 
 def test_faults_of_surfaces(tmp_path: Path):
@@ -237,7 +237,7 @@ def test_faults_of_volume_meshes(tmp_path: Path):
     meshio.Mesh(block.points, [("triangle", block.triangles)]).write(path)
     assert "It holds triangle" in failure(lambda: ImportedMesh(path).mesh())
     write_tetrahedra(path, Block(size=(0.1, 0.1, 0.1)).rest())
-    assert "Did you mean 'face 1'" in failure(lambda: ImportedMesh(path).mesh((Refinement("face1", 0.01),)))
+    assert "Did you mean 'face 1'" in failure(lambda: ImportedMesh(path).mesh((FineMesh("face1", 0.01),)))
     far = SurfacePatch("tip", (5, 5, 5), (6, 6, 6))
     assert "contains no part" in failure(lambda: ImportedMesh(path, patches=(far,)).mesh())
     tetrahedra = block.tetrahedra.copy()

@@ -16,10 +16,10 @@ from palpate.physics.geometry import (
     Block,
     Cylinder,
     Dome,
+    FineMesh,
     Inclusion,
     LayeredBlock,
     Organ,
-    Refinement,
     Tube,
     body_mesh,
 )
@@ -41,7 +41,7 @@ PROGRAM = """
 import hashlib
 from palpate.physics.geometry import *
 shape = {shape}
-mesh = shape.rest((Refinement(shape.surfaces[0], 0.008, (-0.02, -0.02, 0.0), (0.02, 0.02, 1.0)),))
+mesh = shape.rest((FineMesh(shape.surfaces[0], 0.008, (-0.02, -0.02, 0.0), (0.02, 0.02, 1.0)),))
 data = mesh.points.tobytes() + mesh.tetrahedra.tobytes() + mesh.triangles.tobytes()
 print(hashlib.sha256(data + mesh.surface_of.tobytes() + mesh.region_of.tobytes()).hexdigest())
 """
@@ -135,7 +135,7 @@ def test_parts_of_the_phantom_have_their_volumes():
 
 def test_the_fine_rectangle_of_the_block():
     # the mesh whose force ripples by 0.04 % under a sliding probe: 6 mm in 20 mm has about 10,000 unknowns
-    patch = Refinement("top", 0.006, (0.022, 0.034, 0.0), (0.078, 0.072, 1.0))
+    patch = FineMesh("top", 0.006, (0.022, 0.034, 0.0), (0.078, 0.072, 1.0))
     block = Block(element=0.02)
     solver = block.mesh((patch,))
     assert 9_000 < ngsolve.VectorH1(solver, order=2).ndof < 11_000
@@ -156,7 +156,7 @@ def test_the_fine_rectangle_of_the_block():
 @pytest.mark.parametrize("size", [0.003, 0.0065])
 def test_a_rectangle_of_a_few_millimetres_is_fine_too(size):
     """The CAD kernel's boxes around faces are 1e-7 m larger than these, which is much for a small one."""
-    patch = Refinement("top", size / 6, (0.0, 0.0, 0.0), (size, size, 1.0))
+    patch = FineMesh("top", size / 6, (0.0, 0.0, 0.0), (size, size, 1.0))
     mesh = Block((0.03, 0.03, 0.01)).rest((patch,))
     middle = mesh.points[mesh.triangles_of("top")].mean(axis=1)
     count = ((middle <= size) & (middle >= 0)).all(axis=1, where=[True, True, False]).sum()
@@ -176,7 +176,7 @@ def test_a_rectangle_of_a_few_millimetres_is_fine_too(size):
 )
 def test_round_shapes_are_fine_where_asked(shape):
     name = shape.surfaces[-1] if isinstance(shape, Tube) else shape.surfaces[0]
-    patch = Refinement(name, 0.005, (-0.05, -0.015, 0.0), (0.01, 0.015, 1.0))
+    patch = FineMesh(name, 0.005, (-0.05, -0.015, 0.0), (0.01, 0.015, 1.0))
     mesh = shape.rest((patch,))
     corners = mesh.points[mesh.triangles_of(name)]
     centres = corners.mean(axis=1)
@@ -201,7 +201,7 @@ def test_round_shapes_are_fine_where_asked(shape):
 def test_meshes_are_the_same_in_another_process(shape):
     command = [sys.executable, "-c", PROGRAM.format(shape=shape)]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
-    patch = Refinement(shape.surfaces[0], 0.008, (-0.02, -0.02, 0.0), (0.02, 0.02, 1.0))
+    patch = FineMesh(shape.surfaces[0], 0.008, (-0.02, -0.02, 0.0), (0.02, 0.02, 1.0))
     mesh = body_mesh(shape.mesh((patch,)), shape.surfaces, shape.regions)
     data = mesh.points.tobytes() + mesh.tetrahedra.tobytes() + mesh.triangles.tobytes()
     here = hashlib.sha256(data + mesh.surface_of.tobytes() + mesh.region_of.tobytes()).hexdigest()
@@ -265,13 +265,13 @@ def test_faults_of_arguments():
         (lambda: Dome(inclusion=Inclusion((0.055, 0, 0.02), 0.01)), "leaves the dome"),
         (lambda: Organ(seed=-1), "whole number"),
         (lambda: Organ(length=200.0), "Lengths are in m"),
-        (lambda: Refinement("top", 0.0), "must be positive"),
-        (lambda: Refinement("top", 0.01, (0, 0, 0)), "one corner"),
-        (lambda: Refinement("top", 0.01, (1, 0, 0), (0, 1, 1)), "is empty"),
-        (lambda: Block().mesh((Refinement("topp", 0.01),)), "Did you mean 'top'"),
-        (lambda: Block().mesh((Refinement("top", 1e-5),)), "more than"),
+        (lambda: FineMesh("top", 0.0), "must be positive"),
+        (lambda: FineMesh("top", 0.01, (0, 0, 0)), "one corner"),
+        (lambda: FineMesh("top", 0.01, (1, 0, 0), (0, 1, 1)), "is empty"),
+        (lambda: Block().mesh((FineMesh("topp", 0.01),)), "Did you mean 'top'"),
+        (lambda: Block().mesh((FineMesh("top", 1e-5),)), "more than"),
         (lambda: Block(element=1e-4).mesh(), "more than"),
-        (lambda: Dome().mesh((Refinement("top", 1e-5),)), "more than"),
+        (lambda: Dome().mesh((FineMesh("top", 1e-5),)), "more than"),
     ]
     for number, (attempt, words) in enumerate(cases):
         with pytest.raises(UsageError) as caught:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from palpate.errors import UsageError
-from palpate.physics.geometry import Block, Cylinder, Refinement
+from palpate.physics.geometry import Block, Cylinder, FineMesh
 from palpate.physics.interactions.footprint import (
     QUADRATURE,
     bump,
@@ -24,7 +24,7 @@ BLOCK = Block((0.04, 0.03, 0.02), element=0.01)
 def test_its_integral_over_a_plane_is_a_quarter_of_the_disc():
     import ngsolve
 
-    mesh = Block((0.04, 0.03, 0.02)).mesh((Refinement("top", 0.004),))
+    mesh = Block((0.04, 0.03, 0.02)).mesh((FineMesh("top", 0.004),))
     weight = bump(chart_of(BLOCK.rest(), "top"), (0.021, 0.014), 0.008)
     surface = ngsolve.ds(definedon=mesh.Boundaries("top"), bonus_intorder=QUADRATURE)
     assert ngsolve.Integrate(weight * surface, mesh) == pytest.approx(footprint_area(0.008), rel=1e-5)

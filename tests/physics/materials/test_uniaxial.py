@@ -9,7 +9,7 @@ import pytest
 
 from palpate.errors import UsageError
 from palpate.physics.materials.hardening import LinearHardening, VoceHardening
-from palpate.physics.materials.prony import Prony
+from palpate.physics.materials.prony import PronySeries
 from palpate.physics.materials.uniaxial import UniaxialPlastic, UniaxialViscoelastic
 
 YOUNG = 110e9
@@ -20,7 +20,7 @@ LAWS = [
     VoceHardening(70e6, 150e6, 18.0, 0.4e9),
     VoceHardening(1e6, 5e9, 1e5, 0.0),  # saturates within the first thousandth of a per cent
 ]
-NYLON = Prony(((0.3, 0.5), (0.2, 20.0)))
+NYLON = PronySeries(((0.3, 0.5), (0.2, 20.0)))
 
 
 def path(law, strains, state=None):
@@ -103,13 +103,13 @@ def test_hardening_without_strength_is_refused(bad):
 
 def test_prony_shares_and_times_are_checked():
     with pytest.raises(UsageError, match="of_moduli"):
-        Prony(((0.7, 1.0), (0.5, 2.0)))
+        PronySeries(((0.7, 1.0), (0.5, 2.0)))
     with pytest.raises(UsageError):
-        Prony(((0.5, 0.0),))
+        PronySeries(((0.5, 0.0),))
     with pytest.raises(UsageError, match="pair"):
-        Prony((0.5, 3.0))
-    series = Prony.of_moduli(2.0, ((1.0, 3.0), (1.0, 5.0)))
-    assert series == Prony(((0.25, 3.0), (0.25, 5.0)))
+        PronySeries((0.5, 3.0))
+    series = PronySeries.of_moduli(2.0, ((1.0, 3.0), (1.0, 5.0)))
+    assert series == PronySeries(((0.25, 3.0), (0.25, 5.0)))
     assert series.equilibrium == 0.5
 
 
@@ -151,7 +151,7 @@ def test_sinusoid_loses_the_energy_of_the_loss_modulus():
 
 def test_creep_of_a_standard_solid_follows_its_closed_form():
     """J(t) = 1/E_∞ − (1/E_∞ − 1/E_0) exp(−t γ_∞/τ), from Laplace's transform of the one-term series."""
-    fibre = UniaxialViscoelastic(2e9, Prony(((0.4, 2.0),)))
+    fibre = UniaxialViscoelastic(2e9, PronySeries(((0.4, 2.0),)))
     state, stress, strain, dt = fibre.rest(), 1e6, np.array(0.0), 0.004
     steps = 1000
     for i in range(steps + 1):

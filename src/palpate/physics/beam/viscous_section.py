@@ -13,7 +13,7 @@ import numpy as np
 
 from palpate.physics.beam.reissner import Stiffness
 from palpate.physics.beam.resultants import SectionAnswer
-from palpate.physics.materials.prony import Prony
+from palpate.physics.materials.prony import PronySeries
 from palpate.physics.materials.uniaxial import UniaxialViscoelastic, ViscousFibres
 
 __all__ = ["ViscousSection"]
@@ -28,12 +28,12 @@ class ViscousSection:
     ----------
     stiffness : Stiffness
         The instantaneous ones.
-    prony : Prony
+    prony : PronySeries
     """
 
     quadratic = True
 
-    def __init__(self, stiffness: Stiffness, prony: Prony) -> None:
+    def __init__(self, stiffness: Stiffness, prony: PronySeries) -> None:
         self.elastic = np.array([stiffness.axial, stiffness.shear, stiffness.bending])
         self._prony = prony
         # of unit modulus: its "stresses" are strains, its "overstresses" shares of strains

@@ -22,7 +22,7 @@ from palpate.physics.geometry.mesh import BodyMesh, body_mesh, to_ngsolve
 from palpate.physics.geometry.mesh_file import ImportedMesh
 from palpate.physics.geometry.organ import Organ
 from palpate.physics.geometry.quality import MeshQuality
-from palpate.physics.geometry.refinement import Refinement
+from palpate.physics.geometry.refinement import FineMesh
 from palpate.physics.geometry.segments import SurfacePatch
 from palpate.physics.geometry.shape import Geometry
 from palpate.physics.geometry.solid_file import ImportedSolid
@@ -33,6 +33,7 @@ __all__ = [
     "BodyMesh",
     "Cylinder",
     "Dome",
+    "FineMesh",
     "Geometry",
     "ImportedMesh",
     "ImportedSolid",
@@ -40,7 +41,6 @@ __all__ = [
     "LayeredBlock",
     "MeshQuality",
     "Organ",
-    "Refinement",
     "SurfacePatch",
     "Tube",
     "body_mesh",

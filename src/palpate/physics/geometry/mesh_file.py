@@ -14,7 +14,7 @@ from palpate.physics.geometry.checks import plain_name, require_size
 from palpate.physics.geometry.files import UNITS, digest_of, read_with_meshio, require_same, require_unit
 from palpate.physics.geometry.mesh import BodyMesh, outer_faces, to_ngsolve
 from palpate.physics.geometry.quality import tetrahedron_volumes
-from palpate.physics.geometry.refinement import MOST_ELEMENTS, Refinement
+from palpate.physics.geometry.refinement import MOST_ELEMENTS, FineMesh
 from palpate.physics.geometry.segments import SurfacePatch, patched, segments
 from palpate.physics.geometry.shape import Shape
 from palpate.physics.geometry.triangulation import Triangulation
@@ -78,7 +78,7 @@ class ImportedMesh(Shape):
         patches = [patch.describe() for patch in self.patches]
         return {"type": "ImportedMesh", "unit": self.unit, "patches": patches, "sha256": self.digest}
 
-    def generate(self, refinements: tuple[Refinement, ...]) -> Any:
+    def generate(self, refinements: tuple[FineMesh, ...]) -> Any:
         """The file's mesh, its tetrahedra bisected where a refinement asks for smaller ones."""
         mesh = to_ngsolve(_read(self))
         for refinement in refinements:
@@ -192,7 +192,7 @@ def _require_manifold(outer: np.ndarray, source: str) -> None:
         )
 
 
-def _bisect(mesh: Any, refinement: Refinement) -> None:
+def _bisect(mesh: Any, refinement: FineMesh) -> None:
     """Bisect the tetrahedra behind a part of a surface until their edges there are short enough."""
     name = refinement.surface
     for _ in range(40):
@@ -217,7 +217,7 @@ def _bisect(mesh: Any, refinement: Refinement) -> None:
         mesh.Refine()
 
 
-def _overlaps(corners: np.ndarray, refinement: Refinement) -> bool:
+def _overlaps(corners: np.ndarray, refinement: FineMesh) -> bool:
     if refinement.lower is None or refinement.upper is None:
         return True
     low, high = corners.min(axis=0), corners.max(axis=0)

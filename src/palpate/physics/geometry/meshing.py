@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.physics.geometry.mesh import body_mesh
-from palpate.physics.geometry.refinement import GRADING, Refinement, require_budget
+from palpate.physics.geometry.refinement import GRADING, FineMesh, require_budget
 from palpate.physics.geometry.sampling import points_on
 
 __all__ = ["mesh_solid"]
@@ -19,7 +19,7 @@ PADDING = 1e-7  # m by which the CAD kernel's boxes are larger than the faces wi
 SHORTEST = 1e-5  # shortest edge over the body's length that is meshed as such; Netgen's own default is in mm
 
 
-def mesh_solid(solid: Any, coarse: float, refinements: tuple[Refinement, ...]) -> Any:
+def mesh_solid(solid: Any, coarse: float, refinements: tuple[FineMesh, ...]) -> Any:
     """Mesh a solid whose faces and solids carry names.
 
     The fine part of an upright plane rectangle is cut out of it as a face of its own, so that the size of its
@@ -31,7 +31,7 @@ def mesh_solid(solid: Any, coarse: float, refinements: tuple[Refinement, ...]) -
         In m.
     coarse : float
         Largest element size in m.
-    refinements : tuple of Refinement
+    refinements : tuple of FineMesh
 
     Returns
     -------
@@ -97,7 +97,7 @@ def _upright(face: Any) -> int | None:
     return axis if extent[axis] < FLAT * extent.max() + 2 * PADDING else None
 
 
-def _imprinted(solid: Any, refinements: list[Refinement]) -> Any:
+def _imprinted(solid: Any, refinements: list[FineMesh]) -> Any:
     """The solid whose plane faces are cut along the boxes of the refinements."""
     from netgen.occ import Glue
 
@@ -140,7 +140,7 @@ def _patch(face: Any, lower: np.ndarray, upper: np.ndarray) -> list[Any]:
     return [rectangle * face]
 
 
-def _restricted_faces(solid: Any, refinements: list[Refinement]) -> list[tuple[float, float]]:
+def _restricted_faces(solid: Any, refinements: list[FineMesh]) -> list[tuple[float, float]]:
     """Set the element size of the faces inside the boxes; area and size of each."""
     fine = {}
     for number, face in enumerate(solid.faces):
@@ -151,7 +151,7 @@ def _restricted_faces(solid: Any, refinements: list[Refinement]) -> list[tuple[f
     return list(fine.values())
 
 
-def _inside(face: Any, refinement: Refinement) -> bool:
+def _inside(face: Any, refinement: FineMesh) -> bool:
     if refinement.lower is None or refinement.upper is None:
         return True
     low, high = face.bounding_box

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from palpate.errors import UsageError
 from palpate.physics.geometry.checks import require_positive, require_triple
 
-__all__ = ["GRADING", "MOST_ELEMENTS", "Refinement", "require_budget"]
+__all__ = ["GRADING", "MOST_ELEMENTS", "FineMesh", "require_budget"]
 
 GRADING = 0.4  # growth of the element size per distance from a fine surface
 MOST_ELEMENTS = 400_000  # about half a million nodes of second order: beyond any direct solver on one machine
@@ -16,7 +16,7 @@ Point = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class Refinement:
+class FineMesh:
     """A part of a surface that shall have small elements.
 
     Attributes

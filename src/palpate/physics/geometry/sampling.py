@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from palpate.physics.geometry.mesh import BodyMesh
-from palpate.physics.geometry.refinement import Refinement, require_budget
+from palpate.physics.geometry.refinement import FineMesh, require_budget
 
 __all__ = ["points_on", "scattered"]
 
 
-def points_on(mesh: BodyMesh, refinement: Refinement) -> tuple[np.ndarray, float]:
+def points_on(mesh: BodyMesh, refinement: FineMesh) -> tuple[np.ndarray, float]:
     """Points of the refined part of a surface, at most half an element size apart.
 
     The triangles are halved across their longest edges until they are small enough. Where the box holds no point,
@@ -20,7 +20,7 @@ def points_on(mesh: BodyMesh, refinement: Refinement) -> tuple[np.ndarray, float
     ----------
     mesh : BodyMesh
         Any mesh of the body, coarse for example.
-    refinement : Refinement
+    refinement : FineMesh
 
     Returns
     -------
@@ -67,7 +67,7 @@ def _areas(corners: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
 
 
-def _meets(corners: np.ndarray, refinement: Refinement) -> np.ndarray:
+def _meets(corners: np.ndarray, refinement: FineMesh) -> np.ndarray:
     """Which triangles (t, 3, 3) have a box that touches the refinement's, bool (t,)."""
     if refinement.lower is None or refinement.upper is None:
         return np.ones(len(corners), dtype=bool)
@@ -75,7 +75,7 @@ def _meets(corners: np.ndarray, refinement: Refinement) -> np.ndarray:
     return np.asarray(((low <= refinement.upper) & (high >= refinement.lower)).all(axis=1))
 
 
-def _within(points: np.ndarray, refinement: Refinement) -> np.ndarray:
+def _within(points: np.ndarray, refinement: FineMesh) -> np.ndarray:
     if refinement.lower is None or refinement.upper is None:
         return np.ones(len(points), dtype=bool)
     return np.asarray(((points >= refinement.lower) & (points <= refinement.upper)).all(axis=1))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, cast, runtime_checkab
 from palpate.errors import UsageError
 from palpate.physics.geometry.checks import require_known
 from palpate.physics.geometry.mesh import BodyMesh, body_mesh
-from palpate.physics.geometry.refinement import Refinement
+from palpate.physics.geometry.refinement import FineMesh
 
 if TYPE_CHECKING:
     from collections.abc import Hashable
@@ -35,10 +35,10 @@ class Geometry(Protocol):
     @property
     def regions(self) -> tuple[str, ...]: ...  # noqa: D102
 
-    def mesh(self, refinements: tuple[Refinement, ...] = ()) -> Any:
+    def mesh(self, refinements: tuple[FineMesh, ...] = ()) -> Any:
         """Tetrahedra in m as an `ngsolve.Mesh`, with the names set; curved where the shape is."""
 
-    def rest(self, refinements: tuple[Refinement, ...] = ()) -> BodyMesh:
+    def rest(self, refinements: tuple[FineMesh, ...] = ()) -> BodyMesh:
         """The same mesh as plain arrays."""
 
     def describe(self) -> dict[str, Any]:
@@ -63,18 +63,18 @@ class Shape:
         """Names of the parts of the volume."""
         return ("body",)
 
-    def generate(self, refinements: tuple[Refinement, ...]) -> Any:
+    def generate(self, refinements: tuple[FineMesh, ...]) -> Any:
         """A new `netgen.meshing.Mesh` in m, whose names of surfaces and regions are set."""
         raise NotImplementedError
 
-    def mesh(self, refinements: tuple[Refinement, ...] = ()) -> Any:
+    def mesh(self, refinements: tuple[FineMesh, ...] = ()) -> Any:
         """Tetrahedra for NGSolve.
 
         The same value gives the same mesh, bit for bit, in any process.
 
         Parameters
         ----------
-        refinements : tuple of Refinement
+        refinements : tuple of FineMesh
             Parts of surfaces that shall have smaller elements.
 
         Returns
@@ -96,7 +96,7 @@ class Shape:
             mesh.Curve(2)
         return mesh
 
-    def rest(self, refinements: tuple[Refinement, ...] = ()) -> BodyMesh:
+    def rest(self, refinements: tuple[FineMesh, ...] = ()) -> BodyMesh:
         """The same mesh as plain arrays, with straight faces.
 
         Raises
@@ -110,8 +110,8 @@ class Shape:
         """Everything that decides the mesh, as plain data for a JSON file."""
         return {"type": type(self).__name__, **asdict(cast("Any", self))}
 
-    def _checked(self, refinements: tuple[Refinement, ...]) -> tuple[Refinement, ...]:
-        if isinstance(refinements, Refinement):
+    def _checked(self, refinements: tuple[FineMesh, ...]) -> tuple[FineMesh, ...]:
+        if isinstance(refinements, FineMesh):
             return self._checked((refinements,))
         for refinement in refinements:
             require_known("surface", refinement.surface, self.surfaces)
@@ -140,7 +140,7 @@ class Solid(Shape):
         """The shape as `netgen.occ.TopoDS_Shape` in m, whose faces and solids carry the names."""
         raise NotImplementedError
 
-    def generate(self, refinements: tuple[Refinement, ...]) -> Any:
+    def generate(self, refinements: tuple[FineMesh, ...]) -> Any:
         """A new `netgen.meshing.Mesh` in m, whose names of surfaces and regions are set."""
         from palpate.physics.geometry.meshing import mesh_solid
 
@@ -163,11 +163,11 @@ class Solid(Shape):
 
 # a body is meshed with and without refinements, and a sweep holds a few bodies
 @lru_cache(maxsize=32)
-def _generated(shape: Hashable, refinements: tuple[Refinement, ...]) -> Any:
+def _generated(shape: Hashable, refinements: tuple[FineMesh, ...]) -> Any:
     return cast("Shape", shape).generate(refinements)
 
 
 @lru_cache(maxsize=32)
-def _plain(shape: Hashable, refinements: tuple[Refinement, ...]) -> BodyMesh:
+def _plain(shape: Hashable, refinements: tuple[FineMesh, ...]) -> BodyMesh:
     geometry = cast("Shape", shape)
     return body_mesh(_generated(shape, refinements), geometry.surfaces, geometry.regions)

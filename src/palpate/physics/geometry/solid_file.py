@@ -13,7 +13,7 @@ from palpate.physics.geometry.checks import require_positive
 from palpate.physics.geometry.files import digest_of, require_same, require_unit
 from palpate.physics.geometry.mesh import BodyMesh, to_ngsolve
 from palpate.physics.geometry.meshing import mesh_solid
-from palpate.physics.geometry.refinement import Refinement
+from palpate.physics.geometry.refinement import FineMesh
 from palpate.physics.geometry.segments import FEATURE_ANGLE, SurfacePatch
 from palpate.physics.geometry.shape import Shape
 from palpate.physics.geometry.step_file import INTERFACE, read_step
@@ -125,7 +125,7 @@ class ImportedSolid(Shape):
             "sha256": self.digest,
         }
 
-    def generate(self, refinements: tuple[Refinement, ...]) -> Any:
+    def generate(self, refinements: tuple[FineMesh, ...]) -> Any:
         """A new `netgen.meshing.Mesh` in m, whose names of surfaces and regions are set."""
         if self.is_step:
             # read anew: meshing sets element sizes on the faces

@@ -13,7 +13,7 @@ from palpate.errors import FileFormatError, UsageError
 from palpate.physics.geometry.checks import require_size
 from palpate.physics.geometry.files import UNITS, read_with_meshio
 from palpate.physics.geometry.mesh import BodyMesh, body_mesh
-from palpate.physics.geometry.refinement import GRADING, Refinement, require_budget
+from palpate.physics.geometry.refinement import GRADING, FineMesh, require_budget
 from palpate.physics.geometry.sampling import points_on, scattered
 from palpate.physics.geometry.segments import SurfacePatch, patched, segments
 from palpate.physics.geometry.triangulation import Triangulation, merged, require_closed
@@ -60,7 +60,7 @@ def named(surface: Triangulation, patches: tuple[SurfacePatch, ...], angle: floa
     )
 
 
-def fill(skin: BodyMesh, volume: float, coarse: float, refinements: tuple[Refinement, ...]) -> BodyMesh:
+def fill(skin: BodyMesh, volume: float, coarse: float, refinements: tuple[FineMesh, ...]) -> BodyMesh:
     """Tetrahedra inside a closed surface, whose triangles are renewed.
 
     Parameters
@@ -71,7 +71,7 @@ def fill(skin: BodyMesh, volume: float, coarse: float, refinements: tuple[Refine
         Enclosed, in m³.
     coarse : float
         Largest element size in m.
-    refinements : tuple of Refinement
+    refinements : tuple of FineMesh
 
     Raises
     ------

@@ -19,7 +19,7 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.physics.geometry.checks import require_known
 from palpate.physics.geometry.mesh import BodyMesh
-from palpate.physics.geometry.refinement import Refinement
+from palpate.physics.geometry.refinement import FineMesh
 from palpate.physics.interactions.arguments import AXES, axis_of
 from palpate.physics.interactions.patch import Patch
 
@@ -64,11 +64,11 @@ class Chart:
         """Names of the two coordinates, such as x and y."""
         return AXES[self.across[0]], AXES[self.across[1]]
 
-    def refinement(self, mesh: BodyMesh, lower: np.ndarray, upper: np.ndarray, element: float) -> Refinement:
+    def refinement(self, mesh: BodyMesh, lower: np.ndarray, upper: np.ndarray, element: float) -> FineMesh:
         """Fine elements between two corners (2,) in m, all along the axis."""
         low, high = (corner.copy() for corner in mesh.corners)
         low[list(self.across)], high[list(self.across)] = lower, upper
-        return Refinement(self.surface, element, _triple(low), _triple(high))
+        return FineMesh(self.surface, element, _triple(low), _triple(high))
 
 
 def bump(chart: Chart, centre: tuple[Any, Any], radius: float) -> Any:

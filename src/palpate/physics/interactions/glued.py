@@ -25,7 +25,7 @@ from palpate.units import Range
 
 if TYPE_CHECKING:
     from palpate.physics.geometry.mesh import BodyMesh
-    from palpate.physics.geometry.refinement import Refinement
+    from palpate.physics.geometry.refinement import FineMesh
 
 __all__ = ["GluedPad"]
 
@@ -122,7 +122,7 @@ class GluedPad:
         """Its fields, with ``"type": "GluedPad"``."""
         return {"type": "GluedPad", **asdict(self)}
 
-    def refinements(self, geometry: Any) -> tuple[Refinement, ...]:
+    def refinements(self, geometry: Any) -> tuple[FineMesh, ...]:
         """Fine elements wherever the footprint may be."""
         chart, lower, upper = _placed(self, geometry.rest())
         if chart is None or self.radius is None:

@@ -21,7 +21,7 @@ from palpate.physics.equilibrium.stop import Verdict
 
 if TYPE_CHECKING:
     from palpate.physics.geometry.mesh import BodyMesh
-    from palpate.physics.geometry.refinement import Refinement
+    from palpate.physics.geometry.refinement import FineMesh
     from palpate.units import Range
 
 __all__ = ["Attached", "Energy", "Field", "Held", "Interaction", "Planned"]
@@ -144,7 +144,7 @@ class Interaction(Protocol):
     def describe(self) -> dict[str, Any]:
         """Everything that decides what it does, as plain data for a JSON file, with a ``"type"``."""
 
-    def refinements(self, geometry: Any) -> tuple[Refinement, ...]:
+    def refinements(self, geometry: Any) -> tuple[FineMesh, ...]:
         """Where it needs a fine mesh."""
 
     def attach(self, field: Field) -> Attached:

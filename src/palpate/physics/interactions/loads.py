@@ -27,7 +27,7 @@ from palpate.units import Range
 
 if TYPE_CHECKING:
     from palpate.physics.geometry.mesh import BodyMesh
-    from palpate.physics.geometry.refinement import Refinement
+    from palpate.physics.geometry.refinement import FineMesh
 
 __all__ = ["BodyForce", "PointForce", "SurfaceTraction"]
 
@@ -116,7 +116,7 @@ class PointForce:
         """Everything that decides what it does, as plain data for a JSON file."""
         return {"type": "PointForce", **asdict(self)}
 
-    def refinements(self, geometry: Any) -> tuple[Refinement, ...]:
+    def refinements(self, geometry: Any) -> tuple[FineMesh, ...]:
         """Fine elements under the footprint."""
         mesh = geometry.rest()
         chart = self._chart(mesh)
@@ -186,7 +186,7 @@ class SurfaceTraction:
         """Everything that decides what it does, as plain data for a JSON file."""
         return {"type": "SurfaceTraction", **asdict(self)}
 
-    def refinements(self, geometry: Any) -> tuple[Refinement, ...]:
+    def refinements(self, geometry: Any) -> tuple[FineMesh, ...]:
         """None."""
         return ()
 
@@ -243,7 +243,7 @@ class BodyForce:
         """Everything that decides what it does, as plain data for a JSON file."""
         return {"type": "BodyForce", **asdict(self)}
 
-    def refinements(self, geometry: Any) -> tuple[Refinement, ...]:
+    def refinements(self, geometry: Any) -> tuple[FineMesh, ...]:
         """None."""
         return ()
 

@@ -15,7 +15,7 @@ from palpate.physics.interactions.interaction import Attached
 from palpate.units import Range
 
 if TYPE_CHECKING:
-    from palpate.physics.geometry.refinement import Refinement
+    from palpate.physics.geometry.refinement import FineMesh
 
 __all__ = ["PrescribedDisplacement"]
 
@@ -101,15 +101,15 @@ class PrescribedDisplacement:
         """Everything that decides what it does, as plain data for a JSON file."""
         return {"type": "PrescribedDisplacement", **asdict(self)}
 
-    def refinements(self, geometry: Any) -> tuple[Refinement, ...]:
+    def refinements(self, geometry: Any) -> tuple[FineMesh, ...]:
         """Fine elements on the moved part, if their size is given."""
-        from palpate.physics.geometry.refinement import Refinement
+        from palpate.physics.geometry.refinement import FineMesh
 
         if self.element is None:
             return ()
         lower, upper = self.within or (None, None)
         require_known("surface", self.surface, geometry.surfaces)
-        return (Refinement(self.surface, self.element, lower, upper),)
+        return (FineMesh(self.surface, self.element, lower, upper),)
 
     def attach(self, field: Any) -> Attached:
         """Its constraints on an opened body.

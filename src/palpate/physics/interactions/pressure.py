@@ -23,7 +23,7 @@ from palpate.physics.interactions.loads import range_of
 from palpate.units import Range
 
 if TYPE_CHECKING:
-    from palpate.physics.geometry.refinement import Refinement
+    from palpate.physics.geometry.refinement import FineMesh
 
 __all__ = ["Pressure", "volume_density"]
 
@@ -92,7 +92,7 @@ class Pressure:
         """Everything that decides what it does, as plain data for a JSON file."""
         return {"type": "Pressure", **asdict(self)}
 
-    def refinements(self, geometry: Any) -> tuple[Refinement, ...]:
+    def refinements(self, geometry: Any) -> tuple[FineMesh, ...]:
         """None."""
         return ()
 

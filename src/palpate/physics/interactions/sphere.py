@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_number
-from palpate.physics.geometry.refinement import Refinement
+from palpate.physics.geometry.refinement import FineMesh
 from palpate.physics.interactions import columns
 from palpate.physics.interactions.interaction import Attached, Energy, Field
 from palpate.physics.interactions.patch import Patch
@@ -90,11 +90,11 @@ class SphereProbe:
         pairs = zip("xyz", low.tolist(), high.tolist(), strict=True)
         return tuple(Range(f"c_{axis}", a, b, "m") for axis, a, b in pairs)
 
-    def refinements(self, geometry: Geometry) -> tuple[Refinement, ...]:
+    def refinements(self, geometry: Geometry) -> tuple[FineMesh, ...]:
         """Small elements wherever it may touch."""
         low, high = self._footprint(Patch.of(geometry.rest(), self._surface(geometry)))
         low, high = low - MARGIN * self.radius, high + MARGIN * self.radius
-        return (Refinement(self.touches, ELEMENT * self.radius, tuple(low.tolist()), tuple(high.tolist())),)
+        return (FineMesh(self.touches, ELEMENT * self.radius, tuple(low.tolist()), tuple(high.tolist())),)
 
     def design(self, geometry: Geometry, samples: int, seed: int) -> np.ndarray:
         """Positions (samples, 3) in m in columns, each from shallow to deep.

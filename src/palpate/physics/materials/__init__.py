@@ -26,7 +26,7 @@ from palpate.physics.materials.mooney_rivlin import MooneyRivlin
 from palpate.physics.materials.neo_hooke import NeoHookean
 from palpate.physics.materials.ogden import Ogden
 from palpate.physics.materials.plastic import Plastic
-from palpate.physics.materials.prony import Prony
+from palpate.physics.materials.prony import PronySeries
 from palpate.physics.materials.st_venant import StVenantKirchhoff
 from palpate.physics.materials.stability import ModeStability, Stability
 from palpate.physics.materials.user import UserMaterial
@@ -46,7 +46,7 @@ __all__ = [
     "NeoHookean",
     "Ogden",
     "Plastic",
-    "Prony",
+    "PronySeries",
     "StVenantKirchhoff",
     "Stability",
     "StateVariable",

@@ -194,6 +194,11 @@ class FibreReinforced(Elastic):
         kept = getattr(self.matrix, "stored", self.matrix.energy)
         return kept(F, state) + sum(family.energy(F) for family in self.families)
 
+    def stored_distortion(self, F: Tensor, state: Mapping[str, Any]) -> Scalar:
+        """The same without the matrix's volumetric part, which a mixed formulation writes in its own way."""
+        kept = getattr(self.matrix, "stored_distortion", self.matrix.distortion)
+        return kept(F, state) + sum(family.energy(F) for family in self.families)
+
     def dissipated(self, F: Tensor, state: Mapping[str, Any], dt: Any) -> Scalar:
         """Dissipation of a step in J/m³: the matrix's; fibres are elastic."""
         lost = getattr(self.matrix, "dissipated", None)

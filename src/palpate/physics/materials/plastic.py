@@ -31,7 +31,6 @@ from palpate.physics.materials.tensors import (
     scale,
     sqrt,
     sym,
-    trace,
     where,
 )
 
@@ -131,9 +130,12 @@ class Plastic(Elastic):
 
     def stored(self, F: Tensor, state: Mapping[str, Any]) -> Scalar:
         """Elastic energy in J/m³ at F, with the state after the step: what unloading gives back."""
-        strain = sym(F - identity(F))
-        shape = deviator(strain - state["plastic_strain"])
-        return self.shear_modulus * inner(shape, shape) + 0.5 * self.bulk_modulus * trace(strain) ** 2
+        return self.stored_distortion(F, state) + self.volumetric.energy(F)
+
+    def stored_distortion(self, F: Tensor, state: Mapping[str, Any]) -> Scalar:
+        """The same without the volumetric part, which a mixed formulation writes in its own way."""
+        shape = deviator(sym(F - identity(F)) - state["plastic_strain"])
+        return self.shear_modulus * inner(shape, shape)
 
     def dissipated(self, F: Tensor, state: Mapping[str, Any], dt: Any = None) -> Scalar:
         """Plastic work of a step from `state` to F in J/m³, never negative."""

@@ -20,11 +20,11 @@ from palpate.errors import UsageError
 from palpate.physics.arguments import require_number
 from palpate.physics.materials.tensors import exp, is_symbolic, where
 
-__all__ = ["Prony"]
+__all__ = ["PronySeries"]
 
 
 @dataclass(frozen=True)
-class Prony:
+class PronySeries:
     """Shares and relaxation times.
 
     Attributes
@@ -49,11 +49,11 @@ class Prony:
             raise UsageError(
                 f"The Prony shares sum to {math.fsum(self.shares):g}.",
                 why="They are shares of the instantaneous modulus; above 1 the equilibrium modulus is negative.",
-                fix="Divide each modulus by the instantaneous one, G_∞ + ΣG_i: Prony.of_moduli does it.",
+                fix="Divide each modulus by the instantaneous one, G_∞ + ΣG_i: PronySeries.of_moduli does it.",
             )
 
     @classmethod
-    def of_moduli(cls, equilibrium: float, branches: Sequence[tuple[float, float]]) -> Prony:
+    def of_moduli(cls, equilibrium: float, branches: Sequence[tuple[float, float]]) -> PronySeries:
         """Series of an equilibrium modulus (Pa) and of branches (modulus in Pa, relaxation time in s)."""
         whole = equilibrium + math.fsum(modulus for modulus, _ in branches)
         return cls(tuple((modulus / whole, time) for modulus, time in branches))

@@ -17,7 +17,7 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_number
 from palpate.physics.materials.hardening import Hardening
-from palpate.physics.materials.prony import Prony
+from palpate.physics.materials.prony import PronySeries
 
 __all__ = ["PlasticFibres", "UniaxialPlastic", "UniaxialViscoelastic", "ViscousFibres"]
 
@@ -101,12 +101,12 @@ class UniaxialViscoelastic:
     ----------
     young : float
         Instantaneous modulus in Pa.
-    prony : Prony
+    prony : PronySeries
         How it relaxes.
     """
 
     young: float
-    prony: Prony
+    prony: PronySeries
 
     def __post_init__(self) -> None:
         _require_modulus(self.young)

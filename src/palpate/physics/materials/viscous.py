@@ -27,7 +27,7 @@ from palpate.errors import UsageError
 from palpate.physics.materials.compiling import compiled
 from palpate.physics.materials.dashpots import dashpot_loss, spring_energy
 from palpate.physics.materials.material import NO_STATE, Elastic, Material, StateVariable, Volumetric
-from palpate.physics.materials.prony import Prony
+from palpate.physics.materials.prony import PronySeries
 from palpate.physics.materials.scaled import Part, Scaled, kept_bulk, part_of
 from palpate.physics.materials.tensors import (
     Scalar,
@@ -59,7 +59,7 @@ class Viscoelastic(Elastic):
     base : Material
         An elastic law.
     terms : tuple of (float, float)
-        (γ_i, τ_i): share of the instantaneous law that relaxes, and relaxation time in s; a `Prony` is taken too.
+        (γ_i, τ_i): share of the instantaneous law that relaxes, and relaxation time in s; a `PronySeries` is taken too.
         They are shares of the shear modulus, and of Young's modulus only where the volume can't change or relaxes too.
     part : "distortion" or "all"
         What relaxes. If the volumetric part does, there is no mixed formulation.
@@ -87,13 +87,15 @@ class Viscoelastic(Elastic):
                 why="The Prony series relaxes an elastic law's stress.",
                 fix="Pass an elastic law, for example NeoHookean(young=9e3, poisson=0.45).",
             )
-        series = self.terms if isinstance(self.terms, Prony) else Prony(self.terms)
+        series = self.terms if isinstance(self.terms, PronySeries) else PronySeries(self.terms)
         object.__setattr__(self, "terms", series.terms)
         for key in ("name", "source"):
             object.__setattr__(self, key, getattr(self, key) or getattr(self.base, key))
 
     @classmethod
-    def from_relaxed(cls, law: Material, terms: Prony | tuple[tuple[float, float], ...]) -> Viscoelastic:
+    def from_relaxed(
+        cls, law: Material, terms: PronySeries | tuple[tuple[float, float], ...]
+    ) -> Viscoelastic:
         """The material that relaxes to `law`, by the same shares of the instantaneous law.
 
         Raises
@@ -101,7 +103,7 @@ class Viscoelastic(Elastic):
         UsageError
             If the series relaxes to nothing.
         """
-        series = terms if isinstance(terms, Prony) else Prony(terms)
+        series = terms if isinstance(terms, PronySeries) else PronySeries(terms)
         if series.equilibrium <= 0:
             raise UsageError(
                 "A series whose shares sum to 1 relaxes to nothing.",
@@ -111,9 +113,9 @@ class Viscoelastic(Elastic):
         return cls(Scaled(law, 1 / series.equilibrium), series.terms, name=law.name, source=law.source)
 
     @property
-    def prony(self) -> Prony:
+    def prony(self) -> PronySeries:
         """The series."""
-        return Prony(self.terms)
+        return PronySeries(self.terms)
 
     @property
     def density(self) -> float:  # type: ignore[override]
@@ -209,14 +211,21 @@ class Viscoelastic(Elastic):
         return compiled(after)
 
     def stored(self, F: Tensor, state: Mapping[str, Any]) -> Scalar:
-        """Free energy in J/m³ at F, with the state after the step: relaxed law and springs of the terms."""
+        """Free energy in J/m³ at F, with the state after the step: relaxed law and springs of the terms.
+
+        Exact where the base law's stress is linear in its strain; elsewhere an estimate, see `spring_energy`.
+        """
+        relaxed = self.stored_distortion(F, state)
+        return relaxed if self.volumetric is None else relaxed + self.volumetric.energy(F)
+
+    def stored_distortion(self, F: Tensor, state: Mapping[str, Any]) -> Scalar:
+        """The same without the elastic volumetric part, which a mixed formulation writes in its own way."""
         series, bulk = self.prony, self._bulk
         springs = sum(
             spring_energy(state[name], share * self.shear_modulus, share * bulk)
             for name, share in zip(self._overstresses, series.shares, strict=True)
         )
-        relaxed = series.equilibrium * part_of(self.base, self.part, F) + springs
-        return relaxed if self.volumetric is None else relaxed + self.volumetric.energy(F)
+        return series.equilibrium * part_of(self.base, self.part, F) + springs
 
     def dissipated(self, F: Tensor, state: Mapping[str, Any], dt: float) -> Scalar:
         """What the dashpots turn into heat in a step from `state` to F, in J/m³, never negative."""

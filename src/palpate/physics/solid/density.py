@@ -22,7 +22,13 @@ if TYPE_CHECKING:
     from palpate.physics.solid.field import SolidField
     from palpate.physics.solid.history import History
 
-__all__ = ["cauchy_stress", "deformation_gradient", "material_energies"]
+__all__ = [
+    "cauchy_stress",
+    "deformation_gradient",
+    "material_energies",
+    "mixed_density",
+    "stored_density",
+]
 
 
 def deformation_gradient(displacement: Any) -> Any:
@@ -59,12 +65,25 @@ def _region_energy(field: SolidField, region: str, material: Material, history: 
 
 def mixed_density(material: Material, F: Any, pressure: Any, past: tuple[Any, ...] = ()) -> Any:
     """Distortion and p θ(F) - p²/(2κ), in J/m³."""
+    return material.distortion(F, *past) + _volumetric_density(material, F, pressure)
+
+
+def stored_density(field: SolidField, region: str, material: Material, state: Mapping[str, Any]) -> Any:
+    """Free energy in J/m³ of the state under inspection with internal variables, None where the law tells none."""
+    F = deformation_gradient(field.displacement)
+    pressure = field.pressure.get(region)
+    stored = getattr(material, "stored" if pressure is None else "stored_distortion", None)
+    if stored is None or pressure is None:
+        return stored and stored(F, state)
+    return stored(F, state) + _volumetric_density(material, F, pressure)
+
+
+def _volumetric_density(material: Material, F: Any, pressure: Any) -> Any:
+    """p θ(F) - p²/(2κ) in J/m³; at p = κ θ(F) it is ½ κ θ(F)²."""
     volumetric = material.volumetric
     assert volumetric is not None  # `Body` lets no other material go mixed
-    density = material.distortion(F, *past) + pressure * volumetric.measure(F)
-    if math.isinf(volumetric.modulus):
-        return density
-    return density - pressure**2 / (2 * volumetric.modulus)
+    density = pressure * volumetric.measure(F)
+    return density if math.isinf(volumetric.modulus) else density - pressure**2 / (2 * volumetric.modulus)
 
 
 def cauchy_stress(field: SolidField, region: str, material: Material, history: History | None) -> Any:

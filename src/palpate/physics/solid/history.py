@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.physics.solid.density import deformation_gradient
+from palpate.physics.solid.density import deformation_gradient, stored_density
 
 if TYPE_CHECKING:
     from palpate.physics.materials.material import Material
@@ -58,9 +58,7 @@ class History:
             for name, value in self._recipes.items()
         }
         self.arguments = (dict(self._prepared), step) if self._recipes else known
-        stored = getattr(material, "stored", None)
-        gradient = deformation_gradient(field.displacement)
-        self.stored = None if stored is None else stored(gradient, dict(self._values))
+        self.stored = stored_density(field, region, material, dict(self._values))
         self.reset()
 
     def reset(self) -> None:

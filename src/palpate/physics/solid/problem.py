@@ -18,7 +18,7 @@ from palpate.units import Range
 
 if TYPE_CHECKING:
     from palpate.physics.geometry.mesh import BodyMesh
-    from palpate.physics.geometry.refinement import Refinement
+    from palpate.physics.geometry.refinement import FineMesh
     from palpate.physics.solid.body import Body
     from palpate.physics.solid.solution import SolidSolution
     from palpate.physics.solid.solver import SolidSolver
@@ -71,7 +71,7 @@ class SolidProblem:
         return tuple(replace(r, name=name) for r, name in zip(found, numbered, strict=True))
 
     @cached_property
-    def refinements(self) -> tuple[Refinement, ...]:
+    def refinements(self) -> tuple[FineMesh, ...]:
         """Where the mesh is fine."""
         parts = (*self.interactions, *(held.interaction for held in self.body.held))
         wanted = [r for part in parts for r in part.refinements(self.body.geometry)]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from numbers import Real
 from typing import Any
 
 from palpate.errors import UsageError
 
-__all__ = ["require_number"]
+__all__ = ["require_number", "require_positive"]
 
 
 def require_number(what: str, value: Any, unit: str = "") -> None:
@@ -24,4 +25,31 @@ def require_number(what: str, value: Any, unit: str = "") -> None:
         f"{what} is {value!r}, of type {type(value).__name__}.",
         why=f"In Python it is a number{f' in {unit}' if unit else ''}; units in words are for study files.",
         fix="Pass numbers in SI units, for example 0.3 for 300 mm, 5 for 5 N or 70e9 for 70 GPa.",
+    )
+
+
+def require_positive(what: str, value: Any, unit: str, *, infinite: bool = False) -> None:
+    """Refuse what is no positive number.
+
+    Parameters
+    ----------
+    what : str
+        Name of the quantity, which begins the message.
+    unit : str
+        SI unit; empty for a pure number.
+    infinite : bool
+        Whether infinity is taken.
+
+    Raises
+    ------
+    UsageError
+        Unless it is positive and, if `infinite` is false, finite.
+    """
+    require_number(what, value, unit)
+    if value > 0 and (infinite or math.isfinite(value)):
+        return
+    raise UsageError(
+        f"{what} is {value:g} {unit}".rstrip() + ".",
+        why=f"It must be positive{'' if infinite else ' and finite'}.",
+        fix=f"Pass a positive number{f' in {unit}' if unit else ''}.",
     )

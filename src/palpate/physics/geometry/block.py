@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from palpate.physics.geometry.checks import require_positive, require_size, require_triple
+from palpate.physics.arguments import require_positive
+from palpate.physics.geometry.checks import require_size, require_triple
 from palpate.physics.geometry.shape import Solid
 
 __all__ = ["Block", "name_upright_faces"]
@@ -36,7 +37,7 @@ class Block(Solid):
     def __post_init__(self) -> None:
         size = require_triple("The size of a block", self.size)
         for axis, extent in zip("xyz", size, strict=True):
-            require_positive(f"The block's extent along {axis}", extent)
+            require_positive(f"The block's extent along {axis}", extent, "m")
         require_size("The block", max(size))
         object.__setattr__(self, "size", size)
         self._check_element()

@@ -17,23 +17,12 @@ __all__ = [
     "plain_name",
     "require_known",
     "require_name",
-    "require_positive",
     "require_size",
     "require_triple",
 ]
 
 LARGEST, SMALLEST = 10.0, 1e-3  # m, longest side of a body that a hand or a tool would press
 
-
-def require_positive(what: str, value: Any, unit: str = "m") -> None:
-    """Refuse what is no positive, finite number."""
-    require_number(what, value, unit)
-    if not (math.isfinite(value) and value > 0):
-        raise UsageError(
-            f"{what} is {value:g} {unit}.",
-            why="It must be positive and finite.",
-            fix=f"Pass a positive number in {unit}.",
-        )
 
 
 def require_triple(what: str, value: Any) -> tuple[float, float, float]:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from palpate.physics.arguments import require_positive
 from palpate.physics.geometry.block import name_upright_faces
-from palpate.physics.geometry.checks import require_positive, require_size
+from palpate.physics.geometry.checks import require_size
 from palpate.physics.geometry.shape import Solid
 
 __all__ = ["Cylinder"]
@@ -38,8 +39,8 @@ class Cylinder(Solid):
     element: float | None = None
 
     def __post_init__(self) -> None:
-        require_positive("The cylinder's radius", self.radius)
-        require_positive("The cylinder's height", self.height)
+        require_positive("The cylinder's radius", self.radius, "m")
+        require_positive("The cylinder's height", self.height, "m")
         require_size("The cylinder", max(self.size))
         self._check_element()
 

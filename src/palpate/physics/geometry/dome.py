@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from palpate.errors import UsageError
-from palpate.physics.geometry.checks import require_positive, require_size, require_triple
+from palpate.physics.arguments import require_positive
+from palpate.physics.geometry.checks import require_size, require_triple
 from palpate.physics.geometry.shape import Solid
 
 __all__ = ["Dome", "Inclusion"]
@@ -31,7 +32,7 @@ class Inclusion:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre", require_triple("The centre of an inclusion", self.centre))
-        require_positive("The radius of an inclusion", self.radius)
+        require_positive("The radius of an inclusion", self.radius, "m")
 
 
 @dataclass(frozen=True)
@@ -70,10 +71,10 @@ class Dome(Solid):
     element: float | None = None
 
     def __post_init__(self) -> None:
-        require_positive("The dome's radius", self.radius)
-        require_positive("The dome's height", self.rise)
+        require_positive("The dome's radius", self.radius, "m")
+        require_positive("The dome's height", self.rise, "m")
         if self.layer:
-            require_positive("The thickness of the dome's skin", self.layer)
+            require_positive("The thickness of the dome's skin", self.layer, "m")
         require_size("The dome", max(self.size))
         if self.layer >= min(self.radius, self.rise):
             raise UsageError(

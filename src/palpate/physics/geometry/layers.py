@@ -7,8 +7,9 @@ from itertools import pairwise
 from typing import Any
 
 from palpate.errors import UsageError
+from palpate.physics.arguments import require_positive
 from palpate.physics.geometry.block import name_upright_faces
-from palpate.physics.geometry.checks import require_name, require_positive, require_size
+from palpate.physics.geometry.checks import require_name, require_size
 from palpate.physics.geometry.shape import Solid
 
 __all__ = ["LayeredBlock"]
@@ -98,8 +99,8 @@ def _pair(value: Any) -> tuple[float, float]:
             why="It is the extent along x and y; the height is the sum of the layers.",
             fix="Pass (0.10, 0.10) for 100 mm by 100 mm.",
         ) from None
-    require_positive("The layered block's extent along x", x)
-    require_positive("The layered block's extent along y", y)
+    require_positive("The layered block's extent along x", x, "m")
+    require_positive("The layered block's extent along y", y, "m")
     return float(x), float(y)
 
 
@@ -116,7 +117,7 @@ def _layers(value: Any) -> tuple[tuple[str, float], ...]:
         )
     for name, thickness in layers:
         require_name("A layer's name", name)
-        require_positive(f"The thickness of the layer {name!r}", thickness)
+        require_positive(f"The thickness of the layer {name!r}", thickness, "m")
     names = [name for name, _ in layers]
     if len(set(names)) < len(names):
         raise UsageError(

@@ -8,7 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.physics.geometry.checks import require_positive, require_size
+from palpate.physics.arguments import require_positive
+from palpate.physics.geometry.checks import require_size
 from palpate.physics.geometry.shape import Solid
 
 __all__ = ["Organ"]
@@ -53,7 +54,7 @@ class Organ(Solid):
     element: float | None = None
 
     def __post_init__(self) -> None:
-        require_positive("The organ's length", self.length)
+        require_positive("The organ's length", self.length, "m")
         require_size("The organ", self.length)
         if not isinstance(self.seed, int) or self.seed < 0:
             raise UsageError(

@@ -6,7 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from palpate.errors import UsageError
-from palpate.physics.geometry.checks import require_positive, require_triple
+from palpate.physics.arguments import require_positive
+from palpate.physics.geometry.checks import require_triple
 
 __all__ = ["GRADING", "MOST_ELEMENTS", "FineMesh", "require_budget"]
 
@@ -40,7 +41,7 @@ class FineMesh:
     upper: Point | None = None
 
     def __post_init__(self) -> None:
-        require_positive("The element size of a refinement", self.element)
+        require_positive("The element size of a refinement", self.element, "m")
         if (self.lower is None) != (self.upper is None):
             raise UsageError(
                 f"The refinement of {self.surface!r} has one corner only.",

@@ -7,6 +7,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, cast, runtime_checkable
 
 from palpate.errors import UsageError
+from palpate.physics.arguments import require_positive
 from palpate.physics.geometry.checks import require_known
 from palpate.physics.geometry.mesh import BodyMesh, body_mesh
 from palpate.physics.geometry.refinement import FineMesh
@@ -148,11 +149,9 @@ class Solid(Shape):
 
     def _check_element(self) -> None:
         """Refuse an element size that the body has no room for."""
-        from palpate.physics.geometry.checks import require_positive
-
         if self.element is None:
             return
-        require_positive("The element size", self.element)
+        require_positive("The element size", self.element, "m")
         if self.element > max(self.size):
             raise UsageError(
                 f"The element size is {self.element:g} m, the body's longest side {max(self.size):g} m.",

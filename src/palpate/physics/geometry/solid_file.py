@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from palpate.errors import UsageError
-from palpate.physics.geometry.checks import require_positive
+from palpate.physics.arguments import require_positive
 from palpate.physics.geometry.files import digest_of, require_same, require_unit
 from palpate.physics.geometry.mesh import BodyMesh, to_ngsolve
 from palpate.physics.geometry.meshing import mesh_solid
@@ -67,7 +67,7 @@ class ImportedSolid(Shape):
         object.__setattr__(self, "path", fspath(self.path))
         object.__setattr__(self, "patches", tuple(self.patches))
         if self.element is not None:
-            require_positive("The element size", self.element)
+            require_positive("The element size", self.element, "m")
         require_positive("The feature angle", self.feature_angle, "degrees")
         self._check_kind()
         if not self.digest:

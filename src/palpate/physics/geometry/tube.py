@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from palpate.errors import UsageError
+from palpate.physics.arguments import require_positive
 from palpate.physics.geometry.block import name_upright_faces
-from palpate.physics.geometry.checks import require_positive, require_size
+from palpate.physics.geometry.checks import require_size
 from palpate.physics.geometry.shape import Solid
 
 __all__ = ["Tube"]
@@ -41,7 +42,7 @@ class Tube(Solid):
 
     def __post_init__(self) -> None:
         for name in ("inner_radius", "outer_radius", "height"):
-            require_positive(f"The tube's {name}", getattr(self, name))
+            require_positive(f"The tube's {name}", getattr(self, name), "m")
         if self.inner_radius >= self.outer_radius:
             raise UsageError(
                 f"The tube's inner radius is {self.inner_radius:g} m, its outer radius {self.outer_radius:g} m.",

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.physics.geometry.checks import require_known, require_positive, require_triple
+from palpate.physics.arguments import require_positive
+from palpate.physics.geometry.checks import require_known, require_triple
 from palpate.physics.interactions.arguments import AXES, Interval, interval, tag
 from palpate.physics.interactions.footprint import (
     MARGIN,

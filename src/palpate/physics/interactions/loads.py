@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.physics.geometry.checks import require_known, require_positive, require_triple
+from palpate.physics.arguments import require_positive
+from palpate.physics.geometry.checks import require_known, require_triple
 from palpate.physics.interactions.arguments import direction_of, interval
 from palpate.physics.interactions.footprint import (
     MARGIN,
@@ -93,9 +94,9 @@ class PointForce:
     name: str = "F"
 
     def __post_init__(self) -> None:
-        require_positive("The radius of a point force", self.radius)
+        require_positive("The radius of a point force", self.radius, "m")
         if self.element is not None:
-            require_positive("The element under a point force", self.element)
+            require_positive("The element under a point force", self.element, "m")
         object.__setattr__(self, "at", require_triple("The point of a force", self.at))
         object.__setattr__(self, "force", range_of("A point force", self.force, "N"))
         direction = direction_of("The direction of a point force", self.direction)

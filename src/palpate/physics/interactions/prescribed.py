@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.physics.geometry.checks import require_known, require_positive, require_triple
+from palpate.physics.arguments import require_positive
+from palpate.physics.geometry.checks import require_known, require_triple
 from palpate.physics.interactions.arguments import AXES, direction_of, interval, tag
 from palpate.physics.interactions.interaction import Attached
 from palpate.units import Range
@@ -82,7 +83,7 @@ class PrescribedDisplacement:
         if self.within is not None:
             object.__setattr__(self, "within", _box(self.within))
         if self.element is not None:
-            require_positive("The element on a moved surface", self.element)
+            require_positive("The element on a moved surface", self.element, "m")
 
     def ranges(self, geometry: Any) -> tuple[Range, ...]:
         """One input for each direction, in m.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_number
+from palpate.physics.arguments import require_positive
 from palpate.physics.geometry.refinement import FineMesh
 from palpate.physics.interactions import columns
 from palpate.physics.interactions.interaction import Attached, Energy, Field
@@ -70,9 +70,10 @@ class SphereProbe:
     over: tuple[Corner, Corner] | None = None
 
     def __post_init__(self) -> None:
-        for what, value in (("radius", self.radius), ("pad stiffness", self.pad), ("stop", self.stop)):
-            if value is not None:
-                _require_positive(f"The probe's {what}", value)
+        require_positive("The probe's radius", self.radius, "m")
+        require_positive("The probe's pad stiffness", self.pad, "N/m³")
+        if self.stop is not None:
+            require_positive("The probe's stop", self.stop, "m")
         object.__setattr__(self, "depth", _pair("depth", self.depth))
         if self.over is not None:
             object.__setattr__(self, "over", _corners(self.over))
@@ -240,15 +241,6 @@ def _within(patch: Patch, low: np.ndarray, high: np.ndarray) -> Patch:
     inside = ((middle >= low) & (middle <= high)).all(axis=1)
     return Patch(patch.points, patch.triangles[inside] if inside.any() else patch.triangles)
 
-
-def _require_positive(what: str, value: Any) -> None:
-    require_number(what, value)
-    if not (np.isfinite(value) and value > 0):
-        raise UsageError(
-            f"{what} is {value}.",
-            why="It must be positive and finite.",
-            fix="Check the number and its unit (m, N/m³).",
-        )
 
 
 def _pair(what: str, value: Any) -> tuple[float, float]:

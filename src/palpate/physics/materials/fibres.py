@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from palpate.errors import UsageError
+from palpate.physics.arguments import require_positive
 from palpate.physics.materials.isochoric import isochoric_first
 from palpate.physics.materials.material import NO_STATE, Elastic, Material, StateVariable, Volumetric
-from palpate.physics.materials.moduli import require_numbers, require_positive
+from palpate.physics.materials.moduli import require_numbers
 from palpate.physics.materials.tensors import (
     Scalar,
     Tensor,
@@ -66,7 +67,7 @@ class FibreFamily:
                 fix="Pass, for example, direction=(1.0, 0.0, 0.0).",
             )
         object.__setattr__(self, "direction", tuple(x / length for x in along))
-        require_positive("The fibre modulus k1", self.k1)
+        require_positive("The fibre modulus k1", self.k1, "Pa")
         require_positive("The fibre exponent k2", self.k2, "")
         (kappa,) = require_numbers("The fibre dispersion", self.dispersion)
         if not 0 <= kappa <= 1 / 3:

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_number
+from palpate.physics.arguments import require_number, require_positive
 from palpate.physics.materials.tensors import exp, positive_part, where
 
 __all__ = ["Hardening", "LinearHardening", "VoceHardening"]
@@ -67,7 +67,7 @@ class LinearHardening:
     modulus: float = 0.0
 
     def __post_init__(self) -> None:
-        _require_positive("The yield stress", self.yield_stress)
+        require_positive("The yield stress", self.yield_stress, "Pa")
         _require_not_negative("The plastic modulus", self.modulus)
 
     def flow_stress(self, accumulated: Any) -> Any:
@@ -118,9 +118,9 @@ class VoceHardening:
     modulus: float = 0.0
 
     def __post_init__(self) -> None:
-        _require_positive("The yield stress", self.yield_stress)
+        require_positive("The yield stress", self.yield_stress, "Pa")
         _require_not_negative("The saturation stress", self.saturation)
-        _require_positive("The saturation rate", self.rate)
+        require_positive("The saturation rate", self.rate, "")
         _require_not_negative("The plastic modulus", self.modulus)
 
     def flow_stress(self, accumulated: Any) -> Any:
@@ -169,11 +169,6 @@ def _steps(share: float) -> int:
     """Newton steps to double precision: 3 for metals; far below a large share's saturation each step gains about 1."""
     return 3 + int(math.log1p(10 * share))
 
-
-def _require_positive(what: str, value: float) -> None:
-    require_number(what, value, "SI units")
-    if not (math.isfinite(value) and value > 0):
-        raise _refusal(what, value, "positive and finite")
 
 
 def _require_not_negative(what: str, value: float) -> None:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 from typing import Any, Self
 
+from palpate.physics.arguments import require_positive
 from palpate.physics.materials.material import Elastic, Volumetric, volume_change
 from palpate.physics.materials.moduli import (
     bulk_from_poisson,
     poisson_ratio,
     require_density,
     require_poisson,
-    require_positive,
     young_modulus,
 )
 from palpate.physics.materials.tensors import Scalar, Tensor, cofactor, determinant, inner, power
@@ -77,6 +77,6 @@ class Isochoric(Elastic):
         return Volumetric(self.bulk, volume_change)
 
     def _check(self) -> None:
-        require_positive(f"The bulk modulus of {self.name}", self.bulk, infinite=True)
-        require_positive(f"The initial shear modulus of {self.name}", self.shear_modulus)
+        require_positive(f"The bulk modulus of {self.name}", self.bulk, "Pa", infinite=True)
+        require_positive(f"The initial shear modulus of {self.name}", self.shear_modulus, "Pa")
         require_density(self.density)

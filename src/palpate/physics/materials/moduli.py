@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_number
+from palpate.physics.arguments import require_number, require_positive
 
 __all__ = [
     "bulk_from_poisson",
@@ -17,7 +17,6 @@ __all__ = [
     "require_moduli",
     "require_numbers",
     "require_poisson",
-    "require_positive",
     "shear_from_young",
     "unphysical",
     "young_modulus",
@@ -62,7 +61,7 @@ def require_moduli(young: float, poisson: float, density: float) -> None:
     UsageError
         Unless E > 0, −1 < ν ≤ 0.5 and ρ ≥ 0, all finite.
     """
-    require_positive("Young's modulus", young)
+    require_positive("Young's modulus", young, "Pa")
     require_poisson(poisson)
     require_density(density)
 
@@ -92,19 +91,6 @@ def require_density(density: float) -> None:
     if not (math.isfinite(density) and density >= 0):
         raise unphysical("The density", density, "not negative, in kg/m³")
 
-
-def require_positive(what: str, value: float, unit: str = "Pa", *, infinite: bool = False) -> None:
-    """Refuse what is not a positive number.
-
-    Raises
-    ------
-    UsageError
-        Unless it is positive and, if not `infinite` is allowed, finite.
-    """
-    require_number(what, value, unit)
-    if not (value > 0 and (infinite or math.isfinite(value))):
-        in_unit = f", in {unit}" if unit else ""
-        raise unphysical(what, value, ("positive" if infinite else "positive and finite") + in_unit)
 
 
 def require_numbers(what: str, values: float | Sequence[float], unit: str = "") -> tuple[float, ...]:

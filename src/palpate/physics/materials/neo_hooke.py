@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, Self
 
 from palpate.errors import UsageError
+from palpate.physics.arguments import require_positive
 from palpate.physics.materials.isochoric import isochoric_first
 from palpate.physics.materials.material import NO_STATE, Elastic, Volumetric, log_volume, volume_change
 from palpate.physics.materials.moduli import (
@@ -14,7 +15,6 @@ from palpate.physics.materials.moduli import (
     lame_modulus,
     poisson_ratio,
     require_moduli,
-    require_positive,
     shear_from_young,
     young_modulus,
 )
@@ -78,7 +78,7 @@ class NeoHookean(Elastic):
         UsageError
             Unless exactly one of `bulk` and `poisson` is given, or for constants that no stable material has.
         """
-        require_positive("The shear modulus", shear)
+        require_positive("The shear modulus", shear, "Pa")
         if (bulk is None) == (poisson is None):
             raise UsageError(
                 "A neo-Hookean law needs a bulk modulus or a Poisson's ratio, and not both.",
@@ -86,7 +86,7 @@ class NeoHookean(Elastic):
                 fix="Pass poisson=0.49, or bulk=1e6 in Pa.",
             )
         if bulk is not None:
-            require_positive("The bulk modulus", bulk, infinite=True)
+            require_positive("The bulk modulus", bulk, "Pa", infinite=True)
             return cls(young_modulus(shear, bulk), poisson_ratio(shear, bulk), **rest)
         assert poisson is not None
         require_moduli(shear, poisson, 0.0)
@@ -103,7 +103,7 @@ class NeoHookean(Elastic):
         UsageError
             As in `from_shear`.
         """
-        require_positive("C10", c10)
+        require_positive("C10", c10, "Pa")
         return cls.from_shear(2 * c10, bulk=bulk, poisson=poisson, **rest)
 
     @property

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_number
+from palpate.physics.arguments import require_positive
 from palpate.physics.materials.tensors import exp, is_symbolic, where
 
 __all__ = ["PronySeries"]
@@ -43,8 +43,8 @@ class PronySeries:
     def __post_init__(self) -> None:
         object.__setattr__(self, "terms", tuple(_pair(term) for term in self.terms))
         for share, time in self.terms:
-            _require_positive("A Prony share", share, "a pure number")
-            _require_positive("A relaxation time", time, "s")
+            require_positive("A Prony share", share, "")
+            require_positive("A relaxation time", time, "s")
         if math.fsum(self.shares) > 1 + 1e-12:
             raise UsageError(
                 f"The Prony shares sum to {math.fsum(self.shares):g}.",
@@ -123,13 +123,3 @@ def _pair(term: Any) -> tuple[float, float]:
         why="It must be a pair: the share that relaxes and its relaxation time in s.",
         fix="Pass a tuple of pairs, for example terms=((0.39, 700.0),).",
     )
-
-
-def _require_positive(what: str, value: float, unit: str) -> None:
-    require_number(what, value, unit)
-    if not (math.isfinite(value) and value > 0):
-        raise UsageError(
-            f"{what} is {value}.",
-            why=f"It must be positive and finite, in {unit}.",
-            fix="Leave the term out, or check its unit.",
-        )

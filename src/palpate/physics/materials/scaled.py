@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, TypeAlias
 
+from palpate.physics.arguments import require_positive
 from palpate.physics.materials.material import NO_STATE, Elastic, Material, Volumetric
-from palpate.physics.materials.moduli import poisson_ratio, require_positive, young_modulus
+from palpate.physics.materials.moduli import poisson_ratio, young_modulus
 from palpate.physics.materials.tensors import Scalar, Tensor
 
 __all__ = ["Scaled"]

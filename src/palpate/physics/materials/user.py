@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Literal, overload
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.physics.arguments import require_positive
 from palpate.physics.materials.material import (
     NO_STATE,
     Elastic,
@@ -21,7 +22,7 @@ from palpate.physics.materials.material import (
     initial_state,
     volume_change,
 )
-from palpate.physics.materials.moduli import poisson_ratio, require_density, require_positive, young_modulus
+from palpate.physics.materials.moduli import poisson_ratio, require_density, young_modulus
 from palpate.physics.materials.tensors import Scalar, Tensor, gradient, second_gradient
 
 __all__ = ["UserMaterial", "material"]
@@ -90,7 +91,7 @@ class UserMaterial(Elastic):
         if not self.name:
             object.__setattr__(self, "name", getattr(self.function, "__name__", "user").replace("_", " "))
         if self.bulk is not None:
-            require_positive(f"The bulk modulus of {self.name}", self.bulk, infinite=True)
+            require_positive(f"The bulk modulus of {self.name}", self.bulk, "Pa", infinite=True)
         require_density(self.density)
         if self.states and self.evolution is None:
             raise UsageError(

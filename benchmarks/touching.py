@@ -25,7 +25,7 @@ from palpate.physics.interactions import SphereProbe
 from palpate.physics.materials import NeoHookean
 from palpate.physics.solid import Body
 
-__all__ = ["HEIGHT", "RADIUS", "STEP", "STOP", "block", "probe", "tables"]
+__all__ = ["HEIGHT", "RADIUS", "STEP", "STOP", "block", "probe", "stratified", "tables"]
 
 SAMPLES, STRATA, TIGHT = (
     256,
@@ -90,7 +90,7 @@ def tables(*, quick: bool = False) -> list[Table]:
     problem = block().problem(sphere, element=0.02 if quick else None)
     points = problem.design(3 if quick else SAMPLES, 0)
     ours = _swept(problem, points)
-    chosen = _stratified(points[:, 2], 2 if quick else STRATA)
+    chosen = stratified(points[:, 2], 2 if quick else STRATA)
     some = chosen[:: 2 if quick else TIGHT]
     rivals = {
         "loose before the last step": (chosen, _pressed(problem, points[chosen], Setting(between=1e-3))),
@@ -167,7 +167,7 @@ def _notes(ours: Swept, rivals: dict[str, Any], points: np.ndarray) -> tuple[str
     )
 
 
-def _stratified(heights: np.ndarray, strata: int) -> np.ndarray:
+def stratified(heights: np.ndarray, strata: int = STRATA) -> np.ndarray:
     """One row of each of so many groups of equal size in depth, drawn at random, shape (strata,)."""
     random = np.random.default_rng(0)
     return np.array([random.choice(rows) for rows in np.array_split(np.argsort(-heights), strata)])

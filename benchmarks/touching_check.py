@@ -2,7 +2,8 @@
 
 Displacements are read at the ten nodes of each quadratic tetrahedron. Everything else is NumPy: det F on a lattice
 of 35 points in each element, its corners among them, and the gap to the sphere on 45 points of each quadratic
-triangle of the touched surface. The solver looks at four points of an element and at its own quadrature points of the surface.
+triangle of the touched surface. The solver looks at four points of an element and at its own quadrature points of
+the surface.
 """
 
 from __future__ import annotations

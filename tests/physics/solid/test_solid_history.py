@@ -37,6 +37,8 @@ def test_an_instant_is_elastic(solver, elastic):
     np.testing.assert_allclose(found.von_mises, elastic.von_mises, rtol=1e-6, atol=1e-3)
     np.testing.assert_allclose(found.response, elastic.response, rtol=1e-7, atol=1e-9)
     np.testing.assert_allclose(found.response_gradient, elastic.response_gradient, rtol=1e-5, atol=1e-4)
+    assert found.potential_energy == pytest.approx(elastic.potential_energy, rel=1e-7)
+    assert found.strain_energy == pytest.approx(elastic.strain_energy, rel=1e-7)
 
 
 def test_a_held_probe_feels_the_force_relax_to_the_slow_limit(solver, elastic):

@@ -12,6 +12,7 @@ are rejected, and `inspect` looks at each accepted state anew, in ways that do n
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -105,6 +106,17 @@ class Contact:
         if self._inside(centre):
             return Verdict(Stop.THROUGH_SURFACE, "the deformed body encloses it", figures)
         return Verdict(figures=figures)
+
+    def overlap(self, centre: np.ndarray) -> float:
+        """How far in m a sphere at (3,) m is in the surface under the constant loads alone; negative outside."""
+        return float(self.radius - np.linalg.norm(self._places - centre, axis=1).min())
+
+    @cached_property
+    def _places(self) -> np.ndarray:
+        """Positions (N, 3) in m of the quadrature points under the constant loads alone."""
+        import ngsolve as ngs
+
+        return np.asarray((ngs.CF((ngs.x, ngs.y, ngs.z)) + self.field.base)(self._points()))
 
     def _deformed(self) -> tuple[np.ndarray, np.ndarray]:
         """Positions (N, 3) in m and outward unit normals (N, 3) of the deformed surface."""

@@ -11,6 +11,8 @@ from palpate.physics.geometry.mesh import BodyMesh
 
 __all__ = ["Patch", "winding_number"]
 
+PLANE = 1e-9  # by how much the mean normal of a plane surface may fall short of one
+
 
 @dataclass(frozen=True, eq=False)
 class Patch:
@@ -49,6 +51,11 @@ class Patch:
         """Mean outward normal (3,): of length one where the surface is plane, zero where it is closed."""
         area = np.linalg.norm(self.area_vectors, axis=1).sum()
         return np.asarray(self.area_vectors.sum(axis=0) / area)
+
+    @property
+    def is_plane(self) -> bool:
+        """Whether all triangles face one way."""
+        return bool(np.linalg.norm(self.facing) > 1 - PLANE)
 
     @cached_property
     def box(self) -> tuple[np.ndarray, np.ndarray]:

@@ -9,24 +9,35 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_positive
+from palpate.physics.geometry.checks import require_known
 from palpate.physics.geometry.refinement import FineMesh
 from palpate.physics.interactions import columns
+from palpate.physics.interactions.arguments import range_of
+from palpate.physics.interactions.curved import surface_of
 from palpate.physics.interactions.interaction import Attached, Energy, Field
 from palpate.physics.interactions.patch import Patch
+from palpate.physics.words import millimetres, number
 from palpate.units import Range
 
 if TYPE_CHECKING:
     from palpate.physics.geometry.shape import Geometry
+    from palpate.physics.interactions.contact import Contact
 
 __all__ = ["SphereProbe"]
 
 ELEMENT = 0.6  # element size under the probe over its radius: the force then ripples by less than 0.1 %
+ROUND_ELEMENT = 0.4  # the same on curved surfaces, where the elements' shape adds to the error
 MARGIN = 1.3  # how far beyond the footprint of its centres the probe may touch, over its radius
 INSET = 3.0  # distance of the footprint from the surface's rim over the radius, unless it is given
 MOST_INSET = 0.4  # the same, at most, over the surface's width
 SIDEWAYS = 3.0  # how much dearer a move across is than one along the normal
 FIRST = 0.25  # first step along the approach over the radius
+FIRST_PRESSED = 0.5  # the same, at most, over the pad's stop: staying is then an admissible guess
+FIRST_DEPTH = (
+    0.25  # the same, at most, over the largest depth: a large sphere's radius says nothing of the way
+)
 OPEN = 0.3  # length of a surface's mean normal from which on it is looked at along one axis
+CLEAR = 1e-9  # of the radius: roundings
 MOST_STEPS = 50  # of the search for a place outside
 
 Corner = tuple[float, ...]
@@ -74,9 +85,13 @@ class SphereProbe:
         require_positive("The probe's pad stiffness", self.pad, "N/m³")
         if self.stop is not None:
             require_positive("The probe's stop", self.stop, "m")
-        object.__setattr__(self, "depth", _pair("depth", self.depth))
+        object.__setattr__(self, "depth", range_of("The depth of a probe", self.depth, "m"))
         if self.over is not None:
             object.__setattr__(self, "over", _corners(self.over))
+
+    def __str__(self) -> str:
+        stop = f" with a stop at {millimetres(self.stop)}" if self.stop is not None else " without a stop"
+        return f"sphere of radius {millimetres(self.radius)} on {self.touches!r}, pad {number(self.pad)} N/m³{stop}"
 
     def describe(self) -> dict[str, Any]:
         """Everything that decides what it does, as plain data for a JSON file."""
@@ -93,9 +108,11 @@ class SphereProbe:
 
     def refinements(self, geometry: Geometry) -> tuple[FineMesh, ...]:
         """Small elements wherever it may touch."""
-        low, high = self._footprint(Patch.of(geometry.rest(), self._surface(geometry)))
+        patch = Patch.of(geometry.rest(), self._surface(geometry))
+        low, high = self._footprint(patch)
         low, high = low - MARGIN * self.radius, high + MARGIN * self.radius
-        return (FineMesh(self.touches, ELEMENT * self.radius, tuple(low.tolist()), tuple(high.tolist())),)
+        element = ELEMENT if patch.is_plane else ROUND_ELEMENT
+        return (FineMesh(self.touches, element * self.radius, tuple(low.tolist()), tuple(high.tolist())),)
 
     def design(self, geometry: Geometry, samples: int, seed: int) -> np.ndarray:
         """Positions (samples, 3) in m in columns, each from shallow to deep.
@@ -132,27 +149,27 @@ class SphereProbe:
         centre = tuple(ngsolve.Parameter(0.0) for _ in range(3))
         penetration = contact.penetration(field.trial, ngsolve.CF(centre))
         energy = Energy(pad_energy(penetration, self.pad, self.stop), contact.measure())
-        approach = _Approach(self, field)
+        approach = _Approach(self, field, contact)
         return Attached(
             centre,
             (energy,),
             inspect=contact.inspect,
             approach=approach,
             distance=approach.distance,
-            first_step=FIRST * self.radius,
+            first_step=self._first_step(),
         )
+
+    def _first_step(self) -> float:
+        """Longest first step along the approach in m."""
+        pressed = np.inf if self.stop is None else FIRST_PRESSED * self.stop
+        return float(min(FIRST * self.radius, pressed, FIRST_DEPTH * max(map(abs, self.depth))))
 
     def _surface(self, geometry: Geometry) -> str:
-        if self.touches in geometry.surfaces:
-            return self.touches
-        raise UsageError(
-            f"The probe touches {self.touches!r}, which the body does not have.",
-            why=f"Its surfaces are {', '.join(geometry.surfaces)}.",
-            fix='Name one of them, for example touches="top".',
-        )
+        require_known("surface", self.touches, geometry.surfaces)
+        return self.touches
 
     def _patch(self, geometry: Geometry) -> Patch:
-        return Patch.of(geometry.rest(self.refinements(geometry)), self.touches)
+        return surface_of(geometry, self.touches, self.refinements(geometry))
 
     def _footprint(self, patch: Patch) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper corner (3,) of the box of footprints in m."""
@@ -195,8 +212,8 @@ class SphereProbe:
 class _Approach:
     """The straight line along which a sphere comes to a position from outside."""
 
-    def __init__(self, probe: SphereProbe, field: Field) -> None:
-        self._probe, self._field = probe, field
+    def __init__(self, probe: SphereProbe, field: Field, contact: Contact) -> None:
+        self._probe, self._field, self._contact = probe, field, contact
         self._known: Patch | None = None
 
     @property
@@ -213,9 +230,11 @@ class _Approach:
         _, normal, distance = patch.nearest(centre)
         place = np.array(centre, dtype=float)
         for _ in range(MOST_STEPS):
-            if distance >= radius * (1 - 1e-9):
+            # the triangles are straight, the surface that the contact's energy sees may bulge out of them
+            overlap = max(radius * (1 - CLEAR) - distance, self._contact.overlap(place))
+            if overlap <= 0:
                 return place
-            place = place + (radius - distance) * normal
+            place = place + (overlap + CLEAR * radius) * normal
             distance = patch.nearest(place)[2]
         return None
 
@@ -242,20 +261,11 @@ def _within(patch: Patch, low: np.ndarray, high: np.ndarray) -> Patch:
     return Patch(patch.points, patch.triangles[inside] if inside.any() else patch.triangles)
 
 
-
-def _pair(what: str, value: Any) -> tuple[float, float]:
-    low, high = (float(end) for end in value)
-    if not (np.isfinite([low, high]).all() and low < high):
-        raise UsageError(
-            f"The probe's {what} is {value}.",
-            why="It needs two finite ends, the lower one first.",
-            fix="For example depth=(0, 0.015) for 0 to 15 mm.",
-        )
-    return low, high
-
-
 def _corners(value: Any) -> tuple[Corner, Corner]:
-    corners = np.asarray(value, dtype=float)
+    try:
+        corners = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        corners = np.empty(0)
     if (
         corners.ndim != 2
         or corners.shape[0] != 2

@@ -19,9 +19,16 @@ from typing import Any, ClassVar, Literal
 
 from palpate.errors import UsageError
 from palpate.physics.materials.compiling import compiled
-from palpate.physics.materials.hardening import Hardening
+from palpate.physics.materials.hardening import Hardening, require_hardening
 from palpate.physics.materials.linear import LinearElastic
-from palpate.physics.materials.material import NO_STATE, Elastic, StateVariable, Volumetric, initial_state
+from palpate.physics.materials.material import (
+    NO_STATE,
+    Elastic,
+    StateVariable,
+    Volumetric,
+    in_words,
+    initial_state,
+)
 from palpate.physics.materials.tensors import (
     Scalar,
     Tensor,
@@ -58,7 +65,7 @@ class Plastic(Elastic):
     Raises
     ------
     UsageError
-        If the elastic part is no LinearElastic.
+        If the elastic part is no LinearElastic, or the hardening no law of hardening.
     """
 
     elastic: LinearElastic
@@ -80,6 +87,7 @@ class Plastic(Elastic):
                 why="Plastic flow is a small-strain law here and its elastic part a LinearElastic.",
                 fix="Pass LinearElastic(young=110e9, poisson=0.35).",
             )
+        require_hardening(self.hardening)
         for key in ("name", "source"):
             object.__setattr__(self, key, getattr(self, key) or getattr(self.elastic, key))
 
@@ -148,6 +156,10 @@ class Plastic(Elastic):
         """Plain data for JSON: the law, its parts and their constants."""
         parts = {"elastic": self.elastic.describe(), "hardening": self.hardening.describe()}
         return {"law": type(self).__name__, **parts, "name": self.name, "source": self.source}
+
+    def __str__(self) -> str:
+        """The elastic law, yield stress, hardening and source, in words."""
+        return in_words(self, f"{self.hardening}")
 
     def _return(self, F: Tensor, state: Mapping[str, Any]) -> tuple[Tensor, Scalar, Scalar, Scalar]:
         """Elastic trial deviator, q² in Pa², the larger of q and the flow stress, and the plastic increment Δ."""

@@ -26,7 +26,14 @@ from typing import Any, ClassVar, Literal
 from palpate.errors import UsageError
 from palpate.physics.materials.compiling import compiled
 from palpate.physics.materials.dashpots import dashpot_loss, spring_energy
-from palpate.physics.materials.material import NO_STATE, Elastic, Material, StateVariable, Volumetric
+from palpate.physics.materials.material import (
+    NO_STATE,
+    Elastic,
+    Material,
+    StateVariable,
+    Volumetric,
+    in_words,
+)
 from palpate.physics.materials.prony import PronySeries
 from palpate.physics.materials.scaled import Part, Scaled, kept_bulk, part_of
 from palpate.physics.materials.tensors import (
@@ -236,6 +243,10 @@ class Viscoelastic(Elastic):
             )
             for name, (share, time) in zip(self._overstresses, self.terms, strict=True)
         )
+
+    def __str__(self) -> str:
+        """The law, the instantaneous moduli, the Prony terms and the source, in words."""
+        return in_words(self, str(self.prony))
 
     @property
     def _overstresses(self) -> tuple[str, ...]:

@@ -40,7 +40,8 @@ class History:
         import ngsolve
         from ngsolve.comp import IntegrationRuleSpace
 
-        # its rule is exact to twice this order, as is that of a body without a history
+        # its rule is exact to twice this order, as is that of a body without a history in displacement form;
+        # NGSolve takes a finer one for a mixed form, which for a pressure of first order there is no need of
         points = IntegrationRuleSpace(field.mesh, order=field.order - 1)
         self._region = field.region(region)
         self._variables = material.states

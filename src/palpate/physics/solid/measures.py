@@ -39,36 +39,42 @@ class Measures:
         self._gradient = deformation_gradient(field.displacement)
 
     def least_volume_ratio(self) -> float:
-        """Least det F at the quadrature points of regions of large strain, 1 if there are none."""
-        gradients = self._gradients(large=True)
-        return float(np.linalg.det(gradients).min()) if len(gradients) else 1.0
+        """Least det F at the quadrature points of all regions."""
+        gradients = np.concatenate([self._gradients(large=True), self._gradients(large=False)])
+        return float(np.linalg.det(gradients).min())
+
+    def largest_small_strain(self) -> float:
+        """Largest |ε| of a principal strain at the quadrature points of regions of small strain, 0 if there are none."""
+        strains = _principal_strains(self._gradients(large=False))
+        return float(np.abs(strains).max(initial=0.0))
 
     def largest_strain(self) -> float:
         """Largest |λ - 1| of a principal stretch λ at the quadrature points; at small strain, of a principal strain."""
         large, small = self._gradients(large=True), self._gradients(large=False)
         squares = np.linalg.eigvalsh(np.swapaxes(large, 1, 2) @ large)
-        strains = np.linalg.eigvalsh((small + np.swapaxes(small, 1, 2)) / 2) - 1
-        both = np.concatenate([np.sqrt(np.maximum(squares, 0)) - 1, strains])
+        both = np.concatenate([np.sqrt(np.maximum(squares, 0)) - 1, _principal_strains(small)])
         return float(np.abs(both).max())
 
     def stored_energy(self) -> float:
-        """Free energy in J, with the internal variables as they are."""
+        """Free energy in J, with the internal variables as they are; every history must tell its density."""
         import ngsolve
 
         total = 0.0
         for region, material in self._materials.items():
             history = self._histories.get(region)
-            if history is not None and history.stored is not None:
-                symbol = ngsolve.dx(definedon=self._field.region(region), intrules=history.rules)
-                total += ngsolve.Integrate(history.stored * symbol, self._field.mesh)
-            else:
+            # NGSolve's rules for the energy itself: exact to a higher order where a pressure stands in it
+            order = self._field.order if region in self._field.pressure else self._field.order - 1
+            rules = {ngsolve.ET.TET: ngsolve.IntegrationRule(ngsolve.ET.TET, 2 * order)}
+            if history is None:
                 density = self._density(region, material)
-                symbol = ngsolve.dx(definedon=self._field.region(region))
-                total += ngsolve.Integrate(density * symbol, self._field.mesh)
+            else:
+                density, rules = history.stored, history.rules
+            symbol = ngsolve.dx(definedon=self._field.region(region), intrules=rules)
+            total += ngsolve.Integrate(density * symbol, self._field.mesh)
         return float(total)
 
     def _density(self, region: str, material: Material) -> Any:
-        """Energy density in J/m³ of the state under inspection."""
+        """Energy density in J/m³ of the state under inspection, of a material without a history."""
         pressure = self._field.pressure.get(region)
         if pressure is None:
             return material.energy(self._gradient)
@@ -142,3 +148,8 @@ class Measures:
         image = ngsolve.GridFunction(ngsolve.H1(self._field.mesh, order=1))
         image.Set(self._field.mesh.MaterialCF(dict(values)))
         return np.array(image.vec.FV().NumPy())
+
+
+def _principal_strains(gradients: np.ndarray) -> np.ndarray:
+    """Eigenvalues (N, 3) of ε = sym(F - I) for F (N, 3, 3)."""
+    return np.linalg.eigvalsh((gradients + np.swapaxes(gradients, 1, 2)) / 2) - 1

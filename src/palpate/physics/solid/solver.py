@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.errors import SolverError, UsageError
+from palpate.physics.arguments import require_positive
 from palpate.physics.equilibrium.stop import Stop, Verdict
-from palpate.physics.geometry.checks import require_positive
+from palpate.physics.solid.newton import ROUND_OFF
 from palpate.physics.solid.opening import open_problem
 from palpate.physics.solid.path import Followed, Known, follow
 from palpate.physics.solid.solution import SolidSolution
@@ -55,14 +56,15 @@ class SolidSolver:
                 why=f"{settled.verdict.stop}. {settled.verdict.detail}".strip(),
                 fix="Check gravity, density and pre-stress against the material's stiffness.",
             )
-        self._settled = self._remembered()
+        self._settled = self._model.remembered()
         self.reset()
 
     def reset(self) -> None:
         """Forget former answers and history: the next solve starts from the body without interaction."""
         self._known: list[Known] = []
         self._measured = False
-        self._recall(self._settled)
+        self._model.forget()
+        self._model.recall(self._settled)
 
     def solve(self, x: Any, *, dt: float | None = None, fields: bool = False) -> SolidSolution:
         """Find the equilibrium under inputs x (n,).
@@ -86,7 +88,7 @@ class SolidSolver:
         Raises
         ------
         UsageError
-            If `x` has not one number per input, or `dt` is not positive.
+            If `x` has not one number per input, `dt` is not positive or the body has no history.
         """
         q = self._problem.inputs(x)
         if not np.isfinite(q).all():
@@ -94,12 +96,27 @@ class SolidSolver:
         outside = self._model.approach(q)
         if outside is None:
             return self._failure(q, Followed(self._rest(q), Verdict(Stop.NO_APPROACH), ()))
-        self._measure_energies(outside)
+        self._measure_energies()
         if dt is not None:
             require_positive("The time step", dt, "s")
+            self._require_history()
         if not self._model.histories:
             return self._concluded(q, self._search(q, outside), fields=fields)
         return self._instant(q, outside, fields) if dt is None else self._march(q, outside, dt, fields)
+
+    def __str__(self) -> str:
+        kept = f"{len(self._known)} equilibria kept to start from"
+        return f"Solver of {self._problem.words}: {self._model.field.size} unknowns, {kept}"
+
+    __repr__ = __str__
+
+    def _require_history(self) -> None:
+        if not self._model.histories:
+            raise UsageError(
+                "A time step was given for a body without a history.",
+                why="Its materials are elastic: the answer does not depend on time.",
+                fix="Leave dt out, or give it a Viscoelastic or Plastic material.",
+            )
 
     def march(self, times: Any, inputs: Any, *, fields: bool = False) -> list[SolidSolution]:
         """Solve for inputs that follow each other in time, from where the body is.
@@ -121,7 +138,7 @@ class SolidSolver:
         Raises
         ------
         UsageError
-            If the times don't ascend, or there is not one row of inputs for each.
+            If the times don't ascend, there is not one row of inputs for each, or the body has no history.
         """
         times, inputs = np.atleast_1d(np.asarray(times, dtype=float)), np.atleast_2d(inputs)
         steps = np.diff(times, prepend=0.0)
@@ -140,30 +157,26 @@ class SolidSolver:
 
     def _instant(self, q: np.ndarray, outside: np.ndarray, fields: bool) -> SolidSolution:
         """Load a body with a history from rest, and forget it again."""
-        remembered, known = self._remembered(), self._known
-        self._recall(self._settled)
-        self._model.duration = 0.0
-        solution = self._concluded(q, follow(self._model, self._rest(outside), q), fields=fields)
-        self._recall(remembered)
+        model, known = self._model, self._known
+        remembered, standing = model.remembered(), model.standing()
+        self.reset()
+        self._measure_energies()
+        model.duration = 0.0
+        solution = self._concluded(q, follow(model, self._rest(outside), q), fields=fields)
+        model.recall(remembered)
+        model.stand(standing)
         self._known = known
         return solution
 
     def _march(self, q: np.ndarray, outside: np.ndarray, dt: float, fields: bool) -> SolidSolution:
         """Go on from the last equilibrium in time."""
-        remembered = self._remembered()
+        remembered = self._model.remembered()
         self._model.duration = dt
         start = self._known[-1] if self._known else self._rest(outside)
         solution = self._concluded(q, follow(self._model, start, q), fields=fields)
         if not solution.converged:
-            self._recall(remembered)
+            self._model.recall(remembered)
         return solution
-
-    def _remembered(self) -> dict[str, dict[str, np.ndarray]]:
-        return {region: history.snapshot() for region, history in self._model.histories.items()}
-
-    def _recall(self, remembered: dict[str, dict[str, np.ndarray]]) -> None:
-        for region, snapshot in remembered.items():
-            self._model.histories[region].restore(snapshot)
 
     def _search(self, q: np.ndarray, outside: np.ndarray) -> Followed:
         """From the nearest known equilibrium; where that fails, once more from outside."""
@@ -179,10 +192,9 @@ class SolidSolver:
             return Followed(again.last, again.verdict, first.log + again.log)
         return follow(model, start, q)
 
-    def _measure_energies(self, outside: np.ndarray) -> None:
+    def _measure_energies(self) -> None:
         """Take the potential without interaction as the zero of U."""
         if not self._measured:
-            self._model.set(outside)
             self._model.measure_from_base()
             self._measured = True
 
@@ -197,30 +209,39 @@ class SolidSolver:
         system = self._model.system
         self._model.set(q)
         system.factorise(followed.last.z)
-        doubt = Stop.CONVERGED if is_accurate(system) else Stop.SINGULAR
-        if doubt is Stop.CONVERGED and not is_stable(system):
-            doubt = Stop.UNSTABLE
-        if doubt is not Stop.CONVERGED:
-            return self._failure(q, Followed(followed.last, Verdict(doubt), followed.log))
-        return self._answer(q, followed, fields=fields)
+        residual = self._model.error(followed.last.z)
+        doubt = self._doubt(q, followed.last, residual)
+        if doubt.stop is not Stop.CONVERGED:
+            last = followed.last.before or followed.last
+            return self._failure(q, Followed(last, doubt, followed.log))
+        return self._answer(q, followed, residual, fields=fields)
 
-    def _answer(self, q: np.ndarray, followed: Followed, *, fields: bool) -> SolidSolution:
+    def _doubt(self, q: np.ndarray, last: Known, residual: float) -> Verdict:
+        """What speaks against the state that a path ended in, with the tangent just factorised there."""
+        system = self._model.system
+        if not is_accurate(system):
+            return Verdict(Stop.SINGULAR)
+        if not np.array_equal(last.q, q) or not residual < ROUND_OFF:
+            return Verdict(Stop.ITERATION_LIMIT, f"the relative error is {residual:.2g}")
+        return Verdict() if is_stable(system) else Verdict(Stop.UNSTABLE)
+
+    def _answer(self, q: np.ndarray, followed: Followed, residual: float, *, fields: bool) -> SolidSolution:
         """Response and stiffness from the tangent at the equilibrium, and what is measured there."""
         model, z = self._model, followed.last.z
-        response = -model.inputs.gradient(z, model.system.gradient(z))
+        response = model.response(z)
         hessian, slope = model.inputs.hessian(model.system, z)
         known = Known(q, z, slope, followed.last.before)
         self._known = [*(k.alone() for k in self._known[-KEPT + 1 :]), known]
         model.field.show(z)
         measured: dict[str, Any] = model.measures.at_nodes() if fields else {}
-        # only now: the step's own potential, tangent and stress are those with the internal variables before it
-        model.commit(z)
-        strain_energy, energy = model.energies(z)
+        # only now: the step's own tangent and stress are those with the internal variables before it
+        strain_energy, energy = model.conclude(z)
         figures = followed.verdict.figures
         return SolidSolution(
             stop=Stop.CONVERGED,
             iterations=followed.iterations,
-            residual=followed.log[-1].residual,
+            chords=followed.chords,
+            residual=residual,
             log=followed.log,
             mesh=self._mesh,
             ranges=self._problem.ranges,
@@ -228,7 +249,7 @@ class SolidSolver:
             displacement=model.field.at_nodes(),
             response=response,
             response_gradient=-hessian,
-            potential_energy=energy - model.base_energy,
+            potential_energy=energy,
             strain_energy=strain_energy,
             penetration=figures.get("penetration", 0.0),
             least_volume_ratio=figures["least_volume_ratio"],
@@ -244,6 +265,7 @@ class SolidSolver:
         return SolidSolution(
             stop=followed.verdict.stop,
             iterations=followed.iterations,
+            chords=followed.chords,
             residual=followed.log[-1].residual if followed.log else np.inf,
             log=followed.log,
             mesh=self._mesh,
@@ -255,7 +277,33 @@ class SolidSolver:
             detail=followed.verdict.detail,
             reached=last.q,
             state=last.z,
+            last_good=self._last_good(last),
             **self._surroundings(q),
+        )
+
+    def _last_good(self, last: Known) -> SolidSolution:
+        """The last equilibrium before a failure, to be looked at."""
+        model, n = self._model, last.q.size
+        model.set(last.q)
+        figures = model.judge(last.z, last.q).figures
+        return SolidSolution(
+            stop=Stop.CONVERGED,
+            iterations=0,
+            residual=np.nan,
+            log=(),
+            mesh=self._mesh,
+            ranges=self._problem.ranges,
+            inputs=last.q,
+            displacement=model.field.at_nodes(),
+            # with a history it depends on internal variables that have been put back
+            response=np.full(n, np.nan) if model.histories else model.response(last.z),
+            response_gradient=np.full((n, n), np.nan),
+            penetration=figures.get("penetration", 0.0),
+            least_volume_ratio=figures["least_volume_ratio"],
+            largest_strain=model.measures.largest_strain(),
+            reached=last.q,
+            state=last.z,
+            **self._surroundings(last.q),
         )
 
     def _surroundings(self, q: np.ndarray) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from solids import SIZE, Stretched, gel
 from palpate.physics.geometry import Block
 from palpate.physics.materials import LinearElastic
 from palpate.physics.materials.tensors import gradient
-from palpate.physics.solid import Body
+from palpate.physics.solid import Body, path
 
 MATRIX = ((-0.1, 0.2, 0.05), (0.0, 0.15, -0.1), (0.1, 0.0, -0.2))
 VOLUME = float(np.prod(SIZE))
@@ -63,10 +63,13 @@ def test_an_inverted_body_is_called_so():
     assert solver.solve(0.5).converged
 
 
-def test_a_long_step_is_cut_back():
-    """Half the height is lost in one step that must be parted, as the log tells."""
+def test_a_long_step_is_cut_back(monkeypatch):
+    """Nine tenths of the height are lost in one step that must be parted, as the log tells."""
     squeezed = Stretched(((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, -1.0)))
-    found = Body(Block(SIZE, element=0.02), gel(0.4), fixed=()).problem(squeezed).open().solve(0.9)
+    solver = Body(Block(SIZE, element=0.02), gel(0.4), fixed=()).problem(squeezed).open()
+    # without the slope at the start the inside stays behind at first
+    monkeypatch.setattr(path, "_sloped", lambda model, start: start)
+    found = solver.solve(0.9)
     assert found.converged
     assert next(step.stop.name for step in found.log) != "CONVERGED"
     assert found.log[-1].position == 1.0

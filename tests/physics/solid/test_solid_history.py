@@ -60,7 +60,8 @@ def test_an_instant_leaves_the_history_alone(solver):
             solver.solve(above(0.001))
         return solver.solve(PLACE, dt=1.0).response
 
-    np.testing.assert_allclose(last(True), last(False), rtol=1e-9)
+    after, alone = last(True), last(False)
+    assert np.linalg.norm(after - alone) <= 1e-9 * np.linalg.norm(alone)
 
 
 def test_a_failed_step_leaves_the_history_as_it_was(solver):
@@ -71,7 +72,8 @@ def test_a_failed_step_leaves_the_history_as_it_was(solver):
             assert not solver.solve((0.03, 0.03, -0.02), dt=1.0).converged
         return solver.solve(PLACE, dt=1.0).response
 
-    np.testing.assert_allclose(last(True), last(False), rtol=1e-9)
+    after, alone = last(True), last(False)
+    assert np.linalg.norm(after - alone) <= 1e-9 * np.linalg.norm(alone)
 
 
 def test_time_goes_forward(solver):

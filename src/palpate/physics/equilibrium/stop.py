@@ -16,7 +16,7 @@ class Stop(StrEnum):
     ITERATION_LIMIT = "the iteration limit was reached before equilibrium"
     STEP_TOO_SMALL = "no step along the load path, however small, led to an equilibrium"
     NOT_FINITE = "the energy or its derivatives are not finite"
-    UNSTABLE = "the equilibrium is unstable (the body buckles): the tangent has a negative direction"
+    UNSTABLE = "the equilibrium is unstable: the tangent has a negative direction, the body would snap away"
     STRAIN_LIMIT = "the strain is beyond the reach of the material law"
     COARSE_MESH = "one element bends by more than a radian: the load is beyond the reach of this mesh"
     ELEMENT_INVERTED = "an element is turned inside out: det F is not positive at a quadrature point"

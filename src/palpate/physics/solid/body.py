@@ -46,6 +46,12 @@ class Body:
         material has a separate volumetric energy; `describe` and `formulation_of` tell which.
     order : int
         Polynomial order of the displacement, at least 2.
+    strain_limit : float
+        Largest principal strain up to which laws of small strain (linear elastic, plastic) are asked; states beyond
+        it are refused. Their own error is of the order of the strain.
+    step_error : float
+        For materials with a history: error in time of the response that a load step may make, over the largest
+        response. Steps adapt to it; with ``math.inf`` each is taken as given.
 
     Raises
     ------
@@ -61,6 +67,8 @@ class Body:
     held: tuple[Held, ...] = ()
     formulation: Formulation = "auto"
     order: int = 2
+    strain_limit: float = 0.5
+    step_error: float = 1e-3
 
     def __post_init__(self) -> None:
         fixed = (self.fixed,) if isinstance(self.fixed, str) else tuple(self.fixed)
@@ -130,6 +138,8 @@ class Body:
             "held": [{**held.interaction.describe(), "values": list(held.values)} for held in self.held],
             "formulation": {region: list(self.formulation_of(region)) for region in self.materials},
             "order": self.order,
+            "strain_limit": self.strain_limit,
+            "step_error": self.step_error if math.isfinite(self.step_error) else None,
         }
 
     def __str__(self) -> str:

@@ -44,7 +44,7 @@ class Measures:
         return float(np.linalg.det(gradients).min())
 
     def largest_small_strain(self) -> float:
-        """Largest |ε| of a principal strain at the quadrature points of regions of small strain, 0 if there are none."""
+        """Largest |ε| of a principal strain at the quadrature points of regions of small strain; 0 without any."""
         strains = _principal_strains(self._gradients(large=False))
         return float(np.abs(strains).max(initial=0.0))
 

@@ -21,7 +21,7 @@ import numpy as np
 from palpate.physics.equilibrium.stop import Stop
 from palpate.physics.solid.system import System
 
-__all__ = ["Found", "Scale", "equilibrate"]
+__all__ = ["Found", "Scale", "equilibrate", "error_at"]
 
 ARMIJO = 1e-4  # share of the predicted decrease that a step must bring
 SMALLEST = 2.0**-6
@@ -40,6 +40,21 @@ class Scale:
     def error(self, decrement: float, potential: float) -> float:
         """Relative error in the energy norm of a state with this decrement rᵀK⁻¹r in J."""
         return math.sqrt(decrement / max(abs(potential - self.reference), self.floor))
+
+
+def error_at(system: System, scale: Scale, z: np.ndarray) -> float:
+    """Relative error in the energy norm of a state (dof,), with the present tangent."""
+    residual = system.residual(z)
+    return _error(system, scale, residual, system.solve(residual), system.potential(z))
+
+
+def _error(
+    system: System, scale: Scale, residual: np.ndarray, correction: np.ndarray, potential: float
+) -> float:
+    moving, products = system.field.moving, residual * correction
+    # in mixed form the two parts have opposite signs and must not cancel
+    decrement = abs(float(products[moving].sum())) + abs(float(products[~moving].sum()))
+    return scale.error(decrement, potential) if math.isfinite(decrement) else math.inf
 
 
 @dataclass(frozen=True)
@@ -168,6 +183,7 @@ class _Iteration:
             return None
         trial = self._measured(_Point(z, potential, self._system.residual(z), point.correction, 0.0))
         if self._system.saddle and not self._shortens(point, trial, length):
+            self._rejected = None  # admissible: no earlier, longer step tells why the search fails
             return None
         return trial
 
@@ -208,11 +224,7 @@ class _Iteration:
     def _measured(self, point: _Point) -> _Point:
         """The same state with the present tangent's correction and the error."""
         correction = self._system.solve(point.residual)
-        moving = self._system.field.moving
-        products = point.residual * correction
-        # in mixed form the two parts have opposite signs and must not cancel
-        decrement = abs(float(products[moving].sum())) + abs(float(products[~moving].sum()))
-        error = self._scale.error(decrement, point.potential) if math.isfinite(decrement) else math.inf
+        error = _error(self._system, self._scale, point.residual, correction, point.potential)
         return _Point(point.z, point.potential, point.residual, correction, error)
 
     def _end(self, z: np.ndarray, stop: Stop, error: float) -> Found:

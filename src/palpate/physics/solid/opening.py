@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from palpate.physics.equilibrium.stop import Stop
 from palpate.physics.interactions.interaction import Attached
 from palpate.physics.interactions.rigid import require_held
 from palpate.physics.solid.density import material_energies
@@ -67,7 +68,18 @@ def open_problem(problem: SolidProblem, solver: str, tolerance: float) -> Opened
 
     def model(constants: list[Constant], varied: list[Attached], base: np.ndarray) -> SolidModel:
         return SolidModel(
-            field, energies, histories, constants, varied, base, solver, tolerance, measures, time_step
+            field,
+            energies,
+            histories,
+            constants,
+            varied,
+            base,
+            solver,
+            tolerance,
+            measures,
+            time_step,
+            body.strain_limit,
+            body.step_error,
         )
 
     if constants:
@@ -78,7 +90,9 @@ def open_problem(problem: SolidProblem, solver: str, tolerance: float) -> Opened
     varied = [interaction.attach(field) for interaction in problem.interactions]
     if not constants:
         require_held(field, varied)
-    return Opened(model(constants, varied, base), settled)
+    opened = model(constants, varied, base)
+    opened.spans = np.array([r.high - r.low for r in problem.ranges])
+    return Opened(opened, settled)
 
 
 def _settle(model: SolidModel, constants: list[Constant]) -> Followed:
@@ -88,7 +102,8 @@ def _settle(model: SolidModel, constants: list[Constant]) -> Followed:
     start = np.zeros_like(target) if start is None else start
     model.duration = SETTLED
     found = follow(model, Known(start, model.impose(model.base, start)), target)
-    model.commit(found.last.z)
+    if found.verdict.stop is Stop.CONVERGED:
+        model.commit(found.last.z)
     return found
 
 

@@ -1,54 +1,31 @@
 """Following an equilibrium along a straight line of inputs, in steps that adapt themselves.
 
-The next state is predicted from the last ones and their derivatives in the inputs, which the factorised tangent
-gives: z + z' h + ½ z'' h², with z'' from the last two derivatives where the path goes straight on. Where that
-prediction is not admissible, or worse than staying, less of it is taken.
+Steps grow and shrink with the iterations that they take and, for bodies with a history, with their error in time.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from palpate.physics.equilibrium.stop import Stop, Verdict
 from palpate.physics.solid.model import SolidModel
-from palpate.physics.solid.newton import Found
+from palpate.physics.solid.predicting import Known
+from palpate.physics.solid.stepping import Tried, take
 
 __all__ = ["Followed", "Known", "LoadStep", "follow"]
 
 SMALLEST_STEP = 2.0**-10  # of the whole path
-MOST_ITERATIONS = 200  # over a whole path: bounds the time that pointless inputs cost
-EASY, HARD = 3, 6  # factorisations up to which steps grow, beyond which they shrink
+# Where equilibria are found but lie beyond a law's reach, shorter steps find them too
+SMALLEST_REFUSED = 2.0**-4
+# Where a step errs too much in time: the first moments of a long creep may be short
+SMALLEST_IN_TIME = 2.0**-30
+# Of steps that led nowhere, and of all where nothing is remembered: bounds the time that pointless inputs cost
+MOST_ITERATIONS = 200
+EASY, HARD = 3, 6  # factorisations of a search up to which steps grow, beyond which they shrink
 GROWTH, SHRINKAGE = 1.6, 0.7
-STRAIGHT = 0.999  # cosine from which on two steps are on one line
-
-
-@dataclass(frozen=True)
-class Known:
-    """An equilibrium.
-
-    Attributes
-    ----------
-    q : (n,) array
-        Its inputs.
-    z : (dof,) array
-        Its unknowns.
-    slope : (n, dof) array or None
-        ∂z/∂q, about.
-    before : Known or None
-        The equilibrium from which it was reached.
-    """
-
-    q: np.ndarray
-    z: np.ndarray
-    slope: np.ndarray | None = None
-    before: Known | None = None
-
-    def alone(self) -> Known:
-        """The same without the one before it, so that chains don't pile up in memory."""
-        return replace(self, before=None)
+LONGEST, SHORTEST, SAFETY = 4.0, 0.2, 0.8  # factors of the next step that the error in time allows
 
 
 @dataclass(frozen=True)
@@ -71,6 +48,8 @@ class LoadStep:
         √(|rᵀK⁻¹r|/energy) before the last correction.
     cuts : int
         Halvings in the line search.
+    error : float
+        Error in time over what is tolerated: a step counts only if it is at most 1. 0 without a history.
     """
 
     position: float
@@ -80,6 +59,7 @@ class LoadStep:
     chords: int
     residual: float
     cuts: int
+    error: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -94,6 +74,11 @@ class Followed:
     def iterations(self) -> int:
         """Over all steps, also those that failed."""
         return sum(step.iterations for step in self.log)
+
+    @property
+    def chords(self) -> int:
+        """Steps with a tangent used before, over all steps of the path."""
+        return sum(step.chords for step in self.log)
 
 
 def follow(model: SolidModel, start: Known, target: np.ndarray) -> Followed:
@@ -113,73 +98,37 @@ def follow(model: SolidModel, start: Known, target: np.ndarray) -> Followed:
     Followed
         With `Stop.CONVERGED` where it arrived, else with the reason and the last equilibrium before it.
     """
-    here, position, log = start, 0.0, list[LoadStep]()
+    here, position, log = _sloped(model, start), 0.0, list[LoadStep]()
     length = model.distance(start.q, target)
     step = min(1.0, model.first_step() / length) if length > 0 else 1.0
     while True:
         end = _stretched(position, step)
-        q = start.q + end * (target - start.q)
-        model.begin(end - position)
-        found = model.search(q, predict(model, here, q))
-        verdict = model.judge(found.z, q) if found.stop is Stop.CONVERGED else model.why(found, q)
-        log.append(_record(end, end - position, verdict.stop, found))
-        if verdict.stop is Stop.CONVERGED:
+        q = start.q + end * (target - start.q) if end < 1.0 else target
+        remembered = model.remembered()
+        tried = take(model, here, q, end - position)
+        log.append(_record(end, end - position, tried))
+        if len(log) == 1 and here is not start:
+            log[0] = replace(log[0], iterations=log[0].iterations + 1)  # the tangent that gave the slope
+        if tried.good:
             if end == 1.0:
-                return Followed(Known(q, found.z, None, here.alone()), verdict, tuple(log))
-            here = Known(q, found.z, model.sensitivity(found.z), here.alone())
-            model.commit(found.z)
-            step = (end - position) * _pace(found.iterations)
+                return Followed(Known(q, tried.z, None, here.alone()), tried.verdict, tuple(log))
+            here = Known(q, tried.z, model.sensitivity(tried.z), here.alone())
+            model.commit(tried.z)
+            step = (end - position) * _pace(tried)
             position = end
         else:
-            step = (end - position) / 2
-        spent = sum(entry.iterations for entry in log)
-        if step < SMALLEST_STEP or spent >= MOST_ITERATIONS:
-            return Followed(here, verdict, tuple(log))
+            model.recall(remembered)
+            step = (end - position) * min(_allowed(tried.error), 0.5)
+        if step < _smallest(tried) or _spent(model, log) >= MOST_ITERATIONS:
+            return Followed(here, _given_up(tried, _spent(model, log)), tuple(log))
 
 
-def predict(model: SolidModel, here: Known, q: np.ndarray) -> np.ndarray:
-    """Guess of the equilibrium under inputs q (n,), the first admissible one of those at hand."""
-    model.set(q)
-    stay = model.impose(here.z, q)
-    if here.slope is None:
-        return stay
-    best, lowest = stay, model.system.potential(stay)
-    for guess in _extrapolated(here, q):
-        guess = model.impose(guess, q)
-        potential = model.system.potential(guess)
-        if not np.isfinite(potential):
-            continue
-        if model.system.saddle:
-            return guess  # an energy that has no minimum doesn't tell the better one
-        if not potential >= lowest:
-            best, lowest = guess, potential
-    return best
-
-
-def _extrapolated(here: Known, q: np.ndarray) -> Iterator[np.ndarray]:
-    """Extrapolations from the boldest to the most timid."""
-    ahead = q - here.q
-    assert here.slope is not None  # only a state with a slope is extrapolated
-    first = ahead @ here.slope
-    bend = _bend(here, ahead)
-    if bend is not None:
-        yield here.z + first + bend
-    for share in (1.0, 0.5, 0.25):
-        yield here.z + share * first
-
-
-def _bend(here: Known, ahead: np.ndarray) -> np.ndarray | None:
-    """½ z'' h² from the change of slope in the last step, if the path goes straight on."""
-    before = here.before
-    if before is None or before.slope is None or here.slope is None:
-        return None
-    taken = here.q - before.q
-    lengths = float(np.linalg.norm(taken)), float(np.linalg.norm(ahead))
-    if min(lengths) == 0 or taken @ ahead < STRAIGHT * lengths[0] * lengths[1]:
-        return None
-    ratio = min(lengths[1] / lengths[0], 2.0)
-    change: np.ndarray = ahead @ (here.slope - before.slope)
-    return ratio / 2 * change
+def _sloped(model: SolidModel, start: Known) -> Known:
+    """The start with its slope, where the inputs move a part of the body: that part alone would turn elements over."""
+    if start.slope is not None or not model.inputs.lifts.any():
+        return start
+    model.begin(0.0)
+    return replace(start, slope=model.slope_at(start.z, start.q))
 
 
 def _stretched(position: float, step: float) -> float:
@@ -188,9 +137,48 @@ def _stretched(position: float, step: float) -> float:
     return 1.0 if end > 1.0 - 0.25 * step else end
 
 
-def _pace(iterations: int) -> float:
-    return GROWTH if iterations <= EASY else SHRINKAGE if iterations > HARD else 1.0
+def _pace(tried: Tried) -> float:
+    """By how much the next step is longer."""
+    hardest = max(found.iterations for found in tried.found)
+    easy = GROWTH if hardest <= EASY else SHRINKAGE if hardest > HARD else 1.0
+    return min(easy, _allowed(tried.error)) if tried.error > 0 else easy
 
 
-def _record(end: float, step: float, stop: Stop, found: Found) -> LoadStep:
-    return LoadStep(end, step, stop, found.iterations, found.chords, found.error, found.cuts)
+def _allowed(error: float) -> float:
+    """The same, for an error in time that goes at least with the square of the step."""
+    return float(np.clip(SAFETY / np.sqrt(max(error, 1e-9)), SHORTEST, LONGEST))
+
+
+def _smallest(tried: Tried) -> float:
+    """Shortest step that is worth while after this one."""
+    if tried.verdict.stop is Stop.STRAIN_LIMIT:
+        return SMALLEST_REFUSED
+    return SMALLEST_IN_TIME if tried.verdict.stop is Stop.CONVERGED and tried.error > 0 else SMALLEST_STEP
+
+
+def _spent(model: SolidModel, log: list[LoadStep]) -> int:
+    """Iterations that count against the limit."""
+    return sum(e.iterations for e in log if not model.histories or e.stop is not Stop.CONVERGED)
+
+
+def _given_up(last: Tried, spent: int) -> Verdict:
+    """The verdict on a path that ends before its target: never that of a good step on the way."""
+    if last.verdict.stop is not Stop.CONVERGED:
+        return last.verdict
+    if spent >= MOST_ITERATIONS:
+        return Verdict(Stop.ITERATION_LIMIT, f"{spent} iterations along the path")
+    return Verdict(Stop.STEP_TOO_SMALL)
+
+
+def _record(end: float, step: float, tried: Tried) -> LoadStep:
+    found = tried.found
+    return LoadStep(
+        position=end,
+        step=step,
+        stop=tried.verdict.stop,
+        iterations=sum(one.iterations for one in found),
+        chords=sum(one.chords for one in found),
+        residual=found[-1].error,
+        cuts=sum(one.cuts for one in found),
+        error=tried.error,
+    )

@@ -29,8 +29,10 @@ class SolidSolution:
         Why the solver stopped.
     iterations : int
         Newton iterations (tangents assembled and factorised) over all load steps.
+    chords : int
+        Cheap steps beside them, each a residual and a back-substitution with a tangent used before.
     residual : float
-        √(|rᵀK⁻¹r|/energy): about the relative error left, in the energy norm, before the last correction.
+        √(|rᵀK⁻¹r|/energy): about the relative error left, in the energy norm, with the tangent at the equilibrium.
     log : tuple of LoadStep
         The load steps, also those that were cut back.
     mesh : BodyMesh
@@ -67,6 +69,9 @@ class SolidSolution:
         Inputs of the last equilibrium on the way; those asked, if converged.
     state : (dof,) array
         All unknowns of that equilibrium.
+    last_good : SolidSolution or None
+        Of a failed solve, that equilibrium: displacement, strains and penetration, and for a body without a history
+        the response. It has no energies and no stiffness.
     fixed : tuple of str
         Surfaces that are held.
     probe : SphereProbe or None
@@ -96,6 +101,8 @@ class SolidSolution:
     detail: str = ""
     reached: np.ndarray = field(default_factory=lambda: np.empty(0))
     state: np.ndarray = field(default_factory=lambda: np.empty(0))
+    chords: int = 0
+    last_good: SolidSolution | None = None
     fixed: tuple[str, ...] = ()
     probe: SphereProbe | None = None
     centre: np.ndarray | None = None
@@ -123,7 +130,10 @@ class SolidSolution:
         else:
             at = ", ".join(f"{r.name} = {x:g}" for r, x in zip(self.ranges, self.reached, strict=False))
             lines.append(f"  reached      {at or 'nothing'}")
-        lines.append(f"  cost         {self.iterations} Newton iterations in {len(self.log)} load steps")
+        cost = (
+            f"{self.iterations} Newton iterations and {self.chords} chord steps in {len(self.log)} load steps"
+        )
+        lines.append(f"  cost         {cost}")
         return "\n".join(line for line in lines if line)
 
     __repr__ = __str__
@@ -132,14 +142,20 @@ class SolidSolution:
         pairs = zip(self.ranges, self.response, strict=True)
         return ", ".join(f"{x:.6g} {conjugate_unit(r.unit)}" for r, x in pairs)
 
-    def plot(self, *args: Any, **kwargs: Any) -> Any:
-        """Draw the deformed body; see `palpate.physics.pictures.plot_solution`."""
+    def plot(self, *args: Any, last: bool = False, **kwargs: Any) -> Any:
+        """Draw the deformed body; see `palpate.physics.pictures.plot_solution`.
+
+        With `last` a failed solve's last equilibrium is drawn.
+        """
         from palpate.physics.pictures import plot_solution
 
-        return plot_solution(self, *args, **kwargs)
+        return plot_solution(self._shown(last), *args, **kwargs)
 
-    def to_vtu(self, path: Any, **kwargs: Any) -> Any:
-        """Write the deformed body as a VTU file; see `palpate.physics.pictures.write_vtu`."""
+    def to_vtu(self, path: Any, *, last: bool = False, **kwargs: Any) -> Any:
+        """Write the deformed body as a VTU file, as `plot` draws it; see `palpate.physics.pictures.write_vtu`."""
         from palpate.physics.pictures import write_vtu
 
-        return write_vtu(self, path, **kwargs)
+        return write_vtu(self._shown(last), path, **kwargs)
+
+    def _shown(self, last: bool) -> SolidSolution:
+        return self.last_good if last and self.last_good is not None else self

@@ -277,7 +277,7 @@ class SolidSolver:
             detail=followed.verdict.detail,
             reached=last.q,
             state=last.z,
-            last_good=self._last_good(last),
+            last_good=self._last_good(last) if followed.log else None,
             **self._surroundings(q),
         )
 

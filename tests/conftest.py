@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 
 import pytest
 from hypothesis import settings
@@ -11,6 +12,10 @@ from hypothesis import settings
 # machines are shared and kernels compile on first use: time is no law here; examples are the same on every run
 settings.register_profile("palpate", deadline=None, derandomize=True)
 settings.load_profile("palpate")
+
+# a run in the background of a shell ignores interrupts, and so would the programs that tests interrupt
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def require_program(*names: str) -> str:

@@ -66,8 +66,12 @@ class Range:
                 fix="Swap the ends, or give the input a fixed value instead of a range.",
             )
 
+    def __repr__(self) -> str:
+        # roundings in the last digits of an end say nothing
+        return f"Range({self.name!r}, {self.low:.12g}, {self.high:.12g}, {self.unit!r})"
+
     def __str__(self) -> str:
-        return f"{self.name} {self.low:g} … {self.high:g} {self.unit}".rstrip()
+        return f"{self.name} {self.low + 0.0:g} … {self.high:g} {self.unit}".rstrip()
 
 
 def bounds(ranges: Sequence[Range]) -> tuple[np.ndarray, np.ndarray]:

@@ -20,7 +20,8 @@ def in_words(dataset: Dataset) -> str:
     """What a dataset is of, its inputs, its answers and its hash, line by line."""
     failed = len(dataset) - int(dataset.converged.sum())
     tail = f"{failed} did not converge" if failed else "all converged"
-    body = dataset.provenance.get("problem", {}).get("body", {}).get("type", "a body")
+    named = dataset.provenance.get("problem", {}).get("body", {}).get("type", "a body")
+    body = dataset.provenance.get("words") or named
     return "\n".join(
         [
             f"Dataset of {len(dataset)} solves of {body}, {tail}",

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import difflib
 import math
+from collections.abc import Sequence
 from numbers import Real
 from typing import Any
 
 from palpate.errors import UsageError
 
-__all__ = ["require_number", "require_positive"]
+__all__ = ["require_choice", "require_number", "require_positive"]
 
 
 def require_number(what: str, value: Any, unit: str = "") -> None:
@@ -52,4 +54,22 @@ def require_positive(what: str, value: Any, unit: str, *, infinite: bool = False
         f"{what} is {value:g} {unit}".rstrip() + ".",
         why=f"It must be positive{'' if infinite else ' and finite'}.",
         fix=f"Pass a positive number{f' in {unit}' if unit else ''}.",
+    )
+
+
+def require_choice(what: str, value: Any, choices: Sequence[str]) -> None:
+    """Refuse what is not among a few words, and offer the nearest.
+
+    Raises
+    ------
+    UsageError
+        If it is not.
+    """
+    if isinstance(value, str) and value in choices:
+        return
+    near = difflib.get_close_matches(str(value).lower(), choices, n=1, cutoff=0.5)
+    raise UsageError(
+        f"{what} is {value!r}.",
+        why=f"It is one of {', '.join(map(repr, choices))}.",
+        fix=f"Did you mean {near[0]!r}?" if near else "Choose one of these.",
     )

@@ -4,7 +4,7 @@
 
     space.py       named ranges
     designs.py     where to sample
-    problem.py     the contract with whatever is asked
+    problem.py     what a sweep expects of whatever it asks
     external.py    a problem made of one function
     sweep.py       the sweep, from its plan to its dataset
     plan.py        what will be solved, in which order

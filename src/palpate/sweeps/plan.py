@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -101,6 +102,8 @@ def make_plan(
             why=f"Given were samples={samples} and points={'None' if points is None else 'an array'}.",
             fix="For example sweep(body, loads, samples=256).",
         )
+    if samples is not None:
+        _require_samples(samples)
     if points is not None:
         return Plan(problem, space, _some(space.points(points)), "points", seed)
     own = own_design(problem)
@@ -139,6 +142,16 @@ def _checked(chains: list[np.ndarray], count: int) -> list[np.ndarray]:
             fix="Let chains(points) part the rows 0 … N − 1.",
         )
     return [rows for rows in chains if rows.size]
+
+
+def _require_samples(samples: Any) -> None:
+    if isinstance(samples, Integral) and samples >= 1:
+        return
+    raise UsageError(
+        f"A sweep was asked for {samples!r} samples.",
+        why="It needs a whole number of them, at least one.",
+        fix="For example samples=256.",
+    )
 
 
 def _some(points: np.ndarray) -> np.ndarray:

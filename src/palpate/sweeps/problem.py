@@ -1,4 +1,4 @@
-"""The contract between a sweep and whatever it asks.
+"""What a sweep expects of whatever it asks.
 
 A problem of one's own has the five members of `Problem`, and a solver the one of `Solver`. Where that is more
 than needed, `ExternalProblem` makes a problem of one function.

@@ -31,6 +31,7 @@ def provenance(problem: Problem, points: np.ndarray, design: str, seed: int) -> 
     """Plain data that says where the answers come from."""
     return {
         "problem": problem.describe(),
+        "words": getattr(problem, "words", ""),
         "design": design,
         "seed": seed,
         "samples": len(points),

@@ -19,6 +19,7 @@ from palpate.physics.geometry import (
     LayeredBlock,
     SurfacePatch,
 )
+from palpate.physics.geometry.groups import UPRIGHT
 
 PLATE = 0.1 * 0.06 * 0.04 - np.pi * 0.015**2 * 0.04  # m³, a block with a round hole
 CUBE = np.array([[x, y, z] for x in (0.0, 0.1) for y in (0.0, 0.1) for z in (0.0, 0.1)])
@@ -45,7 +46,7 @@ def write_plate(path: Path, *, names: bool = True) -> None:
 
 def write_stl(path: Path, points: np.ndarray, triangles: np.ndarray) -> ImportedSolid:
     meshio.Mesh(points, [("triangle", triangles)]).write(path, binary=True)
-    return ImportedSolid(path)
+    return ImportedSolid(path, unit="m")
 
 
 def write_tetrahedra(path: Path, mesh, **extra) -> None:
@@ -134,12 +135,16 @@ def test_groups_of_a_gmsh_file_are_regions_and_surfaces(tmp_path: Path):
         mesh.points * 1e3,
         [("tetra", mesh.tetrahedra), ("triangle", mesh.triangles)],
         cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags},
-        field_data={"fat": [1, 3], "muscle": [2, 3], "top": [11, 2], "bottom": [12, 2], "side": [13, 2]},
+        field_data={
+            "fat": [1, 3],
+            "muscle": [2, 3],
+            **{name: [11 + i, 2] for i, name in enumerate(mesh.surfaces)},
+        },
     )
     source.write(tmp_path / "layers.msh", file_format="gmsh22", binary=False)
     read = ImportedMesh(tmp_path / "layers.msh", unit="mm")
     assert read.regions == ("fat", "muscle")
-    assert read.surfaces == ("top", "bottom", "side")
+    assert read.surfaces == ("top", "bottom", *UPRIGHT)
     assert read.rest().areas == pytest.approx(mesh.areas)
     assert read.rest().region_volumes == pytest.approx(mesh.region_volumes)
     assert set(read.mesh().GetMaterials()) == {"fat", "muscle"}
@@ -208,9 +213,10 @@ def test_faults_of_files(tmp_path: Path):
     (tmp_path / "wrong.msh").write_bytes(b"\x00\x01\x02" * 40)
     assert "No such file" in failure(lambda: ImportedSolid(tmp_path / "none.step"))
     assert "No such file" in failure(lambda: ImportedMesh(tmp_path / "none.vtu"))
-    assert "is empty" in failure(lambda: ImportedSolid(tmp_path / "empty.stl"), FileFormatError)
-    for name in ("wrong.stl", "wrong.step"):
-        failure(lambda name=name: ImportedSolid(tmp_path / name).mesh(), FileFormatError)
+    assert "is empty" in failure(lambda: ImportedSolid(tmp_path / "empty.stl", unit="m"), FileFormatError)
+    for name, unit in (("wrong.stl", "m"), ("wrong.step", None)):
+        failure(lambda name=name, unit=unit: ImportedSolid(tmp_path / name, unit).mesh(), FileFormatError)
+    assert 'unit="mm"' in failure(lambda: ImportedSolid(tmp_path / "wrong.stl"))
     for name in ("wrong.vtu", "wrong.msh"):
         failure(lambda name=name: ImportedMesh(tmp_path / name).mesh(), FileFormatError)
     assert "neither a STEP nor an STL" in failure(lambda: ImportedSolid(tmp_path / "wrong.vtu"))

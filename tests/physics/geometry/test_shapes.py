@@ -40,7 +40,7 @@ VOLUMES = {
 PROGRAM = """
 import hashlib
 from palpate.physics.geometry import *
-shape = {shape}
+shape = {shape!r}
 mesh = shape.rest((FineMesh(shape.surfaces[0], 0.008, (-0.02, -0.02, 0.0), (0.02, 0.02, 1.0)),))
 data = mesh.points.tobytes() + mesh.tetrahedra.tobytes() + mesh.triangles.tobytes()
 print(hashlib.sha256(data + mesh.surface_of.tobytes() + mesh.region_of.tobytes()).hexdigest())
@@ -104,13 +104,33 @@ def test_curved_volume_and_area_converge_at_fourth_order_and_straight_ones_at_se
     assert (orders[1:] > 3).all()
 
 
+OUTWARD = (
+    ("top", 2, 1),
+    ("bottom", 2, -1),
+    ("x_min", 0, -1),
+    ("x_max", 0, 1),
+    ("y_min", 1, -1),
+    ("y_max", 1, 1),
+)
+
+
 def test_surfaces_of_the_block_lie_where_their_names_say():
     block = Block(size=(0.1, 0.08, 0.05))
     mesh = block.rest()
-    assert mesh.areas == pytest.approx({"top": 0.008, "bottom": 0.008, "side": 2 * 0.05 * 0.18})
-    for name, normal in (("top", [0, 0, 1]), ("bottom", [0, 0, -1])):
-        assert np.allclose(mesh.normals[mesh.surface_of == block.surfaces.index(name)], normal)
+    areas = {"x_min": 0.004, "x_max": 0.004, "y_min": 0.005, "y_max": 0.005}
+    assert mesh.areas == pytest.approx({"top": 0.008, "bottom": 0.008} | areas)
+    for name, axis, sign in OUTWARD:
+        assert np.allclose(mesh.normals[mesh.on(name)], sign * np.eye(3)[axis])
     assert (mesh.points[mesh.triangles_of("top")][..., 2] == 0.05).all()
+
+
+@pytest.mark.parametrize("shape", [Block(size=(0.1, 0.08, 0.05)), LAYERS], ids=lambda s: type(s).__name__)
+def test_the_upright_faces_of_a_box_are_one_surface_too(shape):
+    mesh = shape.rest()
+    parts = [mesh.on(name) for name in ("x_min", "x_max", "y_min", "y_max")]
+    assert (sum(part.astype(int) for part in parts) == mesh.on("side")).all()
+    assert np.allclose(mesh.normals[mesh.on("side")][:, 2], 0)
+    assert all(part.any() for part in parts)
 
 
 def test_layers_are_regions_from_the_surface_down():

@@ -69,7 +69,7 @@ def test_every_interaction_has_an_input_for_each_range(interaction):
     ],
 )
 def test_an_unknown_surface_is_refused_with_those_there_are(make):
-    with pytest.raises(UsageError, match=r"There is no surface 'roof'[^§]*top, bottom, side"):
+    with pytest.raises(UsageError, match=r"There is no surface 'roof'[^§]*top, bottom, x_min"):
         Body(BLOCK, NeoHookean(9e3, 0.3)).problem(make()).ranges  # noqa: B018
 
 

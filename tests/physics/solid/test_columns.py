@@ -86,7 +86,7 @@ def test_any_surface_can_be_touched_from_outside(surface):
 
 def test_a_surface_that_is_not_there_is_named():
     body = Body(Block(SIZE), NeoHookean(9e3, 0.45))
-    with pytest.raises(UsageError, match="top, bottom, side"):
+    with pytest.raises(UsageError, match="top, bottom, x_min"):
         body.problem(SphereProbe(RADIUS, touches="lid")).design(4)
 
 

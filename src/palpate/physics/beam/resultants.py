@@ -1,4 +1,4 @@
-"""What a cross-section answers to its strains when it remembers: the contract, and the elastic stiffnesses.
+"""What a cross-section answers to its strains when it remembers: its protocol, and the elastic stiffnesses.
 
 A section law turns axial strain, shear strain and curvature at the end of a step into section forces. They are the
 derivative of an incremental energy per length, so that the equilibrium is a minimum as it is for an elastic beam.

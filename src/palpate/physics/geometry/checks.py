@@ -10,6 +10,7 @@ from typing import Any
 
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_number
+from palpate.physics.geometry.groups import GROUPS, members
 
 __all__ = [
     "LARGEST",
@@ -24,24 +25,23 @@ __all__ = [
 LARGEST, SMALLEST = 10.0, 1e-3  # m, longest side of a body that a hand or a tool would press
 
 
-
-def require_triple(what: str, value: Any) -> tuple[float, float, float]:
-    """Three finite numbers as a tuple of floats."""
+def require_triple(what: str, value: Any, unit: str = "m") -> tuple[float, float, float]:
+    """Three finite numbers in `unit` as a tuple of floats."""
     try:
         x, y, z = value
     except (TypeError, ValueError):
         raise UsageError(
             f"{what} is {value!r}.",
             why="It needs three numbers, along x, y and z.",
-            fix="Pass (x, y, z) in m.",
+            fix=f"Pass (x, y, z) in {unit}.",
         ) from None
     for number in (x, y, z):
-        require_number(what, number, "m")
+        require_number(what, number, unit)
         if not math.isfinite(number):
             raise UsageError(
                 f"{what} is {value!r}.",
                 why="It must be finite.",
-                fix="Pass finite numbers in m, as (x, y, z).",
+                fix=f"Pass finite numbers in {unit}, as (x, y, z).",
             )
     return float(x), float(y), float(z)
 
@@ -79,9 +79,10 @@ def require_known(kind: str, name: str, known: Iterable[str]) -> None:
         For example ``"surface"``.
     """
     names = tuple(known)
-    if name in names:
+    if name in names or (kind == "surface" and members(name, names)):
         return
-    near = difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
+    groups = [group for group in GROUPS if kind == "surface" and members(group, names)]
+    near = difflib.get_close_matches(str(name), [*names, *groups], n=1, cutoff=0.5)
     raise UsageError(
         f"There is no {kind} {name!r}.",
         why=f"The body's {kind}s are {', '.join(names)}.",

@@ -9,6 +9,7 @@ from palpate.physics.arguments import require_positive
 from palpate.physics.geometry.block import name_upright_faces
 from palpate.physics.geometry.checks import require_size
 from palpate.physics.geometry.shape import Solid
+from palpate.physics.words import millimetres
 
 __all__ = ["Cylinder"]
 
@@ -53,6 +54,9 @@ class Cylinder(Solid):
     def size(self) -> tuple[float, float, float]:
         """Extent along x, y and z in m."""
         return (2 * self.radius, 2 * self.radius, self.height)
+
+    def __str__(self) -> str:
+        return f"cylinder of radius {millimetres(self.radius)}, {millimetres(self.height)} high"
 
     def solid(self) -> Any:
         """The cylinder, its faces named."""

@@ -9,6 +9,7 @@ from palpate.errors import UsageError
 from palpate.physics.arguments import require_positive
 from palpate.physics.geometry.checks import require_size, require_triple
 from palpate.physics.geometry.shape import Solid
+from palpate.physics.words import millimetres
 
 __all__ = ["Dome", "Inclusion"]
 
@@ -105,6 +106,11 @@ class Dome(Solid):
     def size(self) -> tuple[float, float, float]:
         """Extent along x, y and z in m."""
         return (2 * self.radius, 2 * self.radius, self.rise)
+
+    def __str__(self) -> str:
+        skin = f", skin of {millimetres(self.layer)}" if self.layer else ""
+        inside = f", inclusion of radius {millimetres(self.inclusion.radius)}" if self.inclusion else ""
+        return f"dome of radius {millimetres(self.radius)}, {millimetres(self.rise)} high{skin}{inside}"
 
     def solid(self) -> Any:
         """The dome with its inner parts, glued; its faces named."""

@@ -8,9 +8,11 @@ from typing import Any
 
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_positive
-from palpate.physics.geometry.block import name_upright_faces
+from palpate.physics.geometry.block import name_sides, name_upright_faces
 from palpate.physics.geometry.checks import require_name, require_size
+from palpate.physics.geometry.groups import UPRIGHT
 from palpate.physics.geometry.shape import Solid
+from palpate.physics.words import millimetres
 
 __all__ = ["LayeredBlock"]
 
@@ -21,8 +23,9 @@ FLATTEST = 3.0  # element size over thickness of its layer: flatter tetrahedra c
 class LayeredBlock(Solid):
     """A box of layers, with a corner at the origin: x in 0 … extent[0], y in 0 … extent[1], the base at z = 0.
 
-    Surfaces are ``top`` (the first layer's), ``bottom`` and ``side``; each layer is a region of its own. Layers
-    share the nodes of the face between them, so they don't slide.
+    Surfaces are ``top`` (the first layer's), ``bottom`` and the upright faces ``x_min``, ``x_max``, ``y_min`` and
+    ``y_max``, which together can be called ``side``; each layer is a region of its own. Layers share the nodes
+    of the face between them, so they don't slide.
 
     Attributes
     ----------
@@ -52,8 +55,8 @@ class LayeredBlock(Solid):
 
     @property
     def surfaces(self) -> tuple[str, ...]:
-        """``top``, ``bottom`` and ``side``."""
-        return ("top", "bottom", "side")
+        """``top``, ``bottom`` and the four upright faces."""
+        return ("top", "bottom", *UPRIGHT)
 
     @property
     def regions(self) -> tuple[str, ...]:
@@ -71,6 +74,10 @@ class LayeredBlock(Solid):
         """Extent along x, y and z in m."""
         return (*self.extent, self.levels[0])
 
+    def __str__(self) -> str:
+        layers = ", ".join(f"{name} {millimetres(thickness)}" for name, thickness in self.layers)
+        return f"layered block {millimetres(*self.size)} ({layers})"
+
     def solid(self) -> Any:
         """The layers, glued; their faces named."""
         from netgen.occ import Box, Glue, Pnt
@@ -83,9 +90,9 @@ class LayeredBlock(Solid):
             slabs.append(slab)
         block = Glue(slabs)
         name_upright_faces(block, self.size[2])
+        name_sides(block, self.size)
         for face in block.faces:
-            low, high = face.bounding_box
-            if face.name == "side" and high[2] - low[2] < 1e-5 * self.size[2]:
+            if face.name == "side":
                 face.name = "between layers"
         return block
 

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from palpate.physics.geometry.checks import require_known
+from palpate.physics.geometry.groups import members
 from palpate.physics.geometry.quality import MeshQuality, mesh_quality, tetrahedron_volumes
 
 __all__ = ["UNNAMED", "BodyMesh", "body_mesh", "outer_faces", "to_ngsolve"]
@@ -103,9 +105,21 @@ class BodyMesh:
         """Shape of the worst elements."""
         return mesh_quality(self.points, self.tetrahedra)
 
+    def on(self, surface: str) -> np.ndarray:
+        """Which triangles belong to a surface, bool of shape (t,).
+
+        Raises
+        ------
+        UsageError
+            If there is no such surface.
+        """
+        require_known("surface", surface, self.surfaces)
+        numbers = [self.surfaces.index(name) for name in members(surface, self.surfaces)]
+        return np.isin(self.surface_of, numbers)
+
     def triangles_of(self, surface: str) -> np.ndarray:
-        """Nodes of the triangles of one surface, shape (t, 3); `ValueError` if there is no such surface."""
-        return np.asarray(self.triangles[self.surface_of == self.surfaces.index(surface)])
+        """Nodes of the triangles of a surface, shape (t, 3); `UsageError` if there is no such surface."""
+        return np.asarray(self.triangles[self.on(surface)])
 
     def ngsolve(self) -> Any:
         """The same mesh for NGSolve, as `to_ngsolve` gives it."""

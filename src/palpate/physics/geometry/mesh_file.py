@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from os import fspath
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -77,6 +78,9 @@ class ImportedMesh(Shape):
         """Everything that decides the mesh, as plain data."""
         patches = [patch.describe() for patch in self.patches]
         return {"type": "ImportedMesh", "unit": self.unit, "patches": patches, "sha256": self.digest}
+
+    def __str__(self) -> str:
+        return f"mesh of {Path(self.path).name}"
 
     def generate(self, refinements: tuple[FineMesh, ...]) -> Any:
         """The file's mesh, its tetrahedra bisected where a refinement asks for smaller ones."""

@@ -44,7 +44,7 @@ def mesh_solid(solid: Any, coarse: float, refinements: tuple[FineMesh, ...]) -> 
     """
     from netgen.occ import OCCGeometry
 
-    flat = [r for r in refinements if all(_is_rectangle(f) for f in solid.faces if f.name == r.surface)]
+    flat = [r for r in refinements if all(_is_rectangle(f) for f in solid.faces if r.is_on(f.name))]
     solid = _imprinted(solid, flat)
     fine = _restricted_faces(solid, flat)
     points = []
@@ -107,7 +107,7 @@ def _imprinted(solid: Any, refinements: list[FineMesh]) -> Any:
         patches = [
             patch
             for face in solid.faces
-            if face.name == refinement.surface
+            if refinement.is_on(face.name)
             for patch in _patch(face, np.array(refinement.lower), np.array(refinement.upper))
         ]
         if patches:
@@ -145,7 +145,7 @@ def _restricted_faces(solid: Any, refinements: list[FineMesh]) -> list[tuple[flo
     fine = {}
     for number, face in enumerate(solid.faces):
         for refinement in refinements:
-            if face.name == refinement.surface and _inside(face, refinement):
+            if refinement.is_on(face.name) and _inside(face, refinement):
                 face.maxh = min(face.maxh, refinement.element)
                 fine[number] = (face.mass, face.maxh)
     return list(fine.values())

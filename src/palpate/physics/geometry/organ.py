@@ -11,6 +11,7 @@ from palpate.errors import UsageError
 from palpate.physics.arguments import require_positive
 from palpate.physics.geometry.checks import require_size
 from palpate.physics.geometry.shape import Solid
+from palpate.physics.words import millimetres
 
 __all__ = ["Organ"]
 
@@ -78,6 +79,9 @@ class Organ(Solid):
     def coarse(self) -> float:
         """Largest element size in m."""
         return self.element if self.element is not None else self.length / 20
+
+    def __str__(self) -> str:
+        return f"organ {millimetres(self.length)} long, seed {self.seed}"
 
     def solid(self) -> Any:
         """Six spline patches, sewn; their names set."""

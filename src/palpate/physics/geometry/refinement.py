@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_positive
 from palpate.physics.geometry.checks import require_triple
+from palpate.physics.geometry.groups import GROUPS
 
 __all__ = ["GRADING", "MOST_ELEMENTS", "FineMesh", "require_budget"]
 
@@ -60,6 +61,10 @@ class FineMesh:
                 why="Each coordinate of the lower corner must be at most that of the upper one.",
                 fix="Swap the coordinates that are in the wrong order.",
             )
+
+    def is_on(self, name: str | None) -> bool:
+        """Whether the named surface is the refined one, or one of those that its name stands for."""
+        return name == self.surface or name in GROUPS.get(self.surface, ())
 
 
 def require_budget(volumes: Iterable[tuple[float, float]], fine: Iterable[tuple[float, float]]) -> None:

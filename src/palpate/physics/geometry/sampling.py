@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from palpate.physics.geometry.groups import members
 from palpate.physics.geometry.mesh import BodyMesh
 from palpate.physics.geometry.refinement import FineMesh, require_budget
 
@@ -34,7 +35,7 @@ def points_on(mesh: BodyMesh, refinement: FineMesh) -> tuple[np.ndarray, float]:
     UsageError
         If the surface would take too many elements.
     """
-    if refinement.surface not in mesh.surfaces:
+    if not members(refinement.surface, mesh.surfaces):
         return np.empty((0, 3)), 0.0
     corners = mesh.points[mesh.triangles_of(refinement.surface)]
     small = []

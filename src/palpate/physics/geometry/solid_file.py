@@ -37,7 +37,7 @@ class ImportedSolid(Shape):
     path : str
         Ending in .step, .stp or .stl.
     unit : {"m", "dm", "cm", "mm", "um", "in"}, optional
-        Of an STL file's coordinates, by default m. A STEP file states its own.
+        Of an STL file's coordinates, which are bare numbers. A STEP file states its own.
     element : float, optional
         Largest element size in m, by default a third of the least extent.
     patches : tuple of SurfacePatch
@@ -87,6 +87,12 @@ class ImportedSolid(Shape):
                 why="A STEP file states its own unit.",
                 fix="Leave unit out; if the file states a wrong one, scale the model in the CAD program.",
             )
+        if ending in STL and self.unit is None:
+            raise UsageError(
+                f"The unit of {self.path} is not given.",
+                why="An STL file holds bare numbers.",
+                fix='Pass unit="mm" if it is in millimetres, unit="m" if in metres.',
+            )
         if self.unit is not None:
             require_unit(self.unit)
 
@@ -124,6 +130,9 @@ class ImportedSolid(Shape):
             "feature_angle": self.feature_angle,
             "sha256": self.digest,
         }
+
+    def __str__(self) -> str:
+        return f"solid of {Path(self.path).name}"
 
     def generate(self, refinements: tuple[FineMesh, ...]) -> Any:
         """A new `netgen.meshing.Mesh` in m, whose names of surfaces and regions are set."""

@@ -10,6 +10,7 @@ from palpate.physics.arguments import require_positive
 from palpate.physics.geometry.block import name_upright_faces
 from palpate.physics.geometry.checks import require_size
 from palpate.physics.geometry.shape import Solid
+from palpate.physics.words import millimetres
 
 __all__ = ["Tube"]
 
@@ -67,6 +68,10 @@ class Tube(Solid):
         """Largest element size in m."""
         wall = self.outer_radius - self.inner_radius
         return self.element if self.element is not None else min(wall / 2, self.height / 3)
+
+    def __str__(self) -> str:
+        radii = f"{millimetres(self.inner_radius)} inside, {millimetres(self.outer_radius)} outside"
+        return f"tube of radius {radii}, {millimetres(self.height)} high"
 
     def solid(self) -> Any:
         """The tube, its faces named."""

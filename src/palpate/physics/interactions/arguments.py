@@ -8,8 +8,9 @@ from typing import Any
 
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_number
+from palpate.physics.words import number
 
-__all__ = ["AXES", "Interval", "axis_of", "direction_of", "interval", "tag"]
+__all__ = ["AXES", "Interval", "along", "axis_of", "direction_of", "interval", "range_of", "tag"]
 
 Interval = float | tuple[float, float]
 """A fixed value, or the two ends between which an input varies."""
@@ -47,6 +48,24 @@ def interval(what: str, value: Any, unit: str) -> Interval:
             fix="Swap the ends, or give one number for a value that stays.",
         )
     return low, high
+
+
+def range_of(what: str, value: Any, unit: str) -> tuple[float, float]:
+    """Two ends of a range in ascending order.
+
+    Raises
+    ------
+    UsageError
+        For anything else, a single number among it.
+    """
+    ends = interval(what, value, unit)
+    if isinstance(ends, tuple):
+        return ends
+    raise UsageError(
+        f"{what} is the single number {ends:g} {unit}.",
+        why="An input needs a range.",
+        fix=f"Give (low, high) in {unit}; what stays is `Held` with a value within its range.",
+    )
 
 
 def _require_finite(what: str, value: float, unit: str) -> None:
@@ -100,6 +119,17 @@ def axis_of(what: str, value: str) -> tuple[int, float]:
             fix='Say "z" or "-z".',
         )
     return AXES.index(name), sign
+
+
+def along(direction: tuple[float, float, float] | str) -> str:
+    """A direction in words: the axis with its sign, else its parts."""
+    if isinstance(direction, str):
+        return direction
+    size = max(map(abs, direction))
+    axis = max(range(3), key=lambda i: abs(direction[i]))
+    if size == 1.0:
+        return ("-" if direction[axis] < 0 else "") + AXES[axis]
+    return f"({', '.join(map(number, direction))})"
 
 
 def tag(name: str, part: str) -> str:

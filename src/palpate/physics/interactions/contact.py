@@ -20,11 +20,11 @@ import numpy as np
 from palpate.physics.equilibrium.stop import Stop, Verdict
 from palpate.physics.geometry.mesh import BodyMesh
 from palpate.physics.interactions.interaction import BEYOND, Field
+from palpate.physics.interactions.pad_law import REACH, pressed_energy
 from palpate.physics.interactions.patch import winding_number
 
-__all__ = ["REACH", "Contact", "pad_energy"]
+__all__ = ["Contact", "pad_energy"]
 
-REACH = 0.98  # share of the stop up to which states are admissible
 BONUS = 6  # orders of quadrature beyond the elements' own: contact has an edge within elements
 TINY = 1e-9  # m; keeps the distance to the sphere's centre differentiable
 FACING_AWAY = -0.1  # cosine; less than a right angle by more than a fold of the surface takes
@@ -44,9 +44,9 @@ def pad_energy(penetration: Any, pad: float, stop: float | None) -> Any:
     """
     from ngsolve import IfPos
 
+    pressed = pressed_energy(penetration, pad, stop)
     if stop is None:
-        return IfPos(penetration, pad / 2 * penetration**2, 0)
-    pressed = pad / 2 * penetration**2 / (1 - penetration / stop)
+        return IfPos(penetration, pressed, 0)
     return IfPos(penetration, IfPos(penetration - REACH * stop, BEYOND, pressed), 0)
 
 

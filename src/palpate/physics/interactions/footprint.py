@@ -22,6 +22,7 @@ from palpate.physics.geometry.mesh import BodyMesh
 from palpate.physics.geometry.refinement import FineMesh
 from palpate.physics.interactions.arguments import AXES, axis_of
 from palpate.physics.interactions.patch import Patch
+from palpate.physics.interactions.plane import cross
 
 __all__ = ["QUADRATURE", "Chart", "bump", "chart_at", "chart_of", "footprint_area", "require_on_surface"]
 
@@ -161,7 +162,7 @@ def require_on_surface(
         If more than a fiftieth of any footprint is off the surface.
     """
     facing = chart.sign * mesh.area_vectors[:, chart.axis] > 0
-    mine = facing & (mesh.surface_of == mesh.surfaces.index(chart.surface))
+    mine = facing & mesh.on(chart.surface)
     triangles = mesh.points[mesh.triangles[mine]][:, :, list(chart.across)]
     offsets, weight = _disc(radius)
     for corner in np.unique([[x, y] for x in (lower[0], upper[0]) for y in (lower[1], upper[1])], axis=0):
@@ -185,14 +186,10 @@ def _disc(radius: float) -> tuple[np.ndarray, np.ndarray]:
 def _inside(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Whether each point (n, 2) lies in one of the triangles (t, 3, 2), shape (n,)."""
     a, b, c = np.moveaxis(triangles, 1, 0)
-    sides = np.stack([_cross(q - p, points[:, None] - p) for p, q in ((a, b), (b, c), (c, a))])
-    slack = 1e-9 * np.abs(_cross(b - a, c - a))
+    sides = np.stack([cross(q - p, points[:, None] - p) for p, q in ((a, b), (b, c), (c, a))])
+    slack = 1e-9 * np.abs(cross(b - a, c - a))
     found = (sides >= -slack).all(axis=0) | (sides <= slack).all(axis=0)
     return np.asarray(found.any(axis=1), dtype=float)
-
-
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
 def _words(point: Any) -> str:

@@ -22,6 +22,7 @@ from palpate.physics.interactions.footprint import (
     require_on_surface,
 )
 from palpate.physics.interactions.interaction import Attached, Energy
+from palpate.physics.words import millimetres, number
 from palpate.units import Range
 
 if TYPE_CHECKING:
@@ -118,6 +119,10 @@ class GluedPad:
             if isinstance(ends, tuple):
                 found.append(Range(tag(self.name, f"d_{axis}"), *ends, "m"))
         return tuple(found)
+
+    def __str__(self) -> str:
+        size = f" of radius {millimetres(self.radius)}" if self.radius is not None else ""
+        return f"pad{size} glued to {self.touches!r}, {number(self.pad)} N/m³"
 
     def describe(self) -> dict[str, Any]:
         """Its fields, with ``"type": "GluedPad"``."""

@@ -11,13 +11,16 @@ interaction has only to give its densities φ, its load vectors l or its lifts L
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from palpate.errors import UsageError
+from palpate.physics.arguments import require_number
 from palpate.physics.equilibrium.stop import Verdict
+from palpate.physics.words import number
 
 if TYPE_CHECKING:
     from palpate.physics.geometry.mesh import BodyMesh
@@ -176,8 +179,28 @@ class Held:
     ----------
     interaction : Interaction
     values : tuple of float
-        Its inputs.
+        Its inputs; a single number will do for one.
+
+    Raises
+    ------
+    UsageError
+        If it is no interaction, or the values are no numbers.
     """
 
     interaction: Interaction
     values: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.interaction, Interaction):
+            raise UsageError(
+                f"{self.interaction!r} can't be held: it is no interaction.",
+                why="An interaction has ranges, describe, refinements and attach.",
+                fix='For example Held(PrescribedDisplacement("top", "z", (-0.01, 0.0)), -0.004).',
+            )
+        values = tuple(self.values) if isinstance(self.values, Iterable) else (self.values,)
+        for value in values:
+            require_number("A held input", value)
+        object.__setattr__(self, "values", values)
+
+    def __str__(self) -> str:
+        return f"{self.interaction}, at {', '.join(map(number, self.values))}"

@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.errors import UsageError
 from palpate.physics.arguments import require_positive
 from palpate.physics.geometry.checks import require_known, require_triple
-from palpate.physics.interactions.arguments import direction_of, interval
+from palpate.physics.interactions.arguments import along, direction_of, range_of
 from palpate.physics.interactions.footprint import (
     MARGIN,
     QUADRATURE,
@@ -24,6 +23,7 @@ from palpate.physics.interactions.footprint import (
     require_on_surface,
 )
 from palpate.physics.interactions.interaction import Attached
+from palpate.physics.words import number
 from palpate.units import Range
 
 if TYPE_CHECKING:
@@ -34,18 +34,6 @@ __all__ = ["BodyForce", "PointForce", "SurfaceTraction"]
 
 Ends = tuple[float, float]
 Point = tuple[float, float, float]
-
-
-def range_of(what: str, value: Any, unit: str) -> Ends:
-    """Two ends of a range; a single number is refused."""
-    ends = interval(what, value, unit)
-    if isinstance(ends, tuple):
-        return ends
-    raise UsageError(
-        f"{what} is the single number {ends:g} {unit}.",
-        why="An input needs a range.",
-        fix="Give (low, high); a load that stays is `Held` with a value within its range.",
-    )
 
 
 def dead_load(load: np.ndarray) -> Attached:
@@ -112,6 +100,10 @@ class PointForce:
         """
         self._chart(geometry.rest())
         return (Range(self.name, *self.force, "N"),)
+
+    def __str__(self) -> str:
+        at = ", ".join(number(1e3 * x) for x in self.at)
+        return f"force along {along(self.direction)} at ({at}) mm of {self.surface!r}"
 
     def describe(self) -> dict[str, Any]:
         """Everything that decides what it does, as plain data for a JSON file."""
@@ -183,6 +175,9 @@ class SurfaceTraction:
         require_known("surface", self.surface, geometry.surfaces)
         return (Range(self.name, *self.traction, "Pa"),)
 
+    def __str__(self) -> str:
+        return f"traction on {self.surface!r} along {along(self.direction)}"
+
     def describe(self) -> dict[str, Any]:
         """Everything that decides what it does, as plain data for a JSON file."""
         return {"type": "SurfaceTraction", **asdict(self)}
@@ -239,6 +234,9 @@ class BodyForce:
         if self.region is not None:
             require_known("region", self.region, geometry.regions)
         return (Range(self.name, *self.force, "N/m³"),)
+
+    def __str__(self) -> str:
+        return f"body force along {along(self.direction)}{f' on {self.region!r}' if self.region else ''}"
 
     def describe(self) -> dict[str, Any]:
         """Everything that decides what it does, as plain data for a JSON file."""

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from palpate.physics.geometry.mesh import BodyMesh
+from palpate.physics.interactions.plane import cross
 
 __all__ = ["Patch", "winding_number"]
 
@@ -146,16 +147,11 @@ def winding_number(points: np.ndarray, triangles: np.ndarray, place: np.ndarray)
 
 def _barycentric(a: np.ndarray, b: np.ndarray, c: np.ndarray, place: np.ndarray) -> np.ndarray:
     """Weights (t, 3) of a place (2,) in triangles of the plane."""
-    area = _cross(b - a, c - a)
+    area = cross(b - a, c - a)
     area = np.where(np.abs(area) > 1e-14, area, np.nan)  # a triangle seen edge-on hides nothing
-    second = _cross(place - a, c - a) / area
-    third = _cross(b - a, place - a) / area
+    second = cross(place - a, c - a) / area
+    third = cross(b - a, place - a) / area
     return np.stack([1 - second - third, second, third], axis=1)
-
-
-def _cross(v: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """Cross products of vectors (t, 2) of the plane."""
-    return np.asarray(v[:, 0] * w[:, 1] - v[:, 1] * w[:, 0])
 
 
 def _nearest_weights(corners: np.ndarray, point: np.ndarray) -> np.ndarray:

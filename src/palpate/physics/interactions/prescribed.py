@@ -11,7 +11,7 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_positive
 from palpate.physics.geometry.checks import require_known, require_triple
-from palpate.physics.interactions.arguments import AXES, direction_of, interval, tag
+from palpate.physics.interactions.arguments import AXES, along, direction_of, interval, tag
 from palpate.physics.interactions.interaction import Attached
 from palpate.units import Range
 
@@ -36,7 +36,7 @@ class PrescribedDisplacement:
     surface : str
     directions : direction, or tuple of directions
         The eᵢ, each an axis such as ``"-z"`` or three numbers, taken to length 1.
-    travel : range, or tuple of ranges
+    displacement : range, or tuple of ranges
         (low, high) in m of each qᵢ.
     sliding : bool
         Whether displacements across all eᵢ, which must then be axes, are left free; they are held at zero
@@ -58,7 +58,7 @@ class PrescribedDisplacement:
 
     surface: str
     directions: Any = "z"
-    travel: Any = (-0.005, 0.005)
+    displacement: Any = (-0.005, 0.005)
     sliding: bool = False
     within: tuple[Point, Point] | None = None
     element: float | None = None
@@ -67,7 +67,7 @@ class PrescribedDisplacement:
     def __post_init__(self) -> None:
         directions = _directions(self.directions)
         object.__setattr__(self, "directions", directions)
-        object.__setattr__(self, "travel", _travel(self.travel, len(directions)))
+        object.__setattr__(self, "displacement", _ends(self.displacement, len(directions)))
         if np.linalg.matrix_rank(np.array(directions), tol=1e-9) < len(directions):
             raise UsageError(
                 f"The directions {directions} depend on each other.",
@@ -95,8 +95,13 @@ class PrescribedDisplacement:
         """
         require_known("surface", self.surface, geometry.surfaces)
         names = [_word(e, i, len(self.directions)) for i, e in enumerate(self.directions)]
-        pairs = zip(names, self.travel, strict=True)
+        pairs = zip(names, self.displacement, strict=True)
         return tuple(Range(tag(self.name, name), low, high, "m") for name, (low, high) in pairs)
+
+    def __str__(self) -> str:
+        axes = ", ".join(map(along, self.directions))
+        part = " in a box" if self.within is not None else ""
+        return f"{self.surface!r}{part} moved along {axes}{', free across' if self.sliding else ''}"
 
     def describe(self) -> dict[str, Any]:
         """Everything that decides what it does, as plain data for a JSON file."""
@@ -175,7 +180,7 @@ def _directions(value: Any) -> tuple[Point, ...]:
     return tuple(direction_of("The direction of a prescribed displacement", part) for part in several)
 
 
-def _travel(value: Any, count: int) -> tuple[Ends, ...]:
+def _ends(value: Any, count: int) -> tuple[Ends, ...]:
     parts = tuple(value) if isinstance(value, Iterable) else ()
     several = parts if parts and all(isinstance(part, Iterable) for part in parts) else (parts,)
     if len(several) != count:

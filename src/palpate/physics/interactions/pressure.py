@@ -18,8 +18,8 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.physics.geometry.checks import require_known, require_triple
+from palpate.physics.interactions.arguments import range_of
 from palpate.physics.interactions.interaction import Attached, Energy
-from palpate.physics.interactions.loads import range_of
 from palpate.units import Range
 
 if TYPE_CHECKING:
@@ -87,6 +87,9 @@ class Pressure:
         """The pressure, in Pa; `UsageError` if the body has no such surface."""
         require_known("surface", self.surface, geometry.surfaces)
         return (Range(self.name, *self.pressure, "Pa"),)
+
+    def __str__(self) -> str:
+        return f"pressure on {self.surface!r}"
 
     def describe(self) -> dict[str, Any]:
         """Everything that decides what it does, as plain data for a JSON file."""

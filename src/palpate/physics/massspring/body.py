@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +10,7 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.physics.massspring.pad import PointPad, point_areas
 from palpate.physics.massspring.springs import SpringNetwork, spring_network
+from palpate.physics.solid.parts import by_region, surfaces_of
 
 if TYPE_CHECKING:
     from palpate.physics.massspring.solver import MassSpringSolver
@@ -50,8 +50,6 @@ class MassSpringBody:
     volume: bool = True
 
     def __post_init__(self) -> None:
-        for surface in self.fixed_surfaces:
-            self._surface(surface)
         if not self.fixed_surfaces:
             raise UsageError("Nothing is fixed.", fix="Name a surface: fixed='bottom'.")
         self._per_tetrahedron("young")
@@ -59,7 +57,7 @@ class MassSpringBody:
     @property
     def fixed_surfaces(self) -> tuple[str, ...]:
         """Names of the fixed surfaces."""
-        return (self.fixed,) if isinstance(self.fixed, str) else tuple(self.fixed)
+        return surfaces_of(self.fixed, self.mesh)
 
     def network(self) -> SpringNetwork:
         """The springs and volumes."""
@@ -77,12 +75,12 @@ class MassSpringBody:
         moves = np.zeros(len(self.mesh.points), dtype=bool)
         moves[self.mesh.tetrahedra] = True
         for surface in self.fixed_surfaces:
-            moves[self._surface(surface)] = False
+            moves[self.mesh.triangles_of(surface)] = False
         return moves
 
     def pad(self, probe: Any) -> PointPad:
         """The pad of a `SphereProbe` on the points of the surface it touches."""
-        triangles = self._surface(probe.touches)
+        triangles = self.mesh.triangles_of(probe.touches)
         areas = point_areas(self.mesh.points, triangles)
         nodes = np.flatnonzero((areas > 0) & self.free())
         stop = np.inf if probe.stop is None else probe.stop
@@ -94,25 +92,8 @@ class MassSpringBody:
 
         return MassSpringSolver(self, probe)
 
-    def _surface(self, name: str) -> np.ndarray:
-        if name not in self.mesh.surfaces:
-            raise UsageError(
-                f"The mesh has no surface {name!r}.",
-                why=f"Its surfaces are {', '.join(self.mesh.surfaces)}.",
-                fix="Choose one of those.",
-            )
-        chosen = self.mesh.surface_of == self.mesh.surfaces.index(name)
-        return np.asarray(self.mesh.triangles[chosen])
-
     def _per_tetrahedron(self, quantity: str) -> np.ndarray:
         regions = self.mesh.regions
-        materials = (
-            self.material if isinstance(self.material, Mapping) else dict.fromkeys(regions, self.material)
-        )
-        if missing := [region for region in regions if region not in materials]:
-            raise UsageError(
-                f"No material for {', '.join(map(repr, missing))}.",
-                fix="Give one material for all, or one for each region.",
-            )
+        materials = dict(by_region(self.material, regions, ("young", "poisson", "density")))
         values = np.array([float(getattr(materials[region], quantity)) for region in regions])
         return np.asarray(values[self.mesh.region_of])

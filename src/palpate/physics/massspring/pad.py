@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["LIMIT", "PointPad", "point_areas"]
+from palpate.physics.interactions.pad_law import REACH, pressed_energy
 
-LIMIT = 0.98  # of the stop: beyond it a trial state is refused
+__all__ = ["PointPad", "point_areas"]
 
 
 def point_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -54,9 +54,9 @@ class PointPad:
     def energy(self, x: np.ndarray, centre: np.ndarray) -> float:
         """Energy in J; infinite past the stop."""
         p = np.maximum(self.penetration(x, centre), 0.0)
-        if np.any(p > LIMIT * self.stop):
+        if np.any(p > REACH * self.stop):
             return np.inf
-        return float(np.sum(self.areas * 0.5 * self.stiffness * p**2 / (1 - p / self.stop)))
+        return float(np.sum(self.areas * pressed_energy(p, self.stiffness, self.stop)))
 
     def gradient(self, x: np.ndarray, centre: np.ndarray) -> np.ndarray:
         """Derivative of the energy by the touchable points in N, shape (m, 3); its sum is the force on the probe."""
@@ -83,7 +83,7 @@ class PointPad:
 
     def _slopes(self, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """φ' and φ'' of the penetration, 0 outside."""
-        touched = np.clip(p, 0.0, LIMIT * self.stop)
+        touched = np.clip(p, 0.0, REACH * self.stop)
         room = 1 - touched / self.stop
         first = self.stiffness * touched * (1 - 0.5 * touched / self.stop) / room**2
         return first, np.where(p > 0, self.stiffness / room**3, 0.0)

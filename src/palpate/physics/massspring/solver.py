@@ -209,7 +209,7 @@ class MassSpringSolver:
 
     def _outward(self) -> np.ndarray:
         mesh = self.body.mesh
-        chosen = mesh.triangles[mesh.surface_of == mesh.surfaces.index(self.probe.touches)]
+        chosen = mesh.triangles_of(self.probe.touches)
         a, b, c = np.moveaxis(mesh.points[chosen], 1, 0)
         normal = np.cross(b - a, c - a).sum(axis=0)
         return np.asarray(normal / np.linalg.norm(normal))

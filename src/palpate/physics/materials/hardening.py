@@ -20,7 +20,7 @@ from palpate.errors import UsageError
 from palpate.physics.arguments import require_number, require_positive
 from palpate.physics.materials.tensors import exp, positive_part, where
 
-__all__ = ["Hardening", "LinearHardening", "VoceHardening"]
+__all__ = ["Hardening", "LinearHardening", "VoceHardening", "require_hardening"]
 
 
 class Hardening(Protocol):
@@ -90,6 +90,10 @@ class LinearHardening:
         """Plain data for JSON: the law's name and its constants in SI units."""
         return {"law": "linear hardening", **dataclasses.asdict(self)}
 
+    def __str__(self) -> str:
+        linear = f"linear hardening of {self.modulus:.4g} Pa" if self.modulus else "no hardening"
+        return f"yields at {self.yield_stress:.4g} Pa, {linear}"
+
 
 @dataclass(frozen=True)
 class VoceHardening:
@@ -149,6 +153,28 @@ class VoceHardening:
         """Plain data for JSON: the law's name and its constants in SI units."""
         return {"law": "Voce hardening", **dataclasses.asdict(self)}
 
+    def __str__(self) -> str:
+        linear = f" and by {self.modulus:.4g} Pa per strain" if self.modulus else ""
+        gain = f"hardens by {self.saturation:.4g} Pa (Voce, rate {self.rate:.4g}){linear}"
+        return f"yields at {self.yield_stress:.4g} Pa, {gain}"
+
+
+def require_hardening(thing: Any) -> None:
+    """Refuse what is no law of hardening.
+
+    Raises
+    ------
+    UsageError
+        If it lacks a member of one.
+    """
+    members = ("yield_stress", "flow_stress", "slope", "work", "increment", "describe")
+    if isinstance(thing, type) or not all(hasattr(thing, name) for name in members):
+        raise UsageError(
+            f"The hardening of a plastic material is {thing!r}.",
+            why="It is a law: a flow stress over the accumulated plastic strain.",
+            fix="Pass LinearHardening(yield_stress=50e6), stresses in Pa, for perfect plasticity.",
+        )
+
 
 def saturating_root(target: Any, share: Any, largest: float) -> Any:
     """x ≥ 0 with x + share (1 − exp(−x)) = target, for target ≥ 0 and 0 ≤ share ≤ largest.
@@ -168,7 +194,6 @@ def saturating_root(target: Any, share: Any, largest: float) -> Any:
 def _steps(share: float) -> int:
     """Newton steps to double precision: 3 for metals; far below a large share's saturation each step gains about 1."""
     return 3 + int(math.log1p(10 * share))
-
 
 
 def _require_not_negative(what: str, value: float) -> None:

@@ -226,11 +226,17 @@ class Elastic:
 
     def __str__(self) -> str:
         """The law, the initial moduli and the source, in words."""
-        named = self.name if self.name.lower() == self.law.lower() else f"{self.name}, {self.law}"
-        origin = f" ({self.source})" if self.source else ""
-        return (
-            f"{named}: E = {self.young:.4g} Pa, ν = {self.poisson:.5g}, ρ = {self.density:.4g} kg/m³{origin}"
-        )
+        return in_words(self)
+
+
+def in_words(material: Any, more: str = "") -> str:
+    """A material's law, initial moduli, what `more` there is to say of it, and its source."""
+    law = material.law
+    named = material.name if material.name.lower() == law.lower() else f"{material.name}, {law}"
+    figures = [f"E = {material.young:.4g} Pa", f"ν = {material.poisson:.5g}"]
+    figures.append(f"ρ = {material.density:.4g} kg/m³" if material.density else "no density")
+    origin = f" ({material.source})" if material.source else ""
+    return f"{named}: {', '.join([*figures, more] if more else figures)}{origin}"
 
 
 def initial_state(material: Material, like: Tensor) -> dict[str, Any]:

@@ -92,7 +92,6 @@ def require_density(density: float) -> None:
         raise unphysical("The density", density, "not negative, in kg/m³")
 
 
-
 def require_numbers(what: str, values: float | Sequence[float], unit: str = "") -> tuple[float, ...]:
     """A tuple of finite numbers from a number or a sequence of numbers.
 

@@ -73,6 +73,9 @@ class PronySeries:
         """γ_∞, the share that never relaxes."""
         return max(0.0, 1 - math.fsum(self.shares))
 
+    def __str__(self) -> str:
+        return "relaxes by " + " and ".join(f"{share:.4g} in {time:.4g} s" for share, time in self.terms)
+
     def relaxation(self, time: Any) -> Any:
         """g(t) for times in s of any shape."""
         time = np.asarray(time, dtype=float)

@@ -41,7 +41,7 @@ def write_vtu(solution: Any, path: str | os.PathLike[str]) -> Path:
     solution : SolidSolution
         Anything with `mesh` and `displacement`.
     path : path
-        By custom ``NAME.vtu``.
+        Ending in ``.vtu``.
 
     Returns
     -------
@@ -50,8 +50,9 @@ def write_vtu(solution: Any, path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     UsageError
-        If the solution did not converge, or the file can't be written.
+        If the solution did not converge, the file can't be written or its name has another ending.
     """
+    target = _ending_in(".vtu", path)
     require_state(solution)
     mesh = solution.mesh
     sections = [
@@ -65,7 +66,7 @@ def write_vtu(solution: Any, path: str | os.PathLike[str]) -> Path:
     ]
     body = "\n".join(["<UnstructuredGrid>", *sections, "</UnstructuredGrid>"])
     head = 'type="UnstructuredGrid" version="1.0" header_type="UInt64" compressor="vtkZLibDataCompressor"'
-    return _write(Path(path), head, body)
+    return _write(target, head, body)
 
 
 def write_pvd(
@@ -78,7 +79,7 @@ def write_pvd(
     solutions : sequence of SolidSolution
         Steps of a load path or of time, in order.
     path : path
-        By custom ``NAME.pvd``; the steps go to the folder ``NAME``.
+        Ending in ``.pvd``; the steps go to the folder ``NAME``.
     values : sequence of float, optional
         Time in s, or load, of each; 0, 1, 2 … by default.
 
@@ -91,7 +92,7 @@ def write_pvd(
     UsageError
         If there are no solutions, not as many values, or a file can't be written.
     """
-    target = Path(path)
+    target = _ending_in(".pvd", path)
     times = list(range(len(solutions))) if values is None else [float(v) for v in values]
     if not solutions or len(times) != len(solutions):
         raise UsageError(f"{len(solutions)} solutions and {len(times)} values make no series.")
@@ -169,6 +170,17 @@ def _packed(values: np.ndarray) -> str:
     packed = zlib.compress(data)
     header = np.array([1, len(data), len(data), len(packed)], dtype=np.uint64)
     return base64.b64encode(header.tobytes()).decode() + base64.b64encode(packed).decode()
+
+
+def _ending_in(suffix: str, path: str | os.PathLike[str]) -> Path:
+    target = Path(path)
+    if target.suffix.lower() == suffix:
+        return target
+    raise UsageError(
+        f"The file {target} doesn't end in {suffix}.",
+        why="ParaView tells a file's format by its name.",
+        fix=f"Write to {target.with_suffix(suffix).name if target.name else 'NAME' + suffix}.",
+    )
 
 
 def _write(path: Path, head: str, body: str) -> Path:

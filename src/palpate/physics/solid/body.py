@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from palpate.errors import UsageError
-from palpate.physics.geometry.checks import require_known, require_triple
+from palpate.physics.arguments import require_choice, require_positive
+from palpate.physics.geometry.checks import require_triple
 from palpate.physics.interactions.interaction import Held, Interaction
+from palpate.physics.solid.parts import (
+    by_region,
+    require_geometry,
+    require_held_values,
+    require_order,
+    require_weight,
+    surfaces_of,
+)
+from palpate.physics.words import number
 
 if TYPE_CHECKING:
     from palpate.physics.geometry.shape import Geometry
@@ -56,8 +66,8 @@ class Body:
     Raises
     ------
     UsageError
-        For names that the geometry does not have, regions without a material, or a formulation that the material
-        does not allow.
+        For what is no geometry or no material, names that the geometry does not have, regions without a material,
+        gravity on a material without a density, or a formulation that the material does not allow.
     """
 
     geometry: Geometry
@@ -71,20 +81,17 @@ class Body:
     step_error: float = 1e-3
 
     def __post_init__(self) -> None:
-        fixed = (self.fixed,) if isinstance(self.fixed, str) else tuple(self.fixed)
-        for name in fixed:
-            require_known("surface", name, self.geometry.surfaces)
-        held = (self.held,) if isinstance(self.held, Held) else tuple(self.held)
-        object.__setattr__(self, "fixed", fixed)
-        object.__setattr__(self, "held", held)
-        object.__setattr__(self, "gravity", require_triple("Gravity", self.gravity))
-        object.__setattr__(self, "material", self._by_region())
-        if self.order < 2:
-            raise UsageError(
-                f"The order of a solid is {self.order}.",
-                why="Displacements of first order lock in bending and pair with no stable pressure.",
-                fix="Use order=2, or 3 on a coarse mesh.",
-            )
+        require_geometry(self.geometry)
+        object.__setattr__(self, "fixed", surfaces_of(self.fixed, self.geometry))
+        object.__setattr__(self, "held", require_held_values(self.held))
+        object.__setattr__(self, "gravity", require_triple("Gravity", self.gravity, "m/s²"))
+        object.__setattr__(self, "material", by_region(self.material, self.geometry.regions))
+        if any(self.gravity):
+            require_weight(self.materials)
+        require_order(self.order)
+        require_choice("The formulation of a body", self.formulation, get_args(Formulation))
+        require_positive("The strain limit of a body", self.strain_limit, "")
+        require_positive("The error of a step", self.step_error, "", infinite=True)
         for region in self.materials:
             self.formulation_of(region)
 
@@ -148,8 +155,8 @@ class Body:
             form, why = self.formulation_of(region)
             lines += [f"  {region:8s} {material}", f"           {form} form: {why}"]
         if any(self.gravity):
-            lines.append(f"  gravity  {', '.join(f'{g:g}' for g in self.gravity)} m/s²")
-        lines += [f"  held     {held.interaction} at {held.values}" for held in self.held]
+            lines.append(f"  gravity  {', '.join(map(number, self.gravity))} m/s²")
+        lines += [f"  held     {held}" for held in self.held]
         return "\n".join(lines)
 
     def problem(self, *interactions: Interaction, element: float | None = None) -> SolidProblem:
@@ -161,28 +168,15 @@ class Body:
             At least one; their inputs follow each other in this order.
         element : float, optional
             Element size in m where the interactions need a fine mesh, in place of their own.
+
+        Raises
+        ------
+        UsageError
+            For what is no interaction, or lengths that are larger than the body.
         """
         from palpate.physics.solid.problem import SolidProblem
 
         return SolidProblem(self, _flat(interactions), element)
-
-    def _by_region(self) -> tuple[tuple[str, Any], ...]:
-        given = self.material
-        regions = self.geometry.regions
-        if isinstance(given, tuple):
-            given = dict(given)  # a copy of a body brings its material along as kept
-        if not isinstance(given, Mapping):
-            return tuple((region, given) for region in regions)
-        for name in given:
-            require_known("region", name, regions)
-        missing = [region for region in regions if region not in given]
-        if missing:
-            raise UsageError(
-                f"The region {missing[0]!r} has no material.",
-                why=f"The body's regions are {', '.join(regions)}; given were {', '.join(given)}.",
-                fix="Name a material for each region.",
-            )
-        return tuple((region, given[region]) for region in regions)
 
 
 def _flat(interactions: Sequence[Any]) -> tuple[Interaction, ...]:

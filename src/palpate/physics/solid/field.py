@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from palpate.physics.geometry.checks import require_known
+from palpate.physics.geometry.groups import members
 from palpate.physics.geometry.mesh import BodyMesh
 
 __all__ = ["SolidField"]
@@ -43,7 +44,8 @@ class SolidField:
         self.mesh, self.rest, self.order = mesh, rest, order
         for name in fixed:
             require_known("surface", name, rest.surfaces)
-        motion = ngsolve.VectorH1(mesh, order=order, dirichlet=pattern(fixed))
+        held = [member for name in fixed for member in members(name, rest.surfaces)]
+        motion = ngsolve.VectorH1(mesh, order=order, dirichlet=pattern(held))
         pressures = [
             ngsolve.Compress(ngsolve.H1(mesh, order=order - 1, definedon=mesh.Materials(pattern([region]))))
             for region in mixed
@@ -87,7 +89,7 @@ class SolidField:
             If there is none.
         """
         require_known("surface", name, self.rest.surfaces)
-        return self.mesh.Boundaries(pattern([name]))
+        return self.mesh.Boundaries(pattern(members(name, self.rest.surfaces)))
 
     def region(self, name: str) -> Any:
         """NGSolve region of a named part of the volume."""

@@ -12,8 +12,10 @@ import numpy as np
 
 from palpate.dataset import Field, Layout, solid_fields
 from palpate.errors import UsageError
+from palpate.physics.arguments import require_positive
 from palpate.physics.interactions.interaction import Interaction, Planned
 from palpate.physics.interactions.sphere import SphereProbe
+from palpate.physics.solid.lengths import longest_side, require_element, require_lengths, require_near
 from palpate.units import Range
 
 if TYPE_CHECKING:
@@ -58,6 +60,14 @@ class SolidProblem:
                     why="An interaction has ranges, describe, refinements and attach.",
                     fix="Pass for example a SphereProbe.",
                 )
+            require_lengths(interaction, self.longest)
+        if self.element is not None:
+            require_element(self.element, self.longest)
+
+    @cached_property
+    def longest(self) -> float:
+        """The body's longest side in m."""
+        return longest_side(self.body.geometry)
 
     @cached_property
     def ranges(self) -> tuple[Range, ...]:
@@ -112,6 +122,12 @@ class SolidProblem:
         }
 
     @property
+    def words(self) -> str:
+        """The body in a few words, for the title of its answers."""
+        materials = dict.fromkeys(material.name for material in self.body.materials.values())
+        return f"{self.body.geometry} ({', '.join(materials)})"
+
+    @property
     def hash(self) -> str:
         """SHA-256 of the description: equal for equal problems, in any process."""
         text = json.dumps(self.describe(), sort_keys=True)
@@ -126,7 +142,21 @@ class SolidProblem:
             ``"auto"``, or NGSolve's name of a sparse solver.
         tolerance : float
             Relative error in the energy norm at which an iteration ends.
+
+        Raises
+        ------
+        UsageError
+            For an unknown solver, or a tolerance that is not between 0 and 1.
+        SolverError
+            If the body has no equilibrium under its constant loads.
         """
+        require_positive("The tolerance of a solver", tolerance, "")
+        if tolerance >= 1:
+            raise UsageError(
+                f"The tolerance of a solver is {tolerance:g}.",
+                why="It is a relative error: at 1 anything would do.",
+                fix="Leave it out for 1e-9, or pass a number such as 1e-6.",
+            )
         from palpate.physics.solid.solver import SolidSolver
 
         return SolidSolver(self, solver=solver, tolerance=tolerance)
@@ -169,6 +199,7 @@ class SolidProblem:
     def chains(self, points: Any) -> list[np.ndarray]:
         """Rows of `points` (N, n) to be solved one after the other by one solver, chain by chain."""
         points = np.asarray(points, dtype=float)
+        require_near(points, self.ranges, self.longest)
         planned = self._planned()
         if planned is None:
             return [np.arange(len(points))]
@@ -194,15 +225,19 @@ class SolidProblem:
         Raises
         ------
         UsageError
-            If `x` has not one number per input.
+            If `x` has not one number per input, or is a position in m far from the body.
         """
-        values = np.atleast_1d(np.asarray(x, dtype=float))
+        try:
+            values = np.atleast_1d(np.asarray(x, dtype=float))
+        except (TypeError, ValueError):
+            values = np.empty(0)
         if values.shape != (len(self.ranges),):
             raise UsageError(
-                f"The inputs given have the shape {values.shape}.",
+                f"The inputs given are {x!r}.",
                 why=f"This problem has {len(self.ranges)}: {', '.join(r.name for r in self.ranges)}.",
                 fix="Give one number per input, in this order.",
             )
+        require_near(values[None, :], self.ranges, self.longest)
         return values
 
     def _planned(self) -> Any:

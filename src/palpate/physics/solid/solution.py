@@ -10,6 +10,7 @@ import numpy as np
 from palpate.dataset import conjugate_unit
 from palpate.physics.equilibrium.stop import Stop
 from palpate.physics.geometry.mesh import BodyMesh
+from palpate.physics.words import number
 from palpate.units import Range
 
 if TYPE_CHECKING:
@@ -118,7 +119,9 @@ class SolidSolution:
         return f"{self.stop} ({self.detail})" if self.detail else str(self.stop)
 
     def __str__(self) -> str:
-        asked = ", ".join(f"{r.name} = {x:g} {r.unit}" for r, x in zip(self.ranges, self.inputs, strict=True))
+        asked = ", ".join(
+            f"{r.name} = {number(x, 6)} {r.unit}" for r, x in zip(self.ranges, self.inputs, strict=True)
+        )
         lines = [f"Solid of {len(self.mesh.points)} nodes: {self.message}", f"  inputs       {asked}"]
         if self.converged:
             lines += [
@@ -128,7 +131,9 @@ class SolidSolution:
                 f"  least det F  {self.least_volume_ratio:.3g}, largest strain {self.largest_strain:.3g}",
             ]
         else:
-            at = ", ".join(f"{r.name} = {x:g}" for r, x in zip(self.ranges, self.reached, strict=False))
+            at = ", ".join(
+                f"{r.name} = {number(x, 6)}" for r, x in zip(self.ranges, self.reached, strict=False)
+            )
             lines.append(f"  reached      {at or 'nothing'}")
         cost = (
             f"{self.iterations} Newton iterations and {self.chords} chord steps in {len(self.log)} load steps"
@@ -140,7 +145,7 @@ class SolidSolution:
 
     def _responses(self) -> str:
         pairs = zip(self.ranges, self.response, strict=True)
-        return ", ".join(f"{x:.6g} {conjugate_unit(r.unit)}" for r, x in pairs)
+        return ", ".join(f"{number(x, 6)} {conjugate_unit(r.unit)}" for r, x in pairs)
 
     def plot(self, *args: Any, last: bool = False, **kwargs: Any) -> Any:
         """Draw the deformed body; see `palpate.physics.pictures.plot_solution`.

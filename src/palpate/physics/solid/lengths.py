@@ -1,0 +1,96 @@
+"""Lengths against the body's own: what tells mistaken units before a solve does nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.physics.arguments import require_positive
+from palpate.units import Range, bounds
+
+__all__ = ["longest_side", "require_element", "require_lengths", "require_near"]
+
+LENGTHS = ("radius", "depth", "stop", "displacement", "element")  # of interactions, in m
+
+
+def longest_side(geometry: Any) -> float:
+    """The body's longest side in m."""
+    size = getattr(geometry, "size", None)
+    if size is None:
+        low, high = geometry.rest().corners
+        size = high - low
+    return float(np.max(size))
+
+
+def require_lengths(interaction: Any, longest: float) -> None:
+    """Refuse an interaction with a length beyond the body's longest side in m.
+
+    Raises
+    ------
+    UsageError
+        With the length and a hint on units.
+    """
+    for what in LENGTHS:
+        for length in _numbers(getattr(interaction, what, None)):
+            if abs(length) > longest:
+                raise _too_long(f"The {what} of the {_kind(interaction)}", length, longest)
+
+
+def require_element(element: Any, longest: float) -> None:
+    """Refuse an element size that is not positive, or larger than the body.
+
+    Raises
+    ------
+    UsageError
+        With a hint on units.
+    """
+    require_positive("The element size of a problem", element, "m")
+    if element > longest:
+        raise _too_long("The element size of the problem", element, longest)
+
+
+def require_near(points: np.ndarray, ranges: Sequence[Range], longest: float) -> None:
+    """Refuse inputs (N, n) in m that are farther from their ranges than the body is long.
+
+    Raises
+    ------
+    UsageError
+        With the input and a hint on units.
+    """
+    low, high = bounds(ranges)
+    beyond = np.maximum(low - points, points - high)
+    beyond[:, [r.unit != "m" for r in ranges]] = 0.0
+    beyond[~np.isfinite(beyond)] = 0.0  # what is no number is the solver's to report
+    if not beyond.size or beyond.max() <= longest:
+        return
+    row, column = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
+    raise UsageError(
+        f"The input {ranges[column].name} is {points[row, column]:g} m, far from the body.",
+        why=f"Its range is {ranges[column].low:.4g} … {ranges[column].high:.4g} m, the body's longest side "
+        f"{longest:.4g} m: out there nothing touches.",
+        fix="Lengths are in m: pass 0.030 for 30 mm.",
+    )
+
+
+def _numbers(value: Any) -> Iterator[float]:
+    """The numbers in a value, a range or several of them."""
+    if isinstance(value, int | float):
+        yield float(value)
+    elif isinstance(value, tuple | list):
+        for part in value:
+            yield from _numbers(part)
+
+
+def _kind(interaction: Any) -> str:
+    return type(interaction).__name__
+
+
+def _too_long(what: str, length: float, longest: float) -> UsageError:
+    return UsageError(
+        f"{what} is {length:g} m, the body's longest side {longest:.4g} m.",
+        why="Nothing that touches a body or moves it is larger than the body.",
+        fix="Lengths are in m: pass 0.010 for 10 mm.",
+    )

@@ -1,0 +1,166 @@
+"""What a body is made of, checked when it is made."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterable, Mapping
+from numbers import Integral
+from typing import Any
+
+from palpate.errors import UsageError
+from palpate.physics.geometry.checks import require_known
+from palpate.physics.geometry.groups import members
+from palpate.physics.interactions.interaction import Held, Interaction
+
+__all__ = [
+    "by_region",
+    "require_geometry",
+    "require_held_values",
+    "require_order",
+    "require_weight",
+    "surfaces_of",
+]
+
+GEOMETRY = ("surfaces", "regions", "mesh", "rest", "describe")
+MATERIAL = ("poisson", "density", "kinematics", "states", "volumetric", "energy", "advance", "describe")
+
+
+def require_geometry(thing: Any) -> None:
+    """Refuse what is no geometry.
+
+    Raises
+    ------
+    UsageError
+        If it lacks a member of one.
+    """
+    if _lacks(thing, GEOMETRY) or isinstance(thing, type):
+        raise UsageError(
+            f"The geometry of a body is {thing!r}, of type {type(thing).__name__}.",
+            why="A geometry has surfaces and regions, and can be meshed.",
+            fix="Pass for example Block(size=(0.10, 0.10, 0.05)), sizes in m.",
+        )
+
+
+def surfaces_of(given: Any, geometry: Any) -> tuple[str, ...]:
+    """Names of fixed surfaces, ``"side"`` of a box written out.
+
+    Raises
+    ------
+    UsageError
+        If the geometry does not have one.
+    """
+    names = given if isinstance(given, Iterable) and not isinstance(given, str) else (given,)
+    found: list[str] = []
+    for name in names:
+        require_known("surface", name, geometry.surfaces)
+        found += members(name, geometry.surfaces)
+    return tuple(dict.fromkeys(found))
+
+
+def by_region(
+    given: Any, regions: tuple[str, ...], needed: tuple[str, ...] = MATERIAL
+) -> tuple[tuple[str, Any], ...]:
+    """(region, material) in the order of the regions, from one material for all or one for each.
+
+    Parameters
+    ----------
+    given : Material, or mapping or pairs of (region, Material)
+    regions : tuple of str
+    needed : tuple of str
+        Members that a material must have.
+
+    Raises
+    ------
+    UsageError
+        For an unknown region, one without a material, or what is no material.
+    """
+    if isinstance(given, tuple):
+        given = dict(given)  # a copy of a body brings its material along as kept
+    if not isinstance(given, Mapping):
+        given = dict.fromkeys(regions, given)
+    for name in given:
+        require_known("region", name, regions)
+    missing = [region for region in regions if region not in given]
+    if missing:
+        raise UsageError(
+            f"The region {missing[0]!r} has no material.",
+            why=f"The body's regions are {', '.join(regions)}; given were {', '.join(given)}.",
+            fix="Name a material for each region.",
+        )
+    for material in given.values():
+        _require_material(material, needed)
+    return tuple((region, given[region]) for region in regions)
+
+
+def require_held_values(given: Any) -> tuple[Held, ...]:
+    """Interactions that always act, each with its inputs.
+
+    Raises
+    ------
+    UsageError
+        For anything else.
+    """
+    parts = tuple(given) if isinstance(given, tuple | list) else (given,)
+    for part in parts:
+        if isinstance(part, Held):
+            continue
+        raise UsageError(
+            f"{part} is held by the body without inputs."
+            if isinstance(part, Interaction)
+            else f"{part!r} is held.",
+            why="What always acts is an interaction with the values of its inputs.",
+            fix="Wrap it: held=Held(interaction, values), for example "
+            'Held(PrescribedDisplacement("top", "z", (-0.01, 0.0)), -0.004).',
+        )
+    return parts
+
+
+def require_order(order: Any) -> None:
+    """Refuse a polynomial order that is no whole number from 2 on.
+
+    Raises
+    ------
+    UsageError
+        If it is not.
+    """
+    if isinstance(order, Integral) and order >= 2:
+        return
+    raise UsageError(
+        f"The order of a solid is {order!r}.",
+        why="It is a whole number; displacements of first order lock in bending and pair with no stable pressure.",
+        fix="Use order=2, or 3 on a coarse mesh.",
+    )
+
+
+def require_weight(materials: Mapping[str, Any]) -> None:
+    """Refuse gravity on a material without a density.
+
+    Raises
+    ------
+    UsageError
+        With the region's name.
+    """
+    for region, material in materials.items():
+        if not material.density:
+            raise UsageError(
+                f"Gravity acts, but the material of the region {region!r} has no density.",
+                why="The weight is density times gravity: the region would have none.",
+                fix="Give the material a density in kg/m³, for example NeoHookean(..., density=1000).",
+            )
+
+
+def _require_material(thing: Any, needed: tuple[str, ...]) -> None:
+    if not _lacks(thing, needed) and not isinstance(thing, type):
+        return
+    named = f', or named_material("{thing}")' if isinstance(thing, str) else ""
+    raise UsageError(
+        f"The material of a body is {thing!r}, of type {type(thing).__name__}.",
+        why="A material has moduli, a density and an energy.",
+        fix=f"Pass for example NeoHookean(young=9e3, poisson=0.45), moduli in Pa{named}.",
+    )
+
+
+def _lacks(thing: Any, names: tuple[str, ...]) -> bool:
+    """Whether a member is missing; none is evaluated, for a file would be read."""
+    nothing = object()
+    return any(inspect.getattr_static(thing, name, nothing) is nothing for name in names)

@@ -44,8 +44,17 @@ def test_the_stiffness_is_the_gradient_of_the_force(solver, pressed_in):
         ahead, behind = (solver.solve(pressed_in.inputs + sign * axis) for sign in (1, -1))
         columns.append((ahead.response - behind.response) / (2 * h))
     stiffness = pressed_in.response_gradient
-    np.testing.assert_array_equal(stiffness, stiffness.T)
     assert np.abs(np.array(columns).T - stiffness).max() < 1e-5 * np.abs(stiffness).max()
+
+
+def test_the_stiffness_is_symmetric_before_it_is_made_so(solver, pressed_in):
+    """A term that is missing in the coupling or the tangent would show."""
+    model = solver._model
+    model.set(pressed_in.inputs)
+    model.system.factorise(pressed_in.state)
+    raw, _ = model.inputs.raw_hessian(model.system, pressed_in.state)
+    assert np.abs(raw - raw.T).max() < 1e-10 * np.abs(raw).max()
+    np.testing.assert_allclose(-raw, pressed_in.response_gradient, atol=1e-7 * np.abs(raw).max())
 
 
 def test_the_force_is_the_sum_of_the_reactions(solver, pressed_in):
@@ -140,8 +149,7 @@ def test_the_mixed_form_is_chosen_and_does_not_lock():
 
 def test_an_incompressible_body_is_solved():
     """ν = 0.5 is the limit of ν → 0.5."""
-    if not np.isinf(gel(0.5).bulk_modulus):
-        pytest.skip("the law has no incompressible limit")
+    assert np.isinf(gel(0.5).bulk_modulus)
     limit = pressed(0.5).solve(above(0.003))
     near = pressed(0.49999).solve(above(0.003))
     assert limit.converged

@@ -67,13 +67,17 @@ class Inputs:
 
     def hessian(self, system: System, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """∂²U/∂q∂q (n, n) and ∂z/∂q (n, dof), with the system's present tangent, which is to be that at z."""
+        raw, slope = self.raw_hessian(system, z)
+        return (raw + raw.T) / 2, slope
+
+    def raw_hessian(self, system: System, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The same as it is computed, symmetric but for roundings where tangent and couplings are right."""
         explicit, lifted = self._coupling(z), self._lifted(system)
         coupling = explicit + lifted
         inner = self._solved(system, coupling)
         mixed = self.lifts @ explicit.T
         own = self._own(z) + mixed + mixed.T + self.lifts @ lifted.T
-        hessian = own - coupling @ inner.T
-        return (hessian + hessian.T) / 2, self.lifts - inner
+        return own - coupling @ inner.T, self.lifts - inner
 
     def _add(self, part: Attached, rows: slice) -> None:
         """Take over one interaction's loads, lifts and the derivatives of its densities."""

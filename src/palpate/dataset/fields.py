@@ -126,7 +126,7 @@ def solid_fields(nodes: int, ranges: Sequence[Range]) -> tuple[Field, ...]:
     return (
         Field("displacement", ("node", "component"), (nodes, 3), "m", "offset from the rest position"),
         Field("potential_energy", unit="J", meaning="energy U of body and interaction, without contact 0"),
-        Field("strain_energy", unit="J", meaning="energy stored in the body"),
+        Field("strain_energy", unit="J", meaning="energy in the body: elastic, and the plastic work"),
         Field("response", ("input",), (n,), ", ".join(units), "−∂U/∂input: on a probe the force"),
         Field("response_gradient", ("input", "along"), (n, n), slope, "∂response/∂input"),
         Field("penetration", unit="m", meaning="largest penetration of the pad"),

@@ -103,7 +103,7 @@ BODIES = {
 }
 
 
-SLOW = {"organ", "tube", "stl"}  # many elements
+SLOW = {"layered", "organ", "tube", "stl"}  # many elements
 MARKED = {kind: pytest.param(kind, marks=pytest.mark.slow) if kind in SLOW else kind for kind in BODIES}
 
 

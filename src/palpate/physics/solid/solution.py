@@ -45,9 +45,10 @@ class SolidSolution:
     displacement : (node, 3) array
         In m at the mesh's vertices. NaN unless converged, as are all the fields below but `state`.
     potential_energy : float
-        U in J: the least potential energy less that without the interaction.
+        U in J: the least potential energy less that without the interaction. Of a body with a history after a step
+        in time: with the free energy in place of the step's, which for finite viscoelastic strains is an estimate.
     strain_energy : float
-        ∫ W dV in J, without the interactions' energies.
+        ∫ W dV in J, without the interactions' energies. In an instant the plastic work counts too.
     response : (n,) array
         -∂U/∂q: for a probe's position the force on the probe in N.
     response_gradient : (n, n) array

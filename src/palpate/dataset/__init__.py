@@ -6,6 +6,7 @@
     layout.py     Layout: nodes at rest, axes, surface
     assemble.py   inputs and answers → a labelled dataset
     dataset.py    Dataset: the frozen value
+    named.py      its arrays by name
     words.py      a dataset in words
     join.py       the rows of several datasets as one
     store.py      on disk, with a checksum

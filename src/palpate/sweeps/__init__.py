@@ -21,7 +21,7 @@
 from palpate.sweeps.cluster import LocalCluster, local_cluster
 from palpate.sweeps.designs import DESIGNS, Design, grid, random, sobol
 from palpate.sweeps.external import ExternalProblem
-from palpate.sweeps.problem import Answer, Chained, Designed, Problem, Resettable, Solver
+from palpate.sweeps.problem import Answer, Chained, Checking, Designed, Problem, Resettable, Solver
 from palpate.sweeps.space import Space
 from palpate.sweeps.sweep import sweep
 
@@ -29,6 +29,7 @@ __all__ = [
     "DESIGNS",
     "Answer",
     "Chained",
+    "Checking",
     "Design",
     "Designed",
     "ExternalProblem",

@@ -16,7 +16,7 @@ from palpate.errors import UsageError
 from palpate.sweeps.answers import Columns
 from palpate.sweeps.chunks import chunks
 from palpate.sweeps.designs import Design, design_points
-from palpate.sweeps.problem import Designed, Problem, has_chains, missing_members, own_design
+from palpate.sweeps.problem import Checking, Designed, Problem, has_chains, missing_members, own_design
 from palpate.sweeps.provenance import config_hash, provenance
 from palpate.sweeps.space import Space
 
@@ -105,7 +105,10 @@ def make_plan(
     if samples is not None:
         _require_samples(samples)
     if points is not None:
-        return Plan(problem, space, _some(space.points(points)), "points", seed)
+        given = _some(space.points(points))
+        if isinstance(problem, Checking):
+            problem.check_points(given)
+        return Plan(problem, space, given, "points", seed)
     own = own_design(problem)
     if isinstance(problem, Designed) and own is not None and (design is None or design == own):
         return Plan(problem, space, _some(space.points(problem.design(samples or 0, seed))), own, seed)
@@ -145,7 +148,7 @@ def _checked(chains: list[np.ndarray], count: int) -> list[np.ndarray]:
 
 
 def _require_samples(samples: Any) -> None:
-    if isinstance(samples, Integral) and samples >= 1:
+    if isinstance(samples, Integral) and int(samples) >= 1:
         return
     raise UsageError(
         f"A sweep was asked for {samples!r} samples.",

@@ -17,6 +17,7 @@ from palpate.units import Range
 __all__ = [
     "Answer",
     "Chained",
+    "Checking",
     "Designed",
     "Problem",
     "Resettable",
@@ -112,6 +113,14 @@ class Designed(Protocol):
 
     def design(self, samples: int, seed: int) -> np.ndarray:
         """At most `samples` points, shape (N, n)."""
+
+
+@runtime_checkable
+class Checking(Protocol):
+    """A problem that knows points at which it would be asked in vain."""
+
+    def check_points(self, points: np.ndarray) -> None:
+        """Refuse such points (N, n) with a `UsageError`."""
 
 
 def own_design(problem: Problem) -> str | None:

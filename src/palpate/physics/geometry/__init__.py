@@ -12,6 +12,7 @@ sampling       points spread over a part of a surface
 segments       parts of a surface between sharp edges, or named by a box
 triangulation  closed surfaces and their faults
 checks         arguments that all shapes check alike
+groups         names that stand for several surfaces
 """
 
 from palpate.physics.geometry.block import Block

@@ -8,6 +8,7 @@ support      rollers: planes of symmetry
 loads        dead loads: a point force, a traction, a body force
 pressure     a pressure that follows its surface
 
+pad_law      the pad between a sphere and a surface
 contact      a sphere's contact energy, and whether a state is admissible
 columns      in which order a sphere's positions are solved
 patch        a touched surface as triangles

@@ -11,6 +11,7 @@
     plastic, hardening, metals          J2 plasticity, how a metal hardens, metals by name
     uniaxial       laws of single fibres, for beams
     homogeneous    uniaxial, equibiaxial, planar, shear and volumetric tests
+    relaxing       the stress-free state of unloaded directions
     stability      Drucker's criterion over a range of strains
     library        materials by name, with sources
 

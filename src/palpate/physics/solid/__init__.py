@@ -1,7 +1,9 @@
 """Solid bodies in three dimensions, at small and large strain.
 
 body       shape, materials, supports and constant loads
+parts      what a body is made of, checked
 problem    a body and what varies: what a sweep asks
+lengths    lengths against the body's own, which tell mistaken units
 solver     many solves, each from the nearest answer before
 solution   what a solve returns
 opening    building the finite elements of a problem

@@ -66,10 +66,11 @@ def require_near(points: np.ndarray, ranges: Sequence[Range], longest: float) ->
     beyond[~np.isfinite(beyond)] = 0.0  # what is no number is the solver's to report
     if not beyond.size or beyond.max() <= longest:
         return
-    row, column = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
+    row, column = divmod(int(np.argmax(beyond)), len(ranges))
+    given = ranges[column]
     raise UsageError(
-        f"The input {ranges[column].name} is {points[row, column]:g} m, far from the body.",
-        why=f"Its range is {ranges[column].low:.4g} … {ranges[column].high:.4g} m, the body's longest side "
+        f"The input {given.name} is {points[row, column]:g} m, far from the body.",
+        why=f"Its range is {given.low:.4g} … {given.high:.4g} m, the body's longest side "
         f"{longest:.4g} m: out there nothing touches.",
         fix="Lengths are in m: pass 0.030 for 30 mm.",
     )

@@ -123,7 +123,7 @@ def require_order(order: Any) -> None:
     UsageError
         If it is not.
     """
-    if isinstance(order, Integral) and order >= 2:
+    if isinstance(order, Integral) and int(order) >= 2:
         return
     raise UsageError(
         f"The order of a solid is {order!r}.",

@@ -199,11 +199,21 @@ class SolidProblem:
     def chains(self, points: Any) -> list[np.ndarray]:
         """Rows of `points` (N, n) to be solved one after the other by one solver, chain by chain."""
         points = np.asarray(points, dtype=float)
-        require_near(points, self.ranges, self.longest)
+        self.check_points(points)
         planned = self._planned()
         if planned is None:
             return [np.arange(len(points))]
         return list(planned.chains(self.body.geometry, points))
+
+    def check_points(self, points: np.ndarray) -> None:
+        """Refuse positions (N, n) far from the body, which tell of mistaken units; a sweep asks for it.
+
+        Raises
+        ------
+        UsageError
+            If one is farther from its range than the body is long.
+        """
+        require_near(np.asarray(points, dtype=float), self.ranges, self.longest)
 
     def probe_at(self, x: np.ndarray) -> tuple[SphereProbe | None, np.ndarray | None]:
         """The first sphere among the interactions, and where inputs x (n,) put its centre, (3,) in m."""

@@ -70,6 +70,7 @@ def pressed(solver, depths):
     return solver.march(np.arange(1.0, len(depths) + 1), [above(d) for d in depths])
 
 
+@pytest.mark.slow
 def test_the_force_on_a_plastic_body_does_not_depend_on_the_steps_asked_for(metal):
     """A march in one step, in four, and a solve from rest agree within a few errors of a step."""
     solver, deep = metal.open(), 0.0012
@@ -92,6 +93,7 @@ def test_a_smaller_error_of_a_step_comes_closer_to_many_steps(metal):
     assert errors[2] < 3e-3
 
 
+@pytest.mark.slow
 def test_an_instant_of_a_plastic_body_is_the_same_whatever_was_before(metal):
     solver = metal.open()
     first = solver.solve(above(0.0008))

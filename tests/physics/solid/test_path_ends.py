@@ -180,3 +180,13 @@ def test_a_state_refused_for_growing_corrections_clears_the_blame_of_an_earlier_
     assert found.stop is Stop.STEP_TOO_SMALL
     assert found.cuts > 0
     assert found.rejected is None
+
+
+def test_a_path_of_ever_shorter_steps_is_given_up(monkeypatch, solver):
+    solver.reset()
+    monkeypatch.setattr(path, "MOST_STEPS", 1)
+    monkeypatch.setattr(path, "_pace", lambda _: 0.1)
+    found = solver.solve(above(0.006))
+    assert found.stop is Stop.ITERATION_LIMIT
+    assert "1 steps along the path" in found.message
+    assert found.reached[2] > above(0.006)[2]

@@ -23,6 +23,7 @@ SMALLEST_REFUSED = 2.0**-4
 SMALLEST_IN_TIME = 2.0**-30
 # Of steps that led nowhere, and of all where nothing is remembered: bounds the time that pointless inputs cost
 MOST_ITERATIONS = 200
+MOST_STEPS = 400  # a body that flows without end, near collapse, is followed in ever shorter steps
 EASY, HARD = 3, 6  # factorisations of a search up to which steps grow, beyond which they shrink
 GROWTH, SHRINKAGE = 1.6, 0.7
 LONGEST, SHORTEST, SAFETY = 4.0, 0.2, 0.8  # factors of the next step that the error in time allows
@@ -119,8 +120,8 @@ def follow(model: SolidModel, start: Known, target: np.ndarray) -> Followed:
         else:
             model.recall(remembered)
             step = (end - position) * min(_allowed(tried.error), 0.5)
-        if step < _smallest(tried) or _spent(model, log) >= MOST_ITERATIONS:
-            return Followed(here, _given_up(tried, _spent(model, log)), tuple(log))
+        if step < _smallest(tried) or _spent(model, log) >= MOST_ITERATIONS or len(log) >= MOST_STEPS:
+            return Followed(here, _given_up(tried, _spent(model, log), len(log)), tuple(log))
 
 
 def _sloped(model: SolidModel, start: Known) -> Known:
@@ -161,12 +162,14 @@ def _spent(model: SolidModel, log: list[LoadStep]) -> int:
     return sum(e.iterations for e in log if not model.histories or e.stop is not Stop.CONVERGED)
 
 
-def _given_up(last: Tried, spent: int) -> Verdict:
+def _given_up(last: Tried, spent: int, steps: int) -> Verdict:
     """The verdict on a path that ends before its target: never that of a good step on the way."""
     if last.verdict.stop is not Stop.CONVERGED:
         return last.verdict
     if spent >= MOST_ITERATIONS:
         return Verdict(Stop.ITERATION_LIMIT, f"{spent} iterations along the path")
+    if steps >= MOST_STEPS:
+        return Verdict(Stop.ITERATION_LIMIT, f"{steps} steps along the path")
     return Verdict(Stop.STEP_TOO_SMALL)
 
 

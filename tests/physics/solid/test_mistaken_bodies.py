@@ -50,7 +50,6 @@ PROBLEM = BODY.problem(PUSH)
         (lambda: Held(PUSH, "1 mm"), "In Python it is a number"),
         (lambda: SphereProbe(radius=0.01, depth=0.01), "Give (low, high)"),
         (lambda: BODY.problem(SphereProbe(radius=10)), "0.010 for 10 mm"),
-        (lambda: BODY.problem(SphereProbe(radius=0.05)), "larger than the body"),
         (lambda: BODY.problem(SphereProbe(radius=0.01, depth=(0, 5))), "0.010 for 10 mm"),
         (lambda: BODY.problem(PrescribedDisplacement("top", "z", (-4, 0))), "0.010 for 10 mm"),
         (lambda: BODY.problem(PROBE, element=3), "element size of the problem"),
@@ -75,6 +74,10 @@ def test_mistakes_are_refused_with_a_remedy(make, words):
     assert words in str(caught.value)
     assert caught.value.why
     assert caught.value.fix
+
+
+def test_a_large_sphere_is_a_flat_one():
+    assert BODY.problem(SphereProbe(radius=0.4, depth=(0.0, 0.001))).interactions[0].radius == 0.4
 
 
 def test_what_is_near_the_ranges_or_in_other_units_is_solved():

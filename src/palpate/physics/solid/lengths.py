@@ -13,7 +13,11 @@ from palpate.units import Range, bounds
 
 __all__ = ["longest_side", "require_element", "require_lengths", "require_near"]
 
-LENGTHS = ("radius", "depth", "stop", "displacement", "element")  # of interactions, in m
+FLATTEST = (
+    20.0  # radius over the body's longest side: larger spheres are flat, millimetres taken for metres larger
+)
+# of interactions, in m, and how many times the body's longest side they may be
+LENGTHS = {"radius": FLATTEST, "depth": 1.0, "stop": 1.0, "displacement": 1.0, "element": 1.0}
 
 
 def longest_side(geometry: Any) -> float:
@@ -26,16 +30,16 @@ def longest_side(geometry: Any) -> float:
 
 
 def require_lengths(interaction: Any, longest: float) -> None:
-    """Refuse an interaction with a length beyond the body's longest side in m.
+    """Refuse an interaction with a length that the body's longest side in m leaves no room for.
 
     Raises
     ------
     UsageError
         With the length and a hint on units.
     """
-    for what in LENGTHS:
+    for what, share in LENGTHS.items():
         for length in _numbers(getattr(interaction, what, None)):
-            if abs(length) > longest:
+            if abs(length) > share * longest:
                 raise _too_long(f"The {what} of the {_kind(interaction)}", length, longest)
 
 
@@ -92,6 +96,6 @@ def _kind(interaction: Any) -> str:
 def _too_long(what: str, length: float, longest: float) -> UsageError:
     return UsageError(
         f"{what} is {length:g} m, the body's longest side {longest:.4g} m.",
-        why="Nothing that touches a body or moves it is larger than the body.",
+        why="That is out of all proportion to the body.",
         fix="Lengths are in m: pass 0.010 for 10 mm.",
     )

@@ -121,7 +121,7 @@ def test_the_state_does_not_depend_on_the_way(solver, slid):
     by_sliding = slid[5]
     centre = by_sliding.inputs
     foot = centre[:2]
-    deeper, aside = above(foot, 0.006), above(foot + [0.001, -0.001], 0.0045)
+    deeper, aside = above(foot, 0.006), above(np.add(foot, (0.001, -0.001)), 0.0045)
     for way in ([], [deeper], [aside]):
         other = solved(solver, [*way, centre])[-1]
         assert other.potential_energy == pytest.approx(by_sliding.potential_energy, rel=1e-10)

@@ -132,7 +132,9 @@ def solid_fields(nodes: int, ranges: Sequence[Range]) -> tuple[Field, ...]:
         Field("penetration", unit="m", meaning="largest penetration of the pad"),
         Field("least_volume_ratio", meaning="least det F of the body"),
         Field("largest_strain", meaning="largest |λ − 1| of a principal stretch λ", optional=True),
-        Field("chords", meaning="cheap steps with a tangent used before, beside the iterations", optional=True),
+        Field(
+            "chords", meaning="cheap steps with a tangent used before, beside the iterations", optional=True
+        ),
     )
 
 

@@ -34,11 +34,18 @@ def cost(rows: Rows, path: Path) -> None:
                 line,
                 marker=marker,
                 color=colour,
-                label=f"{word}, {form}",
+                label=word,
             )
         right.loglog(unknowns, [row["memory"] for row in mine], marker=marker, color=colour, label=form)
     left.set(xlabel="unknowns", ylabel="CPU seconds, one thread", title="Time")
     right.set(xlabel="unknowns", ylabel="GB", title="Peak memory")
+    left.legend(*_first(left, len(words)), loc="lower right", fontsize="small")
+    right.legend(fontsize="small")
+    for one in (left, right):
+        one.set_xticks((5e3, 1e4, 2e4, 4e4, 8e4), ("5 000", "10 000", "20 000", "40 000", "80 000"))
+        one.set_xticks((), minor=True)
+    right.set_yticks((0.2, 0.5, 1.0), ("0.2", "0.5", "1"))
+    right.set_yticks((), minor=True)
     _finish(figure, (left, right), path)
 
 
@@ -54,7 +61,14 @@ def sizes(rows: Rows, path: Path) -> None:
             one.plot([row["size"] for row in mine], [row[form] for row in mine], marker=marker, label=form)
         one.set(xlabel="element size, mm", title=f"ν = {poisson:g}")
     axes[0].set(ylabel="normal force, N")
+    axes[0].legend(fontsize="small")
     _finish(figure, axes, path)
+
+
+def _first(axes: Any, count: int) -> tuple[list[Any], list[str]]:
+    """The legend's entries of the first form: the other's differ in colour only."""
+    handles, labels = axes.get_legend_handles_labels()
+    return handles[:count], labels[:count]
 
 
 def _finish(figure: Any, axes: Sequence[Any], path: Path) -> None:
@@ -62,8 +76,6 @@ def _finish(figure: Any, axes: Sequence[Any], path: Path) -> None:
 
     for one in axes:
         one.grid(visible=True, which="both", alpha=0.3)
-    for one in axes if len(axes) == 2 else axes[:1]:
-        one.legend(fontsize="small")
     figure.savefig(path, dpi=100)
     pyplot.close(figure)
 

@@ -9,6 +9,7 @@ from solids import PROBE, above, gel, pressed
 
 from palpate.errors import UsageError
 from palpate.physics.equilibrium.stop import Stop
+from palpate.physics.interactions import SphereProbe
 
 STEP = 1e-6  # m; so short that hardly a quadrature point comes into contact, where stiffness jumps
 
@@ -164,3 +165,16 @@ def test_sparse_solvers_are_known_by_name():
     if BaseMatrix.GetDefaultInverseType() != "pardiso":
         with pytest.raises(UsageError, match="mkl"):
             pressed().open(solver="pardiso")
+
+
+def test_a_probe_on_a_surface_that_is_not_there_is_refused_before_meshing():
+    with pytest.raises(UsageError, match="upper"):
+        pressed(probe=SphereProbe(radius=0.01, touches="upper"))
+
+
+def test_the_force_is_the_response_to_lengths(pressed_in):
+    np.testing.assert_array_equal(pressed_in.force, pressed_in.response)
+
+
+def test_an_equivalent_stress_is_never_negative(solver):
+    assert solver.solve(above(0.004), fields=True).von_mises.min() >= 0.0

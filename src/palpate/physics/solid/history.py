@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.physics.solid.density import deformation_gradient, stored_density
+from palpate.physics.solid.density import deformation_gradient, rule_order, stored_density
 
 if TYPE_CHECKING:
     from palpate.physics.materials.material import Material
@@ -40,9 +40,8 @@ class History:
         import ngsolve
         from ngsolve.comp import IntegrationRuleSpace
 
-        # its rule is exact to twice this order, as is that of a body without a history in displacement form;
-        # NGSolve takes a finer one for a mixed form, which for a pressure of first order there is no need of
-        points = IntegrationRuleSpace(field.mesh, order=field.order - 1)
+        # its rule is exact to twice the order given here
+        points = IntegrationRuleSpace(field.mesh, order=rule_order(field, material) // 2)
         self._region = field.region(region)
         self._variables = material.states
         spaces = {v.name: ngsolve.MatrixValued(points) if v.shape else points for v in self._variables}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.physics.solid.density import cauchy_stress, deformation_gradient, mixed_density
+from palpate.physics.solid.density import cauchy_stress, deformation_gradient, mixed_density, volume_rule
 
 if TYPE_CHECKING:
     from palpate.physics.materials.material import Material
@@ -62,9 +62,7 @@ class Measures:
         total = 0.0
         for region, material in self._materials.items():
             history = self._histories.get(region)
-            # NGSolve's rules for the energy itself: exact to a higher order where a pressure stands in it
-            order = self._field.order if region in self._field.pressure else self._field.order - 1
-            rules = {ngsolve.ET.TET: ngsolve.IntegrationRule(ngsolve.ET.TET, 2 * order)}
+            rules = {ngsolve.ET.TET: volume_rule(self._field, material)}
             if history is None:
                 density = self._density(region, material)
             else:
@@ -97,7 +95,10 @@ class Measures:
             return ngsolve.sqrt(1.5 * ngsolve.InnerProduct(deviator, deviator))
 
         known = self._stresses()
-        return self._at_nodes({region: equivalent(stress).Compile() for region, stress in known.items()})
+        projected = self._at_nodes({region: equivalent(stress).Compile() for region, stress in known.items()})
+        return np.maximum(
+            projected, 0.0
+        )  # a projection undershoots beside a steep peak; an equivalent stress is not negative
 
     def stress(self) -> np.ndarray:
         """Cauchy stress in Pa at the nodes, shape (node, 3, 3)."""
@@ -130,13 +131,10 @@ class Measures:
 
     def _gradients(self, *, large: bool) -> np.ndarray:
         """F at the quadrature points of all regions of large or of small strain, shape (N, 3, 3)."""
-        import ngsolve
-
-        # NGSolve's rule for the energy itself, exact for products of two strains
-        rule = ngsolve.IntegrationRule(ngsolve.ET.TET, 2 * (self._field.order - 1))
         found = [np.empty((0, 9))]
         for region, material in self._materials.items():
             if (material.kinematics == "large") == large:
+                rule = volume_rule(self._field, material)
                 points = self._field.mesh.MapToAllElements(rule, self._field.region(region))
                 found.append(np.asarray(self._gradient(points)))
         return np.concatenate(found).reshape(-1, 3, 3)

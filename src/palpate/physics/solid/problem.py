@@ -13,6 +13,7 @@ import numpy as np
 from palpate.dataset import Field, Layout, solid_fields
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_positive
+from palpate.physics.geometry.checks import require_known
 from palpate.physics.interactions.interaction import Interaction, Planned
 from palpate.physics.interactions.sphere import SphereProbe
 from palpate.physics.solid.lengths import longest_side, require_element, require_lengths, require_near
@@ -60,9 +61,16 @@ class SolidProblem:
                     why="An interaction has ranges, describe, refinements and attach.",
                     fix="Pass for example a SphereProbe.",
                 )
+            self._require_surface(interaction)
             require_lengths(interaction, self.longest)
         if self.element is not None:
             require_element(self.element, self.longest)
+
+    def _require_surface(self, interaction: Any) -> None:
+        """Refuse a touched surface that the body does not have, before anything is meshed."""
+        named = getattr(interaction, "touches", getattr(interaction, "surface", None))
+        if isinstance(named, str):
+            require_known("surface", named, self.body.geometry.surfaces)
 
     @cached_property
     def longest(self) -> float:

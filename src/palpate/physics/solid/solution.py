@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.dataset import conjugate_unit
+from palpate.errors import UsageError
 from palpate.physics.equilibrium.stop import Stop
 from palpate.physics.geometry.mesh import BodyMesh
 from palpate.physics.words import number
@@ -118,6 +119,23 @@ class SolidSolution:
     def message(self) -> str:
         """The reason in words, with its figures."""
         return f"{self.stop} ({self.detail})" if self.detail else str(self.stop)
+
+    @property
+    def force(self) -> np.ndarray:
+        """The response where every input is a length, shape (n,): for a probe the force that it feels, in N.
+
+        Raises
+        ------
+        UsageError
+            If an input is no length.
+        """
+        if any(r.unit != "m" for r in self.ranges):
+            raise UsageError(
+                "This solution has no force by itself.",
+                why=f"Its inputs are {', '.join(map(str, self.ranges))}; a force belongs to a length.",
+                fix="Read response: −∂U/∂input for each input.",
+            )
+        return self.response
 
     def __str__(self) -> str:
         asked = ", ".join(

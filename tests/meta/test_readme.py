@@ -61,8 +61,33 @@ def test_the_program_runs_as_a_file_without_a_guard(tmp_path: Path):
     assert (tmp_path / "beam.palpate").is_file()
 
 
+def titled(title: str) -> str:
+    """The program under a heading of the README."""
+    return re.search(rf"^## {title}\n.*?```python\n(.*?)```", README, re.DOTALL | re.MULTILINE)[1]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_the_program_for_soft_bodies_runs(tmp_path: Path):
+    text = titled("Soft bodies")
+    assert "samples=24" in text
+    done = subprocess.run(
+        [sys.executable, "-c", text.replace("samples=24", "samples=3")],
+        check=False,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        env=os.environ | {"PYTHONIOENCODING": "utf-8"},
+        timeout=280,
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    assert done.stdout.startswith("Solid of ")
+    assert {path.name for path in tmp_path.iterdir()} >= {"pressed.png", "pressed.vtu", "block.zarr"}
+
+
 def test_the_program_for_arrays_runs(tmp_path: Path):
-    text = re.findall(r"```python\n(.*?)```", README, re.DOTALL)[1]
+    text = titled("From your own arrays")
     done = subprocess.run(
         [sys.executable, "-c", text],
         check=False,

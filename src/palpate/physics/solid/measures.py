@@ -96,9 +96,8 @@ class Measures:
 
         known = self._stresses()
         projected = self._at_nodes({region: equivalent(stress).Compile() for region, stress in known.items()})
-        return np.maximum(
-            projected, 0.0
-        )  # a projection undershoots beside a steep peak; an equivalent stress is not negative
+        # a projection undershoots beside a steep peak; an equivalent stress is not negative
+        return np.asarray(np.maximum(projected, 0.0))
 
     def stress(self) -> np.ndarray:
         """Cauchy stress in Pa at the nodes, shape (node, 3, 3)."""

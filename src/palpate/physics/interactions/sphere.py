@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["SphereProbe"]
 
-ELEMENT = 0.6  # element size under the probe over its radius: the force then ripples by 0.1 % from 0.2 R of depth on
+ELEMENT = 0.5  # element size under the probe over its radius: the force then ripples by < 0.2 % from 0.1 R of depth on
 ROUND_ELEMENT = 0.4  # the same on curved surfaces, where the elements' shape adds to the error
 MARGIN = 1.3  # how far beyond the footprint of its centres the probe may touch, over its radius
 INSET = 3.0  # distance of the footprint from the surface's rim over the radius, unless it is given

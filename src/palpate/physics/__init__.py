@@ -8,11 +8,13 @@
     equilibrium   finding a minimum of an energy, whatever body it belongs to
     massspring    points and springs on the same mesh, to compare with
     pictures      drawing what was solved
+    advice        warnings of models that are hardly meant
 
 A body and what acts on it make a problem, a plain value. The problem's `open` builds the finite elements and gives a
 solver, whose `solve` returns a solution, a plain value also where there is no equilibrium.
 """
 
+from palpate.physics.advice import ModelWarning
 from palpate.physics.beam import (
     HISTORY_PRESETS,
     PRESETS,
@@ -113,6 +115,7 @@ __all__ = [
     "LinearHardening",
     "LoadAndUnload",
     "Material",
+    "ModelWarning",
     "MooneyRivlin",
     "NeoHookean",
     "Ogden",

@@ -193,9 +193,11 @@ def _body_of_solutions(solutions: list[Any], name: str) -> ShownBody:
 
 
 def _step_of(solution: Any) -> ShownStep:
+    from palpate.physics.pictures.tool import ball_of  # a page of a study needs no bodies
+
     fields = {VON_MISES: "von_mises", STRETCH: "largest_stretch"}
     known = {name: getattr(solution, attribute, None) for name, attribute in fields.items()}
-    ball = _ball_of(solution)
+    ball = ball_of(solution, True)
     return ShownStep(
         displacement=solution.displacement,
         values={name: values for name, values in known.items() if values is not None},
@@ -204,17 +206,6 @@ def _step_of(solution: Any) -> ShownStep:
             getattr(solution, "response", None), getattr(solution, "potential_energy", None), ball
         ),
     )
-
-
-def _ball_of(solution: Any) -> tuple[np.ndarray, float] | None:
-    """The sphere that pressed a solution: its probe's, at its own centre or, failing that, at its inputs."""
-    radius = getattr(getattr(solution, "probe", None), "radius", None)
-    centre = getattr(solution, "centre", None)
-    if centre is None:
-        centre = getattr(solution, "inputs", None)
-    if radius is None or centre is None or np.shape(centre) != (3,):
-        return None
-    return np.asarray(centre, dtype=float), float(radius)
 
 
 def figures(response: Any, energy: Any, ball: tuple[np.ndarray, float] | None) -> dict[str, str]:

@@ -13,6 +13,7 @@ import pytest
 from palpate.errors import FileFormatError, UsageError
 from palpate.physics.geometry import (
     Block,
+    Cylinder,
     FineMesh,
     ImportedMesh,
     ImportedSolid,
@@ -266,3 +267,20 @@ def test_patches_need_a_place():
     assert "no clear place" in failure(lambda: SurfacePatch("tip", lower=(0, 0, 0)))
     assert "no clear place" in failure(lambda: SurfacePatch("tip", (0, 0, 0), (1, 1, 1), above))
     assert "patterns" in failure(lambda: SurfacePatch("tip|top", (0, 0, 0), (1, 1, 1)))
+
+
+def test_faces_say_where_they_are(tmp_path: Path):
+    cube = write_stl(tmp_path / "cube.stl", CUBE, SIDES)
+    faces = {face.normal: face for face in cube.faces}
+    assert set(faces) == {tuple(sign * row) for row in np.eye(3) for sign in (1.0, -1.0)}
+    lid = faces[0.0, 0.0, 1.0]
+    assert lid.name in cube.surfaces
+    assert lid.area == pytest.approx(0.01)
+    assert lid.centre == pytest.approx((0.05, 0.05, 0.1))
+    assert str(lid) == (
+        f"{lid.name}: 1e+04 mm² around (50, 50, 100) mm, facing (0, 0, 1), in (0, 0, 100) … (100, 100, 100) mm"
+    )
+    assert [face.name for face in cube.faces] == list(cube.surfaces)
+    round_faces = {face.name: face for face in Cylinder(0.01, 0.05).faces}
+    assert "facing all ways" in str(round_faces["side"])
+    assert round_faces["top"].lower[2] == pytest.approx(0.05)

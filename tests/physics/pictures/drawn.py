@@ -24,6 +24,7 @@ class Made:
     probe: Any = None
     centre: np.ndarray | None = None
     fixed: tuple[str, ...] = ("bottom",)
+    mid_sides: Any = None
 
     with_ = replace
 
@@ -48,3 +49,13 @@ def dented(mesh: BodyMesh, depth: float = 0.006) -> Made:
         probe=SimpleNamespace(radius=0.010),
         centre=np.array([0.05, 0.05, 0.06 - depth]),
     )
+
+
+def bent(mesh: BodyMesh) -> Made:
+    """u_z = 5 x² m⁻¹, at the vertices and in the middle of the edges."""
+    pairs = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]
+    edges = np.unique(np.sort(mesh.tetrahedra[:, pairs].reshape(-1, 2), axis=1), axis=0)
+    middles = mesh.points[edges].mean(axis=1)
+    lifts = [np.outer(5 * points[:, 0] ** 2, [0.0, 0.0, 1.0]) for points in (mesh.points, middles)]
+    between = SimpleNamespace(edges=edges, points=middles, displacement=lifts[1])
+    return Made(mesh, lifts[0], mid_sides=between)

@@ -9,12 +9,13 @@ from pathlib import Path
 import matplotlib.image
 import numpy as np
 import pytest
-from drawn import Made
+from drawn import Made, bent
 
 from palpate.errors import UsageError
 from palpate.physics.pictures import plot_solution
 from palpate.physics.pictures.camera import Camera
-from palpate.physics.pictures.fields import largest_stretch_strain, nodal_field
+from palpate.physics.pictures.fields import nodal_field, nodal_strain
+from palpate.physics.pictures.fine import fine_body
 from palpate.physics.pictures.lines import cut_off, hatching
 from palpate.physics.pictures.raster import draw_triangles
 from palpate.physics.pictures.render import body_layer, palette
@@ -80,11 +81,38 @@ def test_a_body_fills_the_picture_as_the_projection_says(made: Made):
 
 def test_strain_of_a_uniform_stretch_is_uniform(mesh):
     u = mesh.points * [0.1, -0.02, 0.03]
-    strain = largest_stretch_strain(mesh.points, mesh.tetrahedra, u)
-    assert np.allclose(strain, 0.1, rtol=0, atol=1e-12)
+    assert np.allclose(nodal_strain(Made(mesh, u)), 0.1, rtol=0, atol=1e-12)
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     turned = (mesh.points + u) @ turn.T - mesh.points
-    assert np.allclose(largest_stretch_strain(mesh.points, mesh.tetrahedra, turned), 0.1, rtol=0, atol=1e-12)
+    assert np.allclose(nodal_strain(Made(mesh, turned)), 0.1, rtol=0, atol=1e-12)
+
+
+def test_with_mid_side_nodes_strain_is_that_of_the_second_order(mesh):
+    """u_z = 5 x² m⁻¹ is of second order, so the gradient at each node is exact."""
+    made = bent(mesh)
+    gradients = np.tile(np.eye(3), (len(mesh.points), 1, 1))
+    gradients[:, 2, 0] = 10.0 * mesh.points[:, 0]
+    exact = np.abs(np.linalg.svd(gradients, compute_uv=False) - 1).max(axis=1)
+    assert np.allclose(nodal_strain(made), exact, rtol=0, atol=1e-12)
+    assert np.abs(nodal_strain(made.with_(mid_sides=None)) - exact).max() > 0.01
+
+
+def test_what_is_drawn_follows_the_second_order(mesh):
+    made = bent(mesh)
+    fine = fine_body(made)
+    assert np.allclose(fine.displacement[:, 2], 5 * fine.points[:, 0] ** 2, rtol=0, atol=1e-15)
+    assert len(fine.triangles) == 4 * len(mesh.triangles)
+    # eight tetrahedra of an eighth each, all the same way round, and a closed skin around them
+    cells = np.linalg.det(np.diff(fine.points[fine.tetrahedra], axis=1))
+    parents = np.linalg.det(np.diff(mesh.points[mesh.tetrahedra], axis=1))
+    assert np.allclose(cells.reshape(-1, 8), parents[:, None] / 8, rtol=1e-9, atol=0)
+    a, b, c = np.moveaxis(fine.points[fine.triangles], 1, 0)
+    assert np.einsum("ti,ti->", a, np.cross(b, c)) / 6 == pytest.approx(0.1 * 0.1 * 0.05, rel=1e-9)
+    half = np.linalg.norm(np.diff(fine.points[fine.wires], axis=1)[:, 0], axis=1)
+    whole = np.unique(np.sort(mesh.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
+    assert half.sum() == pytest.approx(
+        np.linalg.norm(np.diff(mesh.points[whole], axis=1)[:, 0], axis=1).sum()
+    )
 
 
 def pixels(picture) -> np.ndarray:
@@ -98,7 +126,11 @@ def test_the_probe_the_cut_and_the_colours_change_the_picture_where_they_should(
     plain = pixels(plot_solution(made, None, probe=False, fixed=(), outline=False, size=size))
     with_probe = pixels(plot_solution(made, None, fixed=(), outline=False, size=size))
     assert plain.shape == with_probe.shape == (340, 500, 3)
-    assert 0.01 < np.mean(np.abs(plain - with_probe).max(axis=2) > 0.05) < 0.6
+    changed, body = np.abs(plain - with_probe).max(axis=2) > 0.05, plain.min(axis=2) < 0.99
+    assert np.mean(changed) > 1e-3
+    # over the body the ball is lines only, of 3 px at most with their smoothing, so its colours can be read there
+    radius = 0.010 * Camera.around(made.mesh.points, (-58.0, 28.0), size).scale
+    assert 0 < np.sum(changed & body) < 3 * 2 * 2 * np.pi * radius < 0.5 * np.pi * radius**2
     brightest = np.array(palette()[-1])
     for cut in (None, "y"):
         coloured = pixels(plot_solution(made, probe=False, cut=cut, size=size))[:, :400]

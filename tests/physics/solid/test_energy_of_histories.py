@@ -13,6 +13,7 @@ from palpate.physics.materials import LinearElastic, LinearHardening, Plastic, V
 from palpate.physics.solid import Body
 
 PROBE = SphereProbe(radius=0.01, depth=(0.0, 0.005))
+ELEMENT = 0.018  # m: what is tested holds on any mesh
 PLACE = above(0.003)
 TERMS = ((0.4, 2.0), (0.2, 20.0))
 STEP = 1e-6  # m
@@ -20,10 +21,10 @@ MATRIX = np.array([[0.02, 0.01, 0.0], [0.0, -0.01, 0.004], [0.006, 0.0, 0.008]])
 
 
 def under_probe(material, **options):
-    return Body(Block(SIZE), material, **options).problem(PROBE, element=0.012)
+    return Body(Block(SIZE), material, **options).problem(PROBE, element=ELEMENT)
 
 
-@pytest.mark.parametrize("poisson", [0.45, 0.499, 0.5])
+@pytest.mark.parametrize("poisson", [0.45, 0.5])
 def test_in_an_instant_force_and_energy_are_those_of_the_elastic_law(poisson):
     """Nothing flows: U is the elastic one, and its derivatives are force and stiffness."""
     elastic = under_probe(gel(poisson)).solve(PLACE)

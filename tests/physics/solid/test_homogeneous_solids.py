@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from solids import SIZE, Stretched, gel
 
-from palpate.physics.geometry import Block
+from palpate.physics.geometry import Block, Dome, LayeredBlock
 from palpate.physics.materials import LinearElastic
 from palpate.physics.materials.tensors import gradient
+from palpate.physics.pictures.fields import nodal_strain
 from palpate.physics.solid import Body, path
+from palpate.physics.solid.field import SolidField
 
 MATRIX = ((-0.1, 0.2, 0.05), (0.0, 0.15, -0.1), (0.1, 0.0, -0.2))
 VOLUME = float(np.prod(SIZE))
@@ -30,6 +32,10 @@ def test_the_patch_test_is_exact(material, formulation):
     F = np.eye(3) + 0.8 * np.array(MATRIX)
     expected = found.mesh.points @ (F - np.eye(3)).T
     np.testing.assert_allclose(found.displacement, expected, atol=1e-10 * np.abs(expected).max())
+    middles = found.mid_sides
+    np.testing.assert_allclose(middles.points, found.mesh.points[middles.edges].mean(axis=1), atol=1e-15)
+    expected = middles.points @ (F - np.eye(3)).T
+    np.testing.assert_allclose(middles.displacement, expected, atol=1e-10 * np.abs(expected).max())
     assert found.potential_energy == pytest.approx(VOLUME * material.energy(F), rel=1e-10)
     slope = VOLUME * np.sum(gradient(material.energy, F) * np.array(MATRIX))
     np.testing.assert_allclose(-found.response, slope, rtol=1e-9)
@@ -37,6 +43,24 @@ def test_the_patch_test_is_exact(material, formulation):
         assert found.least_volume_ratio == pytest.approx(np.linalg.det(F), rel=1e-10)
         stretches = np.sqrt(np.linalg.eigvalsh(F.T @ F))
         assert found.largest_strain == pytest.approx(np.abs(stretches - 1).max(), rel=1e-10)
+        np.testing.assert_allclose(nodal_strain(found), found.largest_strain, rtol=1e-8)
+
+
+@pytest.mark.parametrize("shape", [LayeredBlock(element=0.02), Dome(element=0.03)], ids=["layers", "dome"])
+def test_middles_of_edges_are_found_on_every_mesh(shape):
+    """u = X: what is displaced is read at the place it belongs to, also between regions and on curved edges."""
+    import ngsolve
+
+    field = SolidField(shape.mesh(), shape.rest(), 2, ())
+    field.show(field.interpolate(ngsolve.CF((ngsolve.x, ngsolve.y, ngsolve.z))))
+    middles = field.middles.show()
+    size = np.ptp(field.rest.points)
+    np.testing.assert_allclose(middles.displacement, middles.points, atol=1e-9 * size)
+    ends = field.rest.points[middles.edges]
+    bulge = np.linalg.norm(middles.points - ends.mean(axis=1), axis=1)
+    assert (bulge < 0.3 * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)).all()
+    assert (bulge.max() > 1e-4) == shape.curved
+    assert len(middles.edges) == len(np.unique(middles.edges, axis=0))
 
 
 def test_fields_are_those_of_the_homogeneous_state():

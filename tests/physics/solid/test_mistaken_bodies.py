@@ -1,5 +1,9 @@
 """Mistakes of those who make bodies and problems: each is refused with a word on what to do."""
 
+import pickle
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,6 +16,7 @@ from palpate.physics import (
     Held,
     LinearElastic,
     LinearHardening,
+    ModelWarning,
     NeoHookean,
     Plastic,
     PrescribedDisplacement,
@@ -20,7 +25,9 @@ from palpate.physics import (
     VoceHardening,
     roller,
 )
+from palpate.physics.interactions.estimate import pad_depth
 from palpate.physics.pictures import write_vtu
+from palpate.physics.solid.times import durations
 from palpate.sweeps import sweep
 from palpate.units import Range
 
@@ -76,6 +83,70 @@ def test_mistakes_are_refused_with_a_remedy(make, words):
     assert caught.value.fix
 
 
+@pytest.mark.parametrize(
+    ("times", "words"),
+    [
+        ([1.0, 2.0], "2 times and 1 rows"),
+        ([0.0], "time 0 s comes first"),
+        ([-1.0], "time -1 s comes first"),
+        ([np.nan], "time nan s"),
+        ("soon", "list of numbers in s"),
+    ],
+)
+def test_times_of_a_march_are_refused_with_what_is_wrong(times, words):
+    with pytest.raises(UsageError) as caught:
+        PROBLEM.open().march(times, [[-0.001]])
+    assert words in str(caught.value)
+    assert "march(times=" in caught.value.fix
+
+
+def test_times_that_turn_back_are_named():
+    with pytest.raises(UsageError, match=r"The time 0\.5 s comes after the time 1 s"):
+        durations([1.0, 0.5], 2)
+    assert durations([0.5, 2.0], 2) == [0.5, 1.5]
+
+
+def test_a_modulus_in_kilopascals_is_doubted():
+    with pytest.warns(ModelWarning, match=r"is 9 Pa") as caught:
+        Body(BLOCK, NeoHookean(young=9, poisson=0.45))
+    assert "9e3 for 9 kPa" in str(caught[0].message)
+    assert caught[0].filename == __file__
+    Body(BLOCK, NeoHookean(young=60, poisson=0.45))  # a very soft gel
+
+
+def test_a_pad_that_is_softer_than_the_body_is_doubted_once():
+    rubber = Body(BLOCK, NeoHookean(young=1e6, poisson=0.49))
+    with pytest.warns(ModelWarning, match="most of what is felt is the pad") as caught:
+        problem = rubber.problem(PROBE)
+    assert caught[0].filename == __file__
+    assert len(caught) == 1
+    advised = float(re.search(r"pad=(\S+)", str(caught[0].message))[1])
+    assert pad_depth(replace(PROBE, pad=advised), 1e6 / (1 - 0.49**2), 0.004) <= 0.1 * 0.004
+    rubber.problem(replace(PROBE, pad=advised))
+    pickle.loads(pickle.dumps(problem))  # in another process it is not told again
+
+
+@pytest.mark.parametrize("depth", [0.005, 0.01, 0.015])
+@pytest.mark.parametrize("young", [3e3, 9e3])
+def test_the_default_pad_serves_soft_tissue(young, depth):
+    Body(Block(), NeoHookean(young=young, poisson=0.45)).problem(SphereProbe(radius=0.01, depth=(0.0, depth)))
+
+
+def test_the_pads_depth_balances_the_two_forces():
+    # a pad without a stop: 2πR k b²/2 = 4/3 E* √(R a³); with b = a = 1 mm it follows E*
+    probe = SphereProbe(radius=0.01, pad=2e6, stop=None)
+    modulus = 0.75 * np.pi * 0.01 * 2e6 * 1e-6 / np.sqrt(0.01 * 1e-9)
+    assert pad_depth(probe, modulus, 0.002) == pytest.approx(1e-3, rel=1e-9)
+
+
+def test_progress_is_logged(caplog):
+    gel = Viscoelastic(TISSUE, ((0.5, 1.0),))
+    with caplog.at_level("INFO", logger="palpate.physics.solid"):
+        Body(BLOCK, gel).problem(PUSH).open().march([0.1, 0.2], [[-0.0005], [-0.001]])
+    assert "time 1 of 2: a step of 0.1 s" in caplog.messages[0]
+    assert "load step to 100.0% of the path" in caplog.messages[-1]
+
+
 def test_a_large_sphere_is_a_flat_one():
     assert BODY.problem(SphereProbe(radius=0.4, depth=(0.0, 0.001))).interactions[0].radius == 0.4
 
@@ -94,7 +165,7 @@ def test_bodies_problems_and_solvers_are_told_in_words():
     text = str(BODY.problem(PROBE))
     assert "Block(" not in text
     assert "SphereProbe(" not in text
-    assert "no density" in text
+    assert "ρ not given" in text
     solver = PROBLEM.open()
     assert "block 40 × 40 × 20 mm (neo-Hookean)" in str(solver)
     solver.solve([-0.001])
@@ -105,7 +176,10 @@ def test_materials_with_a_history_say_what_makes_it():
     metal = LinearElastic(110e9, 0.35, 8700)
     assert "yields at 5e+07 Pa, no hardening" in str(Plastic(metal, LinearHardening(50e6)))
     assert "hardens by 6.7e+07 Pa (Voce, rate 52)" in str(Plastic(metal, VoceHardening(125e6, 67e6, 52)))
-    assert "relaxes by 0.3 in 2 s and 0.1 in 40 s" in str(Viscoelastic(TISSUE, ((0.3, 2.0), (0.1, 40.0))))
+    gel = Viscoelastic(TISSUE, ((0.3, 2.0), (0.1, 40.0)))
+    assert "E = 9000 Pa at once" in str(gel)
+    assert f"relaxes by 0.3 in 2 s and 0.1 in 40 s to E = {gel.relaxed().young:.4g} Pa" in str(gel)
+    assert "to E = 0 Pa" in str(Viscoelastic(TISSUE, ((1.0, 2.0),)))
 
 
 def test_printed_numbers_have_no_rounding_dust_and_no_signed_zero():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ngsolve
 import numpy as np
 import pytest
-from solids import PROBE, above, gel, pressed
+from solids import PROBE, RADIUS, above, gel, pressed
 
 from palpate.errors import UsageError
 from palpate.physics.equilibrium.stop import Stop
@@ -104,10 +104,32 @@ def test_without_contact_there_is_nothing(solver):
     assert not found.displacement.any()
 
 
-def test_inputs_that_are_no_numbers_are_a_value(solver):
-    found = solver.solve([0.03, 0.03, np.nan])
-    assert found.stop is Stop.BAD_INPUT
-    assert not found.converged
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_inputs_that_are_no_numbers_are_refused_by_name(solver, wrong):
+    with pytest.raises(UsageError, match=f"The input c_z is {wrong}") as caught:
+        solver.solve([0.03, 0.03, wrong])
+    assert "0.032" in caught.value.fix  # its range: the tip is 8 mm deep at most
+    assert "load" not in str(caught.value)
+
+
+def test_positions_where_the_probe_would_meet_the_fixed_bottom_are_refused_at_once(solver):
+    """The tip may come within the pad's stop of a fixed surface, and no nearer."""
+    for height in (RADIUS - 0.0041, -0.02):  # between bottom and top; below the body, through it
+        found = solver.solve([*above(0.0)[:2], height])
+        assert found.stop is Stop.NO_APPROACH
+        assert not found.log
+        assert "what is held" in found.message
+    assert solver._model.approach(np.array([*above(0.0)[:2], RADIUS - 0.0039])) is not None
+    assert solver._model.approach(above(0.008)) is not None
+
+
+def test_inputs_beyond_their_ranges_are_told(solver):
+    there, deeper = solver.solve(above(0.008)), solver.solve(above(0.0085))
+    assert there.converged
+    assert there.inside
+    assert "beyond" not in str(there)
+    assert not deeper.inside
+    assert "beyond range c_z = 0.0315 is not in 0.032 … 0.04 m" in str(deeper)
 
 
 def test_a_column_extrapolates_from_depth_to_depth():

@@ -22,9 +22,11 @@ class Stop(StrEnum):
     ELEMENT_INVERTED = "an element is turned inside out: det F is not positive at a quadrature point"
     PAST_STOP = "the surface is pressed past the stop of the pad"
     THROUGH_SURFACE = "the probe has gone through the surface: its centre is on the inner side"
-    NO_APPROACH = "no free way leads from outside to these inputs"
+    NO_APPROACH = (
+        "no way leads from outside to these inputs: the probe stays in the body, or meets what is held"
+    )
     SINGULAR = "the tangent can't be factorised accurately"
-    BAD_INPUT = "the loads are not finite numbers"
+    BAD_INPUT = "an input is no finite number"
 
 
 @dataclass(frozen=True)

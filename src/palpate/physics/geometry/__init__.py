@@ -5,6 +5,7 @@ solid_file     a body from a STEP or STL file      step_file, stl_file  how each
 mesh_file      a body from a volume mesh           files                their place, content and unit
 shape          what every shape offers
 mesh           the mesh as plain arrays, from and to NGSolve
+faces          where the named surfaces are
 quality        how well shaped its elements are
 refinement     where it shall be fine
 meshing        tetrahedra for solids of the CAD kernel
@@ -18,6 +19,7 @@ groups         names that stand for several surfaces
 from palpate.physics.geometry.block import Block
 from palpate.physics.geometry.cylinder import Cylinder
 from palpate.physics.geometry.dome import Dome, Inclusion
+from palpate.physics.geometry.faces import Face
 from palpate.physics.geometry.layers import LayeredBlock
 from palpate.physics.geometry.mesh import BodyMesh, body_mesh, to_ngsolve
 from palpate.physics.geometry.mesh_file import ImportedMesh
@@ -34,6 +36,7 @@ __all__ = [
     "BodyMesh",
     "Cylinder",
     "Dome",
+    "Face",
     "FineMesh",
     "Geometry",
     "ImportedMesh",

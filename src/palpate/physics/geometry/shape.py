@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, cast, runtime_checkab
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_positive
 from palpate.physics.geometry.checks import require_known
+from palpate.physics.geometry.faces import Face, faces_of
 from palpate.physics.geometry.mesh import BodyMesh, body_mesh
 from palpate.physics.geometry.refinement import FineMesh
 
@@ -106,6 +107,11 @@ class Shape:
             As for `mesh`.
         """
         return _plain(cast("Hashable", self), self._checked(refinements))
+
+    @property
+    def faces(self) -> tuple[Face, ...]:
+        """Place, size and direction of each surface: what to print to tell which is which."""
+        return faces_of(self.rest())
 
     def describe(self) -> dict[str, Any]:
         """Everything that decides the mesh, as plain data for a JSON file."""

@@ -10,6 +10,7 @@ from typing import Any
 
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_positive
+from palpate.physics.geometry.faces import Face, faces_of
 from palpate.physics.geometry.files import digest_of, require_same, require_unit
 from palpate.physics.geometry.mesh import BodyMesh, to_ngsolve
 from palpate.physics.geometry.meshing import mesh_solid
@@ -112,6 +113,11 @@ class ImportedSolid(Shape):
         if not self.is_step:
             return _skin(self)[0].surfaces
         return tuple(dict.fromkeys(f.name for f in _solid(self).faces if f.name != INTERFACE))
+
+    @property
+    def faces(self) -> tuple[Face, ...]:
+        """Place, size and direction of each surface; those of an STL file are found without meshing."""
+        return super().faces if self.is_step else faces_of(_skin(self)[0])
 
     @property
     def regions(self) -> tuple[str, ...]:

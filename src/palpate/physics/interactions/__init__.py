@@ -13,6 +13,7 @@ contact      a sphere's contact energy, and whether a state is admissible
 columns      in which order a sphere's positions are solved
 patch        a touched surface as triangles
 footprint    the bump under a glued pad or a point force
+estimate     the pad's share of the depth before anything is solved
 pads         how much of what a hand feels is the pad
 rigid        whether a body is held
 arguments    directions and ranges, checked

@@ -21,11 +21,12 @@ from palpate.physics.equilibrium.stop import Stop, Verdict
 from palpate.physics.geometry.mesh import BodyMesh
 from palpate.physics.interactions.interaction import BEYOND, Field
 from palpate.physics.interactions.pad_law import REACH, pressed_energy
-from palpate.physics.interactions.patch import winding_number
+from palpate.physics.interactions.patch import Patch, winding_number
 
 __all__ = ["Contact", "pad_energy"]
 
 BONUS = 6  # orders of quadrature beyond the elements' own: contact has an edge within elements
+WAY = 0.05  # distance over the radius at which a way is looked at
 TINY = 1e-9  # m; keeps the distance to the sphere's centre differentiable
 FACING_AWAY = -0.1  # cosine; less than a right angle by more than a fold of the surface takes
 
@@ -110,6 +111,29 @@ class Contact:
     def overlap(self, centre: np.ndarray) -> float:
         """How far in m a sphere at (3,) m is in the surface under the constant loads alone; negative outside."""
         return float(self.radius - np.linalg.norm(self._places - centre, axis=1).min())
+
+    def meets_held(self, outside: np.ndarray, centre: np.ndarray) -> bool:
+        """Whether a sphere on its way from `outside` (3,) to `centre` (3,) in m must overlap what is held.
+
+        A fixed surface stays where it is, so the body reaches up to it. A sphere on the body's side of it that is
+        nearer than its radius less what the pad yields would have the body pressed past the stop.
+        """
+        if self.stop is None or self._held is None:
+            return False
+        reach = self.radius - self.stop
+        count = max(2, int(np.ceil(np.linalg.norm(centre - outside) / (WAY * self.radius))) + 1)
+        way = outside + np.linspace(0, 1, count)[:, None] * (centre - outside)
+        low, high = self._held.box
+        near = (way > low - reach).all(axis=1) & (way < high + reach).all(axis=1)
+        return any(-reach < self._held.nearest(place)[2] < 0 for place in way[near])
+
+    @cached_property
+    def _held(self) -> Patch | None:
+        """The fixed part of the body's surface."""
+        count = len(self.mesh.points)
+        fixed = ~np.fromiter(self.field.space.FreeDofs(), dtype=bool, count=self.field.size)[:count]
+        held = fixed[self.mesh.triangles].all(axis=1)
+        return Patch(self.mesh.points, self.mesh.triangles[held]) if held.any() else None
 
     @cached_property
     def _places(self) -> np.ndarray:

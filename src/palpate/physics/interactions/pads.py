@@ -7,12 +7,14 @@ displacement. For a curved contact the three differ, and each tells the share in
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from palpate.errors import SolverError, UsageError
+from palpate.physics.advice import ModelWarning
 
 __all__ = ["PadShare", "pad_share"]
 
@@ -95,7 +97,9 @@ def _with_pads(problem: Any, factor: float) -> Any:
         replace(part, pad=part.pad * factor) if hasattr(part, "pad") else part
         for part in problem.interactions
     )
-    return replace(problem, interactions=parts)
+    with warnings.catch_warnings():  # whoever asks for the pad's share knows
+        warnings.simplefilter("ignore", ModelWarning)
+        return replace(problem, interactions=parts)
 
 
 def _logarithms(problem: Any, x: Any, aside: np.ndarray) -> np.ndarray:

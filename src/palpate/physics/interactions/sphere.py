@@ -225,7 +225,10 @@ class _Approach:
         return self._known
 
     def __call__(self, centre: np.ndarray) -> np.ndarray | None:
-        """First position (3,) on the line from `centre` along the outward normal that is clear of the surface."""
+        """First position (3,) on the line from `centre` along the outward normal that is clear of the surface.
+
+        None where there is none, or what is held is in the way from there.
+        """
         radius, patch = self._probe.radius, self._patch
         _, normal, distance = patch.nearest(centre)
         place = np.array(centre, dtype=float)
@@ -233,7 +236,7 @@ class _Approach:
             # the triangles are straight, the surface that the contact's energy sees may bulge out of them
             overlap = max(radius * (1 - CLEAR) - distance, self._contact.overlap(place))
             if overlap <= 0:
-                return place
+                return None if self._contact.meets_held(place, centre) else place
             place = place + (overlap + CLEAR * radius) * normal
             distance = patch.nearest(place)[2]
         return None

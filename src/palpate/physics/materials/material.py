@@ -229,12 +229,16 @@ class Elastic:
         return in_words(self)
 
 
-def in_words(material: Any, more: str = "") -> str:
-    """A material's law, initial moduli, what `more` there is to say of it, and its source."""
+def in_words(material: Any, more: str = "", *, at_once: bool = False) -> str:
+    """A material's law, initial moduli, what `more` there is to say of it, and its source.
+
+    `at_once` says that the moduli are those of an instant, as they relax.
+    """
     law = material.law
     named = material.name if material.name.lower() == law.lower() else f"{material.name}, {law}"
-    figures = [f"E = {material.young:.4g} Pa", f"ν = {material.poisson:.5g}"]
-    figures.append(f"ρ = {material.density:.4g} kg/m³" if material.density else "no density")
+    moment = " at once" if at_once else ""
+    figures = [f"E = {material.young:.4g} Pa{moment}", f"ν = {material.poisson:.5g}"]
+    figures.append(f"ρ = {material.density:.4g} kg/m³" if material.density else "ρ not given")
     origin = f" ({material.source})" if material.source else ""
     return f"{named}: {', '.join([*figures, more] if more else figures)}{origin}"
 

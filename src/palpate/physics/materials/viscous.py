@@ -245,8 +245,9 @@ class Viscoelastic(Elastic):
         )
 
     def __str__(self) -> str:
-        """The law, the instantaneous moduli, the Prony terms and the source, in words."""
-        return in_words(self, str(self.prony))
+        """The law, its moduli at once and in the end, the Prony terms and the source, in words."""
+        left = self.relaxed().young if self.prony.equilibrium > 0 else 0.0
+        return in_words(self, f"{self.prony} to E = {left:.4g} Pa", at_once=True)
 
     @property
     def _overstresses(self) -> tuple[str, ...]:

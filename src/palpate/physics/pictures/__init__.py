@@ -2,6 +2,7 @@
 
     plot      `plot_solution`: one picture of one solution
     picture   what it returns: saved as PNG, shown by a notebook or in a window
+    fine      elements of second order in smaller straight ones
     fields    the quantities that colour a body, at its nodes
     scales    multiples of units that read well
     skin      the surface to draw: smooth normals, and what a cutting plane leaves

@@ -7,8 +7,9 @@ import numpy as np
 from palpate.physics.pictures.camera import Camera
 from palpate.physics.pictures.skin import CREASE
 
-__all__ = ["border", "cut_off", "hatching", "outline", "split_hidden"]
+__all__ = ["ball_lines", "border", "cut_off", "hatching", "outline", "split_hidden"]
 
+ROUND = 72  # pieces of a circle
 PIECES = 12  # of an edge, each of which is hidden or not
 
 
@@ -35,6 +36,19 @@ def outline(points: np.ndarray, triangles: np.ndarray, towards: np.ndarray) -> n
     facing = (normals @ towards) > 0
     rim = facing[sides[:, 0]] != facing[sides[:, 1]]
     return np.asarray(edges[crease | rim | (sides[:, 0] == sides[:, 1])])
+
+
+def ball_lines(centre: np.ndarray, radius: float, towards: np.ndarray) -> np.ndarray:
+    """Segments (s, 2, 3) that draw a sphere seen from direction `towards` (3,): its outline and its equator."""
+    angle = np.linspace(0, 2 * np.pi, ROUND + 1)
+    circles = []
+    for pole in (towards, np.array([0.0, 0.0, 1.0])):
+        first = np.cross(pole, np.eye(3)[np.argmin(np.abs(pole))])
+        first /= np.linalg.norm(first)
+        second = np.cross(pole, first)
+        around = centre + radius * (np.outer(np.cos(angle), first) + np.outer(np.sin(angle), second))
+        circles.append(np.stack([around[:-1], around[1:]], axis=1))
+    return np.concatenate(circles)
 
 
 def border(triangles: np.ndarray, chosen: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ from palpate.errors import UsageError
 from palpate.physics.pictures import lines
 from palpate.physics.pictures.camera import Camera
 from palpate.physics.pictures.fields import NodalField, nodal_field
+from palpate.physics.pictures.fine import fine_body
 from palpate.physics.pictures.picture import Picture
 from palpate.physics.pictures.render import SMOOTHING, Layer, body_layer, composed, palette
 from palpate.physics.pictures.scales import round125, scaled
@@ -22,7 +23,7 @@ __all__ = ["plot_solution"]
 Colour = Literal["displacement", "von_mises", "largest_strain"]
 Plane = tuple[Any, Any]
 
-INK, SOFT, GHOST = "#1d2730", "#5d6b76", "#7d8b96"
+INK, SOFT, GHOST, BALL = "#1d2730", "#5d6b76", "#7d8b96", "#2b3640"
 DPI = 110
 BAR, TITLE = 172, 36  # px that colour bar and title take
 
@@ -101,6 +102,8 @@ def plot_solution(
         pen.strokes(body.wires(), INK, 0.25, hidden=0.0)
     if outline:
         pen.strokes(body.outlines(camera.axes[2], body.points), GHOST, 0.9, hidden=0.25)
+    if sphere is not None:
+        pen.strokes(lines.ball_lines(*sphere, camera.axes[2]), BALL, 1.1, hidden=0.25)
     _mark_fixed(pen, body, fixed_of(solution) if fixed is None else fixed)
     _furnish(figure, axes, camera, scale, title)
     if shown is not None:
@@ -138,10 +141,10 @@ class _Body:
         shown: NodalField | None,
         plane: tuple[np.ndarray, np.ndarray] | None,
     ) -> None:
-        mesh = solution.mesh
+        mesh = fine_body(solution)
         self.mesh, self.points, self.plane = mesh, mesh.points, plane
-        self.moved = mesh.points + scale * np.asarray(solution.displacement, dtype=float)
-        self.values = np.zeros(len(mesh.points)) if shown is None else shown.values
+        self.moved = mesh.points + scale * mesh.displacement
+        self.values = np.zeros(len(mesh.points)) if shown is None else shown.over(mesh)
         self.heights = np.full(len(mesh.points), -1.0)
         if plane is not None:
             self.heights = (mesh.points - plane[0]) @ plane[1]
@@ -185,9 +188,8 @@ class _Body:
         return section_lines(self.moved[self.mesh.triangles], self.heights[self.mesh.triangles])
 
     def wires(self) -> np.ndarray:
-        """Edges of the skin's triangles as drawn, segments (s, 2, 3)."""
-        ends = self.mesh.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-        return self._kept(self.moved, np.unique(np.sort(ends, axis=1), axis=0))
+        """Edges of the mesh on the skin as drawn, segments (s, 2, 3)."""
+        return self._kept(self.moved, self.mesh.wires)
 
     def rim(self, surfaces: tuple[str, ...]) -> np.ndarray:
         """Edges around named surfaces as drawn, segments (s, 2, 3)."""

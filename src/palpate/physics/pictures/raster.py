@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-__all__ = ["draw_triangles", "smooth_normals"]
+__all__ = ["draw_triangles"]
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
 
@@ -55,39 +55,3 @@ def draw_triangles(screen: np.ndarray, attributes: np.ndarray, depth: np.ndarray
                     image[row, column, k] = (
                         w0 * attributes[t, 0, k] + w1 * attributes[t, 1, k] + w2 * attributes[t, 2, k]
                     )
-
-
-@_jit
-def smooth_normals(
-    vectors: np.ndarray, triangles: np.ndarray, starts: np.ndarray, around: np.ndarray, crease: float
-) -> np.ndarray:
-    """Unit normal at each corner: the mean over the triangles at its node that lie nearly flat to its own.
-
-    Parameters
-    ----------
-    vectors : (t, 3) array
-        Area vectors of the triangles.
-    triangles : (t, 3) int array
-    starts : (node + 1,) int array
-        Where the triangles of each node begin in `around`.
-    around : (3 t,) int array
-    crease : float
-        Cosine of the angle between normals beyond which an edge stays sharp.
-
-    Returns
-    -------
-    (t, 3, 3) array
-    """
-    size = np.sqrt((vectors**2).sum(axis=1))
-    out = np.zeros((len(triangles), 3, 3))
-    for t in range(len(triangles)):
-        for corner in range(3):
-            node = triangles[t, corner]
-            for other in around[starts[node] : starts[node + 1]]:
-                cosine = (vectors[t] * vectors[other]).sum()
-                if cosine >= crease * size[t] * size[other]:
-                    out[t, corner] += vectors[other]
-            length = np.sqrt((out[t, corner] ** 2).sum())
-            if length > 0.0:
-                out[t, corner] /= length
-    return out

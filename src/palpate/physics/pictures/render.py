@@ -15,9 +15,8 @@ __all__ = ["PLAIN", "SMOOTHING", "Layer", "body_layer", "composed", "palette"]
 
 SMOOTHING = 2  # samples per pixel along each side
 PLAIN = np.array([0.80, 0.72, 0.66])  # of a body without colours
-STEEL = np.array([0.42, 0.50, 0.57])
+STEEL = np.array([0.72, 0.76, 0.80])
 GROUND = np.array([1.0, 1.0, 1.0])
-SEEN_THROUGH = 0.42  # share of what lies behind the ball that shows through it
 DARKEST = 0.14  # of viridis is left out, as on the page: the deepest violet hides the shading
 LIGHT = np.array([-0.22, 0.50, 0.84])  # to the right, up and towards the camera
 
@@ -48,29 +47,40 @@ def palette() -> np.ndarray:
 def body_layer(soup: np.ndarray, camera: Camera, limits: tuple[float, float] | None) -> Layer:
     """Draw triangles (t, 3, 7) of position, normal and scalar, coloured between `limits` or plain."""
     depth, image = _drawn(soup[:, :, :3], soup[:, :, 3:], camera)
+    there = np.isfinite(depth)
+    normals, values = image[there][:, :3], image[there][:, 3]
     if limits is None:
-        base = np.broadcast_to(PLAIN, (*depth.shape, 3))
-    else:
-        share = (image[..., 3] - limits[0]) / ((limits[1] - limits[0]) or 1.0)
-        base = palette()[np.clip(share * 255 + 0.5, 0, 255).astype(int)]
-    return Layer(depth, _lit(base, image[..., :3], camera, shine=0.10))
+        return _layer(depth, there, _lit(PLAIN, normals, camera, shine=0.10))
+    share = (values - limits[0]) / ((limits[1] - limits[0]) or 1.0)
+    base = palette()[np.clip(share * 255 + 0.5, 0, 255).astype(int)]
+    return _layer(depth, there, _lit(base, normals, camera, shine=0.10))
 
 
 def ball_layer(sphere: Ball, camera: Camera) -> Layer:
     """Draw the probe."""
-    corners, normals = ball(*sphere)
-    depth, image = _drawn(corners, normals, camera)
-    return Layer(depth, _lit(np.broadcast_to(STEEL, (*depth.shape, 3)), image, camera, shine=0.45))
+    depth, image = _drawn(*ball(*sphere), camera)
+    there = np.isfinite(depth)
+    return _layer(depth, there, _lit(STEEL, image[there], camera, shine=0.30))
+
+
+def _layer(depth: np.ndarray, there: np.ndarray, colours: np.ndarray) -> Layer:
+    """Colours (n, 3) where there is something, on the ground."""
+    colour = np.empty((*depth.shape, 3))
+    colour[:] = GROUND
+    colour[there] = colours
+    return Layer(depth, colour)
 
 
 def composed(body: Layer, sphere: Ball | None, camera: Camera) -> np.ndarray:
-    """The image (height, width, 3), 0 … 1, at one sample per pixel: body on white, ball half transparent."""
-    shown = np.where(np.isfinite(body.depth)[..., None], body.colour, GROUND)
+    """The image (height, width, 3), 0 … 1, at one sample per pixel: body on white, the ball beside it.
+
+    The ball is not drawn over the body: its colours are to be read from the scale, also under the ball.
+    """
+    shown = body.colour
     if sphere is not None:
         front = ball_layer(sphere, camera)
-        over = front.depth > body.depth
-        mixed = (1 - SEEN_THROUGH) * front.colour + SEEN_THROUGH * shown
-        shown = np.where(over[..., None], mixed, shown)
+        beside = np.isfinite(front.depth) & ~np.isfinite(body.depth)
+        shown = np.where(beside[..., None], front.colour, shown)
     height, width = body.depth.shape
     s = SMOOTHING
     return np.asarray(shown.reshape(height // s, s, width // s, s, 3).mean(axis=(1, 3)))
@@ -86,7 +96,7 @@ def _drawn(corners: np.ndarray, attributes: np.ndarray, camera: Camera) -> tuple
 
 
 def _lit(base: np.ndarray, normals: np.ndarray, camera: Camera, shine: float) -> np.ndarray:
-    """Colours under a lamp over the observer's left shoulder (Blinn 1977), both sides of a surface alike.
+    """Colours (n, 3) under a lamp over the observer's left shoulder (Blinn 1977), both sides of a surface alike.
 
     Where there is no normal there is no shading.
     """

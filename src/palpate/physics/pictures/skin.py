@@ -10,8 +10,6 @@ import math
 
 import numpy as np
 
-from palpate.physics.pictures.raster import smooth_normals
-
 __all__ = ["CREASE", "ball", "clip", "corner_normals", "section", "section_lines"]
 
 CREASE = math.cos(math.radians(40.0))  # edges sharper than this stay edges
@@ -20,11 +18,27 @@ CREASE = math.cos(math.radians(40.0))  # edges sharper than this stay edges
 def corner_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Unit normals at the corners of a surface's triangles, shape (t, 3, 3), smooth except across creases."""
     a, b, c = np.moveaxis(points[triangles], 1, 0)
-    flat = triangles.ravel()
-    order = np.argsort(flat, kind="stable")
-    starts = np.concatenate([[0], np.cumsum(np.bincount(flat, minlength=len(points)))])
     vectors = np.cross(b - a, c - a) / 2
-    return np.asarray(smooth_normals(vectors, triangles, starts, order // 3, CREASE))
+    size = np.linalg.norm(vectors, axis=1)
+    corner, other = _around(triangles.ravel(), len(points))
+    own = corner // 3
+    cosine = np.einsum("pi,pi->p", vectors[own], vectors[other])
+    level = cosine >= CREASE * size[own] * size[other]
+    sums = [np.bincount(corner[level], vectors[other[level], i], minlength=triangles.size) for i in range(3)]
+    normals = np.stack(sums, axis=1)
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.asarray((normals / np.where(length > 0, length, 1.0)).reshape(-1, 3, 3))
+
+
+def _around(flat: np.ndarray, nodes: int) -> tuple[np.ndarray, np.ndarray]:
+    """All pairs of a corner (p,) and a triangle (p,) at its node, from the corners' nodes (3 t,)."""
+    order = np.argsort(flat, kind="stable")
+    count = np.bincount(flat, minlength=nodes)
+    starts = np.cumsum(count) - count
+    corner = np.repeat(np.arange(len(flat)), count[flat])
+    first = np.cumsum(count[flat]) - count[flat]
+    place = np.arange(len(corner)) - np.repeat(first, count[flat])
+    return corner, order[starts[flat][corner] + place] // 3
 
 
 def clip(soup: np.ndarray, heights: np.ndarray) -> np.ndarray:

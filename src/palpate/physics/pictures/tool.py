@@ -20,8 +20,7 @@ def ball_of(solution: Any, probe: Any) -> Ball | None:
     ----------
     solution : SolidSolution
     probe : bool, SphereProbe or ((x, y, z), radius)
-        True for the solution's own probe, if it has one. A probe stands at the solution's centre or, failing that, at
-        its inputs.
+        True for the solution's own probe, if it has one. A probe stands at the solution's centre.
 
     Raises
     ------
@@ -35,8 +34,6 @@ def ball_of(solution: Any, probe: Any) -> Ball | None:
         return _given(own)
     radius = getattr(own, "radius", None)
     centre = getattr(solution, "centre", None)
-    if centre is None:
-        centre = getattr(solution, "inputs", None)
     if probe is not True and radius is None:
         raise _no_probe(probe)
     if radius is None or centre is None or np.shape(centre) != (3,):

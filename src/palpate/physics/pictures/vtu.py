@@ -18,12 +18,14 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.physics.pictures.fields import largest_stretch_strain
+from palpate.physics.pictures.fields import nodal_strain
 from palpate.physics.pictures.tool import ball_of, require_state
 
 __all__ = ["write_pvd", "write_vtu"]
 
 TRIANGLE, TETRA = 5, 10  # VTK's numbers of cell types
+# a number of the whole body, beside the nodes' means of the same name
+CALLED = {"largest_strain": "largest strain at a quadrature point"}
 NOT_HERE = -1  # region of a triangle, surface of a tetrahedron
 
 
@@ -31,10 +33,10 @@ def write_vtu(solution: Any, path: str | os.PathLike[str]) -> Path:
     """Write a solution as VTU.
 
     The cells are the tetrahedra and, after them, the triangles of the outer surface. Point data: ``displacement`` (m),
-    ``largest strain`` and, where the solution has it, ``von Mises stress`` (Pa). Cell data: ``region`` and ``surface``,
-    numbers, −1 where a cell has none; the field data ``region: NAME`` and ``surface: NAME`` hold the number of each
-    name (numbers alone, because not every reader takes words there). Field data: what else the solution knows of
-    itself, in SI units: energies, response, the probe's centre and radius …
+    ``largest strain`` (|λ − 1|) and, where the solution has it, ``von Mises stress`` (Pa). Cell data: ``region`` and
+    ``surface``, numbers, −1 where a cell has none; the field data ``region: NAME`` and ``surface: NAME`` hold the
+    number of each name (numbers alone, because not every reader takes words there). Field data: what else the solution
+    knows of itself, in SI units: energies, response, the probe's centre and radius …
 
     Parameters
     ----------
@@ -109,9 +111,8 @@ def write_pvd(
 
 
 def _point_data(solution: Any) -> dict[str, np.ndarray]:
-    mesh, displacement = solution.mesh, np.asarray(solution.displacement, dtype=float)
-    strain = largest_stretch_strain(mesh.points, mesh.tetrahedra, displacement)
-    data = {"displacement": displacement, "largest strain": strain}
+    displacement = np.asarray(solution.displacement, dtype=float)
+    data = {"displacement": displacement, "largest strain": nodal_strain(solution)}
     if getattr(solution, "von_mises", None) is not None:
         data["von Mises stress"] = np.asarray(solution.von_mises, dtype=float)
     return data
@@ -143,7 +144,9 @@ def _metadata(solution: Any) -> dict[str, np.ndarray]:
     for name in (*names, "least_volume_ratio", "largest_strain", "iterations", "residual"):
         value = getattr(solution, name, None)
         if value is not None:
-            data[name.replace("_", " ")] = np.atleast_1d(np.asarray(value, dtype=float)).reshape(1, -1)
+            data[CALLED.get(name, name.replace("_", " "))] = np.atleast_1d(
+                np.asarray(value, dtype=float)
+            ).reshape(1, -1)
     if (sphere := ball_of(solution, True)) is not None:
         data["probe centre and radius"] = np.array([[*sphere[0], sphere[1]]])
     for kind, all_names in (("region", mesh.regions), ("surface", mesh.surfaces)):

@@ -10,6 +10,7 @@ opening    building the finite elements of a problem
 field      the unknowns: displacement, and pressure in mixed form
 density    the energy of the material
 history    internal variables at the quadrature points
+times      the steps of a march, checked
 model      the equations as functions of the inputs
 system     energy, residual and factorised tangent
 newton     one equilibrium
@@ -17,6 +18,7 @@ path       equilibria along a line of inputs
 response   forces and stiffness that an interaction feels
 stability  whether a tangent can be trusted, and the equilibrium is stable
 measures   strains and stresses
+midsides   displacements in the middle of edges
 """
 
 from palpate.physics.solid.body import Body

@@ -12,6 +12,7 @@ from palpate.physics.arguments import require_choice, require_positive
 from palpate.physics.geometry.checks import require_triple
 from palpate.physics.interactions.interaction import Held, Interaction
 from palpate.physics.solid.parts import (
+    advise_on_modulus,
     by_region,
     require_geometry,
     require_held_values,
@@ -32,6 +33,7 @@ Formulation = Literal["auto", "displacement", "mixed"]
 # From here on displacements of second order give a contact force more than 1 % too large on meshes of usual
 # size; a region that goes mixed needlessly costs a tenth more unknowns and twice the assembly.
 NEARLY_INCOMPRESSIBLE = 0.48
+DEARER = 2  # times a solve of the mixed form takes, told beforehand: docs/method/solids.md has the figures
 
 
 @dataclass(frozen=True)
@@ -92,8 +94,9 @@ class Body:
         require_choice("The formulation of a body", self.formulation, get_args(Formulation))
         require_positive("The strain limit of a body", self.strain_limit, "")
         require_positive("The error of a step", self.step_error, "", infinite=True)
-        for region in self.materials:
+        for region, material in self.materials.items():
             self.formulation_of(region)
+            advise_on_modulus(region, material)
 
     @property
     def materials(self) -> dict[str, Material]:
@@ -153,7 +156,8 @@ class Body:
         lines = [f"Body of {self.geometry}, fixed at {', '.join(self.fixed) or 'nothing'}"]
         for region, material in self.material:
             form, why = self.formulation_of(region)
-            lines += [f"  {region:8s} {material}", f"           {form} form: {why}"]
+            slow = f" (about {DEARER} times the time of displacements alone)" if form == "mixed" else ""
+            lines += [f"  {region:8s} {material}", f"           {form} form: {why}{slow}"]
         if any(self.gravity):
             lines.append(f"  gravity  {', '.join(map(number, self.gravity))} m/s²")
         lines += [f"  held     {held}" for held in self.held]

@@ -15,6 +15,7 @@ import numpy as np
 from palpate.physics.geometry.checks import require_known
 from palpate.physics.geometry.groups import members
 from palpate.physics.geometry.mesh import BodyMesh
+from palpate.physics.solid.midsides import Middles
 
 __all__ = ["SolidField"]
 
@@ -60,6 +61,7 @@ class SolidField:
         self.pressure = dict(zip(mixed, parts[1:], strict=True))
         self.base = ngsolve.GridFunction(motion)
         self.motion_size = int(motion.ndof)
+        self.middles = Middles(self)
         self.free = np.fromiter(self.space.FreeDofs(), dtype=bool, count=self.space.ndof)
 
     @property

@@ -1,7 +1,8 @@
-"""Lengths against the body's own: what tells mistaken units before a solve does nothing."""
+"""Inputs and lengths that no solve can mean: no numbers, or out of all proportion to the body by mistaken units."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -11,7 +12,7 @@ from palpate.errors import UsageError
 from palpate.physics.arguments import require_positive
 from palpate.units import Range, bounds
 
-__all__ = ["longest_side", "require_element", "require_lengths", "require_near"]
+__all__ = ["longest_side", "require_element", "require_finite", "require_lengths", "require_near"]
 
 FLATTEST = (
     20.0  # radius over the body's longest side: larger spheres are flat, millimetres taken for metres larger
@@ -56,6 +57,25 @@ def require_element(element: Any, longest: float) -> None:
         raise _too_long("The element size of the problem", element, longest)
 
 
+def require_finite(values: np.ndarray, ranges: Sequence[Range]) -> None:
+    """Refuse inputs (n,) that are no finite numbers.
+
+    Raises
+    ------
+    UsageError
+        With the first one's name.
+    """
+    for value, given in zip(values.tolist(), ranges, strict=True):
+        if not math.isfinite(value):
+            raise UsageError(
+                f"The input {given.name} is {value}.",
+                why="It is no finite number: often the outcome of a division by zero, or a gap in a table.",
+                fix=f"Pass finite numbers; the range of {given.name} is {given.low:.4g} … {given.high:.4g} "
+                f"{given.unit}".rstrip()
+                + ".",
+            )
+
+
 def require_near(points: np.ndarray, ranges: Sequence[Range], longest: float) -> None:
     """Refuse inputs (N, n) in m that are farther from their ranges than the body is long.
 
@@ -67,7 +87,7 @@ def require_near(points: np.ndarray, ranges: Sequence[Range], longest: float) ->
     low, high = bounds(ranges)
     beyond = np.maximum(low - points, points - high)
     beyond[:, [r.unit != "m" for r in ranges]] = 0.0
-    beyond[~np.isfinite(beyond)] = 0.0  # what is no number is the solver's to report
+    beyond[~np.isfinite(beyond)] = 0.0  # what is no number is refused by its name
     if not beyond.size or beyond.max() <= longest:
         return
     row, column = divmod(int(np.argmax(beyond)), len(ranges))

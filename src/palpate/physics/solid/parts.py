@@ -8,11 +8,13 @@ from numbers import Integral
 from typing import Any
 
 from palpate.errors import UsageError
+from palpate.physics.advice import advise
 from palpate.physics.geometry.checks import require_known
 from palpate.physics.geometry.groups import members
 from palpate.physics.interactions.interaction import Held, Interaction
 
 __all__ = [
+    "advise_on_modulus",
     "by_region",
     "require_geometry",
     "require_held_values",
@@ -21,6 +23,9 @@ __all__ = [
     "surfaces_of",
 ]
 
+SOFTEST = (
+    50.0  # Pa: tissue by its number of kPa is mostly below, the softest gels that keep a shape are above
+)
 GEOMETRY = ("surfaces", "regions", "mesh", "rest", "describe")
 MATERIAL = ("poisson", "density", "kinematics", "states", "volumetric", "energy", "advance", "describe")
 
@@ -147,6 +152,18 @@ def require_weight(materials: Mapping[str, Any]) -> None:
                 why="The weight is density times gravity: the region would have none.",
                 fix="Give the material a density in kg/m³, for example NeoHookean(..., density=1000).",
             )
+
+
+def advise_on_modulus(region: str, material: Any) -> None:
+    """Warn of a Young's modulus below those of solids, which tells of kPa or MPa taken for Pa."""
+    young = 2 * material.shear_modulus * (1 + material.poisson)
+    if young < SOFTEST:
+        advise(
+            f"Young's modulus in the region {region!r} is {young:.4g} Pa.",
+            why="Fat and brain have some hundred Pa, the softest gels in use some ten; "
+            "a number of kPa taken for Pa looks like this.",
+            fix=f"Moduli are in Pa: pass {young:.4g}e3 for {young:.4g} kPa.",
+        )
 
 
 def _require_material(thing: Any, needed: tuple[str, ...]) -> None:

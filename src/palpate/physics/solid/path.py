@@ -5,6 +5,7 @@ Steps grow and shrink with the iterations that they take and, for bodies with a 
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +16,8 @@ from palpate.physics.solid.predicting import Known
 from palpate.physics.solid.stepping import Tried, take
 
 __all__ = ["Followed", "Known", "LoadStep", "follow"]
+
+logger = logging.getLogger("palpate.physics.solid")  # progress, for those who ask for it
 
 SMALLEST_STEP = 2.0**-10  # of the whole path
 # Where equilibria are found but lie beyond a law's reach, shorter steps find them too
@@ -62,6 +65,11 @@ class LoadStep:
     cuts: int
     error: float = 0.0
 
+    def __str__(self) -> str:
+        how = "" if self.stop is Stop.CONVERGED else f", cut back: {self.stop}"
+        late = ", cut back: it errs too much in time" if not how and self.error > 1 else ""
+        return f"load step to {self.position:.1%} of the path, {self.iterations} Newton iterations{how}{late}"
+
 
 @dataclass(frozen=True)
 class Followed:
@@ -108,6 +116,7 @@ def follow(model: SolidModel, start: Known, target: np.ndarray) -> Followed:
         remembered = model.remembered()
         tried = take(model, here, q, end - position)
         log.append(_record(end, end - position, tried))
+        logger.info("%s", log[-1])
         if len(log) == 1 and here is not start:
             log[0] = replace(log[0], iterations=log[0].iterations + 1)  # the tangent that gave the slope
         if tried.good:

@@ -14,9 +14,16 @@ from palpate.dataset import Field, Layout, solid_fields
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_positive
 from palpate.physics.geometry.checks import require_known
+from palpate.physics.interactions.estimate import advise_on_pad
 from palpate.physics.interactions.interaction import Interaction, Planned
 from palpate.physics.interactions.sphere import SphereProbe
-from palpate.physics.solid.lengths import longest_side, require_element, require_lengths, require_near
+from palpate.physics.solid.lengths import (
+    longest_side,
+    require_element,
+    require_finite,
+    require_lengths,
+    require_near,
+)
 from palpate.units import Range
 
 if TYPE_CHECKING:
@@ -65,6 +72,9 @@ class SolidProblem:
             require_lengths(interaction, self.longest)
         if self.element is not None:
             require_element(self.element, self.longest)
+        for interaction in self.interactions:
+            if isinstance(interaction, SphereProbe):
+                advise_on_pad(interaction, self.body.materials)
 
     def _require_surface(self, interaction: Any) -> None:
         """Refuse a touched surface that the body does not have, before anything is meshed."""
@@ -172,6 +182,8 @@ class SolidProblem:
     def solve(self, x: Any, *, dt: float | None = None, fields: bool = False) -> SolidSolution:
         """Solve for inputs x (n,), from the body without interaction.
 
+        Inputs a little beyond their ranges are solved too; `SolidSolution.inside` tells, and so does its print.
+
         Parameters
         ----------
         x : (n,) array
@@ -183,7 +195,7 @@ class SolidProblem:
         Raises
         ------
         UsageError
-            If `x` has not one number per input, or `dt` is not positive.
+            If `x` has not one finite number per input, or `dt` is not positive.
         """
         return self.open().solve(x, dt=dt, fields=fields)
 
@@ -243,7 +255,7 @@ class SolidProblem:
         Raises
         ------
         UsageError
-            If `x` has not one number per input, or is a position in m far from the body.
+            If `x` has not one finite number per input, or is a position in m far from the body.
         """
         try:
             values = np.atleast_1d(np.asarray(x, dtype=float))
@@ -255,6 +267,7 @@ class SolidProblem:
                 why=f"This problem has {len(self.ranges)}: {', '.join(r.name for r in self.ranges)}.",
                 fix="Give one number per input, in this order.",
             )
+        require_finite(values, self.ranges)
         require_near(values[None, :], self.ranges, self.longest)
         return values
 

@@ -11,14 +11,17 @@ from palpate.dataset import conjugate_unit
 from palpate.errors import UsageError
 from palpate.physics.equilibrium.stop import Stop
 from palpate.physics.geometry.mesh import BodyMesh
-from palpate.physics.words import number
+from palpate.physics.words import number, span
 from palpate.units import Range
 
 if TYPE_CHECKING:
     from palpate.physics.interactions.sphere import SphereProbe
+    from palpate.physics.solid.midsides import MidSides
     from palpate.physics.solid.path import LoadStep
 
 __all__ = ["SolidSolution"]
+
+ROUNDING = 1e-9  # of a range's ends
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -59,7 +62,7 @@ class SolidSolution:
     least_volume_ratio : float
         Least det F at the quadrature points.
     largest_strain : float
-        Largest |λ - 1| of a principal stretch λ at the quadrature points.
+        Largest |λ - 1| of a principal stretch λ at the quadrature points; at small strain, of a principal strain.
     stress : (node, 3, 3) array or None
         Cauchy stress in Pa, averaged over the elements around each node, if fields were asked for.
     von_mises : (node,) array or None
@@ -69,7 +72,7 @@ class SolidSolution:
     detail : str
         Figures that belong to the reason.
     reached : (n,) array
-        Inputs of the last equilibrium on the way; those asked, if converged.
+        Inputs of the last equilibrium on the way; those asked, if converged; NaN where there was no way.
     state : (dof,) array
         All unknowns of that equilibrium.
     last_good : SolidSolution or None
@@ -81,6 +84,8 @@ class SolidSolution:
         The sphere among the interactions, if there is one.
     centre : (3,) array or None
         Where its centre is, in m.
+    mid_sides : MidSides or None
+        Displacements in the middle of the mesh's edges, with which pictures are drawn; None unless converged.
     """
 
     stop: Stop
@@ -109,11 +114,26 @@ class SolidSolution:
     fixed: tuple[str, ...] = ()
     probe: SphereProbe | None = None
     centre: np.ndarray | None = None
+    mid_sides: MidSides | None = None
 
     @property
     def converged(self) -> bool:
         """Whether this is a stable, admissible equilibrium."""
         return self.stop is Stop.CONVERGED
+
+    @property
+    def inside(self) -> bool:
+        """Whether all inputs are within their ranges; beyond them the mesh may be coarse where it is touched."""
+        return not self._beyond()
+
+    def _beyond(self) -> list[str]:
+        """Inputs outside of their ranges, in words; roundings of an end don't count."""
+        found = []
+        for r, x in zip(self.ranges, self.inputs, strict=True):
+            slack = ROUNDING * max(abs(r.low), abs(r.high))
+            if not r.low - slack <= x <= r.high + slack:
+                found.append(f"{r.name} = {number(x, 6)} is not in {span((r.low, r.high), r.unit)}")
+        return found
 
     @property
     def message(self) -> str:
@@ -142,20 +162,26 @@ class SolidSolution:
             f"{r.name} = {number(x, 6)} {r.unit}" for r, x in zip(self.ranges, self.inputs, strict=True)
         )
         lines = [f"Solid of {len(self.mesh.points)} nodes: {self.message}", f"  inputs       {asked}"]
+        if beyond := self._beyond():
+            lines.append(f"  beyond range {', '.join(beyond)}: the mesh may be coarse there")
         if self.converged:
             lines += [
                 f"  response     {self._responses()}",
                 f"  energy       {self.potential_energy:.6g} J, {self.strain_energy:.6g} J of it in the body",
                 f"  penetration  {1e3 * self.penetration:.3g} mm into the pad" if self.probe else "",
-                f"  least det F  {self.least_volume_ratio:.3g}, largest strain {self.largest_strain:.3g}",
+                f"  strain       largest |λ − 1| {self.largest_strain:.3g}, "
+                f"least det F {self.least_volume_ratio:.3g} (at quadrature points)",
             ]
         else:
             at = ", ".join(
-                f"{r.name} = {number(x, 6)}" for r, x in zip(self.ranges, self.reached, strict=False)
+                f"{r.name} = {number(x, 6)}"
+                for r, x in zip(self.ranges, self.reached, strict=False)
+                if np.isfinite(x)
             )
             lines.append(f"  reached      {at or 'nothing'}")
         cost = (
-            f"{self.iterations} Newton iterations and {self.chords} chord steps in {len(self.log)} load steps"
+            f"{self.iterations} Newton iterations (+ {self.chords} steps with a reused tangent)"
+            f" in {len(self.log)} load steps"
         )
         lines.append(f"  cost         {cost}")
         return "\n".join(line for line in lines if line)

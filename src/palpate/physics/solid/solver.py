@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from palpate.physics.solid.path import Followed, Known, follow
 from palpate.physics.solid.solution import SolidSolution
 from palpate.physics.solid.stability import is_accurate, is_stable
 from palpate.physics.solid.system import sparse_solver
+from palpate.physics.solid.times import durations
 
 if TYPE_CHECKING:
     from palpate.physics.solid.problem import SolidProblem
@@ -22,10 +24,13 @@ if TYPE_CHECKING:
 __all__ = ["SolidSolver"]
 
 KEPT = 64  # equilibria kept to start from
+logger = logging.getLogger("palpate.physics.solid")
 
 
 class SolidSolver:
     """Finite elements of one problem, kept open between solves.
+
+    Progress is logged: ``logging.basicConfig(level="INFO")`` shows each load step as it ends.
 
     Each solve starts from the kept equilibrium that is nearest to its inputs, or from outside along the approach
     path of its interactions, whichever is nearer. A body with a history starts from its last equilibrium.
@@ -88,11 +93,9 @@ class SolidSolver:
         Raises
         ------
         UsageError
-            If `x` has not one number per input, `dt` is not positive or the body has no history.
+            If `x` has not one finite number per input, `dt` is not positive or the body has no history.
         """
         q = self._problem.inputs(x)
-        if not np.isfinite(q).all():
-            return self._failure(q, Followed(self._rest(q), Verdict(Stop.BAD_INPUT), ()))
         outside = self._model.approach(q)
         if outside is None:
             return self._failure(q, Followed(self._rest(q), Verdict(Stop.NO_APPROACH), ()))
@@ -138,18 +141,13 @@ class SolidSolver:
         Raises
         ------
         UsageError
-            If the times don't ascend, there is not one row of inputs for each, or the body has no history.
+            If the times don't ascend from above 0, there is not one row of inputs for each, or the body has no
+            history.
         """
-        times, inputs = np.atleast_1d(np.asarray(times, dtype=float)), np.atleast_2d(inputs)
-        steps = np.diff(times, prepend=0.0)
-        if times.shape != (len(inputs),) or not (steps > 0).all():
-            raise UsageError(
-                f"The times have the shape {times.shape} for {len(inputs)} rows of inputs.",
-                why="They must ascend from above 0, one for each row.",
-                fix="For example times=[0.1, 0.2], inputs=[[0.05, 0.05, 0.058], [0.05, 0.05, 0.056]].",
-            )
+        inputs = np.atleast_2d(inputs)
         solutions: list[SolidSolution] = []
-        for step, row in zip(steps.tolist(), inputs, strict=True):
+        for i, (step, row) in enumerate(zip(durations(times, len(inputs)), inputs, strict=True)):
+            logger.info("time %d of %d: a step of %.4g s", i + 1, len(inputs), step)
             solutions.append(self.solve(row, dt=step, fields=fields))
             if not solutions[-1].converged:
                 break
@@ -247,6 +245,7 @@ class SolidSolver:
             ranges=self._problem.ranges,
             inputs=q,
             displacement=model.field.at_nodes(),
+            mid_sides=model.field.middles.show(),
             response=response,
             response_gradient=-hessian,
             potential_energy=energy,
@@ -275,7 +274,7 @@ class SolidSolver:
             response=np.full(n, np.nan),
             response_gradient=np.full((n, n), np.nan),
             detail=followed.verdict.detail,
-            reached=last.q,
+            reached=last.q if followed.log else np.full(n, np.nan),
             state=last.z,
             last_good=self._last_good(last) if followed.log else None,
             **self._surroundings(q),
@@ -295,6 +294,7 @@ class SolidSolver:
             ranges=self._problem.ranges,
             inputs=last.q,
             displacement=model.field.at_nodes(),
+            mid_sides=model.field.middles.show(),
             # with a history it depends on internal variables that have been put back
             response=np.full(n, np.nan) if model.histories else model.response(last.z),
             response_gradient=np.full((n, n), np.nan),

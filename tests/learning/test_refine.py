@@ -214,9 +214,10 @@ def test_time_limit_is_kept_to_within_an_iteration():
     began = time.perf_counter()
     refine(X, Y, start, r, iterations=2)
     two = time.perf_counter() - began
+    allowed = 5 * two  # of this machine as busy as it is now
     began = time.perf_counter()
-    found = refine(X, Y, start, r, iterations=10_000, seconds=0.2)
-    assert time.perf_counter() - began < 0.2 + 3 * two
+    found = refine(X, Y, start, r, iterations=10_000, seconds=allowed)
+    assert time.perf_counter() - began < allowed + 3 * two
     assert not found.converged
     assert found.iterations > 1
 

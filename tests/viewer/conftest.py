@@ -21,7 +21,7 @@ def rod() -> TouchModel:
     return arc_beam()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")  # its loop runs at 1 kHz: not beside other folders' tests
 def viewer(rod: TouchModel) -> Iterator[Viewer]:
     with Viewer(rod, port=0) as running:
         yield running

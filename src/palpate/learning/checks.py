@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 
-__all__ = ["numbers", "real", "samples"]
+__all__ = ["numbers", "real", "samples", "second_derivatives"]
 
 
 def numbers(what: str, given: Any, shape: tuple[int | None, ...], *, finite: bool = True) -> np.ndarray:
@@ -67,7 +67,7 @@ def samples(
         Not negative, one positive; ones if left out.
     slopes : (N, m, n), optional
         ∂Y/∂X.
-    slope_weight : float or (N,)
+    slope_weight : float, (N,) or (N, n)
         Not negative; counts only where there are slopes.
     inputs, outputs : int, optional
         n and m, where they are known.
@@ -78,7 +78,7 @@ def samples(
     -------
     X, Y, weights : (N, n), (N, m), (N,)
     slopes : (N, m, n) or None
-    slope_weight : (N,)
+    slope_weight : (N,) or (N, n)
         Zeros without slopes.
 
     Raises
@@ -96,10 +96,10 @@ def samples(
         )
     N = len(X)
     w = np.ones(N) if weights is None else _weights("Weights", weights, N)
-    s = np.zeros(N) if slopes is None else _weights("Slope weights", slope_weight, N)
+    s = np.zeros(N) if slopes is None else _weights("Slope weights", slope_weight, N, X.shape[1])
     if slopes is not None:
         slopes = numbers("Slopes", slopes, (N, Y.shape[1], X.shape[1]), finite=False)
-        _finite("Slopes", slopes[(w > 0) & (s > 0)])
+        _finite("Slopes", _counting(slopes, w, s))
     known = w > 0
     if not known.any():
         raise UsageError(
@@ -116,6 +116,45 @@ def samples(
     _finite("Inputs X", X[known])
     _finite("Outputs Y", Y[known])
     return X, Y, w, slopes, s
+
+
+def second_derivatives(
+    curvatures: Any, curvature_weight: Any, weights: np.ndarray, *, inputs: int, outputs: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Second derivatives of N samples, and their weights, as float64 arrays that fit the samples.
+
+    Parameters
+    ----------
+    curvatures : (N, m, n(n+1)/2)
+        ∂²y/∂x_i∂x_j, i ≤ j; those of no weight need not be finite.
+    curvature_weight : float, (N,) or (N, n(n+1)/2)
+        Not negative.
+    weights : (N,)
+        Of the samples.
+    inputs, outputs : int
+        n and m.
+
+    Returns
+    -------
+    curvatures : (N, m, n(n+1)/2)
+    curvature_weight : (N,) or (N, n(n+1)/2)
+
+    Raises
+    ------
+    UsageError
+        If anything does not fit, or a number that counts is not finite.
+    """
+    N, count = len(weights), inputs * (inputs + 1) // 2
+    c = _weights("Curvature weights", curvature_weight, N, count)
+    found = numbers("Curvatures", curvatures, (N, outputs, count), finite=False)
+    _finite("Curvatures", _counting(found, weights, c))
+    return found, c
+
+
+def _counting(derivatives: np.ndarray, w: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """Those of derivatives (N, m, q) whose weights, w (N,) times s (N,) or (N, q), are positive."""
+    each = np.broadcast_to(s if s.ndim > 1 else s[:, None], (len(w), derivatives.shape[2]))
+    return np.asarray(derivatives.transpose(0, 2, 1)[(each > 0) & (w > 0)[:, None]])
 
 
 def _finite(what: str, found: np.ndarray) -> None:
@@ -154,12 +193,14 @@ def _no_numbers(what: str, found: str) -> UsageError:
     )
 
 
-def _weights(what: str, given: Any, N: int) -> np.ndarray:
+def _weights(what: str, given: Any, N: int, columns: int = 0) -> np.ndarray:
+    """(N,), or (N, columns) where one came for each column."""
     given = real(what, given)
-    found = numbers(what, np.full(N, float(given)) if given.ndim == 0 else given, (N,))
+    shape = (N, columns) if columns and given.ndim == 2 else (N,)
+    found = numbers(what, np.full(N, float(given)) if given.ndim == 0 else given, shape)
     if (found < 0).any():
         raise UsageError(
-            f"{what} are negative for {int((found < 0).sum())} samples.",
+            f"{what} are negative for {int((found.reshape(N, -1) < 0).any(axis=1).sum())} samples.",
             why="A weight is how many ordinary samples one counts as.",
             fix="Give a sample that is to be left out a weight of zero.",
         )

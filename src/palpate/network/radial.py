@@ -1,4 +1,4 @@
-"""Radial functions g(q) of q = ‖A x − b‖², with their first two derivatives by q.
+"""Radial functions g(q) of q = ‖A x − b‖², with their first three derivatives by q.
 
 gaussian               exp(−q), the founding form (Platt 1991; papers that write exp(−q/2) have widths √2 smaller)
 inverse-multiquadric   (1 + q)^−½ (Hardy 1971): decays slowly, so fewer units reach across the range
@@ -11,7 +11,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-__all__ = ["RADIAL_FUNCTIONS", "RadialFunction", "radial"]
+__all__ = ["RADIAL_FUNCTIONS", "RadialFunction", "radial", "third"]
 
 RadialFunction = Literal["gaussian", "inverse-multiquadric", "matern-5/2"]
 RADIAL_FUNCTIONS: tuple[RadialFunction, ...] = get_args(RadialFunction)
@@ -29,3 +29,19 @@ def radial(name: RadialFunction, q: np.ndarray) -> tuple[np.ndarray, np.ndarray,
     s = np.sqrt(5.0 * q)
     e = np.exp(-s)
     return (1.0 + s + s * s / 3.0) * e, (-5.0 / 6.0) * (1.0 + s) * e, (25.0 / 12.0) * e
+
+
+def third(name: RadialFunction, q: np.ndarray) -> np.ndarray:
+    """d³g/dq³ at squared distances q ≥ 0 of any shape.
+
+    That of matern-5/2 grows like q^−½ towards q = 0, where it counts as zero: in a derivative by place it comes
+    with three factors of A x − b, whose product vanishes faster.
+    """
+    if name == "gaussian":
+        return np.asarray(-np.exp(-q))
+    if name == "inverse-multiquadric":
+        u = 1.0 / (1.0 + q)
+        return np.asarray(-1.875 * np.sqrt(u) * u * u * u)
+    s = np.sqrt(5.0 * q)
+    at_centre = q == 0
+    return np.asarray(np.where(at_centre, 0.0, (-125.0 / 24.0) * np.exp(-s) / np.where(at_centre, 1.0, s)))

@@ -20,7 +20,7 @@ from scipy.linalg import blas, lapack
 
 from palpate.learning.refinement.rows import Rows
 
-__all__ = ["Fit", "Solver", "gauss_newton", "leverage_of_units", "project"]
+__all__ = ["Fit", "Solver", "gauss_newton", "leverage_of_units", "project", "span_of_units"]
 
 Solver = Literal["kaufman", "full"]
 
@@ -138,6 +138,21 @@ def leverage_of_units(rows: Rows, theta: np.ndarray, fit: Fit, *, work: float = 
         moved = D * np.repeat(W[:, j], p)
         found[:, j] = np.einsum("nd,nd->n", moved @ inverse, moved)
     return found
+
+
+def span_of_units(rows: Rows, theta: np.ndarray, fit: Fit) -> np.ndarray:
+    """Z (R, h p), Z Zᵀ the units' part of the hat matrix of the linearised problem, for an output of one mode.
+
+    Where the units' numbers are more than the data can tell apart, those not told apart count for nothing.
+    """
+    (h, p), R = theta.shape, len(rows.targets)
+    moved = rows.derivatives(theta)[:R] * np.repeat(fit.coefficients[len(fit.tau) - h :, 0], p)
+    moved -= fit.Q @ (fit.Q.T @ moved)
+    size = np.sqrt((moved**2).sum(axis=0))
+    moved /= np.maximum(size, max(1e-8 * float(size.max(initial=0.0)), 1e-140))
+    values, V = np.linalg.eigh(moved.T @ moved)
+    known = values > 1e-10 * values[-1]
+    return np.asarray(moved @ (V[:, known] / np.sqrt(values[known])))
 
 
 def _outside(fit: Fit, D: np.ndarray, single: bool) -> np.ndarray:

@@ -18,9 +18,16 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.learning.checks import samples
-from palpate.learning.refinement.leave_one_out import left_out, without_each
+from palpate.learning.refinement.leave_one_out import left_out_rows, without_each
 from palpate.learning.refinement.marquardt import DAMPING, Scaled, held_back, next_damping
-from palpate.learning.refinement.projection import Fit, Solver, gauss_newton, leverage_of_units, project
+from palpate.learning.refinement.projection import (
+    Fit,
+    Solver,
+    gauss_newton,
+    leverage_of_units,
+    project,
+    span_of_units,
+)
 from palpate.learning.refinement.rows import Rows
 from palpate.learning.units.regressors import Regressors
 
@@ -46,9 +53,11 @@ class Refined:
     rms : float
         Weighted root mean square training error per scaled output, of values only.
     loo : float
-        Leave-one-out error per scaled output: in closed form for weights and tail (Allen 1974), with the
-        units' own numbers counted as leverage in the linearised problem. Infinite where there are as many unknowns
-        as known numbers: what can fit anything says nothing of samples it has not seen.
+        Leave-one-sample-out error per scaled output: the root of Σ of the weighted squared errors of all that is
+        known of a sample, its value, slopes and curvatures, when the sample (or its group) is left out, over Σ w.
+        In closed form for weights and tail (Allen 1974), with the units' own numbers counted as leverage in the
+        linearised problem. Infinite where there are as many unknowns as known numbers: what can fit anything says
+        nothing of samples it has not seen.
     condition : float
         2-norm condition number of the regressors; large values mean that units nearly cancel.
     iterations : int
@@ -60,7 +69,7 @@ class Refined:
     heldout : float
         Root mean square error per scaled output on the held-out samples; not-a-number without them.
     rows : int
-        Numbers known of each output: N values, and n slopes wherever those counted too.
+        Numbers known of each output: N values, and the slopes and curvatures that counted too.
     """
 
     regressors: Regressors
@@ -100,6 +109,9 @@ def refine(
     weights: np.ndarray | None = None,
     slopes: np.ndarray | None = None,
     slope_weight: float | np.ndarray = 1.0,
+    curvatures: np.ndarray | None = None,
+    curvature_weight: float | np.ndarray = 1.0,
+    groups: np.ndarray | None = None,
     ridge: float = 1e-13,
     iterations: int = 200,
     seconds: float | None = None,
@@ -110,7 +122,8 @@ def refine(
 ) -> Refined:
     """Refine a network from a start.
 
-    The cost is Σ_i w_i (‖y_i − f(x_i)‖² + s_i ‖∂y_i/∂x − ∂f/∂x(x_i)‖²) + ridge · Σ_i w_i · ‖W‖².
+    The cost is Σ_i w_i (‖y_i − f(x_i)‖² + Σ_l s_il ‖∂_l (y_i − f(x_i))‖² + Σ_lk c_ilk ‖∂_l∂_k (y_i − f(x_i))‖²)
+    + ridge · Σ_i w_i · ‖W‖².
 
     Parameters
     ----------
@@ -125,8 +138,14 @@ def refine(
         w; a weight of two is the sample given twice.
     slopes : (N, m, n), optional
         ∂y/∂x, scaled as outputs over inputs.
-    slope_weight : float or (N,)
+    slope_weight : float, (N,) or (N, n)
         s; zero where no slopes are known.
+    curvatures : (N, m, n(n+1)/2), optional
+        ∂²y/∂x_l∂x_k, l ≤ k (see `pairs` of `palpate.learning.units.regressors`).
+    curvature_weight : float, (N,) or (N, n(n+1)/2)
+        c; zero where no curvatures are known.
+    groups : (N,) int, optional
+        Samples of one group are left out together when the fit is judged.
     ridge : float
         Penalty on squared weights: it holds near-cancelling units together.
     iterations : int
@@ -160,7 +179,15 @@ def refine(
             f"Units of shape {theta.shape} are not finite {regressors.form.name} units of {p} numbers each.",
             fix="Make them with the form's own `unit`.",
         )
-    rows = Rows.of(regressors, X, Y, weights=weights, slopes=slopes, slope_weight=slope_weight)
+    rows = Rows.of(
+        *(regressors, X, Y),
+        weights=weights,
+        slopes=slopes,
+        slope_weight=slope_weight,
+        curvatures=curvatures,
+        curvature_weight=curvature_weight,
+        groups=groups,
+    )
     # the floor keeps the triangle regular where units coincide
     penalty = max(ridge, 1e-30) * rows.total
     judge = _judge(rows, heldout)
@@ -258,12 +285,16 @@ def _result(rows: Rows, point: _Point, count: int, done: bool, error: float) -> 
     # units were fitted too: their h p numbers count as leverage
     even = point.theta.size / rows.targets.size
     counted = judges and 0 < point.theta.size <= _COUNTED
-    shared = leverage_of_units(rows, point.theta, fit) if counted else even
-    missed = left_out(rows, fit, shared=shared, most=_MOST_LEVERAGE)
+    if counted and rows.targets.shape[1] == 1:
+        span = span_of_units(rows, point.theta, fit)
+        missed = left_out_rows(rows, fit, basis=span, most=_MOST_LEVERAGE)
+    else:
+        shared = leverage_of_units(rows, point.theta, fit) if counted else even
+        missed = left_out_rows(rows, fit, shared=shared, most=_MOST_LEVERAGE)
     reduced = without_each(rows, fit, len(point.theta), shared=even, most=_MOST_LEVERAGE)
     F = rows.matrix(point.theta)
     squares = float((fit.residual[: len(rows.X)] ** 2).sum())
-    judged = float(np.sqrt((missed**2 * rows.scale[:, None] ** 2).sum() / (rows.total * m)))
+    judged = float(np.sqrt((missed**2).sum() / (rows.total * m)))
     return Refined(
         rows.regressors,
         point.theta,

@@ -1,7 +1,10 @@
-"""The rows of a least-squares problem: values and slopes of many outputs, weighted, reduced to their modes.
+"""The rows of a least-squares problem: values, slopes and curvatures of many outputs, weighted, in their modes.
 
-    value row of sample i     √w_i φ(x_i)ᵀ C ≈ √w_i y_i
-    slope rows of sample i    √(w_i s_i) ∂φ(x_i)/∂x_l C ≈ √(w_i s_i) ∂y_i/∂x_l,   l = 1 … n
+    value row of sample i      √w_i φ(x_i)ᵀ C ≈ √w_i y_i
+    slope rows of sample i     √(w_i s_il) ∂φ(x_i)/∂x_l C ≈ √(w_i s_il) ∂y_i/∂x_l,   l = 1 … n
+    curvature rows             √(w_i e c_ilk) ∂²φ(x_i)/∂x_l∂x_k C ≈ √(w_i e c_ilk) ∂²y_i/∂x_l∂x_k,   l ≤ k
+
+with e = 1 on the diagonal and 2 off it, so that the squares add up as in the Frobenius norm of all n² entries.
 
 An orthogonal change of the outputs leaves the cost as it is, so m outputs of rank k are fitted as k: what a fit
 costs doesn't grow with m.
@@ -10,14 +13,13 @@ costs doesn't grow with m.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numba import njit
 
-from palpate.learning.checks import numbers, samples
+from palpate.learning.checks import numbers, samples, second_derivatives
 from palpate.learning.modes import every_mode
-from palpate.learning.units.regressors import Regressors
-from palpate.network.radial import radial
+from palpate.learning.units.regressors import Regressors, pairs
 
 __all__ = ["Rows"]
 
@@ -34,15 +36,21 @@ class Rows:
     scale : (N,)
         √w of the value rows.
     sloped : (S,) int
-        Samples whose slopes are known too.
-    slope_scale : (S,)
-        √(w s) of their rows.
+        Samples of which some slope is known too.
+    slope_scale : (S, n)
+        √(w s) of their rows; a slope of no weight has no row.
     targets : (R, k)
-        R = N + S n rows, already weighted: values first, then the slopes sample by sample.
+        Already weighted: N values, then the slopes sample by sample, then the curvatures.
     modes : (k, m)
         Orthonormal; outputs are targets @ modes.
     total : float
         Sum of the weights w.
+    curved : (C,) int
+        Samples of which some curvature is known too.
+    curvature_scale : (C, n(n+1)/2)
+        √(w e c) of their rows.
+    groups : (N,) int
+        Samples of one group are judged together: images of one solve under a symmetry, say.
     """
 
     regressors: Regressors
@@ -53,6 +61,9 @@ class Rows:
     targets: np.ndarray
     modes: np.ndarray
     total: float
+    curved: np.ndarray
+    curvature_scale: np.ndarray
+    groups: np.ndarray
 
     @classmethod
     def of(
@@ -64,10 +75,16 @@ class Rows:
         weights: np.ndarray | None = None,
         slopes: np.ndarray | None = None,
         slope_weight: float | np.ndarray = 1.0,
+        curvatures: np.ndarray | None = None,
+        curvature_weight: float | np.ndarray = 1.0,
+        groups: np.ndarray | None = None,
     ) -> Rows:
-        """From X (N, n), Y (N, m), weights (N,), slopes ∂y_j/∂x_i (N, m, n) and their weights.
+        """From X (N, n), Y (N, m) and what else is known of them.
 
-        Samples of no weight are left out; so are slopes of no weight, which may then be not-a-number.
+        That is weights w (N,), slopes ∂y_j/∂x_l (N, m, n) with s (N,) or (N, n), curvatures ∂²y_j/∂x_l∂x_k
+        (N, m, n(n+1)/2), l ≤ k, with c (N,) or (N, n(n+1)/2), and groups (N,); each sample is one by default.
+        Samples of no weight are left out; so are slopes and curvatures of no weight, which may then be
+        not-a-number.
 
         Raises
         ------
@@ -76,23 +93,32 @@ class Rows:
         """
         n = regressors.form.inputs
         X, Y, w, slopes, s = samples(X, Y, weights, slopes, slope_weight=slope_weight, inputs=n)
-        s = w * s
+        N, m = Y.shape
         kept = np.flatnonzero(w > 0)
-        sloped = np.flatnonzero(s[kept] > 0)
-        targets = Y[kept] * np.sqrt(w[kept])[:, None]
+        parts = [Y[kept] * np.sqrt(w[kept])[:, None]]
+        sloped, slope_scale = _scales(w, s, n, kept)
         if slopes is not None:
-            part = slopes[kept][sloped] * np.sqrt(s[kept][sloped])[:, None, None]
-            targets = np.vstack([targets, part.transpose(0, 2, 1).reshape(-1, Y.shape[1])])
-        latent, basis = every_mode(targets)
+            parts.append(_weighted(slopes[kept][sloped], slope_scale))
+        curved, curvature_scale = np.zeros(0, int), np.zeros((0, n * (n + 1) // 2))
+        if curvatures is not None:
+            curvatures, c = second_derivatives(curvatures, curvature_weight, w, inputs=n, outputs=m)
+            curved, curvature_scale = _scales(w, c, n * (n + 1) // 2, kept)
+            curvature_scale = curvature_scale * np.sqrt(np.where(np.equal(*pairs(n)), 1.0, 2.0))
+            parts.append(_weighted(curvatures[kept][curved], curvature_scale))
+        latent, basis = every_mode(np.vstack(parts))
+        of_each = np.arange(N) if groups is None else numbers("Groups", groups, (N,))
         return cls(
             regressors,
             np.ascontiguousarray(X[kept], float),
             np.sqrt(w[kept]),
             sloped,
-            np.sqrt(s[kept][sloped]),
+            slope_scale,
             latent,
             basis,
             float(w.sum()),
+            curved,
+            curvature_scale,
+            np.unique(of_each[kept], return_inverse=True)[1],
         )
 
     @classmethod
@@ -103,8 +129,9 @@ class Rows:
         *,
         weights: np.ndarray | None = None,
         slope_weight: float | np.ndarray | None = None,
+        curvature_weight: float | np.ndarray | None = None,
     ) -> Rows:
-        """Rows of X (N, n) whose targets do not matter; slopes are among them if they have a weight.
+        """Rows of X (N, n) whose targets do not matter; slopes and curvatures are among them if they have a weight.
 
         Raises
         ------
@@ -113,9 +140,20 @@ class Rows:
         """
         X = numbers("Inputs X", X, (None, regressors.form.inputs), finite=False)
         N, n = X.shape
-        slopes = None if slope_weight is None else np.zeros((N, 1, n))
-        share = 1.0 if slope_weight is None else slope_weight
-        return cls.of(regressors, X, np.zeros((N, 1)), weights=weights, slopes=slopes, slope_weight=share)
+        known: dict[str, Any] = {}
+        if slope_weight is not None:
+            known |= {"slopes": np.zeros((N, 1, n)), "slope_weight": slope_weight}
+        if curvature_weight is not None:
+            blank = np.zeros((N, 1, n * (n + 1) // 2))
+            known |= {"curvatures": blank, "curvature_weight": curvature_weight}
+        return cls.of(regressors, X, np.zeros((N, 1)), weights=weights, **known)
+
+    @property
+    def samples(self) -> np.ndarray:
+        """Which sample each row is of, (R,)."""
+        slopes = np.repeat(self.sloped, (self.slope_scale > 0).sum(axis=1))
+        curvatures = np.repeat(self.curved, (self.curvature_scale > 0).sum(axis=1))
+        return np.concatenate([np.arange(len(self.X)), slopes, curvatures])
 
     def matrix(self, theta: np.ndarray, below: int = 0) -> np.ndarray:
         """Weighted regressors, tail then units (R + below, p_t + h), column by column; the last rows are zero."""
@@ -125,62 +163,52 @@ class Rows:
         F[:N, :t] = r.tail_rows(self.X)
         F[:N, t:] = r.phi(self.X, theta)
         F[:N] *= self.scale[:, None]
+        r, at = self.regressors, N
         if len(self.sloped):
             parts = [r.tail_slopes(len(self.sloped)), r.slopes(self.X[self.sloped], theta)]
-            both = np.concatenate(parts, axis=2) * self.slope_scale[:, None, None]
-            F[N:end] = both.reshape(end - N, -1)
+            at = _filled(F, at, np.concatenate(parts, axis=2), self.slope_scale)
+        if len(self.curved):
+            found = r.curvatures(self.X[self.curved], theta)
+            # a tail is affine at most, and so has no curvature
+            _filled(F[:, t:], at, found, self.curvature_scale)
         return F
 
     def derivatives(self, theta: np.ndarray, below: int = 0) -> np.ndarray:
         """Weighted ∂φ_k/∂θ_k (R + below, h p), row by row; the last rows are zero."""
         N, p = len(self.X), self.regressors.form.size
         D = np.empty((len(self.targets) + below, len(theta) * p))
-        _values_by_theta(self.regressors, self.X, theta, self.scale, D[:N].reshape(N, len(theta), p))
+        self.regressors.scaled_by_theta(self.X, theta, self.scale, D[:N].reshape(N, len(theta), p))
         end = len(self.targets)
         D[end:] = 0.0
+        r, at = self.regressors, N
         if len(self.sloped):
-            part = self.regressors.slopes_by_theta(self.X[self.sloped], theta)[1]
-            D[N:end] = (part * self.slope_scale[:, None, None, None]).reshape(end - N, -1)
+            found = r.slopes_by_theta(self.X[self.sloped], theta)[1]
+            at = _filled(D, at, found.reshape(*found.shape[:2], -1), self.slope_scale)
+        if len(self.curved):
+            found = r.curvatures_by_theta(self.X[self.curved], theta)[1]
+            _filled(D, at, found.reshape(*found.shape[:2], -1), self.curvature_scale)
         return D
 
 
-def _values_by_theta(
-    regressors: Regressors, X: np.ndarray, theta: np.ndarray, scale: np.ndarray, out: np.ndarray
-) -> None:
-    """√w ∂φ_k/∂θ_k into out (N, h, p)."""
-    form = regressors.form
-    A, b = form.factors(theta)
-    h, r, n = A.shape
-    v = (X @ A.reshape(h * r, n).T).reshape(len(X), h, r) - b
-    by_q = radial(regressors.radial, np.einsum("nkr,nkr->nk", v, v))[1]
-    # the chain rule is linear in each unit: its matrix comes from the form's own `pull` of unit vectors
-    e = form.rows.size
-    one = np.broadcast_to(np.eye(e + r)[:, None], (e + r, h, e + r))
-    chain = np.ascontiguousarray(form.pull(theta, one[..., :e], one[..., e:]).transpose(1, 0, 2))
-    _chained(X, v, 2.0 * by_q * scale[:, None], form.rows, form.columns, chain, out)
+def _scales(w: np.ndarray, s: np.ndarray, count: int, kept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which of the kept samples have derivatives of any weight, and the roots of the weights (S, count)."""
+    each = np.broadcast_to(s if s.ndim > 1 else s[:, None], (len(w), count))[kept]
+    some = np.flatnonzero((each > 0).any(axis=1))
+    return some, np.sqrt(w[kept][some, None] * each[some])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _chained(
-    X: np.ndarray,
-    v: np.ndarray,
-    by_v: np.ndarray,
-    rows: np.ndarray,
-    columns: np.ndarray,
-    chain: np.ndarray,
-    out: np.ndarray,
-) -> None:
-    N, h, r = v.shape
-    e, p = rows.size, out.shape[2]
-    for i in range(N):
-        for k in range(h):
-            t, o = by_v[i, k], out[i, k]
-            o[:] = 0.0
-            for a in range(e):
-                d = t * v[i, k, rows[a]] * X[i, columns[a]]
-                for j in range(p):
-                    o[j] += d * chain[k, a, j]
-            for a in range(r):
-                d = -t * v[i, k, a]
-                for j in range(p):
-                    o[j] += d * chain[k, e + a, j]
+def _weighted(derivatives: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Derivatives (S, m, q) as weighted rows (·, m), those of no weight left out."""
+    counts = scale > 0
+    return np.asarray(derivatives.transpose(0, 2, 1)[counts] * scale[counts][:, None])
+
+
+def _filled(F: np.ndarray, start: int, found: np.ndarray, scale: np.ndarray) -> int:
+    """Weighted regressors (S, q, c) into the rows of F from `start`, those of no weight left out; the next row."""
+    counts = scale > 0
+    end = start + int(counts.sum())
+    if counts.all():
+        F[start:end] = (found * scale[..., None]).reshape(end - start, -1)
+    else:
+        F[start:end] = found[counts] * scale[counts][:, None]
+    return end

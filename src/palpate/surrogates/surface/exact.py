@@ -1,0 +1,203 @@
+"""Signed distance to a curved surface, measured point by point: what the smooth field is made of.
+
+**On a smooth piece** the foot on the nearest small triangle is lifted to the curved surface, by the height of the
+paraboloid with the corners' normals, ½ Σ λ_i λ_j (n_j − n_i)·(x_j − x_i) over the edges; d is the distance along the
+normal there.
+
+**Beyond a crease or the border**, d is the distance to that line.
+
+**Below the border.** At height z = −ζ under the surface's tangent plane and a beyond its border, r² = a² + ζ², the
+nearest thing is still the border, r away: that is the distance of a probe that passes beside the body. Under the
+surface d is −ζ. The jump between them is bridged by
+
+    d = −ζ + G (r + ζ),   G = a²/r² + (ζ²/r²) w(r)   beyond the border,   G = w(ζ) (1 − σ(e/ρ))   e within it,
+
+σ the quintic smooth step, w(r) = σ(2 r/ρ − 1), ρ the probe's radius: from ρ outwards d is r, so that a probe feels
+nothing before it meets the border; nearer, the depth falls steadily from the full one to that of the border.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from palpate.surrogates.surface.curved import END, SMOOTH, Pieces, pieces_of
+from palpate.surrogates.surface.nearest import DEEP, boxes_of, nearest_into, ordered
+from palpate.surrogates.surface.skin import Skin
+
+__all__ = ["BRIDGED", "PLAIN", "ROUNDED", "Exact"]
+
+PLAIN, ROUNDED, BRIDGED = 0, 1, 2  # foot on a smooth piece, on a line; below the border
+RESOLVED = 0.98  # cosine between distance and normal, below which small triangles are too coarse for the normal
+
+_jit = njit(cache=True, nogil=True, error_model="numpy")
+
+
+@dataclass(frozen=True, eq=False)
+class Exact:
+    """Measures distances to a surface.
+
+    Attributes
+    ----------
+    pieces : Pieces
+        In the order of `boxes`.
+    boxes : (n, 6) array
+        Their tree.
+    radius : float
+        ρ in m: of the smallest probe.
+    """
+
+    pieces: Pieces
+    boxes: np.ndarray
+    radius: float
+
+    @classmethod
+    def of(cls, skin: Skin, radius: float) -> Exact:
+        """The curved surface behind a mesh, for probes from a radius in m on."""
+        p = pieces_of(skin)
+        order = ordered(p.corners)
+        corners = np.ascontiguousarray(p.corners[order])
+        pieces = Pieces(corners, p.normals[order], p.places[order], p.kinds, p.outward, p.border)
+        return cls(pieces, boxes_of(corners), radius)
+
+    def at(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Signed distances in m and their kinds (PLAIN, ROUNDED, BRIDGED) at places (N, 3), each of shape (N,).
+
+        Fast where each place is near the one before.
+        """
+        places = np.ascontiguousarray(places, dtype=np.float64)
+        distances, kinds = np.empty(len(places)), np.empty(len(places), dtype=np.int8)
+        p = self.pieces
+        _measure_into(
+            places, distances, kinds, self.boxes, p.corners, p.normals, p.places, p.kinds, p.outward,
+            p.border, self.radius,
+        )  # fmt: skip
+        return distances, kinds
+
+
+@_jit
+def _step(t: float) -> float:
+    """σ: from 0 at 0 to 1 at 1, with two vanishing derivatives at both."""
+    t = min(max(t, 0.0), 1.0)
+    return t * t * t * (10.0 + t * (6.0 * t - 15.0))
+
+
+@_jit
+def _lifted_into(corners: np.ndarray, normals: np.ndarray, foot: np.ndarray, v: np.ndarray) -> float:
+    """Put the normal at the foot into v (3,); the height of the curved surface above it."""
+    height = 0.0
+    for i in range(3):
+        j = (i + 1) % 3
+        turn = 0.0
+        for x in range(3):
+            turn += (normals[j, x] - normals[i, x]) * (corners[j, x] - corners[i, x])
+        height += 0.5 * foot[i] * foot[j] * turn
+    length = 0.0
+    for x in range(3):
+        v[x] = foot[0] * normals[0, x] + foot[1] * normals[1, x] + foot[2] * normals[2, x]
+        length += v[x] * v[x]
+    length = np.sqrt(length)
+    for x in range(3):
+        v[x] /= length
+    return height
+
+
+@_jit
+def _to_border(c: np.ndarray, border: np.ndarray) -> float:
+    """Square of the distance of a point to straight parts of the border."""
+    best = np.inf
+    for b in range(border.shape[0]):
+        along = square = 0.0
+        for x in range(3):
+            u = border[b, 1, x] - border[b, 0, x]
+            along += u * (c[x] - border[b, 0, x])
+            square += u * u
+        t = min(max(along / square, 0.0), 1.0)
+        d = 0.0
+        for x in range(3):
+            e = c[x] - border[b, 0, x] - t * (border[b, 1, x] - border[b, 0, x])
+            d += e * e
+        best = min(best, d)
+    return best
+
+
+@_jit
+def _beyond(height: float, r: float, radius: float) -> tuple[float, int]:
+    """Distance where the nearest point is on the border, at a height over its tangent plane."""
+    if height >= 0 or r == 0.0:
+        return r, ROUNDED
+    below = (height / r) ** 2
+    G = 1.0 - below + below * _step(2.0 * r / radius - 1.0)
+    return height + G * (r - height), BRIDGED if G < 1 else ROUNDED
+
+
+@_jit
+def _within(c: np.ndarray, d: float, border: np.ndarray, radius: float) -> tuple[float, int]:
+    """Distance where the nearest point is inside the surface, d away."""
+    if d > -0.5 * radius or border.shape[0] == 0:
+        return d, PLAIN
+    square = _to_border(c, border) - d * d
+    if square >= radius * radius:
+        return d, PLAIN
+    G = _step(-2.0 * d / radius - 1.0) * (1.0 - _step(np.sqrt(max(square, 0.0)) / radius))
+    return d - 2.0 * d * G, BRIDGED
+
+
+@_jit
+def _measure_into(
+    places: np.ndarray,
+    distances: np.ndarray,
+    kinds: np.ndarray,
+    boxes: np.ndarray,
+    corners: np.ndarray,
+    normals: np.ndarray,
+    rows: np.ndarray,
+    feature_kinds: np.ndarray,
+    outward: np.ndarray,
+    border: np.ndarray,
+    radius: float,
+) -> None:
+    """Fill distances (N,) and kinds (N,) at places (N, 3)."""
+    waiting, foot, trial, n = np.empty(DEEP, np.int64), np.empty(3), np.empty(3), np.empty(3)
+    last = np.inf
+    for k in range(places.shape[0]):
+        c = places[k]
+        if k > 0:
+            step = 0.0
+            for x in range(3):
+                step += (c[x] - places[k - 1, x]) ** 2
+            last += np.sqrt(step) + 1e-12  # m: never zero, or nothing would be found
+        square, t, where = nearest_into(
+            c[0], c[1], c[2], last * last * (1 + 1e-9), boxes, corners, waiting, foot, trial
+        )
+        last = np.sqrt(square)
+        row = rows[t, where]
+        lift = _lifted_into(corners[t], normals[t], foot, n)
+        if feature_kinds[row] != SMOOTH:
+            lift = 0.0
+        height, r = 0.0, 0.0
+        for x in range(3):
+            at = foot[0] * corners[t, 0, x] + foot[1] * corners[t, 1, x] + foot[2] * corners[t, 2, x]
+            v = c[x] - at - lift * n[x]
+            height += v * n[x]
+            r += v * v
+        r = np.sqrt(r)
+        if feature_kinds[row] == SMOOTH:
+            if abs(height) < RESOLVED * r:
+                height = np.copysign(RESOLVED * r, height)
+            distances[k], kinds[k] = _within(c, height, border, radius)
+            continue
+        kinds[k] = ROUNDED
+        facing = outward[row, 0] ** 2 + outward[row, 1] ** 2 + outward[row, 2] ** 2
+        if facing > 0:
+            height = 0.0
+            for x in range(3):
+                at = foot[0] * corners[t, 0, x] + foot[1] * corners[t, 1, x] + foot[2] * corners[t, 2, x]
+                height += (c[x] - at) * outward[row, x]
+            height /= np.sqrt(facing)
+        if feature_kinds[row] == END:
+            distances[k], kinds[k] = _beyond(height, r, radius)
+        else:
+            distances[k] = np.copysign(r, height)

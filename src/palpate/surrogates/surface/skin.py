@@ -1,0 +1,153 @@
+"""Triangles of a touched surface, checked: who borders on whom, where the surface ends, where it has a crease."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from palpate.errors import UsageError
+
+__all__ = ["CREASE", "Skin"]
+
+CREASE = np.cos(np.radians(40.0))  # facets that turn by more meet in an edge of the body, not in a mesh's
+FLAT = 1e-7  # height of a triangle by its longest edge, below which it has no normal
+SAME = 1e-9  # of the surface's size: points closer than that are one
+
+
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """An oriented surface, open or closed, in which each edge belongs to one or two triangles.
+
+    Attributes
+    ----------
+    points : (P, 3) array
+        Corners that are used, in m.
+    triangles : (t, 3) int array
+        Counter-clockwise as seen from outside; edge k of a triangle runs from its corner k to the next.
+    neighbours : (t, 3) int array
+        3 times the triangle across each edge, plus the number that the edge has there; -1 at the border.
+    """
+
+    points: np.ndarray
+    triangles: np.ndarray
+    neighbours: np.ndarray
+
+    @classmethod
+    def of(cls, points: np.ndarray, triangles: np.ndarray) -> Skin:
+        """Triangles (t, 3) between points (P, 3) in m, of which not all need be used.
+
+        Raises
+        ------
+        UsageError
+            If there is no triangle, a corner does not exist or is not finite, a triangle has no area, two
+            points are in one place, an edge has more than two triangles or two that face opposite ways.
+        """
+        points, triangles = _arrays(points, triangles)
+        used, numbers = np.unique(triangles, return_inverse=True)
+        points, triangles = points[used], numbers.reshape(triangles.shape)
+        _refuse_flat(points, triangles)
+        _refuse_coincident(points)
+        return cls(points, triangles, _neighbours(len(points), triangles))
+
+    @cached_property
+    def corners(self) -> np.ndarray:
+        """Corner points in m, (t, 3, 3)."""
+        return np.asarray(self.points[self.triangles])
+
+    @cached_property
+    def facets(self) -> np.ndarray:
+        """Outward unit normals of the triangles, (t, 3)."""
+        a, b, c = np.moveaxis(self.corners, 1, 0)
+        area = np.cross(b - a, c - a)
+        return np.asarray(area / np.linalg.norm(area, axis=1, keepdims=True))
+
+    @cached_property
+    def border(self) -> np.ndarray:
+        """Edges at which the surface ends, (t, 3) bool."""
+        return np.asarray(self.neighbours < 0)
+
+    @cached_property
+    def creases(self) -> np.ndarray:
+        """Edges over which the surface turns sharply, (t, 3) bool."""
+        across = self.facets[self.neighbours // 3]
+        return np.asarray((np.einsum("ti,tki->tk", self.facets, across) < CREASE) & ~self.border)
+
+    @cached_property
+    def edges(self) -> np.ndarray:
+        """Mean length of the edges in m, as an array of no dimension."""
+        along = np.roll(self.corners, -1, axis=1) - self.corners
+        return np.asarray(np.linalg.norm(along, axis=2).mean())
+
+
+def _arrays(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    points, triangles = np.asarray(points, dtype=np.float64), np.asarray(triangles)
+    if points.ndim != 2 or points.shape[1:] != (3,) or triangles.ndim != 2 or triangles.shape[1:] != (3,):
+        raise UsageError(
+            f"Points of shape {points.shape} and triangles of shape {triangles.shape} make no surface.",
+            fix="Pass points (P, 3) in m and triangles (t, 3) of point numbers.",
+        )
+    if not len(triangles) or triangles.dtype.kind not in "iu":
+        raise UsageError(
+            "A touched surface needs triangles, as whole numbers of its points.",
+            why=f"{len(triangles)} were given, of kind {triangles.dtype}.",
+        )
+    triangles = triangles.astype(np.int64)
+    if triangles.min() < 0 or triangles.max() >= len(points):
+        raise UsageError(
+            f"A triangle has corner {triangles.max() if triangles.min() >= 0 else triangles.min()}; "
+            f"there are {len(points)} points.",
+            fix="Number the points from 0.",
+        )
+    if not np.isfinite(points[triangles]).all():
+        raise UsageError("A corner of the touched surface is not a finite number.")
+    return points, triangles
+
+
+def _refuse_flat(points: np.ndarray, triangles: np.ndarray) -> None:
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
+    longest = np.max([((q - p) ** 2).sum(axis=1) for p, q in ((a, b), (b, c), (c, a))], axis=0)
+    flat = np.flatnonzero(~(np.linalg.norm(np.cross(b - a, c - a), axis=1) > FLAT * longest))
+    if flat.size:
+        raise UsageError(
+            f"{flat.size} of {len(triangles)} triangles have no area, the first is number {flat[0]}.",
+            why="Two of its corners are one, or all three lie on a line.",
+            fix="Remove such triangles, or mesh the surface again.",
+        )
+
+
+def _refuse_coincident(points: np.ndarray) -> None:
+    cells = np.round((points - points.min(axis=0)) / (SAME * np.ptp(points, axis=0).max())).astype(np.int64)
+    distinct = len(np.unique(cells, axis=0))
+    if distinct < len(points):
+        raise UsageError(
+            f"{len(points) - distinct} points of the touched surface lie where another one is.",
+            why="Triangles that share no point share no edge: the surface would end between them.",
+            fix="Merge the points that coincide and number the triangles anew.",
+        )
+
+
+def _neighbours(count: int, triangles: np.ndarray) -> np.ndarray:
+    """Partners (t, 3) of the edges; -1 where there is none."""
+    start, end = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    key = np.minimum(start, end) * count + np.maximum(start, end)
+    order = np.argsort(key, kind="stable")
+    key = key[order]
+    pair = np.flatnonzero(key[1:] == key[:-1])
+    if (pair[1:] == pair[:-1] + 1).any():
+        raise UsageError(
+            "An edge of the touched surface belongs to more than two triangles.",
+            why="Such a surface has no outer side.",
+            fix="Pass only the triangles of the outer skin.",
+        )
+    one, other = order[pair], order[pair + 1]
+    if (turned := int((start[one] == start[other]).sum())):
+        raise UsageError(
+            f"At {turned} edges of the touched surface two triangles face opposite ways.",
+            why="A distance has a sign only if all triangles are counter-clockwise as seen from outside.",
+            fix="Turn the corners of the wrong ones over.",
+        )
+    partner = np.full(len(start), -1)
+    partner[one], partner[other] = other, one
+    return partner.reshape(triangles.shape)

@@ -1,0 +1,107 @@
+"""One touch at a time, without allocation: what the 1 kHz path calls."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.surrogates.touch_kernels import ANSWER, FORCE, STIFFNESS, touch_into
+from palpate.surrogates.touch_trust import trust_at
+
+__all__ = ["SurrogateEvaluator"]
+
+_NONE = np.zeros(0)
+_DOUBLE = np.dtype(np.float64)
+
+
+class SurrogateEvaluator:
+    """Evaluates one touch at a time into arrays it owns; one evaluator serves one thread at a time.
+
+    Made by `TouchSurrogate.evaluator`.
+
+    Attributes
+    ----------
+    force : (3,)
+        F on the probe, N, where the last call evaluated.
+    stiffness : (3, 3)
+        ∂F/∂c, N/m.
+    inside : bool
+        Whether that was inside the trained region; without contact the answer is exact and counts as inside.
+
+    Parameters
+    ----------
+    compiled : tuple
+        Of `TouchSurrogate.compiled`.
+    root : (1 + n + h, z)
+        Root of the covariance of ℓ's coefficients; (0, 0) without one.
+    somewhere : n numbers
+        An input of the surrogate.
+    """
+
+    def __init__(self, compiled: tuple[Any, ...], root: np.ndarray, somewhere: Sequence[float]) -> None:
+        self._answer = np.zeros(ANSWER)
+        self.force, self.stiffness = self._answer[FORCE], self._answer[STIFFNESS].reshape(3, 3)
+        self.inside = True
+        self._arguments = (self._answer, *compiled)
+        self._shape = (len(somewhere) - 3,)
+        x: np.ndarray = compiled[0][0]  # the kernels keep the whole input there
+        self._posterior = (x, root, np.zeros((4, root.shape[1])), compiled[-1])
+        # compile now, not in the loop
+        self.trust(np.array(somewhere[:3], dtype=float), np.array(somewhere[3:], dtype=float))
+
+    def __call__(self, position: np.ndarray, parameters: np.ndarray = _NONE) -> None:
+        """Evaluate at a centre; float64 arrays are taken as they are, other sequences are converted.
+
+        Parameters
+        ----------
+        position : (3,) float64
+            The probe's centre c, m.
+        parameters : (p,) float64
+            The further inputs.
+
+        Raises
+        ------
+        UsageError
+            If there are not three coordinates and p parameters.
+        """
+        if type(position) is not np.ndarray or position.dtype is not _DOUBLE:
+            position = np.asarray(position, np.float64)
+        if type(parameters) is not np.ndarray or parameters.dtype is not _DOUBLE:
+            parameters = np.asarray(parameters, np.float64)
+        if position.shape != (3,) or parameters.shape != self._shape:
+            raise UsageError(
+                f"A probe at {position.shape} with parameters {parameters.shape} can't be answered.",
+                fix=f"Give its centre (3,) in m and parameters {self._shape}.",
+            )
+        self.inside = touch_into(position, parameters, *self._arguments)
+
+    def trust(self, position: np.ndarray, parameters: np.ndarray = _NONE) -> float:
+        """Standard deviation of the force relative to its size; evaluates there first.
+
+        Zero without contact, where the answer is exact; not-a-number in contact where the surrogate has no
+        posterior, or an input is not finite.
+
+        Raises
+        ------
+        UsageError
+            As a call.
+        """
+        self(position, parameters)
+        return trust_at(self._answer, *self._posterior)
+
+    @property
+    def energy(self) -> float:
+        """U where the last call evaluated, J."""
+        return float(self._answer[0])
+
+    @property
+    def depth(self) -> float:
+        """s where the last call evaluated, m; negative without contact."""
+        return float(self._answer[1])
+
+    def __repr__(self) -> str:
+        where = "inside" if self.inside else "outside"
+        return f"SurrogateEvaluator: force {self.force} N at depth {self.depth:.4g} m, {where} the trained region"

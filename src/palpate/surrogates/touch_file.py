@@ -1,0 +1,123 @@
+"""A touch surrogate in one file: a network archive of its own kind, with every part checked when read."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.errors import FileFormatError, UsageError
+from palpate.network import Archive, TrainedRegion, load_archive, save_archive
+from palpate.surrogates.continuation import Continuation
+from palpate.surrogates.laws import ContactLaw
+from palpate.surrogates.surface import TouchedSurface
+
+if TYPE_CHECKING:
+    from palpate.surrogates.touch_surrogate import TouchSurrogate
+
+__all__ = ["KIND", "load_surrogate", "save_surrogate"]
+
+KIND = "touch-surrogate"
+_NETWORK, _SURFACE = "log-factor", "surface/"
+_KEYS = {"law", "length", "radius", "radius_input", "region_radius", "deepest", "depth_width", "meta"}
+
+
+def save_surrogate(path: str | os.PathLike[str], surrogate: TouchSurrogate) -> Path:
+    """Write a surrogate; the file appears whole or not at all.
+
+    Raises
+    ------
+    UsageError
+        If the folder does not exist or can't be written, or `meta` holds what JSON does not know.
+    """
+    going, region = surrogate.continuation, surrogate.region
+    assert going is not None
+    arrays = {_SURFACE + k: v for k, v in surrogate.surface.arrays().items()} | {"widths": going.widths}
+    if region is not None:
+        arrays["region"] = region.points
+    if surrogate.root is not None:
+        arrays["root"] = surrogate.root
+    meta = {
+        "law": surrogate.law.name,
+        "length": _finite(surrogate.law.length),
+        "radius": _finite(surrogate.radius),
+        "radius_input": surrogate.radius_input,
+        "region_radius": None if region is None else region.radius,
+        "deepest": _finite(going.deepest),
+        "depth_width": going.depth_width,
+        "meta": dict(surrogate.meta),
+    }
+    return save_archive(path, Archive({_NETWORK: surrogate.network}, arrays, meta, KIND))
+
+
+def load_surrogate(path: str | os.PathLike[str]) -> TouchSurrogate:
+    """Read a surrogate back, bit for bit.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is missing, corrupt, foreign or from a later version, or its parts do not fit.
+    """
+    archive = load_archive(path, kind=KIND)
+    try:
+        return _surrogate(archive)
+    except (KeyError, TypeError, ValueError, IndexError, OverflowError, UsageError) as error:
+        raise FileFormatError(
+            f"{path} does not describe a touch surrogate.",
+            why=f"{type(error).__name__}: {error}",
+            fix="Copy the file again, or learn the surrogate anew.",
+        ) from error
+
+
+def _surrogate(archive: Archive) -> TouchSurrogate:
+    from palpate.surrogates.touch_surrogate import TouchSurrogate
+
+    meta, arrays = archive.meta, dict(archive.arrays)
+    if meta.keys() != _KEYS or archive.networks.keys() != {_NETWORK} or not isinstance(meta["meta"], dict):
+        raise ValueError("it is not described as one")
+    own = meta["radius_input"]
+    if own is not None and type(own) is not int:
+        raise TypeError(f"its radius is input {own!r}")
+    surface = {k.removeprefix(_SURFACE): arrays.pop(k) for k in list(arrays) if k.startswith(_SURFACE)}
+    region = arrays.pop("region", None)
+    going = Continuation(
+        _doubles(arrays.pop("widths")), _number(meta, "deepest", math.inf), _number(meta, "depth_width")
+    )
+    root = arrays.pop("root", None)
+    if arrays:
+        raise ValueError(f"it holds {sorted(arrays)}, which belong to nothing")
+    return TouchSurrogate(
+        network=archive.networks[_NETWORK],
+        law=ContactLaw(meta["law"], _number(meta, "length", math.inf)),
+        surface=TouchedSurface.from_arrays(surface),
+        radius=_number(meta, "radius", math.nan),
+        radius_input=own,
+        region=None if region is None else TrainedRegion(_doubles(region), _number(meta, "region_radius")),
+        continuation=going,
+        root=None if root is None else _doubles(root),
+        meta=meta["meta"],
+    )
+
+
+def _finite(number: float) -> float | None:
+    """What JSON can hold: None for a number that is not finite."""
+    return number if math.isfinite(number) else None
+
+
+def _number(meta: Mapping[str, Any], key: str, missing: float | None = None) -> float:
+    found = meta[key]
+    if found is None and missing is not None:
+        return missing
+    if type(found) not in {int, float} or not math.isfinite(found):
+        raise TypeError(f"its {key} is {found!r:.40}, not a finite number")
+    return float(found)
+
+
+def _doubles(array: np.ndarray) -> np.ndarray:
+    if array.dtype != np.float64:
+        raise TypeError(f"it holds {array.dtype} numbers; double precision is needed")
+    return array

@@ -1,0 +1,283 @@
+"""A touched body as one energy, learnt: exactly zero without contact, and its force a gradient everywhere.
+
+    U(c, p) = U₀(s(c)) exp ℓ(c, p),      s = R − d(c),      F = −∂U/∂c
+
+c is the centre of the rigid probe (m), d the signed distance to the touched surface at rest, U₀ a contact law
+(`laws`), ℓ a network of one output, p any further inputs of a family of bodies. F is the force on the probe.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.network import Network, TrainedRegion
+from palpate.network.second_order import gram
+from palpate.surrogates.continuation import Continuation
+from palpate.surrogates.laws import ContactLaw
+from palpate.surrogates.surface import TouchedSurface
+from palpate.surrogates.surrogate_evaluator import SurrogateEvaluator
+from palpate.surrogates.touch_kernels import ANSWER, FORCE, SMALL, STIFFNESS, touches_into
+from palpate.surrogates.touch_trust import trusts_into
+from palpate.units import Range, bounds
+
+__all__ = ["TouchSurrogate"]
+
+_STEP = 1e-3  # of the surface's own reach: difference that finds the third derivative of the distance
+
+
+@dataclass(frozen=True, eq=False)
+class TouchSurrogate:
+    """Energy, force and stiffness of a touch as a value: `save` and `load` give it back bit for bit.
+
+    Attributes
+    ----------
+    network : Network
+        ℓ = ln(U/U₀) of (c_x, c_y, c_z, …), one output; its inputs' ranges are the trained ones.
+    law : ContactLaw
+    surface : TouchedSurface
+    radius : float
+        R of the probe, m; not used where `radius_input` says which input it is.
+    radius_input : int, optional
+        The input, 3 or later, that is the probe's radius.
+    region : TrainedRegion, optional
+        Of the scaled training inputs; without it the ranges alone are the trained region.
+    continuation : Continuation, optional
+        How far ℓ is followed beyond its training; of the network's ranges unless given.
+    root : (1 + n + h, z), optional
+        Root of the covariance of ℓ's tail and weights, in the network's scaled output: what `deviation` needs.
+    meta : mapping
+        JSON-able. `__str__` tells of ``solves``, ``samples`` and ``force_error`` (a mapping with ``median`` and
+        ``p95``, relative) where they are there.
+
+    Raises
+    ------
+    UsageError
+        If the parts do not fit together.
+    """
+
+    network: Network
+    law: ContactLaw
+    surface: TouchedSurface
+    radius: float = math.nan
+    radius_input: int | None = None
+    region: TrainedRegion | None = None
+    continuation: Continuation | None = None
+    root: np.ndarray | None = None
+    meta: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if len(self.network.inputs) >= 3 and self.network.basis is not None:
+            object.__setattr__(self, "network", self.network.select([0]))
+        if self.continuation is None and len(self.network.inputs) >= 3:
+            object.__setattr__(self, "continuation", Continuation.of(self.network.inputs))
+        if self.root is not None:
+            root = np.array(self.root, dtype=np.float64, order="C")
+            root.flags.writeable = False
+            object.__setattr__(self, "root", root)
+        if fault := self._fault():
+            raise UsageError(
+                f"A touch surrogate can't be made: {fault}.",
+                why="Its network, radius, region and posterior must speak of the same inputs.",
+                fix="Make them of one set of samples, the centre's three coordinates first.",
+            )
+
+    def _fault(self) -> str:
+        """What does not fit; "" if all does."""
+        n = len(self.network.inputs)
+        if n < 3 or len(self.network.outputs) != 1:
+            return (
+                f"its network has {n} inputs and {len(self.network.outputs)} outputs, not 3 or more and one"
+            )
+        if fault := self._fault_of_radius():
+            return fault
+        if self.region is not None and self.region.points.shape[1] != n:
+            return f"its region has {self.region.points.shape[1]} inputs, its network {n}"
+        if self.continuation is not None and self.continuation.widths.shape != (n,):
+            return f"its continuation has {self.continuation.widths.size} widths for {n} inputs"
+        rows, root = 1 + n + self.network.units, self.root
+        if root is not None and not (root.ndim == 2 and len(root) == rows and np.isfinite(root).all()):
+            return f"its posterior has shape {root.shape}, not {rows} finite rows"
+        return ""
+
+    def _fault_of_radius(self) -> str:
+        n, own, reach = len(self.network.inputs), self.radius_input, self.surface.reach
+        if own is not None and not 3 <= own < n:
+            return f"input {own} can't be the radius of {n} inputs, the first three being the position"
+        low = self.radius if own is None else self.network.inputs[own].low
+        high = self.radius if own is None else self.network.inputs[own].high
+        if not (math.isfinite(low) and low > 0):
+            return f"its probe has a radius of {low} m"
+        if high > reach * (1.0 + 1e-9):
+            return f"its probe of {high:g} m is in touch before its surface's distance begins, at {reach:g} m"
+        return ""
+
+    def __repr__(self) -> str:
+        return str(self)
+
+    def __str__(self) -> str:
+        names = ", ".join(str(r) for r in self.inputs)
+        probe = (
+            f"of radius {1e3 * self.radius:g} mm"
+            if self.radius_input is None
+            else f"whose radius is {self.inputs[self.radius_input].name!r}"
+        )
+        units = (
+            f"{self.network.units} {self.network.form} units" if self.network.units else "an affine factor"
+        )
+        return f"TouchSurrogate: {names}; sphere {probe}; {self.law}; {units}{_history(self.meta)}"
+
+    @property
+    def inputs(self) -> tuple[Range, ...]:
+        """Names and trained ranges of all inputs: the centre's coordinates (m), then the further ones."""
+        return self.network.inputs
+
+    @property
+    def parameters(self) -> tuple[Range, ...]:
+        """The inputs after the centre's coordinates."""
+        return self.network.inputs[3:]
+
+    @cached_property
+    def _fixed(self) -> tuple[Any, ...]:
+        """What never changes of the kernels' arguments: numbers, limits, points, grams."""
+        going, region = self.continuation, self.region
+        assert going is not None
+        low, high = bounds(self.inputs)
+        own = -1 if self.radius_input is None else self.radius_input
+        radius = self.radius if own < 0 else self.inputs[own].low
+        numbers = np.array(
+            [
+                *self.law.numbers(),
+                radius,
+                own,
+                going.deepest,
+                going.depth_width,
+                math.inf if region is None else region.radius,
+                _STEP * radius,
+            ]
+        )
+        points = np.zeros((0, len(self.inputs))) if region is None else region.points
+        return numbers, np.array([low, high, going.widths]), points, gram(self.network, 3)
+
+    @cached_property
+    def _root(self) -> np.ndarray:
+        """The posterior's root in units of ℓ."""
+        if self.root is None:
+            return np.zeros((0, 0))
+        return np.asarray(self.root * self.network.scaling.output_scale[0])
+
+    def compiled(self) -> tuple[Any, ...]:
+        """What `touch_into` takes after its answer, with scratch for one thread."""
+        scratch = (np.zeros((4, len(self.inputs))), np.zeros((SMALL, 3, 3)))
+        return (*scratch, *self._fixed, self.surface.compiled(), self.network.compiled())
+
+    def _answers(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Checked inputs (N, n), answers (N, 14) and inside (N,)."""
+        X = np.ascontiguousarray(X, dtype=np.float64)
+        if X.ndim != 2 or X.shape[1] != len(self.inputs):
+            raise UsageError(
+                f"Inputs of shape {X.shape} came to a touch surrogate of {len(self.inputs)} inputs.",
+                why=f"They are {', '.join(r.name for r in self.inputs)}.",
+                fix=f"Pass an array of shape (N, {len(self.inputs)}), in SI units.",
+            )
+        answers, inside = np.empty((len(X), ANSWER)), np.empty(len(X), dtype=np.bool_)
+        touches_into(X, answers, inside, *self.compiled())
+        return X, answers, inside
+
+    def energy(self, X: np.ndarray) -> np.ndarray:
+        """U (N,) at inputs X (N, n), J.
+
+        Raises
+        ------
+        UsageError
+            If X has another number of columns; so do all that take X.
+        """
+        return self._answers(X)[1][:, 0].copy()
+
+    def depth(self, X: np.ndarray) -> np.ndarray:
+        """s (N,) of the rigid probe into the surface at rest, m; negative without contact."""
+        return self._answers(X)[1][:, 1].copy()
+
+    def force(self, X: np.ndarray) -> np.ndarray:
+        """F = −∂U/∂c (N, 3) on the probe, N."""
+        return self._answers(X)[1][:, FORCE].copy()
+
+    def stiffness(self, X: np.ndarray) -> np.ndarray:
+        """∂F/∂c (N, 3, 3), symmetric, N/m; a body that resists has negative eigenvalues."""
+        return self._answers(X)[1][:, STIFFNESS].reshape(-1, 3, 3).copy()
+
+    def inside(self, X: np.ndarray) -> np.ndarray:
+        """Whether the answers (N,) are of the trained region: in all ranges, no deeper, near a training input.
+
+        Without contact the answer, zero, is exact, and counts as inside.
+        """
+        return self._answers(X)[2]
+
+    def deviation(self, X: np.ndarray) -> np.ndarray:
+        """Standard deviation (N,) of the force relative to its size; zero without contact.
+
+        Raises
+        ------
+        UsageError
+            If the surrogate has no posterior.
+        """
+        if self.root is None:
+            raise UsageError(
+                "This surrogate does not know its deviation.",
+                why="It has no posterior of its weights.",
+                fix="Learn it with one, or give `root`.",
+            )
+        X, answers, _ = self._answers(X)
+        out, columns = np.empty(len(X)), np.zeros((4, self._root.shape[1]))
+        trusts_into(X, answers, out, self._root, columns, self.network.compiled())
+        return out
+
+    def evaluator(self) -> SurrogateEvaluator:
+        """The allocation-free evaluator of the 1 kHz path."""
+        return SurrogateEvaluator(self.compiled(), self._root, [r.low for r in self.inputs])
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the surrogate to one file.
+
+        Raises
+        ------
+        UsageError
+            If the file can't be written.
+        """
+        from palpate.surrogates.touch_file import save_surrogate
+
+        return save_surrogate(path, self)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> TouchSurrogate:
+        """Read a surrogate back.
+
+        Raises
+        ------
+        FileFormatError
+            If the file is missing, corrupt, foreign or from a later version.
+        """
+        from palpate.surrogates.touch_file import load_surrogate
+
+        return load_surrogate(path)
+
+
+def _history(meta: Mapping[str, Any]) -> str:
+    """What `meta` tells of the training, in words."""
+    words = ""
+    if "solves" in meta:
+        words += f"; trained with {meta['solves']} solves"
+        if meta.get("samples", meta["solves"]) != meta["solves"]:
+            words += f" ({meta['samples']} samples by symmetry)"
+    error = meta.get("force_error")
+    if isinstance(error, Mapping) and {"median", "p95"} <= error.keys():
+        words += f"; force error {100 * error['median']:.2g} % median, {100 * error['p95']:.2g} % p95"
+    return words

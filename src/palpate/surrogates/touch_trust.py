@@ -1,0 +1,49 @@
+"""How far a touch surrogate's force may be off, relative to itself: one small matrix product.
+
+The posterior of the linear weights w of ℓ = offset + scale · r·w, r = [1, ξ, φ], is kept as a root of their
+covariance, C = root rootᵀ (c, z). A column of it moves ℓ by a = scale · r·column and its gradient by b, and the force
+F = κ (U₀' ∇d − U₀ ∇ℓ) by F a − U b, so that
+
+    E‖δF‖²/‖F‖² = Σ over columns of ‖F a − U b‖² / ‖F‖²
+
+(first order in the weights). F and U are what the surrogate answers; r is taken at the input itself and not where a
+continuation holds it: outside the trained region the tail, and with it the figure, goes on growing.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from palpate.network.combine import combine_lines
+from palpate.network.second_order import regressors_into
+
+__all__ = ["trust_at", "trusts_into"]
+
+_jit = njit(cache=True, nogil=True, error_model="numpy")
+
+
+@_jit
+def trust_at(answer, x, root, columns, net) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """Relative deviation of the force in `answer` at x (n,): zero without contact; columns (4, z) is scratch."""
+    size = math.sqrt(answer[2] * answer[2] + answer[3] * answer[3] + answer[4] * answer[4])
+    if size == 0.0:
+        return 0.0
+    if root.shape[0] == 0:
+        return math.nan
+    line = regressors_into(x, *net)
+    combine_lines(net[0][line : line + 4], root, columns)
+    total = 0.0
+    for i in range(3):
+        for k in range(root.shape[1]):
+            moved = answer[2 + i] * columns[0, k] - answer[0] * columns[1 + i, k]
+            total += moved * moved
+    return math.sqrt(total) / size
+
+
+@_jit
+def trusts_into(X, answers, out, root, columns, net) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """`trust_at` for each row of X (N, n) into out (N,)."""
+    for i in range(X.shape[0]):
+        out[i] = trust_at(answers[i], X[i], root, columns, net)

@@ -1,0 +1,121 @@
+"""Touch surrogates made by formula, for tests that need one but no solver."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from palpate.network import Network, Scaling, TrainedRegion
+from palpate.surrogates import ContactLaw, Continuation, TouchedSurface, TouchSurrogate
+from palpate.units import Quantity, Range, bounds
+
+RADIUS = 0.010
+DEEPEST = 0.012
+BOX = [
+    Range("c_x", -0.02, 0.02, "m"),
+    Range("c_y", -0.02, 0.02, "m"),
+    Range("c_z", RADIUS - DEEPEST, RADIUS, "m"),
+]
+SOFT = Range("modulus", 4e3, 12e3, "Pa")
+PROBE = Range("radius", 0.006, 0.012, "m")
+
+
+def network(inputs, *, units: int = 40, seed: int = 1, size: float = 0.02) -> Network:
+    """ℓ with rotated units of random place and width, each of weight about `size`, and a gentle slope."""
+    rng, n = np.random.default_rng(seed), len(inputs)
+    low, high = bounds(inputs)
+    factors = np.tril(rng.normal(0.0, 0.3, (units, n, n)))
+    factors[:, np.arange(n), np.arange(n)] = rng.uniform(0.5, 1.5, (units, n))
+    centres = rng.uniform(-1.2, 1.2, (units, n))
+    tail = np.concatenate([[0.0], rng.uniform(-0.1, 0.1, n)])[None]
+    tail[0, 3] = -0.3  # stiffer with depth
+    return Network(
+        inputs=tuple(inputs),
+        outputs=(Quantity("ln of U over U0"),),
+        factors=factors,
+        shifts=np.einsum("kij,kj->ki", factors, centres),
+        weights=rng.normal(0.0, size, (1, units)),
+        tail=tail,
+        scaling=Scaling((low + high) / 2, (high - low) / 2, np.array([10.0]), np.array([1.0])),
+    )
+
+
+@functools.cache
+def plane() -> TouchedSurface:
+    """The face z = 0 of a body below it, 100 mm wide."""
+    corners = 0.05 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    return TouchedSurface.of(
+        corners, np.array([[0, 1, 2], [0, 2, 3]]), radius=0.006, reach=0.02, spacing=0.002
+    )
+
+
+@functools.cache
+def ball() -> TouchedSurface:
+    """The cap of a ball of 30 mm, its top the origin, as triangles of 3 mm."""
+    rings, sides = 9, 36
+    polar = np.linspace(0.0, 0.9, rings + 1)[1:]
+    turn = 2 * np.pi * np.arange(sides) / sides
+    ring = [[np.sin(a) * np.cos(t), np.sin(a) * np.sin(t), np.cos(a)] for a in polar for t in turn]
+    points = 0.03 * (np.array([[0.0, 0.0, 1.0], *ring]) - [0.0, 0.0, 1.0])
+    triangles = [[0, 1 + k, 1 + (k + 1) % sides] for k in range(sides)]
+    for r in range(rings - 1):
+        for k in range(sides):
+            a, b = 1 + r * sides + k, 1 + r * sides + (k + 1) % sides
+            triangles += [[a, a + sides, b + sides], [a, b + sides, b]]
+    return TouchedSurface.of(points, np.array(triangles), radius=0.006, reach=0.013, spacing=0.002)
+
+
+def surrogate(*, extra=(), surface=None, law=None, seed=1, deep=True, **more) -> TouchSurrogate:
+    """A body with the inputs of `BOX` and `extra`, trained at random points of them."""
+    inputs = [*BOX, *extra]
+    net = network(inputs, seed=seed, **{k: more.pop(k) for k in ("units", "size") if k in more})
+    rng = np.random.default_rng(seed)
+    parts = {
+        "region": TrainedRegion.of(rng.uniform(-1.0, 1.0, (400, len(inputs)))),
+        "continuation": Continuation.of(inputs, deepest=DEEPEST if deep else np.inf),
+        "root": 0.002 * rng.normal(size=(1 + len(inputs) + net.units, 20)),
+        "radius": RADIUS,
+    }
+    return TouchSurrogate(net, law or ContactLaw("series", 1e-3), surface or plane(), **(parts | more))
+
+
+def inside_points(count: int, extra=(), seed: int = 3) -> np.ndarray:
+    """Inputs of the trained box, most of them in contact."""
+    low, high = bounds([*BOX, *extra])
+    return np.random.default_rng(seed).uniform(low, high, (count, len(low)))
+
+
+def around_points(count: int, extra=(), seed: int = 4) -> np.ndarray:
+    """Inputs in and about the trained box: up to its size beyond it in position, deep ones too."""
+    low, high = bounds([*BOX, *extra])
+    wide = np.array([0.02, 0.02, 0.008, *(0.2 * (high - low)[3:])])
+    return np.random.default_rng(seed).uniform(low - wide, high + wide, (count, len(low)))
+
+
+def differences(function, X: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """∂function/∂x_i (N, …, k) by central differences of sixth order, one step for each of the first k inputs."""
+    columns = []
+    for i, h in enumerate(steps):
+        total = 0.0
+        for m, weight in ((1, 45.0), (2, -9.0), (3, 1.0)):
+            up, down = X.copy(), X.copy()
+            up[:, i] += m * h
+            down[:, i] -= m * h
+            total = total + weight * (function(up) - function(down))
+        columns.append(total / (60.0 * h))
+    return np.stack(columns, axis=-1)
+
+
+def undisturbed(S: TouchSurrogate, X: np.ndarray, reach: float) -> np.ndarray:
+    """Rows of X in contact, farther than `reach` (m) from wherever a third derivative of the energy jumps.
+
+    That is at the deepest trained depth, at the ends of ranges and at the nodes of the surface; and 20 times as far
+    from first touch, where derivatives by s grow as powers of 1/s.
+    """
+    s = S.depth(X)
+    keep = (s > 20 * reach) & (np.abs(s - S.continuation.deepest) > reach)
+    for end in bounds(S.inputs):
+        keep &= (np.abs(X - end)[:, :3] > reach).all(axis=1)
+    cell = (X[:, :3] - S.surface.frame[:3]) / S.surface.frame[3]
+    return X[keep & ((np.abs(cell - np.round(cell)) * S.surface.frame[3]) > reach).all(axis=1)]

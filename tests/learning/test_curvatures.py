@@ -64,7 +64,7 @@ def test_curvatures_by_theta_equal_central_differences(kind, name):
 
 
 def test_at_a_units_centre_all_is_finite():
-    r, X, theta = some_units("rotated", "matern-5/2")
+    r, _, theta = some_units("rotated", "matern-5/2")
     centre = r.form.centres(theta)[:1]
     K, D = r.curvatures_by_theta(centre, theta)
     near, D_near = r.curvatures_by_theta(centre + 1e-9, theta)

@@ -13,6 +13,7 @@ from palpate.learning import Observation, freeze, observe, step
 from palpate.learning.filter.growth import grown
 from palpate.learning.filter.model import jacobian, measured, regressors_at, value
 from palpate.learning.filter.pruning import without
+from palpate.learning.refinement.rows import Rows
 from palpate.learning.units.forms import Centred, form
 from palpate.network import Scaling
 from palpate.units import Quantity, Range
@@ -205,3 +206,74 @@ def test_slopes_teach_what_values_do(name):
 def test_an_unknown_form_is_refused_by_name(name):
     with pytest.raises(UsageError, match=name):
         form(name, n)
+
+
+def known_of(state, count, seed=8):
+    """Random observations with slopes and curvatures, each with a weight of its own, one slope of none."""
+    rng, six = np.random.default_rng(seed), n * (n + 1) // 2
+    for _ in range(count):
+        slopes, curvatures = rng.normal(size=(m, n)), rng.normal(size=(m, six))
+        s, c = rng.uniform(0.1, 1.0, n), rng.uniform(0.01, 0.1, six)
+        s[1], c[4], slopes[:, 1], curvatures[:, 4] = 0.0, 0.0, np.nan, np.nan
+        x, y = rng.uniform(-1, 1, n), rng.normal(size=m)
+        yield Observation(x, y, float(rng.uniform(0.5, 3)), slopes, s, curvatures, c)
+
+
+@every_form
+@every_radial
+@pytest.mark.parametrize("update", ["full", "decoupled"])
+def test_values_slopes_and_curvatures_together_are_one_ridge_regression(name, radial, update):
+    """With resting shapes: what the filter learns one by one equals the refinement's rows solved at once."""
+    settings = exact(form=name, radial=radial, noise=0.04, update=update)
+    units = 1 if update == "decoupled" else 3
+    if update == "decoupled":
+        settings = replace(settings, tail="none")
+    state = frozen_shapes(populated(n, m, units, settings, seed=1))
+    state = replace(state, coefficients=np.zeros_like(state.coefficients))
+    seen = list(known_of(state, 20))
+    rows = Rows.of(
+        settings.regressors(n),
+        np.array([o.x for o in seen]),
+        np.array([o.y for o in seen]),
+        weights=np.array([o.weight for o in seen]),
+        slopes=np.array([o.slopes for o in seen]),
+        slope_weight=np.array([o.slope_weight for o in seen]),
+        curvatures=np.array([o.curvatures for o in seen]),
+        curvature_weight=np.array([o.curvature_weight for o in seen]),
+    )
+    F, T = rows.matrix(state.theta), rows.targets @ rows.modes
+    ridge = np.linalg.solve(F.T @ F + settings.noise * np.eye(F.shape[1]), F.T @ T)
+    for one in seen:
+        state, event = observe(state, one, settings)
+        assert event.updated
+    np.testing.assert_allclose(state.coefficients, ridge, rtol=1e-10, atol=1e-10 * np.abs(ridge).max())
+
+
+@every_form
+@every_radial
+def test_jacobian_of_slopes_and_curvatures_equals_central_differences(name, radial):
+    settings = exact(form=name, radial=radial)
+    state = populated(n, m, 4, settings)
+    one = next(known_of(state, 1))
+    f, H = jacobian(state, one, settings)
+    np.testing.assert_allclose(f, measured(state, one, settings), rtol=1e-12, atol=1e-13)
+    assert f.shape == one.targets().shape == one.variances(1.0).shape == (m * (1 + n - 1 + 6 - 1),)
+    z, step = state.vector(), 1e-5
+    for j in range(z.size):
+        away = step * np.eye(z.size)[j]
+        up, down = (measured(state.moved(z + a), one, settings) for a in (away, -away))
+        numeric = (up - down) / (2 * step)
+        np.testing.assert_allclose(H[:, j], numeric, atol=1e-8 * max(1.0, np.abs(numeric).max()))
+
+
+def test_an_observation_less_nothing_is_itself_and_less_itself_is_zero():
+    one = next(known_of(None, 1))
+    np.testing.assert_array_equal(one.less(np.zeros(one.targets().size)).targets(), one.targets())
+    np.testing.assert_array_equal(one.less(one.targets()).targets(), 0.0)
+
+
+def test_a_curvature_that_counts_must_be_finite():
+    one = next(known_of(None, 1))
+    assert not one.flaw
+    assert replace(one, curvature_weight=1.0).flaw == "not finite"
+    assert replace(one, curvature_weight=-1.0).flaw == "its weight is not positive and finite"

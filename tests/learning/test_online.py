@@ -387,7 +387,7 @@ def test_a_retained_sample_counts_in_the_refinement_what_it_counts_in_the_filter
         slope_weight=kept.slope_weights,
     )
     np.testing.assert_allclose(rows.scale**2, 1.0 / seen.variances(1.0)[:1])
-    np.testing.assert_allclose(kept.weights * kept.slope_weights, 1.0 / seen.variances(1.0)[1:])
+    np.testing.assert_allclose(kept.weights * kept.slope_weights[:, 0], 1.0 / seen.variances(1.0)[1:])
 
 
 def test_what_is_declared_wrongly_is_refused_at_once():

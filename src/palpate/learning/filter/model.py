@@ -37,11 +37,15 @@ def value(state: State, x: np.ndarray, settings: Settings) -> np.ndarray:
 def measured(state: State, seen: Observation, settings: Settings) -> np.ndarray:
     """What the network has for everything that an observation holds, (q,)."""
     y = value(state, seen.x, settings)
-    if seen.slopes is None:
+    if seen.plain:
         return y
-    of = settings.regressors(state.inputs)
-    rows = np.hstack([of.tail_slopes(1)[0], of.slopes(seen.x[None], state.theta)[0]])  # (n, p_t + h)
-    return np.concatenate([y, (rows @ state.coefficients).T.ravel()])
+    of, X, parts = settings.regressors(state.inputs), seen.x[None], [y]
+    if seen.slopes is not None:
+        rows = np.hstack([of.tail_slopes(1)[0], of.slopes(X, state.theta)[0]])  # (n, p_t + h)
+        parts.append((rows @ state.coefficients).T.ravel())
+    if seen.curvatures is not None:
+        parts.append((of.curvatures(X, state.theta)[0] @ state.weights).T.ravel())
+    return np.concatenate(parts)[seen.counts]
 
 
 def jacobian(state: State, seen: Observation, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
@@ -50,16 +54,27 @@ def jacobian(state: State, seen: Observation, settings: Settings) -> tuple[np.nd
     X = seen.x[None]
     phi, by_theta = of.by_theta(X, state.theta)
     f, H = _rows(state, of.tail_rows(X)[0], phi[0], by_theta[0])
-    if seen.slopes is None:
+    if seen.plain:
         return f, H
-    slopes, slopes_by_theta = of.slopes_by_theta(X, state.theta)
-    tails = of.tail_slopes(1)[0]
-    n, m = state.inputs, state.outputs
-    parts = [_rows(state, tails[i], slopes[0, i], slopes_by_theta[0, i]) for i in range(n)]
-    # slopes come output by output: (n, m, …) to (m, n, …)
-    df = np.stack([p[0] for p in parts], axis=1).ravel()
-    dH = np.stack([p[1] for p in parts], axis=1).reshape(m * n, -1)
-    return np.concatenate([f, df]), np.vstack([H, dH])
+    found, tails = [(f, H)], of.tail_slopes(1)[0]
+    if seen.slopes is not None:
+        slopes, by_theta = of.slopes_by_theta(X, state.theta)
+        found.append(_several(state, tails, slopes[0], by_theta[0]))
+    if seen.curvatures is not None:
+        bends, by_theta = of.curvatures_by_theta(X, state.theta)
+        found.append(_several(state, np.zeros((len(bends[0]), tails.shape[1])), bends[0], by_theta[0]))
+    kept = seen.counts
+    return np.concatenate([p[0] for p in found])[kept], np.vstack([p[1] for p in found])[kept]
+
+
+def _several(
+    state: State, tails: np.ndarray, units: np.ndarray, by_theta: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Several functionals, output by output: (m q,) and (m q, d) from (q, p_t), (q, h) and (q, h, p)."""
+    parts = [_rows(state, *one) for one in zip(tails, units, by_theta, strict=True)]
+    # functional by functional, (q, m, …), to (m, q, …)
+    values = np.stack([p[0] for p in parts], axis=1)
+    return values.ravel(), np.stack([p[1] for p in parts], axis=1).reshape(values.size, -1)
 
 
 def _rows(

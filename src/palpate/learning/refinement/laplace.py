@@ -77,6 +77,7 @@ class Posterior:
         ridge: float | np.ndarray = 0.0,
         weights: np.ndarray | None = None,
         slope_weight: float | np.ndarray | None = None,
+        curvature_weight: float | np.ndarray | None = None,
     ) -> Posterior:
         """From the samples that the network was refined on.
 
@@ -96,8 +97,10 @@ class Posterior:
             λ, tail first; the refinement's is its own ridge times the sum of the weights, on the units' weights.
         weights : (N,), optional
             As in `refine`.
-        slope_weight : float or (N,), optional
+        slope_weight : float, (N,) or (N, n), optional
             As in `refine`, if slopes were given there.
+        curvature_weight : float, (N,) or (N, n(n+1)/2), optional
+            As in `refine`, if curvatures were given there.
 
         Raises
         ------
@@ -107,7 +110,8 @@ class Posterior:
         r, h = refined.regressors, len(refined.theta)
         entries = Regressors(cast(Form, _Entries(r.form)), r.radial, r.tail)
         m = refined.coefficients.shape[1]
-        rows = Rows.blank(entries, X, weights=weights, slope_weight=slope_weight)
+        shares = {"slope_weight": slope_weight, "curvature_weight": curvature_weight}
+        rows = Rows.blank(entries, X, weights=weights, **shares)
         noise = _noise(refined, X, Y, weights) if noise is None else numbers("Noise variances", noise, (m,))
         if not ((noise > 0).all() and _positive(prior) and (np.asarray(ridge) >= 0).all()):
             raise UsageError(

@@ -20,7 +20,7 @@ from palpate.learning.units.regressors import Regressors
 
 __all__ = ["posterior"]
 
-Given = dict[str, Any]  # weights and slope_weight, as `Rows.blank` takes them
+Given = dict[str, Any]  # weights of values, slopes and curvatures, as `Rows.blank` takes them
 
 
 def posterior(
@@ -31,6 +31,7 @@ def posterior(
     modes: np.ndarray | None = None,
     weights: np.ndarray | None = None,
     slope_weight: float | np.ndarray | None = None,
+    curvature_weight: float | np.ndarray | None = None,
 ) -> State:
     """The filter's state that a refined network stands for.
 
@@ -54,8 +55,10 @@ def posterior(
         Orthonormal output directions for the shared-weight rule.
     weights : (N,), optional
         How many ordinary samples each one counts as.
-    slope_weight : float or (N,), optional
+    slope_weight : float, (N,) or (N, n), optional
         As in `refine`, if slopes were given there: their rows ∂²f/∂z∂x count as the values' do.
+    curvature_weight : float, (N,) or (N, n(n+1)/2), optional
+        The same for curvatures.
 
     Returns
     -------
@@ -83,7 +86,7 @@ def posterior(
         innovation=refined.rms**2,
         in_modes=None if modes is None else refined.coefficients @ modes,
     )
-    given = {"weights": weights, "slope_weight": slope_weight}
+    given = {"weights": weights, "slope_weight": slope_weight, "curvature_weight": curvature_weight}
     return replace(mean, covariance=_COVARIANCES[settings.update](mean, refined, X, given, settings))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from palpate.learning.filter.settings import Settings
 from palpate.learning.filter.state import State, initial
 from palpate.learning.freezing import freeze
 from palpate.learning.modes import output_modes
+from palpate.learning.units.regressors import pairs
 from palpate.network import Network, Scaling
 from palpate.units import Quantity, Range, bounds
 
@@ -37,9 +38,12 @@ class Gauge:
         s, V = self.scaling, self.directions
         y = s.scale_outputs(seen.y)
         slopes = None if seen.slopes is None else seen.slopes * s.input_half / s.output_scale[:, None]
+        curvatures, (i, j) = seen.curvatures, pairs(seen.x.size)
+        if curvatures is not None:
+            curvatures = curvatures * (s.input_half[i] * s.input_half[j]) / s.output_scale[:, None]
         if V is not None:
-            y, slopes = y @ V, None if slopes is None else V.T @ slopes
-        return Observation(s.scale_inputs(seen.x), y, seen.weight, slopes, seen.slope_weight)
+            y, slopes, curvatures = y @ V, _along(V, slopes), _along(V, curvatures)
+        return replace(seen, x=s.scale_inputs(seen.x), y=y, slopes=slopes, curvatures=curvatures)
 
     def initial(self, settings: Settings, Y: np.ndarray | None) -> State:
         """The state to begin with; early outputs Y (N, m) in SI units decide the shared-weight rule's modes."""
@@ -67,3 +71,7 @@ def declared(inputs: Sequence[Range], outputs: Sequence[Quantity | Range]) -> Sc
         return None
     low, high = bounds(ranges)
     return Scaling.of(inputs, (low + high)[None] / 2, scale=float((high - low).max() / 2))
+
+
+def _along(V: np.ndarray, derivatives: np.ndarray | None) -> np.ndarray | None:
+    return None if derivatives is None else V.T @ derivatives

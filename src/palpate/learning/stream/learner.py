@@ -51,7 +51,7 @@ class Learner:
     Cost of an observation, h units of p numbers, d unknowns, q observed numbers: the filter's, about 2 q d²
     operations for the full rule and (p_t + h)² + (h p)² r for the shared one, and for every k-th one R (h p)² +
     tries · ((h p)³/3 + 2 R (h + p_t)²), and that posterior's (h p)³ (shared) or R q d² (full). Memory: d² or
-    (p_t + h)² + (h p)² numbers of covariance, R (n + m + 3) of samples, M (n + m + 1) of the window, `remember`
+    (p_t + h)² + (h p)² numbers of covariance, R (n + m + 2) of samples, M (n + m + 1) of the window, `remember`
     events; none of it grows with the stream. With `basis`, m counts the modes.
 
     Parameters
@@ -135,7 +135,9 @@ class Learner:
         *,
         weight: float = 1.0,
         slopes: np.ndarray | None = None,
-        slope_weight: float = 1.0,
+        slope_weight: float | np.ndarray = 1.0,
+        curvatures: np.ndarray | None = None,
+        curvature_weight: float | np.ndarray = 1.0,
     ) -> Event:
         """Learn one observation.
 
@@ -151,8 +153,12 @@ class Learner:
             How many ordinary observations this one counts as.
         slopes : (m, n), optional
             ∂y/∂x in SI units.
-        slope_weight : float
-            How many ordinary values a scaled slope counts as.
+        slope_weight : float or (n,)
+            How many ordinary values a scaled slope counts as; one of no weight may be not-a-number.
+        curvatures : (m, n(n+1)/2), optional
+            ∂²y/∂x_i∂x_j in SI units, i ≤ j.
+        curvature_weight : float or (n(n+1)/2,)
+            How many ordinary values a scaled curvature counts as.
 
         Returns
         -------
@@ -167,14 +173,17 @@ class Learner:
         # copies: a loop may hand over the same buffers each time
         x, y = np.array(x, np.float64), np.array(y, np.float64)
         slopes = None if slopes is None else np.array(slopes, np.float64)
+        curvatures = None if curvatures is None else np.array(curvatures, np.float64)
         n, m = len(self.inputs), len(self.outputs)
-        if x.shape != (n,) or y.shape != (m,) or not (slopes is None or slopes.shape == (m, n)):
+        seen = Observation(x, y, weight, slopes, slope_weight, curvatures, curvature_weight)
+        if not _fits(seen, n, m):
             raise UsageError(
                 f"An observation of shapes {x.shape} and {y.shape} came to a learner of {n} inputs and {m} outputs.",
-                fix=f"Pass x ({n},), y ({m},) and, where they are known, slopes ({m}, {n}).",
+                why="Every array has a row for each output, and weights one number, or one for each column.",
+                fix=f"Pass x ({n},), y ({m},) and, where they are known, slopes ({m}, {n}) and curvatures "
+                f"({m}, {n * (n + 1) // 2}).",
             )
         self.count += 1
-        seen = Observation(x, y, weight, slopes, slope_weight)
         with self._threads.limit(limits=1), np.errstate(all="ignore"):
             event = (
                 self._settling(seen) if self._gauge is None else self._learnt(self._gauge.observation(seen))
@@ -288,7 +297,12 @@ class Learner:
             return event
         if self._kept is not None and self.refining is not None:
             self._kept.add(
-                *(seen.x, seen.y), weight=seen.weight, slopes=seen.slopes, slope_weight=seen.slope_weight
+                *(seen.x, seen.y),
+                weight=seen.weight,
+                slopes=seen.slopes,
+                slope_weight=seen.slope_weight,
+                curvatures=seen.curvatures,
+                curvature_weight=seen.curvature_weight,
             )
             if self._kept.seen % self.refining.every == 0:
                 before, state = state.units, self._refined(state, self._kept, self.refining)
@@ -327,3 +341,14 @@ def _checked(
 
 def _skipped(units: int, why: str) -> Event:
     return Event(np.nan, np.nan, False, False, 0, units, why)
+
+
+def _fits(seen: Observation, n: int, m: int) -> bool:
+    """Whether an observation's arrays are those of n inputs and m outputs."""
+    fits = seen.x.shape == (n,) and seen.y.shape == (m,)
+    for known, weight, q in (
+        (seen.slopes, seen.slope_weight, n),
+        (seen.curvatures, seen.curvature_weight, n * (n + 1) // 2),
+    ):
+        fits = fits and (known is None or known.shape == (m, q)) and np.shape(weight) in {(), (q,)}
+    return fits

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 
@@ -155,8 +155,13 @@ def _continued(
     """The filter's state with other parameters and their posterior."""
     new = len(theta) - state.units
     refined = replace(_refined(state, settings, theta, coefficients), rms=progress.expected)
-    share = None if kept.slopes is None else kept.slope_weights
-    found = posterior(refined, kept.X, settings, modes=state.modes, weights=weights, slope_weight=share)
+    found = posterior(
+        *(refined, kept.X, settings),
+        modes=state.modes,
+        weights=weights,
+        slope_weight=kept.slope_weights,
+        curvature_weight=kept.curvature_weights,
+    )
     state = replace(
         state,
         coefficients=coefficients,
@@ -182,7 +187,12 @@ def _judging(kept: Reservoir, weights: np.ndarray, refining: Refining) -> np.nda
 
 def _rows(state: State, kept: Reservoir, settings: Settings, weights: np.ndarray) -> Rows:
     of = settings.regressors(state.inputs)
-    return Rows.of(of, kept.X, kept.Y, weights=weights, slopes=kept.slopes, slope_weight=kept.slope_weights)
+    known: dict[str, Any] = {}
+    if kept.slopes is not None:
+        known |= {"slopes": kept.slopes, "slope_weight": kept.slope_weights}
+    if kept.curvatures is not None:
+        known |= {"curvatures": kept.curvatures, "curvature_weight": kept.curvature_weights}
+    return Rows.of(of, kept.X, kept.Y, weights=weights, **known)
 
 
 def _error(

@@ -21,7 +21,8 @@ class Reservoir:
     latest    the last R
 
     The seed decides which. A sample at exactly the inputs of a retained one takes its place: a second sight of it must
-    not count twice against the others. Memory: R (n + m + 3) numbers, and R m n more once a sample comes with slopes.
+    not count twice against the others. Memory: R (n + m + 2) numbers, R (m + 1) n more once a sample comes
+    with slopes, and R (m + 1) n (n + 1)/2 once one comes with curvatures.
 
     Parameters
     ----------
@@ -51,8 +52,11 @@ class Reservoir:
         self._rng = np.random.default_rng(seed)
         self._x, self._y = np.empty((capacity, inputs)), np.empty((capacity, outputs))
         self._times = np.empty(capacity, np.int64)
-        self._weights, self._slope_weights = np.ones(capacity), np.zeros(capacity)
+        self._weights = np.ones(capacity)
         self._slopes: np.ndarray | None = None
+        self._slope_weights: np.ndarray | None = None
+        self._curvatures: np.ndarray | None = None
+        self._curvature_weights: np.ndarray | None = None
 
     def __len__(self) -> int:
         return min(self.fresh, self.capacity)
@@ -83,14 +87,26 @@ class Reservoir:
         return None if self._slopes is None else self._slopes[: len(self)]
 
     @property
-    def slope_weights(self) -> np.ndarray:
-        """(N,), zero for samples without slopes."""
-        return self._slope_weights[: len(self)]
+    def slope_weights(self) -> np.ndarray | None:
+        """(N, n), zero for samples without slopes; none where no sample came with them."""
+        return None if self._slope_weights is None else self._slope_weights[: len(self)]
+
+    @property
+    def curvatures(self) -> np.ndarray | None:
+        """∂²y/∂x_i∂x_j (N, m, n(n+1)/2), where any sample came with them."""
+        return None if self._curvatures is None else self._curvatures[: len(self)]
+
+    @property
+    def curvature_weights(self) -> np.ndarray | None:
+        """(N, n(n+1)/2), zero for samples without curvatures; none where no sample came with them."""
+        return None if self._curvature_weights is None else self._curvature_weights[: len(self)]
 
     @property
     def numbers(self) -> int:
         """How many numbers there is room for."""
-        parts = (self._x, self._y, self._times, self._weights, self._slope_weights, self._slopes)
+        first = (self._slopes, self._slope_weights)
+        second = (self._curvatures, self._curvature_weights)
+        parts = (self._x, self._y, self._times, self._weights, *first, *second)
         return sum(p.size for p in parts if p is not None)
 
     def add(
@@ -100,9 +116,11 @@ class Reservoir:
         *,
         weight: float = 1.0,
         slopes: np.ndarray | None = None,
-        slope_weight: float = 1.0,
+        slope_weight: float | np.ndarray = 1.0,
+        curvatures: np.ndarray | None = None,
+        curvature_weight: float | np.ndarray = 1.0,
     ) -> bool:
-        """Show one more sample x (n,), y (m,); whether it was kept."""
+        """Show one more sample x (n,), y (m,), with what `Observation` may hold; whether it was kept."""
         place = self._place(x)
         self.seen += 1
         if place >= self.capacity:
@@ -110,11 +128,12 @@ class Reservoir:
         self._x[place], self._y[place] = x, y
         self._times[place] = self.seen - 1
         self._weights[place] = weight
-        self._slope_weights[place] = 0.0 if slopes is None else slope_weight
-        if slopes is not None:
-            if self._slopes is None:
-                self._slopes = np.zeros((self.capacity, *slopes.shape))
-            self._slopes[place] = slopes
+        self._slopes, self._slope_weights = _put(
+            *(place, self.capacity, self._slopes, self._slope_weights), slopes, slope_weight
+        )
+        self._curvatures, self._curvature_weights = _put(
+            *(place, self.capacity, self._curvatures, self._curvature_weights), curvatures, curvature_weight
+        )
         return True
 
     def _place(self, x: np.ndarray) -> int:
@@ -128,3 +147,21 @@ class Reservoir:
             return (self.fresh - 1) % self.capacity
         # a place past the last means that the sample is not kept
         return int(self._rng.integers(self.capacity if self.keeping == "fading" else self.fresh))
+
+
+def _put(
+    place: int,
+    capacity: int,
+    kept: np.ndarray | None,
+    weights: np.ndarray | None,
+    new: np.ndarray | None,
+    weight: float | np.ndarray,
+) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """Derivatives (R, m, q) and their weights (R, q) with a new sample's, room being made for the first."""
+    if new is not None and (kept is None or weights is None):
+        kept, weights = np.zeros((capacity, *new.shape)), np.zeros((capacity, new.shape[1]))
+    if kept is not None and weights is not None:
+        weights[place] = 0.0 if new is None else weight
+        if new is not None:
+            kept[place] = new
+    return kept, weights

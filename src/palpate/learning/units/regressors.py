@@ -23,8 +23,8 @@ from typing import Literal, get_args
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.learning.units.forms import Form
 from palpate.learning.units.chained import chained
+from palpate.learning.units.forms import Form
 from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction, radial, third
 
 __all__ = ["Regressors", "Tail", "pairs"]

@@ -40,11 +40,11 @@ def updated(
     Raises
     ------
     UsageError
-        If the observation holds slopes: outputs and slopes have different regressors.
+        If the observation holds slopes or curvatures: they have other regressors than the outputs.
     """
-    if seen.slopes is not None:
+    if not seen.plain:
         raise UsageError(
-            "The shared-weight rule can't learn from slopes.",
+            "The shared-weight rule can't learn from slopes or curvatures.",
             why="It lives on all observed quantities having the same regressors.",
             fix='Choose update="full" or "decoupled".',
         )

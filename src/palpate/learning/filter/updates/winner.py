@@ -40,7 +40,7 @@ def updated(
         covariance=P.only(unit),
     )
     own, H = jacobian(part, seen, settings)
-    rest = _without(seen, found - own)
+    rest = seen.less(found - own)
 
     def whole(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         coefficients, theta = state.coefficients.copy(), state.theta.copy()
@@ -53,10 +53,3 @@ def updated(
     coefficients, theta = whole(part.vector())
     covariance = P.renewed(unit, part.covariance, donate=donate)
     return replace(state, coefficients=coefficients, theta=theta, covariance=covariance)
-
-
-def _without(seen: Observation, others: np.ndarray) -> Observation:
-    """The observation less what other units have for it, (q,)."""
-    m = seen.y.size
-    slopes = None if seen.slopes is None else seen.slopes - others[m:].reshape(seen.slopes.shape)
-    return replace(seen, y=seen.y - others[:m], slopes=slopes)

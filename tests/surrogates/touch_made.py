@@ -110,12 +110,16 @@ def differences(function, X: np.ndarray, steps: np.ndarray) -> np.ndarray:
 def undisturbed(S: TouchSurrogate, X: np.ndarray, reach: float) -> np.ndarray:
     """Rows of X in contact, farther than `reach` (m) from wherever a third derivative of the energy jumps.
 
-    That is at the deepest trained depth, at the ends of ranges and at the nodes of the surface; and 20 times as far
-    from first touch, where derivatives by s grow as powers of 1/s.
+    That is at the deepest trained depth, where the place at which ℓ is taken crosses the end of a range, and at the
+    nodes of the surface; and 20 times as far from first touch, where derivatives by s grow as powers of 1/s.
     """
+    going = S.continuation
+    _, slope, _ = S.surface.at(X[:, :3])
     s = S.depth(X)
-    keep = (s > 20 * reach) & (np.abs(s - S.continuation.deepest) > reach)
-    for end in bounds(S.inputs):
-        keep &= (np.abs(X - end)[:, :3] > reach).all(axis=1)
+    over = np.maximum(s - going.deepest, 0.0)
+    taken = X[:, :3] + (over - going.depth_width * np.tanh(over / going.depth_width))[:, None] * slope
+    keep = (s > 20 * reach) & (np.abs(s - going.deepest) > reach)
+    for end in bounds(S.inputs[:3]):
+        keep &= (np.abs(taken - end) > reach).all(axis=1)
     cell = (X[:, :3] - S.surface.frame[:3]) / S.surface.frame[3]
     return X[keep & ((np.abs(cell - np.round(cell)) * S.surface.frame[3]) > reach).all(axis=1)]

@@ -31,7 +31,7 @@ from palpate.units import Range, bounds
 
 __all__ = ["TouchSurrogate"]
 
-_STEP = 1e-3  # of the surface's own reach: difference that finds the third derivative of the distance
+_STEP = 1e-3  # of the radius: the difference that finds the third derivative of the distance
 
 
 @dataclass(frozen=True, eq=False)

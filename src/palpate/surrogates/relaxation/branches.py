@@ -11,9 +11,11 @@ elastic energy at which pad and body give way alike, the body's share of the com
 
 because a pad's energy grows with the cube of the depth and a Hertzian body's with its power 5/2: the ratio of their
 stiffnesses goes with the root of the depth, that is with U^(1/6). Shares and times are then those of the body behind
-the pad, and the share left of a held force is again a sum of exponentials,
+the pad, and the share left of a held force is
 
-    g(t) = γ_∞ + γᵀ exp(A t) 1        A = T⁻¹ ((1 − β²) 1 γᵀ − I)        T = diag(τ_i)
+    g(t) = (1 − u) (1 − u (1 − β²)/6)        u = b (Σγ_i − γᵀ exp(A t) 1)        b = β²/(1 − (1 − β²) Σγ_i)
+
+with A = T⁻¹ ((1 − β²) 1 γᵀ − I), T = diag(τ_i), where the second factor comes from β growing with the depth.
 """
 
 from __future__ import annotations
@@ -59,7 +61,9 @@ class Branches:
                 fix="Give shares that sum to less than 1.",
             )
         if not 0 <= self.pad < math.inf:
-            raise UsageError(f"A pad's energy can't be {self.pad} J.", fix="Give 0, or a positive energy in J.")
+            raise UsageError(
+                f"A pad's energy can't be {self.pad} J.", fix="Give 0, or a positive energy in J."
+            )
 
     def __str__(self) -> str:
         if not self.terms:
@@ -103,16 +107,19 @@ class Branches:
         time = np.asarray(time, dtype=float)
         if not self.terms:
             return np.ones_like(time)
-        rates, amplitudes = self.modes(1.0 if energy is None else float(self.body_share(energy)))
-        return np.asarray(self.equilibrium + np.exp(-np.multiply.outer(time, rates)) @ amplitudes)
+        body = 1.0 if energy is None else float(self.body_share(energy))
+        rates, amplitudes = self._modes(body)
+        fallen = (1.0 - np.exp(-np.multiply.outer(time, rates))) @ amplitudes
+        return np.asarray((1.0 - fallen) * (1.0 - fallen * (1.0 - body) / 6.0))
 
-    def modes(self, body: float) -> tuple[np.ndarray, np.ndarray]:
-        """Rates (n,) in 1/s and amplitudes (n,) of a held force's exponentials, at a share β² of the body."""
+    def _modes(self, body: float) -> tuple[np.ndarray, np.ndarray]:
+        """Rates (n,) in 1/s and amplitudes (n,) of the exponentials in u, at a share β² of the body."""
         shares, times, _ = self.compiled()
         # A is similar to a symmetric matrix by diag(√(γ τ))
         root = np.sqrt(shares / times)
         rates, vectors = np.linalg.eigh(np.diag(1 / times) - (1 - body) * np.outer(root, root))
-        return rates, (root @ vectors) * (np.sqrt(shares * times) @ vectors)
+        felt = body / (1 - (1 - body) * shares.sum())
+        return rates, felt * (root @ vectors) * (np.sqrt(shares * times) @ vectors)
 
     def compiled(self) -> tuple[np.ndarray, np.ndarray, float]:
         """γ (n,), τ (n,) in s, and √(2U_a) in √J, as the kernels take them."""

@@ -193,7 +193,9 @@ class _Noise:
 def _along(name: str, times: np.ndarray, depths: np.ndarray, touch: Vector, inward: Vector) -> Drive:
     start = np.asarray(touch, dtype=float)
     if start.shape != (3,) or not np.isfinite(start).all():
-        raise UsageError(f"A probe can't start from {touch!r}.", fix="Give its centre at first touch, (3,) in m.")
+        raise UsageError(
+            f"A probe can't start from {touch!r}.", fix="Give its centre at first touch, (3,) in m."
+        )
     return Drive(name, times, start + np.outer(depths, _unit(inward)))
 
 
@@ -224,6 +226,8 @@ def _clock(seconds: float, dt: float) -> np.ndarray:
 def _ascending(times: np.ndarray) -> np.ndarray:
     if times.ndim != 1 or not np.isfinite(times).all() or not (np.diff(times) > 0).all():
         raise UsageError(
-            "The times of a hold must ascend.", why=f"They are {times[1:]}.", fix="Sort them; all above 1e-6 s."
+            "The times of a hold must ascend.",
+            why=f"They are {times[1:]}.",
+            fix="Sort them; all above 1e-6 s.",
         )
     return times

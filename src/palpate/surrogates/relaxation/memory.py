@@ -12,7 +12,7 @@ to stay deeper than the probe, since tissue doesn't stick:
 
 Without memory V = U. Without a pad β = 1, and a probe that is pressed in and held feels its force relax by the Prony
 series exactly. A single patch gives the scalar form F = −[γ_∞ q + Σγ_i (q − z_i)]₊ ∇q. V ≥ 0 because
-Y_j² ≤ Σγ_i z_ij². At U → 0 the slope ∇q = ∇U/q is finite for every contact law (U ~ s², s^{5/2}, s³) and the force zero.
+Y_j² ≤ Σγ_i z_ij². At U → 0 the slope ∇q = ∇U/q is finite for every contact law (U ~ s², s^{5/2}, s³), the force zero.
 
 **Passive.** V is the least of functions that are convex in (p, z), hence convex in z, and ż_ij = −(∂V/∂z_ij)/(γ_i τ_i):
 at a probe that stays, V can only fall. While it moves, dV/dt = −F·ċ − Σ γ_i (p_j − z_ij)²/τ_i.
@@ -31,6 +31,7 @@ trapezoid of the forces at the samples by terms of second order in the step over
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,8 +70,9 @@ class Memory:
         self.force, self._ledger = np.zeros(3), np.zeros(4)
         # amplitudes asked, remembered, whether there are any, and the last q
         self._state = (np.zeros(count), np.zeros((count, n)), np.zeros(count, dtype=np.bool_), np.zeros(1))
-        self._work = (np.zeros(count), np.zeros(3), np.zeros(n), np.zeros(n))
-        self._constants = (patches.points, float(patches.width), shares, times, pad)
+        self._work = (np.zeros(count), np.zeros(4), np.zeros(2), np.zeros((3, n)))
+        law = np.array([patches.width, math.sqrt(2 * patches.energy), patches.least])
+        self._constants = (patches.points, law, shares, times, pad)
         self.step(np.zeros(3), 0.0, np.zeros(3), 0.0)  # compile now, not in the loop
         self.reset()
 

@@ -4,8 +4,14 @@ At a probe's centre c, patch j at x_j carries the share σ_j of the elastic ener
 
     σ_j = exp(−|x_j − c|²/2w²) / Σ_k exp(−|x_k − c|²/2w²)        Σ σ_j = 1
 
-On a plane the distance of c from it cancels, and σ is a Gaussian of width w about the foot point. With a single patch
-the memory is a scalar that travels with the probe.
+On a plane the distance of c from it cancels, and σ is a Gaussian of width w about the foot point. It widens with the
+area of contact. A sphere of radius R at depth s touches a Hertzian body over a radius a = √(R s), and half of it
+follows transient solves best; with U ~ s³ for the pad in front
+
+    w² = w₁² (U/U₁)^(1/3) + w₀²        w₁ = ½ √(R s₁)        U₁ = U(s₁)
+
+where w₀ keeps the patterns wider than the patches are apart. With a single patch the memory is a scalar that travels
+with the probe.
 """
 
 from __future__ import annotations
@@ -18,7 +24,8 @@ from palpate.errors import UsageError
 
 __all__ = ["Patches"]
 
-FINE = 0.5  # distance of the points that a patch is the mean of, over its width
+FINE = 0.5  # distance of the points that a patch is the mean of, over the patches' spacing
+LEAST = 0.4  # w₀ over the spacing: patterns narrower than that jump from patch to patch
 MOST = 20_000  # patches: 1 ms of work and more, far beyond what a loop at 1 kHz can spend
 
 
@@ -31,31 +38,39 @@ class Patches:
     points : (M, 3)
         x_j in m, at rest.
     width : float
-        w in m. For a sphere of radius R on a soft block 0.32 R follows transient solves best.
+        w₁ in m, at the energy U₁; ½ √(R s₁) for a sphere of radius R at a depth s₁ that is typical.
+    energy : float
+        U₁ in J; 0 for a width that doesn't change.
+    least : float
+        w₀ in m.
 
     Raises
     ------
     UsageError
-        If the points are no (M, 3) finite numbers, or the width isn't positive.
+        If the points are no (M, 3) finite numbers, the width isn't positive, or energy or least width is negative.
     """
 
     points: np.ndarray
     width: float
+    energy: float = 0.0
+    least: float = 0.0
 
     def __post_init__(self) -> None:
         points = np.ascontiguousarray(self.points, dtype=float)
         if points.ndim != 2 or points.shape[1] != 3 or not len(points) or not np.isfinite(points).all():
             raise UsageError(
-                f"Patches can't lie at points of shape {points.shape}.", fix="Give (M, 3) finite coordinates in m."
+                f"Patches can't lie at points of shape {points.shape}.",
+                fix="Give (M, 3) finite coordinates in m.",
             )
-        if not 0 < self.width < np.inf:
-            raise UsageError(f"A patch can't be {self.width} m wide.", fix="Give a positive width in m.")
+        _require_sizes(self.width, self.energy, self.least)
         object.__setattr__(self, "points", points)
 
     def __len__(self) -> int:
         return len(self.points)
 
     def __str__(self) -> str:
+        if len(self) == 1:
+            return "one memory that travels with the probe"
         return f"{len(self)} patches of width {1e3 * self.width:.3g} mm"
 
     @classmethod
@@ -64,8 +79,10 @@ class Patches:
         return cls(np.zeros((1, 3)), 1.0)
 
     @classmethod
-    def over(cls, points: np.ndarray, triangles: np.ndarray, width: float) -> Patches:
-        """Patches about `width` (m) apart over a triangulated surface.
+    def over(
+        cls, points: np.ndarray, triangles: np.ndarray, spacing: float, *, width: float, energy: float
+    ) -> Patches:
+        """Patches over a triangulated surface.
 
         Parameters
         ----------
@@ -73,27 +90,37 @@ class Patches:
             Nodes at rest, m.
         triangles : (t, 3) int
             The touched surface.
-        width : float
-            w in m; also the distance of the patches.
+        spacing : float
+            Distance of the patches, m; R/4 is fine enough from a depth of R/20 on.
+        width, energy : float
+            w₁ in m and U₁ in J.
 
         Raises
         ------
         UsageError
-            If the width isn't positive, or so small that there would be more than 20,000 patches.
+            If a size isn't positive, or the spacing so small that there would be more than 20,000 patches.
         """
-        if not 0 < width < np.inf:
-            raise UsageError(f"A patch can't be {width} m wide.", fix="Give a positive width in m.")
+        if not 0 < spacing < np.inf:
+            raise UsageError(f"Patches can't be {spacing} m apart.", fix="Give a positive spacing in m.")
         corners = np.asarray(points, dtype=float)[np.asarray(triangles)]
         area = 0.5 * np.linalg.norm(
             np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
         )
-        if area.sum() > MOST * width**2:
+        if area.sum() > MOST * spacing**2:
             raise UsageError(
-                f"Patches of {width:g} m on {area.sum():g} m² would be {area.sum() / width**2:.0f}.",
-                why="Every step updates all patches that were touched lately.",
-                fix="Give a larger width, or only the part of the surface that will be touched.",
+                f"Patches every {spacing:g} m on {area.sum():g} m² would be {area.sum() / spacing**2:.0f}.",
+                why="Every step looks at all of them.",
+                fix="Give a larger spacing, or only the part of the surface that will be touched.",
             )
-        return cls(_means(_sprinkled(corners, FINE * width), width), width)
+        return cls(_means(_sprinkled(corners, FINE * spacing), spacing), width, energy, LEAST * spacing)
+
+
+def _require_sizes(width: float, energy: float, least: float) -> None:
+    if not (0 < width < np.inf and 0 <= energy < np.inf and 0 <= least < np.inf):
+        raise UsageError(
+            f"Patches can't be {width} m wide at {energy} J, and {least} m at least.",
+            fix="Give a positive width in m, an energy ≥ 0 in J and a least width ≥ 0 in m.",
+        )
 
 
 def _sprinkled(corners: np.ndarray, distance: float) -> np.ndarray:

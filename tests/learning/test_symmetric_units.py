@@ -95,3 +95,9 @@ def test_maps_that_are_no_group_are_refused():
     turns = np.stack([np.eye(3), np.diag([1.0, -1.0, 1.0]), np.diag([-1.0, 1.0, 1.0])])
     with pytest.raises(UsageError, match="not a symmetry"):
         Images(turns, np.zeros((3, 3)))
+
+
+def test_without_units_the_tail_alone_is_left():
+    r, X, theta = some_units("rotated")
+    rows = Rows.blank(r, X, slope_weight=1.0, curvature_weight=1.0)
+    assert rows.matrix(theta[:0]).shape == (6 * 10, 2)

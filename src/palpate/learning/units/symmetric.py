@@ -176,12 +176,13 @@ class SymmetricRegressors(Regressors):
         return self._images.of(X).reshape(-1, X.shape[1])
 
     def _summed(self, found: np.ndarray) -> np.ndarray:
-        return np.asarray(found.reshape(len(self._images.turns), -1, *found.shape[1:]).sum(axis=0))
+        c = len(self._images.turns)
+        return np.asarray(found.reshape(c, len(found) // c, *found.shape[1:]).sum(axis=0))
 
     def _pulled(self, found: np.ndarray, turns: np.ndarray) -> np.ndarray:
         """Σ_c turns[c, a, i] found[c, N, a, …] (N, i, …)."""
         c, q = turns.shape[:2]
-        parts = found.reshape(c, -1, q, int(np.prod(found.shape[2:])))
+        parts = found.reshape(c, len(found) // c, q, int(np.prod(found.shape[2:])))
         return np.asarray(np.einsum("cai,cNaz->Niz", turns, parts, optimize=True)).reshape(
             parts.shape[1], q, *found.shape[2:]
         )

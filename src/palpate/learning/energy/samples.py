@@ -1,0 +1,161 @@
+"""Energies, forces and stiffnesses of touches, as values, slopes and curvatures of ℓ = ln(U/U₀(s)).
+
+With λ = ln U₀, F = −∂U/∂c and K = ∂F/∂c, exactly:
+
+    ℓ = ln U − λ         ∇ℓ = −F/U − λ'∇s         ∇²ℓ = −K/U − FFᵀ/U² − λ''∇s∇sᵀ − λ'∇²s
+
+An error of ℓ is a relative one of U; an error δ of ∇ℓ one of the force, U δ/‖F‖; one of ∇²ℓ one of the stiffness,
+U δ/‖K‖. These quotients are the rows' natural weights.
+
+A mesh shows through where the contact's radius √(2Rs) is less than an element: there all rows of a sample count less,
+by 1 + (s₀/s)³ for elements of size √(2R s₀).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.learning.checks import numbers
+from palpate.learning.units.regressors import pairs
+from palpate.surrogates import ContactLaw, TouchedSurface
+from palpate.units import Range, bounds
+
+__all__ = ["CURVATURE_SHARE", "EnergySamples"]
+
+CURVATURE_SHARE = 0.1  # of a stiffness row's weight: its error level is about three times a force's
+
+
+@dataclass(frozen=True, eq=False)
+class EnergySamples:
+    """Touches of a body, N of them with contact.
+
+    Attributes
+    ----------
+    X : (N, n)
+        Centre of the probe (m), then further inputs.
+    energy : (N,)
+        U > 0, J.
+    force : (N, 3)
+        On the probe, N.
+    stiffness : (N, 3, 3)
+        ∂F/∂c, N/m; not-a-number where it is not known.
+    depth, slope, bend : (N,), (N, 3), (N, 3, 3)
+        s, ∇s and ∇²s of the rigid probe into the surface at rest.
+    inputs : n ranges
+    """
+
+    X: np.ndarray
+    energy: np.ndarray
+    force: np.ndarray
+    stiffness: np.ndarray
+    depth: np.ndarray
+    slope: np.ndarray
+    bend: np.ndarray
+    inputs: tuple[Range, ...]
+
+    @classmethod
+    def of(
+        cls,
+        X: Any,
+        energy: Any,
+        force: Any,
+        stiffness: Any,
+        *,
+        surface: TouchedSurface,
+        radius: float,
+        inputs: tuple[Range, ...],
+    ) -> EnergySamples:
+        """From all solves; those without contact, whose energy is zero whatever is learnt, are left out.
+
+        Raises
+        ------
+        UsageError
+            If shapes disagree, no solve has contact, or one that has stored no energy.
+        """
+        X = numbers("Inputs X", X, (None, len(inputs)))
+        N = len(X)
+        U, F = numbers("Energies", energy, (N,)), numbers("Forces", force, (N, 3))
+        K = np.full((N, 3, 3), np.nan) if stiffness is None else np.asarray(stiffness, float)
+        K = numbers("Stiffnesses", K.reshape(N, -1), (N, 9), finite=False).reshape(N, 3, 3)
+        distance, gradient, hessian = surface.at(np.ascontiguousarray(X[:, :3]))
+        s = radius - distance
+        touching = (s > 0) & (U > 0)
+        if not touching.any():
+            raise UsageError(
+                f"None of {N} solves has contact.",
+                why="A surrogate is learnt from touches: without contact the energy is zero.",
+                fix="Press deeper, or check the surface and the probe's radius.",
+            )
+        strange = (s > 0) & ~(U > 0)
+        if strange.any():
+            raise UsageError(
+                f"{int(strange.sum())} solves in contact stored no energy, the deepest at {s[strange].max():.3g} m.",
+                why="The surface does not lie where the solved body's did, or the energy is not that of the touch.",
+                fix="Pass the touched surface of the body at rest, and energies less those without contact.",
+            )
+        K = (K + K.transpose(0, 2, 1)) / 2
+        parts = (X, U, F, K, s, -gradient, -hessian)
+        return cls(*(p[touching] for p in parts), tuple(inputs))
+
+    def __len__(self) -> int:
+        return len(self.X)
+
+    @property
+    def scaled(self) -> np.ndarray:
+        """ξ (N, n) in [−1, 1] over the declared ranges."""
+        low, high = bounds(self.inputs)
+        return np.asarray((2.0 * self.X - low - high) / (high - low))
+
+    def take(self, which: np.ndarray) -> EnergySamples:
+        """Some of them, by index or mask."""
+        parts = (self.X, self.energy, self.force, self.stiffness, self.depth, self.slope, self.bend)
+        return EnergySamples(*(p[which] for p in parts), self.inputs)
+
+    def targets(self, law: ContactLaw) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """ℓ (N, 1), its slopes (N, 1, n) and curvatures (N, 1, n(n+1)/2) by scaled inputs; unknown ones zero."""
+        value, first, second = law.log(self.depth)
+        g = -self.force / self.energy[:, None]
+        slopes = g - first[:, None] * self.slope
+        bends = -self.stiffness / self.energy[:, None, None] - g[:, :, None] * g[:, None]
+        bends -= second[:, None, None] * self.slope[:, :, None] * self.slope[:, None]
+        bends -= first[:, None, None] * self.bend
+        half, n = self._half, len(self.inputs)
+        i, j = pairs(n)
+        all_slopes, all_bends = np.zeros((len(self), n)), np.zeros((len(self), n, n))
+        all_slopes[:, :3], all_bends[:, :3, :3] = slopes * half[:3], bends * half[:3, None] * half[:3]
+        return (np.log(self.energy) - value)[:, None], all_slopes[:, None], all_bends[:, None, i, j]
+
+    def rows(
+        self, law: ContactLaw, *, resolved: float, curvature_share: float = CURVATURE_SHARE
+    ) -> dict[str, np.ndarray]:
+        """What `refine` takes besides X: targets, and their natural weights.
+
+        `resolved` is the depth s₀ (m) below which the mesh shows; `curvature_share` what a stiffness counts beside
+        a force.
+        """
+        Y, slopes, curvatures = self.targets(law)
+        half, n = self._half, len(self.inputs)
+        i, j = pairs(n)
+        by_force = (self.energy / np.linalg.norm(self.force, axis=1))[:, None]
+        by_stiffness = (self.energy / np.linalg.norm(self.stiffness, axis=(1, 2)))[:, None]
+        own = (
+            np.arange(n) < 3
+        )  # nothing is known of how a touch changes with further inputs but by other touches
+        curvature_weight = curvature_share * (by_stiffness / (half[i] * half[j])) ** 2 * (own[i] & own[j])
+        return {
+            "Y": Y,
+            "weights": 1.0 / (1.0 + (resolved / self.depth) ** 3),
+            "slopes": slopes,
+            "slope_weight": (by_force / half) ** 2 * own,
+            "curvatures": curvatures,
+            "curvature_weight": np.nan_to_num(curvature_weight, nan=0.0),
+        }
+
+    @property
+    def _half(self) -> np.ndarray:
+        low, high = bounds(self.inputs)
+        return np.asarray((high - low) / 2)

@@ -1,0 +1,209 @@
+"""Networks of ℓ from several starts, grown unit by unit, and chosen by the leave-one-solve-out error.
+
+A search judges by the mean over solves of what each one misses when it is left out, not by the root of the mean
+square: a solve that alone decides a unit misses anything, and one such would outweigh all others.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from palpate.learning.filter.observation import Observation
+from palpate.learning.filter.presets import default
+from palpate.learning.filter.state import initial
+from palpate.learning.filter.step import observe
+from palpate.learning.refinement.leave_one_out import left_out_rows
+from palpate.learning.refinement.projection import project, span_of_units
+from palpate.learning.refinement.refine import Refined, refine
+from palpate.learning.refinement.rows import Rows
+from palpate.learning.units.forms import form as form_of
+from palpate.learning.units.regressors import Regressors
+from palpate.learning.units.symmetric import Images, SymmetricRegressors
+from palpate.network.radial import RadialFunction
+
+__all__ = ["EnergyTrial", "Problem", "Search"]
+
+_WIDTHS = (0.2, 1.0)  # of first units, in scaled inputs: from an edge's reach to the whole range
+_TOLERANCE = 1e-5
+_RIDGE = 1e-10
+_MOST = 0.98  # leverage; what a solve decides alone is judged by fifty times its residual
+_PASSES = 5
+_STEP = 1.4  # growth of the number of units from one size to the next
+
+
+@dataclass(frozen=True)
+class EnergyTrial:
+    """One network that was tried.
+
+    Attributes
+    ----------
+    law, form, radial, start : str
+    units : int
+        Of it; with a symmetry, orbits.
+    loo : float
+        Leave-one-solve-out error: mean over solves of the weighted relative error of energy, force and stiffness.
+    seconds : float
+    """
+
+    law: str
+    form: str
+    radial: str
+    start: str
+    units: int
+    loo: float
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Scaled inputs ξ (N, n), what `refine` takes besides them, and the images of every solve."""
+
+    X: np.ndarray
+    rows: dict[str, np.ndarray]
+    images: Images | None
+    law: str
+
+    def regressors(self, form: str, radial: RadialFunction) -> Regressors:
+        """Units of a form, with their images where there is a symmetry."""
+        of = form_of(form, self.X.shape[1])
+        return (
+            Regressors(of, radial)
+            if self.images is None
+            else SymmetricRegressors(of, radial, "affine", self.images)
+        )
+
+    def refined(
+        self, theta: np.ndarray, regressors: Regressors, *, iterations: int, seconds: float
+    ) -> Refined:
+        """The refinement from units θ."""
+        known = dict(self.rows)
+        return refine(
+            *(self.X, known.pop("Y"), theta, regressors),
+            **known,  # type: ignore[arg-type]
+            ridge=_RIDGE,
+            iterations=iterations,
+            seconds=seconds,
+            tolerance=_TOLERANCE,
+        )
+
+    def left_out(self, refined: Refined) -> float:
+        """Mean over solves of the error of all that is known of one, when it is left out; infinite beyond `room`."""
+        known = dict(self.rows)
+        rows = Rows.of(refined.regressors, self.X, known.pop("Y"), **known)  # type: ignore[arg-type]
+        fit = project(rows, refined.theta, _RIDGE * rows.total)
+        if refined.theta.size + len(fit.tau) >= len(rows.targets):
+            return float("inf")
+        span = span_of_units(rows, refined.theta, fit) if len(refined.theta) else None
+        missed = left_out_rows(rows, fit, basis=span, most=_MOST)
+        squares = np.bincount(rows.samples, (missed**2).sum(axis=1))
+        return float(np.sqrt(squares / rows.scale**2) @ rows.scale**2 / rows.total)
+
+    def room(self, regressors: Regressors) -> int:
+        """How many units so many solves can decide on: half as many unknowns as numbers known."""
+        q = [
+            1.0,
+            (self.rows["slope_weight"] > 0).sum(1).mean(),
+            (self.rows["curvature_weight"] > 0).sum(1).mean(),
+        ]
+        return int(sum(q) * len(self.X) / 2 / (1 + regressors.form.size))
+
+
+@dataclass(eq=False)
+class Search:
+    """A search that keeps what it tried, and stops when its time is over.
+
+    Attributes
+    ----------
+    problem : Problem
+    deadline : float
+        Of `time.monotonic`.
+    seed : int
+    """
+
+    problem: Problem
+    deadline: float
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        self.trials: list[EnergyTrial] = []
+        self.best: Refined | None = None
+        self.error = np.inf
+        self._rng = np.random.default_rng(self.seed)
+
+    @property
+    def left(self) -> float:
+        """Seconds left."""
+        return self.deadline - time.monotonic()
+
+    def tried(
+        self, theta: np.ndarray, regressors: Regressors, start: str, iterations: int = 150
+    ) -> tuple[Refined, float]:
+        """A refinement from a start, recorded, and its error."""
+        begun = time.monotonic()
+        found = self.problem.refined(theta, regressors, iterations=iterations, seconds=max(self.left, 0.1))
+        error = self.problem.left_out(found)
+        took = time.monotonic() - begun
+        form, radial = regressors.form.name, regressors.radial
+        self.trials.append(EnergyTrial(self.problem.law, form, radial, start, len(found.theta), error, took))
+        if self.best is None or error < self.error:
+            self.best, self.error = found, error
+        return found, error
+
+    def random(self, regressors: Regressors, count: int) -> np.ndarray:
+        """Units (count, p) at samples drawn, of widths drawn."""
+        X, rng = self.problem.X, self._rng
+        places = X[rng.integers(len(X), size=count)] + rng.normal(0.0, 0.05, (count, X.shape[1]))
+        widths = np.exp(rng.uniform(*np.log(_WIDTHS), count))
+        units = [
+            regressors.form.unit(x, w, seed=int(rng.integers(2**31)))
+            for x, w in zip(places, widths, strict=True)
+        ]
+        return np.array(units).reshape(count, regressors.form.size)
+
+    def filtered(self, regressors: Regressors, count: int) -> np.ndarray:
+        """Units (≤ count, p) that the sequential filter allocates and tunes on the solves as they come."""
+        p, n = self.problem, self.problem.X.shape[1]
+        plain = default()
+        settings = replace(
+            plain, form=regressors.form.name, radial=regressors.radial, tail="affine", units_max=count, error_min=0.01,
+            error_rms_min=0.005, distance_max=0.6, distance_min=0.15, update="full",
+        )  # fmt: skip
+        state = initial(n, 1, settings)
+        for _ in range(_PASSES):
+            for i in self._rng.permutation(len(p.X)):
+                one = {k: p.rows[k][i] for k in ("slopes", "slope_weight", "curvatures", "curvature_weight")}
+                seen = Observation(p.X[i], p.rows["Y"][i], float(p.rows["weights"][i]), **one)
+                state, _event = observe(state, seen, settings)
+        return state.theta
+
+    def grow(self, begin: Refined, units_max: int, target: float) -> None:
+        """Sizes upwards from a network, each from the last one and more units, the filter's, and random ones."""
+        best, error, regressors = begin, self.problem.left_out(begin), begin.regressors
+        most = min(units_max, self.problem.room(regressors))
+        for h in _sizes(len(begin.theta), most):
+            for start, theta in self._starts(best, regressors, h):
+                if self.left <= 0 or error <= target:
+                    return
+                found, missed = self.tried(theta, regressors, start)
+                if missed < error:
+                    best, error = found, missed
+
+    def _starts(self, best: Refined, regressors: Regressors, h: int) -> Iterator[tuple[str, np.ndarray]]:
+        more = h - len(best.theta)
+        if more > 0:
+            yield "grown", np.vstack([best.theta, self.random(regressors, more)])
+        if h >= 4 and (units := self.filtered(regressors, h)).size:
+            yield "filter", units
+        yield "random", self.random(regressors, h)
+
+
+def _sizes(least: int, most: int) -> list[int]:
+    sizes, h = [], max(least, 2)
+    while h <= most:
+        sizes.append(h)
+        h = max(h + 1, round(_STEP * h))
+    return sizes

@@ -1,0 +1,72 @@
+"""The posterior of the linear weights of ℓ, and the factor that makes it cover the errors of solves left out.
+
+Given the units, the weights have the covariance M = (ΦᵀΦ + λ)⁻¹ times a variance. Leaving solve i out, its rows have
+the covariance H_ii (I − H_ii)⁻¹ (Cook & Weisberg 1982), and its force the relative error that its left-out residual
+has. The variance is chosen such that nine tenths of those errors are below 1.645 deviations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.learning.energy.samples import EnergySamples
+from palpate.learning.energy.search import Problem
+from palpate.learning.refinement.leave_one_out import left_out_rows
+from palpate.learning.refinement.projection import project, span_of_units
+from palpate.learning.refinement.refine import Refined
+from palpate.learning.refinement.rows import Rows
+
+__all__ = ["Trust", "trust_of"]
+
+_NINE_TENTHS = 1.645  # standard deviations that hold 90 % of a Gaussian's errors
+_MOST = 0.98
+
+
+@dataclass(frozen=True, eq=False)
+class Trust:
+    """What leaving solves out has shown.
+
+    Attributes
+    ----------
+    root : (c, c)
+        Of the covariance of the coefficients, tail first; calibrated.
+    errors : (N,)
+        Relative force error of each solve when it is left out.
+    """
+
+    root: np.ndarray
+    errors: np.ndarray
+
+
+def trust_of(refined: Refined, problem: Problem, samples: EnergySamples, ridge: float = 1e-10) -> Trust:
+    """From the solves that the network was refined on."""
+    known = dict(problem.rows)
+    rows = Rows.of(refined.regressors, problem.X, known.pop("Y"), **known)  # type: ignore[arg-type]
+    fit = project(rows, refined.theta, ridge * rows.total)
+    span = span_of_units(rows, refined.theta, fit) if len(refined.theta) else None
+    missed = left_out_rows(rows, fit, basis=span, most=_MOST) @ rows.modes
+    Q, N = fit.Q, len(problem.X)
+    to_force = _to_force(rows, samples)
+    errors, sizes = np.empty(N), np.empty(N)
+    for i in range(N):
+        block = np.r_[i, N + 3 * i + np.arange(3)]
+        errors[i] = np.linalg.norm(to_force[i] @ missed[block, 0])
+        values, V = np.linalg.eigh(Q[block] @ Q[block].T)
+        values = np.clip(values, 0.0, _MOST)
+        sizes[i] = np.linalg.norm(to_force[i] @ (V * np.sqrt(values / (1.0 - values))))
+    ratio = float(np.quantile(errors / np.maximum(sizes, 1e-300), 0.9)) / _NINE_TENTHS
+    triangle = np.linalg.cholesky(fit.inverse + 1e-14 * np.trace(fit.inverse) * np.eye(len(fit.tau)))
+    return Trust(ratio * triangle, errors)
+
+
+def _to_force(rows: Rows, samples: EnergySamples) -> np.ndarray:
+    """(N, 3, 4): what errors of a solve's weighted value and slope rows make of its force, relative to its size."""
+    size = np.linalg.norm(samples.force, axis=1)
+    found = np.zeros((len(samples), 3, 4))
+    found[:, :, 0] = samples.force / (size * rows.scale)[:, None]
+    half = samples._half[:3]
+    for i in range(3):
+        found[:, i, 1 + i] = -samples.energy / (size * rows.slope_scale[:, i] * half[i])
+    return found

@@ -43,6 +43,18 @@ def test_slope_and_curvature_are_derivatives_and_meet_at_the_edge():
     assert (value, slope, curvature) == pytest.approx((1.0, 1.0, 0.0), abs=1e-6)
 
 
+@pytest.mark.parametrize(("power", "steepest"), [(2.0, 1.2), (2.5, 3.6), (3.0, 12.0)])
+def test_bending_a_growing_factor_down_leaves_the_stiffness_positive(power, steepest):
+    """Along the depth, in units of the deepest trained one, with the default width of a quarter."""
+    depth = np.linspace(1.0, 3.0, 4001)
+    _, slope, curvature = np.array([saturated(s, 1.0, 0.25) for s in depth]).T
+    for e in np.linspace(0.0, steepest - 0.01, 60):
+        stiffness = (
+            power * (power - 1) / depth**2 + 2 * power * e * slope / depth + e**2 * slope**2 + e * curvature
+        )
+        assert (stiffness > 0).all()
+
+
 def test_widths_are_shares_of_the_ranges_positions_together():
     going = Continuation.of(RANGES, deepest=0.01)
     np.testing.assert_allclose(going.widths, [0.003, 0.003, 0.003, 1e3])

@@ -19,10 +19,10 @@ shortest of the three ranges, further inputs at a quarter of their own, each unl
 tanh and not a polynomial that ends: where ℓ grows with depth by e per metre, bending it down takes e σ'' from the
 stiffness, and σ'' here is never large where σ' is gone. Along the depth, with U₀ of local power p,
 
-    U''/U = (p(p − 1) + 2 p y σ' + y² σ'² + y s σ'')/s²,        y = e s
+    U''/U = p(p − 1)/s² + 2 p e σ'/s + e² σ'² + e σ''
 
-stays positive with w = s*/4 for y up to 5 at p = 5/2 (a stiffness growing like s^{5.5} at the deepest point), and
-up to 1.6 at p = 2. Far out ℓ is constant and the stiffness along the depth is that of U₀, times κ.
+stays positive with w = s*/4 for e s* up to 3.6 at p = 5/2, up to 1.2 at p = 2 and up to 12 and more at p = 3 (where
+ℓ itself is not curved). Far out ℓ is constant and the stiffness along the depth is that of U₀, times κ.
 """
 
 from __future__ import annotations

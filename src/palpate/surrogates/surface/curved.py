@@ -16,9 +16,9 @@ from palpate.surrogates.surface.skin import CREASE, Skin
 
 __all__ = ["SMOOTH", "Pieces", "pieces_of"]
 
-TURN = np.radians(4.0)  # between the normals of a small triangle's corners, at most
+TURN = np.radians(6.0)  # between the normals of a small triangle's corners, at most
 PARTS = 8  # of an edge, at most
-MOST = 250_000  # small triangles
+MOST = 60_000  # small triangles
 SMOOTH, SHARP, END = 0, 1, 2  # kinds of a place: inside a smooth piece, on a crease, on the border
 
 
@@ -62,9 +62,7 @@ def pieces_of(skin: Skin) -> Pieces:
     kinds, outward, of_edges, of_vertices = _features(skin, corners)
     places = _places(parts, of_edges, of_vertices, pattern, weights)
     ends = np.argwhere(skin.border)
-    border = skin.points[
-        np.stack([skin.triangles[ends[:, 0], (ends[:, 1] + k) % 3] for k in (0, 1)], axis=1)
-    ]
+    border = skin.points[np.stack([skin.triangles[ends[:, 0], (ends[:, 1] + k) % 3] for k in (0, 1)], axis=1)]
     return Pieces(
         np.ascontiguousarray(shape[:, pattern].reshape(-1, 3, 3)),
         np.ascontiguousarray(normals[:, pattern].reshape(-1, 3, 3)),

@@ -30,7 +30,9 @@ from palpate.surrogates.surface.skin import Skin
 __all__ = ["BRIDGED", "PLAIN", "ROUNDED", "Exact"]
 
 PLAIN, ROUNDED, BRIDGED = 0, 1, 2  # foot on a smooth piece, on a line; below the border
-RESOLVED = 0.98  # cosine between distance and normal, below which small triangles are too coarse for the normal
+RESOLVED = (
+    0.98  # cosine between distance and normal, below which small triangles are too coarse for the normal
+)
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
 
@@ -161,18 +163,10 @@ def _measure_into(
 ) -> None:
     """Fill distances (N,) and kinds (N,) at places (N, 3)."""
     waiting, foot, trial, n = np.empty(DEEP, np.int64), np.empty(3), np.empty(3), np.empty(3)
-    last = np.inf
+    t = 0
     for k in range(places.shape[0]):
         c = places[k]
-        if k > 0:
-            step = 0.0
-            for x in range(3):
-                step += (c[x] - places[k - 1, x]) ** 2
-            last += np.sqrt(step) + 1e-12  # m: never zero, or nothing would be found
-        square, t, where = nearest_into(
-            c[0], c[1], c[2], last * last * (1 + 1e-9), boxes, corners, waiting, foot, trial
-        )
-        last = np.sqrt(square)
+        _, t, where = nearest_into(c[0], c[1], c[2], t, boxes, corners, waiting, foot, trial)
         row = rows[t, where]
         lift = _lifted_into(corners[t], normals[t], foot, n)
         if feature_kinds[row] != SMOOTH:

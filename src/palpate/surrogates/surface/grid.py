@@ -22,7 +22,9 @@ from palpate.surrogates.surface.exact import BRIDGED, Exact
 __all__ = ["Grid", "sampled"]
 
 SMOOTH, SHARP = 0.4, 0.8  # change of slope from cell to cell
-LEVEL = 2  # cells from the reach to the level
+CLEAR = 2  # cells beyond the reach, within which the spline hears of what comes after
+LEVEL = 2  # cells by which the distance rises from there to its level
+COARSE = 4  # every so many nodes the distance is measured where it is large
 PAD = 2  # nodes beyond the spline's own that its coefficients need
 AROUND = 3  # nodes to each side that lend a coefficient their values
 
@@ -55,16 +57,18 @@ def shape_of(corners: np.ndarray, margin: float, spacing: float) -> tuple[np.nda
 
 def margin_of(reach: float, inner: float, spacing: float) -> float:
     """How far the grid goes beyond the surface, in m: all around, the distance has levelled off by then."""
-    return max(reach + 2 * LEVEL * spacing, inner) + 5 * spacing
+    return max(reach + (CLEAR + 2 * LEVEL) * spacing, inner) + 5 * spacing
 
 
 def sampled(exact: Exact, reach: float, inner: float, spacing: float) -> Grid:
     """The field of a surface out to a reach and in to an inner reach, both in m."""
-    first, nodes = shape_of(exact.pieces.corners, margin_of(reach, inner, spacing), spacing)
+    margin = margin_of(reach, inner, spacing)
+    first, nodes = shape_of(exact.pieces.corners, margin, spacing)
     first, nodes = first - PAD * spacing, nodes + 2 * PAD
-    f, true = _measured(exact, first, nodes, spacing)
-    beyond = f > reach
-    f = _levelled(f, reach, LEVEL * spacing)
+    f, true = _measured(exact, first, nodes, spacing, margin)
+    last = reach + CLEAR * spacing
+    beyond = f > last
+    f = _levelled(f, last, LEVEL * spacing)
     kink = _kink(f) / spacing
     t = np.clip((SHARP - kink) / (SHARP - SMOOTH), 0.0, 1.0)
     share = t * t * (3 - 2 * t)
@@ -76,21 +80,33 @@ def sampled(exact: Exact, reach: float, inner: float, spacing: float) -> Grid:
 
 
 def _measured(
-    exact: Exact, first: np.ndarray, nodes: np.ndarray, spacing: float
+    exact: Exact, first: np.ndarray, nodes: np.ndarray, spacing: float, far: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Distances (i, j, k) in m at the nodes, and whether they are distances, not bridged."""
-    x, y, z = (first[a] + spacing * np.arange(nodes[a]) for a in range(3))
-    f, true = np.empty(nodes), np.empty(nodes, dtype=bool)
-    line = np.empty((nodes[1], nodes[2], 3))
-    line[..., 1], line[..., 2] = y[:, None], z
-    # there and back along z: each node is beside the last one
-    line[1::2, :, 2] = z[::-1]
+    """Distances (i, j, k) in m at the nodes, and whether they are distances, not bridged.
+
+    Farther than `far` (m) they are interpolated between every fourth node.
+    """
+    f = _coarse(exact, first, nodes, spacing)
+    true = np.ones(f.shape, dtype=bool)
     for i in range(nodes[0]):
-        line[..., 0] = x[i]
-        d, kinds = (a.reshape(nodes[1:]) for a in exact.at(line.reshape(-1, 3)))
-        d[1::2], kinds[1::2] = d[1::2, ::-1].copy(), kinds[1::2, ::-1].copy()
-        f[i], true[i] = d, kinds != BRIDGED
+        near = np.argwhere(np.abs(f[i]) < far + COARSE * spacing)
+        place = first + spacing * np.column_stack([np.full(len(near), i), near])
+        d, kinds = exact.at(place)
+        f[i][tuple(near.T)], true[i][tuple(near.T)] = d, kinds != BRIDGED
     return f, true
+
+
+def _coarse(exact: Exact, first: np.ndarray, nodes: np.ndarray, spacing: float) -> np.ndarray:
+    """Distances (i, j, k) in m at every fourth node, interpolated between them."""
+    count = -(-(nodes - 1) // COARSE) + 1
+    places = np.stack(np.meshgrid(*(np.arange(n) for n in count), indexing="ij"), axis=-1).reshape(-1, 3)
+    f = exact.at(first + COARSE * spacing * places)[0].reshape(count)
+    for axis in range(3):
+        cell, step = np.divmod(np.arange(nodes[axis]), COARSE)
+        share = np.expand_dims(step / COARSE, tuple(a for a in range(3) if a != axis))
+        after = np.minimum(cell + 1, count[axis] - 1)
+        f = (1 - share) * f.take(cell, axis) + share * f.take(after, axis)
+    return f
 
 
 def _levelled(d: np.ndarray, reach: float, rise: float) -> np.ndarray:

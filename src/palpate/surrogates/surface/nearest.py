@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-__all__ = ["LEAF", "boxes_of", "nearest_into", "ordered"]
+__all__ = ["boxes_of", "nearest_into", "ordered"]
 
-LEAF = 4  # triangles in each smallest box
+LEAF = 2  # triangles in each smallest box
 DEEP = 64  # boxes that can wait at a time: two for each level of the tree
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
@@ -45,32 +45,35 @@ def boxes_of(corners: np.ndarray) -> np.ndarray:
 
 
 @_jit
-def _apart(box: np.ndarray, x: float, y: float, z: float) -> float:
-    """Square of the distance of a point to a box."""
-    u = max(max(box[0] - x, x - box[3]), 0.0)
-    v = max(max(box[1] - y, y - box[4]), 0.0)
-    w = max(max(box[2] - z, z - box[5]), 0.0)
+def _apart(boxes: np.ndarray, i: int, x: float, y: float, z: float) -> float:
+    """Square of the distance of a point to box i."""
+    u = max(max(boxes[i, 0] - x, x - boxes[i, 3]), 0.0)
+    v = max(max(boxes[i, 1] - y, y - boxes[i, 4]), 0.0)
+    w = max(max(boxes[i, 2] - z, z - boxes[i, 5]), 0.0)
     return u * u + v * v + w * w
 
 
 @_jit
-def _share(p: np.ndarray, q: np.ndarray, x: float, y: float, z: float) -> float:
-    """Where between p and q, from 0 to 1, the point of their line is that is nearest to a point."""
-    u, v, w = q[0] - p[0], q[1] - p[1], q[2] - p[2]
-    along = (x - p[0]) * u + (y - p[1]) * v + (z - p[2]) * w
-    return min(max(along / (u * u + v * v + w * w), 0.0), 1.0)
+def _edge(dx: float, dy: float, dz: float, ux: float, uy: float, uz: float) -> tuple[float, float]:
+    """Share of the edge u, from 0 to 1, that is nearest to a point at d from its start; square of the distance."""
+    t = min(max((dx * ux + dy * uy + dz * uz) / (ux * ux + uy * uy + uz * uz), 0.0), 1.0)
+    dx, dy, dz = dx - t * ux, dy - t * uy, dz - t * uz
+    return t, dx * dx + dy * dy + dz * dz
 
 
 @_jit
-def _foot_into(tri: np.ndarray, x: float, y: float, z: float, foot: np.ndarray) -> tuple[float, int]:
-    """Fill the weights (3,) of the nearest point of a triangle; square of the distance, and where on it.
+def _foot_into(
+    corners: np.ndarray, i: int, x: float, y: float, z: float, foot: np.ndarray
+) -> tuple[float, int]:
+    """Fill the weights (3,) of the nearest point of triangle i; square of the distance, and where on it.
 
     Where: 0 inside, 1 to 3 on the edge from corner 0 to 2, 4 to 6 on that corner.
     """
-    a, b, c = tri[0], tri[1], tri[2]
-    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-    px, py, pz = x - a[0], y - a[1], z - a[2]
+    ax, ay, az = corners[i, 0, 0], corners[i, 0, 1], corners[i, 0, 2]
+    bx, by, bz = corners[i, 1, 0], corners[i, 1, 1], corners[i, 1, 2]
+    cx, cy, cz = corners[i, 2, 0], corners[i, 2, 1], corners[i, 2, 2]
+    ux, uy, uz, vx, vy, vz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
+    px, py, pz = x - ax, y - ay, z - az
     nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
     square = nx * nx + ny * ny + nz * nz
     second = ((py * vz - pz * vy) * nx + (pz * vx - px * vz) * ny + (px * vy - py * vx) * nz) / square
@@ -79,23 +82,20 @@ def _foot_into(tri: np.ndarray, x: float, y: float, z: float, foot: np.ndarray) 
         height = px * nx + py * ny + pz * nz
         foot[0], foot[1], foot[2] = 1.0 - second - third, second, third
         return height * height / square, 0
-    best, where = np.inf, 0
-    for k in range(3):
-        p, q = tri[k], tri[(k + 1) % 3]
-        t = _share(p, q, x, y, z)
-        dx = x - p[0] - t * (q[0] - p[0])
-        dy = y - p[1] - t * (q[1] - p[1])
-        dz = z - p[2] - t * (q[2] - p[2])
-        d = dx * dx + dy * dy + dz * dz
-        if d < best:
-            best = d
-            foot[k], foot[(k + 1) % 3], foot[(k + 2) % 3] = 1.0 - t, t, 0.0
-            where = 1 + k
-            if t == 0.0:
-                where = 4 + k
-            elif t == 1.0:
-                where = 4 + (k + 1) % 3
-    return best, where
+    k = 0
+    t, best = _edge(px, py, pz, ux, uy, uz)
+    s, d = _edge(x - bx, y - by, z - bz, cx - bx, cy - by, cz - bz)
+    if d < best:
+        k, t, best = 1, s, d
+    s, d = _edge(x - cx, y - cy, z - cz, -vx, -vy, -vz)
+    if d < best:
+        k, t, best = 2, s, d
+    after = k + 1 if k < 2 else 0
+    foot[0] = foot[1] = foot[2] = 0.0
+    foot[k], foot[after] = 1.0 - t, t
+    if t == 0.0:
+        return best, 4 + k
+    return best, 4 + after if t == 1.0 else 1 + k
 
 
 @_jit
@@ -103,7 +103,7 @@ def nearest_into(
     x: float,
     y: float,
     z: float,
-    bound: float,
+    guess: int,
     boxes: np.ndarray,
     corners: np.ndarray,
     waiting: np.ndarray,
@@ -114,23 +114,24 @@ def nearest_into(
 
     Parameters
     ----------
-    bound : float
-        Square of a distance within which a triangle is known to be; infinity if none is.
+    guess : int
+        A triangle that may be near.
     waiting : (DEEP,) int array
         Scratch.
     foot, trial : (3,) arrays
         The nearest point's weights; scratch.
     """
     leaves = boxes.shape[0] // 2
-    best, which, place, top = bound, -1, 0, 1
+    best, place = _foot_into(corners, guess, x, y, z, foot)
+    which, top = guess, 1
     waiting[0] = 1
     while top > 0:
         top -= 1
         box = waiting[top]
-        if _apart(boxes[box], x, y, z) >= best:
+        if _apart(boxes, box, x, y, z) >= best:
             continue
         if box < leaves:
-            left, right = _apart(boxes[2 * box], x, y, z), _apart(boxes[2 * box + 1], x, y, z)
+            left, right = _apart(boxes, 2 * box, x, y, z), _apart(boxes, 2 * box + 1, x, y, z)
             near = 0 if left <= right else 1  # looked at first, so stacked last
             if max(left, right) < best:
                 waiting[top] = 2 * box + 1 - near
@@ -141,7 +142,7 @@ def nearest_into(
             continue
         first = (box - leaves) * LEAF
         for t in range(first, min(first + LEAF, corners.shape[0])):
-            d, where = _foot_into(corners[t], x, y, z, trial)
+            d, where = _foot_into(corners, t, x, y, z, trial)
             if d < best:
                 best, which, place = d, t, where
                 foot[0], foot[1], foot[2] = trial[0], trial[1], trial[2]

@@ -142,7 +142,7 @@ def _neighbours(count: int, triangles: np.ndarray) -> np.ndarray:
             fix="Pass only the triangles of the outer skin.",
         )
     one, other = order[pair], order[pair + 1]
-    if (turned := int((start[one] == start[other]).sum())):
+    if turned := int((start[one] == start[other]).sum()):
         raise UsageError(
             f"At {turned} edges of the touched surface two triangles face opposite ways.",
             why="A distance has a sign only if all triangles are counter-clockwise as seen from outside.",

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
 __all__ = ["TouchedSurface"]
 
-CELLS = 10  # to the radius of the smallest probe
+CELLS = 10  # to the radius of the smallest probe, where there are edges to go round
+FEW = 6  # where there are none
 TRUE = 1e-3  # of that radius: the error to which the spacing is refined, where there is room
 MOST = 2_000_000  # nodes: 16 MB
 CHECKS = 20_000  # places at which the error is measured
@@ -84,8 +85,8 @@ class TouchedSurface:
         inner : float, optional
             How deep the probe's centre may go, in m. By default 1.5 times `radius`.
         spacing : float, optional
-            Of the grid, in m. By default a tenth of the radius, refined where curvature asks and the grid stays
-            under 2 million nodes.
+            Of the grid, in m. By default a tenth of the radius (a sixth for a surface without edges), refined
+            where curvature asks and the grid stays under 2 million nodes.
 
         Raises
         ------
@@ -156,7 +157,9 @@ class TouchedSurface:
             raise FileFormatError("The arrays of a touched surface have the wrong shapes or kinds.")
         finite = all(np.isfinite(a).all() for a in (frame, C, lengths))
         if not (finite and frame[3] > 0 and (lengths[:3] > 0).all() and lengths[3] >= 0):
-            raise FileFormatError("The numbers of a touched surface are not finite, or its lengths not positive.")
+            raise FileFormatError(
+                "The numbers of a touched surface are not finite, or its lengths not positive."
+            )
         radius, reach, inner, error_ = lengths.tolist()
         C = np.ascontiguousarray(C)
         return cls(np.ascontiguousarray(frame), C, radius, reach, inner, error_)
@@ -174,7 +177,8 @@ def _built(exact: Exact, reach: float, inner: float, spacing: float | None) -> T
     """The field on a grid of given spacing (m), or the coarsest that is true enough."""
     from palpate.surrogates.surface.grid import sampled
 
-    h = max(exact.radius / CELLS, _finest(exact, reach, inner)) if spacing is None else spacing
+    cells = CELLS if exact.pieces.kinds.any() else FEW
+    h = max(exact.radius / cells, _finest(exact, reach, inner)) if spacing is None else spacing
     _refuse_nodes(exact, reach, inner, h)
     for _ in range(TRIALS):
         grid = sampled(exact, reach, inner, h)
@@ -189,8 +193,8 @@ def _built(exact: Exact, reach: float, inner: float, spacing: float | None) -> T
 def _error(exact: Exact, grid: Grid, reach: float, inner: float) -> float:
     """Largest deviation in m from the measured distance where the grid is faithful; zero if it is nowhere."""
     h, C = grid.frame[3], grid.coefficients
-    inside = np.abs(C) < (reach if reach > inner else inner)
-    cells = np.argwhere((grid.faithful & inside & (C > -inner) & (C < reach))[1:-2, 1:-2, 1:-2]) + 1
+    near = grid.faithful & (C > -inner) & (C < reach)
+    cells = np.argwhere(near[1:-2, 1:-2, 1:-2]) + 1
     if not len(cells):
         return 0.0
     random = np.random.default_rng(0)
@@ -228,7 +232,9 @@ def _refuse_nodes(exact: Exact, reach: float, inner: float, spacing: float) -> N
 def _refuse_lengths(**lengths: float) -> None:
     for name, value in lengths.items():
         if not (np.isfinite(value) and value > 0):
-            raise UsageError(f"The {name} of a touched surface is {value}.", fix="Pass a positive length in m.")
+            raise UsageError(
+                f"The {name} of a touched surface is {value}.", fix="Pass a positive length in m."
+            )
 
 
 def _places(C: np.ndarray) -> np.ndarray:

@@ -170,7 +170,7 @@ def _searched(
     search = Search(problem, deadline, seed)
     copies = 1 if problem.images is None else len(problem.images.turns)
     most, n = units_max // copies, problem.X.shape[1]
-    found = []
+    found: list[tuple[Refined, float]] = []
     until = time.monotonic() + _FORM_SHARE * search.left
     for kind in _kinds(form, radial, n):
         of = problem.regressors(*kind)

@@ -99,7 +99,7 @@ class EnergySamples:
             )
         K = (K + K.transpose(0, 2, 1)) / 2
         parts = (X, U, F, K, s, -gradient, -hessian)
-        return cls(*(p[touching] for p in parts), tuple(inputs))
+        return cls(*[p[touching] for p in parts], inputs=tuple(inputs))
 
     def __len__(self) -> int:
         return len(self.X)
@@ -113,7 +113,7 @@ class EnergySamples:
     def take(self, which: np.ndarray) -> EnergySamples:
         """Some of them, by index or mask."""
         parts = (self.X, self.energy, self.force, self.stiffness, self.depth, self.slope, self.bend)
-        return EnergySamples(*(p[which] for p in parts), self.inputs)
+        return EnergySamples(*[p[which] for p in parts], inputs=self.inputs)
 
     def targets(self, law: ContactLaw) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """ℓ (N, 1), its slopes (N, 1, n) and curvatures (N, 1, n(n+1)/2) by scaled inputs; unknown ones zero."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -80,10 +81,10 @@ class Problem:
         self, theta: np.ndarray, regressors: Regressors, *, iterations: int, seconds: float
     ) -> Refined:
         """The refinement from units θ."""
-        known = dict(self.rows)
+        known: dict[str, Any] = dict(self.rows)
         return refine(
             *(self.X, known.pop("Y"), theta, regressors),
-            **known,  # type: ignore[arg-type]
+            **known,
             ridge=_RIDGE,
             iterations=iterations,
             seconds=seconds,
@@ -92,8 +93,8 @@ class Problem:
 
     def left_out(self, refined: Refined) -> float:
         """Mean over solves of the error of all that is known of one, when it is left out; infinite beyond `room`."""
-        known = dict(self.rows)
-        rows = Rows.of(refined.regressors, self.X, known.pop("Y"), **known)  # type: ignore[arg-type]
+        known: dict[str, Any] = dict(self.rows)
+        rows = Rows.of(refined.regressors, self.X, known.pop("Y"), **known)
         fit = project(rows, refined.theta, _RIDGE * rows.total)
         if refined.theta.size + len(fit.tau) >= len(rows.targets):
             return float("inf")
@@ -157,7 +158,7 @@ class Search:
         """Units (count, p) at samples drawn, of widths drawn."""
         X, rng = self.problem.X, self._rng
         places = X[rng.integers(len(X), size=count)] + rng.normal(0.0, 0.05, (count, X.shape[1]))
-        widths = np.exp(rng.uniform(*np.log(_WIDTHS), count))
+        widths = np.exp(rng.uniform(np.log(_WIDTHS[0]), np.log(_WIDTHS[1]), count))
         units = [
             regressors.form.unit(x, w, seed=int(rng.integers(2**31)))
             for x, w in zip(places, widths, strict=True)

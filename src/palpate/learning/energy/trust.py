@@ -8,6 +8,7 @@ has. The variance is chosen such that nine tenths of those errors are below 1.64
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -42,8 +43,8 @@ class Trust:
 
 def trust_of(refined: Refined, problem: Problem, samples: EnergySamples, ridge: float = 1e-10) -> Trust:
     """From the solves that the network was refined on."""
-    known = dict(problem.rows)
-    rows = Rows.of(refined.regressors, problem.X, known.pop("Y"), **known)  # type: ignore[arg-type]
+    known: dict[str, Any] = dict(problem.rows)
+    rows = Rows.of(refined.regressors, problem.X, known.pop("Y"), **known)
     fit = project(rows, refined.theta, ridge * rows.total)
     span = span_of_units(rows, refined.theta, fit) if len(refined.theta) else None
     missed = left_out_rows(rows, fit, basis=span, most=_MOST) @ rows.modes

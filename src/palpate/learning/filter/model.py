@@ -45,7 +45,7 @@ def measured(state: State, seen: Observation, settings: Settings) -> np.ndarray:
         parts.append((rows @ state.coefficients).T.ravel())
     if seen.curvatures is not None:
         parts.append((of.curvatures(X, state.theta)[0] @ state.weights).T.ravel())
-    return np.concatenate(parts)[seen.counts]
+    return np.asarray(np.concatenate(parts)[seen.counts])
 
 
 def jacobian(state: State, seen: Observation, settings: Settings) -> tuple[np.ndarray, np.ndarray]:

@@ -72,7 +72,7 @@ class Observation:
     def variances(self, r: float) -> np.ndarray:
         """Measurement variances (q,) for an R of `r`."""
         shares = self._shares()
-        return r / (self.weight * shares[shares > 0])
+        return np.asarray(r / (self.weight * shares[shares > 0]))
 
     def less(self, others: np.ndarray) -> Observation:
         """The observation less what something else explains of its targets, (q,)."""

@@ -1,0 +1,181 @@
+"""A touch surrogate from solves of a body whose energy is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from palpate.errors import UsageError
+from palpate.learning.energy import EnergySamples, learn_surrogate
+from palpate.learning.energy.images import images_of
+from palpate.learning.energy.search import Problem
+from palpate.learning.refinement.rows import Rows
+from palpate.learning.units.regressors import pairs
+from palpate.surrogates import ContactLaw, TouchedSurface
+from palpate.units import Range
+
+SIDE, RADIUS, LAW = 0.04, 0.01, ContactLaw("series", 1e-3)
+INPUTS = (Range("x", 0.0, SIDE, "m"), Range("y", 0.0, SIDE, "m"), Range("z", 0.004, 0.010, "m"))
+MIDDLE = np.array([SIDE / 2, SIDE / 2, 0.0])
+STEP = 1e-30
+SQUARE = [
+    np.diag([a, b, 1.0]) @ turn
+    for a in (1, -1)
+    for b in (1, -1)
+    for turn in (np.eye(3), np.eye(3)[[1, 0, 2]])
+]
+
+
+@pytest.fixture(scope="module")
+def surface():
+    """A plane that goes on well beyond where it is touched."""
+    points = SIDE * np.array([[-1, -1, 0], [2, -1, 0], [2, 2, 0], [-1, 2, 0]], float)
+    return TouchedSurface.of(points, np.array([[0, 1, 2], [0, 2, 3]]), radius=RADIUS)
+
+
+def factor(c):
+    """ℓ, symmetric as a square is, softer towards the edges and stiffer with depth; for complex c too."""
+    x, y, z = ((c - MIDDLE) / (SIDE / 2)).T
+    return 9.0 - 0.3 * (x**2 + y**2) - 0.2 * x**2 * y**2 - 0.5 * z + 0.1 * z * (x**2 + y**2)
+
+
+def energy(c):
+    s = RADIUS - c[:, 2]
+    return s**3 / np.sqrt(1 + s / LAW.length) * np.exp(factor(c))
+
+
+def touches(count, seed=0):
+    """Positions over the face, their energies, forces by complex step, stiffnesses by its central difference."""
+    rng = np.random.default_rng(seed)
+    X = np.array([0.0, 0.0, 0.004]) + rng.random((count, 3)) * [SIDE, SIDE, 0.0055]
+
+    def force(c):
+        return np.stack([-energy(c + 1j * STEP * e).imag / STEP for e in np.eye(3)], axis=1)
+
+    h = 1e-7
+    K = np.stack([(force(X + h * e) - force(X - h * e)) / (2 * h) for e in np.eye(3)], axis=2)
+    return X, energy(X), force(X), K
+
+
+def test_values_slopes_and_curvatures_are_those_of_the_factor(surface):
+    X, U, F, K = touches(20)
+    samples = EnergySamples.of(X, U, F, K, surface=surface, radius=RADIUS, inputs=INPUTS)
+    value, slopes, curvatures = samples.targets(LAW)
+    half = np.array([SIDE / 2, SIDE / 2, 0.003])
+    np.testing.assert_allclose(value[:, 0], factor(X), atol=1e-9)
+    i, j = pairs(3)
+    h = 1e-6
+    for a in range(3):
+        e = np.eye(3)[a]
+        by_step = factor(X + 1j * STEP * e).imag / STEP * half[a]
+        np.testing.assert_allclose(slopes[:, 0, a], by_step, atol=1e-7)
+        for b in range(a, 3):
+            up, down = (factor(X + d * np.eye(3)[b] + 1j * STEP * e).imag / STEP for d in (h, -h))
+            at = int(np.flatnonzero((i == a) & (j == b))[0])
+            np.testing.assert_allclose(
+                curvatures[:, 0, at], (up - down) / (2 * h) * half[a] * half[b], atol=2e-3
+            )
+
+
+def test_natural_weights_make_errors_relative(surface):
+    """An error of ℓ's slope times U over ‖F‖ is the force's; of its curvature, U over ‖K‖ the stiffness's."""
+    X, U, F, K = touches(10)
+    samples = EnergySamples.of(X, U, F, K, surface=surface, radius=RADIUS, inputs=INPUTS)
+    rows = samples.rows(LAW, resolved=0.0, curvature_share=1.0)
+    half = np.array([SIDE / 2, SIDE / 2, 0.003])
+    np.testing.assert_allclose(
+        np.sqrt(rows["slope_weight"]) * half, (U / np.linalg.norm(F, axis=1))[:, None] * np.ones(3), rtol=1e-9
+    )
+    i, j = pairs(3)
+    scale = np.sqrt(rows["curvature_weight"]) * half[i] * half[j]
+    np.testing.assert_allclose(scale, (U / np.linalg.norm(K, axis=(1, 2)))[:, None] * np.ones(6), rtol=1e-7)
+
+
+def test_unknown_stiffnesses_and_solves_without_contact_leave_no_rows(surface):
+    X, U, F, K = touches(10)
+    K[3] = np.nan
+    X[5, 2], U[5], F[5] = 0.0101, 0.0, 0.0
+    samples = EnergySamples.of(X, U, F, K, surface=surface, radius=RADIUS, inputs=INPUTS)
+    problem = Problem(samples.scaled, samples.rows(LAW, resolved=0.0), None, "")
+    known = dict(problem.rows)
+    rows = Rows.of(problem.regressors("rotated", "gaussian"), problem.X, known.pop("Y"), **known)
+    assert len(samples) == 9
+    assert len(rows.targets) == 9 * 4 + 8 * 6
+
+
+def test_the_leave_one_solve_out_error_is_that_of_fits_without_each_solve(surface):
+    X, U, F, K = touches(8)
+    samples = EnergySamples.of(X, U, F, K, surface=surface, radius=RADIUS, inputs=INPUTS)
+    problem = Problem(samples.scaled, samples.rows(LAW, resolved=1e-3), images_of(SQUARE, MIDDLE, INPUTS), "")
+    of = problem.regressors("rotated", "gaussian")
+    none = np.zeros((0, of.form.size))
+    found = problem.left_out(problem.refined(none, of, iterations=0, seconds=1.0))
+    known = dict(problem.rows)
+    rows = Rows.of(of, problem.X, known.pop("Y"), **known)
+    A, b, total = rows.matrix(none), rows.targets, 0.0
+    for i in range(8):
+        out = rows.samples == i
+        C = np.linalg.lstsq(A[~out], b[~out], rcond=None)[0]
+        total += rows.scale[i] * np.linalg.norm(b[out] - A[out] @ C)
+    assert found == pytest.approx(total / rows.total, rel=1e-6)
+
+
+@pytest.fixture(scope="module")
+def learnt(surface):
+    return learn_surrogate(
+        *touches(14),
+        surface=surface,
+        radius=RADIUS,
+        inputs=INPUTS,
+        symmetry=SQUARE,
+        about=MIDDLE,
+        law=LAW,
+        units_max=32,
+        target=0.0,
+        seconds=8.0,
+        form="rotated",
+        radial="inverse-multiquadric",
+    )
+
+
+def test_a_smooth_body_is_learnt_from_a_few_solves(learnt):
+    X, U, F, K = touches(200, seed=1)
+    s = learnt.surrogate
+    size = np.linalg.norm(F, axis=1)
+    assert np.quantile(np.linalg.norm(s.force(X) - F, axis=1) / size, 0.95) < 0.01
+    assert np.quantile(np.abs(s.energy(X) / U - 1), 0.95) < 0.01
+    # a stiffness is twice differentiated: its error is that of the force over a unit's width
+    bend = np.linalg.norm(s.stiffness(X) - K, axis=(1, 2)) / np.linalg.norm(K, axis=(1, 2))
+    assert np.quantile(bend, 0.95) < 0.04
+
+
+def test_what_is_learnt_has_the_symmetry_exactly(learnt):
+    X = touches(20, seed=2)[0]
+    s = learnt.surrogate
+    for M in SQUARE:
+        image = (X - MIDDLE) @ M.T + MIDDLE
+        np.testing.assert_allclose(s.energy(image), s.energy(X), rtol=1e-10)
+        np.testing.assert_allclose(s.force(image), s.force(X) @ M.T, rtol=1e-8, atol=1e-10)
+        np.testing.assert_allclose(s.deviation(image), s.deviation(X), rtol=1e-6)
+
+
+def test_the_record_tells_what_was_tried(learnt):
+    assert {t.start for t in learnt.trials} >= {"kind", "filter", "random"}
+    assert learnt.loo == pytest.approx(min(t.loo for t in learnt.trials))
+    assert learnt.surrogate.meta["solves"] == 14
+    assert learnt.surrogate.meta["samples"] == 8 * 14
+
+
+def test_what_makes_no_sense_is_refused(surface):
+    given = {"surface": surface, "radius": RADIUS, "inputs": INPUTS}
+    X, U, F, K = touches(6)
+    with pytest.raises(UsageError, match="no isometry"):
+        learn_surrogate(X, U, F, K, **given, symmetry=[np.eye(3), 2 * np.eye(3)])
+    with pytest.raises(UsageError, match="not a symmetry"):
+        learn_surrogate(X, U, F, K, **given, symmetry=SQUARE[:3], about=MIDDLE)
+    with pytest.raises(UsageError, match="has contact"):
+        learn_surrogate(X + np.array([0, 0, 0.02]), 0 * U, F, K, **given)
+    with pytest.raises(UsageError, match="stored no energy"):
+        learn_surrogate(X, np.where(np.arange(6) == 2, 0.0, U), F, K, **given)
+    with pytest.raises(UsageError, match="allow no learning"):
+        learn_surrogate(X, U, F, K, **given, seconds=0.0)

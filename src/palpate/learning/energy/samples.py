@@ -13,7 +13,7 @@ by 1 + (s₀/s)³ for elements of size √(2R s₀).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -98,8 +98,7 @@ class EnergySamples:
                 fix="Pass the touched surface of the body at rest, and energies less those without contact.",
             )
         K = (K + K.transpose(0, 2, 1)) / 2
-        parts = (X, U, F, K, s, -gradient, -hessian)
-        return cls(*[p[touching] for p in parts], inputs=tuple(inputs))
+        return cls(X, U, F, K, s, -gradient, -hessian, tuple(inputs)).take(touching)
 
     def __len__(self) -> int:
         return len(self.X)
@@ -112,8 +111,8 @@ class EnergySamples:
 
     def take(self, which: np.ndarray) -> EnergySamples:
         """Some of them, by index or mask."""
-        parts = (self.X, self.energy, self.force, self.stiffness, self.depth, self.slope, self.bend)
-        return EnergySamples(*[p[which] for p in parts], inputs=self.inputs)
+        own = ("X", "energy", "force", "stiffness", "depth", "slope", "bend")
+        return replace(self, **{name: getattr(self, name)[which] for name in own})
 
     def targets(self, law: ContactLaw) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """ℓ (N, 1), its slopes (N, 1, n) and curvatures (N, 1, n(n+1)/2) by scaled inputs; unknown ones zero."""

@@ -61,7 +61,7 @@ class Observation:
     @property
     def counts(self) -> np.ndarray:
         """Which of y, the slopes and the curvatures, row by row, have a weight."""
-        return self._shares() > 0
+        return np.asarray(self._shares() > 0)
 
     def targets(self) -> np.ndarray:
         """All that was observed, (q,): y, then the slopes row by row, then the curvatures, if they have a weight."""

@@ -67,7 +67,7 @@ class Observation:
         """All that was observed, (q,): y, then the slopes row by row, then the curvatures, if they have a weight."""
         if self.plain:
             return self.y
-        return np.concatenate([p.ravel() for p in self._parts()])[self.counts]
+        return np.asarray(np.concatenate([p.ravel() for p in self._parts()])[self.counts])
 
     def variances(self, r: float) -> np.ndarray:
         """Measurement variances (q,) for an R of `r`."""

@@ -87,7 +87,7 @@ steps = st.lists(
 )
 
 
-@settings(max_examples=40)
+@settings(max_examples=60)
 @given(motion=steps)
 def test_no_motion_and_no_step_gains_energy(memory, motion):
     memory.reset()

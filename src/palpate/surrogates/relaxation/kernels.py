@@ -73,7 +73,8 @@ def beta_of(q: float, pad: float) -> float:
     """β at q = √(2U), with `pad` = √(2U_a)."""
     if pad <= 0.0:
         return 1.0
-    ratio = (q / pad) ** (1.0 / 3.0)
+    # a q between two steps may be rounded below zero
+    ratio = (max(q, 0.0) / pad) ** (1.0 / 3.0)
     return math.sqrt(ratio / (1.0 + ratio))
 
 

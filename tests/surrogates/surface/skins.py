@@ -6,7 +6,9 @@ import numpy as np
 def plate(size, cells, seed=None):
     """A square in z = 0 around the origin, its inner points scattered by a seed."""
     x = np.linspace(-size / 2, size / 2, cells + 1)
-    points = np.stack([*np.meshgrid(x, x, indexing="ij"), np.zeros((cells + 1, cells + 1))], -1).reshape(-1, 3)
+    points = np.stack([*np.meshgrid(x, x, indexing="ij"), np.zeros((cells + 1, cells + 1))], -1).reshape(
+        -1, 3
+    )
     if seed is not None:
         inner = np.abs(points).max(axis=1) < size / 2 - 1e-9
         points[inner, :2] += np.random.default_rng(seed).uniform(-0.3, 0.3, (inner.sum(), 2)) * size / cells
@@ -41,7 +43,9 @@ def ball(radius, parts, scatter=0.0, seed=0):
 
                 triangles.append([at(i, j, k), at(i + 1, j, k - 1), at(i, j + 1, k - 1)][::turn])
                 if k > 1:
-                    triangles.append([at(i + 1, j, k - 1), at(i + 1, j + 1, k - 2), at(i, j + 1, k - 1)][::turn])
+                    triangles.append(
+                        [at(i + 1, j, k - 1), at(i + 1, j + 1, k - 2), at(i, j + 1, k - 1)][::turn]
+                    )
     points = np.array(points)
     points += np.random.default_rng(seed).normal(0, scatter * np.pi / 2 / parts, points.shape)
     return radius * points / np.linalg.norm(points, axis=1, keepdims=True), np.array(triangles)
@@ -61,7 +65,7 @@ def box(size, cells):
     """A cube around the origin with all its six faces."""
     points, triangles = [], []
     flat, few = plate(size, cells)
-    flat = flat + [0, 0, size / 2]
+    flat = flat + np.array([0, 0, size / 2])
     for axis in range(3):
         for flip in (1, -1):
             turned = np.roll(flat, axis, axis=1) * flip

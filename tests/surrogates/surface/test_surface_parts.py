@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from skins import ball, box, directions, plate, tube
 
 from palpate.errors import UsageError
 from palpate.surrogates.surface.curved import pieces_of
@@ -9,7 +10,6 @@ from palpate.surrogates.surface.exact import Exact
 from palpate.surrogates.surface.nearest import DEEP, boxes_of, nearest_into, ordered
 from palpate.surrogates.surface.normals import corners_of
 from palpate.surrogates.surface.skin import Skin
-from skins import ball, box, directions, plate, tube
 
 
 def broken(change):
@@ -29,7 +29,7 @@ def flatten(points, triangles):
 
 
 def third(points, triangles):
-    edge = triangles[0, :2]
+    edge = triangles[0, [2, 0]]
     return np.vstack([points, [0, 0, 1.0]]), np.vstack([triangles, [*edge, len(points)]])
 
 
@@ -103,10 +103,14 @@ def test_patches_of_a_coarse_tube_lie_on_it_and_its_rim_is_a_circle():
     sag = 0.03 * (1 - np.cos(np.pi / 24))
     r = np.linalg.norm(pieces.corners[..., :2], axis=2)
     assert len(pieces.corners) > 4 * len(skin.triangles)
-    assert np.abs(r - 0.03).max() < sag / 50
+    # a cubic with the circle's tangents misses 0.19 θ² of the sag, θ = 15°; across diagonals about twice that
+    assert np.abs(r - 0.03).max() < sag / 30
     rim = np.abs(pieces.corners[..., 2]) > 0.03 - 1e-9
     assert np.abs(r[rim] - 0.03).max() < sag / 50
-    radial = np.concatenate([pieces.corners[..., :2], np.zeros_like(pieces.corners[..., :1])], axis=2) / r[..., None]
+    radial = (
+        np.concatenate([pieces.corners[..., :2], np.zeros_like(pieces.corners[..., :1])], axis=2)
+        / r[..., None]
+    )
     assert np.abs(pieces.normals - radial).max() < 0.005
 
 
@@ -156,6 +160,7 @@ def test_depths_into_a_dome_are_those_of_its_finite_elements():
     elements = surface_of(dome, "top")
     d = exact.at(C)[0]
     longest = np.linalg.norm(np.diff(mesh.points[mesh.triangles_of("top")], axis=1), axis=2).max()
-    left = longest**2 / (8 * 0.05) / 16  # what small triangles, four to an edge, miss
-    assert np.abs(d - [elements.nearest(c)[2] for c in C]).max() < 1.5 * left
-    assert np.abs(d - (np.linalg.norm(C, axis=1) - 0.05)).max() < left / 4
+    sag = longest**2 / (8 * 0.05)
+    # small triangles, four to an edge, miss a sixteenth; a third more off the edges
+    assert np.abs(d - [elements.nearest(c)[2] for c in C]).max() < sag / 16 * 1.5
+    assert np.abs(d - (np.linalg.norm(C, axis=1) - 0.05)).max() < sag / 40

@@ -4,10 +4,10 @@ from functools import cache
 
 import numpy as np
 import pytest
+from skins import ball, box, directions, plate, tube
 
 from palpate.errors import FileFormatError, UsageError
 from palpate.surrogates.surface import TouchedSurface, distance_into
-from skins import ball, box, directions, plate, tube
 
 R = 0.010  # m
 FACE = 0.060  # m
@@ -29,16 +29,26 @@ def uniform(low, high, count, seed=0):
 
 def one(surface, c):
     gradient, hessian = np.zeros(3), np.zeros((3, 3))
-    return distance_into(np.asarray(c, dtype=float), gradient, hessian, *surface.compiled()), gradient, hessian
+    return (
+        distance_into(np.asarray(c, dtype=float), gradient, hessian, *surface.compiled()),
+        gradient,
+        hessian,
+    )
 
 
 def test_over_the_interior_of_a_plane_the_distance_is_its_height():
-    edge = FACE / 2 - 6 * face().spacing
-    C = uniform([-edge, -edge, -R / 2], [edge, edge, face().reach], 5000)
-    d, gradient, hessian = face().at(C)
-    assert np.abs(d - C[:, 2]).max() < 1e-12 * FACE
+    h = face().spacing
+    # how far inside the border, and from what depth on: that is bridged deeper than R/2 within R of the border
+    for edge, low in ((FACE / 2 - 5 * h, -R / 2 + 5 * h), (FACE / 2 - R - 5 * h, -face().inner)):
+        C = uniform([-edge, -edge, low], [edge, edge, face().reach], 5000)
+        exact(face(), C, C[:, 2])
+
+
+def exact(surface, C, truth):
+    d, gradient, hessian = surface.at(C)
+    assert np.abs(d - truth).max() < 1e-12 * FACE
     assert np.abs(gradient - [0, 0, 1]).max() < 1e-12
-    assert np.abs(hessian).max() < 1e-12 / face().spacing
+    assert np.abs(hessian).max() < 1e-12 / surface.spacing
 
 
 def test_a_plane_that_lies_askew_is_as_exact():
@@ -46,8 +56,12 @@ def test_a_plane_that_lies_askew_is_as_exact():
     Q *= np.linalg.det(Q)
     points, triangles = plate(FACE, 6, seed=1)
     surface = TouchedSurface.of(points @ Q.T + 0.3, triangles, radius=R, spacing=0.0015)
-    edge = FACE / 2 - 9 * surface.spacing
-    C = uniform([-edge, -edge, -R / 2], [edge, edge, surface.reach], 2000)
+    edge = FACE / 2 - 9 * surface.spacing  # the grid's diagonal neighbours are 5 √3 nodes away
+    C = uniform(
+        [-edge, -edge, 9 * surface.spacing - R],
+        [edge, edge, surface.reach - 4 * surface.spacing],
+        2000,
+    )
     d, gradient, _ = surface.at(C @ Q.T + 0.3)
     assert np.abs(d - C[:, 2]).max() < 1e-12
     assert np.abs(gradient - Q[:, 2]).max() < 1e-10
@@ -65,7 +79,7 @@ def test_beyond_an_edge_it_is_the_distance_to_the_edge():
     told = (C[:, 2] > 0) & (r > 0.8 * R) & (r < face().reach)
     miss = np.abs(face().at(C)[0] - r)
     assert (miss < face().spacing ** 2 / (8 * r))[told].all()
-    assert miss[(C[:, 2] > 0) & (r < face().reach)].max() < face().spacing / 5  # rounded at the edge itself
+    assert miss[(C[:, 2] > 0) & (r < face().reach)].max() < face().spacing / 4  # rounded at the edge itself
 
 
 def test_beyond_a_corner_it_is_the_distance_to_the_corner():
@@ -91,7 +105,7 @@ def test_below_the_border_the_depth_falls_steadily_to_that_of_the_border(height)
     d = face().at(C)[0]
     r = np.hypot(np.maximum(x - FACE / 2, 0), height)
     assert np.diff(d).min() > -0.01 * face().spacing
-    assert np.abs(np.diff(d)).max() < 2.5 * (x[1] - x[0])
+    assert np.abs(np.diff(d)).max() < 3 * (x[1] - x[0])
     assert d[0] == pytest.approx(height, abs=1e-12)
     assert d[-1] == pytest.approx(r[-1], abs=face().spacing ** 2 / (4 * R))
 
@@ -138,18 +152,24 @@ def test_the_facets_of_a_coarse_ball_do_not_show():
 
 
 def test_spacing_is_refined_until_the_error_is_small():
-    surface = TouchedSurface.of(*ball(0.012, 6), radius=0.004, inner=0.004)
+    points, triangles = ball(0.012, 6)
+    surface = TouchedSurface.of(points, triangles, radius=0.004, inner=0.004)
     assert surface.error < 1e-3 * surface.radius
     v = directions(3000, 2)
     d = surface.at(0.014 * v)[0]
-    assert np.abs(d - 0.002).max() < 4 * surface.error + 2e-6
+    facets = 0.012 - np.linalg.norm(points[triangles].mean(axis=1), axis=1)
+    assert np.abs(d - 0.002).max() < 2 * surface.error + facets.max() / 20
 
 
 def test_the_side_of_a_cylinder():
     surface = TouchedSurface.of(*tube(0.03, 0.06, 32, 10), radius=R, spacing=0.0015)
     sag = 0.03 * (1 - np.cos(np.pi / 32))
     rng = np.random.default_rng(0)
-    angle, r, z = rng.uniform(0, 7, 4000), rng.uniform(0.025, 0.03 + R, 4000), rng.uniform(-0.02, 0.02, 4000)
+    angle, r, z = (
+        rng.uniform(0, 7, 4000),
+        rng.uniform(0.025, 0.03 + R, 4000),
+        rng.uniform(-0.012, 0.012, 4000),
+    )
     d, gradient, _ = surface.at(np.column_stack([r * np.cos(angle), r * np.sin(angle), z]))
     assert sag > 1.4e-4
     assert np.abs(d - (r - 0.03)).max() < sag / 20
@@ -165,7 +185,7 @@ def test_a_box_from_outside_and_inside():
     truth = np.where(out > 0, out, beyond.max(axis=1))
     d = surface.at(C)[0]
     outside = (out > 0.8 * R) & (out < surface.reach)
-    assert np.abs(d - truth)[outside].max() < 2 * surface.spacing ** 2 / (8 * 0.8 * R)
+    assert np.abs(d - truth)[outside].max() < 2 * surface.spacing**2 / (8 * 0.8 * R)
     second = np.sort(beyond, axis=1)[:, 1]
     clear = (out == 0) & (truth > -0.012) & (truth - second > 6 * surface.spacing)
     assert np.abs(d - truth)[clear].max() < 1e-12
@@ -212,7 +232,8 @@ def test_the_kernel_is_the_tensor_product_spline():
 
     surface = face()
     knots = [
-        surface.frame[a] + surface.spacing * (np.arange(surface.coefficients.shape[a] + 4) - 2) for a in range(3)
+        surface.frame[a] + surface.spacing * (np.arange(surface.coefficients.shape[a] + 4) - 2)
+        for a in range(3)
     ]
     spline = NdBSpline(tuple(knots), surface.coefficients, 3)
     low, high = surface.box
@@ -262,7 +283,12 @@ def test_damaged_arrays_are_refused(name, wrong):
 
 @pytest.mark.parametrize(
     "lengths",
-    [{"radius": 0.0}, {"radius": R, "reach": 0.005}, {"radius": R, "inner": -1.0}, {"radius": R, "spacing": 1e-5}],
+    [
+        {"radius": 0.0},
+        {"radius": R, "reach": 0.005},
+        {"radius": R, "inner": -1.0},
+        {"radius": R, "spacing": 1e-5},
+    ],
 )
 def test_mistaken_lengths_are_refused(lengths):
     with pytest.raises(UsageError):

@@ -108,7 +108,7 @@ def _bulged(skin: Skin, corners: Corners, weights: np.ndarray) -> np.ndarray:
         parts.append((3 * here * there**2, handles[:, k, 1]))
     flat = np.einsum("nk,tki->tni", weights, P)
     # a sum of deviations from the flat triangle: what is plane stays plane to the last digit
-    return flat + sum(f[:, None] * (q[:, None] - flat) for f, q in parts)
+    return np.asarray(flat + sum(f[:, None] * (q[:, None] - flat) for f, q in parts))
 
 
 def _handles(skin: Skin, corners: Corners) -> np.ndarray:

@@ -10,10 +10,11 @@ normal there.
 nearest thing is still the border, r away: that is the distance of a probe that passes beside the body. Under the
 surface d is −ζ. The jump between them is bridged by
 
-    d = −ζ + G (r + ζ),   G = a²/r² + (ζ²/r²) w(r)   beyond the border,   G = w(ζ) (1 − σ(e/ρ))   e within it,
+    d = −ζ + G (r + ζ),   G = a²/r² + (ζ²/r²) w(r)   beyond the border,   G = w(ζ) (1 − σ(e/R))   e within it,
 
-σ the quintic smooth step, w(r) = σ(2 r/ρ − 1), ρ the probe's radius: from ρ outwards d is r, so that a probe feels
-nothing before it meets the border; nearer, the depth falls steadily from the full one to that of the border.
+σ the quintic smooth step, R the probe's radius, w a smooth step from 0 at r = R/2 to 1 at 0.85 R: farther out d is r,
+so that a probe feels nothing before it meets the border; nearer, the depth falls steadily from the full one to that
+of the border. Deeper than R/2, within R of its border, the inner side is not one any more.
 """
 
 from __future__ import annotations
@@ -30,9 +31,9 @@ from palpate.surrogates.surface.skin import Skin
 __all__ = ["BRIDGED", "PLAIN", "ROUNDED", "Exact"]
 
 PLAIN, ROUNDED, BRIDGED = 0, 1, 2  # foot on a smooth piece, on a line; below the border
-RESOLVED = (
-    0.98  # cosine between distance and normal, below which small triangles are too coarse for the normal
-)
+START, FINISH = 0.5, 0.85  # of the radius: where the bridge below the border begins and ends
+# cosine between distance and normal, below which small triangles are too coarse for the normal
+RESOLVED = 0.98
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
 
@@ -48,7 +49,7 @@ class Exact:
     boxes : (n, 6) array
         Their tree.
     radius : float
-        ρ in m: of the smallest probe.
+        R in m: of the smallest probe.
     """
 
     pieces: Pieces
@@ -84,6 +85,12 @@ def _step(t: float) -> float:
     """σ: from 0 at 0 to 1 at 1, with two vanishing derivatives at both."""
     t = min(max(t, 0.0), 1.0)
     return t * t * t * (10.0 + t * (6.0 * t - 15.0))
+
+
+@_jit
+def _bridge(r: float) -> float:
+    """w, of a distance in radii."""
+    return _step((r - START) / (FINISH - START))
 
 
 @_jit
@@ -131,19 +138,19 @@ def _beyond(height: float, r: float, radius: float) -> tuple[float, int]:
     if height >= 0 or r == 0.0:
         return r, ROUNDED
     below = (height / r) ** 2
-    G = 1.0 - below + below * _step(2.0 * r / radius - 1.0)
+    G = 1.0 - below + below * _bridge(r / radius)
     return height + G * (r - height), BRIDGED if G < 1 else ROUNDED
 
 
 @_jit
 def _within(c: np.ndarray, d: float, border: np.ndarray, radius: float) -> tuple[float, int]:
     """Distance where the nearest point is inside the surface, d away."""
-    if d > -0.5 * radius or border.shape[0] == 0:
+    if d > -START * radius or border.shape[0] == 0:
         return d, PLAIN
     square = _to_border(c, border) - d * d
     if square >= radius * radius:
         return d, PLAIN
-    G = _step(-2.0 * d / radius - 1.0) * (1.0 - _step(np.sqrt(max(square, 0.0)) / radius))
+    G = _bridge(-d / radius) * (1.0 - _step(np.sqrt(max(square, 0.0)) / radius))
     return d - 2.0 * d * G, BRIDGED
 
 

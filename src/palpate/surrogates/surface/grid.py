@@ -22,7 +22,7 @@ from palpate.surrogates.surface.exact import BRIDGED, Exact
 __all__ = ["Grid", "sampled"]
 
 SMOOTH, SHARP = 0.4, 0.8  # change of slope from cell to cell
-CLEAR = 2  # cells beyond the reach, within which the spline hears of what comes after
+CLEAR = 4  # cells beyond the reach, within which the spline hears of what comes after
 LEVEL = 2  # cells by which the distance rises from there to its level
 COARSE = 4  # every so many nodes the distance is measured where it is large
 PAD = 2  # nodes beyond the spline's own that its coefficients need

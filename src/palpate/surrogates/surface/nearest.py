@@ -47,10 +47,10 @@ def boxes_of(corners: np.ndarray) -> np.ndarray:
 @_jit
 def _apart(boxes: np.ndarray, i: int, x: float, y: float, z: float) -> float:
     """Square of the distance of a point to box i."""
-    u = max(max(boxes[i, 0] - x, x - boxes[i, 3]), 0.0)
-    v = max(max(boxes[i, 1] - y, y - boxes[i, 4]), 0.0)
-    w = max(max(boxes[i, 2] - z, z - boxes[i, 5]), 0.0)
-    return u * u + v * v + w * w
+    u = max(boxes[i, 0] - x, x - boxes[i, 3], 0.0)
+    v = max(boxes[i, 1] - y, y - boxes[i, 4], 0.0)
+    w = max(boxes[i, 2] - z, z - boxes[i, 5], 0.0)
+    return float(u * u + v * v + w * w)
 
 
 @_jit

@@ -58,7 +58,7 @@ def _pieces(skin: Skin, ends: np.ndarray) -> np.ndarray:
     partner = skin.neighbours.ravel()[edge]
     after = edge // 3 * 3 + (edge + 1) % 3
     # the partner runs the other way: its start is this edge's end
-    links = np.vstack([np.stack([after, partner], axis=1)])
+    links = np.stack([after, partner], axis=1)
     label = np.arange(ends.size)
     while True:
         low = label[links].min(axis=1)

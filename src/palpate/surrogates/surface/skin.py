@@ -74,12 +74,6 @@ class Skin:
         across = self.facets[self.neighbours // 3]
         return np.asarray((np.einsum("ti,tki->tk", self.facets, across) < CREASE) & ~self.border)
 
-    @cached_property
-    def edges(self) -> np.ndarray:
-        """Mean length of the edges in m, as an array of no dimension."""
-        along = np.roll(self.corners, -1, axis=1) - self.corners
-        return np.asarray(np.linalg.norm(along, axis=2).mean())
-
 
 def _arrays(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     points, triangles = np.asarray(points, dtype=np.float64), np.asarray(triangles)

@@ -22,6 +22,7 @@ FEW = 6  # where there are none
 TRUE = 1e-3  # of that radius: the error to which the spacing is refined, where there is room
 MOST = 2_000_000  # nodes: 16 MB
 CHECKS = 20_000  # places at which the error is measured
+COARSEST = 3  # cells to the radius, below which nothing is known of edges
 TRIALS = 3
 
 
@@ -191,12 +192,12 @@ def _built(exact: Exact, reach: float, inner: float, spacing: float | None) -> T
 
 
 def _error(exact: Exact, grid: Grid, reach: float, inner: float) -> float:
-    """Largest deviation in m from the measured distance where the grid is faithful; zero if it is nowhere."""
+    """Largest deviation in m from the measured distance where the grid is faithful; its spacing if it is nowhere."""
     h, C = grid.frame[3], grid.coefficients
-    near = grid.faithful & (C > -inner) & (C < reach)
+    near = grid.faithful & (-inner < C) & (reach > C)
     cells = np.argwhere(near[1:-2, 1:-2, 1:-2]) + 1
     if not len(cells):
-        return 0.0
+        return float(h)
     random = np.random.default_rng(0)
     chosen = cells[np.sort(random.choice(len(cells), min(CHECKS, len(cells)), replace=False))]
     places = grid.frame[:3] + h * (chosen + random.random(chosen.shape))
@@ -221,6 +222,12 @@ def _nodes(exact: Exact, reach: float, inner: float, spacing: float) -> int:
 
 
 def _refuse_nodes(exact: Exact, reach: float, inner: float, spacing: float) -> None:
+    if spacing > exact.radius / COARSEST:
+        raise UsageError(
+            f"A grid of {1e3 * spacing:.3g} mm can't tell how a probe of {1e3 * exact.radius:.3g} mm touches.",
+            why=f"It needs {COARSEST} cells to its radius; left open, the spacing is as fine as there is room for.",
+            fix="Choose a finer spacing, a smaller part of the surface or a larger probe.",
+        )
     nodes = _nodes(exact, reach, inner, spacing)
     if nodes > MOST:
         raise UsageError(

@@ -156,9 +156,9 @@ def _notes(ours: Swept, rivals: dict[str, Any], points: np.ndarray) -> tuple[str
         "times are CPU times, the building of forms and mesh left out; palpate's include energy, force, stiffness and "
         "all its checks, the script's only its solve, the force and its check",
         f"the script solves {len(chosen)} samples, one of each stratum of depth, drawn by seed 0, and with one "
-        f"tolerance every {TIGHT}rd of them, each from the undeformed block in load steps of {1e3 * STEP:g} mm; same "
-        "mesh, law, contact energy, quadrature and tolerance; NGSolve's NewtonSolver with its line search, sparse "
-        "Cholesky with the symbolic factorisation kept. "
+        f"tolerance every {TIGHT}rd of them, each from the undeformed block in load steps of {1e3 * STEP:g} mm, begun "
+        "anew with half as large ones where that fails; same mesh, law, contact energy, quadrature and tolerance; "
+        "NGSolve's NewtonSolver with its line search, sparse Cholesky with the symbolic factorisation kept. "
         f"On the same {len(chosen)} samples palpate is faster by {same:.1f}",
         "admissible: det F > 0 at 35 points of each element, all of the surface short of the stop and, where pressed, "
         "facing the sphere's centre, the centre outside, F_z ≥ 0, and the script's residual there below 1e-6 of the "

@@ -53,6 +53,7 @@ def test_the_winding_number_tells_inside_from_outside(field):
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:The pad of the probe takes")  # so soft on purpose
 def test_a_pad_without_a_stop_swallows_the_sphere_and_the_solver_says_so():
     """A merely quadratic pad has a limit point: beyond it no state that pushes back is left."""
     deep = 0.013

@@ -19,7 +19,7 @@ class Stop(StrEnum):
     UNSTABLE = "the equilibrium is unstable: the tangent has a negative direction, the body would snap away"
     STRAIN_LIMIT = "the strain is beyond the reach of the material law"
     COARSE_MESH = "one element bends by more than a radian: the load is beyond the reach of this mesh"
-    ELEMENT_INVERTED = "an element is turned inside out: det F is not positive at a quadrature point"
+    ELEMENT_INVERTED = "an element is turned inside out: det F is not positive somewhere in it"
     PAST_STOP = "the surface is pressed past the stop of the pad"
     THROUGH_SURFACE = "the probe has gone through the surface: its centre is on the inner side"
     NO_APPROACH = (

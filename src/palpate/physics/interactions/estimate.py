@@ -17,7 +17,7 @@ from palpate.physics.words import millimetres, number
 
 __all__ = ["advise_on_pad", "pad_depth"]
 
-LARGE = 0.4  # share of the depth: tissue of 9 kPa under the default pad stays below it from 3 mm of depth on
+LARGE = 0.5  # share of the depth: from here on more of it is the pad's than the body's
 SMALL = 0.1  # share that the pad advised would take
 
 
@@ -42,7 +42,7 @@ def pad_depth(probe: Any, modulus: float, depth: float) -> float:
 
 
 def advise_on_pad(probe: Any, materials: dict[str, Any]) -> None:
-    """Warn of a pad that takes most of the largest depth, on a body of these materials by region.
+    """Warn of a pad that takes more than half of the largest depth, on a body of these materials by region.
 
     Of several materials the softest counts, so the warning comes late rather than falsely.
     """

@@ -5,7 +5,8 @@ parts      what a body is made of, checked
 problem    a body and what varies: what a sweep asks
 lengths    lengths against the body's own, which tell mistaken units
 solver     many solves, each from the nearest answer before
-solution   what a solve returns
+answers    what it returns, from where a path ended
+solution   an equilibrium, or why there is none
 opening    building the finite elements of a problem
 field      the unknowns: displacement, and pressure in mixed form
 density    the energy of the material

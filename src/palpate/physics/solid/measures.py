@@ -39,9 +39,11 @@ class Measures:
         self._gradient = deformation_gradient(field.displacement)
 
     def least_volume_ratio(self) -> float:
-        """Least det F at the quadrature points of all regions."""
-        gradients = np.concatenate([self._gradients(large=True), self._gradients(large=False)])
-        return float(np.linalg.det(gradients).min())
+        """Least det F at the quadrature points, corners and middles of edges of all elements."""
+        gradients = [self._gradients(large=large) for large in (True, False)]
+        # F varies linearly over an element of second order: its corners turn over first
+        gradients.append(self._at(self._field.mesh.Materials(".*"), _corners_and_middles()))
+        return float(min(np.linalg.det(each).min(initial=np.inf) for each in gradients))
 
     def largest_small_strain(self) -> float:
         """Largest |ε| of a principal strain at the quadrature points of regions of small strain; 0 without any."""
@@ -130,13 +132,15 @@ class Measures:
 
     def _gradients(self, *, large: bool) -> np.ndarray:
         """F at the quadrature points of all regions of large or of small strain, shape (N, 3, 3)."""
-        found = [np.empty((0, 9))]
+        found = [np.empty((0, 3, 3))]
         for region, material in self._materials.items():
             if (material.kinematics == "large") == large:
-                rule = volume_rule(self._field, material)
-                points = self._field.mesh.MapToAllElements(rule, self._field.region(region))
-                found.append(np.asarray(self._gradient(points)))
-        return np.concatenate(found).reshape(-1, 3, 3)
+                found.append(self._at(self._field.region(region), volume_rule(self._field, material)))
+        return np.concatenate(found)
+
+    def _at(self, region: Any, rule: Any) -> np.ndarray:
+        """F at the points of a rule in all elements of a region, shape (N, 3, 3)."""
+        return np.asarray(self._gradient(self._field.mesh.MapToAllElements(rule, region))).reshape(-1, 3, 3)
 
     def _at_nodes(self, values: Mapping[str, Any]) -> np.ndarray:
         """A field given by region, averaged over the elements around each node, shape (node,)."""
@@ -145,6 +149,16 @@ class Measures:
         image = ngsolve.GridFunction(ngsolve.H1(self._field.mesh, order=1))
         image.Set(self._field.mesh.MaterialCF(dict(values)))
         return np.array(image.vec.FV().NumPy())
+
+
+def _corners_and_middles() -> Any:
+    """The nodes of a tetrahedron of second order as points to look at."""
+    import ngsolve
+
+    corners = np.vstack([np.eye(3), np.zeros(3)])
+    middles = [(a + b) / 2 for a, b in itertools.combinations(corners, 2)]
+    points = [tuple(point) for point in np.vstack([corners, middles]).tolist()]
+    return ngsolve.IntegrationRule(points, [1.0] * len(points))
 
 
 def _principal_strains(gradients: np.ndarray) -> np.ndarray:

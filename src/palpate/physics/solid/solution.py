@@ -60,7 +60,7 @@ class SolidSolution:
     penetration : float
         Largest penetration of a probe's pad in m; 0 where there is none.
     least_volume_ratio : float
-        Least det F at the quadrature points.
+        Least det F at the quadrature points, corners and middles of edges of the elements.
     largest_strain : float
         Largest |λ - 1| of a principal stretch λ at the quadrature points; at small strain, of a principal strain.
     stress : (node, 3, 3) array or None
@@ -170,7 +170,7 @@ class SolidSolution:
                 f"  energy       {self.potential_energy:.6g} J, {self.strain_energy:.6g} J of it in the body",
                 f"  penetration  {1e3 * self.penetration:.3g} mm into the pad" if self.probe else "",
                 f"  strain       largest |λ − 1| {self.largest_strain:.3g}, "
-                f"least det F {self.least_volume_ratio:.3g} (at quadrature points)",
+                f"least det F {self.least_volume_ratio:.3g}",
             ]
         else:
             at = ", ".join(

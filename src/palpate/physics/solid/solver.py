@@ -10,16 +10,17 @@ import numpy as np
 from palpate.errors import SolverError, UsageError
 from palpate.physics.arguments import require_positive
 from palpate.physics.equilibrium.stop import Stop, Verdict
+from palpate.physics.solid.answers import Answers
 from palpate.physics.solid.newton import ROUND_OFF
 from palpate.physics.solid.opening import open_problem
 from palpate.physics.solid.path import Followed, Known, follow
-from palpate.physics.solid.solution import SolidSolution
 from palpate.physics.solid.stability import is_accurate, is_stable
 from palpate.physics.solid.system import sparse_solver
 from palpate.physics.solid.times import durations
 
 if TYPE_CHECKING:
     from palpate.physics.solid.problem import SolidProblem
+    from palpate.physics.solid.solution import SolidSolution
 
 __all__ = ["SolidSolver"]
 
@@ -51,9 +52,9 @@ class SolidSolver:
 
     def __init__(self, problem: SolidProblem, *, solver: str = "auto", tolerance: float = 1e-9) -> None:
         self._problem = problem
-        self._mesh = problem.mesh
         opened = open_problem(problem, sparse_solver(solver), tolerance)
         self._model = opened.model
+        self._answers = Answers(problem, opened.model)
         settled = opened.settled
         if settled is not None and settled.verdict.stop is not Stop.CONVERGED:
             raise SolverError(
@@ -98,7 +99,7 @@ class SolidSolver:
         q = self._problem.inputs(x)
         outside = self._model.approach(q)
         if outside is None:
-            return self._failure(q, Followed(self._rest(q), Verdict(Stop.NO_APPROACH), ()))
+            return self._answers.failure(q, Followed(self._rest(q), Verdict(Stop.NO_APPROACH), ()))
         self._measure_energies()
         if dt is not None:
             require_positive("The time step", dt, "s")
@@ -203,7 +204,7 @@ class SolidSolver:
     def _concluded(self, q: np.ndarray, followed: Followed, *, fields: bool) -> SolidSolution:
         """The solution, after a look at the tangent at the equilibrium found."""
         if followed.verdict.stop is not Stop.CONVERGED:
-            return self._failure(q, followed)
+            return self._answers.failure(q, followed)
         system = self._model.system
         self._model.set(q)
         system.factorise(followed.last.z)
@@ -211,8 +212,11 @@ class SolidSolver:
         doubt = self._doubt(q, followed.last, residual)
         if doubt.stop is not Stop.CONVERGED:
             last = followed.last.before or followed.last
-            return self._failure(q, Followed(last, doubt, followed.log))
-        return self._answer(q, followed, residual, fields=fields)
+            return self._answers.failure(q, Followed(last, doubt, followed.log))
+        found = self._answers.equilibrium(q, followed, residual, fields=fields)
+        known = Known(q, followed.last.z, found.slope, followed.last.before)
+        self._known = [*(k.alone() for k in self._known[-KEPT + 1 :]), known]
+        return found.solution
 
     def _doubt(self, q: np.ndarray, last: Known, residual: float) -> Verdict:
         """What speaks against the state that a path ended in, with the tangent just factorised there."""
@@ -222,91 +226,3 @@ class SolidSolver:
         if not np.array_equal(last.q, q) or not residual < ROUND_OFF:
             return Verdict(Stop.ITERATION_LIMIT, f"the relative error is {residual:.2g}")
         return Verdict() if is_stable(system) else Verdict(Stop.UNSTABLE)
-
-    def _answer(self, q: np.ndarray, followed: Followed, residual: float, *, fields: bool) -> SolidSolution:
-        """Response and stiffness from the tangent at the equilibrium, and what is measured there."""
-        model, z = self._model, followed.last.z
-        response = model.response(z)
-        hessian, slope = model.inputs.hessian(model.system, z)
-        known = Known(q, z, slope, followed.last.before)
-        self._known = [*(k.alone() for k in self._known[-KEPT + 1 :]), known]
-        model.field.show(z)
-        measured: dict[str, Any] = model.measures.at_nodes() if fields else {}
-        # only now: the step's own tangent and stress are those with the internal variables before it
-        strain_energy, energy = model.conclude(z)
-        figures = followed.verdict.figures
-        return SolidSolution(
-            stop=Stop.CONVERGED,
-            iterations=followed.iterations,
-            chords=followed.chords,
-            residual=residual,
-            log=followed.log,
-            mesh=self._mesh,
-            ranges=self._problem.ranges,
-            inputs=q,
-            displacement=model.field.at_nodes(),
-            mid_sides=model.field.middles.show(),
-            response=response,
-            response_gradient=-hessian,
-            potential_energy=energy,
-            strain_energy=strain_energy,
-            penetration=figures.get("penetration", 0.0),
-            least_volume_ratio=figures["least_volume_ratio"],
-            largest_strain=model.measures.largest_strain(),
-            reached=q,
-            state=z,
-            **self._surroundings(q),
-            **measured,
-        )
-
-    def _failure(self, q: np.ndarray, followed: Followed) -> SolidSolution:
-        n, last = q.size, followed.last
-        return SolidSolution(
-            stop=followed.verdict.stop,
-            iterations=followed.iterations,
-            chords=followed.chords,
-            residual=followed.log[-1].residual if followed.log else np.inf,
-            log=followed.log,
-            mesh=self._mesh,
-            ranges=self._problem.ranges,
-            inputs=q,
-            displacement=np.full((len(self._mesh.points), 3), np.nan),
-            response=np.full(n, np.nan),
-            response_gradient=np.full((n, n), np.nan),
-            detail=followed.verdict.detail,
-            reached=last.q if followed.log else np.full(n, np.nan),
-            state=last.z,
-            last_good=self._last_good(last) if followed.log else None,
-            **self._surroundings(q),
-        )
-
-    def _last_good(self, last: Known) -> SolidSolution:
-        """The last equilibrium before a failure, to be looked at."""
-        model, n = self._model, last.q.size
-        model.set(last.q)
-        figures = model.judge(last.z, last.q).figures
-        return SolidSolution(
-            stop=Stop.CONVERGED,
-            iterations=0,
-            residual=np.nan,
-            log=(),
-            mesh=self._mesh,
-            ranges=self._problem.ranges,
-            inputs=last.q,
-            displacement=model.field.at_nodes(),
-            mid_sides=model.field.middles.show(),
-            # with a history it depends on internal variables that have been put back
-            response=np.full(n, np.nan) if model.histories else model.response(last.z),
-            response_gradient=np.full((n, n), np.nan),
-            penetration=figures.get("penetration", 0.0),
-            least_volume_ratio=figures["least_volume_ratio"],
-            largest_strain=model.measures.largest_strain(),
-            reached=last.q,
-            state=last.z,
-            **self._surroundings(last.q),
-        )
-
-    def _surroundings(self, q: np.ndarray) -> dict[str, Any]:
-        """What a picture shows beside the body."""
-        probe, centre = self._problem.probe_at(q)
-        return {"fixed": self._problem.body.fixed, "probe": probe, "centre": centre}

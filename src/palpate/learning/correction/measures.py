@@ -1,0 +1,73 @@
+"""How far forces are off: before, after, and on measurements that were left out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.surrogates import TouchSurrogate
+
+__all__ = ["ForceError", "force_error"]
+
+FELT = 0.05  # of the largest force: relative errors are of touches above it
+
+
+@dataclass(frozen=True)
+class ForceError:
+    """Errors of N measured touches.
+
+    Attributes
+    ----------
+    count : int
+        Touches in contact, by the model or by the sensor.
+    rms : float
+        Root mean square of ‖error‖, N.
+    relative : float
+        That over the root mean square of the measured force.
+    median, p95 : float
+        Of ‖error‖/‖force‖ over touches of more than a twentieth of the largest force.
+    """
+
+    count: int
+    rms: float
+    relative: float
+    median: float
+    p95: float
+
+    def __str__(self) -> str:
+        return (
+            f"{1e3 * self.rms:.3g} mN rms ({100 * self.relative:.2g} %), of felt touches "
+            f"{100 * self.median:.2g} % median, {100 * self.p95:.2g} % p95"
+        )
+
+    def as_dict(self) -> dict[str, float]:
+        """The same, by name."""
+        return dict(vars(self))
+
+
+def force_error(
+    surrogate: TouchSurrogate, X: np.ndarray, force: np.ndarray, along: np.ndarray | None = None
+) -> ForceError:
+    """Of a surrogate at inputs X (N, n), with measured forces (N, 3) in N; `along` as in `Corrector.observe`."""
+    predicted, measured = surrogate.force(X), np.array(force)
+    if along is not None:
+        one = along.any(axis=1)
+        for F in (predicted, measured):
+            F[one] = (F[one] * along[one]).sum(axis=1)[:, None] * along[one]
+    size, missed = np.linalg.norm(measured, axis=1), np.linalg.norm(predicted - measured, axis=1)
+    largest = float(size.max(initial=0.0))
+    felt = size > FELT * largest
+    touched = (surrogate.depth(X) > 0) | felt
+    if not felt.any():
+        return ForceError(int(touched.sum()), _rms(missed), np.nan, np.nan, np.nan)
+    ratio = missed[felt] / size[felt]
+    rms = _rms(missed[touched])
+    quantiles = np.quantile(ratio, [0.5, 0.95])
+    return ForceError(
+        int(touched.sum()), rms, rms / _rms(size[touched]), float(quantiles[0]), float(quantiles[1])
+    )
+
+
+def _rms(sizes: np.ndarray) -> float:
+    return float(np.sqrt((sizes**2).mean())) if sizes.size else 0.0

@@ -1,0 +1,69 @@
+"""A specimen made by formula, to try a correction with: another energy, measured with noise.
+
+    U_p(c) = U₀(s) exp[ℓ(c) + ln m + ½ g (1 + tanh((s − s_l)/w))],     s the depth under a surface raised by o
+
+The modulus is m times the model's; a stiffer layer makes the energy e^g times as large once the probe is deeper than
+s_l. That is no change of the kind that the prior of a correction expects, and not one that the network contains.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.learning.correction.written import raised
+from palpate.surrogates import TouchSurrogate
+
+__all__ = ["Phantom"]
+
+
+@dataclass(frozen=True, eq=False)
+class Phantom:
+    """A specimen that differs from a model.
+
+    Attributes
+    ----------
+    model : TouchSurrogate
+    factor : float
+        m.
+    layer : float
+        g.
+    depth, width : float
+        s_l and w, m.
+    height : float
+        o, m.
+    """
+
+    model: TouchSurrogate
+    factor: float = 1.4
+    layer: float = 0.3
+    depth: float = 0.006
+    width: float = 0.002
+    height: float = 3e-4
+
+    def force(self, X: np.ndarray) -> np.ndarray:
+        """F (N, 3) at inputs X (N, n), without noise."""
+        surface = raised(self.model.surface, self.height, self.model.radius)
+        d, normal, _ = surface.at(np.ascontiguousarray(X[:, :3]))
+        s = self.model.radius - d
+        U0, first, _ = self.model.law.energy(s)
+        value, slope = self._factor(X)
+        t = np.tanh((s - self.depth) / self.width)
+        kappa = self.factor * np.exp(value + 0.5 * self.layer * (1.0 + t))
+        grows = 0.5 * self.layer * (1.0 - t * t) / self.width  # of the layer's part, by s
+        by_s = first + U0 * grows
+        return np.asarray(kappa[:, None] * (by_s[:, None] * normal - U0[:, None] * slope))
+
+    def measured(
+        self, X: np.ndarray, noise: float, rng: np.random.Generator, relative: float = 0.0
+    ) -> np.ndarray:
+        """The same with Gaussian noise (N, and relative to the force's size) in each component."""
+        F = self.force(X)
+        size = np.sqrt(noise**2 + (relative * np.linalg.norm(F, axis=1)) ** 2)
+        return np.asarray(F + size[:, None] * rng.standard_normal(F.shape))
+
+    def _factor(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """ℓ (N,) and ∇ℓ (N, 3) of the model, inside of its trained ranges."""
+        net = self.model.network
+        return net.predict(X)[:, 0], np.stack([net.jacobian(x)[0, :3] for x in X])

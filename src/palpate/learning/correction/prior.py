@@ -1,0 +1,142 @@
+"""How a specimen may differ from the model, before it has been touched.
+
+Its energy is U₀(s + o) exp(ℓ + δ): δ(x) a change of ln κ, o a height of its surface over the model's (m). A priori
+
+    δ(x) = σ_c a + v(x)       a ~ N(0, 1), v a Gaussian process,   E v(x)v(x') = σ_v² exp(−‖ξ − ξ'‖²/2L²)
+    o ~ N(0, σ_o²)
+
+with ξ the scaled inputs: a constant factor, and one that varies slowly with place and depth (a random field for
+what a model misses: Kennedy & O'Hagan 2001, section 4). v is written in the network's own tail and units, by least
+squares at the places of the training, so the corrected energy is a network of the same size. The model's own
+posterior is kept beside it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.network import Network
+from palpate.network.radial import radial
+from palpate.surrogates import TouchSurrogate
+
+__all__ = ["Discrepancy", "Opened", "opened", "regressors"]
+
+_KEPT = 1e-4  # of the largest variance: directions of the slow change below it are left out
+_MOST = 40  # such directions
+_POINTS = 256  # where the slow change is matched, where no training inputs are known
+_RIDGE = 1e-6  # of a regressor's mean square
+
+
+@dataclass(frozen=True)
+class Discrepancy:
+    """Standard deviations of what a specimen differs by.
+
+    Attributes
+    ----------
+    constant : float
+        σ_c of ln κ: 0.5 means that a factor between 0.6 and 1.6 is ordinary.
+    varying : float
+        σ_v of ln κ.
+    length : float
+        L over which it varies, in halves of the inputs' ranges.
+    offset : float
+        σ_o, m; zero where the surface's height is known.
+
+    Raises
+    ------
+    UsageError
+        If one of them is negative or not finite, or the length not positive.
+    """
+
+    constant: float = 0.5
+    varying: float = 0.2
+    length: float = 1.0
+    offset: float = 5e-4
+
+    def __post_init__(self) -> None:
+        sizes = (self.constant, self.varying, self.offset)
+        if not (
+            all(math.isfinite(v) and v >= 0 for v in sizes) and self.length > 0 and math.isfinite(self.length)
+        ):
+            raise UsageError(
+                f"{self} says nothing of a specimen.",
+                why="Standard deviations are not negative, and a length is positive.",
+                fix="Set to zero what is known, to its typical size what is not.",
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """What may change, as independent standard normal numbers.
+
+    Attributes
+    ----------
+    root : (1 + n + h, z)
+        What each of z numbers does to the network's tail and weights, in its scaled output.
+    offset : float
+        What a last number does to the surface's height, m.
+    expressed : float
+        Share of the slow change's variance that tail and units can follow.
+    """
+
+    root: np.ndarray
+    offset: float
+    expressed: float
+
+
+def opened(surrogate: TouchSurrogate, discrepancy: Discrepancy) -> Opened:
+    """The posterior of the training, with the discrepancy added.
+
+    Raises
+    ------
+    UsageError
+        If nothing may change at all.
+    """
+    net = surrogate.network
+    scale, rows = float(net.scaling.output_scale[0]), 1 + len(net.inputs) + net.units
+    parts = [np.zeros((rows, 0)) if surrogate.root is None else surrogate.root]
+    if discrepancy.constant:
+        parts.append(np.eye(rows, 1) * discrepancy.constant / scale)
+    expressed = 1.0
+    if discrepancy.varying:
+        root, expressed = _slow(surrogate, discrepancy)
+        parts.append(root / scale)
+    root = np.hstack(parts)
+    if not root.any() and not discrepancy.offset:
+        raise UsageError(
+            "A surrogate without posterior and a discrepancy of zero leave nothing to correct.",
+            fix="Give one of the discrepancy's deviations a positive size.",
+        )
+    return Opened(root, discrepancy.offset, expressed)
+
+
+def regressors(net: Network, scaled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """r = [1, ξ, φ] (N, c) and its slopes by ξ (N, n, c) at scaled inputs (N, n)."""
+    N, n = scaled.shape
+    A = net.factors
+    v = np.einsum("kri,ni->nkr", A, scaled) - net.shifts
+    g, first, _ = radial(net.radial, (v * v).sum(axis=2))
+    by = 2.0 * first[:, None] * np.einsum("kri,nkr->nik", A, v)
+    tail = np.broadcast_to(np.eye(n, 1 + n, 1), (N, n, 1 + n))
+    return np.hstack([np.ones((N, 1)), scaled, g]), np.concatenate([tail, by], axis=2)
+
+
+def _slow(surrogate: TouchSurrogate, discrepancy: Discrepancy) -> tuple[np.ndarray, float]:
+    """Root (c, r) of the slowly varying change in units of ℓ, and the share of it that the network can express."""
+    n, region = len(surrogate.inputs), surrogate.region
+    points = (
+        region.points if region is not None else np.random.default_rng(0).uniform(-1.0, 1.0, (_POINTS, n))
+    )
+    square = ((points[:, None] - points) ** 2).sum(axis=2)
+    values, V = np.linalg.eigh(discrepancy.varying**2 * np.exp(-square / (2.0 * discrepancy.length**2)))
+    keep = np.flatnonzero(values > _KEPT * values[-1])[-_MOST:]
+    wanted = V[:, keep] * np.sqrt(values[keep])
+    R, _ = regressors(surrogate.network, points)
+    gram = R.T @ R
+    found = np.linalg.solve(gram + _RIDGE * np.trace(gram) / len(gram) * np.eye(len(gram)), R.T @ wanted)
+    missed = wanted - R @ found
+    return found, float(1.0 - (missed**2).sum() / (wanted**2).sum())

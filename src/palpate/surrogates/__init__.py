@@ -8,11 +8,13 @@
     touch_kernels, touch_trust     … the loops behind it
     surrogate_evaluator            … one touch at a time, without allocation
     touch_file                     … in a file
+    field                          what the eye sees of it: displacement, stress, stretch on its surface
     surface                        how far a point is from a touched surface
     relaxation                     memory on top of an energy
 """
 
 from palpate.surrogates.continuation import Continuation
+from palpate.surrogates.field import FieldEvaluator, FieldSurrogate, TouchedBody
 from palpate.surrogates.laws import ContactLaw
 from palpate.surrogates.surface import TouchedSurface
 from palpate.surrogates.surrogate_evaluator import SurrogateEvaluator
@@ -22,9 +24,12 @@ from palpate.surrogates.touch_surrogate import TouchSurrogate
 __all__ = [
     "ContactLaw",
     "Continuation",
+    "FieldEvaluator",
+    "FieldSurrogate",
     "SurrogateEvaluator",
     "TouchEvaluator",
     "TouchModel",
     "TouchSurrogate",
+    "TouchedBody",
     "TouchedSurface",
 ]

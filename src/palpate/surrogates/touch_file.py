@@ -19,7 +19,7 @@ from palpate.surrogates.surface import TouchedSurface
 if TYPE_CHECKING:
     from palpate.surrogates.touch_surrogate import TouchSurrogate
 
-__all__ = ["KIND", "load_surrogate", "save_surrogate"]
+__all__ = ["KIND", "archive_of", "load_surrogate", "save_surrogate", "surrogate_of"]
 
 KIND = "touch-surrogate"
 _NETWORK, _SURFACE = "log-factor", "surface/"
@@ -34,6 +34,11 @@ def save_surrogate(path: str | os.PathLike[str], surrogate: TouchSurrogate) -> P
     UsageError
         If the folder does not exist or can't be written, or `meta` holds what JSON does not know.
     """
+    return save_archive(path, archive_of(surrogate))
+
+
+def archive_of(surrogate: TouchSurrogate) -> Archive:
+    """What its file holds."""
     going, region = surrogate.continuation, surrogate.region
     assert going is not None
     arrays = {_SURFACE + k: v for k, v in surrogate.surface.arrays().items()} | {"widths": going.widths}
@@ -51,7 +56,7 @@ def save_surrogate(path: str | os.PathLike[str], surrogate: TouchSurrogate) -> P
         "depth_width": going.depth_width,
         "meta": dict(surrogate.meta),
     }
-    return save_archive(path, Archive({_NETWORK: surrogate.network}, arrays, meta, KIND))
+    return Archive({_NETWORK: surrogate.network}, arrays, meta, KIND)
 
 
 def load_surrogate(path: str | os.PathLike[str]) -> TouchSurrogate:
@@ -64,7 +69,7 @@ def load_surrogate(path: str | os.PathLike[str]) -> TouchSurrogate:
     """
     archive = load_archive(path, kind=KIND)
     try:
-        return _surrogate(archive)
+        return surrogate_of(archive)
     except (KeyError, TypeError, ValueError, IndexError, OverflowError, UsageError) as error:
         raise FileFormatError(
             f"{path} does not describe a touch surrogate.",
@@ -73,7 +78,14 @@ def load_surrogate(path: str | os.PathLike[str]) -> TouchSurrogate:
         ) from error
 
 
-def _surrogate(archive: Archive) -> TouchSurrogate:
+def surrogate_of(archive: Archive) -> TouchSurrogate:
+    """The surrogate that an archive holds.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError, UsageError
+        If it holds none, or its parts do not fit.
+    """
     from palpate.surrogates.touch_surrogate import TouchSurrogate
 
     meta, arrays = archive.meta, dict(archive.arrays)

@@ -1,0 +1,83 @@
+"""The part of a field that travels with the probe: a dimple, the same wherever it is pressed.
+
+Modes are fixed in the body, and a dimple that moves needs one for nearly every place where it may be. So what is the
+same everywhere in the probe's own frame is taken out before:
+
+    foot     o = c − d ∇d, the touched place at rest, with the normal n = ∇d
+    node X   ρ = |X − o|,  t = (X − o) less its part along n
+    vector   f(s) [g₀(ρ, s) n + g₁(ρ, s) t/L]        scalar   f(s) g₀(ρ, s)
+
+on the nodes of the touched surface with ρ < L, else zero. g is a product of uniform cubic B-splines (de Boor 1978) in
+ρ and s; the last three in ρ are left out, so that it ends at L with two continuous derivatives.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.errors import UsageError
+
+__all__ = ["Dimple", "products", "splines"]
+
+
+def splines(t: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """First index (N,) and the four values (N, 4) of the uniform cubic B-splines at t in [0, count − 3]."""
+    t = np.clip(t, 0.0, count - 3.0)
+    first = np.minimum(t.astype(np.int64), count - 4)
+    u = t - first
+    v = 1.0 - u
+    four = [v**3, 3 * u**3 - 6 * u**2 + 4, 3 * v**3 - 6 * v**2 + 4, u**3]
+    return first, np.stack(four, axis=-1) / 6.0
+
+
+def products(offsets: np.ndarray, depths: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Products of the splines (N, r − 3, q) at ρ/L in [0, 1) and s/s* in [0, 1], both (N,), for a shape (r, q)."""
+    r, q = shape
+    out = np.zeros((len(offsets), r, q))
+    row = np.arange(len(offsets))
+    i, of_rho = splines(offsets * (r - 3), r)
+    j, of_s = splines(depths * (q - 3), q)
+    for a in range(4):
+        for b in range(4):
+            out[row, i + a, j + b] = of_rho[:, a] * of_s[:, b]
+    return out[:, : r - 3]
+
+
+@dataclass(frozen=True, eq=False)
+class Dimple:
+    """A travelling part of a field.
+
+    Attributes
+    ----------
+    table : (parts, r, q)
+        Coefficients of the splines in ρ (r of them, the last three zero) and s (q), for g₀ and, of vectors, g₁.
+    reach : float
+        L, m.
+    touched : (nodes,) bool
+        Where it is.
+
+    Raises
+    ------
+    UsageError
+        If the table or the reach is none.
+    """
+
+    table: np.ndarray
+    reach: float
+    touched: np.ndarray
+
+    def __post_init__(self) -> None:
+        table, touched = np.array(self.table, float, order="C"), np.array(self.touched, bool)
+        for array in (table, touched):
+            array.flags.writeable = False
+        object.__setattr__(self, "table", table)
+        object.__setattr__(self, "touched", touched)
+        fits = table.ndim == 3 and table.shape[0] in (1, 2) and min(table.shape[1:]) >= 4
+        if not (fits and np.isfinite(table).all() and not table[:, -3:].any() and 0 < self.reach < np.inf):
+            raise UsageError(
+                f"A table of shape {table.shape} that reaches {self.reach} m is no dimple.",
+                why="It holds finite coefficients of four splines or more each way, the last three in ρ zero.",
+                fix="Let `palpate.learning.fields` fit it.",
+            )

@@ -1,0 +1,270 @@
+"""A field over a body's surface under a touch: displacement, von Mises stress, stretch.
+
+    y(X; c, p) = y₀(X) + f(s) [Σ_k b_k(c, p) φ_k(X) + dimple(X; c, s)]
+
+s = R − d(c) is the depth of the rigid probe, f how the field begins (`rise`), φ_k modes that are orthonormal in the
+mean over the surface (proper orthogonal decomposition, Sirovich 1987), b a network, and the dimple what travels with
+the probe. Without contact the field is y₀, exactly.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.network import Network
+from palpate.network.compiled import Precision
+from palpate.surrogates.continuation import Continuation
+from palpate.surrogates.field.dimple import Dimple
+from palpate.surrogates.field.errors import FieldErrors, sizes_of
+from palpate.surrogates.field.evaluator import FieldEvaluator
+from palpate.surrogates.field.rise import Rise
+from palpate.surrogates.surface import TouchedSurface
+from palpate.units import Range, bounds
+
+__all__ = ["FieldSurrogate"]
+
+_ARRAYS = ("modes", "rest", "points", "mass")
+
+
+@dataclass(frozen=True, eq=False)
+class FieldSurrogate:
+    """A field as a value: `save` and `load` give it back bit for bit.
+
+    Attributes
+    ----------
+    name, unit : str
+    network : Network
+        b of (c_x, c_y, c_z, …), k outputs in the field's unit; its inputs' ranges are the trained ones.
+    modes : (k, nodes, components)
+        φ, with Σ_j mass_j φ_kj·φ_lj = δ_kl.
+    rest : (nodes, components)
+        y₀, the field without contact.
+    points : (nodes, 3)
+        The nodes at rest, m.
+    triangles : (t, 3)
+        Of the surface, in these nodes.
+    mass : (nodes,)
+        Share of the surface that each node stands for; they add up to one.
+    rise : Rise
+    surface : TouchedSurface
+    radius : float
+        R of the probe, m; not used where `radius_input` says which input it is.
+    dimple : Dimple, optional
+    radius_input : int, optional
+    continuation : Continuation, optional
+        How far b is followed beyond its training; of the network's ranges and the rise's depth unless given.
+    meta : mapping
+        JSON-able.
+
+    Raises
+    ------
+    UsageError
+        If the parts do not fit together.
+    """
+
+    name: str
+    unit: str
+    network: Network
+    modes: np.ndarray
+    rest: np.ndarray
+    points: np.ndarray
+    triangles: np.ndarray
+    mass: np.ndarray
+    rise: Rise
+    surface: TouchedSurface
+    radius: float = math.nan
+    dimple: Dimple | None = None
+    radius_input: int | None = None
+    continuation: Continuation | None = None
+    meta: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in (*_ARRAYS, "triangles"):
+            array = np.array(getattr(self, name), np.int64 if name == "triangles" else np.float64, order="C")
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+        if self.continuation is None and len(self.network.inputs) >= 3:
+            going = Continuation.of(self.network.inputs, deepest=self.rise.deepest)
+            object.__setattr__(self, "continuation", going)
+        if fault := self._fault():
+            raise UsageError(
+                f"A field surrogate can't be made: {fault}.",
+                why="Its network, modes, nodes and probe must speak of the same body.",
+                fix="Let `palpate.learning.fields.learn_field` make it of one set of solves.",
+            )
+
+    def _fault(self) -> str:
+        """What does not fit; "" if all does."""
+        n, k = len(self.network.inputs), len(self.modes)
+        nodes = len(self.points)
+        if n < 3 or len(self.network.outputs) != k:
+            return f"its network has {n} inputs and {len(self.network.outputs)} outputs for {k} modes"
+        if self.modes.ndim != 3 or self.rest.shape != self.modes.shape[1:] or self.rest.shape[0] != nodes:
+            return f"its modes {self.modes.shape} and rest {self.rest.shape} are not of {nodes} nodes"
+        if self.points.shape != (nodes, 3) or self.mass.shape != (nodes,):
+            return f"its points {self.points.shape} and masses {self.mass.shape} are not of {nodes} nodes"
+        if not all(np.isfinite(getattr(self, name)).all() for name in _ARRAYS):
+            return "a number of it is not finite"
+        if not ((self.mass >= 0).all() and abs(self.mass.sum() - 1.0) < 1e-9):
+            return "its masses are no shares of one"
+        corners = self.triangles
+        if corners.ndim != 2 or corners.shape[1] != 3 or ((corners < 0) | (corners >= nodes)).any():
+            return "its triangles are not of its nodes"
+        return self._fault_of_probe()
+
+    def _fault_of_probe(self) -> str:
+        n, own = len(self.network.inputs), self.radius_input
+        if own is not None and not 3 <= own < n:
+            return f"input {own} can't be the radius of {n} inputs, the first three being the position"
+        if own is None and not (math.isfinite(self.radius) and self.radius > 0):
+            return f"its probe has a radius of {self.radius} m"
+        if self.continuation is not None and self.continuation.widths.shape != (n,):
+            return f"its continuation has {self.continuation.widths.size} widths for {n} inputs"
+        if self.dimple is None:
+            return ""
+        wanted = {1: 1, 3: 2}.get(self.rest.shape[1])
+        if self.dimple.touched.shape != (len(self.points),) or len(self.dimple.table) != wanted:
+            return "its travelling part is of other nodes or components"
+        return ""
+
+    def __str__(self) -> str:
+        nodes, components = self.rest.shape
+        names = ", ".join(str(r) for r in self.inputs)
+        return (
+            f"FieldSurrogate: {self.name} ({self.unit or '1'}) on {nodes} nodes, {components} each; {names}; "
+            f"{len(self.modes)} modes{'' if self.dimple is None else ' and a dimple'}, rise {self.rise.name!r}, "
+            f"{self.network.units} units"
+        )
+
+    __repr__ = __str__
+
+    @property
+    def inputs(self) -> tuple[Range, ...]:
+        """Names and trained ranges of all inputs: the centre's coordinates (m), then the further ones."""
+        return self.network.inputs
+
+    @cached_property
+    def _fixed(self) -> tuple[np.ndarray, np.ndarray]:
+        going = self.continuation
+        assert going is not None
+        low, high = bounds(self.inputs)
+        own = -1 if self.radius_input is None else self.radius_input
+        radius = self.radius if own < 0 else self.inputs[own].low
+        numbers = [radius, own, going.deepest, going.depth_width, *self.rise.numbers()]
+        return np.array(numbers, dtype=np.float64), np.array([low, high, going.widths])
+
+    def compiled(self) -> tuple[Any, ...]:
+        """(numbers, limits, surface, net): what `coefficients_into` takes last, with scratch for one thread."""
+        return (*self._fixed, self.surface.compiled(), self.network.compiled())
+
+    def travelling(self) -> tuple[Any, ...]:
+        """(table, profile, reach, nodes, points): what `field_into` takes last."""
+        if self.dimple is None:
+            return np.zeros((1, 4, 4)), np.zeros((1, 4)), 1.0, np.zeros(0, np.int64), np.zeros((0, 3))
+        nodes = np.flatnonzero(self.dimple.touched)
+        table = self.dimple.table
+        points = np.ascontiguousarray(self.points[nodes])
+        return table, np.zeros(table.shape[:2]), float(self.dimple.reach), nodes, points
+
+    def _checked(self, X: np.ndarray) -> np.ndarray:
+        X = np.ascontiguousarray(X, dtype=np.float64)
+        if X.ndim != 2 or X.shape[1] != len(self.inputs):
+            raise UsageError(
+                f"Inputs of shape {X.shape} came to a field of {len(self.inputs)} inputs.",
+                why=f"They are {', '.join(r.name for r in self.inputs)}.",
+                fix=f"Pass an array of shape (N, {len(self.inputs)}), in SI units.",
+            )
+        return X
+
+    def depth(self, X: np.ndarray) -> np.ndarray:
+        """s (N,) of the rigid probe into the surface at rest, m; negative without contact."""
+        X = self._checked(X)
+        radius = self.radius if self.radius_input is None else X[:, self.radius_input]
+        return self.surface.depth(X[:, :3], radius)
+
+    def coefficients(self, X: np.ndarray) -> np.ndarray:
+        """f b (N, k) at inputs X (N, n), in the field's unit; zero without contact.
+
+        Raises
+        ------
+        UsageError
+            If X has another number of columns; so do all that take X.
+        """
+        ev = self.evaluator(precision="double")
+        out = np.empty((len(self._checked(X)), len(self.modes)))
+        for i, x in enumerate(self._checked(X)):
+            ev(x[:3], x[3:])
+            out[i] = ev.coefficients
+        return out
+
+    def values(self, X: np.ndarray) -> np.ndarray:
+        """The field (N, nodes, components) at inputs X (N, n)."""
+        ev = self.evaluator(precision="double")
+        out = np.empty((len(self._checked(X)), *self.rest.shape))
+        for i, x in enumerate(self._checked(X)):
+            ev(x[:3], x[3:])
+            out[i] = ev.field()
+        return out
+
+    def errors(self, X: np.ndarray, values: np.ndarray) -> FieldErrors:
+        """Errors at solves X (N, n) with the fields (N, nodes, components), split into truncation and learning.
+
+        Raises
+        ------
+        UsageError
+            If shapes disagree.
+        """
+        values = np.asarray(values, float)
+        if values.shape != (len(self._checked(X)), *self.rest.shape):
+            raise UsageError(
+                f"Fields of shape {values.shape} can't be compared.",
+                fix=f"Pass an array of shape {(len(X), *self.rest.shape)}.",
+            )
+        missed = values - self.values(X)
+        learning = np.tensordot(self._along(missed), self.modes, 1)
+        return FieldErrors(
+            sizes_of(missed - learning), sizes_of(learning), sizes_of(missed), self.mass, self.unit
+        )
+
+    def _along(self, values: np.ndarray) -> np.ndarray:
+        """Coefficients (N, k) of fields in the modes."""
+        weighted = (self.modes * self.mass[:, None]).reshape(len(self.modes), -1)
+        return np.asarray(values.reshape(len(values), -1) @ weighted.T)
+
+    def evaluator(self, *, precision: Precision = "single") -> FieldEvaluator:
+        """The allocation-free evaluator of a picture's path."""
+        return FieldEvaluator(self, precision)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the field alone to one file; `TouchedBody` keeps it beside its energy.
+
+        Raises
+        ------
+        UsageError
+            If the file can't be written.
+        """
+        from palpate.surrogates.field.field_file import save_field
+
+        return save_field(path, self)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> FieldSurrogate:
+        """Read a field back.
+
+        Raises
+        ------
+        FileFormatError
+            If the file is missing, corrupt, foreign or from a later version.
+        """
+        from palpate.surrogates.field.field_file import load_field
+
+        return load_field(path)

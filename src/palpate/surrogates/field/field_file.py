@@ -1,0 +1,147 @@
+"""Fields in a file: alone, or beside the energy of the same body; every part is checked when read."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.errors import FileFormatError, UsageError
+from palpate.network import Archive, Network, load_archive, save_archive
+from palpate.surrogates.continuation import Continuation
+from palpate.surrogates.field.dimple import Dimple
+from palpate.surrogates.field.rise import Rise
+from palpate.surrogates.surface import TouchedSurface
+
+if TYPE_CHECKING:
+    from palpate.surrogates.field.field import FieldSurrogate
+
+__all__ = ["KIND", "arrays_of", "described", "field_of", "load_field", "save_field"]
+
+KIND = "field-surrogate"
+_NETWORK, _SURFACE = "coefficients", "surface/"
+_OWN = ("modes", "rest", "points", "triangles", "mass")
+_KEYS = {"name", "unit", "rise", "deepest", "length", "radius", "radius_input", "reach", "widths", "trained"}
+_KEYS |= {"trained_width", "meta"}
+
+
+def save_field(path: str | os.PathLike[str], field: FieldSurrogate) -> Path:
+    """Write a field; the file appears whole or not at all.
+
+    Raises
+    ------
+    UsageError
+        If the folder does not exist or can't be written, or `meta` holds what JSON does not know.
+    """
+    arrays = arrays_of(field) | {_SURFACE + k: v for k, v in field.surface.arrays().items()}
+    return save_archive(path, Archive({_NETWORK: field.network}, arrays, described(field), KIND))
+
+
+def load_field(path: str | os.PathLike[str]) -> FieldSurrogate:
+    """Read a field back, bit for bit.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is missing, corrupt, foreign or from a later version, or its parts do not fit.
+    """
+    archive = load_archive(path, kind=KIND)
+    try:
+        arrays = dict(archive.arrays)
+        taken = {k: arrays.pop(k) for k in list(arrays) if k.startswith(_SURFACE)}
+        surface = TouchedSurface.from_arrays({k.removeprefix(_SURFACE): v for k, v in taken.items()})
+        if archive.networks.keys() != {_NETWORK}:
+            raise ValueError("it has other networks than one")
+        return field_of(archive.networks[_NETWORK], arrays, archive.meta, surface)
+    except (KeyError, TypeError, ValueError, IndexError, OverflowError, UsageError) as error:
+        raise FileFormatError(
+            f"{path} does not describe a field.",
+            why=f"{type(error).__name__}: {error}",
+            fix="Copy the file again, or learn the field anew.",
+        ) from error
+
+
+def arrays_of(field: FieldSurrogate) -> dict[str, np.ndarray]:
+    """Its own arrays, network and surface apart."""
+    arrays = {name: getattr(field, name) for name in _OWN}
+    if field.dimple is not None:
+        arrays |= {"table": field.dimple.table, "touched": field.dimple.touched}
+    return arrays
+
+
+def described(field: FieldSurrogate) -> dict[str, Any]:
+    """All that is no array, for JSON."""
+    going, rise, dimple = field.continuation, field.rise, field.dimple
+    assert going is not None
+    return {
+        "name": field.name,
+        "unit": field.unit,
+        "rise": rise.name,
+        "deepest": rise.deepest,
+        "length": _finite(rise.length),
+        "radius": _finite(field.radius),
+        "radius_input": field.radius_input,
+        "reach": None if dimple is None else dimple.reach,
+        "widths": going.widths.tolist(),
+        "trained": _finite(going.deepest),
+        "trained_width": going.depth_width,
+        "meta": dict(field.meta),
+    }
+
+
+def field_of(
+    network: Network, arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any], surface: TouchedSurface
+) -> FieldSurrogate:
+    """The field whose parts these are.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError, UsageError
+        If they are not those of one.
+    """
+    from palpate.surrogates.field.field import FieldSurrogate
+
+    expected = {*_OWN, *(("table", "touched") if meta.get("reach") is not None else ())}
+    if meta.keys() != _KEYS or arrays.keys() != expected or not isinstance(meta["meta"], dict):
+        raise ValueError("it is not described as one")
+    own = meta["radius_input"]
+    if own is not None and type(own) is not int:
+        raise TypeError(f"its radius is input {own!r}")
+    if not (isinstance(meta["name"], str) and isinstance(meta["unit"], str)):
+        raise TypeError("its name or unit is no text")
+    kinds = {"triangles": np.int64, "touched": np.bool_}
+    for name, array in arrays.items():
+        if array.dtype != kinds.get(name, np.float64):
+            raise TypeError(f"its {name} holds {array.dtype} numbers")
+    dimple = None
+    if meta["reach"] is not None:
+        dimple = Dimple(arrays["table"], _number(meta, "reach"), arrays["touched"])
+    widths = np.array([_number({"width": w}, "width") for w in meta["widths"]])
+    return FieldSurrogate(
+        *(meta["name"], meta["unit"], network, *(arrays[k] for k in _OWN)),
+        rise=Rise(meta["rise"], _number(meta, "deepest"), _number(meta, "length", math.inf)),
+        surface=surface,
+        radius=_number(meta, "radius", math.nan),
+        dimple=dimple,
+        radius_input=own,
+        continuation=Continuation(widths, _number(meta, "trained", math.inf), _number(meta, "trained_width")),
+        meta=meta["meta"],
+    )
+
+
+def _finite(number: float) -> float | None:
+    """What JSON can hold: None for a number that is not finite."""
+    return number if math.isfinite(number) else None
+
+
+def _number(meta: Mapping[str, Any], key: str, missing: float | None = None) -> float:
+    found = meta[key]
+    if found is None and missing is not None:
+        return missing
+    if type(found) not in {int, float} or not math.isfinite(found):
+        raise TypeError(f"its {key} is {found!r:.40}, not a finite number")
+    return float(found)

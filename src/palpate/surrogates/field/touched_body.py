@@ -1,0 +1,115 @@
+"""A body that is felt and seen: the energy of its touch, and fields on its surface, in one file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import FileFormatError, UsageError
+from palpate.network import Archive, load_archive, save_archive
+from palpate.surrogates.field.field import FieldSurrogate
+from palpate.surrogates.field.field_file import arrays_of, described, field_of
+from palpate.surrogates.touch_file import archive_of, surrogate_of
+from palpate.surrogates.touch_surrogate import TouchSurrogate
+
+__all__ = ["TouchedBody"]
+
+KIND = "touched-body"
+
+
+@dataclass(frozen=True, eq=False)
+class TouchedBody:
+    """An energy and the fields that go with it, as one value.
+
+    Attributes
+    ----------
+    touch : TouchSurrogate
+    fields : mapping of name to FieldSurrogate
+        Of the same touched surface and the same inputs.
+
+    Raises
+    ------
+    UsageError
+        If a field is of another surface or other inputs.
+    """
+
+    touch: TouchSurrogate
+    fields: Mapping[str, FieldSurrogate] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "fields", dict(self.fields))
+        own = self.touch.surface.arrays()
+        names = [(r.name, r.unit) for r in self.touch.inputs]
+        for name, one in self.fields.items():
+            theirs = one.surface.arrays()
+            same = one.surface is self.touch.surface or all(
+                np.array_equal(theirs[k], own[k], equal_nan=True) for k in own
+            )
+            if not same or [(r.name, r.unit) for r in one.inputs] != names:
+                raise UsageError(
+                    f"The field {name!r} is not of the body that is touched.",
+                    why="It has another touched surface, or other inputs.",
+                    fix="Learn energy and fields from the same solves, with the same TouchedSurface.",
+                )
+
+    def __str__(self) -> str:
+        return "\n".join([str(self.touch), *(f"  {one}" for one in self.fields.values())])
+
+    __repr__ = __str__
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write all of it to one file; the surface stands there once.
+
+        Raises
+        ------
+        UsageError
+            If the file can't be written.
+        """
+        touch = archive_of(self.touch)
+        networks, arrays = dict(touch.networks), dict(touch.arrays)
+        told: list[dict[str, Any]] = []
+        for i, (name, one) in enumerate(self.fields.items()):
+            networks[f"field-{i}"] = one.network
+            arrays |= {f"field-{i}/{k}": v for k, v in arrays_of(one).items()}
+            told.append({"as": name, "field": described(one)})
+        return save_archive(path, Archive(networks, arrays, {"touch": touch.meta, "fields": told}, KIND))
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> TouchedBody:
+        """Read it back, bit for bit.
+
+        Raises
+        ------
+        FileFormatError
+            If the file is missing, corrupt, foreign or from a later version, or its parts do not fit.
+        """
+        archive = load_archive(path, kind=KIND)
+        try:
+            return cls(*_parts(archive))
+        except (KeyError, TypeError, ValueError, IndexError, OverflowError, UsageError) as error:
+            raise FileFormatError(
+                f"{path} does not describe a touched body.",
+                why=f"{type(error).__name__}: {error}",
+                fix="Copy the file again, or learn the body anew.",
+            ) from error
+
+
+def _parts(archive: Archive) -> tuple[TouchSurrogate, dict[str, FieldSurrogate]]:
+    networks, arrays, told = dict(archive.networks), dict(archive.arrays), archive.meta["fields"]
+    if archive.meta.keys() != {"touch", "fields"} or not isinstance(told, list):
+        raise ValueError("it is not described as one")
+    mine = []
+    for i, one in enumerate(told):
+        begin = f"field-{i}/"
+        own = {k.removeprefix(begin): arrays.pop(k) for k in list(arrays) if k.startswith(begin)}
+        mine.append((str(one["as"]), networks.pop(f"field-{i}"), own, one["field"]))
+    touch = surrogate_of(Archive(networks, arrays, archive.meta["touch"]))
+    fields = {name: field_of(net, own, meta, touch.surface) for name, net, own, meta in mine}
+    if len(fields) != len(told):
+        raise ValueError("two fields have one name")
+    return touch, fields

@@ -231,6 +231,42 @@ def run(
 
 
 @app.command()
+def correct(
+    model: Annotated[Path, typer.Argument(help="A file that a touch surrogate was saved to.")],
+    out: Annotated[Path, typer.Option(help="File to write the corrected surrogate to.")],
+    file: Annotated[Path | None, typer.Option(help="Table of measured positions and forces.")] = None,
+    stdin: Annotated[bool, typer.Option("--stdin", help="Lines of a sensor from standard input.")] = False,
+    port: Annotated[
+        int | None,
+        typer.Option(min=0, max=65535, help="Lines from one connection to 127.0.0.1; 0: any port."),
+    ] = None,
+    parameter: Annotated[
+        list[str] | None, typer.Option(help="NAME=VALUE of a further input of the model.")
+    ] = None,
+    offset: Annotated[
+        float, typer.Option(min=0, help="How far the surface's height may be off, m (one deviation).")
+    ] = 5e-4,
+    constant: Annotated[float, typer.Option(min=0, help="How far ln of the stiffness may be off.")] = 0.5,
+    varying: Annotated[float, typer.Option(min=0, help="The same, of what varies with place.")] = 0.3,
+    noise: Annotated[float, typer.Option(help="Of a measured component, N (one deviation).")] = 0.005,
+    relative: Annotated[float, typer.Option(min=0, help="The same, of the force's size.")] = 0.01,
+    jitter: Annotated[float, typer.Option(min=0, help="Of the measured position, m.")] = 0.0,
+    stall: Annotated[float, typer.Option(min=0.1, help="Seconds of silence that end a stream.")] = 30.0,
+    wait: Annotated[float, typer.Option(min=0.1, help="Seconds that a connection is waited for.")] = 60.0,
+    as_json: Json = False,
+) -> None:
+    """Correct a touch surrogate by forces measured on a specimen; prints the error before and after."""
+    from palpate.cli.correct import Source, correct_model
+    from palpate.learning.correction import Discrepancy, Noise
+
+    source = Source(file, stdin, port, stall, wait)
+    differs = Discrepancy(constant=constant, varying=varying, offset=offset)
+    correct_model(
+        model, source, out, parameter or [], differs, Noise(noise, relative, jitter), Console(as_json)
+    )
+
+
+@app.command()
 def doctor(as_json: Json = False) -> None:
     """Say what this machine can do, and what to do about each miss."""
     from palpate.cli.doctor import report

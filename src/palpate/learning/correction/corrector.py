@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -134,6 +134,11 @@ class Corrector:
         """Height of the specimen's surface over the model's and its standard deviation, m."""
         scale = self._may.offset
         return scale * float(self._belief.mean[-1]), scale * self._belief.spread(-1)
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """The specimen's further inputs (p,)."""
+        return self._parameters
 
     @property
     def expressed(self) -> float:

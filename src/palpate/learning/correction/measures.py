@@ -47,10 +47,17 @@ class ForceError:
 
 
 def force_error(
-    surrogate: TouchSurrogate, X: np.ndarray, force: np.ndarray, along: np.ndarray | None = None
+    answer: TouchSurrogate | tuple[np.ndarray, np.ndarray],
+    X: np.ndarray,
+    force: np.ndarray,
+    along: np.ndarray | None = None,
 ) -> ForceError:
-    """Of a surrogate at inputs X (N, n), with measured forces (N, 3) in N; `along` as in `Corrector.observe`."""
-    predicted, measured = surrogate.force(X), np.array(force)
+    """Of a surrogate, or of forces (N, 3) and depths (N,), at inputs X (N, n), with measured forces (N, 3) in N.
+
+    `along` as in `Corrector.observe`.
+    """
+    predicted, depth = answer if isinstance(answer, tuple) else (answer.force(X), answer.depth(X))
+    measured = np.array(force)
     if along is not None:
         one = along.any(axis=1)
         for F in (predicted, measured):
@@ -58,7 +65,7 @@ def force_error(
     size, missed = np.linalg.norm(measured, axis=1), np.linalg.norm(predicted - measured, axis=1)
     largest = float(size.max(initial=0.0))
     felt = size > FELT * largest
-    touched = (surrogate.depth(X) > 0) | felt
+    touched = (depth > 0) | felt
     if not felt.any():
         return ForceError(int(touched.sum()), _rms(missed), np.nan, np.nan, np.nan)
     ratio = missed[felt] / size[felt]

@@ -53,8 +53,8 @@ class Discrepancy:
     """
 
     constant: float = 0.5
-    varying: float = 0.2
-    length: float = 1.0
+    varying: float = 0.3
+    length: float = 0.7
     offset: float = 5e-4
 
     def __post_init__(self) -> None:

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from palpate.units import bounds
 
 __all__ = ["Noise", "Touches"]
 
+_ARRAYS = ("depth", "normal", "base", "lines", "measured", "whitening")
 _FARTHEST = 30.0  # of a change of ℓ: e³⁰ times the model's force is nobody's specimen
 
 
@@ -135,14 +137,16 @@ class Touches:
 
     def take(self, which: np.ndarray) -> Touches:
         """Some of them, by index or mask."""
-        own = ("depth", "normal", "base", "lines", "measured", "whitening")
-        return replace(self, **{name: getattr(self, name)[which] for name in own})
+        parts: dict[str, Any] = {name: getattr(self, name)[which] for name in _ARRAYS}
+        return replace(self, **parts)
 
     @classmethod
-    def joined(cls, parts: Sequence[Touches]) -> Touches:
+    def joined(cls, touches: Sequence[Touches]) -> Touches:
         """All of them as one."""
-        own = ("depth", "normal", "base", "lines", "measured", "whitening")
-        return replace(parts[0], **{name: np.concatenate([getattr(p, name) for p in parts]) for name in own})
+        parts: dict[str, Any] = {
+            name: np.concatenate([getattr(t, name) for t in touches]) for name in _ARRAYS
+        }
+        return replace(touches[0], **parts)
 
     def forces(self, theta: np.ndarray) -> np.ndarray:
         """F (N, 3), N."""

@@ -28,7 +28,7 @@ def corrected(
     height, sure = may.offset * float(belief.mean[-1]), may.offset * belief.spread(-1)
     root = may.root @ belief.root[:-1]
     if root.shape[1] > root.shape[0]:
-        root = np.linalg.qr(root.T, mode="r").T
+        root = np.linalg.qr(root.T)[1].T
     meta: dict[str, Any] = dict(surrogate.meta)
     meta["correction"] = {"counts": dict(counts), "offset": height, "offset_deviation": sure}
     going = surrogate.continuation

@@ -1,0 +1,138 @@
+"""`palpate correct`: a touch surrogate follows a specimen, from a file, a pipe or a sensor's script."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from palpate.cli.console import Console
+from palpate.dataset.measured import Measured, lines_of, listening, measurements, read_measured
+from palpate.errors import UsageError
+from palpate.learning.correction import Corrected, Corrector, Discrepancy, Noise, correct, judged
+from palpate.surrogates import TouchSurrogate
+from palpate.units import to_si
+
+__all__ = ["Source", "correct_model"]
+
+_OFTEN = 100  # measurements between two lines of progress
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where measurements come from: one of a file, standard input, a port.
+
+    Attributes
+    ----------
+    file : Path, optional
+    stdin : bool
+    port : int, optional
+    stall, wait : float
+        Seconds of silence that end a stream, and that a connection is waited for.
+    """
+
+    file: Path | None
+    stdin: bool
+    port: int | None
+    stall: float
+    wait: float
+
+    def __post_init__(self) -> None:
+        if (self.file is not None) + self.stdin + (self.port is not None) != 1:
+            raise UsageError(
+                "Measurements come from one source.", fix="Give one of --file FILE, --stdin and --port N."
+            )
+
+
+def correct_model(
+    model: Path,
+    source: Source,
+    out: Path,
+    parameters: Sequence[str],
+    discrepancy: Discrepancy,
+    noise: Noise,
+    console: Console,
+) -> None:
+    """Correct a model and write it; errors before and after go to stdout.
+
+    Raises
+    ------
+    UsageError
+        If files or options do not fit, or nothing was learnt.
+    DeviceError
+        If nobody connects to the port.
+    """
+    surrogate = TouchSurrogate.load(model)
+    values = _parameters(surrogate, parameters)
+    if not out.absolute().parent.is_dir():  # before anything is measured
+        raise UsageError(f"There is no folder for {out}.", fix="Choose a folder that exists.")
+    if source.file is not None:
+        done = correct(
+            surrogate, read_measured(source.file), parameters=values, discrepancy=discrepancy, noise=noise
+        )
+    else:
+        corrector = Corrector(surrogate, parameters=values, discrepancy=discrepancy, noise=noise)
+        done = _streamed(corrector, source, console)
+    path = done.surrogate.save(out)
+    if done.warning:
+        console.say(done.warning)
+    console.result(f"{done}\n{path}", {**done.as_dict(), "warning": done.warning or None, "model": str(path)})
+
+
+def _streamed(corrector: Corrector, source: Source, console: Console) -> Corrected:
+    def say(port: int) -> None:
+        # whoever feeds it must know the port, with --json too
+        print(f"listening on 127.0.0.1:{port}", file=sys.stderr, flush=True)  # noqa: T201
+
+    def answer(text: str) -> None:
+        print(text, file=sys.stderr, flush=True)  # noqa: T201
+
+    if source.port is not None:
+        with listening(source.port, source.wait, say) as other:
+            lines = measurements(other.lines(source.stall), other.answer)
+            return _learnt(corrector, lines, console)
+    # a descriptor of its own: at exit Python waits for a thread that still reads sys.stdin
+    stream = open(os.dup(sys.stdin.fileno()), "rb")  # noqa: SIM115 - the thread goes on reading it
+    return _learnt(corrector, measurements(lines_of(stream, source.stall), answer), console)
+
+
+def _learnt(corrector: Corrector, lines: Iterable[Measured], console: Console) -> Corrected:
+    rows = []
+    for i, one in enumerate(lines, 1):
+        corrector.observe(one.position[0], one.force[0], along=one.along[0])
+        rows.append(one)
+        if i % _OFTEN == 0:
+            console.say(str(corrector))
+    if not rows:
+        raise UsageError(
+            "No measurement came.",
+            why="The stream ended, or was silent for too long, before the first good line.",
+            fix="Greet with units first, such as: palpate 1 length=mm force=N time=s",
+        )
+    fields = ("position", "force", "along", "depth", "time")
+    record = Measured(*(np.concatenate([getattr(r, name) for r in rows]) for name in fields))
+    return judged(corrector, record)
+
+
+def _parameters(surrogate: TouchSurrogate, words: Sequence[str]) -> list[float]:
+    """Values of the further inputs, in their order, from NAME=VALUE in SI units or with a unit."""
+    said = dict(word.partition("=")[::2] for word in words)
+    names = [r.name for r in surrogate.parameters]
+    if set(said) != set(names) or len(said) != len(words):
+        raise UsageError(
+            f"The model's further inputs are: {', '.join(names) or 'none'}.",
+            why="A specimen is one member of the family that the model is of.",
+            fix="Give each of them once: --parameter NAME=VALUE." if names else "Leave --parameter out.",
+        )
+    return [_value(said[r.name], r.unit) for r in surrogate.parameters]
+
+
+def _value(text: str, unit: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return to_si(text, unit)

@@ -1,0 +1,158 @@
+"""A whole record of measurements at once, and what it brought."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palpate.dataset.measured import Measured
+from palpate.errors import UsageError
+from palpate.learning.correction.corrector import Corrector
+from palpate.learning.correction.measures import ForceError, force_error
+from palpate.learning.correction.placing import placed
+from palpate.surrogates import TouchSurrogate
+
+__all__ = ["Corrected", "correct", "judged"]
+
+_FOLDS = 5
+_FEWEST = 10  # touches that are enough to leave some of them out
+_STRANGE = 0.3  # of the touches: as many outliers are no outliers
+
+
+@dataclass(frozen=True, eq=False)
+class Corrected:
+    """A corrected surrogate, and errors of the measured forces.
+
+    Attributes
+    ----------
+    surrogate : TouchSurrogate
+    before, after : ForceError
+        Of the model and of the corrected surrogate on all measurements that were not outliers of both.
+    left_out : ForceError, optional
+        Of measurements that the correction did not know: a fifth of them at a time.
+    counts : mapping
+        Of the verdicts.
+    offset : (float, float)
+        Height of the specimen's surface over the model's and its standard deviation, m.
+    """
+
+    surrogate: TouchSurrogate
+    before: ForceError
+    after: ForceError
+    left_out: ForceError | None
+    counts: Mapping[str, int]
+    offset: tuple[float, float]
+
+    @property
+    def warning(self) -> str:
+        """What is suspicious, in words; "" if nothing is."""
+        out, learnt = self.counts.get("outlier", 0), self.counts.get("learnt", 0)
+        if out > _STRANGE * (out + learnt):
+            return (
+                f"{out} of {out + learnt} touches are outliers: units, frame or probe may be others than the "
+                "model's, or the specimen differs by more than the discrepancy allows."
+            )
+        return ""
+
+    def __str__(self) -> str:
+        said = ", ".join(f"{n} {verdict}" for verdict, n in self.counts.items() if n)
+        lines = [
+            f"measured  {said}",
+            f"before    {self.before}",
+            f"after     {self.after}",
+        ]
+        if self.left_out is not None:
+            lines.append(f"left out  {self.left_out}")
+        height, sure = self.offset
+        return "\n".join([*lines, f"surface   {1e3 * height:+.3f} ± {1e3 * sure:.3f} mm over the model's"])
+
+    def as_dict(self) -> dict[str, Any]:
+        """The figures, by name."""
+        return {
+            "counts": dict(self.counts),
+            "before": self.before.as_dict(),
+            "after": self.after.as_dict(),
+            "left_out": None if self.left_out is None else self.left_out.as_dict(),
+            "offset": {"value": self.offset[0], "deviation": self.offset[1]},
+        }
+
+
+def correct(
+    surrogate: TouchSurrogate, measured: Measured, *, parameters: Sequence[float] = (), **options: Any
+) -> Corrected:
+    """Correct a surrogate by a record of one specimen.
+
+    Parameters
+    ----------
+    surrogate : TouchSurrogate
+    measured : Measured
+    parameters : sequence of p numbers
+        The specimen's further inputs.
+    **options
+        Of `Corrector`.
+
+    Raises
+    ------
+    UsageError
+        If nothing of the record teaches anything, or options do not fit.
+    """
+    options["parameters"] = parameters
+    own = surrogate.radius_input
+    radius = surrogate.radius if own is None else float(parameters[own - 3])
+    measured = placed(measured, surrogate.surface, radius)
+    corrector = Corrector(surrogate, **options)
+    _observed(corrector, measured, np.arange(len(measured)))
+    return judged(corrector, measured, left_out=_left_out(surrogate, measured, options))
+
+
+def judged(corrector: Corrector, measured: Measured, left_out: ForceError | None = None) -> Corrected:
+    """What a corrector has made of measurements.
+
+    Raises
+    ------
+    UsageError
+        If it has learnt nothing.
+    """
+    after = corrector.surrogate
+    counts = {verdict: n for verdict, n in corrector.counts.items() if n}
+    if not counts.get("learnt"):
+        said = ", ".join(f"{n} {verdict}" for verdict, n in counts.items()) or "none came"
+        raise UsageError(
+            f"No measurement taught anything: {said}.",
+            why="Touches teach where the probe is in contact, in the trained ranges and no deeper than trained.",
+            fix="Check the frame, the units, the probe's radius and the surface's height.",
+        )
+    X = _inputs(corrector.model, measured, corrector.parameters)
+    usable = np.isfinite(X).all(axis=1) & np.isfinite(measured.force).all(axis=1)
+    X, force, along = X[usable], measured.force[usable], measured.along[usable]
+    before = force_error(corrector.model, X, force, along)
+    return Corrected(after, before, force_error(after, X, force, along), left_out, counts, corrector.offset)
+
+
+def _left_out(surrogate: TouchSurrogate, measured: Measured, options: Mapping[str, Any]) -> ForceError | None:
+    """Errors of every fifth measurement by a correction from the others."""
+    if len(measured) < _FEWEST:
+        return None
+    turn, force = np.arange(len(measured)) % _FOLDS, measured.force
+    X = _inputs(surrogate, measured, np.array(options["parameters"], dtype=float))
+    predicted = np.empty_like(force)
+    depth = np.empty(len(force))
+    for fold in range(_FOLDS):
+        corrector = Corrector(surrogate, **options)
+        _observed(corrector, measured, np.flatnonzero(turn != fold))
+        found, out = corrector.surrogate, turn == fold
+        predicted[out], depth[out] = found.force(X[out]), found.depth(X[out])
+    return force_error((predicted, depth), X, force, measured.along)
+
+
+def _observed(corrector: Corrector, measured: Measured, which: np.ndarray) -> None:
+    for i in which:
+        corrector.observe(measured.position[i], measured.force[i], along=measured.along[i])
+
+
+def _inputs(surrogate: TouchSurrogate, measured: Measured, parameters: np.ndarray) -> np.ndarray:
+    further = np.broadcast_to(parameters, (len(measured), len(surrogate.parameters)))
+    return np.hstack([measured.position, further])

@@ -16,9 +16,10 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from palpate.validation.dispatch import validate
     from palpate.validation.limits import Check, Limits
     from palpate.validation.report import Chapter, write_report
-    from palpate.validation.result import Validation, validate
+    from palpate.validation.result import Validation
 
 __all__ = ["Chapter", "Check", "Limits", "Validation", "validate", "write_report"]
 
@@ -28,7 +29,7 @@ _HOMES = {
     "Chapter": "report",
     "write_report": "report",
     "Validation": "result",
-    "validate": "result",
+    "validate": "dispatch",
 }
 
 

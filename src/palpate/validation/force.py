@@ -1,7 +1,8 @@
-"""Errors of the force that a hand feels, through the evaluator that the 1 kHz loop uses."""
+"""Errors of the force that a hand feels."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,25 +10,34 @@ import numpy as np
 from palpate.dataset import Dataset
 from palpate.learning.touch import hand_coordinates
 from palpate.surrogates import TouchModel
-from palpate.validation.limits import FORCE_JND
+from palpate.units import Range
+from palpate.validation.limits import force_jnd
 from palpate.validation.region import Worst
 
-__all__ = ["ForceErrors", "ForceSamples", "force_errors", "force_samples"]
+__all__ = [
+    "ForceErrors",
+    "ForceSamples",
+    "angles",
+    "force_errors",
+    "force_samples",
+    "hand_positions",
+    "quantile",
+]
 
 
 @dataclass(frozen=True, eq=False)
 class ForceSamples:
-    """Forces on the hand, asked for where each finite-element solve puts the hand.
+    """Forces on the hand or probe, asked for where each finite-element solve has it.
 
     Attributes
     ----------
     hand : (N, k)
-        Coordinates of the hand along the touched loads: the held node's displacement plus the stretch of the
-        virtual coupling, m.
+        Where it is, m: the centre of a probe; or coordinates along the touched loads, the held node's displacement
+        plus the stretch of the virtual coupling.
     truth, answer : (N, 3)
-        Force of the finite-element solve and of the touch model, N.
+        Force of the finite-element solve and of the model, N.
     inside : (N,) bool
-        Whether the model called the hand inside its trained range.
+        Whether the model called the place inside its trained range.
     """
 
     hand: np.ndarray
@@ -49,6 +59,22 @@ class ForceSamples:
     def light(self) -> float:
         """f₀ = min(0.5 N, 5 % of the largest ‖F‖): below it relative errors say little."""
         return float(min(0.5, 0.05 * self.size.max()))
+
+    @property
+    def heavy(self) -> np.ndarray:
+        """Which touches are stronger than that (N,)."""
+        return np.asarray(self.size > self.light)
+
+    @property
+    def relative(self) -> np.ndarray:
+        """‖ΔF‖/‖F‖ (N,); not-a-number without force, infinite where there should be none."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(self.error / self.size)
+
+    @property
+    def jnd(self) -> np.ndarray:
+        """The same in just noticeable differences of a force of that size."""
+        return np.asarray(self.relative / force_jnd(self.size))
 
 
 @dataclass(frozen=True)
@@ -114,52 +140,60 @@ def hand_positions(touch: TouchModel, hand: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(hand @ np.linalg.pinv(touch.directions).T)
 
 
-def force_errors(touch: TouchModel, test: Dataset, samples: ForceSamples) -> ForceErrors:
-    """Judge forces; see `ForceErrors`."""
-    size, error, light = samples.size, samples.error, samples.light
-    heavy = size > light
-    relative = error[heavy] / size[heavy]
-    small = error[~heavy] / light
-    angles = _angles(samples.truth[heavy], samples.answer[heavy]) if len(touch.touched) > 1 else np.empty(0)
-    median, p95 = _quantile(relative, 0.5), _quantile(relative, 0.95)
-    largest = _quantile(relative, 1.0)
+def force_errors(
+    samples: ForceSamples, X: np.ndarray, ranges: Sequence[Range], *, units: int, turning: bool = True
+) -> ForceErrors:
+    """Judge forces; see `ForceErrors`.
+
+    Parameters
+    ----------
+    samples : ForceSamples
+    X : (N, n)
+        Inputs of the solves.
+    ranges : n ranges
+    units : int
+        Of the network.
+    turning : bool
+        Whether the force can point in more than one direction.
+    """
+    heavy = samples.heavy
+    relative, jnd = samples.relative[heavy], samples.jnd[heavy]
+    small = samples.error[~heavy] / samples.light if samples.light > 0 else samples.error[~heavy]
+    turned = angles(samples.truth[heavy], samples.answer[heavy]) if turning else np.empty(0)
     return ForceErrors(
-        units=touch.networks["force"].units,
-        largest=float(size.max()),
-        light=light,
+        units=units,
+        largest=float(samples.size.max()),
+        light=samples.light,
         outside=int((~samples.inside).sum()),
         count=int(heavy.sum()),
         light_count=int((~heavy).sum()),
-        median=median,
-        p95=p95,
-        max=largest,
-        median_jnd=_jnd(median),
-        p95_jnd=_jnd(p95),
-        max_jnd=_jnd(largest),
-        light_p95=_quantile(small, 0.95),
-        direction_p95=_quantile(angles, 0.95),
-        worst=_worst(relative, test, heavy),
-        light_worst=_worst(small, test, ~heavy),
-        direction_worst=_worst(angles, test, heavy),
+        median=quantile(relative, 0.5),
+        p95=quantile(relative, 0.95),
+        max=quantile(relative, 1.0),
+        median_jnd=quantile(jnd, 0.5),
+        p95_jnd=quantile(jnd, 0.95),
+        max_jnd=quantile(jnd, 1.0),
+        light_p95=quantile(small, 0.95),
+        direction_p95=quantile(turned, 0.95),
+        worst=_worst(relative, X[heavy], ranges),
+        light_worst=_worst(small, X[~heavy], ranges),
+        direction_worst=_worst(turned, X[heavy], ranges),
     )
 
 
-def _jnd(relative: float | None) -> float | None:
-    return None if relative is None else relative / FORCE_JND
-
-
-def _quantile(values: np.ndarray, q: float) -> float | None:
+def quantile(values: np.ndarray, q: float) -> float | None:
+    """A quantile; None of nothing."""
     return float(np.quantile(values, q)) if values.size else None
 
 
-def _worst(values: np.ndarray, test: Dataset, rows: np.ndarray) -> Worst | None:
+def _worst(values: np.ndarray, X: np.ndarray, ranges: Sequence[Range]) -> Worst | None:
     if not values.size:
         return None
     i = int(np.argmax(values))
-    return Worst.of(values[i], test.X[rows][i], test.ranges)
+    return Worst.of(values[i], X[i], ranges)
 
 
-def _angles(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def angles(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Angles between vectors (N, 3) in degrees, accurate near zero too (Kahan 2006)."""
     u = a / np.linalg.norm(a, axis=1, keepdims=True)
     length = np.linalg.norm(b, axis=1, keepdims=True)

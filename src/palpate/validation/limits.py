@@ -1,4 +1,4 @@
-"""What is asked of a touch model, and why: thresholds from what a hand and an eye can tell apart.
+"""What is asked of a model, and why: thresholds from what a hand and an eye can tell apart.
 
 Just noticeable differences: force about 7 % from 2.5 to 10 N and 10 to 15 % below 1 N (Jones 1989; Pang, Tan &
 Durlach 1991), stiffness 8 to 23 % (Jones & Hunter 1990; Tan, Durlach, Beauregard & Srinivasan 1995), direction
@@ -13,15 +13,44 @@ import math
 from dataclasses import dataclass, fields
 from typing import Literal
 
+import numpy as np
+
 from palpate.errors import UsageError
 
-__all__ = ["CRITERIA", "FORCE_JND", "Check", "Criterion", "Grade", "Limits"]
+__all__ = [
+    "CRITERIA",
+    "FAINT",
+    "FAINT_JND",
+    "FORCE_JND",
+    "Bound",
+    "Check",
+    "Criterion",
+    "Grade",
+    "Limits",
+    "force_jnd",
+]
 
 FORCE_JND = 0.07
 """Just noticeable relative difference of a force (Jones 1989; Pang, Tan & Durlach 1991)."""
 
+FAINT, FAINT_JND = 1.0, 0.10
+"""Below so many newtons a difference is noticed from 10 to 15 % on (the same sources); the stricter end is taken."""
+
 Grade = Literal["good", "pass", "fail"]
 Kind = Literal["scale", "metres", "share", "degrees", "times"]
+Bound = float | tuple[float, float]
+"""The largest figure that passes, or the smallest and the largest."""
+
+
+def force_jnd(size: np.ndarray) -> np.ndarray:
+    """Just noticeable relative difference of forces of these sizes (N,), N."""
+    return np.where(np.asarray(size) < FAINT, FAINT_JND, FORCE_JND)
+
+
+def _within(value: float, bound: Bound) -> bool:
+    """Whether a figure keeps a bound; not-a-number never does."""
+    low, high = bound if isinstance(bound, tuple) else (-math.inf, bound)
+    return bool(low <= value <= high)
 
 
 @dataclass(frozen=True)
@@ -50,11 +79,19 @@ class Limits:
         Angle between the forces in degrees, where ‖F‖ > f₀.
     loop_work : float
         Largest net work around closed paths, over the energy given on the way.
+    border_loop_work : float
+        The same around paths that cross the border of the trained region.
+    smoothness : float
+        Largest second difference of the force along strokes over that of a reference.
+    interval_coverage : (float, float)
+        Smallest and largest share of the errors that the 90 % interval holds.
+    refined_force_median, refined_force_p95 : float
+        ‖ΔF‖/‖F‖ against solves on a refined mesh: the model's error and the mesh's together.
 
     Raises
     ------
     UsageError
-        If a limit is not positive.
+        If a limit is not positive, or a smallest figure not below the largest.
     """
 
     rmse: float | None = 1e-3
@@ -69,15 +106,30 @@ class Limits:
     stiffness_p95: float | None = 0.15
     direction_p95: float | None = 10.0
     loop_work: float | None = 0.01
+    border_loop_work: float | None = 0.01
+    smoothness: float | None = 3.0
+    interval_coverage: tuple[float, float] | None = (0.80, 0.97)
+    refined_force_median: float | None = 0.035
+    refined_force_p95: float | None = 0.07
 
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if value is not None and not (value > 0 and math.isfinite(value)):
+            if isinstance(value, tuple):
+                _refuse_band(field.name, value)
+            elif value is not None and not (value > 0 and math.isfinite(value)):
                 raise UsageError(
                     f"The limit {field.name} is {value}; it must be a positive number.",
                     fix="Give a positive limit, or none to ask nothing.",
                 )
+
+
+def _refuse_band(name: str, band: tuple[float, ...]) -> None:
+    if not (len(band) == 2 and all(map(math.isfinite, band)) and 0 <= band[0] < band[1]):
+        raise UsageError(
+            f"The limit {name} is {band}; it must be a smallest and a largest figure, in that order.",
+            fix="Give two numbers, or none to ask nothing.",
+        )
 
 
 @dataclass(frozen=True)
@@ -91,8 +143,8 @@ class Criterion:
     label : str
     kind : "scale", "metres", "share", "degrees" or "times"
         How its figures are written.
-    good : float or None
-        A figure better than which nothing is gained; None where there is no such thing.
+    good : float, (float, float) or None
+        A figure better than which nothing is gained, or between which; None where there is no such thing.
     source : str
         Where the threshold comes from.
     fix : str
@@ -102,7 +154,7 @@ class Criterion:
     key: str
     label: str
     kind: Kind
-    good: float | None
+    good: Bound | None
     source: str
     fix: str
 
@@ -115,20 +167,25 @@ class Check:
     ----------
     criterion : Criterion
     measured : float
-    limit : float
+    limit : float or (float, float)
     where : str
         The worst case in words; empty where there is none to name.
     """
 
     criterion: Criterion
     measured: float
-    limit: float
+    limit: Bound
     where: str = ""
 
     @property
     def passed(self) -> bool:
         """Whether the figure is within its limit; not-a-number never is."""
-        return bool(self.measured <= self.limit)
+        return _within(self.measured, self.limit)
+
+    @property
+    def most(self) -> float:
+        """The largest figure that passes."""
+        return self.limit[1] if isinstance(self.limit, tuple) else self.limit
 
     @property
     def grade(self) -> Grade:
@@ -136,7 +193,7 @@ class Check:
         if not self.passed:
             return "fail"
         good = self.criterion.good
-        return "good" if good is not None and self.measured <= good else "pass"
+        return "good" if good is not None and _within(self.measured, good) else "pass"
 
     def __str__(self) -> str:
         """What was measured, what was asked, where the worst case is, what to do."""
@@ -161,6 +218,9 @@ _FILTER = (
     "there, with smaller values."
 )
 _TARGET = "the study's own target"
+_MESH = "Refine the mesh where the probe touches, or sweep more solves: the two errors stand apart below the table."
+_ROUGH = "palpate's own: at 0.1 m/s and 1 kHz, three times the roughness of the body itself"
+_COVER = "calibration: an interval should hold what it says (Gneiting, Balabdaoui & Raftery 2007)"
 _EYE = "palpate's own: about a pixel where a body of 1 m fills a screen"
 
 CRITERIA = (
@@ -223,6 +283,43 @@ CRITERIA = (
         1e-9,
         "passivity: a body at rest gives nothing away (Colgate & Schenkel 1997)",
         "The force is not the gradient of an energy: sweep more loads (`samples` in [sweep]), or touch one load only.",
+    ),
+    Criterion(
+        "border_loop_work",
+        "Work around paths across the trained border, largest",
+        "share",
+        1e-9,
+        "passivity: a body at rest gives nothing away (Colgate & Schenkel 1997)",
+        "Beyond its training the force is not the gradient of an energy: continue the energy there, and never scale "
+        "the force itself.",
+    ),
+    Criterion(
+        "smoothness",
+        "Second difference of the force along strokes, against the reference",
+        "times",
+        1.5,
+        _ROUGH,
+        "The force ripples: learn from more solves, or with fewer or wider units.",
+    ),
+    Criterion(
+        "interval_coverage",
+        "Share of errors within the 90 % interval",
+        "share",
+        (0.85, 0.95),
+        _COVER,
+        "The model is surer of itself than it may be, or less: learn again, or calibrate its deviation by solves "
+        "that were left out.",
+    ),
+    Criterion(
+        "refined_force_median", "Force error and mesh error together, median", "share", 0.01, _FORCE, _MESH
+    ),
+    Criterion(
+        "refined_force_p95",
+        "Force error and mesh error together, 95th percentile",
+        "share",
+        0.035,
+        _FORCE,
+        _MESH,
     ),
 )
 """Everything that is judged, in the order in which it is told."""

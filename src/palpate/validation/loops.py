@@ -8,12 +8,17 @@ import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.surrogates import TouchEvaluator, TouchModel
+from palpate.units import bounds
 from palpate.validation.force import hand_positions
+from palpate.validation.quadrature import work_of_polygons
+from palpate.validation.solves import TouchFunction, TouchSolves
 
-__all__ = ["LoopWork", "loop_work", "work_around"]
+__all__ = ["LoopWork", "function_work", "loop_work", "work_around"]
 
 LOOPS = 100
 PANELS, ORDER = 6, 8  # panels per edge; Gauss–Legendre points per panel
+BEYOND = 0.3  # of each range of position: how far the loops that cross the border go beyond it
+GRAZING = 1e-6  # of the median energy: loops below hardly touch
 
 
 @dataclass(frozen=True)
@@ -27,6 +32,8 @@ class LoopWork:
         |∮F·dx| / ½∮|F·dx|.
     energy : float
         Median energy ½∮|F·dx| of a loop, J.
+    open : float
+        Largest share of that energy that the quadrature left open.
     """
 
     loops: int
@@ -34,6 +41,7 @@ class LoopWork:
     p95: float
     max: float
     energy: float
+    open: float = 0.0
 
 
 def loop_work(
@@ -100,6 +108,67 @@ def work_around(
             power = w * float(evaluate.force @ (b - a))
             net, energy = net + power, energy + abs(power) / 2
     return net, energy
+
+
+def function_work(
+    model: TouchFunction, test: TouchSolves, *, border: bool = False, loops: int = LOOPS, seed: int = 0
+) -> LoopWork | str:
+    """Work around random triangles to pentagons of a function of the probe's centre, by converged quadrature.
+
+    Parameters
+    ----------
+    model : TouchFunction
+    test : TouchSolves
+        Corners are where its solves are.
+    border : bool
+        Corners instead at random in a box 30 % beyond the ranges, some trained and some not.
+    loops, seed : int
+
+    Returns
+    -------
+    LoopWork, or the reason why there is none
+    """
+    rng = np.random.default_rng(seed)
+    drawn = (_across(model, test, rng) if border else _between(test, rng) for _ in range(50 * loops))
+    corners = []
+    for polygon in drawn:
+        touching = int(model.force(polygon).any(axis=1).sum())
+        if touching >= 2 and (not border or 0 < int(model.within(polygon).sum()) < len(polygon)):
+            corners.append(polygon)
+        if len(corners) == loops:
+            break
+    name = "paths across the trained border" if border else "closed paths"
+    if len(corners) < 10:
+        return f"Work around {name} is not judged: too few loops touch the body."
+    work = work_of_polygons(model.force, corners)
+    rows = work.energy > GRAZING * np.median(work.energy)
+    net, energy = np.abs(work.net[rows]), work.energy[rows]
+    ratio = net / energy
+    return LoopWork(
+        len(ratio),
+        float(np.median(ratio)),
+        float(np.quantile(ratio, 0.95)),
+        float(ratio.max()),
+        float(np.median(energy)),
+        float((work.open[rows] / energy).max()),
+    )
+
+
+def _between(test: TouchSolves, rng: np.random.Generator) -> np.ndarray:
+    """A polygon between places of solves; the further inputs are those of the first."""
+    rows = rng.choice(len(test), min(len(test), int(rng.integers(3, 6))), replace=False)
+    polygon = test.X[rows].copy()
+    polygon[:, 3:] = polygon[0, 3:]
+    return polygon
+
+
+def _across(model: TouchFunction, test: TouchSolves, rng: np.random.Generator) -> np.ndarray:
+    """A polygon in the box of the ranges made larger; the further inputs are those of some solve."""
+    low, high = bounds(model.inputs)
+    more = BEYOND * (high - low)
+    polygon = rng.uniform(low - more, high + more, (int(rng.integers(3, 6)), len(low)))
+    polygon[:, 3:] = test.X[int(rng.integers(len(test))), 3:]
+    return polygon
 
 
 def _rule(panels: int) -> tuple[np.ndarray, np.ndarray]:

@@ -1,17 +1,15 @@
-"""`validate`: a touch model against unseen solves, and the value that says how it did."""
+"""A touch model against unseen solves, and the value that says how it did."""
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from palpate.dataset import Dataset
-from palpate.errors import AccuracyError, UsageError
+from palpate.errors import UsageError
 from palpate.learning import History
 from palpate.learning.touch import node_outputs
 from palpate.surrogates import TouchModel
@@ -20,28 +18,27 @@ from palpate.units import bounds
 from palpate.validation.field import FieldErrors, field_errors
 from palpate.validation.force import ForceErrors, force_errors, force_samples
 from palpate.validation.judge import checks, figures
-from palpate.validation.limits import Check, Limits
+from palpate.validation.judgement import Judgement
+from palpate.validation.limits import Limits
 from palpate.validation.loops import LoopWork, loop_work
 from palpate.validation.outputs import OutputErrors, output_errors
 from palpate.validation.stiffness import StiffnessErrors, stiffness_errors
-from palpate.validation.words import count, length, plain, scientific, share, shown
+from palpate.validation.words import count, length, plain, scientific, share
 
-__all__ = ["Validation", "node_truth", "validate", "worse_than_filter"]
+__all__ = ["Validation", "node_truth", "validate_model", "worse_than_filter"]
 
 NETWORKS = {"refined": "nodes", "filter": "filter"}
 """Networks for the nodes' displacements: what they are called here and in a `TouchModel`."""
 
 
 @dataclass(frozen=True)
-class Validation:
+class Validation(Judgement):
     """How a touch model did on solves that it has never seen.
 
     Attributes
     ----------
-    name : str
-        Of the model.
-    samples : int
-        Unseen solves.
+    name, samples, checks, notes
+        See `Judgement`.
     networks : mapping of str to OutputErrors
         ``refined`` and, if the model holds it, ``filter``.
     field : FieldErrors
@@ -50,97 +47,21 @@ class Validation:
     loops : LoopWork or None
     relapse : float or None
         Largest ratio of the filter's held-out error to its best so far.
-    checks : tuple of Check
-        What was judged.
-    notes : tuple of str
-        What was not judged, and why.
     """
 
-    name: str
-    samples: int
     networks: Mapping[str, OutputErrors]
     field: FieldErrors
     force: ForceErrors
     stiffness: StiffnessErrors | None
     loops: LoopWork | None
     relapse: float | None
-    checks: tuple[Check, ...]
-    notes: tuple[str, ...]
 
-    @property
-    def passed(self) -> bool:
-        """Whether every limit is kept."""
-        return not self.failures
-
-    @property
-    def failures(self) -> tuple[Check, ...]:
-        """The checks that failed."""
-        return tuple(c for c in self.checks if not c.passed)
-
-    def raise_if_failed(self) -> None:
-        """Do nothing if every limit is kept.
-
-        Raises
-        ------
-        AccuracyError
-            What was measured, what was asked and where the worst case is, for every limit missed.
-        """
-        if self.passed:
-            return
-        count = f"{len(self.failures)} of {len(self.checks)} limits"
-        raise AccuracyError(
-            f"{self.name} misses {count} on {self.samples} solves that it has never seen.",
-            why="\n".join(_without_fix(c) for c in self.failures),
-            fix=" ".join(dict.fromkeys(c.criterion.fix for c in self.failures)),
-        )
-
-    def as_dict(self) -> dict[str, Any]:
-        """Everything as plain data for a JSON file; figures that are not finite become null."""
-        judged = [
-            {
-                "name": c.criterion.key,
-                "measured": c.measured,
-                "limit": c.limit,
-                "good": c.criterion.good,
-                "grade": c.grade,
-                "passed": c.passed,
-                "where": c.where,
-            }
-            for c in self.checks
-        ]
-        data = {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.name != "checks"}
-        plain: dict[str, Any] = _plain({"passed": self.passed, **data, "checks": judged})
-        return plain
-
-    def __str__(self) -> str:
-        rows = [("", "measured", "asked", "good", "")]
-        for c in self.checks:
-            kind, good = c.criterion.kind, c.criterion.good
-            rows.append(
-                (
-                    c.criterion.label,
-                    shown(c.measured, kind),
-                    shown(c.limit, kind),
-                    "" if good is None else shown(good, kind),
-                    c.grade.upper() if c.grade == "fail" else c.grade,
-                )
-            )
-        widths = [max(len(r[i]) for r in rows) for i in range(5)]
-        table = [
-            "  " + "  ".join(cell.ljust(w) for cell, w in zip(r, widths, strict=True)).rstrip() for r in rows
-        ]
-        verdict = (
-            "every limit kept" if self.passed else f"{len(self.failures)} of {len(self.checks)} limits missed"
-        )
-        lines = [
-            f"{self.name} on {self.samples} unseen solves: {verdict}",
-            *table,
-            *map(_line, self.networks.items()),
-        ]
-        return "\n".join(lines + [f"  {note}" for note in self.notes])
+    def details(self) -> list[str]:
+        """One line per network."""
+        return list(map(_line, self.networks.items()))
 
 
-def validate(
+def validate_model(
     touch: TouchModel, test: Dataset, *, history: History | None = None, limits: Limits | None = None
 ) -> Validation:
     """Judge a touch model by solves that it has never seen.
@@ -172,7 +93,9 @@ def validate(
         if key in touch.networks
     }
     forces = force_samples(touch, test)
-    field, force = field_errors(touch, test), force_errors(touch, test, forces)
+    field = field_errors(touch, test)
+    units, turning = touch.networks["force"].units, len(touch.touched) > 1
+    force = force_errors(forces, test.X, test.ranges, units=units, turning=turning)
     stiffness, loops = stiffness_errors(touch, test, forces.hand), loop_work(touch, test, forces.hand)
     relapse = history.relapse if history is not None and math.isfinite(history.relapse) else None
     notes = [text for text in (stiffness, loops) if isinstance(text, str)]
@@ -186,7 +109,16 @@ def validate(
     work = None if isinstance(loops, str) else loops
     judged = checks(figures(networks, field, force, curve, work, relapse), limits or Limits())
     return Validation(
-        touch.name, len(test), networks, field, force, curve, work, relapse, judged, tuple(notes)
+        name=touch.name,
+        samples=len(test),
+        checks=judged,
+        notes=tuple(notes),
+        networks=networks,
+        field=field,
+        force=force,
+        stiffness=curve,
+        loops=work,
+        relapse=relapse,
     )
 
 
@@ -261,24 +193,7 @@ def _line(named: tuple[str, OutputErrors]) -> str:
     """One network in a line."""
     label, e = named
     text = (
-        f"  {label}: {count(e.units, 'unit')}, RMSE {length(e.rmse)} ({scientific(e.relative)} of full scale)"
+        f"{label}: {count(e.units, 'unit')}, RMSE {length(e.rmse)} ({scientific(e.relative)} of full scale)"
     )
     text += f", largest {length(e.max)}"
     return text if e.outer_ratio is None else f"{text}, ends of the range {plain(e.outer_ratio)} × the rest"
-
-
-def _without_fix(check: Check) -> str:
-    return str(check).removesuffix(check.criterion.fix).rstrip()
-
-
-def _plain(value: Any) -> Any:
-    """Dataclasses, arrays and mappings as JSON-able data."""
-    if dataclasses.is_dataclass(value):
-        return {f.name: _plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
-    if isinstance(value, Mapping):
-        return {str(k): _plain(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
-    if isinstance(value, float):
-        return float(value) if math.isfinite(value) else None
-    return value

@@ -1,28 +1,31 @@
-"""∂F/∂x that the hand feels against the slope of the finite-element load–deflection curve."""
+"""∂F/∂x that the hand feels against that of finite elements: their own matrix, or the slope of a curve of loads."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.surrogates import TouchModel
+from palpate.units import Range
 from palpate.validation.region import Worst
 
-__all__ = ["StiffnessErrors", "curve_slope", "stiffness_errors"]
+__all__ = ["StiffnessErrors", "curve_slope", "matrix_errors", "stiffness_errors"]
 
 METHOD = (
     "the Jacobian of the force network against the slope of a cubic spline through the finite-element loads and "
     "deflections of the test set"
 )
+MATRIX = "the gradient of the force against that of the finite elements, in Frobenius' norm"
 COARSE = 0.02
 """Largest disagreement of the slopes from all points and from every other one: a quarter of the "good" limit."""
 
 
 @dataclass(frozen=True)
 class StiffnessErrors:
-    """|ΔK|/K of the slope of the force: median, 95th percentile, where it is largest, and how it was found."""
+    """‖ΔK‖/‖K‖ of the slope of the force: median, 95th percentile, where it is largest, and how it was found."""
 
     median: float
     p95: float
@@ -55,6 +58,28 @@ def stiffness_errors(touch: TouchModel, test: Dataset, hand: np.ndarray) -> Stif
     i = int(np.argmax(error))
     worst = Worst.of(error[i], test.X[rows[i]], test.ranges)
     return StiffnessErrors(float(np.median(error)), float(np.quantile(error, 0.95)), worst)
+
+
+def matrix_errors(
+    truth: np.ndarray, answer: np.ndarray, X: np.ndarray, ranges: Sequence[Range]
+) -> StiffnessErrors | str:
+    """Errors of ∂F/∂c in Frobenius' norm, or the reason why there are none.
+
+    Parameters
+    ----------
+    truth, answer : (N, 3, 3)
+        ∂F/∂c, N/m; rows whose truth is zero (no contact) or unknown are left out.
+    X : (N, n)
+    ranges : n ranges
+    """
+    size = np.linalg.norm(truth, axis=(1, 2))
+    rows = np.isfinite(size) & (size > 0)
+    if not rows.any():
+        return "Stiffness is not judged: the solves do not know theirs."
+    error = np.linalg.norm(answer[rows] - truth[rows], axis=(1, 2)) / size[rows]
+    i = int(np.argmax(error))
+    worst = Worst.of(error[i], X[rows][i], ranges)
+    return StiffnessErrors(float(np.median(error)), float(np.quantile(error, 0.95)), worst, MATRIX)
 
 
 def curve_slope(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:

@@ -92,8 +92,10 @@ def duration(seconds: float) -> str:
     return f"{plain(seconds)} s" if seconds >= 1 else f"{plain(1e3 * seconds)} ms"
 
 
-def shown(value: float, kind: str) -> str:
-    """A figure of one of the kinds of `palpate.validation.limits.Criterion`."""
+def shown(value: float | tuple[float, float], kind: str) -> str:
+    """A figure, or the two ends of a band, of one of the kinds of `palpate.validation.limits.Criterion`."""
+    if isinstance(value, tuple):
+        return " … ".join(shown(end, kind) for end in value)
     if kind == "scale":
         return scientific(value)
     if kind == "metres":

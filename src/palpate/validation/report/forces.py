@@ -9,8 +9,9 @@ import numpy as np
 from palpate.dataset import Dataset
 from palpate.surrogates import TouchModel
 from palpate.validation.force import ForceSamples, hand_positions
-from palpate.validation.limits import FORCE_JND
+from palpate.validation.limits import FAINT, FAINT_JND, FORCE_JND
 from palpate.validation.report.style import BLUE, INK, ORANGE, SERIES, figure, logarithmic
+from palpate.validation.words import share
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,14 +40,13 @@ def plot_force_errors(samples: ForceSamples) -> Figure:
     """Share of the unseen solves whose force error is at most so many just noticeable differences."""
     fig, axes = figure(1, 1, size=(4.6, 3.4))
     axis = axes[0, 0]
-    heavy = samples.size > samples.light
-    relative = samples.error[heavy] / samples.size[heavy] / FORCE_JND
+    relative = samples.jnd[samples.heavy]
     shown = np.sort(np.maximum(relative[np.isfinite(relative)], 1e-9))  # zero has no place on this axis
-    share = 100 * np.arange(1, shown.size + 1) / max(relative.size, 1)
+    held = 100 * np.arange(1, shown.size + 1) / max(relative.size, 1)
     low = min(0.1, 10 ** np.floor(np.log10(shown[0]))) if shown.size else 1e-3
     high = max(10.0, 3 * float(shown[-1])) if shown.size else 10.0
     logarithmic(axis, "x", low, high)
-    axis.step(shown, share, where="post", color=BLUE)
+    axis.step(shown, held, where="post", color=BLUE)
     axis.set_ylim(0, 104)
     axis.axvspan(1.0, high, color=ORANGE, alpha=0.16, linewidth=0)
     axis.axvline(1.0, color=ORANGE, linewidth=1.2)
@@ -60,7 +60,9 @@ def plot_force_errors(samples: ForceSamples) -> Figure:
         va="center",
         fontsize=8.5,
     )
-    axis.set_xlabel("force error / just noticeable differences (1 JND = 7 %)")
+    faint = np.any(samples.size[samples.heavy] < FAINT)
+    one = f"{share(FORCE_JND)}, below 1 N {share(FAINT_JND)}" if faint else share(FORCE_JND)
+    axis.set_xlabel(f"force error / just noticeable differences (1 JND = {one})")
     axis.set_ylabel("unseen solves / %")
     return fig
 

@@ -53,7 +53,7 @@ def _shapes(chapter: Chapter, key: str) -> Picture:
 def _errors(chapter: Chapter, key: str) -> Picture:
     v = chapter.validation
     refined, own = v.networks["refined"], v.networks.get("filter")
-    limit = next((c.limit * refined.full_scale for c in v.checks if c.criterion.key == "rmse"), None)
+    limit = next((c.most * refined.full_scale for c in v.checks if c.criterion.key == "rmse"), None)
     text = f"Refinement (network “nodes”) leaves at most {length(refined.max)} ({refined.worst})."
     if own:
         text = (

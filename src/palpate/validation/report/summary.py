@@ -107,7 +107,7 @@ def _shortfall(v: Validation) -> str:
     if missed is not None:
         text += (
             f" The refined network misses its target: {scientific(missed.measured)} of full scale measured, "
-            f"{scientific(missed.limit)} asked."
+            f"{scientific(missed.most)} asked."
         )
     return text
 

@@ -1,7 +1,8 @@
 """Lines from a pipe or from one TCP connection of this machine; a silent or broken stream ends.
 
 Lines are read in a thread of their own, so that silence can be noticed wherever they come from. A line that is too
-long is cut at its limit and the rest of it dropped: what is left of it is malformed, and answered as such.
+long is cut at its limit and the rest of it dropped: what is left of it is malformed, and answered as such. A last line
+without its end is dropped.
 """
 
 from __future__ import annotations
@@ -43,9 +44,12 @@ def _read(stream: BinaryIO, found: queue.Queue[bytes | None]) -> None:
     inside = False  # of a line that was too long
     with contextlib.suppress(OSError, ValueError):  # closed from the other side, or from this one
         while line := stream.readline(LONGEST):
+            ended = line.endswith(b"\n")
+            if not ended and len(line) < LONGEST:
+                break  # cut off on its way: what stands there may be half a number
             if not inside:
                 found.put(line)
-            inside = not line.endswith(b"\n")
+            inside = not ended
     found.put(None)
 
 

@@ -19,6 +19,7 @@ __all__ = ["Corrected", "correct", "judged"]
 
 _FOLDS = 5
 _FEWEST = 10  # touches that are enough to leave some of them out
+_SURPRISE = 5.0  # one in 1.7 million of a Gaussian's numbers is as far
 _STRANGE = 0.3  # of the touches: as many outliers are no outliers
 
 
@@ -37,6 +38,8 @@ class Corrected:
         Of the verdicts.
     offset : (float, float)
         Height of the specimen's surface over the model's and its standard deviation, m.
+    surprise : float
+        Largest change, in standard deviations of the discrepancy.
     """
 
     surrogate: TouchSurrogate
@@ -45,6 +48,7 @@ class Corrected:
     left_out: ForceError | None
     counts: Mapping[str, int]
     offset: tuple[float, float]
+    surprise: float
 
     @property
     def warning(self) -> str:
@@ -54,6 +58,11 @@ class Corrected:
             return (
                 f"{out} of {out + learnt} touches are outliers: units, frame or probe may be others than the "
                 "model's, or the specimen differs by more than the discrepancy allows."
+            )
+        if self.surprise > _SURPRISE:
+            return (
+                f"The specimen differs by {self.surprise:.0f} standard deviations of what was expected: units, frame "
+                "or probe may be others than the model's, or the discrepancy is larger."
             )
         return ""
 
@@ -76,6 +85,7 @@ class Corrected:
             "before": self.before.as_dict(),
             "after": self.after.as_dict(),
             "left_out": None if self.left_out is None else self.left_out.as_dict(),
+            "surprise": self.surprise,
             "offset": {"value": self.offset[0], "deviation": self.offset[1]},
         }
 
@@ -128,8 +138,11 @@ def judged(corrector: Corrector, measured: Measured, left_out: ForceError | None
     X = _inputs(corrector.model, measured, corrector.parameters)
     usable = np.isfinite(X).all(axis=1) & np.isfinite(measured.force).all(axis=1)
     X, force, along = X[usable], measured.force[usable], measured.along[usable]
+    surprise = float(np.abs(corrector.belief.mean).max())
     before = force_error(corrector.model, X, force, along)
-    return Corrected(after, before, force_error(after, X, force, along), left_out, counts, corrector.offset)
+    return Corrected(
+        after, before, force_error(after, X, force, along), left_out, counts, corrector.offset, surprise
+    )
 
 
 def _left_out(surrogate: TouchSurrogate, measured: Measured, options: Mapping[str, Any]) -> ForceError | None:

@@ -29,7 +29,7 @@ __all__ = ["Corrector", "Event", "Verdict"]
 Verdict = Literal["learnt", "no contact", "outside", "outlier", "not finite"]
 _FREE = 4.0  # deviations of the surface's height: farther above it nothing is to be learnt
 _BEYOND = 0.25  # of the width over which ℓ is followed beyond a range
-_ROUNDS = 4  # of looking again which touches are outliers
+_ROUNDS = 6  # of looking again which touches are outliers
 
 
 @dataclass(frozen=True)
@@ -188,18 +188,31 @@ class Corrector:
         """Take all touches of the window again, with rows where θ now is; does nothing with forgetting."""
         if not self._seen or self._memory is not None:
             return
-        everything, learnt = Touches.joined(self._seen), np.array(self._learnt)
+        everything = Touches.joined(self._seen)
         with threadpool_limits(1), np.errstate(over="ignore", invalid="ignore"):
+            learnt = self._in_doubt(everything)
             for _ in range(_ROUNDS):
                 self._belief = self._anchor.learnt(everything.take(learnt))
-                far = self._distances(everything, learnt) > self.gate
-                if (far != learnt).all():
+                near = self._distances(everything, learnt) <= self.gate
+                if (near == learnt).all():
                     break
-                learnt = ~far
+                learnt = near
         change = int(learnt.sum()) - sum(self._learnt)
         self.counts["learnt"] += change
         self.counts["outlier"] -= change
         self._learnt = learnt.tolist()
+
+    def _in_doubt(self, touches: Touches) -> np.ndarray:
+        """Which touches (N,) are no outliers, judged from all of them with less weight for the far ones (Huber 1964).
+
+        So the choice does not depend on which came first.
+        """
+        weights = np.ones(len(touches))
+        for _ in range(_ROUNDS):
+            self._belief = self._anchor.learnt(touches.weighted(weights))
+            far = np.linalg.norm(touches.residuals(self._belief.mean), axis=1)
+            weights = np.minimum(1.0, self.gate / np.maximum(far, 1e-12))
+        return np.asarray(weights == 1.0)
 
     def _event(self, c: np.ndarray, F: np.ndarray, along: np.ndarray) -> Event:
         nothing = np.full(3, math.nan)
@@ -209,14 +222,15 @@ class Corrector:
         touch = Touches.of(self.model, self._may, X, F[None], along[None], self.noise)
         with np.errstate(over="ignore", invalid="ignore"):
             predicted = touch.forces(self._belief.mean)[0]
-            if self._outside(X[0], touch.depth[0]):
+            height, sure = self.offset
+            free = touch.depth[0] + height <= -_FREE * sure
+            if not free and self._outside(X[0], touch.depth[0]):
                 return Event("outside", predicted)
             distance = float(self._distances(touch, np.zeros(1, bool))[0])
             if not distance <= self.gate:
                 self._keep(touch, learnt=False)
                 return Event("outlier", predicted, distance)
-            height, sure = self.offset
-            if touch.depth[0] + height <= -_FREE * sure:
+            if free:
                 return Event("no contact", predicted, distance)
             self._belief = self._belief.learnt(touch)
             if self._memory is not None:

@@ -140,6 +140,10 @@ class Touches:
         parts: dict[str, Any] = {name: getattr(self, name)[which] for name in _ARRAYS}
         return replace(self, **parts)
 
+    def weighted(self, weights: np.ndarray) -> Touches:
+        """The same, each counting as `weights` (N,) touches."""
+        return replace(self, whitening=np.sqrt(weights)[:, None, None] * self.whitening)
+
     @classmethod
     def joined(cls, touches: Sequence[Touches]) -> Touches:
         """All of them as one."""

@@ -1,0 +1,163 @@
+"""`palpate correct` on files, on a real pipe and on a real connection."""
+
+from __future__ import annotations
+
+import json
+import re
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from palpate.dataset.measured import write_measured
+from palpate.learning.correction import force_error
+from palpate.surrogates import TouchSurrogate
+
+sys.path.append(str(Path(__file__).parents[1] / "learning" / "correction"))
+from correction_made import MODULUS, model, scaled, touches
+
+HELLO = "palpate 1 length=mm force=mN time=ms\n"
+FACTOR = 1.4
+
+
+@pytest.fixture
+def folder(tmp_path):
+    model().save(tmp_path / "model.touch")
+    return tmp_path
+
+
+def measured(count=40, seed=0):
+    X = touches(count, seed, shallowest=0.001)
+    return X, scaled(model(), FACTOR).force(X)
+
+
+def lines(X, F):
+    rows = np.column_stack([np.arange(len(X)), 1e3 * X, 1e3 * F]).tolist()
+    return "".join(" ".join(map(repr, row)) + "\n" for row in rows)
+
+
+def follows(path):
+    X, F = measured(100, 9)
+    return force_error(TouchSurrogate.load(path), X, F).median < 0.02
+
+
+def started(folder, *words):
+    command = [sys.executable, "-m", "palpate", "correct", "model.touch", "--out", "new.touch", *words]
+    pipe = subprocess.PIPE
+    return subprocess.Popen(command, cwd=folder, stdin=pipe, stdout=pipe, stderr=pipe, text=True)
+
+
+def test_a_file_corrects_a_model(palpate, folder):
+    X, F = measured()
+    write_measured(folder / "specimen.csv", X, F)
+    answer = palpate(
+        "correct", folder / "model.touch", "--file", folder / "specimen.csv", "--out", folder / "new.touch"
+    )
+    assert answer.code == 0
+    assert follows(folder / "new.touch")
+    before = re.search(r"before .* ([\d.]+) % median", answer.out)[1]
+    after = re.search(r"after .* ([\d.]+) % median", answer.out)[1]
+    assert float(before) == pytest.approx(100 * (1 - 1 / FACTOR), abs=1.0)
+    assert float(after) < 2
+    said = palpate(
+        "correct",
+        folder / "model.touch",
+        "--file",
+        folder / "specimen.csv",
+        "--out",
+        folder / "new.touch",
+        "--json",
+    )
+    content = json.loads(said.out)
+    assert content["counts"]["learnt"] == 40
+    assert content["left_out"]["median"] < 0.03
+
+
+def test_standard_input_of_a_real_process(folder):
+    X, F = measured()
+    with started(folder, "--stdin") as process:
+        out, err = process.communicate(
+            HELLO + lines(X[:20], F[:20]) + "oops\n" + lines(X[20:], F[20:]), timeout=60
+        )
+    assert process.returncode == 0, err
+    assert "ok t x y z fx fy fz" in err
+    assert "error line 22: 1 values stand where 7 belong." in err
+    assert "40 learnt" in out
+    assert follows(folder / "new.touch")
+
+
+def test_a_pipe_that_falls_silent_ends_and_what_came_is_kept(folder):
+    X, F = measured()
+    with started(folder, "--stdin", "--stall", "1.5") as process:
+        process.stdin.write(HELLO + lines(X, F))
+        process.stdin.flush()
+        assert process.wait(timeout=60) == 0  # its input is still open
+        assert "40 learnt" in process.stdout.read()
+        assert "Fatal" not in process.stderr.read()
+    assert follows(folder / "new.touch")
+
+
+def test_a_connection_to_a_real_process(folder):
+    X, F = measured()
+    with started(folder, "--port", "0", "--json") as process:
+        port = int(re.search(r"127\.0\.0\.1:(\d+)", process.stderr.readline())[1])
+        with (
+            socket.create_connection(("127.0.0.1", port), timeout=10) as sensor,
+            sensor.makefile("rw") as talk,
+        ):
+            talk.write(HELLO + lines(X[:30], F[:30]) + "1 2 3\n")
+            talk.flush()
+            assert talk.readline().startswith("ok")
+            assert talk.readline().startswith("error line 32:")
+            talk.write(lines(X[30:], F[30:]) + "end\n")
+            talk.flush()
+            assert talk.readline() == ""
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == 0, err
+    assert json.loads(out)["counts"] == {"learnt": 40}
+    assert follows(folder / "new.touch")
+
+
+def test_a_family_takes_its_parameters_with_units(palpate, tmp_path):
+    S = model(extra=[MODULUS])
+    S.save(tmp_path / "family.touch")
+    X = touches(30, 5, extra=[MODULUS])
+    X[:, 3] = 9e3
+    write_measured(tmp_path / "specimen.csv", X[:, :3], scaled(S, 1.3).force(X))
+    words = (
+        "correct",
+        tmp_path / "family.touch",
+        "--file",
+        tmp_path / "specimen.csv",
+        "--out",
+        tmp_path / "new",
+    )
+    assert palpate(*words, "--parameter", "modulus=9 kPa").code == 0
+    for wrong in ((), ("--parameter", "modulus=9 m"), ("--parameter", "height=1")):
+        answer = palpate(*words, *wrong)
+        assert answer.code == 2
+        assert "modulus" in answer.err or "quantity" in answer.err
+
+
+def test_what_can_not_be_is_refused_with_its_reason(palpate, folder):
+    model_, out = folder / "model.touch", folder / "new.touch"
+    (folder / "bad.csv").write_text("x [mm],y [mm],z [mm],Fz [N]\n1,2,3,four\n")
+    for words, said in (
+        ((), "one source"),
+        (("--stdin", "--port", "0"), "one source"),
+        (("--file", folder / "none.csv"), "can't be read"),
+        (("--file", folder / "bad.csv"), "line 2: Column 4 (fz) holds 'four'"),
+        (("--file", folder / "bad.csv", "--noise", "0"), "no noise of a force sensor"),
+    ):
+        answer = palpate("correct", model_, "--out", out, *words)
+        assert answer.code == 2
+        assert said in answer.err
+        assert not out.exists()
+    answer = palpate("correct", model_, "--file", folder / "bad.csv", "--out", folder / "no" / "new.touch")
+    assert (answer.code, "no folder" in answer.err) == (2, True)
+    assert palpate("correct", folder / "bad.csv", "--stdin", "--out", out).code == 2
+    silent = palpate("correct", model_, "--port", "0", "--wait", "0.1", "--out", out)
+    assert (silent.code, "Nobody connected" in silent.err) == (3, True)

@@ -1,0 +1,131 @@
+"""Tables of measured indentation: what they mean, and what is said of those that mean nothing."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from palpate.dataset.measured import read_measured, write_measured
+from palpate.errors import FileFormatError, UsageError
+
+ROWS = "0.0,50,40,59.5,1,-2,13\n10,50,40,59,1,-2,26\n"
+
+
+def table(folder, text, side=None):
+    path = folder / "specimen.csv"
+    path.write_text(text, encoding="utf-8")
+    if side is not None:
+        (folder / "specimen.json").write_text(side if isinstance(side, str) else json.dumps(side))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("text", "side"),
+    [
+        ("# made by hand\n\nt,x,y,z,Fx,Fy,Fz\nms,mm,mm,mm,mN,mN,mN\n" + ROWS, None),
+        ("t [ms], x [mm], Y [mm], z [mm], Fx [mN], Fy [mN], fz [mN]\n" + ROWS, None),
+        ("t;x;y;z;Fx;Fy;Fz\nms;mm;mm;mm;mN;mN;mN\n" + ROWS.replace(",", ";"), None),
+        ("\ufefft\tx\ty\tz\tFx\tFy\tFz\r\n" + ROWS.replace(",", "\t"), "side"),
+    ],
+)
+def test_units_stand_in_a_row_in_the_header_or_beside(tmp_path, text, side):
+    units = {"t": "ms", **dict.fromkeys(("x", "y", "z"), "mm"), **dict.fromkeys(("Fx", "Fy", "Fz"), "mN")}
+    found = read_measured(table(tmp_path, text, side and {"units": units}))
+    np.testing.assert_allclose(found.position, [[0.05, 0.04, 0.0595], [0.05, 0.04, 0.059]], rtol=1e-15)
+    np.testing.assert_allclose(found.force, [[0.001, -0.002, 0.013], [0.001, -0.002, 0.026]], rtol=1e-15)
+    np.testing.assert_allclose(found.time, [0.0, 0.01])
+    assert not found.along.any()
+    assert not found.pressed
+
+
+def test_a_gram_force_is_a_gram_in_standard_gravity(tmp_path):
+    found = read_measured(table(tmp_path, "x [cm],y [um],z [m],Fz [gf]\n1,2,3,100\n"))
+    np.testing.assert_allclose(found.position, [[0.01, 2e-6, 3.0]])
+    np.testing.assert_allclose(found.force, [[0.0, 0.0, 0.980665]])
+    np.testing.assert_array_equal(found.along, [[0.0, 0.0, 1.0]])
+
+
+def test_depths_at_a_place(tmp_path):
+    side = {"place": [0.05, 0.05, 0.05], "direction": [0, 3, -4]}
+    found = read_measured(table(tmp_path, "depth [mm],F [N]\n1,0.5\n2,1.5\n", side))
+    assert found.pressed
+    np.testing.assert_allclose(found.depth, [0.001, 0.002])
+    np.testing.assert_allclose(found.along, np.tile([0.0, -0.6, 0.8], (2, 1)))
+    np.testing.assert_allclose(found.force, [[0.0, -0.3, 0.4], [0.0, -0.9, 1.2]])
+    own = read_measured(table(tmp_path, "x [mm],y [mm],z [mm],depth [mm],F [N]\n1,2,3,1,0.5\n", {}))
+    np.testing.assert_allclose(own.position, [[0.001, 0.002, 0.003]])
+    np.testing.assert_array_equal(own.along, [[0.0, 0.0, 1.0]])
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "holds no table"),
+        ("# nothing\n", "holds no table"),
+        ("x,y,z,Fz\nm,m,m,N\n", "no measurement"),
+        ("x [m],y [m],z [m],Fz [N]\n1,2,3,4\n\n1,2,oops,4\n", "line 4: Column 3 (z) holds 'oops'"),
+        ("x [m],y [m],z [m],Fz [N]\n1,2,3,nan\n", "line 2: Column 4 (fz) holds 'nan'"),
+        ("x [m],y [m],z [m],Fz [N]\n1,2,3,1_0\n", "line 2: Column 4 (fz) holds '1_0'"),
+        ("x [m],y [m],z [m],Fz [N]\n1,2,3\n", "line 2: 3 values stand where 4 belong"),
+        ("x [m],y [m],z [m],Fz [N]\n1,2,3,1e999\n", "line 2: Column 4"),
+        ("x [m],y [m],z [m],Fz [lbf]\n1,2,3,4\n", "line 1: 'lbf' is no unit of force"),
+        ("x [m],y [m],z [N],Fz [N]\n1,2,3,4\n", "line 1: 'N' is no unit of length"),
+        ("x [m],y [m],z,Fz [N]\n1,2,3,4\n", "line 1: Column 3, 'z', has no unit"),
+        ("x,y,z,Fz\n1,2,3,4\n", "line 1: Column 1, 'x', has no unit"),
+        ("x,y,z,Fz\nm,m,m\n1,2,3,4\n", "line 1: The row of units has 3 cells"),
+        ("x [m],y [m],y [m],Fz [N]\n1,2,3,4\n", "line 1: Column 3 is called 'y', as another"),
+        ("x [m],y [m],w [m],Fz [N]\n1,2,3,4\n", "line 1: Column 3 is called 'w'"),
+        ("x [m],y [m],z [m],Fx [N],Fz [N]\n1,2,3,4,5\n", "make no measurement"),
+        ("x [m],y [m],Fz [N]\n1,2,3\n", "make no measurement"),
+        ("depth [mm],F [N]\n1,2\n", "make no measurement"),
+    ],
+)
+def test_what_is_wrong_is_named_with_file_line_and_column(tmp_path, text, said):
+    path = table(tmp_path, text)
+    with pytest.raises(FileFormatError) as error:
+        read_measured(path)
+    assert said in error.value.what + error.value.why
+    assert "specimen.csv" in error.value.what
+    assert error.value.fix
+
+
+@pytest.mark.parametrize(
+    "side",
+    [
+        "{",
+        [],
+        {"unit": {}},
+        {"units": {"x": 1}},
+        {"units": {"q": "m"}},
+        {"place": [1, 2]},
+        {"place": [1, 2, None]},
+        {"direction": [0, 0, 0]},
+    ],
+)
+def test_a_sidecar_that_says_nothing_is_refused_by_name(tmp_path, side):
+    with pytest.raises(FileFormatError, match=r"specimen\.json"):
+        read_measured(table(tmp_path, "depth [mm],F [N]\n1,2\n", side))
+
+
+def test_units_in_two_places_are_refused(tmp_path):
+    with pytest.raises(FileFormatError, match="header and in the sidecar"):
+        read_measured(table(tmp_path, "x [m],y [m],z [m],Fz [N]\n1,2,3,4\n", {"units": {"x": "mm"}}))
+
+
+def test_a_missing_file_and_one_of_bytes_are_refused(tmp_path):
+    with pytest.raises(FileFormatError, match="can't be read"):
+        read_measured(tmp_path / "none.csv")
+    (tmp_path / "bytes.csv").write_bytes(b"\xff\xfe\x00\x01")
+    with pytest.raises(FileFormatError, match="can't be read"):
+        read_measured(tmp_path / "bytes.csv")
+
+
+def test_what_is_written_is_read_back_bit_for_bit(tmp_path):
+    position, force = np.random.default_rng(0).normal(size=(2, 50, 3)) * [[[1e-2]], [[3.0]]]
+    found = read_measured(write_measured(tmp_path / "made.csv", position, force))
+    np.testing.assert_array_equal(found.position, position)
+    np.testing.assert_array_equal(found.force, force)
+    with pytest.raises(UsageError):
+        write_measured(tmp_path / "no" / "made.csv", position, force)

@@ -162,18 +162,36 @@ def learn(study: StudyFile = STUDY, as_json: Json = False) -> None:
 
 @app.command()
 def validate(
-    study: StudyFile = STUDY,
+    study: Annotated[Path, typer.Argument(help="A study file, or a touch surrogate.")] = STUDY,
+    test: Annotated[
+        Path | None, typer.Option(help="Unseen solves of a surrogate's body, by default NAME-test.zarr.")
+    ] = None,
+    refined: Annotated[
+        Path | None, typer.Option(help="The same on a finer mesh, which tell the mesh's own error.")
+    ] = None,
     report: Annotated[bool, typer.Option("--report/--no-report", help="Write the HTML report.")] = True,
     as_json: Json = False,
 ) -> None:
-    """Judge the learnt model on loads it has never seen; exit code 1 where it misses the study's target."""
+    """Judge what was learnt on solves it has never seen; exit code 1 where it misses a limit."""
+    from palpate.cli.surrogate import is_archive, validate_file
+
+    if is_archive(study):
+        validate_file(study, test, refined, report, Console(as_json))
+        return
+    if test is not None or refined is not None:
+        raise UsageError(
+            "A study file says by itself what it is tested with.", fix="Leave out --test and --refined."
+        )
+    _validate_study(study, report, Console(as_json))
+
+
+def _validate_study(study: Path, report: bool, console: Console) -> None:
     from palpate.learning import History
     from palpate.study import read_study
     from palpate.study.pipeline import Outcome, report_study, validate_study
     from palpate.study.rows import check_model
     from palpate.surrogates import TouchModel
 
-    console = Console(as_json)
     record = read_study(study)
     paths = _paths(study, record.name)
     train, test = _datasets(record, paths)

@@ -52,9 +52,9 @@ def work_of_polygons(
         return _rule(force, begin[edge], end[edge], low, width)
 
     value, size = rule(edge, low, width)
-    scale = np.bincount(loop[edge], size, len(corners))
     net, energy, left = (np.zeros(len(corners)) for _ in range(3))
     for _ in range(LEVELS):
+        scale = energy + np.bincount(loop[edge], size, len(corners))
         halves = (np.repeat(edge, 2), _halves(low, width), np.repeat(width / 2, 2))
         fine, fine_size = rule(*halves)
         apart = np.abs(fine.reshape(-1, 2).sum(axis=1) - value)

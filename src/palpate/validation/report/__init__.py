@@ -4,11 +4,13 @@ chapter   what the page tells of one body         write    the page itself
 summary   the plain words on top                  tables   rows of its tables
 style     how figures look                        svg      a figure as part of a page
 shapes, errors, growth, forces   the figures
+surrogates/   the same of a touched body
 """
 
 from __future__ import annotations
 
 from palpate.validation.report.chapter import Chapter
+from palpate.validation.report.surrogates import SurrogateChapter
 from palpate.validation.report.write import write_report
 
-__all__ = ["Chapter", "write_report"]
+__all__ = ["Chapter", "SurrogateChapter", "write_report"]

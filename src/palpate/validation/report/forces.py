@@ -61,8 +61,8 @@ def plot_force_errors(samples: ForceSamples) -> Figure:
         fontsize=8.5,
     )
     faint = np.any(samples.size[samples.heavy] < FAINT)
-    one = f"{share(FORCE_JND)}, below 1 N {share(FAINT_JND)}" if faint else share(FORCE_JND)
-    axis.set_xlabel(f"force error / just noticeable differences (1 JND = {one})")
+    one = f"{share(FORCE_JND)}; {share(FAINT_JND)} below 1 N" if faint else f"1 JND = {share(FORCE_JND)}"
+    axis.set_xlabel(f"force error / just noticeable differences ({one})")
     axis.set_ylabel("unseen solves / %")
     return fig
 

@@ -20,7 +20,7 @@ from palpate.validation.words import count, length, plain, scientific, share
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["pictures"]
+__all__ = ["picture", "pictures"]
 
 
 def pictures(chapter: Chapter, key: str) -> list[Picture]:
@@ -29,7 +29,8 @@ def pictures(chapter: Chapter, key: str) -> list[Picture]:
     return [*made, _outer(chapter, key)]
 
 
-def _picture(key: str, title: str, alt: str, caption: str, draw: Callable[[], Figure]) -> Picture:
+def picture(key: str, title: str, alt: str, caption: str, draw: Callable[[], Figure]) -> Picture:
+    """Draw one figure; `alt` is what it shows for who cannot see it."""
     with styled(key):
         return Picture(key, title, alt, caption, inline_svg(draw(), key, alt))
 
@@ -38,7 +39,7 @@ def _shapes(chapter: Chapter, key: str) -> Picture:
     data, field = chapter.test.ok, chapter.validation.field
     _, colour = colour_of_load(data)
     alike = f"Left and right differ by {length(field.mean)} on average and {length(field.max)} at most."
-    return _picture(
+    return picture(
         f"{key}-shapes",
         "Deflected shapes",
         f"Two panels with the deflected shapes of {chapter.name} under {count(len(data), 'load')}: finite elements on "
@@ -64,7 +65,7 @@ def _errors(chapter: Chapter, key: str) -> Picture:
         if len(v.networks["refined"].worst.inputs) == 1
         else ""
     )
-    return _picture(
+    return picture(
         f"{key}-errors",
         "Error at each node against load",
         f"Error at each node of {chapter.name} against load, on a logarithmic axis. {text}",
@@ -76,7 +77,7 @@ def _errors(chapter: Chapter, key: str) -> Picture:
 def _growth(chapter: Chapter, key: str) -> Picture:
     h = chapter.history
     text = _grown(h) + _compared(chapter.rivals)
-    return _picture(
+    return picture(
         f"{key}-growth",
         "Growth and pruning while learning",
         f"Units of the sequential filter over observations of {chapter.name}, with the error beside them. {text}",
@@ -118,7 +119,7 @@ def _force(chapter: Chapter, key: str) -> list[Picture]:
     felt = "No touch was strong enough to judge in relative terms."
     if force.p95 is not None and force.max is not None:
         felt = f"95 of 100 forces are within {share(force.p95)}, all within {share(force.max)}; a person notices 7 %."
-    first = _picture(
+    first = picture(
         f"{key}-force",
         "Force on the hand",
         f"Force on the hand {what}, for {chapter.name}, up to {plain(force.largest, 3)} N.",
@@ -126,7 +127,7 @@ def _force(chapter: Chapter, key: str) -> list[Picture]:
         f"{_signs(chapter)}",
         lambda: plot_force(chapter.touch, data, samples),
     )
-    second = _picture(
+    second = picture(
         f"{key}-felt",
         "Force error as a hand feels it",
         f"Share of unseen solves of {chapter.name} against force error in just noticeable differences. {felt}",
@@ -158,7 +159,7 @@ def _outer(chapter: Chapter, key: str) -> Picture:
         place = "with any load in the outer 5 % of its range"
     lie = f"{v.networks['refined'].outer_count} of {v.samples} unseen solves lie {place}."
     text = f"{lie} RMSE there: {', '.join(parts) or 'not known'}."
-    return _picture(
+    return picture(
         f"{key}-outer",
         "Ends of the range against the rest",
         f"Errors of {chapter.name} at the ends of the range beside the rest. {text}",

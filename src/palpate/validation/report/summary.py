@@ -9,7 +9,7 @@ from palpate.validation.report.chapter import Chapter
 from palpate.validation.result import Validation, worse_than_filter
 from palpate.validation.words import count, length, plain, scientific, share
 
-__all__ = ["Fact", "Story", "story"]
+__all__ = ["Fact", "Story", "felt", "story"]
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def _facts(chapter: Chapter) -> tuple[Fact, ...]:
     ]
     if v.force.p95 is not None and v.force.p95_jnd is not None:
         facts.append(
-            Fact(share(v.force.p95), f"force error at most, for 95 of 100 loads: {_felt(v.force.p95_jnd)}")
+            Fact(share(v.force.p95), f"force error at most, for 95 of 100 loads: {felt(v.force.p95_jnd)}")
         )
     return tuple(facts)
 
@@ -119,7 +119,7 @@ def _good(v: Validation) -> str:
         return f"{seen} No touch in the test was strong enough to judge its force in relative terms."
     text = (
         f"{seen} The force that a hand feels is off by {share(force.median)} at the median and by at most "
-        f"{share(force.p95)} for 95 of 100 loads: {_felt(force.p95_jnd)}."
+        f"{share(force.p95)} for 95 of 100 loads: {felt(force.p95_jnd)}."
     )
     if force.direction_p95 is not None:
         text += f" Its direction is within {plain(force.direction_p95)}° for 95 of 100; a person notices 25° to 35°."
@@ -131,7 +131,7 @@ def _good(v: Validation) -> str:
     return text
 
 
-def _felt(jnd: float) -> str:
+def felt(jnd: float) -> str:
     """An error in just noticeable differences, in words."""
     if jnd >= 1:
         return f"{plain(jnd)} times what a person notices"

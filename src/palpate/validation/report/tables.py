@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from palpate.validation.judgement import Judgement
 from palpate.validation.limits import CRITERIA
-from palpate.validation.report.chapter import Chapter
 from palpate.validation.result import Validation
 from palpate.validation.words import duration, length, scientific, shown
 
@@ -28,7 +28,7 @@ class Judged:
     where: str
 
 
-def judged_rows(validation: Validation) -> list[Judged]:
+def judged_rows(validation: Judgement) -> list[Judged]:
     """Every check as text."""
     return [
         Judged(
@@ -57,11 +57,11 @@ def node_rows(validation: Validation) -> tuple[list[str], list[list[str]]]:
     return head, rows
 
 
-def timing_rows(chapter: Chapter) -> list[list[str]]:
+def timing_rows(timings: Mapping[str, float]) -> list[list[str]]:
     """Stages and how long they took, with the sum."""
-    rows = [[str(stage), duration(float(seconds))] for stage, seconds in chapter.timings.items()]
+    rows = [[str(stage), duration(float(seconds))] for stage, seconds in timings.items()]
     if len(rows) > 1:
-        rows.append(["together", duration(float(sum(chapter.timings.values())))])
+        rows.append(["together", duration(float(sum(timings.values())))])
     return rows
 
 
@@ -77,7 +77,7 @@ def flat(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str
             yield name, _text(value)
 
 
-def sources(validations: list[Validation]) -> list[tuple[str, str]]:
+def sources(validations: Sequence[Judgement]) -> list[tuple[str, str]]:
     """What was judged anywhere, and where its threshold comes from."""
     keys = {c.criterion.key for v in validations for c in v.checks}
     return [(c.label, c.source) for c in CRITERIA if c.key in keys]

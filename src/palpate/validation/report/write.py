@@ -14,6 +14,8 @@ from palpate.validation.report.chapter import Chapter
 from palpate.validation.report.networks import network_rows
 from palpate.validation.report.pictures import pictures
 from palpate.validation.report.summary import story
+from palpate.validation.report.surrogates import SurrogateChapter
+from palpate.validation.report.surrogates.told import surrogate_told
 from palpate.validation.report.tables import flat, judged_rows, node_rows, sources, timing_rows
 from palpate.validation.words import bound
 
@@ -27,7 +29,7 @@ TITLE = "What the hand will feel"
 
 def write_report(
     path: str | os.PathLike[str],
-    chapters: Sequence[Chapter],
+    chapters: Sequence[Chapter | SurrogateChapter],
     *,
     title: str = TITLE,
     machine: Mapping[str, Any] | None = None,
@@ -38,7 +40,7 @@ def write_report(
     ----------
     path : path
         Of the file; its folder is made if need be.
-    chapters : sequence of Chapter
+    chapters : sequence of Chapter or SurrogateChapter
         One per body.
     title : str
     machine : mapping, optional
@@ -72,7 +74,10 @@ def write_report(
 
 
 def render(
-    chapters: Sequence[Chapter], *, title: str = TITLE, machine: Mapping[str, Any] | None = None
+    chapters: Sequence[Chapter | SurrogateChapter],
+    *,
+    title: str = TITLE,
+    machine: Mapping[str, Any] | None = None,
 ) -> str:
     """The page as text; the same chapters give the same text.
 
@@ -114,7 +119,9 @@ def _prose(text: str) -> Markup:
     return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(bound(text)))))
 
 
-def _told(chapter: Chapter, key: str) -> dict[str, Any]:
+def _told(chapter: Chapter | SurrogateChapter, key: str) -> dict[str, Any]:
+    if isinstance(chapter, SurrogateChapter):
+        return surrogate_told(chapter, key)
     head, rows = node_rows(chapter.validation)
     return {
         "key": key,
@@ -125,9 +132,8 @@ def _told(chapter: Chapter, key: str) -> dict[str, Any]:
         "failures": [str(c) for c in chapter.validation.failures],
         "notes": chapter.validation.notes,
         "networks": network_rows(chapter.touch),
-        "node_head": head,
-        "node_rows": rows,
-        "timings": timing_rows(chapter),
+        "tables": [("Error of each displacement", head, rows)],
+        "timings": timing_rows(chapter.timings),
         "settings": list(flat(chapter.settings or chapter.touch.meta.get("settings", {}))),
         "provenance": list(flat(chapter.provenance or chapter.train.provenance)),
     }

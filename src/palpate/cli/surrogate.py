@@ -1,0 +1,81 @@
+"""`palpate validate FILE` where the file is a touch surrogate and no study."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from palpate.cli.console import Console
+from palpate.errors import UsageError
+
+if TYPE_CHECKING:
+    from palpate.dataset import Dataset
+
+__all__ = ["is_archive", "validate_file"]
+
+FOLDERS = ("-test.zarr", "-random.zarr")
+
+
+def is_archive(path: Path) -> bool:
+    """Whether a file is something learnt and not a study: told by its first bytes, or by its name if there is none.
+
+    A study is text; an archive begins with eight bytes of a length, the last of them zero (safetensors).
+    """
+    if not path.is_file():
+        return path.suffix == ".palpate"
+    with path.open("rb") as file:
+        return b"\0" in file.read(8)
+
+
+def validate_file(
+    path: Path, test: Path | None, refined: Path | None, report: bool, console: Console
+) -> None:
+    """Judge a surrogate by the solves of a dataset, print, and write the report beside the file.
+
+    Raises
+    ------
+    UsageError
+        If the file is no surrogate, or there is no test set.
+    AccuracyError
+        If a limit is missed; everything has been printed and written then.
+    """
+    from palpate.dataset import Dataset
+    from palpate.network import load_archive
+    from palpate.surrogates import TouchSurrogate
+    from palpate.surrogates.touch_file import KIND
+    from palpate.validation import SurrogateChapter, validate, write_report
+    from palpate.validation.surrogate import unseen_solves
+
+    if (kind := load_archive(path).kind) != KIND:
+        raise UsageError(
+            f"{path} holds {kind!r}, which is not judged by itself.",
+            why="A touch model of a held body is judged together with its study.",
+            fix="Give the study file: palpate validate study.toml",
+        )
+    surrogate = TouchSurrogate.load(path)
+    data, fine = _test(path, test), None if refined is None else Dataset.open(refined)
+    validation = validate(surrogate, data, refined=fine)
+    text, target = str(validation), path.with_suffix(".html") if report else None
+    if target is not None:
+        solves, _ = unseen_solves(surrogate, data)
+        told = {"settings": surrogate.meta, "provenance": data.provenance}
+        write_report(target, [SurrogateChapter(path.stem, surrogate, solves, validation, **told)])
+        text += f"\nreport: {target}"
+    console.result(text, validation.as_dict() | {"report": str(target) if target else None})
+    validation.raise_if_failed()
+
+
+def _test(path: Path, test: Path | None) -> Dataset:
+    from palpate.dataset import Dataset
+
+    if test is not None:
+        return Dataset.open(test)
+    beside = [path.with_name(path.stem + end) for end in FOLDERS]
+    for folder in beside:
+        if folder.exists():
+            return Dataset.open(folder)
+    raise UsageError(
+        f"There are no solves to judge {path} by.",
+        why=f"Neither {beside[0].name} nor {beside[1].name} lies beside it.",
+        fix="Name a dataset of solves that it was not learnt from: --test DATA.zarr",
+    )

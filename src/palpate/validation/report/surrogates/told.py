@@ -1,0 +1,102 @@
+"""All that the page shows of a touched body."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from palpate.validation.report.forces import plot_force_errors
+from palpate.validation.report.pictures import picture
+from palpate.validation.report.surrogates.chapter import SurrogateChapter
+from palpate.validation.report.surrogates.curves import plot_curves
+from palpate.validation.report.surrogates.maps import plot_errors, plot_trust
+from palpate.validation.report.surrogates.story import surrogate_story
+from palpate.validation.report.svg import Picture
+from palpate.validation.report.tables import flat, judged_rows, timing_rows
+from palpate.validation.solves import TouchFunction
+from palpate.validation.surrogate import SurrogateValidation, probe_samples
+from palpate.validation.words import plain, share
+
+__all__ = ["surrogate_told"]
+
+
+def surrogate_told(chapter: SurrogateChapter, key: str) -> dict[str, Any]:
+    """A chapter as the template takes it."""
+    v = chapter.validation
+    return {
+        "key": key,
+        "name": chapter.name,
+        "story": surrogate_story(chapter),
+        "pictures": _pictures(chapter, key),
+        "judged": judged_rows(v),
+        "failures": [str(c) for c in v.failures],
+        "notes": v.notes,
+        "networks": [],
+        "tables": [("Parts of the test", *_part_rows(v)), ("Worst cases", *_case_rows(v))],
+        "timings": timing_rows(chapter.timings),
+        "settings": list(flat(chapter.settings)),
+        "provenance": list(flat(chapter.provenance or chapter.surrogate.meta)),
+    }
+
+
+def _pictures(chapter: SurrogateChapter, key: str) -> list[Picture]:
+    surrogate, test, v = chapter.surrogate, chapter.test, chapter.validation
+    samples = probe_samples(TouchFunction.of(surrogate), test)
+    off = "No touch was strong enough to judge in relative terms."
+    if v.force.p95 is not None and v.force.max is not None:
+        off = f"95 of 100 forces are within {share(v.force.p95)}, all within {share(v.force.max)}."
+    smooth = (
+        "" if v.smoothness is None else f" Along strokes the force is smooth to {plain(v.smoothness.p95)} ×."
+    )
+    trust = "Colour: standard deviation of the force that the surrogate states."
+    if surrogate.root is None:
+        trust = "The surrogate states no deviation."
+    return [
+        picture(
+            f"{key}-curves",
+            "Force against depth",
+            f"Size of the force on the probe of {chapter.name} against its depth, surrogate and finite elements. {off}",
+            f"Lines into the body along its normal, through the deepest unseen solves. {off}{smooth}",
+            lambda: plot_curves(surrogate, test),
+        ),
+        picture(
+            f"{key}-map",
+            "Error on the touched surface",
+            f"Force error of {chapter.name} at each unseen solve, on the surface seen from outside. {off}",
+            f"One dot per unseen solve, where the probe touches. Numbers mark the worst cases of the table. {off}",
+            lambda: plot_errors(surrogate, test, samples),
+        ),
+        picture(
+            f"{key}-felt",
+            "Force error as a hand feels it",
+            f"Share of unseen solves of {chapter.name} against force error in just noticeable differences. {off}",
+            f"{off} Touches up to f₀ = {plain(v.force.light)} N ({v.force.light_count}) are judged against f₀ instead.",
+            lambda: plot_force_errors(samples),
+        ),
+        picture(
+            f"{key}-trust",
+            "Where to trust it",
+            f"Stated deviation of the force of {chapter.name} on the surface seen from outside, at two depths. {trust}",
+            f"{trust} Hatched: outside what was trained. Dots: unseen solves.",
+            lambda: plot_trust(surrogate, test),
+        ),
+    ]
+
+
+def _part_rows(v: SurrogateValidation) -> tuple[list[str], list[list[str]]]:
+    head = ["part", "solves", "above f₀", "force, median", "force, p95", "light, p95 of f₀", "stiffness, p95"]
+    rows = []
+    for p in v.parts:
+        figures = (p.median, p.p95, p.light_p95, p.stiffness_p95)
+        rows.append([p.name, str(p.count), str(p.felt), *("–" if f is None else share(f) for f in figures)])
+    return head, rows
+
+
+def _case_rows(v: SurrogateValidation) -> tuple[list[str], list[list[str]]]:
+    head = ["", "force error", "JND", "depth", "finite elements / N", "surrogate / N", "inputs"]
+    rows = []
+    for i, c in enumerate(v.worst, 1):
+        forces = (", ".join(f"{f:.3g}" for f in force) for force in (c.truth, c.answer))
+        deep = "–" if c.depth is None else f"{plain(1e3 * c.depth, 3)} mm"
+        where = str(c.at).removeprefix("at ")
+        rows.append([str(i), share(c.relative), plain(c.jnd), deep, *forces, where])
+    return head, rows

@@ -164,10 +164,20 @@ def test_positions_that_count_as_outside_are_explained() -> None:
     assert far == "4 of 4 hand positions count as outside the trained range."
 
 
+TOUCHED = {  # judged of touched bodies only, which have no study file yet
+    "border_loop_work",
+    "smoothness",
+    "interval_coverage",
+    "refined_force_median",
+    "refined_force_p95",
+}
+
+
 def test_remedies_name_keys_of_a_study_file() -> None:
     from palpate.study import Study
 
-    for criterion in CRITERIA:
+    of_beams = (c for c in CRITERIA if c.key not in TOUCHED)
+    for criterion in of_beams:
         named = re.findall(r"`(?:settings = \{ )?(\w+)", criterion.fix)
         assert named, criterion.key
         sections = re.findall(r"\[(\w+)\]", criterion.fix)

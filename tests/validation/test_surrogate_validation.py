@@ -13,7 +13,8 @@ from palpate.errors import AccuracyError, UsageError
 from palpate.network import TrainedRegion
 from palpate.units import bounds
 from palpate.validation import SurrogateValidation, TouchFunction, TouchSolves, validate
-from palpate.validation.limits import FAINT_JND, FORCE_JND, Limits, force_jnd
+from palpate.validation.force import force_jnd
+from palpate.validation.limits import FAINT_JND, FORCE_JND, Limits
 from palpate.validation.quadrature import work_of_polygons
 from palpate.validation.strokes import STEP
 from pressed import (

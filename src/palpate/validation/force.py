@@ -11,7 +11,7 @@ from palpate.dataset import Dataset
 from palpate.learning.touch import hand_coordinates
 from palpate.surrogates import TouchModel
 from palpate.units import Range
-from palpate.validation.limits import force_jnd
+from palpate.validation.limits import FAINT, FAINT_JND, FORCE_JND
 from palpate.validation.region import Worst
 
 __all__ = [
@@ -23,6 +23,11 @@ __all__ = [
     "hand_positions",
     "quantile",
 ]
+
+
+def force_jnd(size: np.ndarray) -> np.ndarray:
+    """Just noticeable relative difference of forces of these sizes (N,), N."""
+    return np.where(np.asarray(size) < FAINT, FAINT_JND, FORCE_JND)
 
 
 @dataclass(frozen=True, eq=False)

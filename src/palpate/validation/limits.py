@@ -13,8 +13,6 @@ import math
 from dataclasses import dataclass, fields
 from typing import Literal
 
-import numpy as np
-
 from palpate.errors import UsageError
 
 __all__ = [
@@ -27,7 +25,6 @@ __all__ = [
     "Criterion",
     "Grade",
     "Limits",
-    "force_jnd",
 ]
 
 FORCE_JND = 0.07
@@ -40,11 +37,6 @@ Grade = Literal["good", "pass", "fail"]
 Kind = Literal["scale", "metres", "share", "degrees", "times"]
 Bound = float | tuple[float, float]
 """The largest figure that passes, or the smallest and the largest."""
-
-
-def force_jnd(size: np.ndarray) -> np.ndarray:
-    """Just noticeable relative difference of forces of these sizes (N,), N."""
-    return np.where(np.asarray(size) < FAINT, FAINT_JND, FORCE_JND)
 
 
 def _within(value: float, bound: Bound) -> bool:

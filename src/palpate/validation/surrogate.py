@@ -219,7 +219,7 @@ def _relative_stiffness(model: TouchFunction, solves: TouchSolves) -> np.ndarray
         return None
     size = np.linalg.norm(solves.stiffness, axis=(1, 2))
     error = np.linalg.norm(model.stiffness(solves.X) - solves.stiffness, axis=(1, 2))
-    return np.divide(error, size, out=np.full(len(size), np.nan), where=size > 0)
+    return np.asarray(np.divide(error, size, out=np.full(len(size), np.nan), where=size > 0))
 
 
 def _energy(model: TouchFunction, solves: TouchSolves) -> np.ndarray | None:

@@ -73,8 +73,10 @@ def test_units_that_are_wrong_by_a_thousand_are_suspicious():
     assert np.log(1e3) / np.hypot(0.5, 0.3) < done.surprise < np.log(1e3) / 0.5
     assert f"{done.surprise:.0f} standard deviations" in done.warning
     rng = np.random.default_rng(3)
-    done = correct(S, record(X, S.force(X) + (rng.random((30, 1)) < 0.5) * 5.0))
+    done = correct(S, record(X, S.force(X) + (rng.random((30, 1)) < 0.4) * 5.0))
     assert "touches are outliers" in done.warning
+    done = correct(S, record(X, S.force(X) + 0.2 * rng.standard_normal((30, 3))))
+    assert "times as much as the noise" in done.warning
 
 
 def test_a_record_without_contact_teaches_nothing():

@@ -20,6 +20,7 @@ __all__ = ["Corrected", "correct", "judged"]
 _FOLDS = 5
 _FEWEST = 10  # touches that are enough to leave some of them out
 _SURPRISE = 5.0  # one in 1.7 million of a Gaussian's numbers is as far
+_STRAINED = 3.0
 _STRANGE = 0.3  # of the touches: as many outliers are no outliers
 
 
@@ -40,6 +41,8 @@ class Corrected:
         Height of the specimen's surface over the model's and its standard deviation, m.
     surprise : float
         Largest change, in standard deviations of the discrepancy.
+    strain : float
+        How many times larger the noise is than was said.
     """
 
     surrogate: TouchSurrogate
@@ -49,6 +52,7 @@ class Corrected:
     counts: Mapping[str, int]
     offset: tuple[float, float]
     surprise: float
+    strain: float
 
     @property
     def warning(self) -> str:
@@ -58,6 +62,11 @@ class Corrected:
             return (
                 f"{out} of {out + learnt} touches are outliers: units, frame or probe may be others than the "
                 "model's, or the specimen differs by more than the discrepancy allows."
+            )
+        if self.strain > _STRAINED:
+            return (
+                f"Forces scatter {self.strain:.1f} times as much as the noise: positions may be off, the body be "
+                "viscous or slip, or vary on shorter lengths than the discrepancy; the deviation has been widened."
             )
         if self.surprise > _SURPRISE:
             return (
@@ -86,6 +95,7 @@ class Corrected:
             "after": self.after.as_dict(),
             "left_out": None if self.left_out is None else self.left_out.as_dict(),
             "surprise": self.surprise,
+            "strain": self.strain,
             "offset": {"value": self.offset[0], "deviation": self.offset[1]},
         }
 
@@ -141,7 +151,14 @@ def judged(corrector: Corrector, measured: Measured, left_out: ForceError | None
     surprise = float(np.abs(corrector.belief.mean).max())
     before = force_error(corrector.model, X, force, along)
     return Corrected(
-        after, before, force_error(after, X, force, along), left_out, counts, corrector.offset, surprise
+        after,
+        before,
+        force_error(after, X, force, along),
+        left_out,
+        counts,
+        corrector.offset,
+        surprise,
+        corrector.strain,
     )
 
 

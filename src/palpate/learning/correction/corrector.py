@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_limits
 
 from palpate.errors import UsageError
 from palpate.learning.correction.belief import Belief
-from palpate.learning.correction.prior import Discrepancy, opened
+from palpate.learning.correction.prior import Discrepancy, extended, opened
 from palpate.learning.correction.touches import Noise, Touches
 from palpate.learning.correction.written import corrected
 from palpate.surrogates import TouchSurrogate
@@ -29,6 +29,9 @@ __all__ = ["Corrector", "Event", "Verdict"]
 Verdict = Literal["learnt", "no contact", "outside", "outlier", "not finite"]
 _FREE = 4.0  # deviations of the surface's height: farther above it nothing is to be learnt
 _BEYOND = 0.25  # of the width over which ℓ is followed beyond a range
+_ENOUGH = 30  # touches from which it is judged how far the noise is larger than was said
+_MEDIANS = (0.674, 1.538)  # of the size of one and of three standard normal numbers
+_STRAINED = 20.0  # at most: what is farther off is no noise
 _ROUNDS = 6  # of looking again which touches are outliers
 
 
@@ -111,11 +114,12 @@ class Corrector:
                 f"gate={gate}, window={window} and memory={memory} allow no correction.",
                 fix="Give positive numbers.",
             )
-        self.model, self.noise, self.gate = surrogate, noise, gate
+        self.model, self.noise, self.gate = extended(surrogate, discrepancy), noise, gate
         self.counts: Counter[str] = Counter()
-        self._may = opened(surrogate, discrepancy)
+        self._may = opened(self.model, discrepancy)
         self._anchor = self._belief = Belief.standard(self._may.root.shape[1] + 1)
         self._parameters, self._window, self._memory = p, window, memory
+        self._strain = 1.0
         self._seen: list[Touches] = []
         self._learnt: list[bool] = []
 
@@ -139,6 +143,14 @@ class Corrector:
     def parameters(self) -> np.ndarray:
         """The specimen's further inputs (p,)."""
         return self._parameters
+
+    @property
+    def strain(self) -> float:
+        """How many times larger the noise is than was said, by the residuals of the last window; 1 at least.
+
+        What no change of the weights explains counts as noise: then the posterior covers it.
+        """
+        return self._strain
 
     @property
     def expressed(self) -> float:
@@ -191,6 +203,7 @@ class Corrector:
         everything = Touches.joined(self._seen)
         with threadpool_limits(1), np.errstate(over="ignore", invalid="ignore"):
             learnt = self._in_doubt(everything)
+            everything = everything.weighted(np.full(len(everything), self._strain**-2))
             for _ in range(_ROUNDS):
                 self._belief = self._anchor.learnt(everything.take(learnt))
                 near = self._distances(everything, learnt) <= self.gate
@@ -207,19 +220,23 @@ class Corrector:
 
         So the choice does not depend on which came first.
         """
-        weights = np.ones(len(touches))
+        weights, everyone = np.ones(len(touches)), np.ones(len(touches), bool)
         for _ in range(_ROUNDS):
-            self._belief = self._anchor.learnt(touches.weighted(weights))
-            far = np.linalg.norm(touches.residuals(self._belief.mean), axis=1)
+            self._belief = self._anchor.learnt(touches.weighted(weights / self._strain**2))
+            far = self._distances(touches.weighted(np.full(len(touches), self._strain**-2)), everyone)
+            if len(touches) >= _ENOUGH:
+                ratio = np.median(far / np.where(touches.single, *_MEDIANS))
+                self._strain = min(max(1.0, self._strain * float(ratio)), _STRAINED)
             weights = np.minimum(1.0, self.gate / np.maximum(far, 1e-12))
-        return np.asarray(weights == 1.0)
+        return np.asarray(far <= self.gate)
 
     def _event(self, c: np.ndarray, F: np.ndarray, along: np.ndarray) -> Event:
         nothing = np.full(3, math.nan)
         if not np.isfinite([c, F, along]).all():
             return Event("not finite", nothing)
         X = np.concatenate([c, self._parameters])[None]
-        touch = Touches.of(self.model, self._may, X, F[None], along[None], self.noise)
+        said = Touches.of(self.model, self._may, X, F[None], along[None], self.noise)
+        touch = said.weighted(np.full(1, self._strain**-2))
         with np.errstate(over="ignore", invalid="ignore"):
             predicted = touch.forces(self._belief.mean)[0]
             height, sure = self.offset
@@ -228,14 +245,15 @@ class Corrector:
                 return Event("outside", predicted)
             distance = float(self._distances(touch, np.zeros(1, bool))[0])
             if not distance <= self.gate:
-                self._keep(touch, learnt=False)
+                if not free:
+                    self._keep(said, learnt=False)
                 return Event("outlier", predicted, distance)
             if free:
                 return Event("no contact", predicted, distance)
             self._belief = self._belief.learnt(touch)
             if self._memory is not None:
                 self._belief = self._belief.loosened(-math.expm1(-1.0 / self._memory))
-        self._keep(touch, learnt=True)
+        self._keep(said, learnt=True)
         return Event("learnt", predicted, distance)
 
     def _keep(self, touch: Touches, *, learnt: bool) -> None:
@@ -266,4 +284,4 @@ class Corrector:
         S = np.eye(3) + np.where(learnt, -1.0, 1.0)[:, None, None] * own
         values, V = np.linalg.eigh(S)
         turned = np.einsum("nij,ni->nj", V, r)
-        return np.asarray(np.sqrt((turned**2 / np.maximum(values, 1e-6)).sum(axis=1)))
+        return np.asarray(np.sqrt((turned**2 / np.maximum(values, 1e-3)).sum(axis=1)))

@@ -6,15 +6,15 @@ Its energy is U₀(s + o) exp(ℓ + δ): δ(x) a change of ln κ, o a height of 
     o ~ N(0, σ_o²)
 
 with ξ the scaled inputs: a constant factor, and one that varies slowly with place and depth (a random field for
-what a model misses: Kennedy & O'Hagan 2001, section 4). v is written in the network's own tail and units, by least
-squares at the places of the training, so the corrected energy is a network of the same size. The model's own
-posterior is kept beside it.
+what a model misses: Kennedy & O'Hagan 2001, section 4). v is written in the tail and units of the network, to which
+broad units of weight zero are added, by least squares at the places of the training: a network of few units follows
+its own body and no other. The model's own posterior is kept beside it.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,10 +23,10 @@ from palpate.network import Network
 from palpate.network.radial import radial
 from palpate.surrogates import TouchSurrogate
 
-__all__ = ["Discrepancy", "Opened", "opened", "regressors"]
+__all__ = ["Discrepancy", "Opened", "extended", "opened", "regressors"]
 
-_KEPT = 1e-4  # of the largest variance: directions of the slow change below it are left out
-_MOST = 40  # such directions
+_KEPT = 1e-5  # of the largest variance: directions of the slow change below it are left out
+_MOST = 80  # such directions
 _POINTS = 256  # where the slow change is matched, where no training inputs are known
 _RIDGE = 1e-6  # of a regressor's mean square
 
@@ -45,6 +45,8 @@ class Discrepancy:
         L over which it varies, in halves of the inputs' ranges.
     offset : float
         σ_o, m; zero where the surface's height is known.
+    units : int
+        Broad units that are added at most; they make each answer of the corrected surrogate slower.
 
     Raises
     ------
@@ -54,13 +56,16 @@ class Discrepancy:
 
     constant: float = 0.5
     varying: float = 0.3
-    length: float = 0.7
+    length: float = 0.5
     offset: float = 5e-4
+    units: int = 64
 
     def __post_init__(self) -> None:
         sizes = (self.constant, self.varying, self.offset)
         if not (
-            all(math.isfinite(v) and v >= 0 for v in sizes) and self.length > 0 and math.isfinite(self.length)
+            all(math.isfinite(v) and v >= 0 for v in (*sizes, self.units))
+            and self.length > 0
+            and math.isfinite(self.length)
         ):
             raise UsageError(
                 f"{self} says nothing of a specimen.",
@@ -86,6 +91,32 @@ class Opened:
     root: np.ndarray
     offset: float
     expressed: float
+
+
+def extended(surrogate: TouchSurrogate, discrepancy: Discrepancy) -> TouchSurrogate:
+    """The same energy with broad units of weight zero, far from each other among the training inputs.
+
+    Only where something may vary, and not a second time.
+    """
+    net, points = surrogate.network, _points(surrogate)
+    k, n = min(discrepancy.units, len(points)), len(net.inputs)
+    if not (k and discrepancy.varying) or "correction" in surrogate.meta:
+        return surrogate
+    own = np.zeros((net.units, n, n))
+    own[:, : net.factors.shape[1]] = net.factors
+    shifts = np.zeros((net.units, n))
+    shifts[:, : net.factors.shape[1]] = net.shifts
+    wide = 1.0 / (math.sqrt(2.0) * discrepancy.length)
+    more = replace(
+        net,
+        factors=np.concatenate([own, np.broadcast_to(wide * np.eye(n), (k, n, n))]),
+        shifts=np.concatenate([shifts, wide * points[:k]]),
+        weights=np.hstack([net.weights, np.zeros((1, k))]),
+    )
+    root = surrogate.root
+    if root is not None:
+        root = np.vstack([root, np.zeros((k, root.shape[1]))])
+    return replace(surrogate, network=more, root=root)
 
 
 def opened(surrogate: TouchSurrogate, discrepancy: Discrepancy) -> Opened:
@@ -127,10 +158,7 @@ def regressors(net: Network, scaled: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 def _slow(surrogate: TouchSurrogate, discrepancy: Discrepancy) -> tuple[np.ndarray, float]:
     """Root (c, r) of the slowly varying change in units of ℓ, and the share of it that the network can express."""
-    n, region = len(surrogate.inputs), surrogate.region
-    points = (
-        region.points if region is not None else np.random.default_rng(0).uniform(-1.0, 1.0, (_POINTS, n))
-    )
+    points = _points(surrogate)
     square = ((points[:, None] - points) ** 2).sum(axis=2)
     values, V = np.linalg.eigh(discrepancy.varying**2 * np.exp(-square / (2.0 * discrepancy.length**2)))
     keep = np.flatnonzero(values > _KEPT * values[-1])[-_MOST:]
@@ -140,3 +168,9 @@ def _slow(surrogate: TouchSurrogate, discrepancy: Discrepancy) -> tuple[np.ndarr
     found = np.linalg.solve(gram + _RIDGE * np.trace(gram) / len(gram) * np.eye(len(gram)), R.T @ wanted)
     missed = wanted - R @ found
     return found, float(1.0 - (missed**2).sum() / (wanted**2).sum())
+
+
+def _points(surrogate: TouchSurrogate) -> np.ndarray:
+    """Scaled inputs (k, n) of the training, the first ones far from each other; random ones where it is not known."""
+    n, region = len(surrogate.inputs), surrogate.region
+    return np.random.default_rng(0).uniform(-1.0, 1.0, (_POINTS, n)) if region is None else region.points

@@ -135,6 +135,11 @@ class Touches:
     def __len__(self) -> int:
         return len(self.depth)
 
+    @property
+    def single(self) -> np.ndarray:
+        """Which (N,) are of one component only."""
+        return np.asarray(~self.whitening[:, 1:].any(axis=(1, 2)))
+
     def take(self, which: np.ndarray) -> Touches:
         """Some of them, by index or mask."""
         parts: dict[str, Any] = {name: getattr(self, name)[which] for name in _ARRAYS}

@@ -1,7 +1,8 @@
 """The travelling part of a field, by linear least squares over all nodes of all solves at once.
 
 Per solve some hundred nodes of the touched surface lie in reach of the probe, each at another distance ρ: a few
-solves decide the whole table of splines in (ρ, s). A small penalty decides what no node has seen.
+solves decide the whole table of splines in (ρ, s). Where no node has been, a small penalty on second differences
+decides (Eilers & Marx 1996), and on the slope at the foot: what is smooth in the body is even in ρ.
 """
 
 from __future__ import annotations
@@ -12,16 +13,23 @@ from palpate.surrogates.field.dimple import Dimple, products
 from palpate.surrogates.field.rise import Rise
 from palpate.surrogates.surface import TouchedSurface
 
-__all__ = ["fitted_dimple", "travelling_values"]
+__all__ = ["fitted_dimple", "touched_nodes", "travelling_values"]
 
 _REACH = 3.0  # times the radius
 _CELLS = 17  # to the reach: a sixth of the radius each
-_PENALTY = 1e-6  # of the mean diagonal
+_PENALTY = 1e-5  # of the mean diagonal
+# of the radius: the smooth distance rounds a border by 2 to 4 % of it
+_ON, _ON_BORDER = 0.01, 0.06
+_EVEN = 1e3  # an even profile is known, not guessed
+_LEAST = 1e-6  # keeps the system regular
 
 
-def touched_nodes(surface: TouchedSurface, points: np.ndarray, radius: float) -> np.ndarray:
-    """Which nodes (nodes, 3) lie on the touched surface, bool."""
-    return np.abs(surface.at(np.ascontiguousarray(points))[0]) < 0.02 * radius
+def touched_nodes(
+    surface: TouchedSurface, points: np.ndarray, radius: float, *, border: bool = True
+) -> np.ndarray:
+    """Which nodes (nodes, 3) lie on the touched surface, bool; with or without those on its border."""
+    near = (_ON_BORDER if border else _ON) * radius
+    return np.asarray(np.abs(surface.at(np.ascontiguousarray(points))[0]) < near)
 
 
 def fitted_dimple(
@@ -34,13 +42,15 @@ def fitted_dimple(
     points: np.ndarray,
     mass: np.ndarray,
     radius: float,
+    border: bool = True,
 ) -> Dimple | None:
     """The dimple of fields (N, nodes, components) less their rest, of probes at C (N, 3); None where none is in reach.
 
-    Fields of one component are scalars, those of three vectors; others have no dimple.
+    Fields of one component are scalars, those of three vectors; others have no dimple. Nodes on the border of the
+    touched surface, which also belong to another one, may move otherwise: they can be left to the modes.
     """
     components = values.shape[2]
-    touched = touched_nodes(surface, points, radius)
+    touched = touched_nodes(surface, points, radius, border=border)
     if components not in (1, 3) or not touched.any():
         return None
     levels = int(np.clip(len(np.unique(np.round(depth / rise.deepest, 6))), 1, 5))
@@ -55,10 +65,22 @@ def fitted_dimple(
     mean = float(np.trace(G)) / len(G)
     if not mean > 0:
         return None
-    G[np.diag_indices_from(G)] += _PENALTY * mean
+    G += _PENALTY * mean * np.kron(np.eye(parts), _roughness(*shape))
     table = np.zeros((parts, *shape))
     table[:, :-3] = np.linalg.solve(G, b).reshape(parts, shape[0] - 3, shape[1])
     return Dimple(table, reach, touched)
+
+
+def _roughness(r: int, q: int) -> np.ndarray:
+    """Squares of second differences in ρ and s, and of the slope at ρ = 0, of the (r − 3) · q free coefficients."""
+    in_rho = np.diff(np.eye(r), n=2, axis=0)[:, : r - 3]
+    in_s = np.diff(np.eye(q), n=2, axis=0)
+    slope = np.zeros(r - 3)
+    slope[[0, 2]] = -1.0, 1.0
+    along = in_rho.T @ in_rho + _EVEN * np.outer(slope, slope)
+    return np.asarray(
+        np.kron(along, np.eye(q)) + np.kron(np.eye(r - 3), in_s.T @ in_s) + _LEAST * np.eye((r - 3) * q)
+    )
 
 
 def travelling_values(

@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.learning.checks import numbers
-from palpate.learning.fields.dimples import fitted_dimple, travelling_values
+from palpate.learning.fields.dimples import fitted_dimple, touched_nodes, travelling_values
 from palpate.learning.fields.modes import SurfaceModes, left_out, lumped_mass
 from palpate.learning.fields.search import Coefficients, FieldTrial, searched
 from palpate.learning.freezing import freeze_refined, training_record
@@ -187,8 +187,7 @@ def learn_field(
     length = radius / 10.0 if length is None else length
     with threadpool_limits(1):  # small matrices: more BLAS threads cost time and the bits of the result
         names = RISES if rise == "auto" else (rise,)
-        parted = [_parted(solves, one, length, tolerance, modes_max, travelling) for one in names]
-        best = _chosen(parted, seconds, seed)
+        best = _best_part(solves, names, length, tolerance, modes_max, travelling, seconds, seed)
         options = {"units_max": units_max, "seconds": seconds, "target": 0.1 * best.truncation, "seed": seed}
         found, error, trials = searched(best.problem, **options)  # type: ignore[arg-type]
     meta = {
@@ -203,7 +202,8 @@ def learn_field(
     }
     network = _network(found, best, solves.inputs)
     field = FieldSurrogate(
-        *(name, unit, network, best.modes.modes, rest, solves.points, triangles, solves.mass),
+        *(name, unit, network),
+        *(best.modes.modes, rest, solves.points, triangles, solves.mass),
         rise=best.rise,
         surface=surface,
         radius=radius,
@@ -252,7 +252,7 @@ def _checked(
 
 
 def _parted(
-    solves: _Solves, name: str, length: float, tolerance: float, most: int, travelling: bool
+    solves: _Solves, name: str, length: float, tolerance: float, most: int, travelling: bool, border: bool
 ) -> _Parted:
     """Travelling part, modes and coefficients of the fields, as they follow from a rise."""
     deepest = float(solves.depth.max())
@@ -260,7 +260,7 @@ def _parted(
     C, remainder, dimple = np.ascontiguousarray(solves.X[:, :3]), solves.values, None
     probe = {"surface": solves.surface, "points": solves.points}
     if travelling:
-        known: dict[str, Any] = {**probe, "mass": solves.mass, "radius": solves.radius}
+        known: dict[str, Any] = {**probe, "mass": solves.mass, "radius": solves.radius, "border": border}
         dimple = fitted_dimple(remainder, C, solves.depth, rise=rise, **known)
     if dimple is not None:
         remainder = remainder - travelling_values(dimple, C, solves.depth, rise, **probe)  # type: ignore[arg-type]
@@ -276,13 +276,40 @@ def _parted(
     return _Parted(rise, dimple, modes, problem, truncation, beyond)
 
 
+def _best_part(
+    solves: _Solves,
+    names: Sequence[str],
+    length: float,
+    tolerance: float,
+    most: int,
+    travelling: bool,
+    seconds: float,
+    seed: int,
+) -> _Parted:
+    """First whether the border travels too, then the rise: what misses least of solves left out."""
+
+    def of(name: str, border: bool) -> _Parted:
+        return _parted(solves, name, length, tolerance, most, travelling, border)
+
+    borders = (True, False) if travelling else (True,)
+    each = _SHARE * seconds / (len(borders) + len(names))
+    first = _chosen([of(names[-1], border) for border in borders], each, seed)
+    border = first.dimple is None or bool(_same_touched(first, solves))
+    return _chosen([first, *(of(name, border) for name in names[:-1])], each, seed)
+
+
+def _same_touched(part: _Parted, solves: _Solves) -> bool:
+    """Whether the border's nodes are in a travelling part."""
+    assert part.dimple is not None
+    return bool((part.dimple.touched == touched_nodes(solves.surface, solves.points, solves.radius)).all())
+
+
 def _chosen(parted: list[_Parted], seconds: float, seed: int) -> _Parted:
-    """The one of which affine coefficients and a few units miss least when a solve is left out."""
+    """The one of which affine coefficients and a few units miss least when a solve is left out; seconds for each."""
     if len(parted) == 1:
         return parted[0]
-    each = _SHARE * seconds / len(parted)
     missed = [
-        searched(p.problem, units_max=2, seconds=each, target=0.0, seed=seed)[1] ** 2
+        searched(p.problem, units_max=2, seconds=seconds, target=0.0, seed=seed)[1] ** 2
         + np.nan_to_num(p.truncation_left_out) ** 2
         for p in parted
     ]

@@ -112,29 +112,26 @@ class FieldSurrogate:
             return f"its modes {self.modes.shape} and rest {self.rest.shape} are not of {nodes} nodes"
         if self.points.shape != (nodes, 3) or self.mass.shape != (nodes,):
             return f"its points {self.points.shape} and masses {self.mass.shape} are not of {nodes} nodes"
-        if not all(np.isfinite(getattr(self, name)).all() for name in _ARRAYS):
-            return "a number of it is not finite"
-        if not ((self.mass >= 0).all() and abs(self.mass.sum() - 1.0) < 1e-9):
-            return "its masses are no shares of one"
-        corners = self.triangles
-        if corners.ndim != 2 or corners.shape[1] != 3 or ((corners < 0) | (corners >= nodes)).any():
-            return "its triangles are not of its nodes"
+        finite = all(np.isfinite(getattr(self, name)).all() for name in _ARRAYS)
+        if not (finite and (self.mass >= 0).all() and abs(self.mass.sum() - 1.0) < 1e-9):
+            return "its masses are no shares of one, or a number of it is not finite"
         return self._fault_of_probe()
 
     def _fault_of_probe(self) -> str:
-        n, own = len(self.network.inputs), self.radius_input
+        n, own, corners = len(self.network.inputs), self.radius_input, self.triangles
+        if corners.shape != (len(corners), 3) or ((corners < 0) | (corners >= len(self.points))).any():
+            return "its triangles are not of its nodes"
         if own is not None and not 3 <= own < n:
             return f"input {own} can't be the radius of {n} inputs, the first three being the position"
         if own is None and not (math.isfinite(self.radius) and self.radius > 0):
             return f"its probe has a radius of {self.radius} m"
         if self.continuation is not None and self.continuation.widths.shape != (n,):
             return f"its continuation has {self.continuation.widths.size} widths for {n} inputs"
-        if self.dimple is None:
-            return ""
-        wanted = {1: 1, 3: 2}.get(self.rest.shape[1])
-        if self.dimple.touched.shape != (len(self.points),) or len(self.dimple.table) != wanted:
-            return "its travelling part is of other nodes or components"
-        return ""
+        wanted, dimple = {1: 1, 3: 2}.get(self.rest.shape[1]), self.dimple
+        strange = dimple is not None and (
+            dimple.touched.shape != (len(self.points),) or len(dimple.table) != wanted
+        )
+        return "its travelling part is of other nodes or components" if strange else ""
 
     def __str__(self) -> str:
         nodes, components = self.rest.shape

@@ -54,9 +54,8 @@ def load_field(path: str | os.PathLike[str]) -> FieldSurrogate:
         arrays = dict(archive.arrays)
         taken = {k: arrays.pop(k) for k in list(arrays) if k.startswith(_SURFACE)}
         surface = TouchedSurface.from_arrays({k.removeprefix(_SURFACE): v for k, v in taken.items()})
-        if archive.networks.keys() != {_NETWORK}:
-            raise ValueError("it has other networks than one")
-        return field_of(archive.networks[_NETWORK], arrays, archive.meta, surface)
+        (network,) = archive.networks.values()
+        return field_of(network, arrays, archive.meta, surface)
     except (KeyError, TypeError, ValueError, IndexError, OverflowError, UsageError) as error:
         raise FileFormatError(
             f"{path} does not describe a field.",
@@ -122,7 +121,10 @@ def field_of(
         dimple = Dimple(arrays["table"], _number(meta, "reach"), arrays["touched"])
     widths = np.array([_number({"width": w}, "width") for w in meta["widths"]])
     return FieldSurrogate(
-        *(meta["name"], meta["unit"], network, *(arrays[k] for k in _OWN)),
+        name=meta["name"],
+        unit=meta["unit"],
+        network=network,
+        **{name: arrays[name] for name in _OWN},
         rise=Rise(meta["rise"], _number(meta, "deepest"), _number(meta, "length", math.inf)),
         surface=surface,
         radius=_number(meta, "radius", math.nan),

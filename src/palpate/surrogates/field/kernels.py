@@ -101,7 +101,8 @@ def _profile(s, f, deepest, table, profile) -> None:  # type: ignore[no-untyped-
 def _spline(u, first, row) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
     v = 1.0 - u
     total = v * v * v * row[first] + (3.0 * u * u * u - 6.0 * u * u + 4.0) * row[first + 1]
-    return (total + (3.0 * v * v * v - 6.0 * v * v + 4.0) * row[first + 2] + u * u * u * row[first + 3]) / 6.0
+    total += (3.0 * v * v * v - 6.0 * v * v + 4.0) * row[first + 2] + u * u * u * row[first + 3]
+    return float(total / 6.0)
 
 
 @_jit

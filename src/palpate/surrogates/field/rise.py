@@ -83,13 +83,13 @@ def rise_at(s, power, deepest, length) -> float:  # type: ignore[no-untyped-def]
         return 0.0
     t = s / deepest
     if t >= 1.0:
-        return t
+        return float(t)
     f = t
     if power == 2.0:
         f *= t
     elif power == 1.5:
         f *= math.sqrt(t)
-    return f * math.sqrt((1.0 + deepest / length) / (1.0 + s / length))
+    return float(f * math.sqrt((1.0 + deepest / length) / (1.0 + s / length)))
 
 
 @_jit

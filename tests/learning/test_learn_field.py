@@ -1,0 +1,231 @@
+"""Fields learnt from solves: the modes are the singular vectors, exact parts are found, errors are stated honestly."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from palpate.errors import UsageError
+from palpate.learning.fields import SurfaceModes, learn_displacement, learn_field, lumped_mass
+from palpate.learning.fields.dimples import fitted_dimple, travelling_values
+from palpate.learning.fields.modes import left_out
+from palpate.surrogates import TouchedSurface
+from palpate.surrogates.field import Rise
+from palpate.units import Range
+
+RADIUS, DEEPEST = 0.010, 0.006
+BOX = [
+    Range("c_x", -0.01, 0.01, "m"),
+    Range("c_y", -0.01, 0.01, "m"),
+    Range("c_z", RADIUS - DEEPEST, RADIUS, "m"),
+]
+
+
+@pytest.fixture(scope="module")
+def face():
+    """Points and triangles of the face z = 0, 60 mm wide, and its distance."""
+    side = 13
+    x = np.linspace(-0.03, 0.03, side)
+    points = np.array([(a, b, 0.0) for a in x for b in x])
+    k = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)).ravel()
+    lower, upper = np.stack([k, k + side, k + 1], 1), np.stack([k + 1, k + side, k + side + 1], 1)
+    triangles = np.vstack([lower, upper])
+    return points, triangles, TouchedSurface.of(points, triangles, radius=RADIUS)
+
+
+def columns(count: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (3 · count, 3) in columns of three depths, the last the deepest, and their columns."""
+    rng = np.random.default_rng(seed)
+    places = rng.uniform(-0.01, 0.01, (count, 2))
+    depths = np.column_stack([rng.uniform(0.0005, 0.005, (count, 2)), np.full(count, DEEPEST)])
+    X = np.column_stack([np.repeat(places, 3, axis=0), RADIUS - depths.ravel()])
+    return X, np.repeat(np.arange(count), 3)
+
+
+def snapshots(seed: int = 0, N: int = 12, nodes: int = 40) -> tuple[np.ndarray, np.ndarray]:
+    """Random fields and masses, with sizes that fall."""
+    rng = np.random.default_rng(seed)
+    mass = rng.uniform(0.2, 2.0, nodes)
+    fields = np.tensordot(rng.normal(size=(N, N)) * 0.5 ** np.arange(N), rng.normal(size=(N, nodes, 3)), 1)
+    return fields, mass / mass.sum()
+
+
+def test_modes_are_singular_vectors_in_the_weighted_inner_product():
+    values, mass = snapshots()
+    found = SurfaceModes.of(values, mass)
+    # eigenvectors of the correlation in the same inner product, by another way: the method of snapshots
+    gram = np.einsum("ajc,bjc,j->ab", values, values, mass)
+    sizes, V = np.linalg.eigh(gram)
+    np.testing.assert_allclose(found.sizes[:6], np.sqrt(sizes[::-1][:6] / len(values)), rtol=1e-8)
+    for k in range(6):
+        mode = np.tensordot(V[:, -1 - k], values, 1) / np.sqrt(sizes[-1 - k])
+        overlap = abs((mode * found.modes[k] * mass[:, None]).sum())
+        assert overlap == pytest.approx(1.0, abs=1e-8)
+
+
+def test_modes_are_orthonormal_to_twelve_digits():
+    values, mass = snapshots()
+    modes = SurfaceModes.of(values, mass).modes
+    inner = np.einsum("ajc,bjc,j->ab", modes, modes, mass)
+    np.testing.assert_allclose(inner, np.eye(len(modes)), atol=1e-12)
+
+
+def test_what_the_modes_miss_of_the_snapshots_is_the_tail_of_singular_values():
+    values, mass = snapshots()
+    found = SurfaceModes.of(values, mass)
+    for r in (1, 3, 7, 11):
+        modes = found.take(r).modes
+        along = np.einsum("njc,kjc,j->nk", values, modes, mass)
+        rest = values - np.tensordot(along, modes, 1)
+        missed = np.sqrt(((rest**2).sum(axis=2) @ mass).mean())
+        assert missed == pytest.approx(found.missed[r], rel=1e-8)
+        assert found.count(missed * 1.01) == r
+        assert found.count(missed * 0.99) == r + 1
+
+
+def test_no_modes_of_zero_fields_and_none_beyond_the_rank():
+    values, mass = snapshots()
+    assert len(SurfaceModes.of(values[:3][[0, 1, 2, 0, 1]], mass).sizes) == 3
+    nothing = SurfaceModes.of(np.zeros((4, 40, 3)), mass)
+    assert len(nothing.modes) == 1
+    assert not nothing.sizes.any()
+
+
+def test_modes_left_out_miss_what_is_new_in_a_group():
+    _, mass = snapshots()
+    values = np.random.default_rng(0).normal(size=(6, 40, 3))  # hardly anything in common
+    alike = np.concatenate([values, 2.0 * values])
+    assert left_out(alike, mass, 6, np.arange(12) % 6) > 1.0  # each pair goes together
+    assert left_out(alike, mass, 6, np.arange(12)) < 0.2  # folds of ten part but two pairs
+    assert np.isnan(left_out(values, mass, 6, np.zeros(6)))
+
+
+def test_masses_are_shares_of_the_area(face):
+    points, triangles, _ = face
+    mass = lumped_mass(points, triangles)
+    assert mass.sum() == pytest.approx(1.0, abs=1e-14)
+    assert mass @ points[:, 0] == pytest.approx(0.0, abs=1e-16)
+    inner = (np.abs(points[:, :2]) < 0.029).all(axis=1)
+    np.testing.assert_allclose(mass[inner], 1 / 144, rtol=1e-12)  # one square of 12 × 12
+
+
+def test_rigid_fields_whose_coefficients_are_affine_are_found_exactly(face):
+    points, triangles, surface = face
+    X, column = columns(8)
+    moves = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, -1]])
+    f = ((RADIUS - X[:, 2]) / DEEPEST) ** 2
+    # translations and a turn about z, with coefficients f times affine functions of the place
+    b = np.column_stack([0.3 + 20 * X[:, 0], 10 * X[:, 1], 1 + 5 * X[:, 0], 30 * X[:, 0] - 90 * X[:, 2]])
+    turn = np.cross([0, 0, 1.0], points) / 0.03
+    shapes = np.concatenate([np.broadcast_to(moves[:, None], (3, len(points), 3)), turn[None]])
+    values = 1e-3 * np.tensordot(f[:, None] * b, shapes, 1)
+    known = {"points": points, "triangles": triangles, "surface": surface, "radius": RADIUS, "inputs": BOX}
+    learnt = learn_field(
+        X, values, **known, tolerance=1e-12, travelling=False, groups=column, units_max=4, seconds=10
+    )
+    assert learnt.field.rise.name == "square"
+    assert len(learnt.field.modes) == 4
+    new, _ = columns(5, seed=1)
+    bn = np.column_stack(
+        [0.3 + 20 * new[:, 0], 10 * new[:, 1], 1 + 5 * new[:, 0], 30 * new[:, 0] - 90 * new[:, 2]]
+    )
+    fn = ((RADIUS - new[:, 2]) / DEEPEST) ** 2
+    errors = learnt.field.errors(new, 1e-3 * np.tensordot(fn[:, None] * bn, shapes, 1))
+    # the ridge of 1e-9 on weights of size one; fields of 1 mm
+    assert errors.max() < 1e-8
+    assert errors.max("truncation") < 1e-12
+    assert learnt.learning_left_out < 1e-8
+
+
+@pytest.mark.parametrize("components", [1, 3])
+def test_a_dimple_alone_needs_no_modes(face, components):
+    """A field that is the same everywhere in the probe's frame is shown by the travelling part, where modes fail."""
+    points, triangles, surface = face
+    mass = lumped_mass(points, triangles)
+    rise = Rise("square", DEEPEST)
+
+    def dimples(X):
+        offset = points[None] - np.column_stack([X[:, :2], np.zeros(len(X))])[:, None]
+        rho = np.linalg.norm(offset, axis=2) / (3 * RADIUS)
+        s = (RADIUS - X[:, 2]) / DEEPEST
+        shape = np.where(rho < 1, (1 - rho**2) ** 4, 0.0) * (s**2 * (1 - 0.3 * s))[:, None]
+        if components == 1:
+            return 1e-3 * shape[..., None]
+        return 1e-3 * (0.2 * shape[..., None] * offset / RADIUS - shape[..., None] * [0, 0, 1.0])
+
+    X, column = columns(10)
+    new, _ = columns(6, seed=1)
+    known = {"surface": surface, "points": points}
+    dimple = fitted_dimple(dimples(X), X, RADIUS - X[:, 2], rise=rise, **known, mass=mass, radius=RADIUS)
+    shown = travelling_values(dimple, new, RADIUS - new[:, 2], rise, **known)
+    # splines of 1.8 mm, a seventeenth of the reach, on a polynomial of degree 8: h⁴ |g''''|/384 of it
+    assert np.abs(shown - dimples(new)).max() < 0.01 * np.abs(dimples(new)).max()
+
+    more = {**known, "triangles": triangles, "radius": RADIUS, "inputs": BOX, "groups": column}
+    errors = [
+        learn_field(X, dimples(X), **more, travelling=t, rise="square", seconds=3, units_max=2)
+        .field.errors(new, dimples(new))
+        .mean()
+        for t in (True, False)
+    ]
+    assert errors[0] < 0.1 * errors[1]
+
+
+def test_without_contact_nothing_moves_and_the_file_and_record_are_whole(face, tmp_path):
+    points, triangles, surface = face
+    X, column = columns(5)
+    rng = np.random.default_rng(0)
+    values = 1.0 + rng.normal(size=(15, len(points))) * 1e-3
+    learnt = learn_field(
+        X, values, points=points, triangles=triangles, surface=surface, radius=RADIUS, inputs=BOX, groups=column,
+        name="largest stretch", unit="", rest=np.ones((len(points), 1)), seconds=2, units_max=2,
+    )  # fmt: skip
+    F = learnt.field
+    assert (F.values(np.array([[0.0, 0, RADIUS], [0, 0, 1.0]])) == 1.0).all()
+    again = type(F).load(F.save(tmp_path / "f.palpate"))
+    np.testing.assert_array_equal(again.values(X), F.values(X))
+    assert again.meta["solves"] == 15
+    assert again.meta["truncation"] == learnt.truncation
+    # noise can't be learnt, and what is left out says so
+    assert learnt.learning_left_out > 3 * learnt.truncation
+    assert all(t.loo >= learnt.learning_left_out for t in learnt.trials)
+
+
+def test_what_cannot_be_learnt_is_refused(face):
+    points, triangles, surface = face
+    X, _ = columns(3)
+    known = {"points": points, "triangles": triangles, "surface": surface, "radius": RADIUS, "inputs": BOX}
+    values = np.zeros((9, len(points), 3))
+    for more, words in (
+        ({"rise": "cube"}, "rise"),
+        ({"seconds": 0}, "no learning"),
+        ({"triangles": triangles[:0]}, "area"),
+    ):
+        with pytest.raises(UsageError, match=words):
+            learn_field(X, values, **(known | more))
+    with pytest.raises(UsageError, match="Fields of shape"):
+        learn_field(X, values[:, :5], **known)
+    with pytest.raises(UsageError, match="contact"):
+        learn_field(X + np.array([0, 0, 0.02]), values, **known)
+
+
+@pytest.mark.slow
+def test_a_pressed_block_is_seen_within_stated_errors(tmp_path):
+    import palpate as pp
+
+    body = pp.Body(pp.Block(size=(0.06, 0.06, 0.03)), pp.NeoHookean(young=9e3, poisson=0.45))
+    probe = pp.SphereProbe(
+        radius=RADIUS, touches="top", depth=(0.0, DEEPEST), over=((0.02, 0.02), (0.04, 0.04))
+    )
+    problem = body.problem(probe, element=0.008)
+    data = pp.sweep(problem, samples=16, seed=0, workers=1, progress=False, path=tmp_path / "block.zarr").ok
+    top = np.abs(data.rest[data.triangles][:, :, 2] - 0.03).max(axis=1) < 1e-9
+    surface = TouchedSurface.of(data.rest, data.triangles[top], radius=RADIUS)
+    train, test = data.take(np.arange(12)), data.take(np.arange(12, len(data)))
+    learnt = learn_displacement(train, surface=surface, radius=RADIUS, seconds=5)
+    nodes = np.unique(data.triangles)
+    errors = learnt.field.errors(test.X, test.displacement[:, nodes])
+    assert np.abs(test.displacement).max() > 1e-3  # it was pressed
+    # what the study of a touched organ asks of its field
+    assert errors.mean() < 0.1e-3
+    assert errors.max() < 0.6e-3

@@ -1,0 +1,59 @@
+"""Field surrogates made by formula, for tests that need one but no solver."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+from touch_made import BOX, DEEPEST, RADIUS, ball, plane
+
+from palpate.network import Network, Scaling
+from palpate.surrogates import FieldSurrogate
+from palpate.surrogates.field import Dimple, Rise
+from palpate.units import Quantity, bounds
+
+
+@functools.cache
+def grid(side: int = 15) -> tuple[np.ndarray, np.ndarray]:
+    """Points of the face z = 0, 100 mm wide, and of one below it; triangles of the face."""
+    x = np.linspace(-0.05, 0.05, side)
+    points = np.array([(a, b, 0.0) for a in x for b in x] + [(0.0, 0.0, -0.03)])
+    k = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)).ravel()
+    lower = np.stack([k, k + side, k + 1], 1)
+    upper = np.stack([k + 1, k + side, k + side + 1], 1)
+    return points, np.vstack([lower, upper])
+
+
+def field(
+    *, components: int = 3, modes: int = 5, extra=(), dimple=True, curved=False, seed=0, **more
+) -> FieldSurrogate:
+    """A field of random modes, coefficients and dimple on the grid."""
+    rng = np.random.default_rng(seed)
+    points, triangles = grid()
+    nodes, inputs = len(points), (*BOX, *extra)
+    n, low, high = len(inputs), *bounds(inputs)
+    mass = rng.uniform(0.5, 1.5, nodes)
+    mass /= mass.sum()
+    basis = np.linalg.qr(rng.normal(size=(nodes * components, modes)))[0].T.reshape(modes, nodes, components)
+    table = np.zeros((1 if components == 1 else 2, 11, 5))
+    table[:, :-3] = rng.normal(0.0, 1e-3, (len(table), 8, 5))
+    net = Network.axis_aligned(
+        inputs,
+        [Quantity(f"b{k}", "") for k in range(modes)],
+        centres=rng.uniform(-1, 1, (6, n)),
+        widths=rng.uniform(0.5, 2.0, (6, n)),
+        weights=rng.normal(size=(modes, 6)),
+        tail=rng.normal(size=(modes, 1 + n)),
+        scaling=Scaling((low + high) / 2, (high - low) / 2, np.zeros(modes), np.full(modes, 1e-3)),
+    )
+    parts = {
+        "rise": Rise("series", DEEPEST, 1e-3),
+        "surface": ball() if curved else plane(),
+        "radius": RADIUS,
+        "dimple": Dimple(table, 0.02, points[:, 2] == 0.0) if dimple else None,
+        "rest": rng.normal(0.0, 1e-3, (nodes, components)),
+    } | more
+    rest = parts.pop("rest")
+    return FieldSurrogate(
+        "displacement", "m", net, basis / np.sqrt(mass)[:, None], rest, points, triangles, mass, **parts
+    )

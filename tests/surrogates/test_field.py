@@ -1,0 +1,239 @@
+"""A field under a touch: its formula, nothing without contact, its errors parted, its file."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from field_made import field, grid
+from touch_made import DEEPEST, PROBE, RADIUS, SOFT, around_points, ball, inside_points, surrogate
+
+from palpate.errors import FileFormatError, UsageError
+from palpate.network import Archive, load_archive, save_archive
+from palpate.surrogates import FieldSurrogate, TouchedBody
+from palpate.surrogates.field import Dimple, Rise
+from palpate.surrogates.field.dimple import products
+from palpate.surrogates.field.rise import RISES
+
+
+def by_formula(F: FieldSurrogate, x: np.ndarray) -> np.ndarray:
+    """y₀ + f (Σ b φ + g₀ n + g₁ t/L) inside the trained region, with SciPy's splines."""
+    from scipy.interpolate import BSpline
+
+    d, n, _ = (a[0] for a in F.surface.at(x[None, :3]))
+    s = F.radius - d
+    p, a = {"linear": 1.0, "hertz": 1.5, "square": 2.0, "series": 2.0}[F.rise.name], F.rise.length
+    f = (s / F.rise.deepest) ** p * math.sqrt((1 + F.rise.deepest / a) / (1 + s / a))
+    shown = np.tensordot(F.network.predict(x[None])[0], F.modes, 1)
+    if F.dimple is not None:
+        _, r, q = F.dimple.table.shape
+        offset = F.points - (x[:3] - d * n)
+        rho = np.linalg.norm(offset, axis=1)
+        near = np.flatnonzero(F.dimple.touched & (rho < F.dimple.reach))
+        in_depth = BSpline(np.arange(-3.0, q + 1), np.moveaxis(F.dimple.table, 2, 0), 3)
+        profile = in_depth(s / F.rise.deepest * (q - 3))  # (parts, r)
+        g = BSpline(np.arange(-3.0, r + 1), profile.T, 3)(rho[near] / F.dimple.reach * (r - 3))
+        if F.rest.shape[1] == 1:
+            shown[near, 0] += g[:, 0]
+        else:
+            across = offset[near] - (offset[near] @ n)[:, None] * n
+            shown[near] += g[:, :1] * n + g[:, 1:] * across / F.dimple.reach
+    return F.rest + f * shown
+
+
+@pytest.mark.parametrize("rise", RISES)
+@pytest.mark.parametrize("components", [1, 3])
+def test_the_field_is_its_formula(rise, components):
+    F = field(components=components, rise=Rise(rise, DEEPEST, 1e-3 if rise == "series" else math.inf))
+    X = inside_points(20)
+    expected = np.array([by_formula(F, x) for x in X])
+    assert F.dimple.touched.sum() == len(F.points) - 1
+    np.testing.assert_allclose(F.values(X), expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+
+
+def test_on_a_curved_surface_the_dimple_follows_its_normal():
+    F = field(curved=True)
+    X = np.array([[0.006, -0.004, 0.0055], [0.0, 0.008, 0.004]])
+    assert (F.depth(X) > 0).all()
+    expected = np.array([by_formula(F, x) for x in X])
+    np.testing.assert_allclose(F.values(X), expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("components", [1, 3])
+def test_without_contact_the_field_is_that_at_rest_to_the_last_bit(components):
+    F = field(components=components)
+    X = around_points(200)
+    away = X[F.depth(X) <= 0]
+    assert len(away) > 20
+    assert (F.values(away) == F.rest).all()
+    ev = F.evaluator()
+    assert not ev(away[0])
+    assert (ev.field() == F.rest.astype(np.float32)).all()
+
+
+def test_with_rest_zero_nothing_moves_without_contact_and_little_at_first_touch():
+    F = field(rest=np.zeros((226, 3)))
+    above = np.array([[0.001, 0.002, RADIUS + h] for h in (1e-9, 1e-3)])
+    assert not F.values(above).any()
+    # f of "series" begins with s²: a depth ten times less moves a hundred times less
+    first, second = (np.abs(F.values(np.array([[0.001, 0.002, RADIUS - s]]))).max() for s in (1e-6, 1e-7))
+    assert second / first == pytest.approx(0.01, rel=2e-3)  # 1 + s/a, and what is linear in s of b
+
+
+def test_beyond_the_trained_depth_the_field_goes_on_in_proportion():
+    rise = Rise("square", DEEPEST)
+    s = DEEPEST * np.array([-1.0, 0.0, 0.5, 1.0, 2.0, 3.0])
+    np.testing.assert_allclose(rise.at(s), [0, 0, 0.25, 1, 2, 3], rtol=1e-15)
+    F = field()
+    far = np.array([[0.0, 0.0, -0.2], [0.3, 0.2, 0.0], [0.0, 0.0, RADIUS - 10 * DEEPEST]])
+    assert np.isfinite(F.values(far)).all()
+
+
+def test_a_radius_may_be_an_input():
+    F = field(extra=(SOFT, PROBE), radius_input=4, radius=math.nan)
+    X = inside_points(30, (SOFT, PROBE))
+    np.testing.assert_allclose(F.depth(X), X[:, 4] - F.surface.at(X[:, :3])[0], atol=1e-15)
+    one = X[F.depth(X) > 0][:1]
+    alone = dataclasses.replace(F, radius_input=None, radius=float(one[0, 4]))
+    np.testing.assert_array_equal(alone.values(one), F.values(one))
+
+
+def test_single_precision_costs_seven_digits_and_no_more():
+    F = field()
+    ev, double = F.evaluator(), F.evaluator(precision="double")
+    for x in inside_points(20):
+        ev(x)
+        double(x)
+        size = np.abs(F.modes).max(axis=(1, 2)) @ np.abs(double.coefficients) + np.abs(F.rest).max()
+        # 2 + k roundings of 2⁻²⁴ on each side of k + 1 products, and the dimple's
+        assert np.abs(ev.field() - double.field()).max() <= 2 * (len(F.modes) + 4) * 2.0**-24 * size
+        np.testing.assert_array_equal(double.values, F.values(x[None])[0])
+        np.testing.assert_array_equal(double.coefficients, F.coefficients(x[None])[0])
+
+
+def test_an_input_that_is_not_finite_gives_no_number():
+    ev = field(dimple=False).evaluator()
+    assert not ev([0.0, np.nan, 0.005])
+    assert np.isnan(ev.field()).all()
+
+
+def test_errors_are_parted_at_right_angles():
+    F, rng = field(), np.random.default_rng(1)
+    X = inside_points(12)
+    answered = F.values(X)
+    a = rng.normal(0.0, 1e-3, (12, len(F.modes)))
+    within = np.tensordot(a, F.modes, 1)
+    outside = rng.normal(0.0, 1e-3, answered.shape)
+    outside -= np.tensordot(np.einsum("njc,kjc,j->nk", outside, F.modes, F.mass), F.modes, 1)
+    found = F.errors(X, answered + within + outside)
+    np.testing.assert_allclose(found.learning, np.linalg.norm(within, axis=2), atol=1e-15)
+    np.testing.assert_allclose(found.truncation, np.linalg.norm(outside, axis=2), atol=1e-15)
+    np.testing.assert_allclose(found.rms("learning"), np.linalg.norm(a, axis=1), rtol=1e-12)
+    squares = found.rms("truncation") ** 2 + found.rms("learning") ** 2
+    np.testing.assert_allclose(found.rms() ** 2, squares, rtol=1e-12)
+    assert found.as_dict()["total"] == {"mean": found.mean(), "max": found.max()}
+    assert str(found).endswith("mm")
+    assert f"{1e3 * found.mean():.3g} / {1e3 * found.max():.3g}" in str(found)
+
+
+def test_the_splines_are_the_textbook_ones():
+    from scipy.interpolate import BSpline
+
+    t = np.random.default_rng(0).uniform(0, 1, 50)
+    P = products(t, 1 - t, (9, 5))
+    r = BSpline.design_matrix(6 * t, np.arange(-3.0, 10), 3).toarray()[:, :6]
+    q = BSpline.design_matrix(2 * (1 - t), np.arange(-3.0, 6), 3).toarray()
+    np.testing.assert_allclose(P, r[:, :, None] * q[:, None], atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "more",
+    [{}, {"components": 1, "dimple": False}, {"extra": (SOFT, PROBE), "radius_input": 4, "radius": math.nan}],
+    ids=["vector", "scalar", "family"],
+)
+def test_the_file_gives_the_same_bits_back(tmp_path, more):
+    F = field(**more, meta={"solves": 7})
+    again = FieldSurrogate.load(F.save(tmp_path / "f.palpate"))
+    X = around_points(50, more.get("extra", ()))
+    np.testing.assert_array_equal(again.values(X), F.values(X))
+    assert str(again) == str(F)
+    assert again.meta == {"solves": 7}
+
+
+def test_a_body_keeps_energy_and_fields_in_one_file_with_one_surface(tmp_path):
+    S = surrogate()
+    F = {"displacement": field(), "von Mises stress": field(components=1, seed=2)}
+    path = TouchedBody(S, F).save(tmp_path / "b.palpate")
+    assert sum(name.startswith("surface/") for name in load_archive(path).arrays) == 3
+    again = TouchedBody.load(path)
+    X = around_points(50)
+    np.testing.assert_array_equal(again.touch.force(X), S.force(X))
+    for name, one in F.items():
+        np.testing.assert_array_equal(again.fields[name].values(X), one.values(X))
+        assert again.fields[name].surface is again.touch.surface
+    with pytest.raises(FileFormatError, match="touched-body"):
+        FieldSurrogate.load(path)
+
+
+def test_fields_of_another_body_are_refused():
+    with pytest.raises(UsageError, match="not of the body"):
+        TouchedBody(surrogate(), {"u": field(curved=True)})
+    with pytest.raises(UsageError, match="not of the body"):
+        TouchedBody(surrogate(surface=ball()), {"u": field()})
+    with pytest.raises(UsageError, match="not of the body"):
+        TouchedBody(surrogate(), {"u": field(extra=(SOFT,))})
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"rise": "cube"}, {"reach": -1.0}, {"radius": True}, {"widths": [0.1]}, {"meta": []}, {"name": 3}],
+)
+def test_a_file_with_a_valid_checksum_and_parts_that_do_not_fit_is_refused(tmp_path, change):
+    archive = load_archive(field().save(tmp_path / "f.palpate"))
+    meta = dict(archive.meta) | change
+    save_archive(tmp_path / "f.palpate", Archive(archive.networks, archive.arrays, meta, archive.kind))
+    with pytest.raises(FileFormatError, match="field"):
+        FieldSurrogate.load(tmp_path / "f.palpate")
+
+
+@pytest.mark.parametrize("name", ["modes", "mass", "triangles", "table", "touched"])
+def test_a_file_with_an_array_of_another_kind_or_shape_is_refused(tmp_path, name):
+    archive = load_archive(field().save(tmp_path / "f.palpate"))
+    for array in (archive.arrays[name].astype(np.float32), archive.arrays[name][:-1].copy()):
+        arrays = dict(archive.arrays) | {name: array}
+        if name == "triangles" and array.dtype == np.int64:
+            continue  # a triangle less is a smaller surface, no fault
+        if name == "table" and array.dtype == np.float64:
+            array = archive.arrays[name][:1].copy()  # a scalar's table for a vector
+            arrays[name] = array
+        save_archive(tmp_path / "g.palpate", Archive(archive.networks, arrays, archive.meta, archive.kind))
+        with pytest.raises(FileFormatError, match="field"):
+            FieldSurrogate.load(tmp_path / "g.palpate")
+
+
+def test_parts_that_do_not_fit_are_refused():
+    F = field()
+    for more in (
+        {"rest": np.zeros((4, 3))},
+        {"mass": 2 * F.mass},
+        {"radius": -1.0},
+        {"triangles": np.array([[0, 1, 999]])},
+        {"radius_input": 2},
+        {"modes": F.modes[:-1]},
+        {"dimple": Dimple(F.dimple.table[:1], 0.02, F.dimple.touched)},
+    ):
+        with pytest.raises(UsageError, match="field surrogate"):
+            dataclasses.replace(F, **more)
+    with pytest.raises(UsageError, match="rise"):
+        Rise("cube", 0.01)
+    with pytest.raises(UsageError, match="length"):
+        Rise("square", 0.01, 1e-3)
+    with pytest.raises(UsageError, match="dimple"):
+        Dimple(np.ones((2, 9, 5)), 0.02, F.dimple.touched)
+    with pytest.raises(UsageError, match="shape"):
+        F.values(np.zeros((3, 2)))
+    with pytest.raises(UsageError, match="answered"):
+        F.evaluator()(np.zeros(2))
+    assert len(grid()[0]) == len(F.points)

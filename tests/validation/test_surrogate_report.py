@@ -1,0 +1,62 @@
+"""The report of a touched body: what its figures show is what was solved and what the surrogate answers."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+from linear_bodies import history, tip_data, tip_model
+
+from palpate.validation import Chapter, SurrogateChapter, TouchSolves, validate, write_report
+from palpate.validation.report.surrogates.curves import curves
+from palpate.validation.report.surrogates.view import View, at_depth, feet
+from palpate.validation.words import bound
+from pressed import DEEPEST, INPUTS, RADIUS, force, places, solves, steady, surrogate
+
+HOSTILE = '<script>window.hacked = 1</script> $\\frac{1}$ "&amp;'
+
+
+def columns() -> TouchSolves:
+    """Five depths in each of four columns."""
+    feet_at = np.array([[-0.015, -0.015], [0.015, -0.01], [0.0, 0.0], [0.01, 0.015]])
+    depth = np.linspace(0.2, 1.0, 5) * DEEPEST
+    X = np.array([[x, y, RADIUS - s] for x, y in feet_at for s in depth])
+    return solves(X)
+
+
+def test_curves_lie_on_the_closed_form_with_the_solves_of_their_column() -> None:
+    test = columns()
+    found = curves(surrogate(), test)
+    assert len(found) == 4
+    assert sorted(np.concatenate([c.rows for c in found])) == list(range(20))
+    for curve in found:
+        line = np.repeat(test.X[curve.rows[:1]], len(curve.depth), axis=0)
+        line[:, 2] = RADIUS - curve.depth
+        np.testing.assert_allclose(curve.force, np.linalg.norm(force(line), axis=1), atol=1e-12)
+        assert (np.diff(RADIUS - test.X[curve.rows, 2]) < 0).all()
+
+
+def test_a_flat_face_is_seen_from_above() -> None:
+    S, X = surrogate(), places(50)
+    view = View.of(S, X)
+    np.testing.assert_allclose(view.out, [0, 0, 1], atol=1e-12)
+    np.testing.assert_allclose(view.flat(feet(S, X)), X[:, :2], atol=1e-12)
+    assert view.labels() == ("x / mm", "y / mm")
+    there = at_depth(S, view, X[:, :2], X[0], 0.004)
+    np.testing.assert_allclose(there, np.column_stack([X[:, :2], np.full(50, RADIUS - 0.004)]), atol=1e-6)
+
+
+def test_both_kinds_of_bodies_stand_in_one_report(tmp_path: Path) -> None:
+    S, test = surrogate(root=steady(0.01), meta={"name": HOSTILE, "solves": 12}), solves()
+    touched = SurrogateChapter(HOSTILE, S, test, validate(S, test), settings={HOSTILE: 1.0})
+    unsure = dataclasses.replace(touched, name="no posterior", surrogate=surrogate())
+    touch, data = tip_model(), tip_data()
+    held = Chapter("beam", touch, data, data, validate(touch, data), history())
+    text = write_report(tmp_path / "both.html", [held, touched, unsure]).read_text(encoding="utf-8")
+    assert "<script" not in text
+    assert text.count('id="c2-trust"') == text.count('id="c3-curves"') == text.count('id="c1-shapes"') == 1
+    assert "The surrogate states no deviation." in text
+    # overconfident or too careful: here no error at all, which no 90 % interval should hold all of
+    assert "Share of errors within the 90" in text.split("What was missed")[1]
+    assert bound(str(INPUTS[0])) in text

@@ -73,9 +73,11 @@ def test_units_that_are_wrong_by_a_thousand_are_suspicious():
     assert np.log(1e3) / np.hypot(0.5, 0.3) < done.surprise < np.log(1e3) / 0.5
     assert f"{done.surprise:.0f} standard deviations" in done.warning
     rng = np.random.default_rng(3)
-    done = correct(S, record(X, S.force(X) + (rng.random((30, 1)) < 0.4) * 5.0))
+    X = touches(80, 3)
+    slipped = (rng.random((80, 1)) < 0.38) * rng.normal(0.0, 5.0, (80, 3))
+    done = correct(S, record(X, S.force(X) + slipped))
     assert "touches are outliers" in done.warning
-    done = correct(S, record(X, S.force(X) + 0.2 * rng.standard_normal((30, 3))))
+    done = correct(S, record(X, S.force(X) + 0.2 * rng.standard_normal((80, 3))))
     assert "times as much as the noise" in done.warning
 
 

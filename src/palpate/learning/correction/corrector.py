@@ -119,7 +119,7 @@ class Corrector:
         self._may = opened(self.model, discrepancy)
         self._anchor = self._belief = Belief.standard(self._may.root.shape[1] + 1)
         self._parameters, self._window, self._memory = p, window, memory
-        self._strain = 1.0
+        self._strain = self._strain_before = 1.0  # now, and when the window began
         self._seen: list[Touches] = []
         self._learnt: list[bool] = []
 
@@ -220,6 +220,7 @@ class Corrector:
 
         So the choice does not depend on which came first.
         """
+        self._strain = self._strain_before  # taken again, the same window gives the same
         weights, everyone = np.ones(len(touches)), np.ones(len(touches), bool)
         for _ in range(_ROUNDS):
             self._belief = self._anchor.learnt(touches.weighted(weights / self._strain**2))
@@ -266,6 +267,7 @@ class Corrector:
             self.settle()
             self.counts["learnt" if learnt else "outlier"] -= 1
             self._anchor, self._seen, self._learnt = self._belief, [], []
+            self._strain_before = self._strain
 
     def _outside(self, x: np.ndarray, depth: float) -> bool:
         """Deeper than trained, or far beyond a range."""

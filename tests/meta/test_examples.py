@@ -189,6 +189,14 @@ def tissue(text: str, folder: Path) -> None:
     assert (folder / "tissue.zarr" / "zarr.json").is_file()
 
 
+def specimen(text: str, folder: Path) -> None:
+    medians = [float(v) for v in re.findall(r"([\d.]+) % median", text)]
+    assert len(medians) == 6
+    assert medians[0] == pytest.approx(50, abs=5)  # 1.4 times the modulus, and up to e^0.3 times by the layer
+    assert medians[-1] < 0.05 * medians[0]
+    assert (folder / "specimen.palpate").stat().st_size > 1000
+
+
 CHECKS: dict[str, Callable[[str, Path], None]] = {
     "01_cantilever.py": cantilever,
     "02_two_loads.py": two_loads,
@@ -201,6 +209,7 @@ CHECKS: dict[str, Callable[[str, Path], None]] = {
     "09_bend_copper_past_yield.py": copper,
     "10_creeping_nylon.py": nylon,
     "11_press_soft_tissue.py": tissue,
+    "12_correct_from_a_specimen.py": specimen,
 }
 QUICK = {"04_filter_by_hand.py"}
 

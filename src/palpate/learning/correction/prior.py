@@ -27,7 +27,7 @@ __all__ = ["Discrepancy", "Opened", "extended", "opened", "regressors"]
 
 _KEPT = 1e-5  # of the largest variance: directions of the slow change below it are left out
 _MOST = 80  # such directions
-_POINTS = 256  # where the slow change is matched, where no training inputs are known
+_POINTS = 256  # places at least where the slow change is matched
 _RIDGE = 1e-6  # of a regressor's mean square
 
 
@@ -171,6 +171,8 @@ def _slow(surrogate: TouchSurrogate, discrepancy: Discrepancy) -> tuple[np.ndarr
 
 
 def _points(surrogate: TouchSurrogate) -> np.ndarray:
-    """Scaled inputs (k, n) of the training, the first ones far from each other; random ones where it is not known."""
+    """Scaled inputs (k, n) of the training, the first far from each other, and random ones where few are known."""
     n, region = len(surrogate.inputs), surrogate.region
-    return np.random.default_rng(0).uniform(-1.0, 1.0, (_POINTS, n)) if region is None else region.points
+    known = np.zeros((0, n)) if region is None else region.points
+    more = np.random.default_rng(0).uniform(-1.0, 1.0, (max(_POINTS - len(known), 0), n))
+    return np.concatenate([known, more])

@@ -120,7 +120,7 @@ def measured(form: str, size: float, depths: Sequence[float]) -> dict[str, Any]:
         "size": 1e3 * size,
         **_operations(problem),
         **_samples(problem, depths),
-        "memory": _gigabytes("VmHWM"),  # the peak; ru_maxrss would count the parent's too, from before the exec
+        "memory": _gigabytes("VmHWM"),  # ru_maxrss would count the parent's too, from before the exec
         "swap": _gigabytes("VmSwap"),
     }
 

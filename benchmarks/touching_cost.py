@@ -6,7 +6,6 @@ python -m benchmarks.touching_cost [--quick] [--json | --markdown]
 from __future__ import annotations
 
 import json
-import resource
 import subprocess
 import sys
 import time
@@ -121,8 +120,8 @@ def measured(form: str, size: float, depths: Sequence[float]) -> dict[str, Any]:
         "size": 1e3 * size,
         **_operations(problem),
         **_samples(problem, depths),
-        "memory": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6,  # kB on Linux
-        "swap": _swapped(),
+        "memory": _gigabytes("VmHWM"),  # ru_maxrss would count the parent's too, from before the exec
+        "swap": _gigabytes("VmSwap"),
     }
 
 
@@ -164,10 +163,10 @@ def _samples(problem: Any, depths: Sequence[float]) -> dict[str, float]:
     }
 
 
-def _swapped() -> float:
-    """Memory of this process that has been swapped out, GB."""
+def _gigabytes(name: str) -> float:
+    """A figure of this process' memory by Linux's name for it, GB."""
     lines = Path("/proc/self/status").read_text(encoding="utf-8").splitlines()
-    return next((float(line.split()[1]) / 1e6 for line in lines if line.startswith("VmSwap")), 0.0)
+    return next((float(line.split()[1]) / 1e6 for line in lines if line.startswith(f"{name}:")), 0.0)
 
 
 def _run(arguments: Sequence[str]) -> int:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import importlib.util
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 import typer
+
+from programs import run_program
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -41,23 +40,11 @@ def test_the_program_runs_as_a_file_without_a_guard(tmp_path: Path):
     text = program(README)
     assert "__main__" not in text
     assert len([line for line in text.splitlines() if line and not line.startswith("import")]) <= 9
-    (tmp_path / "program.py").write_text(text, encoding="utf-8")
-    (tmp_path / "site").mkdir()
-    (tmp_path / "site" / "sitecustomize.py").write_text(STANDS_IN, encoding="utf-8")
-    path = os.pathsep.join(filter(None, [str(tmp_path / "site"), os.environ.get("PYTHONPATH", "")]))
-    done = subprocess.run(
-        [sys.executable, "program.py"],
-        check=False,
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        encoding="utf-8",
-        env=os.environ | {"PYTHONPATH": path, "PYTHONIOENCODING": "utf-8"},
-        stdin=subprocess.DEVNULL,
-        timeout=200,
-    )
-    assert done.returncode == 0, done.stderr[-3000:]
-    assert "served: TouchModel" in done.stdout
+    site = tmp_path / "site"
+    site.mkdir()
+    (site / "sitecustomize.py").write_text(STANDS_IN, encoding="utf-8")
+    printed = run_program(text, tmp_path, 200, site=site)
+    assert "served: TouchModel" in printed
     assert (tmp_path / "beam.palpate").is_file()
 
 
@@ -71,35 +58,14 @@ def titled(title: str) -> str:
 def test_the_program_for_soft_bodies_runs(tmp_path: Path):
     text = titled("Soft bodies")
     assert "samples=24" in text
-    done = subprocess.run(
-        [sys.executable, "-c", text.replace("samples=24", "samples=3")],
-        check=False,
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        encoding="utf-8",
-        env=os.environ | {"PYTHONIOENCODING": "utf-8"},
-        timeout=280,
-    )
-    assert done.returncode == 0, done.stderr[-3000:]
-    assert done.stdout.startswith("Solid of ")
+    printed = run_program(text.replace("samples=24", "samples=3"), tmp_path, 280)
+    assert printed.startswith("Solid of ")
     assert {path.name for path in tmp_path.iterdir()} >= {"pressed.png", "pressed.vtu", "block.zarr"}
 
 
 def test_the_program_for_arrays_runs(tmp_path: Path):
-    text = titled("From your own arrays")
-    done = subprocess.run(
-        [sys.executable, "-c", text],
-        check=False,
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        encoding="utf-8",
-        env=os.environ | {"PYTHONIOENCODING": "utf-8"},
-        timeout=100,
-    )
-    assert done.returncode == 0, done.stderr[-3000:]
-    assert done.stdout.startswith("Fitted: 2 inputs → 2 outputs")
+    printed = run_program(titled("From your own arrays"), tmp_path, 100)
+    assert printed.startswith("Fitted: 2 inputs → 2 outputs")
     assert (tmp_path / "model.palpate").is_file()
 
 

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +11,7 @@ from linear_bodies import tip_model
 
 from palpate.study import Study
 from palpate.validation import Limits
+from programs import run_program
 
 GUIDE = (Path(__file__).parents[2] / "docs" / "guide" / "python.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL)
@@ -23,20 +21,8 @@ BLOCKS = re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL)
 @pytest.mark.timeout(240)
 def test_the_program_that_writes_a_report_runs(tmp_path: Path) -> None:
     (program,) = (block for block in BLOCKS if "write_report(" in block)
-    (tmp_path / "program.py").write_text(program, encoding="utf-8")
-    done = subprocess.run(
-        [sys.executable, "program.py"],
-        check=False,
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        encoding="utf-8",
-        env=os.environ | {"PYTHONIOENCODING": "utf-8"},
-        stdin=subprocess.DEVNULL,
-        timeout=200,
-    )
-    assert done.returncode == 0, done.stderr[-3000:]
-    assert "beam on 16 unseen solves: every limit kept" in done.stdout
+    printed = run_program(program, tmp_path, 200)
+    assert "beam on 16 unseen solves: every limit kept" in printed
     assert "A cantilever of nylon (E = 2 GPa)" in (tmp_path / "beam.html").read_text(
         encoding="utf-8"
     ).replace("\N{NO-BREAK SPACE}", " ")

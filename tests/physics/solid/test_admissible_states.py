@@ -13,6 +13,17 @@ from palpate.physics.interactions.contact import Contact
 from palpate.physics.interactions.patch import winding_number
 
 
+def test_a_corner_turned_over_between_the_quadrature_points_is_seen():
+    """u_x = -a x²/(2 L) with a just above 1: det F = 1 - a x/L is negative at the face x = L only."""
+    model = pressed(element=0.02).open()._model
+    z = model.field.interpolate(ngsolve.CF((-1.002 * ngsolve.x**2 / (2 * SIZE[0]), 0, 0)))
+    model.field.show(z)
+    inside = np.linalg.det(model.measures._gradients(large=True))
+    assert inside.min() > 0
+    assert model.measures.least_volume_ratio() == pytest.approx(-0.002, rel=1e-6)
+    assert model.judge(z, above(0.0)).stop is Stop.ELEMENT_INVERTED
+
+
 @pytest.fixture(scope="module")
 def field():
     return pressed().open()._model.field

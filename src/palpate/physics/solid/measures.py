@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.physics.solid.density import cauchy_stress, deformation_gradient, mixed_density, volume_rule
+from palpate.physics.solid.midsides import CORNERS, MIDDLES
 
 if TYPE_CHECKING:
     from palpate.physics.materials.material import Material
@@ -155,9 +156,7 @@ def _corners_and_middles() -> Any:
     """The nodes of a tetrahedron of second order as points to look at."""
     import ngsolve
 
-    corners = np.vstack([np.eye(3), np.zeros(3)])
-    middles = [(a + b) / 2 for a, b in itertools.combinations(corners, 2)]
-    points = [tuple(point) for point in np.vstack([corners, middles]).tolist()]
+    points = [tuple(point) for point in np.vstack([CORNERS, MIDDLES]).tolist()]
     return ngsolve.IntegrationRule(points, [1.0] * len(points))
 
 

@@ -12,10 +12,11 @@ import numpy as np
 if TYPE_CHECKING:
     from palpate.physics.solid.field import SolidField
 
-__all__ = ["MidSides", "Middles"]
+__all__ = ["CORNERS", "MIDDLES", "MidSides", "Middles"]
 
 CORNERS = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]])  # of NGSolve's tetrahedron
 PAIRS = list(itertools.combinations(range(4), 2))
+MIDDLES = np.array([(CORNERS[i] + CORNERS[j]) / 2 for i, j in PAIRS])  # of its edges
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +55,7 @@ class Middles:
         import ngsolve
 
         mesh = self._field.mesh
-        middles = [tuple((CORNERS[i] + CORNERS[j]) / 2) for i, j in PAIRS]
-        rule = ngsolve.IntegrationRule(points=middles, weights=[1 / 36] * 6)
+        rule = ngsolve.IntegrationRule(points=[tuple(m) for m in MIDDLES], weights=[1 / 36] * 6)
         mapped = mesh.MapToAllElements(rule, mesh.Materials(".*"))
         nodes = mesh.ngmesh.Elements3D().NumPy()["nodes"][:, :4].astype(np.int64) - 1
         ends = np.sort(nodes[:, PAIRS].reshape(-1, 2), axis=1)

@@ -1,0 +1,131 @@
+"""Bodies that the surrogates are measured on: shape, material, probe, and the part of the surface that is pressed.
+
+Of a body with symmetries only one part is solved, a quadrant; its images stand for the rest. Every study has the
+sphere of 10 mm with a pad of 2·10⁶ N/m³ and a stop of 4 mm, unless its name says otherwise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from palpate.physics.geometry import Block, Dome, LayeredBlock, Organ
+from palpate.physics.interactions import SphereProbe
+from palpate.physics.materials import NeoHookean
+from palpate.physics.solid import Body, SolidProblem
+
+__all__ = ["STUDIES", "TouchStudy"]
+
+RADIUS, PAD, SOFT_PAD, STOP = 0.01, 2e6, 1e4, 0.004
+POISSON = 0.45
+LEAST = 2e-4  # m: depths begin here, where the force is a thousandth of the largest
+CLEAR = 0.012  # m of a named surface around a footprint: half the widest contact
+
+Values = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class TouchStudy:
+    """One body under the probe.
+
+    Attributes
+    ----------
+    body : callable
+        Further inputs → Body.
+    touches : str
+        Surface that is pressed.
+    depth : float
+        Largest, in m.
+    over : pair of corners, optional
+        Box of the footprints in m; without it all of the surface that is `CLEAR` of its rim.
+    pad : float
+        In N/m³.
+    symmetry : str
+        ``"square"`` (8 images), ``"round"`` or ``"none"``.
+    about : (2,) tuple
+        Where the axis of symmetry stands, in m.
+    within : float
+        Farthest footprint from that axis, in m.
+    inputs : tuple of (name, low, high, unit)
+        Beyond the position.
+    wanted : int
+        Number of training solves at which targets are set.
+    target : tuple of float
+        Median and 95th percentile of the relative force error that are asked for; NaN where nothing is.
+    """
+
+    body: Callable[..., Body]
+    touches: str = "top"
+    depth: float = 0.012
+    over: Any = None
+    pad: float = PAD
+    symmetry: str = "square"
+    about: tuple[float, float] = (0.0, 0.0)
+    within: float = np.inf
+    inputs: tuple[tuple[str, float, float, str], ...] = ()
+    wanted: int = 80
+    target: tuple[float, float] = (0.005, 0.02)
+
+    @property
+    def probe(self) -> SphereProbe:
+        """The sphere."""
+        return SphereProbe(
+            RADIUS,
+            touches=self.touches,
+            pad=self.pad,
+            stop=STOP,
+            depth=(0.0, self.depth),
+            over=self.over,
+        )
+
+    def problem(self, values: Values = (), *, finer: float = 1.0) -> SolidProblem:
+        """The body of these inputs under the probe; elements `finer` times smaller where it is pressed."""
+        body, probe = self.body(*values), self.probe
+        element = None if finer == 1.0 else min(f.element for f in probe.refinements(body.geometry)) / finer
+        return body.problem(probe, element=element)
+
+
+def _block() -> Body:
+    return Body(Block((0.1, 0.1, 0.05)), NeoHookean(9e3, POISSON), fixed="bottom")
+
+
+def _layered(fat: float = 4e3, muscle: float = 15e3) -> Body:
+    layers = (("skin", 0.002), ("fat", 0.010), ("muscle", 0.028))
+    moduli = {"skin": 30e3, "fat": fat, "muscle": muscle}
+    materials = {name: NeoHookean(modulus, POISSON) for name, modulus in moduli.items()}
+    return Body(LayeredBlock((0.1, 0.1), layers), materials, fixed="bottom")
+
+
+def _dome() -> Body:
+    materials = {"skin": NeoHookean(20e3, POISSON), "body": NeoHookean(6e3, POISSON)}
+    return Body(Dome(0.06, 0.045, layer=0.002), materials, fixed="bottom")
+
+
+def _liver() -> Body:
+    return Body(Organ(0.2), NeoHookean(6e3, POISSON), fixed="attached")
+
+
+_WHOLE = ((0.05, 0.05), (0.1, 0.1))  # a quadrant of the whole top face
+_MIDDLE = ((0.05, 0.05), (0.08, 0.08))  # of its middle, 60 mm wide
+_BLOCK = TouchStudy(_block, over=_WHOLE, about=(0.05, 0.05), wanted=40, target=(0.003, 0.01))
+_LAYERED = TouchStudy(_layered, over=_MIDDLE, about=(0.05, 0.05))
+
+STUDIES: dict[str, TouchStudy] = {
+    "block": _BLOCK,
+    "block-10k": replace(_BLOCK, pad=SOFT_PAD),
+    "layered": _LAYERED,
+    "breast-dome": TouchStudy(_dome, over=((0.0, 0.0), (0.045, 0.045)), symmetry="round", within=0.045),
+    "liver": TouchStudy(
+        _liver, touches="front", depth=0.015, symmetry="none", wanted=200, target=(np.nan, 0.03)
+    ),
+    "family": replace(
+        _LAYERED,
+        inputs=(("E_fat", 2e3, 8e3, "Pa"), ("E_muscle", 8e3, 30e3, "Pa")),
+        wanted=200,
+        target=(np.nan, 0.03),
+    ),
+}
+"""By name, as on the command line and in the files' names."""

@@ -67,13 +67,12 @@ def columns_of(study: TouchStudy, count: int, depths: int, seed: int, role: str)
     engine = qmc.Sobol(3 + len(study.inputs), scramble=True, rng=rng)
     unit = engine.random(1 << int(np.ceil(np.log2(8 * count + 8))))
     found: list[Column] = []
-    for row, foot, normal in _feet(study, unit[:, :2]):
-        share = np.full(depths, unit[row, 2])
+    share = np.sin(np.pi / 2 * unit[:, :2]) if training and study.to_edges else unit[:, :2]
+    for row, foot, normal in _feet(study, share):
+        d = (np.arange(depths) + unit[row, 2]) / depths
         if not training:
-            share = np.random.default_rng([seed, 1, row]).random(depths)
-        d = LEAST + (study.depth - LEAST) * (
-            (np.arange(depths) + share) / depths if training else np.sort(share)
-        )
+            d = np.sort(np.random.default_rng([seed, 1, row]).random(depths))
+        d = LEAST + (study.depth - LEAST) * d
         values = tuple(
             low + (high - low) * u for (_, low, high, _), u in zip(study.inputs, unit[row, 3:], strict=True)
         )

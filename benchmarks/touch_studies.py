@@ -19,7 +19,7 @@ from palpate.physics.solid import Body, SolidProblem
 
 __all__ = ["STUDIES", "TouchStudy"]
 
-RADIUS, PAD, SOFT_PAD, STOP = 0.01, 2e6, 1e4, 0.004
+RADIUS, PAD, STIFF_PAD, STOP = 0.01, 2e6, 2e7, 0.004
 POISSON = 0.45
 LEAST = 2e-4  # m: depths begin here, where the force is a thousandth of the largest
 CLEAR = 0.012  # m of a named surface around a footprint: half the widest contact
@@ -47,6 +47,9 @@ class TouchStudy:
         ``"square"`` (8 images), ``"round"`` or ``"none"``.
     about : (2,) tuple
         Where the axis of symmetry stands, in m.
+    to_edges : bool
+        Whether `over` ends at edges of the body: training footprints are then denser there, where the body gives way
+        within a few mm (by the sine, as Chebyshev's points are).
     within : float
         Farthest footprint from that axis, in m.
     inputs : tuple of (name, low, high, unit)
@@ -64,6 +67,7 @@ class TouchStudy:
     pad: float = PAD
     symmetry: str = "square"
     about: tuple[float, float] = (0.0, 0.0)
+    to_edges: bool = False
     within: float = np.inf
     inputs: tuple[tuple[str, float, float, str], ...] = ()
     wanted: int = 80
@@ -110,12 +114,12 @@ def _liver() -> Body:
 
 _WHOLE = ((0.05, 0.05), (0.1, 0.1))  # a quadrant of the whole top face
 _MIDDLE = ((0.05, 0.05), (0.08, 0.08))  # of its middle, 60 mm wide
-_BLOCK = TouchStudy(_block, over=_WHOLE, about=(0.05, 0.05), wanted=40, target=(0.003, 0.01))
+_BLOCK = TouchStudy(_block, over=_WHOLE, to_edges=True, about=(0.05, 0.05), wanted=40, target=(0.003, 0.01))
 _LAYERED = TouchStudy(_layered, over=_MIDDLE, about=(0.05, 0.05))
 
 STUDIES: dict[str, TouchStudy] = {
     "block": _BLOCK,
-    "block-10k": replace(_BLOCK, pad=SOFT_PAD),
+    "block-10k": replace(_BLOCK, pad=STIFF_PAD),
     "layered": _LAYERED,
     "breast-dome": TouchStudy(_dome, over=((0.0, 0.0), (0.045, 0.045)), symmetry="round", within=0.045),
     "liver": TouchStudy(

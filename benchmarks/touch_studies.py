@@ -1,7 +1,7 @@
 """Bodies that the surrogates are measured on: shape, material, probe, and the part of the surface that is pressed.
 
 Of a body with symmetries only one part is solved, a quadrant; its images stand for the rest. Every study has the
-sphere of 10 mm with a pad of 2·10⁶ N/m³ and a stop of 4 mm, unless its name says otherwise.
+sphere of 10 mm with a pad of k = 2·10⁶ N/m³ and a stop of 4 mm; block-10k has ten times that k.
 """
 
 from __future__ import annotations

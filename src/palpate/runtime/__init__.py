@@ -6,6 +6,7 @@
     clock, priority, histogram        being on time, and knowing how much so
     safety, faults, stability         what may reach a hand
     workspace, devices                where the hand is
+    touchable, pressed                what it is laid on
     realtime                          what this machine permits
 
 Names are loaded when asked for, so that the loop's process imports nothing it doesn't need.

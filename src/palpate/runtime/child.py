@@ -22,8 +22,7 @@ from palpate.runtime.priority import obtain
 from palpate.runtime.rehearsal import rehearsal
 from palpate.runtime.safety import Limits
 from palpate.runtime.shared import Shared
-from palpate.runtime.workspace import Workspace
-from palpate.surrogates import TouchModel
+from palpate.runtime.touchable import load_touchable, workspace_for
 
 __all__ = ["FOREIGN", "main"]
 
@@ -45,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser("python -m palpate.runtime", description="The 1 kHz loop of palpate.")
-    parser.add_argument("model", help="touch model, a .palpate file")
+    parser.add_argument("model", help="touch model or touched body, a .palpate file")
     parser.add_argument("--state", required=True, help="name of the shared memory")
     parser.add_argument("--device", default="page", help="name, or name:key=value,key=value")
     parser.add_argument("--rate", type=float, default=1000.0, help="Hz")
@@ -59,9 +58,9 @@ def _run(options: argparse.Namespace) -> int:
     shared = Shared.attach(options.state)
     shared.unlink()  # both sides have it: from here on no kind of death can leave it behind
     orphaned = _watch_parent()
-    model = TouchModel.load(options.model)
+    model = load_touchable(options.model)
     device = device_named(options.device, shared.command)
-    workspace = Workspace.for_reach(options.radius, model.reach)
+    workspace = workspace_for(model, options.radius)
     limits = Limits(options.max_force, options.slew)
     loop = Loop(model, device, shared, workspace, limits, rate=options.rate, orphaned=orphaned)
     _say({"obtained": obtain()})

@@ -25,6 +25,7 @@ from palpate.errors import DeviceError, UsageError
 from palpate.runtime.clock import Metronome
 from palpate.runtime.devices import Device
 from palpate.runtime.faults import Fault
+from palpate.runtime.pressed import PressedEvaluator
 from palpate.runtime.publisher import Publisher
 from palpate.runtime.safety import Limits, Safety, stalled
 from palpate.runtime.shared import MAX_INPUTS, Shared
@@ -35,7 +36,7 @@ __all__ = ["Evaluator", "Loop", "Model"]
 
 
 class Evaluator(Protocol):
-    """What answers the hand; `palpate.surrogates.TouchEvaluator` does.
+    """What answers the hand; `palpate.surrogates.TouchEvaluator` and `PressedEvaluator` do.
 
     Attributes
     ----------
@@ -118,6 +119,7 @@ class Loop:
                 f"The loop can't run at {rate:g} Hz.", fix="Choose 10 … 10000 Hz; 1000 is usual."
             )
         self.evaluator, self.device, self.workspace = model.evaluator(), device, workspace
+        self.pressed = self.evaluator if isinstance(self.evaluator, PressedEvaluator) else None
         if max(len(self.evaluator.loads), len(model.parameters)) > MAX_INPUTS:
             raise UsageError(
                 f"The model has {len(self.evaluator.loads)} inputs; the runtime carries {MAX_INPUTS}.",
@@ -129,6 +131,7 @@ class Loop:
         self.out.describe(workspace, limits)
         self.parameters = np.array([(r.low + r.high) / 2.0 for r in model.parameters])
         self.fault, self.now, self.holding = Fault.NONE, 0.0, False
+        self._answered, self._sent = math.inf, np.zeros(3)
         self._commands, self._quit = shared.command, shared.command.record["quit"]
         self._wished = shared.command.record["parameters"]
         self._orphaned = orphaned
@@ -207,6 +210,8 @@ class Loop:
     def map(self) -> None:
         """Hand metres to body metres; parameters that were set to those the model takes."""
         self.workspace.to_body(self.out.hand, self.out.position)
+        if self.pressed is not None and not self.holding:
+            self.out.position[:] = self.pressed.away  # a way back to the centre could lead through the body
         for i in range(len(self.parameters)):
             wish = float(self._wished[i])
             if math.isfinite(wish):
@@ -216,7 +221,10 @@ class Loop:
         """Ask the learnt body."""
         if self.fault is not Fault.NONE:
             return
-        answer = self.evaluator
+        answer, pressed = self.evaluator, self.pressed
+        if pressed is not None:
+            pressed.elapsed = max(0.0, self.now - self._answered)
+        self._answered = self.now
         try:
             answer(self.out.position, self.parameters)
         except (ArithmeticError, ValueError, TypeError, IndexError):
@@ -226,6 +234,8 @@ class Loop:
             sum(answer.force.tolist()) + sum(answer.contact.tolist()) + sum(answer.loads.tolist())
         ):
             self.out.answer(answer.contact, answer.loads, inside=answer.inside, mirrored=answer.mirrored)
+            if pressed is not None:
+                self.out.pressed(pressed.depth, pressed.stiffness)
         else:
             self.fail(Fault.OUTPUT_NOT_FINITE)
 
@@ -236,8 +246,9 @@ class Loop:
 
     def write(self) -> None:
         """Push on the hand."""
+        self.workspace.force_on_hand(self.safety.force, self._sent)
         try:
-            self.device.write(self.safety.force)
+            self.device.write(self._sent)
         except (DeviceError, OSError):
             self.safety.stop()  # nobody knows what was sent: don't claim it, and ramp in again
             self.fail(Fault.DEVICE_ERROR)

@@ -25,6 +25,7 @@ class Publisher:
         self._record = record
         self.hand, self.position, self.force = record["hand"], record["position"], record["force"]
         self._contact, self._loads = record["contact"], record["loads"][:inputs]
+        self._depth, self._stiffness = record["depth"], record["stiffness"]
         self._tick, self._time = record["tick"], record["time"]
         self._inside, self._mirrored = record["inside"], record["mirrored"]
         self._grabbed, self._stalled, self._clamped = record["grabbed"], record["stalled"], record["clamped"]
@@ -49,6 +50,10 @@ class Publisher:
         self._contact[:] = contact
         self._loads[:] = loads
         self._inside[()], self._mirrored[()] = inside, mirrored
+
+    def pressed(self, depth: float, stiffness: float) -> None:
+        """How deep a probe is (m), and how stiff the body is under it (N/m)."""
+        self._depth[()], self._stiffness[()] = depth, stiffness
 
     def clamped(self, acted: bool) -> None:
         """Whether the force limit acted."""

@@ -19,9 +19,11 @@ STATE = np.dtype(
         ("tick", "i8"),
         ("time", "f8"),  # s, `now()` when the tick began
         ("hand", "f8", 3),  # m, device coordinates
-        ("position", "f8", 3),  # m, body: offset from the touched node's rest position
-        ("contact", "f8", 3),  # m, body: where the touched node is
-        ("force", "f8", 3),  # N on the hand, as sent
+        ("position", "f8", 3),  # m, body: offset from the touched node's rest position, or the probe's centre
+        ("contact", "f8", 3),  # m, body: where the touched node is, or the probe's centre
+        ("force", "f8", 3),  # N on the hand, as sent, in the body's axes
+        ("depth", "f8"),  # m, of a probe in the surface at rest; 0 for a body held at a node
+        ("stiffness", "f8"),  # N/m, felt along the force in body metres; 0 where it isn't known
         ("loads", "f8", MAX_INPUTS),  # N, the loads that hold the body there
         ("mirrored", "u1"),
         ("inside", "u1"),  # within the trained range
@@ -74,6 +76,8 @@ class State:
     position: np.ndarray
     contact: np.ndarray
     force: np.ndarray
+    depth: float
+    stiffness: float
     loads: np.ndarray
     mirrored: bool
     inside: bool

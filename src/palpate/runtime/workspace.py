@@ -1,7 +1,9 @@
 """From the hand's few centimetres to the body's travel and back.
 
-The device's centre is the touched node's rest position and the axes are parallel. Positions are scaled,
-forces are not: the hand feels the body's own newtons, at a stiffness that is `scale` times the body's.
+Of a body held at one node the device's centre is that node's rest position and the axes are parallel. Of a body
+pressed anywhere it is a place of first contact, and the body stands upright: devices have y up and z towards the
+user, solids z up. Positions are scaled, forces are not: the hand feels the body's own newtons, at a stiffness that
+is `scale` times the body's.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ _USED = 0.8  # share of the radius that the trained reach takes: the rest shows 
 
 @dataclass(frozen=True)
 class Workspace:
-    """A uniform scaling about the device's centre.
+    """A uniform scaling about the device's centre, and a quarter turn for bodies with z up.
 
     Attributes
     ----------
@@ -28,15 +30,21 @@ class Workspace:
         Sphere that the hand can reach, m.
     scale : float
         Metres of body per metre of hand.
+    centre : three floats
+        The device's centre in the body's coordinates, m.
+    upright : bool
+        Whether the body's z is the hand's y: (x, y, z) of the body is (x, −z, y) of the hand.
 
     Raises
     ------
     UsageError
-        If either is not positive.
+        If radius or scale is not positive.
     """
 
     radius: float
     scale: float
+    centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    upright: bool = False
 
     def __post_init__(self) -> None:
         if not (0.0 < self.radius < math.inf and 0.0 < self.scale < math.inf):
@@ -47,17 +55,40 @@ class Workspace:
             )
 
     @classmethod
-    def for_reach(cls, radius: float, reach: float) -> Workspace:
+    def for_reach(
+        cls,
+        radius: float,
+        reach: float,
+        *,
+        centre: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        upright: bool = False,
+    ) -> Workspace:
         """Workspace of `radius` (m) whose 80 % is the model's `reach` (m)."""
-        return cls(radius, reach / (_USED * radius) if radius > 0.0 else math.nan)
+        scale = reach / (_USED * radius) if radius > 0.0 else math.nan
+        return cls(radius, scale, centre, upright)
 
     def to_body(self, hand: np.ndarray, position: np.ndarray) -> None:
-        """Write the body offset (3,) of a hand position (3,), both m, into `position`."""
-        np.multiply(hand, self.scale, out=position)
+        """Write the body position (3,) of a hand position (3,), both m, into `position`."""
+        if not self.upright:
+            np.multiply(hand, self.scale, out=position)
+            return
+        x, y, z = hand.tolist()
+        scale, centre = self.scale, self.centre
+        position[0] = centre[0] + scale * x
+        position[1] = centre[1] - scale * z
+        position[2] = centre[2] + scale * y
 
     def to_hand(self, position: np.ndarray) -> np.ndarray:
-        """Hand position (3,) of a body offset (3,), both m."""
-        return np.asarray(position) / self.scale
+        """Hand position (3,) of a body position (3,), both m."""
+        offset = (np.asarray(position) - self.centre) / self.scale
+        return np.array([offset[0], offset[2], -offset[1]]) if self.upright else offset
+
+    def force_on_hand(self, force: np.ndarray, sent: np.ndarray) -> None:
+        """Write a force (3,) of the body's axes, N, into `sent`, in the device's."""
+        if not self.upright:
+            sent[:] = force
+            return
+        sent[0], sent[1], sent[2] = force[0], force[2], -force[1]
 
     def felt(self, stiffness: float) -> float:
         """Stiffness (N/m) that the hand feels of a body's `stiffness` (N/m)."""

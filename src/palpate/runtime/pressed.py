@@ -1,0 +1,276 @@
+"""A body pressed anywhere, as the loop and the page need it: where the hand rests, how deep and stiff it is.
+
+The probe's centre c is the hand's place itself, in the body's coordinates, z up. Nothing of the body's answer is
+made here: energy, force and stiffness are the surrogate's, and memory, where its file tells of branches, is
+`palpate.surrogates.relaxation`. A file tells of them in its ``meta``,
+
+    relaxation = {"terms": [[share, time in s], …], "pad": energy in J, "spacing": m}
+
+where the pad is 0 unless given, and with a spacing the memory stays in patches of the surface that far apart
+instead of travelling with the probe.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from palpate.errors import FileFormatError, UsageError
+from palpate.surrogates import FieldSurrogate, SurrogateEvaluator, TouchedBody, TouchSurrogate
+from palpate.surrogates.relaxation import Branches, Memory, Patches
+from palpate.units import Range, bounds
+
+__all__ = ["PressedBody", "PressedEvaluator"]
+
+_SAMPLES = 4096  # of the trained ranges, for what is largest there
+_SHARE = 0.75  # of the deepest trained depth: how deep a scripted stroke goes
+_SLIVER = 1e-3  # of the deepest depth: shallower is no press
+
+_jit = njit(cache=True, nogil=True, error_model="numpy")
+
+
+@dataclass(frozen=True, eq=False)
+class PressedBody:
+    """An energy of touch with all that follows from it for a hand.
+
+    Attributes
+    ----------
+    touch : TouchSurrogate
+    fields : mapping of name to FieldSurrogate
+        What the eye sees; may be empty.
+    name : str
+    """
+
+    touch: TouchSurrogate
+    fields: Mapping[str, FieldSurrogate] = field(default_factory=dict)
+    name: str = "body"
+
+    @classmethod
+    def of(cls, body: TouchedBody | TouchSurrogate, name: str = "") -> PressedBody:
+        """The same body, ready for a hand; `name` where its own record has none."""
+        alone = isinstance(body, TouchSurrogate)
+        touch = body if isinstance(body, TouchSurrogate) else body.touch
+        known = str(touch.meta.get("name", "")) or name or "body"
+        return cls(touch, {} if alone else dict(body.fields), known)  # type: ignore[union-attr]
+
+    def __str__(self) -> str:
+        return f"PressedBody {self.name}: {self.touch}"
+
+    __repr__ = __str__
+
+    @property
+    def inputs(self) -> tuple[Range, ...]:
+        """Names and trained ranges of all inputs: the centre's coordinates (m), then the further ones."""
+        return self.touch.inputs
+
+    @property
+    def parameters(self) -> tuple[Range, ...]:
+        """The inputs that the hand doesn't supply."""
+        return self.touch.parameters
+
+    @property
+    def meta(self) -> Mapping[str, Any]:
+        """What its file says of its making."""
+        return self.touch.meta
+
+    @property
+    def radius(self) -> float:
+        """Of the probe, m; the middle of its range where it is an input."""
+        own = self.touch.radius_input
+        return self.touch.radius if own is None else (self.inputs[own].low + self.inputs[own].high) / 2.0
+
+    @cached_property
+    def presses(self) -> np.ndarray:
+        """Inputs (N, n) in contact and inside the trained region: random ones, and those it was trained at.
+
+        Raises
+        ------
+        UsageError
+            If there is none.
+        """
+        low, high = bounds(self.inputs)
+        X = np.random.default_rng(0).uniform(low, high, (_SAMPLES, len(low)))
+        X[0] = (low + high) / 2.0
+        if self.touch.region is not None:
+            scaling = self.touch.network.scaling
+            X = np.vstack([X, scaling.input_centre + scaling.input_half * self.touch.region.points])
+        depth = self.touch.depth(X)
+        kept = X[self.touch.inside(X) & (depth > _SLIVER * max(depth.max(), 0.0)) & (depth > 0.0)]
+        if not len(kept):
+            raise UsageError(
+                "This body can't be pressed.",
+                why="No probe within the ranges it was trained on touches it.",
+                fix="Learn it from solves in contact.",
+            )
+        return np.asarray(kept)
+
+    @cached_property
+    def stiffness_max(self) -> float:
+        """K, the largest eigenvalue of −∂F/∂c over the trained region, N/m: what the loop's stability depends on."""
+        return float(np.linalg.eigvalsh(-self.touch.stiffness(self.presses)).max())
+
+    @cached_property
+    def force_max(self) -> float:
+        """Largest ‖F‖ of the trained region, N."""
+        return float(np.linalg.norm(self.touch.force(self.presses), axis=1).max())
+
+    @cached_property
+    def deepest(self) -> float:
+        """Deepest trained depth, m."""
+        assert self.touch.continuation is not None
+        known = self.touch.continuation.deepest
+        return known if math.isfinite(known) else float(self.touch.depth(self.presses).max())
+
+    @cached_property
+    def _foothold(self) -> tuple[np.ndarray, np.ndarray]:
+        """First contact in the middle of the touched place, and the outer normal there, each (3,)."""
+        X = self.presses
+        low, high = bounds(self.inputs)
+        # the middle of the ranges where that is a press; on a curved body it may lie too deep
+        x = X[np.argmin((((X - (low + high) / 2.0) / (high - low)) ** 2).sum(axis=1))]
+        distance, slope, _ = self.touch.surface.at(x[None, :3])
+        normal = slope[0] / np.linalg.norm(slope[0])
+        return x[:3] + (self.radius - distance[0]) * normal, normal
+
+    @property
+    def home(self) -> np.ndarray:
+        """Where the device's centre is: the probe's centre (3,), m, at first contact in the middle."""
+        return self._foothold[0]
+
+    @property
+    def normal(self) -> np.ndarray:
+        """Outer normal (3,) of the surface there."""
+        return self._foothold[1]
+
+    @property
+    def away(self) -> np.ndarray:
+        """Where a probe that nobody holds is, m: a radius above `home`, in the air."""
+        return self.home + self.radius * self.normal
+
+    @cached_property
+    def reach(self) -> float:
+        """How far from `home` a trained press can be, m."""
+        return float(np.linalg.norm(self.presses[:, :3] - self.home, axis=1).max())
+
+    @cached_property
+    def branches(self) -> Branches | None:
+        """What of its force relaxes, where its file says so.
+
+        Raises
+        ------
+        FileFormatError
+            If it says so in other words than this module knows.
+        """
+        told = self.meta.get("relaxation")
+        if told is None:
+            return None
+        try:
+            return Branches(
+                tuple((float(s), float(t)) for s, t in told["terms"]), float(told.get("pad", 0.0))
+            )
+        except (KeyError, TypeError, ValueError, AttributeError, UsageError) as error:
+            raise FileFormatError(
+                "The file does not say how the body relaxes.",
+                why=f"{type(error).__name__}: {error}",
+                fix='Its record holds relaxation = {"terms": [[share, seconds], …], "pad": joules}.',
+            ) from error
+
+    def memory(self) -> Memory | None:
+        """A body's memory at rest, or None for one that forgets nothing."""
+        if self.branches is None or not self.branches.terms:
+            return None
+        return Memory(self.branches, self._patches())
+
+    def _patches(self) -> Patches | None:
+        spacing = self.meta["relaxation"].get("spacing")
+        skin = next(iter(self.fields.values()), None)
+        if spacing is None or skin is None:
+            return None
+        corners = skin.triangles
+        if skin.dimple is not None:
+            corners = corners[skin.dimple.touched[corners].all(axis=1)]
+        depth = self.deepest / 2.0  # typical
+        X = self.presses
+        near = np.argmin(np.abs(self.touch.depth(X) - depth))
+        energy = float(self.touch.energy(X[near : near + 1])[0])
+        width = 0.5 * math.sqrt(self.radius * depth)
+        return Patches.over(skin.points, corners, float(spacing), width=width, energy=energy)
+
+    def evaluator(self) -> PressedEvaluator:
+        """The allocation-free evaluator of the 1 kHz path."""
+        return PressedEvaluator(self.touch.evaluator(), self.memory(), self.away)
+
+    def stroke(self, scale: float) -> dict[str, float]:
+        """Amplitude (m) and direction, in device coordinates, of a stroke that presses to three quarters of `deepest`.
+
+        Parameters
+        ----------
+        scale : float
+            Metres of body per metre of hand.
+        """
+        x, y, z = (-self.normal).tolist()
+        return {"amplitude": _SHARE * self.deepest / scale, "x": x, "y": z, "z": -y}
+
+
+class PressedEvaluator:
+    """Answers a probe's centre; nothing is allocated.
+
+    Attributes
+    ----------
+    force : (3,)
+        On the probe, N.
+    contact : (3,)
+        The probe's centre, m.
+    loads : (0,)
+        None: the body is held by nothing but the probe.
+    inside : bool
+        Within the trained region.
+    mirrored : bool
+        Never.
+    depth : float
+        Of the rigid probe in the surface at rest, m; negative without contact.
+    stiffness : float
+        Along the force, −F·(∂F/∂c)F/‖F‖², N/m, of the elastic answer; zero without contact.
+    elapsed : float
+        Since the call before, s, to be set ahead of each call where the body has a memory.
+    away : (3,)
+        Where a probe is that nobody holds, m.
+    """
+
+    def __init__(self, elastic: SurrogateEvaluator, memory: Memory | None, away: np.ndarray) -> None:
+        self._elastic, self._memory = elastic, memory
+        self.force = elastic.force if memory is None else memory.force
+        self._slope = np.zeros(3)
+        self.contact, self.loads, self.away = np.zeros(3), np.zeros(0), away
+        self.inside, self.mirrored = True, False
+        self.depth, self.stiffness, self.elapsed = -math.inf, 0.0, 0.0
+        _along(elastic.force, elastic.stiffness)  # compile now, not in the loop
+
+    def __call__(self, position: np.ndarray, parameters: np.ndarray) -> None:
+        """Renew the attributes for a probe at `position` (3,), m, and the further inputs (p,)."""
+        elastic, memory = self._elastic, self._memory
+        elastic(position, parameters)
+        self.contact[:] = position
+        self.inside, self.depth = elastic.inside, elastic.depth
+        self.stiffness = _along(elastic.force, elastic.stiffness)
+        if memory is None:
+            return
+        np.negative(elastic.force, out=self._slope)
+        if not memory.step(position, elastic.energy, self._slope, self.elapsed):
+            self.force[:] = math.nan  # the loop makes a fault of it
+
+
+@_jit
+def _along(force, stiffness) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    size, total = 0.0, 0.0
+    for i in range(3):
+        size += force[i] * force[i]
+        for j in range(3):
+            total -= force[i] * stiffness[i, j] * force[j]
+    return total / size if size > 0.0 else 0.0

@@ -32,6 +32,7 @@ def provenance(problem: Problem, points: np.ndarray, design: str, seed: int) -> 
     return {
         "problem": problem.describe(),
         "words": getattr(problem, "words", ""),
+        "symmetry": getattr(problem, "symmetry", None),
         "design": design,
         "seed": seed,
         "samples": len(points),

@@ -8,6 +8,7 @@ from typing import Any
 from palpate.physics.arguments import require_positive
 from palpate.physics.geometry.checks import require_size, require_triple
 from palpate.physics.geometry.groups import UPRIGHT
+from palpate.physics.geometry.isometries import Isometry, box_isometries
 from palpate.physics.geometry.shape import Solid
 from palpate.physics.words import millimetres
 
@@ -49,6 +50,11 @@ class Block(Solid):
     def surfaces(self) -> tuple[str, ...]:
         """``top``, ``bottom`` and the four upright faces."""
         return ("top", "bottom", *UPRIGHT)
+
+    @property
+    def isometries(self) -> tuple[Isometry, ...]:
+        """Those of the box."""
+        return box_isometries(self.size)
 
     def __str__(self) -> str:
         return f"block {millimetres(*self.size)}"

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 from palpate.physics.arguments import require_positive
 from palpate.physics.geometry.block import name_upright_faces
 from palpate.physics.geometry.checks import require_size
+from palpate.physics.geometry.isometries import Isometry, round_isometries
 from palpate.physics.geometry.shape import Solid
 from palpate.physics.words import millimetres
 
@@ -54,6 +55,11 @@ class Cylinder(Solid):
     def size(self) -> tuple[float, float, float]:
         """Extent along x, y and z in m."""
         return (2 * self.radius, 2 * self.radius, self.height)
+
+    @property
+    def isometries(self) -> tuple[Isometry, ...]:
+        """Turns about the axis and mirror images."""
+        return round_isometries()
 
     def __str__(self) -> str:
         return f"cylinder of radius {millimetres(self.radius)}, {millimetres(self.height)} high"

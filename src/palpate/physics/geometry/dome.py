@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_positive
 from palpate.physics.geometry.checks import require_size, require_triple
+from palpate.physics.geometry.isometries import Isometry, mirror, round_isometries
 from palpate.physics.geometry.shape import Solid
 from palpate.physics.words import millimetres
 
@@ -106,6 +107,12 @@ class Dome(Solid):
     def size(self) -> tuple[float, float, float]:
         """Extent along x, y and z in m."""
         return (2 * self.radius, 2 * self.radius, self.rise)
+
+    @property
+    def isometries(self) -> tuple[Isometry, ...]:
+        """Turns about the axis and mirror images; one mirror image if an inclusion lies beside the axis."""
+        x, y = self.inclusion.centre[:2] if self.inclusion else (0.0, 0.0)
+        return mirror(x, y) if x or y else round_isometries()
 
     def __str__(self) -> str:
         skin = f", skin of {millimetres(self.layer)}" if self.layer else ""

@@ -11,6 +11,7 @@ from palpate.physics.arguments import require_positive
 from palpate.physics.geometry.block import name_sides, name_upright_faces
 from palpate.physics.geometry.checks import require_name, require_size
 from palpate.physics.geometry.groups import UPRIGHT
+from palpate.physics.geometry.isometries import Isometry, box_isometries
 from palpate.physics.geometry.shape import Solid
 from palpate.physics.words import millimetres
 
@@ -73,6 +74,11 @@ class LayeredBlock(Solid):
     def size(self) -> tuple[float, float, float]:
         """Extent along x, y and z in m."""
         return (*self.extent, self.levels[0])
+
+    @property
+    def isometries(self) -> tuple[Isometry, ...]:
+        """Those of the box that keep the layers."""
+        return box_isometries(self.size, layered=True)
 
     def __str__(self) -> str:
         layers = ", ".join(f"{name} {millimetres(thickness)}" for name, thickness in self.layers)

@@ -10,6 +10,7 @@ from palpate.errors import UsageError
 from palpate.physics.arguments import require_positive
 from palpate.physics.geometry.checks import require_known
 from palpate.physics.geometry.faces import Face, faces_of
+from palpate.physics.geometry.isometries import NO_ISOMETRIES, Isometry
 from palpate.physics.geometry.mesh import BodyMesh, body_mesh
 from palpate.physics.geometry.refinement import FineMesh
 
@@ -64,6 +65,11 @@ class Shape:
     def regions(self) -> tuple[str, ...]:
         """Names of the parts of the volume."""
         return ("body",)
+
+    @property
+    def isometries(self) -> tuple[Isometry, ...]:
+        """Rotations and reflections that leave it where it is; the identity alone unless a shape knows more."""
+        return NO_ISOMETRIES
 
     def generate(self, refinements: tuple[FineMesh, ...]) -> Any:
         """A new `netgen.meshing.Mesh` in m, whose names of surfaces and regions are set."""

@@ -9,6 +9,7 @@ from palpate.errors import UsageError
 from palpate.physics.arguments import require_positive
 from palpate.physics.geometry.block import name_upright_faces
 from palpate.physics.geometry.checks import require_size
+from palpate.physics.geometry.isometries import Isometry, round_isometries
 from palpate.physics.geometry.shape import Solid
 from palpate.physics.words import millimetres
 
@@ -68,6 +69,11 @@ class Tube(Solid):
         """Largest element size in m."""
         wall = self.outer_radius - self.inner_radius
         return self.element if self.element is not None else min(wall / 2, self.height / 3)
+
+    @property
+    def isometries(self) -> tuple[Isometry, ...]:
+        """Turns about the axis and mirror images."""
+        return round_isometries()
 
     def __str__(self) -> str:
         radii = f"{millimetres(self.inner_radius)} inside, {millimetres(self.outer_radius)} outside"

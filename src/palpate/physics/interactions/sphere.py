@@ -114,15 +114,16 @@ class SphereProbe:
         element = ELEMENT if patch.is_plane else ROUND_ELEMENT
         return (FineMesh(self.touches, element * self.radius, tuple(low.tolist()), tuple(high.tolist())),)
 
-    def design(self, geometry: Geometry, samples: int, seed: int) -> np.ndarray:
+    def design(self, geometry: Geometry, samples: int, seed: int, depths: int | None = None) -> np.ndarray:
         """Positions (samples, 3) in m in columns, each from shallow to deep.
 
         The footprints are a scrambled Sobol sequence (Sobol 1967; Owen 1998) over the footprint of the touched
-        surface; the depths of a column are evenly spaced, all shifted by a random share of their distance.
+        surface; the depths of a column are evenly spaced, all shifted by a random share of their distance. `depths` is
+        their number in a column, by default about ¾ √samples.
         """
         from scipy.stats import qmc
 
-        count = columns.per_column(samples)
+        count = columns.per_column(samples) if depths is None else depths
         number = -(-samples // count)
         engine = qmc.Sobol(3, scramble=True, rng=np.random.default_rng(seed))
         unit, feet = np.empty((0, 3)), np.empty((0, 3))

@@ -24,6 +24,7 @@ from palpate.physics.solid.lengths import (
     require_lengths,
     require_near,
 )
+from palpate.physics.solid.symmetry import symmetry_of
 from palpate.units import Range
 
 if TYPE_CHECKING:
@@ -138,6 +139,14 @@ class SolidProblem:
             "interactions": [interaction.describe() for interaction in self.interactions],
             "element": self.element,
         }
+
+    @property
+    def symmetry(self) -> dict[str, Any] | None:
+        """Isometries of body, supports and touched surface as plain data, None for more than a probe."""
+        probe = self.interactions[0]
+        if len(self.interactions) > 1 or not isinstance(probe, SphereProbe):
+            return None
+        return symmetry_of(self.body, probe.touches).describe()
 
     @property
     def words(self) -> str:

@@ -1,0 +1,107 @@
+"""Which rotations and reflections leave a body, its supports and a touched surface where they are.
+
+A touch at a place then tells of the touches at all images of that place: U(c) = U(M c), F(M c) = M F(c).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.physics.geometry.groups import members
+from palpate.physics.geometry.isometries import NO_ISOMETRIES, Isometry
+from palpate.physics.interactions.sphere import SphereProbe
+from palpate.physics.materials.fibres import FibreReinforced
+from palpate.physics.materials.user import UserMaterial
+
+if TYPE_CHECKING:
+    from palpate.physics.solid.body import Body
+
+__all__ = ["Symmetry", "fundamental_part", "symmetry_of"]
+
+DIRECTED = (FibreReinforced, UserMaterial)  # have directions of their own, or may have
+LEAST = 1e-6  # of the part's size: rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Symmetry:
+    """A group of isometries about one point.
+
+    Attributes
+    ----------
+    matrices : (k, 3, 3) array
+        The identity among them.
+    about : (3,) array
+        In m.
+    """
+
+    matrices: np.ndarray
+    about: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.matrices)
+
+    def describe(self) -> dict[str, Any]:
+        """As plain data for a JSON file."""
+        return {"about": self.about.tolist(), "isometries": self.matrices.tolist()}
+
+
+def symmetry_of(body: Body, touches: str) -> Symmetry:
+    """The isometries of a body that is touched on a surface; the identity alone where there is no symmetry.
+
+    Fixed surfaces and the touched one must stay where they are as a whole, gravity must keep its direction, and no
+    material may have directions. Bodies that are held by interactions are not looked into.
+    """
+    shape = body.geometry
+    whole: tuple[Isometry, ...] = getattr(shape, "isometries", NO_ISOMETRIES)
+    if body.held or any(_is_directed(material) for material in body.materials.values()):
+        whole = NO_ISOMETRIES
+    fixed = {name for one in body.fixed for name in members(one, shape.surfaces)}
+    touched = set(members(touches, shape.surfaces))
+    gravity = np.array(body.gravity)
+    kept = [
+        one
+        for one in whole
+        if {one.surface(name) for name in fixed} == fixed
+        and {one.surface(name) for name in touched} == touched
+        and np.allclose(one.matrix @ gravity, gravity)
+    ]
+    return Symmetry(np.array([one.matrix for one in kept]), np.array(kept[0].about))
+
+
+def _is_directed(material: Any) -> bool:
+    """Whether a material, or one that it is made from, has directions."""
+    if isinstance(material, DIRECTED):
+        return True
+    if not is_dataclass(material):
+        return False
+    parts = (getattr(material, one.name) for one in fields(material))
+    return any(_is_directed(part) for part in parts if is_dataclass(part))
+
+
+def fundamental_part(body: Body, probe: SphereProbe) -> SphereProbe:
+    """The probe, over a part of its footprint whose images are all of it.
+
+    For groups about an upright axis in the middle of the footprint: with n mirror planes the box around a sector
+    of the angle π/n. Any other probe comes back as it is. The mesh is then fine there only.
+    """
+    symmetry = symmetry_of(body, probe.touches)
+    upright = np.allclose(symmetry.matrices[:, 2], [0.0, 0.0, 1.0])
+    mirrors = int(np.sum(np.linalg.det(symmetry.matrices) < 0))
+    if probe.over is None or not upright or mirrors < 2 or not _has_mirror_on_x(symmetry):
+        return probe
+    low, high = (np.array(corner[:2], dtype=float) for corner in probe.over)
+    middle, half = symmetry.about[:2], (high - low) / 2
+    if not np.allclose((low + high) / 2, middle, atol=LEAST * half.max()):
+        return probe
+    width = half[1] if mirrors == 2 else min(half[1], half[0] * float(np.tan(np.pi / mirrors)))
+    corners = (middle, middle + np.array([half[0], width]))
+    lower, upper = ((*corner.tolist(), *own[2:]) for corner, own in zip(corners, probe.over, strict=True))
+    return replace(probe, over=(lower, upper))
+
+
+def _has_mirror_on_x(symmetry: Symmetry) -> bool:
+    """Whether y → −y is one of them: a sector begins at the x axis."""
+    return any(np.allclose(matrix, np.diag([1.0, -1.0, 1.0])) for matrix in symmetry.matrices)

@@ -1,0 +1,22 @@
+"""Learning bodies with a history from histories.
+
+paths        histories as values, and in a file      drives   loads to learn from and to be judged by
+learn_held   a body held at one node
+"""
+
+from palpate.learning.plastic.drives import held_loads, load_unload_reload, random_times, random_turns
+from palpate.learning.plastic.learn_held import Fit, learn_held
+from palpate.learning.plastic.paths import Histories, History, Marches, follow_loads
+
+__all__ = [
+    "Fit",
+    "Histories",
+    "History",
+    "Marches",
+    "follow_loads",
+    "held_loads",
+    "learn_held",
+    "load_unload_reload",
+    "random_times",
+    "random_turns",
+]

@@ -1,0 +1,55 @@
+"""Loads to learn from and to be judged by: random turning points, loading and unloading, holds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+__all__ = ["held_loads", "load_unload_reload", "random_times", "random_turns"]
+
+
+def random_turns(
+    rng: np.random.Generator, low: float, high: float, *, turns: int = 6, step: float
+) -> np.ndarray:
+    """Loads (N,) in N that go to and fro between random turning points, in steps of `step` N at most, back to 0."""
+    return even_steps(np.append(rng.uniform(low, high, turns), 0.0), step)
+
+
+def load_unload_reload(rng: np.random.Generator, low: float, high: float, *, step: float) -> np.ndarray:
+    """Loads (N,) in N: to a peak, back a part of the way, further than before, and off."""
+    end = high if low >= 0 or rng.random() < 0.5 else low
+    peak = end * rng.uniform(0.5, 1.0)
+    back, further = peak * rng.uniform(0.0, 0.8), peak + (end - peak) * rng.random()
+    return even_steps(np.array([peak, back, further, 0.0]), step)
+
+
+def even_steps(knots: np.ndarray, step: float) -> np.ndarray:
+    """From 0 through the knots (k,) in even steps no longer than `step`."""
+    ends = np.concatenate([[0.0], knots])
+    legs = [
+        np.linspace(a, b, max(2, int(np.ceil(abs(b - a) / step))) + 1)[1:]
+        for a, b in zip(ends[:-1], ends[1:], strict=True)
+    ]
+    return np.concatenate(legs)
+
+
+def random_times(
+    rng: np.random.Generator, low: float, high: float, *, span: float, step: float, slowest: float = 3.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Times (N,) in s, in steps of `step`, and loads (N,) in N.
+
+    Even ramps between random loads that take 0.05 s to `slowest` seconds, every third one a hold, none at the start.
+    """
+    times = np.arange(1, round(span / step) + 1) * step
+    knots_t, knots_p = [0.0], [0.0]
+    while knots_t[-1] < span:
+        hold = len(knots_t) % 3 == 2
+        knots_t.append(knots_t[-1] + float(np.exp(rng.uniform(np.log(0.05), np.log(slowest)))))
+        knots_p.append(knots_p[-1] if hold else float(rng.uniform(low, high)))
+    return times, np.interp(times, knots_t, knots_p)
+
+
+def held_loads(size: float, *, rise: float, span: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Times (N,) in s and loads (N,) in N: put on within `rise`, held to `span`, times growing geometrically."""
+    on = np.linspace(0.0, rise, 6)[1:]
+    times = np.concatenate([on, rise + np.geomspace(rise / 2, span - rise, count)])
+    return times, size * np.minimum(times / rise, 1.0)

@@ -1,0 +1,12 @@
+"""Bodies with a history: bent and stays bent, dented and keeps the dent, pushed and creeps.
+
+elements, element_kernels    springs in parallel that slip or relax
+held_body, held_evaluator    a body held at one node, one step at a time
+held_file                    … in a file
+"""
+
+from palpate.surrogates.plastic.elements import Elements
+from palpate.surrogates.plastic.held_body import HeldBody
+from palpate.surrogates.plastic.held_evaluator import HeldEvaluator, HeldState
+
+__all__ = ["Elements", "HeldBody", "HeldEvaluator", "HeldState"]

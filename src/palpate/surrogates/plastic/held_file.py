@@ -1,0 +1,66 @@
+"""A held body that remembers in one file: a network archive of its own kind, checked when read."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from palpate.errors import FileFormatError, UsageError
+from palpate.network import Archive, load_archive, save_archive
+from palpate.surrogates.plastic.elements import Elements
+
+if TYPE_CHECKING:
+    from palpate.surrogates.plastic.held_body import HeldBody
+
+__all__ = ["KIND", "load_held", "save_held"]
+
+KIND = "held-body"
+_PLAIN = ("name", "mirrors", "touch_node", "reach", "radius")
+_ARRAYS = ("rest", "nodes_of_interest", "directions")
+
+
+def save_held(path: str | os.PathLike[str], body: HeldBody) -> Path:
+    """Write a held body; the file appears whole or not at all.
+
+    Raises
+    ------
+    UsageError
+        If the folder does not exist or can't be written, or `meta` holds what JSON does not know.
+    """
+    arrays = {name: getattr(body, name) for name in _ARRAYS}
+    arrays["elements"] = np.stack(body.elements.compiled())
+    meta = {name: getattr(body, name) for name in _PLAIN} | {"meta": dict(body.meta)}
+    return save_archive(path, Archive({"stretch": body.stretch, "field": body.field}, arrays, meta, KIND))
+
+
+def load_held(path: str | os.PathLike[str]) -> HeldBody:
+    """Read a held body back, bit for bit.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is missing, corrupt, foreign or from a later version, or its parts do not fit.
+    """
+    from palpate.surrogates.plastic.held_body import HeldBody
+
+    archive = load_archive(path, kind=KIND)
+    try:
+        elements = np.asarray(archive.arrays["elements"], dtype=np.float64)
+        if elements.ndim != 2 or len(elements) != 4:
+            raise ValueError("its elements are none")
+        return HeldBody(
+            stretch=archive.networks["stretch"],
+            field=archive.networks["field"],
+            elements=Elements(*elements),
+            **{name: archive.arrays[name] for name in _ARRAYS},
+            **{name: archive.meta[name] for name in (*_PLAIN, "meta")},
+        ).checked()
+    except (KeyError, TypeError, ValueError, IndexError, UsageError) as error:
+        raise FileFormatError(
+            f"{path} does not describe a held body.",
+            why=f"{type(error).__name__}: {error}",
+            fix="Copy the file again, or learn the body anew.",
+        ) from error

@@ -41,6 +41,8 @@ class SurrogateEvaluator:
         An input of the surrogate.
     """
 
+    _kernel = staticmethod(touch_into)
+
     def __init__(self, compiled: tuple[Any, ...], root: np.ndarray, somewhere: Sequence[float]) -> None:
         self._answer = np.zeros(ANSWER)
         self.force, self.stiffness = self._answer[FORCE], self._answer[STIFFNESS].reshape(3, 3)
@@ -76,7 +78,7 @@ class SurrogateEvaluator:
                 f"A probe at {position.shape} with parameters {parameters.shape} can't be answered.",
                 fix=f"Give its centre (3,) in m and parameters {self._shape}.",
             )
-        self.inside = touch_into(position, parameters, *self._arguments)
+        self.inside = self._kernel(position, parameters, *self._arguments)
 
     def trust(self, position: np.ndarray, parameters: np.ndarray = _NONE) -> float:
         """Standard deviation of the force relative to its size; evaluates there first.

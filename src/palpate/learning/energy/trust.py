@@ -8,11 +8,10 @@ has. The variance is chosen such that nine tenths of those errors are below 1.64
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
-from palpate.learning.energy.samples import EnergySamples
 from palpate.learning.energy.search import Problem
 from palpate.learning.refinement.leave_one_out import left_out_rows
 from palpate.learning.refinement.projection import project, span_of_units
@@ -34,14 +33,24 @@ class Trust:
     root : (c, c)
         Of the covariance of the coefficients, tail first; calibrated.
     errors : (N,)
-        Relative force error of each solve when it is left out.
+        Relative force error of each solve whose force is known, when it is left out.
     """
 
     root: np.ndarray
     errors: np.ndarray
 
 
-def trust_of(refined: Refined, problem: Problem, samples: EnergySamples, ridge: float = 1e-10) -> Trust:
+class Touches(Protocol):
+    """What is asked of samples: energy (N,), force (N, 3 or more), and half of each input's range."""
+
+    energy: np.ndarray
+    force: np.ndarray
+
+    @property
+    def _half(self) -> np.ndarray: ...
+
+
+def trust_of(refined: Refined, problem: Problem, samples: Touches, ridge: float = 1e-10) -> Trust:
     """From the solves that the network was refined on."""
     known: dict[str, Any] = dict(problem.rows)
     rows = Rows.of(refined.regressors, problem.X, known.pop("Y"), **known)
@@ -49,25 +58,34 @@ def trust_of(refined: Refined, problem: Problem, samples: EnergySamples, ridge: 
     span = span_of_units(rows, refined.theta, fit) if len(refined.theta) else None
     missed = left_out_rows(rows, fit, basis=span, most=_MOST) @ rows.modes
     Q, N = fit.Q, len(problem.X)
-    to_force = _to_force(rows, samples)
-    errors, sizes = np.empty(N), np.empty(N)
-    for i in range(N):
-        block = np.r_[i, N + 3 * i + np.arange(3)]
-        errors[i] = np.linalg.norm(to_force[i] @ missed[block, 0])
+    to_force, at = _to_force(rows, samples), _slope_rows(rows)
+    errors, sizes = np.empty(len(at)), np.empty(len(at))
+    for k, (i, first) in enumerate(at):
+        block = np.r_[i, first + np.arange(3)]
+        errors[k] = np.linalg.norm(to_force[k] @ missed[block, 0])
         values, V = np.linalg.eigh(Q[block] @ Q[block].T)
         values = np.clip(values, 0.0, _MOST)
-        sizes[i] = np.linalg.norm(to_force[i] @ (V * np.sqrt(values / (1.0 - values))))
+        sizes[k] = np.linalg.norm(to_force[k] @ (V * np.sqrt(values / (1.0 - values))))
     ratio = float(np.quantile(errors / np.maximum(sizes, 1e-300), 0.9)) / _NINE_TENTHS
     triangle = np.linalg.cholesky(fit.inverse + 1e-14 * np.trace(fit.inverse) * np.eye(len(fit.tau)))
     return Trust(ratio * triangle, errors)
 
 
-def _to_force(rows: Rows, samples: EnergySamples) -> np.ndarray:
-    """(N, 3, 4): what errors of a solve's weighted value and slope rows make of its force, relative to its size."""
-    size = np.linalg.norm(samples.force, axis=1)
-    found = np.zeros((len(samples), 3, 4))
-    found[:, :, 0] = samples.force / (size * rows.scale)[:, None]
+def _slope_rows(rows: Rows) -> list[tuple[int, int]]:
+    """Samples whose force is known, and the first row of each one's slopes: the first three are the force's."""
+    counts = (rows.slope_scale > 0).sum(axis=1)
+    starts = len(rows.X) + np.cumsum(counts) - counts
+    return [(int(i), int(start)) for i, start in zip(rows.sloped, starts, strict=True)]
+
+
+def _to_force(rows: Rows, samples: Touches) -> np.ndarray:
+    """(S, 3, 4): what errors of a solve's weighted value and slope rows make of its force, relative to its size."""
+    known = rows.sloped
+    force = samples.force[known, :3]
+    size = np.linalg.norm(force, axis=1)
+    found = np.zeros((len(known), 3, 4))
+    found[:, :, 0] = force / (size * rows.scale[known])[:, None]
     half = samples._half[:3]
     for i in range(3):
-        found[:, i, 1 + i] = -samples.energy / (size * rows.slope_scale[:, i] * half[i])
+        found[:, i, 1 + i] = -samples.energy[known] / (size * rows.slope_scale[:, i] * half[i])
     return found

@@ -1,0 +1,145 @@
+"""From solves of a held body to its surrogate: stiffness at rest, network and what it is trusted with."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from palpate.errors import UsageError
+from palpate.learning.energy.learn_surrogate import _meta, _region, _searched, _written_out
+from palpate.learning.energy.search import EnergyTrial, Problem
+from palpate.learning.energy.trust import trust_of
+from palpate.learning.grasp.images import hold_images
+from palpate.learning.grasp.rest import found_rest
+from palpate.learning.grasp.samples import GraspSamples
+from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction
+from palpate.surrogates.grasp import GraspSurrogate
+from palpate.units import Range
+
+__all__ = ["LearntGrasp", "learn_grasp"]
+
+Degree = Literal["auto", 0, 1, 2]
+
+
+@dataclass(frozen=True, eq=False)
+class LearntGrasp:
+    """A surrogate, and how it was found.
+
+    Attributes
+    ----------
+    surrogate : GraspSurrogate
+    trials : tuple of EnergyTrial
+        All networks that were tried, in order.
+    errors : (N,)
+        Relative force error of each solve with a displaced pad when it is left out.
+    loo : float
+        Leave-one-solve-out error of the network chosen, as in its trial.
+    rest_errors : dict
+        Error on solves left out of a quadratic ℓ, by the degree of the stiffness at rest.
+    """
+
+    surrogate: GraspSurrogate
+    trials: tuple[EnergyTrial, ...]
+    errors: np.ndarray
+    loo: float
+    rest_errors: dict[int, float]
+
+
+def learn_grasp(
+    X: np.ndarray,
+    energy: np.ndarray,
+    force: np.ndarray,
+    stiffness: np.ndarray | None,
+    *,
+    inputs: Sequence[Range],
+    axes: Sequence[int] = (0, 1),
+    symmetry: Sequence[np.ndarray] = (),
+    about: np.ndarray | None = None,
+    degree: Degree = "auto",
+    units_max: int = 192,
+    target: float = 1e-3,
+    seconds: float = 60.0,
+    form: str = "auto",
+    radial: RadialFunction | Literal["auto"] = "auto",
+    seed: int = 0,
+) -> LearntGrasp:
+    """Learn the energy of a held body from solves.
+
+    Parameters
+    ----------
+    X : (N, n)
+        Displacement of the pad (m), then its place (m), then further inputs.
+    energy : (N,)
+        U, J; zero at rest.
+    force : (N, 3) or (N, n)
+        −∂U/∂d on the hand, N; or that and −∂U/∂y by the other inputs, which every solve knows too.
+    stiffness : (N, 3, 3) or (N, n, n), optional
+        Derivative of the force; not-a-number where unknown. Pads at rest are of use through it.
+    inputs : n ranges
+    axes : sequence of int
+        Along which axes the place's coordinates are: two on a face, (0, 1, 2) on a curved surface, () for none.
+    symmetry : (3, 3) matrices
+        Isometries of body, supports and surface: the whole group, the identity among them.
+    about : (3,), optional
+        The point that they leave where it is, m; the middle of the place's ranges by default.
+    degree : {"auto", 0, 1, 2}
+        Of the stiffness at rest as a polynomial of place and further inputs.
+    units_max : int
+        Most units; images count.
+    target : float
+        Leave-one-solve-out error at which no more units are added.
+    seconds : float
+        For the search; a refinement under way is ended.
+    form : str
+        Of a unit (see `palpate.learning.units.forms`), or "auto".
+    radial : {"gaussian", "inverse-multiquadric", "matern-5/2", "auto"}
+    seed : int
+        Decides the starts. With a limit on time the result also depends on the machine's speed.
+
+    Returns
+    -------
+    LearntGrasp
+
+    Raises
+    ------
+    UsageError
+        If samples, symmetry or options do not fit.
+    """
+    begun, inputs = time.monotonic(), tuple(inputs)
+    _require(seconds, units_max, radial, axes, len(inputs))
+    samples = GraspSamples.of(X, energy, force, stiffness, inputs=inputs)
+    images = hold_images(symmetry, about, inputs, axes)
+    with threadpool_limits(1):  # small matrices: more BLAS threads cost time and the bits of the result
+        rest, errors = found_rest(samples, images, symmetry, None if degree == "auto" else degree)
+        problem = Problem(
+            samples.scaled, samples.rows(rest), images, f"rest stiffness of degree {rest.degree}"
+        )
+        search = _searched(problem, begun + seconds, form, radial, units_max, target, seed)
+        best = search.best
+        assert best is not None  # the tail at least was tried
+        trust = trust_of(best, problem, samples)
+    meta: dict[str, Any] = _meta(samples, images, best, search.error, trust.errors)
+    network, root = _written_out(best, trust.root, samples, meta)
+    surrogate = GraspSurrogate(network, rest, region=_region(samples, images), root=root, meta=meta)
+    return LearntGrasp(surrogate, tuple(search.trials), trust.errors, search.error, errors)
+
+
+def _require(seconds: float, units_max: int, radial: str, axes: Sequence[int], inputs: int) -> None:
+    if not (math.isfinite(seconds) and seconds > 0 and units_max >= 0):
+        raise UsageError(
+            f"seconds={seconds} and units_max={units_max} allow no learning.", fix="Give positive numbers."
+        )
+    if radial != "auto" and radial not in get_args(RadialFunction):
+        raise UsageError(f"There is no radial function {radial!r}.", fix=f"Choose from {RADIAL_FUNCTIONS}.")
+    if len(set(axes)) != len(axes) or not set(axes) <= {0, 1, 2} or 3 + len(axes) > inputs:
+        raise UsageError(
+            f"A place along the axes {tuple(axes)} does not fit {inputs} inputs.",
+            why="Three components of the displacement come first, then one coordinate of the place for each axis.",
+            fix="Name the axes of the place's coordinates, for example (0, 1) on top of a block.",
+        )

@@ -1,0 +1,226 @@
+"""A body held by a glued pad as one energy, learnt: nothing at rest, and its force a gradient for every place.
+
+    U(p, d) = ½ ‖S(y) d‖² exp ℓ(d, y),      F = −∂U/∂d at fixed y
+
+d is the displacement of the pad (m), y its place p on the surface and any further inputs of a family of bodies, S a
+symmetric root of the stiffness at rest (`rest`), ℓ a network of one output. F is the force on the hand.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.network import Network, TrainedRegion
+from palpate.network.second_order import gram
+from palpate.surrogates.continuation import Continuation
+from palpate.surrogates.grasp.evaluator import GraspEvaluator
+from palpate.surrogates.grasp.kernels import grasps_into
+from palpate.surrogates.grasp.rest import RestStiffness
+from palpate.surrogates.touch_kernels import ANSWER, FORCE, SMALL, STIFFNESS
+from palpate.surrogates.touch_surrogate import _history
+from palpate.surrogates.touch_trust import trusts_into
+from palpate.units import Range, bounds
+
+__all__ = ["GraspSurrogate"]
+
+
+@dataclass(frozen=True, eq=False)
+class GraspSurrogate:
+    """Energy, force and stiffness of a held body as a value: `save` and `load` give it back bit for bit.
+
+    Attributes
+    ----------
+    network : Network
+        ℓ of (d_x, d_y, d_z, y…), one output; its inputs' ranges are the trained ones.
+    rest : RestStiffness
+        S of the inputs after the displacement.
+    region : TrainedRegion, optional
+        Of the scaled training inputs; without it the ranges alone are the trained region.
+    continuation : Continuation, optional
+        How far ℓ and S are followed beyond their training; of the network's ranges unless given.
+    root : (1 + n + h, z), optional
+        Root of the covariance of ℓ's tail and weights, in the network's scaled output: what `deviation` needs.
+    meta : mapping
+        JSON-able. `__str__` tells of ``solves``, ``samples`` and ``force_error`` where they are there.
+
+    Raises
+    ------
+    UsageError
+        If the parts do not fit together.
+    """
+
+    network: Network
+    rest: RestStiffness
+    region: TrainedRegion | None = None
+    continuation: Continuation | None = None
+    root: np.ndarray | None = None
+    meta: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        enough = len(self.network.inputs) >= 3
+        if enough and self.network.basis is not None:
+            object.__setattr__(self, "network", self.network.select([0]))
+        if self.continuation is None and enough:
+            object.__setattr__(self, "continuation", Continuation.of(self.network.inputs))
+        if self.root is not None:
+            root = np.array(self.root, dtype=np.float64, order="C")
+            root.flags.writeable = False
+            object.__setattr__(self, "root", root)
+        if fault := self._fault():
+            raise UsageError(
+                f"A grasp surrogate can't be made: {fault}.",
+                why="Its network, stiffness at rest, region and posterior must speak of the same inputs.",
+                fix="Make them of one set of samples, the displacement's three components first.",
+            )
+
+    def _fault(self) -> str:
+        """What does not fit; "" if all does."""
+        n, m = len(self.network.inputs), len(self.network.outputs)
+        if n < 3 or m != 1:
+            return f"its network has {n} inputs and {m} outputs, not 3 or more and one"
+        if self.rest.count != n - 3:
+            return f"its stiffness at rest depends on {self.rest.count} inputs, its network on {n - 3}"
+        if self.region is not None and self.region.points.shape[1] != n:
+            return f"its region has {self.region.points.shape[1]} inputs, its network {n}"
+        if self.continuation is not None and self.continuation.widths.shape != (n,):
+            return f"its continuation has {self.continuation.widths.size} widths for {n} inputs"
+        rows, root = 1 + n + self.network.units, self.root
+        if root is not None and not (root.ndim == 2 and len(root) == rows and np.isfinite(root).all()):
+            return f"its posterior has shape {root.shape}, not {rows} finite rows"
+        return ""
+
+    def __repr__(self) -> str:
+        return str(self)
+
+    def __str__(self) -> str:
+        names = ", ".join(str(r) for r in self.inputs)
+        units = (
+            f"{self.network.units} {self.network.form} units" if self.network.units else "an affine factor"
+        )
+        even = ("the same everywhere", "linear in place", "quadratic in place")[self.rest.degree]
+        return f"GraspSurrogate: {names}; stiffness at rest {even}; {units}{_history(self.meta)}"
+
+    @property
+    def inputs(self) -> tuple[Range, ...]:
+        """Names and trained ranges of all inputs: the displacement's components (m), then the further ones."""
+        return self.network.inputs
+
+    @property
+    def parameters(self) -> tuple[Range, ...]:
+        """The inputs after the displacement: the place on the surface, then any others."""
+        return self.network.inputs[3:]
+
+    @cached_property
+    def _fixed(self) -> tuple[Any, ...]:
+        """What never changes of the kernels' arguments: radius, limits, points, stiffness at rest, grams."""
+        going, region = self.continuation, self.region
+        assert going is not None
+        low, high = bounds(self.inputs)
+        radius = math.inf if region is None else region.radius
+        points = np.zeros((0, len(self.inputs))) if region is None else region.points
+        limits = np.array([low, high, going.widths])
+        return radius, limits, points, self.rest.compiled(), gram(self.network, 3)
+
+    @cached_property
+    def _root(self) -> np.ndarray:
+        """The posterior's root in units of ℓ."""
+        if self.root is None:
+            return np.zeros((0, 0))
+        return np.asarray(self.root * self.network.scaling.output_scale[0])
+
+    def compiled(self) -> tuple[Any, ...]:
+        """What `grasp_into` takes after its answer, with scratch for one thread."""
+        scratch = (np.zeros((5, len(self.inputs))), np.zeros((SMALL, 3, 3)))
+        return (*scratch, *self._fixed, self.network.compiled())
+
+    def _answers(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Checked inputs (N, n), answers (N, 14) and inside (N,)."""
+        X = np.ascontiguousarray(X, dtype=np.float64)
+        if X.ndim != 2 or X.shape[1] != len(self.inputs):
+            raise UsageError(
+                f"Inputs of shape {X.shape} came to a grasp surrogate of {len(self.inputs)} inputs.",
+                why=f"They are {', '.join(r.name for r in self.inputs)}.",
+                fix=f"Pass an array of shape (N, {len(self.inputs)}), in SI units.",
+            )
+        answers, inside = np.empty((len(X), ANSWER)), np.empty(len(X), dtype=np.bool_)
+        grasps_into(X, answers, inside, *self.compiled())
+        return X, answers, inside
+
+    def energy(self, X: np.ndarray) -> np.ndarray:
+        """U (N,) at inputs X (N, n), J: what the hand gave to bring the pad from rest to d at this place.
+
+        Raises
+        ------
+        UsageError
+            If X has another number of columns; so do all that take X.
+        """
+        return self._answers(X)[1][:, 0].copy()
+
+    def force(self, X: np.ndarray) -> np.ndarray:
+        """F = −∂U/∂d (N, 3) on the hand, N."""
+        return self._answers(X)[1][:, FORCE].copy()
+
+    def stiffness(self, X: np.ndarray) -> np.ndarray:
+        """∂F/∂d (N, 3, 3), symmetric, N/m; a body that resists has negative eigenvalues."""
+        return self._answers(X)[1][:, STIFFNESS].reshape(-1, 3, 3).copy()
+
+    def inside(self, X: np.ndarray) -> np.ndarray:
+        """Whether the answers (N,) are of the trained region: in all ranges, and near a training input."""
+        return self._answers(X)[2]
+
+    def deviation(self, X: np.ndarray) -> np.ndarray:
+        """Standard deviation (N,) of the force relative to its size; zero at rest.
+
+        Raises
+        ------
+        UsageError
+            If the surrogate has no posterior.
+        """
+        if self.root is None:
+            raise UsageError(
+                "This surrogate does not know its deviation.",
+                why="It has no posterior of its weights.",
+                fix="Learn it with one, or give `root`.",
+            )
+        X, answers, _ = self._answers(X)
+        out, columns = np.empty(len(X)), np.zeros((4, self._root.shape[1]))
+        trusts_into(X, answers, out, self._root, columns, self.network.compiled())
+        return out
+
+    def evaluator(self) -> GraspEvaluator:
+        """The allocation-free evaluator of the 1 kHz path."""
+        return GraspEvaluator(self.compiled(), self._root, [r.low for r in self.inputs])
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the surrogate to one file.
+
+        Raises
+        ------
+        UsageError
+            If the file can't be written.
+        """
+        from palpate.surrogates.grasp.file import save_grasp
+
+        return save_grasp(path, self)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> GraspSurrogate:
+        """Read a surrogate back.
+
+        Raises
+        ------
+        FileFormatError
+            If the file is missing, corrupt, foreign or from a later version.
+        """
+        from palpate.surrogates.grasp.file import load_grasp
+
+        return load_grasp(path)

@@ -1,0 +1,61 @@
+"""A held body whose energy is known in closed form: a point on springs that are slack where it is glued."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from palpate.units import Range
+
+INPUTS = (
+    *(Range(f"d_{axis}", -0.01, 0.01, "m") for axis in "xyz"),
+    *(Range(f"p_{axis}", -0.02, 0.02, "m") for axis in "xy"),
+)
+SQUARE = tuple(
+    np.array(m, dtype=float)
+    for s in (1, -1)
+    for t in (1, -1)
+    for m in ([[s, 0, 0], [0, t, 0], [0, 0, 1]], [[0, s, 0], [t, 0, 0], [0, 0, 1]])
+)
+"""The eight isometries of a square about z."""
+
+ANCHORS = np.array(
+    [
+        [0.05, 0.05, -0.02],
+        [-0.05, 0.05, -0.02],
+        [0.05, -0.05, -0.02],
+        [-0.05, -0.05, -0.02],
+        [0.0, 0.0, -0.05],
+    ]
+)
+SPRINGS = np.array([60.0, 60.0, 60.0, 60.0, 80.0])  # N/m
+
+
+def held(X: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """U (N,), −∂U/∂x (N, 5) and its derivative (N, 5, 5) at x = (d, p): U = Σ ½ k (|p + d − b| − |p − b|)²."""
+    d, p = X[:, None, :3], np.zeros((len(X), 1, 3))
+    p[:, 0, :2] = X[:, 3:]
+    (r, n, P), (r0, n0, P0) = _from(p + d - ANCHORS), _from(p - ANCHORS)
+    e = r - r0
+    slope = np.concatenate([n, (n - n0)[..., :2]], axis=2)
+    bend = np.zeros((*e.shape, 5, 5))
+    bend[..., :3, :3] = P
+    bend[..., :3, 3:], bend[..., 3:, :3] = P[..., :2], P[..., :2, :]
+    bend[..., 3:, 3:] = (P - P0)[..., :2, :2]
+    force = -np.einsum("k,nk,nki->ni", SPRINGS, e, slope)
+    gradient = np.einsum("k,nki,nkj->nij", SPRINGS, slope, slope) + np.einsum(
+        "k,nk,nkij->nij", SPRINGS, e, bend
+    )
+    return (SPRINGS * e**2).sum(axis=1) / 2, force, -gradient
+
+
+def _from(a: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Lengths of vectors (N, k, 3), their directions and the derivatives of those."""
+    r = np.linalg.norm(a, axis=2)
+    n = a / r[..., None]
+    return r, n, (np.eye(3) - n[..., :, None] * n[..., None, :]) / r[..., None, None]
+
+
+def drawn(count: int, seed: int = 0) -> np.ndarray:
+    """Inputs (count, 5) at random."""
+    low, high = np.array([[r.low for r in INPUTS], [r.high for r in INPUTS]])
+    return np.random.default_rng(seed).uniform(low, high, (count, 5))

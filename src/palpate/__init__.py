@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from palpate.dataset import Dataset, Field, Layout
     from palpate.errors import PalpateError
     from palpate.learning import Fitted, Learner, Refinement, Settings, fit
-    from palpate.learning import learn_touch as learn
+    from palpate.learning import learn_dataset as learn
     from palpate.network import Network
     from palpate.physics import (
         Block,
@@ -67,7 +67,7 @@ if TYPE_CHECKING:
     )
     from palpate.physics.massspring import MassSpringBody
     from palpate.study import Study, preset_study, read_study
-    from palpate.surrogates import TouchModel
+    from palpate.surrogates import TouchedBody, TouchedSurface, TouchModel, TouchSurrogate
     from palpate.sweeps import ExternalProblem, Space, local_cluster, sweep
     from palpate.units import Quantity, Range
     from palpate.validation import validate, write_report
@@ -128,13 +128,16 @@ _HOMES = {
     "SurfaceTraction": "physics",
     "TipLoad": "physics",
     "TouchModel": "surrogates",
+    "TouchSurrogate": "surrogates",
+    "TouchedBody": "surrogates",
+    "TouchedSurface": "surrogates",
     "Tube": "physics",
     "UserMaterial": "physics",
     "Viscoelastic": "physics",
     "VoceHardening": "physics",
     "Yeoh": "physics",
     "fit": "learning",
-    "learn": "learning:learn_touch",
+    "learn": "learning:learn_dataset",
     "local_cluster": "sweeps",
     "named_material": "physics",
     "preset_study": "study",
@@ -200,6 +203,9 @@ __all__ = [
     "SurfaceTraction",
     "TipLoad",
     "TouchModel",
+    "TouchSurrogate",
+    "TouchedBody",
+    "TouchedSurface",
     "Tube",
     "UserMaterial",
     "Viscoelastic",

@@ -10,11 +10,15 @@ history      what happened meanwhile, and its picture (drawing)
 modes        the few directions in which many outputs move
 checks       samples as arrays that fit together         measures     errors relative to the outputs' spread
 freezing     a network value of what was learnt, and the hash of its samples
-touch        a dataset made into a body that can be touched
+touch        a dataset of beam loads made into a body that can be touched
+bodies       the same of a body pressed anywhere
+dispatch     `palpate.learn`: which of the two
 """
 
+from palpate.learning.bodies import TouchHistory, learn_body
 from palpate.learning.choosing.automatic import automatic
 from palpate.learning.choosing.choice import Fitted, fit
+from palpate.learning.dispatch import learn_dataset
 from palpate.learning.filter.observation import Observation
 from palpate.learning.filter.presets import PRESETS, default, founding, recommended
 from palpate.learning.filter.settings import Settings
@@ -47,6 +51,7 @@ __all__ = [
     "Reservoir",
     "Settings",
     "State",
+    "TouchHistory",
     "Trial",
     "automatic",
     "default",
@@ -57,6 +62,8 @@ __all__ = [
     "hand_coordinates",
     "initial",
     "learn",
+    "learn_body",
+    "learn_dataset",
     "learn_touch",
     "node_outputs",
     "observe",

@@ -1,0 +1,161 @@
+"""From a sweep of touches to a body that is felt and seen."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from palpate.dataset import Dataset, Layout
+from palpate.errors import UsageError
+from palpate.learning.bodies.images import shapes_of
+from palpate.learning.bodies.touches import Touches
+from palpate.learning.energy import LearntSurrogate, learn_surrogate
+from palpate.learning.fields import LearntField, learn_field
+from palpate.surrogates import TouchedBody
+
+__all__ = ["TouchHistory", "learn_body"]
+
+SHARE = 0.5  # of the energy's time for the shape
+
+
+@dataclass(frozen=True, eq=False)
+class TouchHistory:
+    """How a touched body was learnt.
+
+    Attributes
+    ----------
+    energy : LearntSurrogate
+        The energy, every network that was tried, and the error of each solve when it is left out.
+    shape : LearntField or None
+        The same of the displacement; None if only the force was asked for.
+    solves : int
+        That were learnt from.
+    seconds : float
+    """
+
+    energy: LearntSurrogate
+    shape: LearntField | None
+    solves: int
+    seconds: float
+
+    def __str__(self) -> str:
+        tried = len(self.energy.trials)
+        left = self.energy.surrogate.meta.get("left_out", {})
+        words = f"{self.solves} solves, {tried} networks of the energy tried in {self.seconds:.0f} s"
+        if left:
+            words += (
+                f"; a solve left out is missed by {100 * left['median']:.2g} % of its force (median), "
+                f"{100 * left['p95']:.2g} % (95th percentile)"
+            )
+        if self.shape is not None:
+            modes = self.shape.field.meta["modes"]
+            words += f"; shape: {modes} modes, which miss {1e3 * self.shape.truncation:.2g} mm"
+        return words
+
+    __repr__ = __str__
+
+
+def learn_body(
+    train: Dataset,
+    *,
+    name: str = "body",
+    layout: Layout | None = None,
+    seconds: float = 60.0,
+    units_max: int = 96,
+    target: float = 1e-3,
+    shape: bool = True,
+    seed: int = 0,
+    say: Callable[[str], None] = lambda _: None,
+    **options: Any,
+) -> tuple[TouchedBody, TouchHistory]:
+    """Learn a body that can be touched anywhere on a surface, and seen.
+
+    Parameters
+    ----------
+    train : Dataset
+        Of ``palpate.sweep(body, probe, …)``; rows that did not converge are left out. The body's symmetry stands in it.
+    name : str
+    layout : Layout, optional
+        Of a mesh that is fine wherever the body shall be touched, where the sweep's is fine in a part only.
+    seconds : float
+        To search the network of the energy; half as long for the shape.
+    units_max : int
+        Most units of the energy; mirror images count.
+    target : float
+        Leave-one-solve-out error of the energy at which no more units are added.
+    shape : bool
+        Whether to learn the displacement of the surface too.
+    seed : int
+    say : callable
+        Told what begins, as one line.
+    **options
+        Of `palpate.learning.energy.learn_surrogate`.
+
+    Returns
+    -------
+    TouchedBody, TouchHistory
+
+    Raises
+    ------
+    UsageError
+        If the data is of no body under one probe, lacks energies, has too few solves or none in contact.
+    """
+    if not seconds > 0:
+        raise UsageError(f"{seconds} s allow no learning.", fix="Give a positive time.")
+    began = time.monotonic()
+    touches = Touches.of(train, layout)
+    say(f"energy of {len(touches.data)} solves")
+    energy = _energy(
+        touches, {"seconds": seconds, "units_max": units_max, "target": target, "seed": seed} | options
+    )
+    found = None
+    if shape:
+        say("shape")
+        found = _shape(touches, SHARE * seconds, seed)
+    meta = {**energy.surrogate.meta, "name": name, "dataset": _origin(touches.data)}
+    touch = replace(energy.surrogate, meta=meta)
+    fields = {} if found is None else {"displacement": found.field}
+    history = TouchHistory(energy, found, len(touches.data), time.monotonic() - began)
+    return TouchedBody(touch, fields), history
+
+
+def _energy(touches: Touches, options: dict[str, Any]) -> LearntSurrogate:
+    data = touches.data
+    K = data.response_gradient[:, :3, :3] if "response_gradient" in data else None
+    return learn_surrogate(
+        data.X,
+        data.potential_energy,
+        data.response[:, :3],
+        K,
+        **{
+            "surface": touches.surface,
+            "radius": touches.radius,
+            "inputs": touches.inputs,
+            "symmetry": touches.matrices if len(touches.matrices) > 1 else (),
+            "about": touches.about,
+            "resolved": touches.resolved,
+        }
+        | options,
+    )
+
+
+def _shape(touches: Touches, seconds: float, seed: int) -> LearntField:
+    shapes = shapes_of(touches, seed=seed)
+    return learn_field(
+        shapes.X,
+        shapes.values,
+        inputs=touches.inputs,
+        points=touches.points,
+        triangles=touches.triangles,
+        surface=touches.surface,
+        radius=touches.radius,
+        groups=shapes.groups,
+        seconds=seconds,
+        seed=seed,
+    )
+
+
+def _origin(data: Dataset) -> dict[str, Any]:
+    return {"hash": data.hash, "provenance": data.provenance}

@@ -1,0 +1,174 @@
+"""What a dataset of touches knows: the probe, the surface that it presses, the body's symmetry, and the energies."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palpate.dataset import Dataset, Layout
+from palpate.errors import UsageError
+from palpate.surrogates import TouchedSurface
+from palpate.units import Range, bounds
+
+__all__ = ["FEWEST", "Touches", "is_touched"]
+
+FEWEST = 6  # solves in contact: what the law and an affine network have to be found from, and judged by
+UPRIGHT = ("x_min", "x_max", "y_min", "y_max")  # what "side" of a box means
+PROBES = ("SphereProbe",)
+DISSIPATING = ("Plastic",)
+SAME_FOOT = 0.02  # of the radius: solves that share a footprint are one column
+
+
+def is_touched(data: Dataset) -> bool:
+    """Whether a dataset is of a body pressed by a probe, by what its provenance says."""
+    return _probe(data) is not None
+
+
+def _probe(data: Dataset) -> Mapping[str, Any] | None:
+    acting = data.provenance.get("problem", {}).get("interactions", [])
+    found = [a for a in acting if isinstance(a, Mapping) and a.get("type") in PROBES]
+    return found[0] if len(found) == len(acting) == 1 else None
+
+
+@dataclass(frozen=True, eq=False)
+class Touches:
+    """Solves of a body under a probe, and what is known of them.
+
+    Attributes
+    ----------
+    data : Dataset
+        Converged rows.
+    radius : float
+        Of the probe, m.
+    inputs : n ranges
+        Those of the data, widened to all mirror images.
+    surface : TouchedSurface
+    points, triangles : (P, 3), (t, 3) arrays
+        The body's whole surface, of a mesh that is fine wherever it is touched.
+    matrices, about : (k, 3, 3), (3,) arrays
+        The body's symmetry, the identity among it.
+    resolved : float or None
+        Depth at which a contact is as wide as an element, m; None for elements of the usual size.
+    """
+
+    data: Dataset
+    radius: float
+    inputs: tuple[Range, ...]
+    surface: TouchedSurface
+    points: np.ndarray
+    triangles: np.ndarray
+    matrices: np.ndarray
+    about: np.ndarray
+    resolved: float | None
+
+    @classmethod
+    def of(cls, data: Dataset, layout: Layout | None = None) -> Touches:
+        """From a sweep; `layout` is of a mesh that is fine wherever the body shall be touched, by default the sweep's.
+
+        Raises
+        ------
+        UsageError
+            If the data is of no body under one probe, lacks energies or forces, or too few solves converged.
+        """
+        probe = _checked_probe(data)
+        data = data.ok
+        if len(data) < FEWEST:
+            raise UsageError(
+                f"{len(data)} converged solves are too few to learn a touched body from.",
+                fix=f"Sweep at least {FEWEST}, better 40 or more.",
+            )
+        rest, triangles, touched = _surface(data, layout, str(probe["touches"]))
+        nodes, own = np.unique(triangles, return_inverse=True)
+        radius = float(probe["radius"])
+        matrices, about = _symmetry(data)
+        element = data.provenance["problem"].get("element")
+        return cls(
+            data,
+            radius,
+            _widened(data.ranges, matrices, about),
+            TouchedSurface.of(rest, touched, radius=radius),
+            rest[nodes],
+            own.reshape(-1, 3),
+            matrices,
+            about,
+            None if element is None else float(element) ** 2 / (2 * radius),
+        )
+
+    @property
+    def columns(self) -> np.ndarray:
+        """For each solve (N,) the number of its column: solves with one footprint."""
+        C = np.ascontiguousarray(self.data.X[:, :3])
+        distance, gradient, _ = self.surface.at(C)
+        feet = np.round((C - distance[:, None] * gradient) / (SAME_FOOT * self.radius))
+        return np.asarray(np.unique(feet, axis=0, return_inverse=True)[1].ravel())
+
+
+def _checked_probe(data: Dataset) -> Mapping[str, Any]:
+    probe = _probe(data)
+    if probe is None:
+        raise UsageError(
+            "This dataset is not of a body under one probe.",
+            why="Its provenance names no single SphereProbe.",
+            fix="Pass what `palpate.sweep(body, probe, …)` returns; for other arrays use `palpate.fit`.",
+        )
+    for name in ("potential_energy", "response", "displacement"):
+        if name not in data:
+            raise UsageError(
+                f"The dataset has no {name.replace('_', ' ')}.",
+                why="A touched body is learnt from energies, forces and displacements.",
+                fix="Sweep the body again with this version.",
+            )
+    body = data.provenance["problem"].get("body", {})
+    if body.get("held") or any(body.get("gravity", ())):
+        raise UsageError(
+            "A touched body under constant loads can't be learnt yet.",
+            why="Depth is measured to the surface at rest, which gravity and pre-stress have moved.",
+            fix="Leave gravity and held interactions out.",
+        )
+    for region, material in body.get("material", {}).items():
+        if material.get("type") in DISSIPATING:
+            raise UsageError(
+                f"The material of {region!r} yields, so its force has no energy.",
+                fix="Take an elastic or viscoelastic one.",
+            )
+    return probe
+
+
+def _surface(data: Dataset, layout: Layout | None, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Nodes, all triangles, and those of the touched surface."""
+    if layout is None:
+        rest, triangles = data.rest, data.triangles
+        surfaces, of = data["surface"].tolist(), data["surface_of"]
+    else:
+        rest, triangles, surfaces = layout.rest, layout.triangles, list(layout.surfaces)
+        of = layout.surface_of
+    assert triangles is not None
+    assert of is not None
+    names = (name,) if name in surfaces else UPRIGHT if name == "side" else ()
+    touched = np.isin(of, [i for i, one in enumerate(surfaces) if one in names])
+    if not touched.any():
+        raise UsageError(
+            f"The mesh has no surface called {name!r}.", why=f"It has {', '.join(map(str, surfaces))}."
+        )
+    return rest, triangles, triangles[touched]
+
+
+def _symmetry(data: Dataset) -> tuple[np.ndarray, np.ndarray]:
+    told = data.provenance.get("symmetry") or {"about": [0.0, 0.0, 0.0], "isometries": [np.eye(3).tolist()]}
+    return np.array(told["isometries"], dtype=float), np.array(told["about"], dtype=float)
+
+
+def _widened(ranges: tuple[Range, ...], matrices: np.ndarray, about: np.ndarray) -> tuple[Range, ...]:
+    """The ranges of places, so that all images of their box are inside; others as they are."""
+    low, high = bounds(ranges[:3])
+    corners = np.array(list(itertools.product(*zip(low, high, strict=True))))
+    images = about + (corners - about) @ matrices.transpose(0, 2, 1)
+    least, most = images.min(axis=(0, 1)), images.max(axis=(0, 1))
+    places = tuple(
+        Range(r.name, float(a), float(b), r.unit) for r, a, b in zip(ranges, least, most, strict=False)
+    )
+    return (*places, *ranges[3:])

@@ -1,0 +1,188 @@
+"""Ours and the rivals on one study: errors against solves, closed-loop work, times."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from benchmarks.surrogate_cases import Case
+from benchmarks.surrogate_rivals import RIVALS
+from benchmarks.surrogate_springs import identified, some
+from palpate.learning.energy import learn_surrogate
+from palpate.surrogates import TouchSurrogate
+from palpate.validation import TouchFunction, TouchSolves
+from palpate.validation.force import ForceSamples, angles
+from palpate.validation.loops import function_work
+
+__all__ = ["OURS", "SIZES", "SPRINGS", "Measured", "measured", "sprung"]
+
+OURS, SPRINGS = "palpate", "mass–spring body"
+SIZES = (6, 10, 20, 40, 80, 150, 300)
+SEED = 0
+QUERIES = 200
+SPRUNG = 40  # test solves that springs are asked for: each query is an equilibrium
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Everything measured on a study.
+
+    Attributes
+    ----------
+    case : Case
+    rows : list of mappings
+        One for each method and number of solves.
+    surrogates : mapping of int to TouchSurrogate
+        Ours, by the number of solves.
+    """
+
+    case: Case
+    rows: list[Row]
+    surrogates: dict[int, TouchSurrogate]
+
+    def of(self, method: str, solves: int) -> Row | None:
+        """A method's row at a number of solves."""
+        return next((r for r in self.rows if r["method"] == method and r["solves"] == solves), None)
+
+
+def measured(
+    case: Case,
+    sizes: tuple[int, ...],
+    *,
+    seconds: float,
+    detailed: int,
+    loops: int,
+    report: Callable[[str], None],
+) -> Measured:
+    """Learn and ask; `detailed` is the number of solves at which closed-loop work and query times are measured too.
+
+    Parameters
+    ----------
+    case : Case
+    sizes : tuple of int
+    seconds : float
+        That ours may search for.
+    detailed, loops : int
+    report : callable
+        Takes a line for each result.
+    """
+    test, rows, ours = case.solves("test"), [], {}
+    assert test is not None
+    for size in sizes:
+        training = case.training(size)
+        for name in (OURS, *RIVALS):
+            wall, begun = time.perf_counter(), time.process_time()
+            if name == OURS:
+                ours[size] = learnt(case, size, seconds)
+                model = TouchFunction.of(ours[size])
+            else:
+                model = RIVALS[name](case, training)
+            spent = time.process_time() - begun
+            row = {"method": name, "solves": size, "learning": spent, "wall": time.perf_counter() - wall}
+            row |= errors(model, test)
+            if size == detailed:
+                row |= _loops(model, test, loops) | {"query": _query(model, ours.get(size), name, test)}
+            rows.append(row)
+            report(
+                f"{case.name}, {size} solves, {name}: {row['median']:.2%} / {row['p95']:.2%}, {spent:.0f} s"
+            )
+    return Measured(case, rows, ours)
+
+
+def learnt(case: Case, size: int, seconds: float) -> TouchSurrogate:
+    """Our surrogate of so many solves."""
+    training = case.training(size)
+    return learn_surrogate(
+        training.X,
+        training.energy,
+        training.force,
+        training.stiffness,
+        surface=case.surface,
+        radius=case.radius,
+        inputs=case.inputs,
+        symmetry=case.symmetry,
+        about=case.about if case.symmetry else None,
+        seconds=seconds,
+        seed=SEED,
+    ).surrogate
+
+
+def errors(model: TouchFunction, test: TouchSolves) -> Row:
+    """Errors of force, light touch, direction and stiffness on solves that were not learnt from."""
+    K = None if model.stiffness is None else model.stiffness(test.X)
+    return _errors(test, model.force(test.X), K)
+
+
+def _errors(test: TouchSolves, F: np.ndarray, K: np.ndarray | None) -> Row:
+    samples = ForceSamples(test.X[:, :3], test.force, F, np.ones(len(F), dtype=bool))
+    heavy, light = samples.heavy, samples.light
+    relative = samples.relative[heavy]
+    turned = angles(test.force[heavy], F[heavy])
+    row = {
+        "median": _quantile(relative, 0.5),
+        "p95": _quantile(relative, 0.95),
+        "light": _quantile(samples.error[~heavy] / light, 0.95),
+        "direction": _quantile(turned, 0.95),
+        "stiffness": None,
+    }
+    if K is not None and test.stiffness is not None:
+        size = np.linalg.norm(test.stiffness, axis=(1, 2))
+        known = np.isfinite(size) & (size > 0)
+        off = np.linalg.norm(K - test.stiffness, axis=(1, 2))[known] / size[known]
+        row["stiffness"] = _quantile(off, 0.95)
+    return row
+
+
+def sprung(case: Case, size: int, report: Callable[[str], None]) -> Row:
+    """The same of springs, on some of the test: each query is an equilibrium."""
+    found = case.solves("test")
+    assert found is not None
+    test, begun = some(found, SPRUNG), time.process_time()
+    springs = identified(case, case.training(size))
+    spent, begun = time.process_time() - begun, time.process_time()
+    F, K = springs.answers(test.X, stiffness=True)
+    query = 1e6 * (time.process_time() - begun) / len(test)
+    # what has no equilibrium counts as no force
+    row = _errors(test, np.nan_to_num(F), np.nan_to_num(K))
+    report(f"{case.name}, {SPRINGS}: {row['median']:.2%} / {row['p95']:.2%}, moduli × {springs.factors}")
+    return {
+        "method": SPRINGS,
+        "solves": size,
+        "learning": spent,
+        "query": query,
+        "factors": springs.factors,
+        **row,
+    }
+
+
+def _loops(model: TouchFunction, test: TouchSolves, loops: int) -> Row:
+    found = function_work(model, test, loops=loops, seed=SEED)
+    return (
+        {} if isinstance(found, str) else {"loop_median": found.median, "loop": found.max, "open": found.open}
+    )
+
+
+def _query(model: TouchFunction, ours: TouchSurrogate | None, name: str, test: TouchSolves) -> float:
+    """Microseconds of one force at one place; of ours with the stiffness."""
+    X = test.X[np.arange(QUERIES) % len(test)]
+    if name == OURS and ours is not None:
+        evaluate = ours.evaluator()
+        pairs = [(x[:3].copy(), x[3:].copy()) for x in X]
+        begun = time.perf_counter()
+        for position, parameters in pairs:
+            evaluate(position, parameters)
+        return 1e6 * (time.perf_counter() - begun) / len(X)
+    ones = [x[None] for x in X]
+    begun = time.perf_counter()
+    for x in ones:
+        model.force(x)
+    return 1e6 * (time.perf_counter() - begun) / len(X)
+
+
+def _quantile(values: np.ndarray, q: float) -> float:
+    return float(np.quantile(values, q)) if values.size else float("nan")

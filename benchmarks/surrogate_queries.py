@@ -1,0 +1,78 @@
+"""What one answer of a surrogate costs, beside the same in plain NumPy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from benchmarks.plain_field import NODES, PlainField, _time, made
+from benchmarks.plain_query import PlainQuery, _example
+from benchmarks.table import Claim, Column, Table
+from palpate.units import bounds
+
+__all__ = ["query_table"]
+
+UNITS, RATIO = 40, 0.7
+FRAME = 1e6 / 60  # µs of a picture at 60 Hz
+
+
+def query_table(quick: bool) -> Table:
+    """Microseconds of an answer both ways."""
+    repeats = 50 if quick else 1000
+    surrogate = _example(UNITS)
+    low, high = bounds(surrogate.inputs)
+    c = (low + high) / 2
+    c[2] = 0.004
+    evaluate, plain = surrogate.evaluator(), PlainQuery(surrogate)
+    energy, field = made()
+    force, eye, plain_force, plain_eye = (
+        energy.evaluator(),
+        field.evaluator(),
+        PlainQuery(energy),
+        PlainField(field),
+    )
+    place = np.array([0.003, 0.001, 0.004])
+
+    def both() -> None:
+        force(place)
+        eye(place)
+        eye.field()
+
+    def by_hand() -> None:
+        plain_force(place)
+        plain_eye(place)
+
+    cases: tuple[tuple[str, Callable[[], object], Callable[[], object], float], ...] = (
+        ("force and stiffness", lambda: evaluate(c), lambda: plain(c), 10.0),
+        ("the same and the trust figure", lambda: evaluate.trust(c), lambda: plain.trust(c), 20.0),
+        (f"force, stiffness and field of {NODES} nodes", both, by_hand, 100.0),
+    )
+    rows = []
+    for what, ours, other, about in cases:
+        a, b = _time(ours, repeats), _time(other, max(1, repeats // 10))
+        rows.append({"what": what, "ours": a, "plain": b, "ratio": a / b, "about": about})
+    places = np.random.default_rng(0).uniform(low, high, (NODES, len(low)))
+    variance = _time(lambda: surrogate.deviation(places), 1)
+    rows.append({"what": f"deviation at {NODES} places", "ours": variance, "about": FRAME})
+    return Table(
+        "surrogates-query",
+        f"One answer of a surrogate{' (quick)' if quick else ''}",
+        (
+            Column("what", "answer"),
+            Column("ours", "µs", ".1f"),
+            Column("about", "aim, about, µs", ".0f"),
+            Column("plain", "plain NumPy, µs", ".0f"),
+            Column("ratio", "ratio", ".2f"),
+        ),
+        rows,
+        (
+            *(Claim(f"{r['what']}, over NumPy", (r["ratio"],), RATIO, ".2f") for r in rows if "ratio" in r),
+            Claim("deviation over the surface, µs of a picture at 60 Hz", (variance,), FRAME, ".0f"),
+        ),
+        (
+            f"{UNITS} rotated units of three inputs, 512 training inputs, a full posterior; the field: 20 modes, "
+            "a moving dimple; plain NumPy as one would write it from the formulas (benchmarks/plain_query.py, "
+            "plain_field.py); medians of seven runs",
+        ),
+    )

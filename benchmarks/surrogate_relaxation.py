@@ -1,0 +1,122 @@
+"""Branches of relaxation on an elastic energy, against transient finite elements.
+
+The file ``benchmarks/data/visco.npz`` holds drives by name: ``<drive>_t`` (N,) in s, ``_c`` (N, 3) centres in m, ``_F`` transient
+forces in N, ``_U`` elastic energies in J and ``_Fe`` elastic forces in N of the same positions. Drives called ``hold…``
+are pressed at once and held: the parameters come from them alone.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from benchmarks.surrogate_cases import DATA
+from benchmarks.table import Claim, Column, Table
+from palpate.surrogates.relaxation import Memory, Patches, Record, course, identify_behind_pad
+
+__all__ = ["relaxation_table"]
+
+RADIUS, SPACING = 0.01, 0.0025
+FLOOR = 0.05  # of the drive's largest force: below, errors are relative to that
+AIM, TIMES = 0.05, 3.0
+Drive = dict[str, np.ndarray]
+
+
+def relaxation_table(quick: bool) -> list[Table]:
+    """Errors on each drive; nothing where there is no file."""
+    path = DATA / "visco.npz"
+    if not path.exists():
+        return []
+    drives = _drives(path)
+    holds = [d for name, d in drives.items() if name.startswith("hold")]
+    found = identify_behind_pad(
+        [Record(d["t"], d["F"][:, 2], energy=float(d["U"][0])) for d in holds], most=2
+    )
+    patches = _patches(drives)
+    rows = [_row(name, drive, Memory(found.branches, patches)) for name, drive in drives.items()]
+    drive = next((row for row in rows if row["drive"] == "random"), rows[-1])
+    return [
+        Table(
+            "surrogates-relaxation",
+            f"Relaxation against transient finite elements{' (quick)' if quick else ''}",
+            (
+                Column("drive", "drive"),
+                Column("seconds", "s", ".0f"),
+                Column("samples", "samples"),
+                Column("median", "error, median", ".1%"),
+                Column("p95", "p95", ".1%"),
+                Column("elastic", "elastic only, p95", ".0%"),
+                Column("times", "times worse", ".1f"),
+                Column("stored", "least stored, J", ".1e"),
+                Column("lost", "least loss of a step, J", ".1e"),
+            ),
+            rows,
+            (
+                Claim(f"error p95 on the {drive['drive']} drive", (drive["p95"],), AIM, ".1%"),
+                Claim("3 over how much worse elastic only is", (TIMES / drive["times"],), 1.0, ".2f"),
+                Claim("energy stored below zero, J, most", (max(-r["stored"] for r in rows),), 0.0),
+                Claim("energy given by a step's dissipation, J, most", (max(-r["lost"] for r in rows),), 0.0),
+            ),
+            (
+                f"identified on held presses alone: {found.branches}",
+                f"errors relative to the transient force, at least {FLOOR:.0%} of the drive's largest; elastic energies "
+                "and forces by finite elements, so nothing learnt is in between",
+            ),
+        )
+    ]
+
+
+def _drives(path: Any) -> dict[str, Drive]:
+    with np.load(path) as data:
+        names = [key[:-2] for key in data.files if key.endswith("_t")]
+        return {name: {k: data[f"{name}_{k}"] for k in ("t", "c", "F", "U", "Fe")} for name in names}
+
+
+def _patches(drives: dict[str, Drive]) -> Patches:
+    """A grid under all that is touched, as wide as the contact of a middling depth."""
+    c = np.concatenate([d["c"] for d in drives.values()])
+    energy = np.concatenate([d["U"] for d in drives.values()])
+    depth = np.concatenate([_depths(d) for d in drives.values()])
+    middle = 0.004
+    touching = depth > 0
+    U = float(np.interp(middle, *np.sort(np.array([depth[touching], energy[touching]]), axis=1)))
+    low, high = c[:, :2].min(axis=0) - RADIUS, c[:, :2].max(axis=0) + RADIUS
+    axes = [np.arange(a, b + SPACING, SPACING) for a, b in zip(low, high, strict=True)]
+    grid = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
+    surface = _surface(drives)
+    points = np.c_[grid, np.full(len(grid), surface)]
+    return Patches(points, 0.5 * np.sqrt(RADIUS * middle), U, 0.4 * SPACING)
+
+
+def _surface(drives: dict[str, Drive]) -> float:
+    """Height in m of the surface: R below the lowest centre without contact, or the highest with it."""
+    touching = np.concatenate([d["c"][d["U"] > 0, 2] for d in drives.values()])
+    free = np.concatenate([d["c"][d["U"] <= 0, 2] for d in drives.values()])
+    top = min(free.min() if len(free) else np.inf, touching.max() + 1e-4)
+    return float(round(top - RADIUS, 3))
+
+
+def _depths(drive: Drive) -> np.ndarray:
+    return np.asarray(_surface({"": drive}) + RADIUS - drive["c"][:, 2])
+
+
+def _row(name: str, drive: Drive, memory: Memory) -> dict[str, Any]:
+    felt = course(memory, drive["t"], drive["c"], np.maximum(drive["U"], 0.0), -drive["Fe"])
+    size = np.linalg.norm(drive["F"], axis=1)
+    scale = np.maximum(size, FLOOR * size.max())
+    contact = (size > 0) | felt.force.any(axis=1)
+    error = (np.linalg.norm(felt.force - drive["F"], axis=1) / scale)[contact]
+    elastic = (np.linalg.norm(drive["Fe"] - drive["F"], axis=1) / scale)[contact]
+    p95, plain = float(np.quantile(error, 0.95)), float(np.quantile(elastic, 0.95))
+    return {
+        "drive": name,
+        "seconds": float(drive["t"][-1]),
+        "samples": len(size),
+        "median": float(np.median(error)),
+        "p95": p95,
+        "elastic": plain,
+        "times": plain / p95,
+        "stored": float(felt.stored.min()),
+        "lost": float(np.diff(felt.lost, prepend=0.0).min()),
+    }

@@ -43,6 +43,8 @@ class Column:
         In m, from shallow to deep.
     values : tuple of float
         Further inputs.
+    turn : (3, 3) array
+        By which answers are turned: of a round body one meridian is solved.
     """
 
     number: int
@@ -50,6 +52,7 @@ class Column:
     normal: np.ndarray
     depths: np.ndarray
     values: tuple[float, ...]
+    turn: np.ndarray
 
     @property
     def centres(self) -> np.ndarray:
@@ -76,10 +79,17 @@ def columns_of(study: TouchStudy, count: int, depths: int, seed: int, role: str)
         values = tuple(
             low + (high - low) * u for (_, low, high, _), u in zip(study.inputs, unit[row, 3:], strict=True)
         )
-        found.append(Column(len(found), foot, normal, d, values))
+        found.append(Column(len(found), foot, normal, d, values, _turn(study, unit[row, 1])))
         if len(found) == count:
             return found
     raise RuntimeError(f"only {len(found)} of {count} footprints lie on the surface")
+
+
+def _turn(study: TouchStudy, share: float) -> np.ndarray:
+    """A rotation (3, 3) about the axis by this share of a turn; none of bodies that are not round."""
+    angle = 2 * np.pi * share if study.symmetry == "round" else 0.0
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _feet(study: TouchStudy, unit: np.ndarray) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
@@ -89,7 +99,10 @@ def _feet(study: TouchStudy, unit: np.ndarray) -> Iterator[tuple[int, np.ndarray
     low, high = (corner[:2] for corner in (study.over if study.over is not None else patch.box))
     low, high = np.asarray(low), np.asarray(high)
     rim = _rim(patch) if study.over is None else np.empty((0, 3))
-    for row, place in enumerate(low + unit * (high - low)):
+    places = low + unit * (high - low)
+    if study.symmetry == "round":  # evenly over the disc
+        places = np.asarray(study.about) + study.within * np.sqrt(unit[:, :1]) * (1.0, 0.0)
+    for row, place in enumerate(places):
         if np.hypot(*(place - study.about)) > study.within:
             continue
         foot = patch.cast(2, 1.0, place[None])[0]
@@ -183,10 +196,10 @@ def _solve(solver: Any, column: Column, options: argparse.Namespace) -> list[dic
             solver.reset()
             continue
         row: dict[str, Any] = {
-            "inputs": np.r_[centre, column.values],
+            "inputs": np.r_[column.turn @ centre, column.values],
             "energy": float(found.potential_energy),
-            "force": np.asarray(found.response),
-            "stiffness": np.asarray(found.response_gradient),
+            "force": column.turn @ np.asarray(found.response),
+            "stiffness": column.turn @ np.asarray(found.response_gradient) @ column.turn.T,
             "column": column.number,
             "role": options.role,
             "seconds": time.process_time() - start,

@@ -54,6 +54,8 @@ class TouchStudy:
         Farthest footprint from that axis, in m.
     inputs : tuple of (name, low, high, unit)
         Beyond the position.
+    element : float, optional
+        Size of the elements that are pressed, in m; half the sphere's radius by default.
     wanted : int
         Number of training solves at which targets are set.
     target : tuple of float
@@ -70,6 +72,7 @@ class TouchStudy:
     to_edges: bool = False
     within: float = np.inf
     inputs: tuple[tuple[str, float, float, str], ...] = ()
+    element: float | None = None
     wanted: int = 80
     target: tuple[float, float] = (0.005, 0.02)
 
@@ -88,7 +91,9 @@ class TouchStudy:
     def problem(self, values: Values = (), *, finer: float = 1.0) -> SolidProblem:
         """The body of these inputs under the probe; elements `finer` times smaller where it is pressed."""
         body, probe = self.body(*values), self.probe
-        element = None if finer == 1.0 else min(f.element for f in probe.refinements(body.geometry)) / finer
+        element = self.element
+        if finer != 1.0:
+            element = (element or min(f.element for f in probe.refinements(body.geometry))) / finer
         return body.problem(probe, element=element)
 
 
@@ -97,7 +102,7 @@ def _block() -> Body:
 
 
 def _layered(fat: float = 4e3, muscle: float = 15e3) -> Body:
-    layers = (("skin", 0.002), ("fat", 0.010), ("muscle", 0.028))
+    layers = (("skin", 0.003), ("fat", 0.009), ("muscle", 0.028))
     moduli = {"skin": 30e3, "fat": fat, "muscle": muscle}
     materials = {name: NeoHookean(modulus, POISSON) for name, modulus in moduli.items()}
     return Body(LayeredBlock((0.1, 0.1), layers), materials, fixed="bottom")
@@ -105,7 +110,7 @@ def _layered(fat: float = 4e3, muscle: float = 15e3) -> Body:
 
 def _dome() -> Body:
     materials = {"skin": NeoHookean(20e3, POISSON), "body": NeoHookean(6e3, POISSON)}
-    return Body(Dome(0.06, 0.045, layer=0.002), materials, fixed="bottom")
+    return Body(Dome(0.06, 0.045, layer=0.003), materials, fixed="bottom")
 
 
 def _liver() -> Body:
@@ -114,6 +119,7 @@ def _liver() -> Body:
 
 _WHOLE = ((0.05, 0.05), (0.1, 0.1))  # a quadrant of the whole top face
 _MIDDLE = ((0.05, 0.05), (0.08, 0.08))  # of its middle, 60 mm wide
+_MERIDIAN = ((0.0, -0.001), (0.045, 0.001))  # what is solved of a round body, and then turned
 _BLOCK = TouchStudy(_block, over=_WHOLE, to_edges=True, about=(0.05, 0.05), wanted=40, target=(0.003, 0.01))
 _LAYERED = TouchStudy(_layered, over=_MIDDLE, about=(0.05, 0.05))
 
@@ -121,9 +127,15 @@ STUDIES: dict[str, TouchStudy] = {
     "block": _BLOCK,
     "block-10k": replace(_BLOCK, pad=STIFF_PAD),
     "layered": _LAYERED,
-    "breast-dome": TouchStudy(_dome, over=((0.0, 0.0), (0.045, 0.045)), symmetry="round", within=0.045),
+    "breast-dome": TouchStudy(_dome, over=_MERIDIAN, symmetry="round", within=0.045),
     "liver": TouchStudy(
-        _liver, touches="front", depth=0.015, symmetry="none", wanted=200, target=(np.nan, 0.03)
+        _liver,
+        touches="front",
+        depth=0.015,
+        symmetry="none",
+        element=0.0065,
+        wanted=200,
+        target=(np.nan, 0.03),
     ),
     "family": replace(
         _LAYERED,

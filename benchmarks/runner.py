@@ -29,6 +29,7 @@ BENCHMARKS = (
     "refinement",
     "runtime",
     "stability",
+    "surrogates",
     "sweep",
     "touching",
     "touching_cost",
@@ -66,7 +67,8 @@ def main(arguments: Sequence[str] | None = None, *, only: str | None = None) -> 
     with threadpool_limits(1):  # as in palpate's own learning and loop
         for name in names:
             print(f"{name} …", file=sys.stderr, flush=True)
-            found = importlib.import_module(f"benchmarks.{name}").tables(quick=options.quick)
+            studies = {"studies": options.study} if name == "surrogates" and options.study else {}
+            found = importlib.import_module(f"benchmarks.{name}").tables(quick=options.quick, **studies)
             tables += found
             if not (options.json or options.markdown):
                 for table in found:
@@ -89,6 +91,10 @@ def _parser(only: str | None) -> argparse.ArgumentParser:
     shape.add_argument("--json", action="store_true", help="numbers for machines")
     shape.add_argument("--markdown", action="store_true", help="the blocks of docs/benchmarks.md")
     parser.add_argument("--into", type=Path, metavar="FILE", help="replace the blocks in this Markdown file")
+    if only in {None, "surrogates"}:
+        parser.add_argument("--study", nargs="+", metavar="NAME", help="of the surrogates: some of the studies")
+    else:
+        parser.set_defaults(study=None)
     if only is None:
         parser.add_argument("--only", nargs="+", choices=BENCHMARKS, help="some of them")
     return parser

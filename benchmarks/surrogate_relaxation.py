@@ -1,8 +1,9 @@
 """Branches of relaxation on an elastic energy, against transient finite elements.
 
-The file ``benchmarks/data/visco.npz`` holds drives by name: ``<drive>_t`` (N,) in s, ``_c`` (N, 3) centres in m, ``_F`` transient
-forces in N, ``_U`` elastic energies in J and ``_Fe`` elastic forces in N of the same positions. Drives called ``hold…``
-are pressed at once and held: the parameters come from them alone.
+The file ``benchmarks/data/visco.npz`` (made by `benchmarks.visco_data`) holds drives by name: ``<drive>_t`` (N,) in s,
+``_c`` (N, 3) centres in m, ``_F`` transient forces in N, ``_U`` elastic energies in J and ``_Fe`` elastic forces in N
+of the same positions, and ``height`` of the touched plane in m. Drives called ``hold…`` are pressed at once and held:
+the parameters come from them alone.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from palpate.surrogates.relaxation import Memory, Patches, Record, course, ident
 
 __all__ = ["relaxation_table"]
 
-RADIUS, SPACING = 0.01, 0.0025
+RADIUS, SPACING, DEPTH = 0.01, 0.0025, 0.004  # m
 FLOOR = 0.05  # of the drive's largest force: below, errors are relative to that
 AIM, TIMES = 0.05, 3.0
 Drive = dict[str, np.ndarray]
@@ -28,12 +29,12 @@ def relaxation_table(quick: bool) -> list[Table]:
     path = DATA / "visco.npz"
     if not path.exists():
         return []
-    drives = _drives(path)
+    drives, height = _drives(path)
     holds = [d for name, d in drives.items() if name.startswith("hold")]
     found = identify_behind_pad(
         [Record(d["t"], d["F"][:, 2], energy=float(d["U"][0])) for d in holds], most=2
     )
-    patches = _patches(drives)
+    patches = _patches(drives, height)
     rows = [_row(name, drive, Memory(found.branches, patches)) for name, drive in drives.items()]
     drive = next((row for row in rows if row["drive"] == "random"), rows[-1])
     return [
@@ -60,45 +61,32 @@ def relaxation_table(quick: bool) -> list[Table]:
             ),
             (
                 f"identified on held presses alone: {found.branches}",
-                f"errors relative to the transient force, at least {FLOOR:.0%} of the drive's largest; elastic energies "
-                "and forces by finite elements, so nothing learnt is in between",
+                f"errors relative to the transient force, at least {FLOOR:.0%} of the drive's largest; elastic "
+                "energies and forces by finite elements, so nothing learnt is in between",
             ),
         )
     ]
 
 
-def _drives(path: Any) -> dict[str, Drive]:
+def _drives(path: Any) -> tuple[dict[str, Drive], float]:
+    """Drives by name, and the height of the touched plane."""
     with np.load(path) as data:
         names = [key[:-2] for key in data.files if key.endswith("_t")]
-        return {name: {k: data[f"{name}_{k}"] for k in ("t", "c", "F", "U", "Fe")} for name in names}
+        drives = {name: {k: data[f"{name}_{k}"] for k in ("t", "c", "F", "U", "Fe")} for name in names}
+        return drives, float(data["height"])
 
 
-def _patches(drives: dict[str, Drive]) -> Patches:
-    """A grid under all that is touched, as wide as the contact of a middling depth."""
-    c = np.concatenate([d["c"] for d in drives.values()])
-    energy = np.concatenate([d["U"] for d in drives.values()])
-    depth = np.concatenate([_depths(d) for d in drives.values()])
-    middle = 0.004
-    touching = depth > 0
-    U = float(np.interp(middle, *np.sort(np.array([depth[touching], energy[touching]]), axis=1)))
+def _patches(drives: dict[str, Drive], height: float) -> Patches:
+    """A grid under all that is touched, half as wide as the contact of a middling depth."""
+    c, energy = (np.concatenate([d[key] for d in drives.values()]) for key in ("c", "U"))
+    depth = height + RADIUS - c[:, 2]
+    deep = np.argsort(depth)
     low, high = c[:, :2].min(axis=0) - RADIUS, c[:, :2].max(axis=0) + RADIUS
     axes = [np.arange(a, b + SPACING, SPACING) for a, b in zip(low, high, strict=True)]
     grid = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
-    surface = _surface(drives)
-    points = np.c_[grid, np.full(len(grid), surface)]
-    return Patches(points, 0.5 * np.sqrt(RADIUS * middle), U, 0.4 * SPACING)
-
-
-def _surface(drives: dict[str, Drive]) -> float:
-    """Height in m of the surface: R below the lowest centre without contact, or the highest with it."""
-    touching = np.concatenate([d["c"][d["U"] > 0, 2] for d in drives.values()])
-    free = np.concatenate([d["c"][d["U"] <= 0, 2] for d in drives.values()])
-    top = min(free.min() if len(free) else np.inf, touching.max() + 1e-4)
-    return float(round(top - RADIUS, 3))
-
-
-def _depths(drive: Drive) -> np.ndarray:
-    return np.asarray(_surface({"": drive}) + RADIUS - drive["c"][:, 2])
+    points = np.c_[grid, np.full(len(grid), height)]
+    middle = float(np.interp(DEPTH, depth[deep], energy[deep]))
+    return Patches(points, 0.5 * np.sqrt(RADIUS * DEPTH), middle, 0.4 * SPACING)
 
 
 def _row(name: str, drive: Drive, memory: Memory) -> dict[str, Any]:

@@ -92,7 +92,9 @@ def _parser(only: str | None) -> argparse.ArgumentParser:
     shape.add_argument("--markdown", action="store_true", help="the blocks of docs/benchmarks.md")
     parser.add_argument("--into", type=Path, metavar="FILE", help="replace the blocks in this Markdown file")
     if only in {None, "surrogates"}:
-        parser.add_argument("--study", nargs="+", metavar="NAME", help="of the surrogates: some of the studies")
+        parser.add_argument(
+            "--study", nargs="+", metavar="NAME", help="of the surrogates: some of the studies"
+        )
     else:
         parser.set_defaults(study=None)
     if only is None:

@@ -85,7 +85,12 @@ class Case:
         return len(self.rows("train"))
 
     def training(self, count: int) -> Training:
-        """So many training solves: the first columns, of each about ∛N depths spread over it."""
+        """So many training solves."""
+        rows = self.training_rows(count)
+        return Training(*(self.arrays[k][rows] for k in ("inputs", "energy", "force", "stiffness")))
+
+    def training_rows(self, count: int) -> np.ndarray:
+        """Rows of so many training solves: the first columns, of each about ∛N depths spread over it."""
         rows = self.rows("train")
         columns = [rows[self.arrays["column"][rows] == j] for j in np.unique(self.arrays["column"][rows])]
         depths = max(1, round(count ** (1 / 3)))
@@ -98,10 +103,7 @@ class Case:
             m = min(depths, len(column))
             at = ((np.arange(m) + (j * GOLDEN) % 1.0) * len(column) / m).astype(int)
             chosen += column[at].tolist()
-        return self._training(np.array(chosen[:count]))
-
-    def _training(self, rows: np.ndarray) -> Training:
-        return Training(*(self.arrays[k][rows] for k in ("inputs", "energy", "force", "stiffness")))
+        return np.array(chosen[:count])
 
     def solves(self, role: str) -> TouchSolves | None:
         """Solves of a role; None where the file has none."""

@@ -1,7 +1,7 @@
 """Surrogates of touched bodies: error against the number of solves, beside every rival; what a hand feels; time.
 
 python -m benchmarks --only surrogates [--study block layered] [--quick] [--json | --markdown] [--into FILE]
-python -m benchmarks.surrogate_plots figures.json docs/images
+python -m benchmarks.surrogate_plots figures.json docs/images      the curves, from what --json wrote
 
 Data come from ``benchmarks/data``, made by `benchmarks.touch_data`; a study without a file is left out.
 """
@@ -17,6 +17,7 @@ import numpy as np
 
 from benchmarks.runner import main
 from benchmarks.surrogate_cases import Case
+from benchmarks.surrogate_fields import field_table
 from benchmarks.surrogate_measure import OURS, SIZES, Measured, measured, sprung
 from benchmarks.surrogate_queries import query_table
 from benchmarks.surrogate_relaxation import relaxation_table
@@ -67,6 +68,7 @@ def _study(case: Case, quick: bool) -> list[Table]:
         _curve_table(result, sizes, mark),
         _rival_table(result, beside, detailed, mark),
         _good_table(result, detailed, mark),
+        *field_table(case, detailed, QUICK_SECONDS if quick else SECONDS, mark),
     ]
 
 
@@ -122,6 +124,7 @@ def _rival_table(result: Measured, beside: list[dict[str, Any]], size: int, mark
         notes=(
             "stiffness of others by central differences of 1 µm; ours and springs have their own; a query of ours is "
             "force and stiffness, of others the force",
+            "ours learns from energies, forces and stiffnesses of the solves, the others from forces: all they take",
             "closed-loop work: |∮F·dx| over ½∮|F·dx| of random triangles to pentagons, by one quadrature that goes on "
             "until it has converged; –: a query of springs is an equilibrium, too slow for it",
             "springs: Young's modulus of each region identified on up to 10 of the solves, errors on 40 of the test; "

@@ -21,7 +21,7 @@ VIEWER = Path(palpate.viewer.__file__).parent
 CLIENT = Path(__file__).parents[2] / "src" / "palpate" / "viewer" / "client"
 
 HELLO = Hello(
-    protocol=1,
+    protocol=2,
     name="rod",
     rest=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
     radius=0.005,
@@ -70,7 +70,7 @@ def test_generated_typescript_is_up_to_date():
 
 
 def test_the_built_page_is_of_these_sources():
-    own = ["body.html", "index.html", "package-lock.json", "package.json", "tsconfig.json", "vite.config.js"]
+    own = ["body.html", "index.html", "package-lock.json", "package.json", "pressed.html", "tsconfig.json", "vite.config.js"]
     inside = [f"{folder}/{p.name}" for folder in ("public", "src") for p in (CLIENT / folder).iterdir()]
     digest = hashlib.sha256()
     for name in sorted([*own, *inside]):

@@ -22,13 +22,17 @@ from typing import Self
 
 from starlette.applications import Starlette
 from starlette.middleware import Middleware
-from starlette.routing import Mount, WebSocketRoute
+from starlette.routing import BaseRoute, Mount, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 
 from palpate.runtime import LoopProcess
-from palpate.surrogates import TouchModel
+from palpate.runtime.pressed import PressedBody
+from palpate.runtime.touchable import load_touchable, touchable
+from palpate.surrogates import TouchedBody, TouchModel, TouchSurrogate
 from palpate.viewer.guard import Guard
 from palpate.viewer.ports import listen
+from palpate.viewer.pressing import PressedExhibit
+from palpate.viewer.pressing_routes import pressing_routes
 from palpate.viewer.running import STATIC, Running, address, termination_interrupts
 from palpate.viewer.session import Session
 
@@ -37,6 +41,9 @@ __all__ = ["Viewer", "application", "serve"]
 
 def application(session: Session) -> Starlette:
     """The web application of a session: the built page, and its websocket at ``/touch``."""
+    more: list[BaseRoute] = []
+    if isinstance(session.exhibit, PressedExhibit):
+        more = pressing_routes(session.exhibit)
 
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
@@ -48,6 +55,7 @@ def application(session: Session) -> Starlette:
     return Starlette(
         routes=[
             WebSocketRoute("/touch", session.talk),
+            *more,
             Mount("/", StaticFiles(directory=STATIC, html=True)),
         ],
         middleware=[Middleware(Guard)],
@@ -56,11 +64,11 @@ def application(session: Session) -> Starlette:
 
 
 class Viewer:
-    """A body to look at and pull on, at `url`, while the context lasts.
+    """A body to look at and touch, at `url`, while the context lasts.
 
     Parameters
     ----------
-    model : TouchModel or path
+    model : TouchModel, TouchedBody, TouchSurrogate or path
     port : int
         The port wanted; 0 takes any free one.
     host : str
@@ -76,7 +84,7 @@ class Viewer:
 
     Attributes
     ----------
-    model : TouchModel
+    model : TouchModel or PressedBody
     loop : LoopProcess
         The real-time process, once started.
     port : int
@@ -85,12 +93,12 @@ class Viewer:
     Raises
     ------
     FileFormatError
-        If the file is no touch model.
+        If the file holds nothing that can be touched.
     """
 
     def __init__(
         self,
-        model: TouchModel | str | os.PathLike[str],
+        model: TouchModel | TouchedBody | TouchSurrogate | str | os.PathLike[str],
         *,
         port: int = 8080,
         host: str = "127.0.0.1",
@@ -99,9 +107,12 @@ class Viewer:
         max_force: float | None = None,
         strict_port: bool = False,
     ) -> None:
-        self.model = model if isinstance(model, TouchModel) else TouchModel.load(model)
+        self._source = model
+        if isinstance(model, str | os.PathLike):
+            self.model = load_touchable(model)
+        else:
+            self.model = touchable(model)
         self.host, self.port = host, port
-        self._path = None if isinstance(model, TouchModel) else model
         self._wanted = (port, host, strict_port)
         self._loop = functools.partial(LoopProcess, device=device, rate=rate, max_force=max_force)
         self._closing = contextlib.ExitStack()
@@ -127,7 +138,7 @@ class Viewer:
             port, host, strict = self._wanted
             socket = self._closing.enter_context(listen(port, host, strict=strict))
             self.port = int(socket.getsockname()[1])
-            path = self._written() if self._path is None else self._path
+            path = self._written()
             self.loop = self._closing.enter_context(self._loop(path))
             page = application(Session(self.model, self.loop))
             self._running = self._closing.enter_context(Running(page, socket))
@@ -144,10 +155,12 @@ class Viewer:
         """Return when the server has ended."""
         self._running.wait()
 
-    def _written(self) -> Path:
+    def _written(self) -> str | os.PathLike[str]:
         """A file of the model, which the real-time process can read."""
+        if isinstance(self._source, str | os.PathLike):
+            return self._source
         folder = self._closing.enter_context(tempfile.TemporaryDirectory(prefix="palpate-"))
-        return self.model.save(Path(folder) / "model.palpate")
+        return self._source.save(Path(folder) / "model.palpate")
 
     def __enter__(self) -> Self:
         return self.start()
@@ -159,7 +172,7 @@ class Viewer:
 
 
 def serve(
-    model: TouchModel | str | os.PathLike[str],
+    model: TouchModel | TouchedBody | TouchSurrogate | str | os.PathLike[str],
     *,
     port: int = 8080,
     host: str = "127.0.0.1",
@@ -193,5 +206,6 @@ def serve(
 
 
 def _announce(viewer: Viewer) -> None:
-    sys.stderr.write(f"{viewer.url} shows {viewer.model.name}. Pull the tip; Ctrl-C ends it.\n")
+    how = "Press it" if isinstance(viewer.model, PressedBody) else "Pull the tip"
+    sys.stderr.write(f"{viewer.url} shows {viewer.model.name}. {how}; Ctrl-C ends it.\n")
     sys.stderr.flush()

@@ -12,7 +12,7 @@ import itertools
 import logging
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -21,14 +21,11 @@ from palpate.errors import DeviceError, UsageError
 from palpate.runtime.faults import Fault
 from palpate.runtime.histogram import EDGES
 from palpate.runtime.shared import Shared, State, now
+from palpate.runtime.touchable import Touchable
+from palpate.viewer.exhibits import exhibit_of, vector
 from palpate.viewer.hands import Command, Hands
-from palpate.viewer.messages import PROTOCOL, Credit, Frame, Hand, Hello, Loop, Notice, RangeInfo
-from palpate.viewer.picture import Picture, Shape
-from palpate.viewer.travel import travel
-
-if TYPE_CHECKING:
-    from palpate.surrogates import TouchModel
-    from palpate.units import Range
+from palpate.viewer.messages import Beat, Credit, Hand, Loop, Notice
+from palpate.viewer.wire import Json
 
 __all__ = ["LoopLike", "Session"]
 
@@ -93,11 +90,9 @@ class Page:
 class Session:
     """A body, its real-time process and the pages that look at it."""
 
-    def __init__(self, model: TouchModel, loop: LoopLike) -> None:
-        self.model, self.loop = model, loop
+    def __init__(self, model: Touchable, loop: LoopLike) -> None:
+        self.model, self.loop, self.exhibit = model, loop, exhibit_of(model)
         self._hands = Hands(np.array([(r.low + r.high) / 2 for r in model.parameters]))
-        self._picture = Picture(model)
-        self._travel = tuple(_vector(corner) for corner in travel(model))
         self._pages: dict[int, Page] = {}
         self._numbers: Iterator[int] = itertools.count(1)
         self._ended = False
@@ -131,65 +126,43 @@ class Session:
             with contextlib.suppress(WebSocketDisconnect, RuntimeError):  # RuntimeError: just closed
                 await page.socket.send_text(ENDED.to_json())
 
-    def hello(self) -> Hello:
+    def hello(self) -> Json:
         """The first message to every page."""
-        model, state = self.model, self._read()[0]
-        return Hello(
-            protocol=PROTOCOL,
-            name=model.name,
-            rest=tuple(_vector(node) for node in model.rest),
-            radius=model.radius,
-            touch_node=model.touch_node,
-            nodes_of_interest=tuple(int(i) for i in model.nodes_of_interest),
-            inputs=tuple(_range(r) for r in model.inputs),
-            parameters=tuple(_range(r) for r in model.parameters),
-            reach=model.reach,
-            travel=self._travel,
-            scale=state.scale,
-            workspace=state.radius,
-            max_force=state.max_force,
-            rate=self.loop.rate,
-            faults=tuple(f.meaning for f in Fault),
-            meta=model.meta,
-        )
+        return self.exhibit.hello(self._read()[0], self.loop.rate)
 
-    def frame(self, page: Page) -> Frame:
+    def frame(self, page: Page) -> Beat:
         """The newest state as one page sees it."""
         state, loop = self._read()
         held = state.grabbed and not state.stalled and loop is Loop.RUNNING
-        shape = self._shape(state, held)
-        fault, faults, last_fault = _faults(state)
-        return Frame(
-            tick=state.tick,
-            time=now(),
-            echo=page.echo,
-            position=_vector(state.position if held else shape.contact),
-            contact=_vector(shape.contact),
-            force=_vector(state.force) if loop is Loop.RUNNING else (0.0, 0.0, 0.0),
-            rate=state.rate,
-            lateness=_latest(state, page),
-            lateness_p50=state.lateness_p50,
-            lateness_p99=state.lateness_p99,
-            lateness_max=state.lateness_max,
-            work_p50=state.work_p50,
-            faults=faults,
-            fault=fault,
-            last_fault=last_fault,
-            loop=loop,
-            hold=self._hands.hold(page.number),
-            inside=state.inside or not held,
-            clamped=state.clamped and held,
-            grabbed=state.grabbed and loop is Loop.RUNNING,
-            stalled=state.stalled,
-            parameters=self._hands.parameters,
-            displacement=shape.displacement,
-        )
+        beat = self._beat(page, state, loop, held)
+        return self.exhibit.frame(beat, state, held, self._hands.parameters)
 
-    def _shape(self, state: State, held: bool) -> Shape:
-        if held:
-            loads = state.loads[: len(self.model.inputs)]
-            return self._picture.held(loads, state.mirrored, state.contact, now())
-        return self._picture.free(self._hands.parameters, now())
+    def _beat(self, page: Page, state: State, loop: Loop, held: bool) -> dict[str, Any]:
+        """The fields of `Beat`."""
+        fault, faults, last_fault = _faults(state)
+        return {
+            "tick": state.tick,
+            "time": now(),
+            "echo": page.echo,
+            "position": vector(state.position),
+            "force": vector(state.force if loop is Loop.RUNNING else np.zeros(3)),
+            "rate": state.rate,
+            "lateness": _latest(state, page),
+            "lateness_p50": state.lateness_p50,
+            "lateness_p99": state.lateness_p99,
+            "lateness_max": state.lateness_max,
+            "work_p50": state.work_p50,
+            "faults": faults,
+            "fault": fault,
+            "last_fault": last_fault,
+            "loop": loop,
+            "hold": self._hands.hold(page.number),
+            "inside": state.inside or not held,
+            "clamped": state.clamped and held,
+            "grabbed": state.grabbed and loop is Loop.RUNNING,
+            "stalled": state.stalled,
+            "parameters": self._hands.parameters,
+        }
 
     def _read(self) -> tuple[State, Loop]:
         """The newest tick, or the last one of a process that has ended."""
@@ -241,14 +214,6 @@ class Session:
         del self._pages[page.number]
         if self._hands.leave(page.number):
             self.loop.shared.write_command(grabbed=False)
-
-
-def _range(r: Range) -> RangeInfo:
-    return RangeInfo(r.name, r.low, r.high, r.unit)
-
-
-def _vector(v: np.ndarray) -> tuple[float, float, float]:
-    return (float(v[0]), float(v[1]), float(v[2]))
 
 
 def _latest(state: State, page: Page) -> float:

@@ -19,9 +19,12 @@ BINARY: tuple[type[Binary], ...] = (
     messages.Credit,
     messages.Surface,
     messages.Step,
+    messages.Press,
+    messages.Skin,
+    messages.Modes,
 )
-JSON: tuple[type[Json], ...] = (messages.Hello, messages.Notice, messages.Shown)
-RECORDS: tuple[type, ...] = (messages.RangeInfo, messages.FieldInfo, messages.StepInfo)
+JSON: tuple[type[Json], ...] = (messages.Hello, messages.Touched, messages.Notice, messages.Shown)
+RECORDS: tuple[type, ...] = (messages.RangeInfo, messages.Look, messages.FieldInfo, messages.StepInfo)
 ENUMS: tuple[type[IntEnum], ...] = (messages.Loop, messages.Hold)
 
 # wire type → TypeScript type, DataView suffix, bytes of one number

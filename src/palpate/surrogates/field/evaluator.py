@@ -88,6 +88,11 @@ class FieldEvaluator:
         return self._z[1:]
 
     @property
+    def place(self) -> np.ndarray:
+        """Where the last call evaluated (8,): depth s (m), f, then foot (m) and normal; all zero but s without contact."""
+        return self._place
+
+    @property
     def depth(self) -> float:
         """s where the last call evaluated, m; negative without contact."""
         return float(self._place[0])

@@ -8,7 +8,7 @@ const here = import.meta.dirname;
 /** Names of the files that the bundle is made of; the tests compare their digest with the bundle's. */
 function sources() {
   const inside = (folder) => readdirSync(join(here, folder)).map((name) => `${folder}/${name}`);
-  const own = ["body.html", "index.html", "package-lock.json", "package.json", "tsconfig.json", "vite.config.js"];
+  const own = ["body.html", "index.html", "package-lock.json", "package.json", "pressed.html", "tsconfig.json", "vite.config.js"];
   return [...own, ...inside("public"), ...inside("src")].sort();
 }
 
@@ -37,7 +37,12 @@ export default defineConfig({
     chunkSizeWarningLimit: 1000,
     rollupOptions: {
       // the messages stay a module of their own, whole, so that tests can speak through them
-      input: { page: join(here, "index.html"), body: join(here, "body.html"), messages: join(here, "src/messages.ts") },
+      input: {
+        page: join(here, "index.html"),
+        pressed: join(here, "pressed.html"),
+        body: join(here, "body.html"),
+        messages: join(here, "src/messages.ts"),
+      },
       preserveEntrySignatures: "strict",
       output: {
         // plain names: the files are under version control and the server forbids stale copies

@@ -1,7 +1,6 @@
 // What is known of the model: its own figures, and what its file says of how it was made.
 
-import type { Hello } from "./messages";
-import { fixed, metres, share, tidy } from "./units";
+import { fixed, share, tidy } from "./units";
 
 const ROWS = 80; // of one group
 const FIRST = ["validation", "errors"]; // groups that matter most stand first and open
@@ -16,9 +15,16 @@ const UNITS: Record<string, readonly [unit: string, factor: number]> = {
   rate: ["Hz", 1],
 };
 
-type Row = readonly [string, string];
+export type Row = readonly [string, string];
 
-export function about(hello: Hello): void {
+interface Known {
+  meta: Record<string, unknown>;
+  max_force: number;
+  scale: number;
+}
+
+/** `own`: what the kind of body has to say of itself. */
+export function about(hello: Known, own: Row[]): void {
   const entries = Object.entries(hello.meta);
   const loose = entries.filter(([, value]) => !isGroup(value)).flatMap(([key, value]) => rows([key], value));
   const groups = entries.filter(([, value]) => isGroup(value));
@@ -26,13 +32,11 @@ export function about(hello: Hello): void {
   groups.sort(([a], [b]) => rank(a) - rank(b));
   document
     .getElementById("meta")!
-    .replaceChildren(table([...figures(hello), ...loose]), ...groups.map(([key, value]) => group(key, value)));
+    .replaceChildren(table([...own, ...figures(hello), ...loose]), ...groups.map(([key, value]) => group(key, value)));
 }
 
-function figures(hello: Hello): Row[] {
+function figures(hello: Known): Row[] {
   return [
-    ["reach of the tip", metres(hello.reach, hello.reach)],
-    ["nodes", String(hello.rest.length)],
     ["force limit", `${tidy(hello.max_force)} N`],
     ["hand to body", `1 : ${tidy(hello.scale)}`],
   ];

@@ -17,7 +17,7 @@ export class Arrow {
   constructor(
     private readonly length: number,
     private readonly full: number,
-    private readonly gap: number,
+    private gap: number,
   ) {
     const width = 0.021 * length;
     this.shaft = new Mesh(new CylinderGeometry(width, width, 1, 12).translate(0, 0.5, 0), this.material);
@@ -29,6 +29,11 @@ export class Arrow {
   recolour(): void {
     this.material.color.set(css("--accent"));
     this.material.emissive.set(css("--accent")).multiplyScalar(0.35);
+  }
+
+  /** Change the gap (m) between node and arrow. */
+  resize(gap: number): void {
+    this.gap = gap;
   }
 
   /** Point it; a force too small to see is not drawn. */

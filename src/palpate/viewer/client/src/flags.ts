@@ -1,10 +1,27 @@
 // What is out of the ordinary, in plain words.
 
 import { Hold, Loop } from "./messages";
-import type { Frame, Hello } from "./messages";
+import type { Frame } from "./messages";
 import { tidy } from "./units";
 
 const SLOW = 0.9; // of the rate aimed at
+
+/** What every picture tells of the loop, whatever the body. */
+export type Beat = Omit<Frame, "contact" | "displacement">;
+
+/** What is told once of the loop. */
+export interface LoopFacts {
+  faults: string[];
+  max_force: number;
+  rate: number;
+}
+
+/** How a kind of body says where the hand is. */
+export interface Places {
+  free: string;
+  inside: string;
+  outside: string;
+}
 
 export interface Flag {
   id: string;
@@ -13,9 +30,9 @@ export interface Flag {
 }
 
 /** The flags of one frame, the worst first. */
-export function flags(frame: Frame, hello: Hello): Flag[] {
-  const found = [...failures(frame, hello), ...limits(frame, hello)];
-  if (found.length === 0) found.push(ordinary(frame));
+export function flags(frame: Beat, hello: LoopFacts, places: Places): Flag[] {
+  const found = [...failures(frame, hello), ...limits(frame, hello, places)];
+  if (found.length === 0) found.push(ordinary(frame, places));
   if (frame.hold === Hold.ANOTHER) {
     found.push({ id: "watching", tone: "calm", words: "Another page holds the hand; this one watches." });
   }
@@ -26,7 +43,7 @@ export function flags(frame: Frame, hello: Hello): Flag[] {
   return found;
 }
 
-function failures(frame: Frame, hello: Hello): Flag[] {
+function failures(frame: Beat, hello: LoopFacts): Flag[] {
   if (frame.loop === Loop.ENDED) {
     return [{ id: "ended", tone: "bad", words: "The real-time process has ended. The force is zero." }];
   }
@@ -48,14 +65,10 @@ function failures(frame: Frame, hello: Hello): Flag[] {
   return found;
 }
 
-function limits(frame: Frame, hello: Hello): Flag[] {
+function limits(frame: Beat, hello: LoopFacts, places: Places): Flag[] {
   const found: Flag[] = [];
   if (!frame.inside) {
-    found.push({
-      id: "outside",
-      tone: "warn",
-      words: "Outside the trained range: the force is the one at its edge.",
-    });
+    found.push({ id: "outside", tone: "warn", words: places.outside });
   }
   if (frame.clamped) {
     found.push({ id: "clamped", tone: "warn", words: `Force limited to ${tidy(hello.max_force)} N.` });
@@ -67,7 +80,7 @@ function limits(frame: Frame, hello: Hello): Flag[] {
   return found;
 }
 
-function ordinary(frame: Frame): Flag {
-  if (!frame.grabbed) return { id: "free", tone: "calm", words: "Nobody holds the body. Drag the ball at its tip." };
-  return { id: "inside", tone: "good", words: "Within what the network was trained on." };
+function ordinary(frame: Beat, places: Places): Flag {
+  if (!frame.grabbed) return { id: "free", tone: "calm", words: places.free };
+  return { id: "inside", tone: "good", words: places.inside };
 }

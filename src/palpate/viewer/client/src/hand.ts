@@ -1,7 +1,7 @@
 // The hand: mouse, finger or arrow keys hold the body's tip. Sends at display rate while holding, else every 50 ms.
 
 import type { Connection } from "./connection";
-import type { Vec3 } from "./messages";
+import type { Frame, Hello, Vec3 } from "./messages";
 import type { View } from "./scene";
 
 const BEAT = 50; // ms between heartbeats
@@ -29,7 +29,7 @@ export class HandInput {
 
   constructor(
     private readonly canvas: HTMLCanvasElement,
-    private readonly connection: Connection,
+    private readonly connection: Connection<Hello, Frame>,
   ) {
     // registered before the view's own handlers, so that a grab can keep the view still
     canvas.addEventListener("pointerdown", (e) => this.down(e));

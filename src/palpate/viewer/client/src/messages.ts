@@ -3,7 +3,7 @@
 
 export type Vec3 = [number, number, number];
 
-export const PROTOCOL = 1;
+export const PROTOCOL = 2;
 
 /** The real-time process as the server sees it. */
 export const Loop = {
@@ -25,6 +25,16 @@ export interface RangeInfo {
   low: number;
   high: number;
   unit: string;
+}
+
+/** A field that deforms or colours a touched body, and its range over the trained region. */
+export interface Look {
+  name: string;
+  unit: string;
+  low: number;
+  high: number;
+  components: number;
+  modes: number;
 }
 
 /** A quantity that colours a body, and its range over all steps. */
@@ -61,6 +71,28 @@ export interface Hello {
   meta: Record<string, unknown>;
 }
 
+/** A body pressed anywhere and its loop, once per connection, server to page. */
+export interface Touched {
+  protocol: number;
+  name: string;
+  inputs: RangeInfo[];
+  parameters: RangeInfo[];
+  radius: number;
+  radius_parameter: number;
+  deepest: number;
+  force_max: number;
+  stiffness_max: number;
+  centre: Vec3;
+  scale: number;
+  workspace: number;
+  max_force: number;
+  rate: number;
+  fields: Look[];
+  relaxes: string;
+  faults: string[];
+  meta: Record<string, unknown>;
+}
+
 /** An event in plain words, server to page. */
 export interface Notice {
   what: string;
@@ -81,6 +113,10 @@ export function isHello(message: { kind: string }): message is Hello & { kind: s
   return message.kind === "Hello";
 }
 
+export function isTouched(message: { kind: string }): message is Touched & { kind: string } {
+  return message.kind === "Touched";
+}
+
 export function isNotice(message: { kind: string }): message is Notice & { kind: string } {
   return message.kind === "Notice";
 }
@@ -91,7 +127,7 @@ export function isShown(message: { kind: string }): message is Shown & { kind: s
 
 export const FRAME = 1;
 
-/** One picture, server to page. */
+/** One picture of a body held at a node, server to page. */
 export interface Frame {
   /** counts the loop's ticks */
   tick: number;
@@ -99,10 +135,8 @@ export interface Frame {
   time: number;
   /** ms, page clock: `sent` of the last Hand that this page sent */
   echo: number;
-  /** m, the hand in body metres, as an offset from the held node at rest */
+  /** m, the probe's centre, or the hand's offset from the held node at rest */
   position: Vec3;
-  /** m, where the held node is, as an offset from rest */
-  contact: Vec3;
   /** N, on the hand */
   force: Vec3;
   /** Hz, ticks per second achieved */
@@ -135,7 +169,9 @@ export interface Frame {
   grabbed: boolean;
   /** the input is older than the loop allows */
   stalled: boolean;
-  /** current values of Hello.parameters */
+  /** m, where the held node is, as an offset from rest */
+  contact: Vec3;
+  /** current values of the parameters */
   parameters: Float32Array;
   /** m, x y z of each node's offset from Hello.rest */
   displacement: Float32Array;
@@ -150,27 +186,27 @@ export function encodeFrame(m: Frame): ArrayBuffer {
   view.setFloat32(25, m.position[0], true);
   view.setFloat32(29, m.position[1], true);
   view.setFloat32(33, m.position[2], true);
-  view.setFloat32(37, m.contact[0], true);
-  view.setFloat32(41, m.contact[1], true);
-  view.setFloat32(45, m.contact[2], true);
-  view.setFloat32(49, m.force[0], true);
-  view.setFloat32(53, m.force[1], true);
-  view.setFloat32(57, m.force[2], true);
-  view.setFloat32(61, m.rate, true);
-  view.setFloat32(65, m.lateness, true);
-  view.setFloat32(69, m.lateness_p50, true);
-  view.setFloat32(73, m.lateness_p99, true);
-  view.setFloat32(77, m.lateness_max, true);
-  view.setFloat32(81, m.work_p50, true);
-  view.setUint32(85, m.faults, true);
-  view.setUint8(89, m.fault);
-  view.setUint8(90, m.last_fault);
-  view.setUint8(91, m.loop);
-  view.setUint8(92, m.hold);
-  view.setUint8(93, m.inside ? 1 : 0);
-  view.setUint8(94, m.clamped ? 1 : 0);
-  view.setUint8(95, m.grabbed ? 1 : 0);
-  view.setUint8(96, m.stalled ? 1 : 0);
+  view.setFloat32(37, m.force[0], true);
+  view.setFloat32(41, m.force[1], true);
+  view.setFloat32(45, m.force[2], true);
+  view.setFloat32(49, m.rate, true);
+  view.setFloat32(53, m.lateness, true);
+  view.setFloat32(57, m.lateness_p50, true);
+  view.setFloat32(61, m.lateness_p99, true);
+  view.setFloat32(65, m.lateness_max, true);
+  view.setFloat32(69, m.work_p50, true);
+  view.setUint32(73, m.faults, true);
+  view.setUint8(77, m.fault);
+  view.setUint8(78, m.last_fault);
+  view.setUint8(79, m.loop);
+  view.setUint8(80, m.hold);
+  view.setUint8(81, m.inside ? 1 : 0);
+  view.setUint8(82, m.clamped ? 1 : 0);
+  view.setUint8(83, m.grabbed ? 1 : 0);
+  view.setUint8(84, m.stalled ? 1 : 0);
+  view.setFloat32(85, m.contact[0], true);
+  view.setFloat32(89, m.contact[1], true);
+  view.setFloat32(93, m.contact[2], true);
   let at = 97;
   view.setUint32(at, m.parameters.length, true);
   at += 4;
@@ -198,23 +234,23 @@ export function decodeFrame(buffer: ArrayBuffer): Frame {
     time: view.getFloat64(9, true),
     echo: view.getFloat64(17, true),
     position: [view.getFloat32(25, true), view.getFloat32(29, true), view.getFloat32(33, true)],
-    contact: [view.getFloat32(37, true), view.getFloat32(41, true), view.getFloat32(45, true)],
-    force: [view.getFloat32(49, true), view.getFloat32(53, true), view.getFloat32(57, true)],
-    rate: view.getFloat32(61, true),
-    lateness: view.getFloat32(65, true),
-    lateness_p50: view.getFloat32(69, true),
-    lateness_p99: view.getFloat32(73, true),
-    lateness_max: view.getFloat32(77, true),
-    work_p50: view.getFloat32(81, true),
-    faults: view.getUint32(85, true),
-    fault: view.getUint8(89),
-    last_fault: view.getUint8(90),
-    loop: view.getUint8(91),
-    hold: view.getUint8(92),
-    inside: view.getUint8(93) !== 0,
-    clamped: view.getUint8(94) !== 0,
-    grabbed: view.getUint8(95) !== 0,
-    stalled: view.getUint8(96) !== 0,
+    force: [view.getFloat32(37, true), view.getFloat32(41, true), view.getFloat32(45, true)],
+    rate: view.getFloat32(49, true),
+    lateness: view.getFloat32(53, true),
+    lateness_p50: view.getFloat32(57, true),
+    lateness_p99: view.getFloat32(61, true),
+    lateness_max: view.getFloat32(65, true),
+    work_p50: view.getFloat32(69, true),
+    faults: view.getUint32(73, true),
+    fault: view.getUint8(77),
+    last_fault: view.getUint8(78),
+    loop: view.getUint8(79),
+    hold: view.getUint8(80),
+    inside: view.getUint8(81) !== 0,
+    clamped: view.getUint8(82) !== 0,
+    grabbed: view.getUint8(83) !== 0,
+    stalled: view.getUint8(84) !== 0,
+    contact: [view.getFloat32(85, true), view.getFloat32(89, true), view.getFloat32(93, true)],
     parameters: new Float32Array(buffer.slice(parametersAt + 4, parametersEnd)),
     displacement: new Float32Array(buffer.slice(displacementAt + 4, displacementEnd)),
   };
@@ -228,13 +264,13 @@ export interface Hand {
   sent: number;
   /** s, the longest time to the next of these */
   period: number;
-  /** m, the hand in device coordinates: body metres / Hello.scale */
+  /** m, the hand in device coordinates */
   target: Vec3;
   /** a hand holds the body */
   grabbed: boolean;
   /** the page is in the background */
   hidden: boolean;
-  /** wanted values of Hello.parameters */
+  /** wanted values of the parameters */
   parameters: Float32Array;
 }
 
@@ -413,5 +449,304 @@ export function decodeStep(buffer: ArrayBuffer): Step {
     radius: view.getFloat32(18, true),
     displacement: new Float32Array(buffer.slice(displacementAt + 4, displacementEnd)),
     values: new Float32Array(buffer.slice(valuesAt + 4, valuesEnd)),
+  };
+}
+
+export const PRESS = 6;
+
+/** One picture of a body pressed anywhere, server to page. */
+export interface Press {
+  /** counts the loop's ticks */
+  tick: number;
+  /** s, when the frame was composed, on the loop's clock */
+  time: number;
+  /** ms, page clock: `sent` of the last Hand that this page sent */
+  echo: number;
+  /** m, the probe's centre, or the hand's offset from the held node at rest */
+  position: Vec3;
+  /** N, on the hand */
+  force: Vec3;
+  /** Hz, ticks per second achieved */
+  rate: number;
+  /** s, the latest tick since the frame before, to a quarter of itself */
+  lateness: number;
+  /** s, median since the start, 0 below a microsecond */
+  lateness_p50: number;
+  /** s, 99th percentile since the start */
+  lateness_p99: number;
+  /** s, largest since the start */
+  lateness_max: number;
+  /** s, median CPU time of one tick */
+  work_p50: number;
+  /** faults since the start, stalls apart */
+  faults: number;
+  /** code of this tick's fault, 0 for none; words in Hello.faults */
+  fault: number;
+  /** code of the latest fault */
+  last_fault: number;
+  /** a Loop */
+  loop: number;
+  /** a Hold */
+  hold: number;
+  /** the hand is within the trained range */
+  inside: boolean;
+  /** the force limit acted */
+  clamped: boolean;
+  /** a hand holds the body */
+  grabbed: boolean;
+  /** the input is older than the loop allows */
+  stalled: boolean;
+  /** m, of the rigid probe in the surface at rest; negative in the air */
+  depth: number;
+  /** N/m, along the force */
+  stiffness: number;
+  /** standard deviation of the force relative to it, NaN where unknown */
+  deviation: number;
+  /** m, depth of the shape drawn: after release it goes back to 0 */
+  drawn: number;
+  /** m, of the dimple at rest */
+  foot: Vec3;
+  /** of the surface there */
+  normal: Vec3;
+  /** current values of the parameters */
+  parameters: Float32Array;
+  /** for each field its growth with depth and its modes' coefficients */
+  coefficients: Float32Array;
+}
+
+export function encodePress(m: Press): ArrayBuffer {
+  const view = new DataView(new ArrayBuffer(125 + 4 + 4 * m.parameters.length + 4 + 4 * m.coefficients.length));
+  view.setUint8(0, 6);
+  view.setFloat64(1, m.tick, true);
+  view.setFloat64(9, m.time, true);
+  view.setFloat64(17, m.echo, true);
+  view.setFloat32(25, m.position[0], true);
+  view.setFloat32(29, m.position[1], true);
+  view.setFloat32(33, m.position[2], true);
+  view.setFloat32(37, m.force[0], true);
+  view.setFloat32(41, m.force[1], true);
+  view.setFloat32(45, m.force[2], true);
+  view.setFloat32(49, m.rate, true);
+  view.setFloat32(53, m.lateness, true);
+  view.setFloat32(57, m.lateness_p50, true);
+  view.setFloat32(61, m.lateness_p99, true);
+  view.setFloat32(65, m.lateness_max, true);
+  view.setFloat32(69, m.work_p50, true);
+  view.setUint32(73, m.faults, true);
+  view.setUint8(77, m.fault);
+  view.setUint8(78, m.last_fault);
+  view.setUint8(79, m.loop);
+  view.setUint8(80, m.hold);
+  view.setUint8(81, m.inside ? 1 : 0);
+  view.setUint8(82, m.clamped ? 1 : 0);
+  view.setUint8(83, m.grabbed ? 1 : 0);
+  view.setUint8(84, m.stalled ? 1 : 0);
+  view.setFloat32(85, m.depth, true);
+  view.setFloat32(89, m.stiffness, true);
+  view.setFloat32(93, m.deviation, true);
+  view.setFloat32(97, m.drawn, true);
+  view.setFloat32(101, m.foot[0], true);
+  view.setFloat32(105, m.foot[1], true);
+  view.setFloat32(109, m.foot[2], true);
+  view.setFloat32(113, m.normal[0], true);
+  view.setFloat32(117, m.normal[1], true);
+  view.setFloat32(121, m.normal[2], true);
+  let at = 125;
+  view.setUint32(at, m.parameters.length, true);
+  at += 4;
+  for (const value of m.parameters) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
+  view.setUint32(at, m.coefficients.length, true);
+  at += 4;
+  for (const value of m.coefficients) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
+  return view.buffer;
+}
+
+export function decodePress(buffer: ArrayBuffer): Press {
+  const view = new DataView(buffer);
+  const parametersAt = 125;
+  const parametersEnd = parametersAt + 4 + 4 * view.getUint32(parametersAt, true);
+  const coefficientsAt = parametersEnd;
+  const coefficientsEnd = coefficientsAt + 4 + 4 * view.getUint32(coefficientsAt, true);
+  return {
+    tick: view.getFloat64(1, true),
+    time: view.getFloat64(9, true),
+    echo: view.getFloat64(17, true),
+    position: [view.getFloat32(25, true), view.getFloat32(29, true), view.getFloat32(33, true)],
+    force: [view.getFloat32(37, true), view.getFloat32(41, true), view.getFloat32(45, true)],
+    rate: view.getFloat32(49, true),
+    lateness: view.getFloat32(53, true),
+    lateness_p50: view.getFloat32(57, true),
+    lateness_p99: view.getFloat32(61, true),
+    lateness_max: view.getFloat32(65, true),
+    work_p50: view.getFloat32(69, true),
+    faults: view.getUint32(73, true),
+    fault: view.getUint8(77),
+    last_fault: view.getUint8(78),
+    loop: view.getUint8(79),
+    hold: view.getUint8(80),
+    inside: view.getUint8(81) !== 0,
+    clamped: view.getUint8(82) !== 0,
+    grabbed: view.getUint8(83) !== 0,
+    stalled: view.getUint8(84) !== 0,
+    depth: view.getFloat32(85, true),
+    stiffness: view.getFloat32(89, true),
+    deviation: view.getFloat32(93, true),
+    drawn: view.getFloat32(97, true),
+    foot: [view.getFloat32(101, true), view.getFloat32(105, true), view.getFloat32(109, true)],
+    normal: [view.getFloat32(113, true), view.getFloat32(117, true), view.getFloat32(121, true)],
+    parameters: new Float32Array(buffer.slice(parametersAt + 4, parametersEnd)),
+    coefficients: new Float32Array(buffer.slice(coefficientsAt + 4, coefficientsEnd)),
+  };
+}
+
+export const SKIN = 7;
+
+/** The surface of a touchable body at rest, server to page. Points are split along sharp edges. */
+export interface Skin {
+  /** m, x y z of each point */
+  rest: Float32Array;
+  /** three points each; exact up to 16 million */
+  triangles: Float32Array;
+  /** two points for each sharp edge */
+  creases: Float32Array;
+  /** 1 for each triangle that a probe may touch, else 0 */
+  touchable: Float32Array;
+}
+
+export function encodeSkin(m: Skin): ArrayBuffer {
+  const view = new DataView(new ArrayBuffer(1 + 4 + 4 * m.rest.length + 4 + 4 * m.triangles.length + 4 + 4 * m.creases.length + 4 + 4 * m.touchable.length));
+  view.setUint8(0, 7);
+  let at = 1;
+  view.setUint32(at, m.rest.length, true);
+  at += 4;
+  for (const value of m.rest) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
+  view.setUint32(at, m.triangles.length, true);
+  at += 4;
+  for (const value of m.triangles) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
+  view.setUint32(at, m.creases.length, true);
+  at += 4;
+  for (const value of m.creases) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
+  view.setUint32(at, m.touchable.length, true);
+  at += 4;
+  for (const value of m.touchable) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
+  return view.buffer;
+}
+
+export function decodeSkin(buffer: ArrayBuffer): Skin {
+  const view = new DataView(buffer);
+  const restAt = 1;
+  const restEnd = restAt + 4 + 4 * view.getUint32(restAt, true);
+  const trianglesAt = restEnd;
+  const trianglesEnd = trianglesAt + 4 + 4 * view.getUint32(trianglesAt, true);
+  const creasesAt = trianglesEnd;
+  const creasesEnd = creasesAt + 4 + 4 * view.getUint32(creasesAt, true);
+  const touchableAt = creasesEnd;
+  const touchableEnd = touchableAt + 4 + 4 * view.getUint32(touchableAt, true);
+  return {
+    rest: new Float32Array(buffer.slice(restAt + 4, restEnd)),
+    triangles: new Float32Array(buffer.slice(trianglesAt + 4, trianglesEnd)),
+    creases: new Float32Array(buffer.slice(creasesAt + 4, creasesEnd)),
+    touchable: new Float32Array(buffer.slice(touchableAt + 4, touchableEnd)),
+  };
+}
+
+export const MODES = 8;
+
+/** A field on a Skin's points, server to page: rest + coefficients · modes + growth · dimple. */
+export interface Modes {
+  /** m, depth at which the dimple's table ends */
+  deepest: number;
+  /** m, of the dimple from its foot; 0 for none */
+  reach: number;
+  /** of the table: 2 of a vector, along and across the normal */
+  parts: number;
+  /** splines of the distance from the foot */
+  rows: number;
+  /** splines of the depth */
+  columns: number;
+  /** components of each point */
+  rest: Float32Array;
+  /** the same of each mode */
+  modes: Float32Array;
+  /** parts · rows · columns */
+  table: Float32Array;
+  /** points that the dimple may move */
+  touched: Float32Array;
+}
+
+export function encodeModes(m: Modes): ArrayBuffer {
+  const view = new DataView(new ArrayBuffer(15 + 4 + 4 * m.rest.length + 4 + 4 * m.modes.length + 4 + 4 * m.table.length + 4 + 4 * m.touched.length));
+  view.setUint8(0, 8);
+  view.setFloat32(1, m.deepest, true);
+  view.setFloat32(5, m.reach, true);
+  view.setUint16(9, m.parts, true);
+  view.setUint16(11, m.rows, true);
+  view.setUint16(13, m.columns, true);
+  let at = 15;
+  view.setUint32(at, m.rest.length, true);
+  at += 4;
+  for (const value of m.rest) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
+  view.setUint32(at, m.modes.length, true);
+  at += 4;
+  for (const value of m.modes) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
+  view.setUint32(at, m.table.length, true);
+  at += 4;
+  for (const value of m.table) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
+  view.setUint32(at, m.touched.length, true);
+  at += 4;
+  for (const value of m.touched) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
+  return view.buffer;
+}
+
+export function decodeModes(buffer: ArrayBuffer): Modes {
+  const view = new DataView(buffer);
+  const restAt = 15;
+  const restEnd = restAt + 4 + 4 * view.getUint32(restAt, true);
+  const modesAt = restEnd;
+  const modesEnd = modesAt + 4 + 4 * view.getUint32(modesAt, true);
+  const tableAt = modesEnd;
+  const tableEnd = tableAt + 4 + 4 * view.getUint32(tableAt, true);
+  const touchedAt = tableEnd;
+  const touchedEnd = touchedAt + 4 + 4 * view.getUint32(touchedAt, true);
+  return {
+    deepest: view.getFloat32(1, true),
+    reach: view.getFloat32(5, true),
+    parts: view.getUint16(9, true),
+    rows: view.getUint16(11, true),
+    columns: view.getUint16(13, true),
+    rest: new Float32Array(buffer.slice(restAt + 4, restEnd)),
+    modes: new Float32Array(buffer.slice(modesAt + 4, modesEnd)),
+    table: new Float32Array(buffer.slice(tableAt + 4, tableEnd)),
+    touched: new Float32Array(buffer.slice(touchedAt + 4, touchedEnd)),
   };
 }

@@ -3,10 +3,12 @@
 import { gradient } from "./colour";
 import { Connection } from "./connection";
 import { HandInput } from "./hand";
-import { Hold, Loop } from "./messages";
-import type { Frame, Hello, Notice } from "./messages";
-import { element, Panel } from "./panel";
+import { decodeFrame, isHello } from "./messages";
+import type { Frame, Hello } from "./messages";
+import { Panel } from "./panel";
+import { element } from "./readings";
 import { View } from "./scene";
+import { describe, say, status, warn } from "./telling";
 import { fixed, metres, tidy } from "./units";
 
 const SILENT = 1500; // ms without a picture until the page says so
@@ -17,7 +19,7 @@ let view: View | null = null;
 let latest: Frame | null = null;
 let lastFrame = 0;
 
-const connection = new Connection({ hello: start, notice: warn, lost });
+const connection = new Connection<Hello, Frame>({ isHello, decode: decodeFrame }, { hello: start, notice: warn, lost });
 const hand = new HandInput(canvas, connection);
 
 function start(hello: Hello): void {
@@ -73,17 +75,6 @@ function notes(view: View): void {
   );
 }
 
-function say(words: string, tone: "bad" | "calm"): void {
-  const banner = element("banner");
-  banner.textContent = words;
-  banner.dataset["tone"] = tone;
-  banner.hidden = false;
-}
-
-function warn(notice: Notice): void {
-  say(`${notice.what} ${notice.fix}`, "bad");
-}
-
 function lost(): void {
   latest = null;
   hand.release();
@@ -91,21 +82,6 @@ function lost(): void {
   element("arrow-label").hidden = true;
   status("lost", "disconnected, trying again");
   say("Disconnected from palpate. This page connects again as soon as the server is back.", "bad");
-}
-
-function status(state: string, words: string): void {
-  const pill = element("status");
-  if (pill.textContent === words) return;
-  pill.dataset["state"] = state;
-  pill.textContent = words;
-}
-
-function describe(frame: Frame): void {
-  if (frame.loop === Loop.ENDED) status("ended", "real-time process ended");
-  else if (frame.loop === Loop.FROZEN) status("warn", "real-time process stands still");
-  else if (frame.hold === Hold.ANOTHER) status("warn", "watching");
-  else if (frame.stalled && frame.grabbed) status("warn", "no word from the hand");
-  else status("live", frame.grabbed ? "holding" : "live");
 }
 
 function labelArrow(view: View, frame: Frame): void {

@@ -1,32 +1,28 @@
-// The side panel: numbers, flags, plots, sliders, and what is known of the model.
+// The side panel of a held body: numbers, flags, plots, sliders, and what is known of the model.
 
 import { about } from "./about";
 import { flags } from "./flags";
-import type { Flag } from "./flags";
-import { Hold, Loop } from "./messages";
-import type { Frame, Hello, RangeInfo } from "./messages";
+import type { Frame, Hello } from "./messages";
 import { Plot } from "./plot";
-import { fixed, printed, round125, tidy } from "./units";
+import { element, EVERY, Flags, follow, put, record, sliders, Timing, trained } from "./readings";
+import { metres, round125 } from "./units";
 
-const EVERY = 80; // ms between changes of the numbers: faster can't be read
-
-export function element<T extends HTMLElement>(id: string): T {
-  return document.getElementById(id) as T;
-}
+const PLACES = {
+  free: "Nobody holds the body. Drag the ball at its tip.",
+  inside: "Within what the network was trained on.",
+  outside: "Outside the trained range: the force is the one at its edge.",
+};
 
 export class Panel {
   private readonly force = new Plot(element<HTMLCanvasElement>("force-plot"), "--accent");
-  private readonly lateness = new Plot(element<HTMLCanvasElement>("lateness-plot"), "--accent-2");
+  private readonly timing = new Timing();
+  private readonly flags = new Flags();
   private hello: Hello | null = null;
-  private shown = "";
   private last = 0;
-  private pictures = 0;
-  private since = 0;
-  private delay = NaN; // ms from the hand's message to the picture, smoothed
 
   recolour(): void {
     this.force.recolour();
-    this.lateness.recolour();
+    this.timing.recolour();
     this.last = 0;
   }
 
@@ -36,8 +32,11 @@ export class Panel {
     element("model-name").textContent = hello.name;
     element("model-line").replaceChildren("trained on ", ...hello.inputs.flatMap(trained));
     document.title = `${hello.name} · palpate`;
-    sliders(hello, moved);
-    about(hello);
+    sliders(hello.parameters, moved);
+    about(hello, [
+      ["reach of the tip", metres(hello.reach, hello.reach)],
+      ["nodes", String(hello.rest.length)],
+    ]);
   }
 
   /** Record every frame; now and then show it. */
@@ -45,21 +44,21 @@ export class Panel {
     const hello = this.hello;
     if (!hello) return;
     this.force.add(frame.time, Math.hypot(...frame.force));
-    if (frame.loop === Loop.RUNNING) this.lateness.add(frame.time, 1e6 * frame.lateness);
-    this.pictures += drawn ? 1 : 0;
+    this.timing.add(frame, drawn);
     const now = performance.now();
     if (now - this.last < EVERY) return;
     this.last = now;
     this.numbers(frame);
-    this.timing(frame, now);
-    this.tell(flags(frame, hello));
+    this.timing.show(frame, now);
+    this.flags.tell(flags(frame, hello, PLACES));
     follow(frame);
-    this.plots(frame);
+    const peak = round125(Math.max(this.force.peak(frame.time), 0.1));
+    this.force.draw(frame.time, { unit: "N", low: 0, high: peak, logarithmic: false, stepped: false });
   }
 
   /** The tab went to the background. */
   hidden(): void {
-    this.tell([{ id: "hidden", tone: "warn", words: "This tab is in the background: the hand has let go." }]);
+    this.flags.hidden();
   }
 
   /** Nothing is known any more. */
@@ -68,7 +67,7 @@ export class Panel {
       put(id, NaN, 0);
     }
     delete document.documentElement.dataset["tick"];
-    this.tell([{ id: "lost", tone: "bad", words: "Disconnected: nothing is known of the body. Trying again." }]);
+    this.flags.lost();
   }
 
   private numbers(frame: Frame): void {
@@ -80,109 +79,7 @@ export class Panel {
     put("tip-x", mm[0]!, 1);
     put("tip-y", mm[1]!, 1);
     put("tip-norm", Math.hypot(...mm), 1);
-    // for programs that read the page: one frame, whole
-    const data = document.documentElement.dataset;
-    data["tick"] = String(frame.tick);
-    data["time"] = String(frame.time);
-    data["position"] = frame.position.join(" ");
-    data["contact"] = frame.contact.join(" ");
-    data["force"] = frame.force.join(" ");
-    data["parameters"] = frame.parameters.join(" ");
-    data["grabbed"] = String(frame.grabbed);
-    data["inside"] = String(frame.inside);
-    data["loop"] = String(frame.loop);
-    data["hold"] = String(frame.hold);
+    record(frame); // one frame, whole
+    document.documentElement.dataset["contact"] = frame.contact.join(" ");
   }
-
-  private timing(frame: Frame, now: number): void {
-    duration("lateness-p50", frame.lateness_p50);
-    duration("lateness-p99", frame.lateness_p99);
-    duration("lateness-max", frame.lateness_max);
-    put("rate", frame.rate, 0);
-    this.delay += 0.2 * (now - frame.echo - this.delay);
-    if (!frame.grabbed || frame.hold !== Hold.YOURS) this.delay = NaN;
-    else if (Number.isNaN(this.delay)) this.delay = now - frame.echo;
-    put("delay", this.delay, 0);
-    duration("work", frame.work_p50);
-    if (now - this.since > 1000) {
-      put("picture-rate", (1000 * this.pictures) / (now - this.since), 0);
-      [this.pictures, this.since] = [0, now];
-    }
-  }
-
-  private plots(frame: Frame): void {
-    const peak = round125(Math.max(this.force.peak(frame.time), 0.1));
-    this.force.draw(frame.time, { unit: "N", low: 0, high: peak, logarithmic: false, stepped: false });
-    const scale = { unit: "µs", low: 1, high: 1e5, logarithmic: true, stepped: true };
-    this.lateness.draw(frame.time, scale, [1e6 * frame.lateness_p50, 1e6 * frame.lateness_p99]);
-  }
-
-  private tell(found: Flag[]): void {
-    const key = JSON.stringify(found);
-    if (key === this.shown) return;
-    this.shown = key;
-    element("flags").replaceChildren(
-      ...found.map((flag) => {
-        const row = document.createElement("li");
-        row.textContent = flag.words;
-        row.dataset["flag"] = flag.id;
-        row.dataset["tone"] = flag.tone;
-        return row;
-      }),
-    );
-  }
-}
-
-/** An input and its range, which no line break parts. */
-function trained(range: RangeInfo, i: number): (Node | string)[] {
-  const words = document.createElement("span");
-  words.className = "whole";
-  words.append(...printed(range.name), ` ${tidy(range.low)} … ${tidy(range.high)} ${range.unit}`);
-  return i === 0 ? [words] : [", ", words];
-}
-
-function put(id: string, value: number, decimals: number): void {
-  const output = element(id);
-  output.textContent = Number.isFinite(value) ? fixed(value, decimals) : "–";
-  output.dataset["value"] = String(value);
-}
-
-/** A duration in s as µs or ms. */
-function duration(id: string, seconds: number): void {
-  const [us, output] = [1e6 * seconds, element(id)];
-  output.dataset["value"] = String(us);
-  if (us < 1) output.textContent = "< 1 µs"; // where the loop's histogram starts
-  else output.textContent = us < 9999.5 ? `${fixed(us, us < 9.95 ? 1 : 0)} µs` : `${fixed(us / 1000, 0)} ms`;
-}
-
-function sliders(hello: Hello, moved: (i: number, value: number) => void): void {
-  element("parameters").hidden = hello.parameters.length === 0;
-  element("sliders").replaceChildren(
-    ...hello.parameters.map((range, i) => {
-      const [label, value, input] = ["label", "output", "input"].map((t) => document.createElement(t));
-      const slider = input as HTMLInputElement;
-      [slider.type, slider.id] = ["range", `parameter-${i}`];
-      [slider.min, slider.max, slider.step] = [range.low, range.high, (range.high - range.low) / 200].map(String) as [
-        string,
-        string,
-        string,
-      ];
-      slider.dataset["unit"] = range.unit;
-      slider.addEventListener("input", () => moved(i, slider.valueAsNumber));
-      const name = document.createElement("span");
-      name.append(...printed(range.name));
-      label!.append(name, value!, slider);
-      return label!;
-    }),
-  );
-}
-
-/** Sliders show the values in force, whoever set them, except under the user's finger. */
-function follow(frame: Frame): void {
-  frame.parameters.forEach((value, i) => {
-    const slider = document.getElementById(`parameter-${i}`) as HTMLInputElement | null;
-    if (!slider) return;
-    if (!slider.matches(":active")) slider.valueAsNumber = value;
-    slider.previousElementSibling!.textContent = `${tidy(value)} ${slider.dataset["unit"]}`;
-  });
 }

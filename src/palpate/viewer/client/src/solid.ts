@@ -43,27 +43,28 @@ export class SolidView {
   readonly cell: number; // m, spacing of the floor's grid
 
   private readonly renderer: WebGLRenderer;
-  private readonly scene = new Scene();
-  private readonly camera = new PerspectiveCamera(30, 1, 0.01, 100);
-  private readonly controls: OrbitControls;
+  protected readonly scene = new Scene();
+  protected readonly camera = new PerspectiveCamera(30, 1, 0.01, 100);
+  protected readonly controls: OrbitControls;
   private readonly geometry = new BufferGeometry();
   private readonly position: BufferAttribute;
   private readonly colour: BufferAttribute;
-  private readonly body: Mesh<BufferGeometry, MeshPhongMaterial>;
-  private readonly wires: Mesh<BufferGeometry, MeshBasicMaterial>;
+  protected readonly body: Mesh<BufferGeometry, MeshPhongMaterial>;
+  protected readonly wires: Mesh<BufferGeometry, MeshBasicMaterial>;
   private readonly creases: LineSegments<BufferGeometry, LineBasicMaterial>;
-  private readonly ghost: LineSegments<BufferGeometry, LineBasicMaterial>;
-  private readonly shade: Mesh<BufferGeometry, MeshBasicMaterial>;
+  protected readonly ghost: LineSegments<BufferGeometry, LineBasicMaterial>;
+  protected readonly shade: Mesh<BufferGeometry, MeshBasicMaterial>;
   private readonly held: LineSegments<BufferGeometry, LineBasicMaterial>;
   private readonly floor: LineSegments<BufferGeometry, LineBasicMaterial>;
-  private readonly probe: Mesh<SphereGeometry, MeshLambertMaterial>;
+  protected readonly probe: Mesh<SphereGeometry, MeshLambertMaterial>;
   private readonly low = new Vector3();
   private readonly high = new Vector3();
-  private dirty = true;
+  protected dirty = true;
+  protected roof = 0; // m, room that a view leaves above the body
 
   constructor(
     readonly canvas: HTMLCanvasElement,
-    private readonly surface: Surface,
+    protected readonly surface: Surface,
     private readonly words: readonly Element[], // that stand in front of the canvas
   ) {
     this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
@@ -94,6 +95,7 @@ export class SolidView {
       new MeshLambertMaterial({ transparent: true, opacity: 0.5, depthWrite: false }),
     );
     this.measure();
+    this.roof = 0.08 * this.size3();
     this.cell = round125(this.size3() / 14);
     this.floor = new LineSegments(this.grid(), new LineBasicMaterial());
     this.assemble();
@@ -216,7 +218,7 @@ export class SolidView {
     }
   }
 
-  private size3(): number {
+  protected size3(): number {
     return this.low.distanceTo(this.high);
   }
 
@@ -224,7 +226,7 @@ export class SolidView {
     const all: Vector3[] = [];
     for (const x of [this.low.x, this.high.x]) {
       for (const y of [this.low.y, this.high.y]) {
-        for (const z of [this.low.z - 0.03 * this.size3(), this.high.z + 0.08 * this.size3()]) all.push(new Vector3(x, y, z));
+        for (const z of [this.low.z - 0.03 * this.size3(), this.high.z + this.roof]) all.push(new Vector3(x, y, z));
       }
     }
     return all;
@@ -268,7 +270,7 @@ export class SolidView {
     return fixed.length > 0 && Array.from(fixed).every((i) => rest[3 * i + 2]! - this.low.z < near);
   }
 
-  private size(): Size {
+  protected size(): Size {
     return [this.canvas.clientWidth || 1, this.canvas.clientHeight || 1];
   }
 }

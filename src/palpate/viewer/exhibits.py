@@ -1,0 +1,108 @@
+"""What a page is told of a body, and the pictures it is sent: a body held at one node, or one pressed anywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+import numpy as np
+
+from palpate.runtime.faults import Fault
+from palpate.runtime.pressed import PressedBody
+from palpate.runtime.shared import State, now
+from palpate.runtime.touchable import Touchable
+from palpate.surrogates import TouchModel
+from palpate.units import Range
+from palpate.viewer.messages import PROTOCOL, Beat, Frame, Hello, RangeInfo, Vec3
+from palpate.viewer.picture import Picture
+from palpate.viewer.travel import travel
+from palpate.viewer.wire import Json
+
+__all__ = ["Exhibit", "HeldExhibit", "exhibit_of", "loop_facts", "ranges", "vector"]
+
+
+class Exhibit(Protocol):
+    """A body as the pages of one server see it."""
+
+    def hello(self, state: State, rate: float) -> Json:
+        """What every page is told first; `rate` is what the loop aims at, Hz."""
+        ...
+
+    def frame(self, beat: Mapping[str, Any], state: State, held: bool, parameters: np.ndarray) -> Beat:
+        """A picture: what every one tells (`beat`), and what this body looks like in the loop's state.
+
+        Parameters
+        ----------
+        beat : mapping
+            The fields of `Beat`.
+        state : State
+        held : bool
+            Whether a hand holds the body.
+        parameters : (p,)
+            The untouched inputs.
+        """
+        ...
+
+
+class HeldExhibit:
+    """A body held at one node."""
+
+    def __init__(self, model: TouchModel) -> None:
+        self.model = model
+        self._picture = Picture(model)
+        self._travel = tuple(vector(corner) for corner in travel(model))
+
+    def hello(self, state: State, rate: float) -> Hello:
+        """See `Exhibit`."""
+        model = self.model
+        return Hello(
+            protocol=PROTOCOL,
+            name=model.name,
+            rest=tuple(vector(node) for node in model.rest),
+            radius=model.radius,
+            touch_node=model.touch_node,
+            nodes_of_interest=tuple(int(i) for i in model.nodes_of_interest),
+            inputs=ranges(model.inputs),
+            parameters=ranges(model.parameters),
+            reach=model.reach,
+            travel=self._travel,
+            meta=model.meta,
+            **loop_facts(state, rate),
+        )
+
+    def frame(self, beat: Mapping[str, Any], state: State, held: bool, parameters: np.ndarray) -> Frame:
+        """See `Exhibit`."""
+        if held:
+            loads = state.loads[: len(self.model.inputs)]
+            shape = self._picture.held(loads, state.mirrored, state.contact, now())
+        else:
+            shape = self._picture.free(parameters, now())
+        return Frame(**beat, contact=vector(shape.contact), displacement=shape.displacement)
+
+
+def exhibit_of(model: Touchable) -> Exhibit:
+    """The exhibit of a model."""
+    from palpate.viewer.pressing import PressedExhibit
+
+    return PressedExhibit(model) if isinstance(model, PressedBody) else HeldExhibit(model)
+
+
+def loop_facts(state: State, rate: float) -> dict[str, Any]:
+    """What every page is told of the loop: scale, workspace, force limit, rate, words for faults."""
+    return {
+        "scale": state.scale,
+        "workspace": state.radius,
+        "max_force": state.max_force,
+        "rate": rate,
+        "faults": tuple(f.meaning for f in Fault),
+    }
+
+
+def ranges(inputs: tuple[Range, ...]) -> tuple[RangeInfo, ...]:
+    """Ranges as the page takes them."""
+    return tuple(RangeInfo(r.name, r.low, r.high, r.unit) for r in inputs)
+
+
+def vector(v: np.ndarray) -> Vec3:
+    """Three numbers."""
+    return (float(v[0]), float(v[1]), float(v[2]))

@@ -1,0 +1,87 @@
+"""A slab that is pressed anywhere on its top: energy in closed form (`tests/pressed.py`), fields made by formula."""
+
+from __future__ import annotations
+
+import numpy as np
+import pressed
+from models import linear_network
+
+from palpate.surrogates import FieldSurrogate, TouchedBody
+from palpate.surrogates.field import Dimple, Rise
+from palpate.surrogates.field.dimple import splines
+from palpate.units import Quantity
+
+HALF, HIGH = 0.03, 0.02  # m: 60 × 60 × 20 mm
+DEVIATION = 0.03
+
+
+def box(cells: int = 24) -> tuple[np.ndarray, np.ndarray]:
+    """Points and triangles of the slab's surface, its top z = 0."""
+    faces = []
+    t = np.linspace(-1.0, 1.0, cells + 1)
+    a, b = (x.ravel() for x in np.meshgrid(t, t, indexing="ij"))
+    k = (np.arange(cells)[:, None] * (cells + 1) + np.arange(cells)).ravel()
+    two = np.vstack([np.stack([k, k + cells + 1, k + cells + 2], 1), np.stack([k, k + cells + 2, k + 1], 1)])
+    for axis in range(3):
+        for sign in (1.0, -1.0):
+            p = np.empty((a.size, 3))
+            p[:, axis], p[:, (axis + 1) % 3], p[:, (axis + 2) % 3] = sign, a, b
+            faces.append((p, two if sign > 0 else two[:, ::-1]))
+    points = np.vstack([p for p, _ in faces]) * [HALF, HALF, HIGH / 2] - [0.0, 0.0, HIGH / 2]
+    triangles = np.vstack([tri + i * a.size for i, (_, tri) in enumerate(faces)])
+    points, which = np.unique(points.round(9), axis=0, return_inverse=True)
+    return points, which.reshape(-1)[triangles]
+
+
+def touched_slab(**more: object) -> TouchedBody:
+    """The slab with its displacement, and a stretch that is a scalar."""
+    touch = pressed.surrogate(root=pressed.steady(DEVIATION), **more)
+    return TouchedBody(touch, {"displacement": _field(touch, 3), "largest stretch": _field(touch, 1)})
+
+
+def _field(touch, components: int) -> FieldSurrogate:
+    points, triangles = box()
+    nodes, top = len(points), points[:, 2] > -1e-9
+    mass = np.full(nodes, 1.0 / nodes)
+    # the middle sinks, the sides bulge; nothing moves at the bottom
+    deep = 1.0 + points[:, 2] / HIGH
+    wide = np.exp(-(points[:, 0] ** 2 + points[:, 1] ** 2) / 0.03**2)
+    shapes = [np.zeros((nodes, components)), np.zeros((nodes, components))]
+    shapes[0][:, -1] = deep * wide
+    shapes[1][:, 0] = deep * points[:, 0] / HALF if components == 3 else deep * np.cos(60.0 * points[:, 0])
+    flat = np.linalg.qr(np.stack([s.ravel() for s in shapes], axis=1))[0]
+    modes = (flat.T / np.sqrt(mass[0])).reshape(2, nodes, components)
+    size = 4e-4 if components == 3 else 0.02
+    tail = size * np.array([[-1.0, 0.2, 0.0, 0.3], [0.5, 0.3, 0.1, 0.0]])
+    net = linear_network(list(pressed.INPUTS), [Quantity("b0"), Quantity("b1")], tail)
+    return FieldSurrogate(
+        "displacement" if components == 3 else "largest stretch",
+        "m" if components == 3 else "",
+        net,
+        modes,
+        np.zeros((nodes, 3)) if components == 3 else np.ones((nodes, 1)),
+        points,
+        triangles,
+        mass,
+        rise=Rise("linear", pressed.DEEPEST),
+        surface=touch.surface,
+        radius=pressed.RADIUS,
+        dimple=Dimple(_table(components), 0.03, top),
+    )
+
+
+def _table(components: int) -> np.ndarray:
+    """Splines of a dent exp(−ρ²/w²), as deep as the probe, a little narrower when it is deep."""
+    rho, r, q = np.linspace(0.0, 0.999, 200), 14, 6
+    first, four = splines(rho * (r - 3), r)
+    A = np.zeros((200, r))
+    for j in range(4):
+        A[np.arange(200), first + j] = four[:, j]
+    table = np.zeros((2 if components == 3 else 1, r, q))
+    for j in range(q):
+        dent = np.exp(-((rho * 0.03 / (0.010 - 0.0003 * j)) ** 2))
+        scale = -0.85 * pressed.DEEPEST if components == 3 else 0.25
+        table[0, :-3, j] = scale * np.linalg.lstsq(A[:, :-3], dent, rcond=None)[0]
+    if components == 3:
+        table[1, :-3] = -0.1 * pressed.DEEPEST * table[0, :-3] / scale  # drawn in a little
+    return table

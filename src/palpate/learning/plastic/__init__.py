@@ -1,20 +1,23 @@
 """Learning bodies with a history from histories.
 
 paths        histories as values, and in a file      drives   loads to learn from and to be judged by
-learn_held   a body held at one node
+learn_held   a body held at one node              learn_dents   a touched body that keeps prints
 """
 
 from palpate.learning.plastic.drives import held_loads, load_unload_reload, random_times, random_turns
+from palpate.learning.plastic.learn_dents import Press, learn_dents
 from palpate.learning.plastic.learn_held import Fit, learn_held
-from palpate.learning.plastic.paths import Histories, History, Marches, follow_loads
+from palpate.learning.plastic.paths import HeldPath, HeldPaths, Marches, follow_loads
 
 __all__ = [
     "Fit",
-    "Histories",
-    "History",
+    "HeldPath",
+    "HeldPaths",
     "Marches",
+    "Press",
     "follow_loads",
     "held_loads",
+    "learn_dents",
     "learn_held",
     "load_unload_reload",
     "random_times",

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 __all__ = ["held_loads", "load_unload_reload", "random_times", "random_turns"]
 
 
 def random_turns(
-    rng: np.random.Generator, low: float, high: float, *, turns: int = 6, step: float
+    rng: np.random.Generator, low: float, high: float, *, turns: int = 6, step: float, outward: float = 0.0
 ) -> np.ndarray:
-    """Loads (N,) in N that go to and fro between random turning points, in steps of `step` N at most, back to 0."""
-    return even_steps(np.append(rng.uniform(low, high, turns), 0.0), step)
+    """Loads (N,) in N that go to and fro between random turning points, in steps of `step` N at most, back to 0.
+
+    The points are even over the range; `outward` above 0 draws them to its ends, where a body yields most.
+    """
+    share = rng.uniform(-1.0, 1.0, turns)
+    share = np.sign(share) * np.abs(share) ** (1.0 / (1.0 + outward))
+    return even_steps(np.append((low + high + share * (high - low)) / 2, 0.0), step)
 
 
 def load_unload_reload(rng: np.random.Generator, low: float, high: float, *, step: float) -> np.ndarray:
@@ -27,7 +34,7 @@ def even_steps(knots: np.ndarray, step: float) -> np.ndarray:
     ends = np.concatenate([[0.0], knots])
     legs = [
         np.linspace(a, b, max(2, int(np.ceil(abs(b - a) / step))) + 1)[1:]
-        for a, b in zip(ends[:-1], ends[1:], strict=True)
+        for a, b in itertools.pairwise(ends)
     ]
     return np.concatenate(legs)
 

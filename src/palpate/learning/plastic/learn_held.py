@@ -5,9 +5,9 @@ at rest, ℓ = ½ ln(2U/K w²). Along a history the elongation of any one elemen
 
     P_t = h'(w_t) Σ k_i e_i(t)
 
-is linear in the stiffnesses. So a dictionary is laid out, of limits and rises or of relaxation times on a grid, and the k_i are its
-non-negative least squares (Lawson & Hanson 1974): a convex problem with one answer, which is sparse. No start, no
-iteration count and no seed decide it.
+is linear in the stiffnesses. So a dictionary is laid out, of limits and rises or of relaxation times on a grid, and the
+k_i are its non-negative least squares (Lawson & Hanson 1974): a convex problem with one answer, which is sparse. No
+start, no iteration count and no seed decide it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from palpate.errors import UsageError
-from palpate.learning.plastic.paths import Histories, History
+from palpate.learning.plastic.paths import HeldPath, HeldPaths
 from palpate.learning.refinement.structure import refined_network
 from palpate.network import Network
 from palpate.surrogates.plastic import Elements, HeldBody
@@ -67,8 +67,8 @@ class Fit:
 
 
 def learn_held(
-    train: Histories,
-    twin: History,
+    train: HeldPaths,
+    twin: HeldPath,
     *,
     relaxes: bool = False,
     mirrors: bool = True,
@@ -79,9 +79,9 @@ def learn_held(
 
     Parameters
     ----------
-    train : Histories
+    train : HeldPaths
         With turning points; a body that yields shows its hardening only when it is turned back.
-    twin : History
+    twin : HeldPath
         Of the same body without a memory: its elastic, instantaneous answer, as far as the histories reach.
     relaxes : bool
         Whether it creeps with time; else it yields.
@@ -105,11 +105,11 @@ def learn_held(
 
 
 def _learn(
-    train: Histories, twin: History, relaxes: bool, mirrors: bool, name: str, seed: int
+    train: HeldPaths, twin: HeldPath, relaxes: bool, mirrors: bool, name: str, seed: int
 ) -> tuple[HeldBody, Fit]:
     _check(train, twin, mirrors)
     stretch, stretch_error = _stretch(twin, mirrors, seed)
-    field, shape_error = _field(train, seed)
+    shape, shape_error = _shape(train, seed)
     rest = np.zeros((len(train.rest), 3))
     rest[:, :2] = train.rest
     places = np.concatenate([path.place for path in train.paths])
@@ -118,7 +118,7 @@ def _learn(
         return HeldBody(
             name=name,
             stretch=stretch,
-            field=field,
+            shape=shape,
             elements=elements,
             mirrors=mirrors,
             rest=rest,
@@ -138,7 +138,7 @@ def _learn(
     return body(elements), Fit(error, len(elements), len(candidates), stretch_error, shape_error)
 
 
-def _check(train: Histories, twin: History, mirrors: bool) -> None:
+def _check(train: HeldPaths, twin: HeldPath, mirrors: bool) -> None:
     if not train.paths or len(twin) < FEWEST:
         raise UsageError(
             f"{len(train)} histories and a twin of {len(twin)} samples are too few to learn from.",
@@ -157,7 +157,7 @@ def _check(train: Histories, twin: History, mirrors: bool) -> None:
         )
 
 
-def _stretch(twin: History, mirrors: bool, seed: int) -> tuple[Network, float]:
+def _stretch(twin: HeldPath, mirrors: bool, seed: int) -> tuple[Network, float]:
     """ℓ of the elastic twin, and the largest error of its slope as a force."""
     w, P, U = (
         a[np.abs(twin.place) > 1e-3 * np.abs(twin.place).max()] for a in (twin.place, twin.force, twin.stored)
@@ -177,7 +177,7 @@ def _stretch(twin: History, mirrors: bool, seed: int) -> tuple[Network, float]:
     return network, float(np.abs(found - P).max() / np.abs(P).max())
 
 
-def _field(train: Histories, seed: int) -> tuple[Network, float]:
+def _shape(train: HeldPaths, seed: int) -> tuple[Network, float]:
     """Displacement of all nodes over (w, P)."""
     X = np.concatenate([np.stack([path.place, path.force], axis=1) for path in train.paths])
     Y = np.concatenate([path.displacement.reshape(len(path), -1) for path in train.paths])
@@ -201,7 +201,7 @@ def _limits(reach: float) -> np.ndarray:
     return np.array([(np.inf, 0.0, np.inf), *grid])
 
 
-def _times(train: Histories) -> np.ndarray:
+def _times(train: HeldPaths) -> np.ndarray:
     """(y, c, τ) of each candidate (n, 3): a spring, and times from a third of a step to three times the longest."""
     steps = np.concatenate([np.diff(path.times, prepend=0.0) for path in train.paths])
     low, high = (
@@ -213,7 +213,7 @@ def _times(train: Histories) -> np.ndarray:
 
 
 def _fitted(
-    train: Histories, stretches: list[tuple[np.ndarray, np.ndarray]], candidates: np.ndarray, relaxes: bool
+    train: HeldPaths, stretches: list[tuple[np.ndarray, np.ndarray]], candidates: np.ndarray, relaxes: bool
 ) -> tuple[Elements, float]:
     from scipy.optimize import nnls
 

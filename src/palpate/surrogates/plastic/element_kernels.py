@@ -46,16 +46,16 @@ def _lost(e, alpha, slip, dh, dt, k, y, c, tau):  # type: ignore[no-untyped-def]
 
 
 @_jit
-def pull_after(dh, dt, e, alpha, k, y, c, tau):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def pull_after(dh, dt, e, alpha, k, y, c, tau) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Σ k e, N, after an even step that is not taken."""
     pull = 0.0
     for i in range(k.size):
         pull += k[i] * _after(e[i], alpha[i], dh, dt, y[i], c[i], tau[i])[0]
-    return pull
+    return float(pull)
 
 
 @_jit
-def advance(dh, dt, e, alpha, ledger, k, y, c, tau):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def advance(dh, dt, e, alpha, ledger, k, y, c, tau) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Take an even step; returns Σ k e, N. The ledger has stored, lost, work and lost in this step, J."""
     before, stored, lost, pull = ledger[0], 0.0, 0.0, 0.0
     for i in range(k.size):
@@ -68,11 +68,11 @@ def advance(dh, dt, e, alpha, ledger, k, y, c, tau):  # type: ignore[no-untyped-
     ledger[1] += lost
     ledger[2] += stored - before + lost
     ledger[3] = lost
-    return pull
+    return float(pull)
 
 
 @_jit
-def free_step(dt, e, alpha, k, y, c, tau):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def free_step(dt, e, alpha, k, y, c, tau) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Change of h, m, after which nothing pulls: the force grows with h, so halving an interval finds it."""
     reach = 0.0
     for i in range(k.size):
@@ -93,11 +93,11 @@ def free_step(dt, e, alpha, k, y, c, tau):  # type: ignore[no-untyped-def]  # no
             high = middle
         else:
             low = middle
-    return 0.5 * (low + high)
+    return float(0.5 * (low + high))
 
 
 @_jit
-def follow(stretch, steps, k, y, c, tau):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def follow(stretch, steps, k, y, c, tau) -> np.ndarray:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Elongations (N, n) along a history."""
     e, alpha, out = np.zeros(k.size), np.zeros(k.size), np.zeros((stretch.size, k.size))
     last = 0.0

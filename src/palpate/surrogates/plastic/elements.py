@@ -17,8 +17,8 @@ so nothing can be had back that was not put in; where nothing slips or relaxes t
 memory, and a closed path takes nothing.
 
 **A step** in which h changes evenly is integrated exactly: a slider's elongation is the return mapping of the end
-point (Wilkins 1964), as its path has one direction, and a dashpot's is e^{−x} e + (1 − e^{−x})/x Δh with x = Δt/τ (Taylor,
-Pister & Goudreau 1970). So any length of step is stable.
+point (Wilkins 1964), as its path has one direction, and a dashpot's is e^{−x} e + (1 − e^{−x})/x Δh with x = Δt/τ
+(Taylor, Pister & Goudreau 1970). So any length of step is stable.
 """
 
 from __future__ import annotations
@@ -141,4 +141,4 @@ class Elements:
                 f"Times of shape {np.shape(times)} don't fit a history of shape {stretch.shape}.",
                 fix="Give one time in s for each sample, ascending from 0.",
             )
-        return follow(stretch, steps, *self.compiled())
+        return np.asarray(follow(stretch, steps, *self.compiled()))

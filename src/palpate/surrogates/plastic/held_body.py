@@ -7,11 +7,11 @@ The hand moves the held node by w along the direction D of the load it supplies,
 
     F = −Σ k_i e_i h'(w) D
 
-so that without memory F = −∂U/∂w with U = ½ K h². Where both sides answer alike ℓ is a function of w². Beyond the trained range
-h goes on along its tangent: the force stays a gradient at kept memory and `inside` says so.
+so that without memory F = −∂U/∂w with U = ½ K h². Where both sides answer alike ℓ is a function of w². Beyond the
+trained range h goes on along its tangent: the force stays a gradient at kept memory and `inside` says so.
 
-What is shown, the displacement of every node, is a third network over (w, P): bending that stays is shaped otherwise than
-bending that springs back, and w and P tell how much there is of each.
+What is shown, the displacement of every node, is another network, over (w, P): bending that stays is shaped
+otherwise than bending that springs back, and w and P tell how much there is of each.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class HeldBody:
     name : str
     stretch : Network
         w in m, or w² in m² where both sides answer alike → ℓ, a pure number.
-    field : Network
+    shape : Network
         w in m and P in N → displacement in m of every mesh node, x and y in turn.
     elements : Elements
     mirrors : bool
@@ -64,7 +64,7 @@ class HeldBody:
 
     name: str
     stretch: Network
-    field: Network
+    shape: Network
     elements: Elements
     mirrors: bool
     rest: np.ndarray
@@ -87,7 +87,7 @@ class HeldBody:
     @property
     def inputs(self) -> tuple[Range, ...]:
         """Of the displacement field: where the held node is, and what holds it there."""
-        return self.field.inputs
+        return self.shape.inputs
 
     @property
     def parameters(self) -> tuple[Range, ...]:
@@ -121,7 +121,7 @@ class HeldBody:
         del mirrored
         held = np.clip(np.atleast_2d(loads), *bounds(self.inputs))
         full = np.zeros_like(self.rest)
-        full[:, :2] = self.field.predict(held).reshape(len(self.rest), 2)
+        full[:, :2] = self.shape.predict(held).reshape(len(self.rest), 2)
         return full
 
     def evaluator(self, *, period: float = 1e-3) -> HeldEvaluator:
@@ -200,8 +200,8 @@ class HeldBody:
             and self.reach > 0
             and math.isfinite(self.radius)
             and len(self.stretch.inputs) == len(self.stretch.outputs) == 1
-            and len(self.field.inputs) == 2
-            and len(self.field.outputs) == 2 * nodes
+            and len(self.shape.inputs) == 2
+            and len(self.shape.outputs) == 2 * nodes
             and bool(((self.nodes_of_interest >= 0) & (self.nodes_of_interest < nodes)).all())
         )
         if not consistent:

@@ -69,10 +69,10 @@ class HeldEvaluator:
         self._state = (np.zeros(1), np.zeros(n), np.zeros(n), np.zeros(4))  # w, e, α, ledger
         self._work = (np.zeros(1), np.zeros(1), np.zeros((1, 1)), np.zeros(2), np.zeros(2))
         held = slice(2 * body.touch_node, 2 * body.touch_node + 2)
-        low, high = (np.array([getattr(r, end) for r in body.field.inputs]) for end in ("low", "high"))
+        low, high = (np.array([getattr(r, end) for r in body.shape.inputs]) for end in ("low", "high"))
         edge = body.stretch.inputs[0]
         self._shape = (0.0, math.sqrt(edge.high), True) if body.mirrors else (edge.low, edge.high, False)
-        self._nets = (body.stretch.compiled(), body.field.select(held).compiled(), low, high)
+        self._nets = (body.stretch.compiled(), body.shape.select(held).compiled(), low, high)
         self._direction = np.ascontiguousarray(body.directions[0], dtype=np.float64)
         self._elements = body.elements.compiled()
         # compile now, not in the loop
@@ -238,7 +238,7 @@ def _place_of(h, guess, shape, work, net) -> float:  # type: ignore[no-untyped-d
         w += change
         if abs(change) <= 1e-15 * (abs(w) + abs(guess)):
             break
-    return w
+    return float(w)
 
 
 @_jit

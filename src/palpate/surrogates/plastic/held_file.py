@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -33,7 +33,7 @@ def save_held(path: str | os.PathLike[str], body: HeldBody) -> Path:
     arrays = {name: getattr(body, name) for name in _ARRAYS}
     arrays["elements"] = np.stack(body.elements.compiled())
     meta = {name: getattr(body, name) for name in _PLAIN} | {"meta": dict(body.meta)}
-    return save_archive(path, Archive({"stretch": body.stretch, "field": body.field}, arrays, meta, KIND))
+    return save_archive(path, Archive({"stretch": body.stretch, "shape": body.shape}, arrays, meta, KIND))
 
 
 def load_held(path: str | os.PathLike[str]) -> HeldBody:
@@ -48,15 +48,14 @@ def load_held(path: str | os.PathLike[str]) -> HeldBody:
 
     archive = load_archive(path, kind=KIND)
     try:
-        elements = np.asarray(archive.arrays["elements"], dtype=np.float64)
-        if elements.ndim != 2 or len(elements) != 4:
-            raise ValueError("its elements are none")
+        given: dict[str, Any] = {name: archive.arrays[name] for name in _ARRAYS}
+        given |= {name: archive.meta[name] for name in (*_PLAIN, "meta")}
+        numbers = archive.arrays["elements"].astype(np.float64)
         return HeldBody(
             stretch=archive.networks["stretch"],
-            field=archive.networks["field"],
-            elements=Elements(*elements),
-            **{name: archive.arrays[name] for name in _ARRAYS},
-            **{name: archive.meta[name] for name in (*_PLAIN, "meta")},
+            shape=archive.networks["shape"],
+            elements=Elements(*numbers),
+            **given,
         ).checked()
     except (KeyError, TypeError, ValueError, IndexError, UsageError) as error:
         raise FileFormatError(

@@ -4,6 +4,8 @@ body       shape, materials, supports and constant loads
 parts      what a body is made of, checked
 problem    a body and what varies: what a sweep asks
 lengths    lengths against the body's own, which tell mistaken units
+varied     properties of its materials that are inputs
+family     bodies that differ in them, as one problem
 solver     many solves, each from the nearest answer before
 answers    what it returns, from where a path ended
 solution   an equilibrium, or why there is none
@@ -23,7 +25,9 @@ midsides   displacements in the middle of edges
 """
 
 from palpate.physics.solid.body import Body
+from palpate.physics.solid.family import BodyFamily, FamilyProblem
 from palpate.physics.solid.problem import SolidProblem
 from palpate.physics.solid.solution import SolidSolution
+from palpate.physics.solid.varied import Varied
 
-__all__ = ["Body", "SolidProblem", "SolidSolution"]
+__all__ = ["Body", "BodyFamily", "FamilyProblem", "SolidProblem", "SolidSolution", "Varied"]

@@ -19,6 +19,7 @@ from palpate.physics.solid.system import sparse_solver
 from palpate.physics.solid.times import durations
 
 if TYPE_CHECKING:
+    from palpate.physics.solid.model import SolidModel
     from palpate.physics.solid.problem import SolidProblem
     from palpate.physics.solid.solution import SolidSolution
 
@@ -64,6 +65,11 @@ class SolidSolver:
             )
         self._settled = self._model.remembered()
         self.reset()
+
+    @property
+    def model(self) -> SolidModel:
+        """The equations that are solved."""
+        return self._model
 
     def reset(self) -> None:
         """Forget former answers and history: the next solve starts from the body without interaction."""

@@ -1,0 +1,282 @@
+"""Bodies that differ in their materials, as one problem: positions and properties are its inputs.
+
+The body's energy U(c, p) at the equilibrium has the slope ∂U/∂p that its energy has at the same displacement: what the
+equilibrium adds is of second order (envelope theorem). So each solve also tells how its energy changes with every
+property, for two evaluations of an integral.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.dataset import Field, solid_fields
+from palpate.errors import UsageError
+from palpate.physics.interactions.interaction import Interaction
+from palpate.physics.solid.density import material_energies
+from palpate.physics.solid.system import System
+from palpate.physics.solid.varied import Varied, with_values
+from palpate.units import Range
+
+if TYPE_CHECKING:
+    from palpate.dataset import Layout
+    from palpate.physics.solid.body import Body
+    from palpate.physics.solid.problem import SolidProblem
+    from palpate.physics.solid.solution import SolidSolution
+    from palpate.physics.solid.solver import SolidSolver
+
+__all__ = ["BodyFamily", "FamilyProblem", "FamilySolver"]
+
+STEP = 1e-4  # of a property, in the central difference of the energy: most laws are linear in it, so exact
+
+
+@dataclass(frozen=True)
+class BodyFamily:
+    """A body some of whose properties are inputs.
+
+    Attributes
+    ----------
+    body : Body
+        What all members have in common; its own values of what varies do not matter.
+    varied : tuple of Varied
+
+    Raises
+    ------
+    UsageError
+        If nothing varies, a property occurs twice or does not exist, a range is empty, or the body has a history.
+    """
+
+    body: Body
+    varied: tuple[Varied, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(
+            self, "varied", (self.varied,) if isinstance(self.varied, Varied) else tuple(self.varied)
+        )
+        paths = [one.path for one in self.varied]
+        if not paths or len(set(paths)) < len(paths):
+            raise UsageError(
+                "A family needs properties that vary, each once.",
+                why=f"It has {', '.join(map(repr, paths)) or 'none'}.",
+                fix='Give for example Varied("fat.young", 2e3, 8e3).',
+            )
+        if self.body.has_history:
+            raise UsageError(
+                "A body with a history makes no family.",
+                why="Its answers depend on what was before, not on inputs alone.",
+                fix="Use elastic materials; time comes afterwards, as branches on the learnt energy.",
+            )
+        for ends in ([v.low for v in self.varied], [v.high for v in self.varied]):
+            with_values(self.body, self.varied, tuple(ends))
+        for one in self.varied:
+            _ = one.range
+
+    def problem(self, *interactions: Interaction, element: float | None = None) -> FamilyProblem:
+        """The family under interactions; see `Body.problem`."""
+        return FamilyProblem(self.body.problem(*interactions, element=element), self.varied)
+
+    def member(self, values: Sequence[float]) -> Body:
+        """The body of these values."""
+        return with_values(self.body, self.varied, tuple(float(v) for v in values))
+
+    def __str__(self) -> str:
+        return f"{self.body}\n  varied   {', '.join(str(one.range) for one in self.varied)}"
+
+
+@dataclass(frozen=True)
+class FamilyProblem:
+    """A family under interactions: inputs are theirs, n of them, and then the k properties.
+
+    The response to a property is −∂U/∂p as well. Of the stiffness only what belongs to the interactions is known; the
+    rest is NaN.
+
+    Attributes
+    ----------
+    base : SolidProblem
+    varied : tuple of Varied
+    """
+
+    base: SolidProblem
+    varied: tuple[Varied, ...]
+
+    @cached_property
+    def ranges(self) -> tuple[Range, ...]:
+        """Name, range and unit of each input."""
+        return (*self.base.ranges, *(one.range for one in self.varied))
+
+    @property
+    def layout(self) -> Layout:
+        """Of all members: their shape is the same."""
+        return self.base.layout
+
+    @property
+    def schema(self) -> tuple[Field, ...]:
+        """What each solve answers."""
+        return solid_fields(len(self.base.mesh.points), self.ranges)
+
+    @property
+    def design_name(self) -> str | None:
+        """Name of the problem's own design, None where it has none."""
+        return self.base.design_name
+
+    @property
+    def symmetry(self) -> dict[str, Any] | None:
+        """Of every member."""
+        return self.base.symmetry
+
+    @property
+    def words(self) -> str:
+        """The family in a few words."""
+        return f"{self.base.words}, {', '.join(one.range.name for one in self.varied)} varied"
+
+    @property
+    def mesh(self) -> Any:
+        """Of all members at rest."""
+        return self.base.mesh
+
+    def member(self, values: Sequence[float]) -> SolidProblem:
+        """The problem of the body with these values."""
+        return replace(
+            self.base, body=with_values(self.base.body, self.varied, tuple(float(v) for v in values))
+        )
+
+    def describe(self) -> dict[str, Any]:
+        """Everything that decides the answers, as plain data for a JSON file."""
+        varied = [{"path": one.path, "range": [one.low, one.high]} for one in self.varied]
+        low = self.member([one.low for one in self.varied])
+        return low.describe() | {"varied": varied}
+
+    def open(self) -> FamilySolver:
+        """Get ready to solve; a member's finite elements are built when it is first asked."""
+        return FamilySolver(self)
+
+    def solve(self, x: Any) -> SolidSolution:
+        """Solve for inputs x (n + k,), from the body without interaction."""
+        return self.open().solve(x)
+
+    def design(self, samples: int, seed: int = 0, **options: Any) -> np.ndarray:
+        """Inputs (samples, n + k): chains of the interaction's own design, each of one member.
+
+        Members are a scrambled Sobol sequence (Owen 1998) of their own.
+        """
+        from scipy.stats import qmc
+
+        points = self.base.design(samples, seed, **options)
+        chains = self.base.chains(points)
+        k = len(self.varied)
+        engine = qmc.Sobol(k, scramble=True, rng=np.random.default_rng([seed, k]))
+        unit = engine.random(1 << int(np.ceil(np.log2(max(len(chains), 2)))))
+        low = np.array([one.low for one in self.varied])
+        high = np.array([one.high for one in self.varied])
+        values = np.empty((len(points), k))
+        for rows, u in zip(chains, unit, strict=False):
+            values[rows] = low + u * (high - low)
+        return np.hstack([points, values])
+
+    def chains(self, points: Any) -> list[np.ndarray]:
+        """Rows of `points` (N, n + k) in chains, each of one member."""
+        points = np.asarray(points, dtype=float)
+        n, found = len(self.base.ranges), []
+        _, which = np.unique(points[:, n:], axis=0, return_inverse=True)
+        for member in range(which.max() + 1 if len(points) else 0):
+            rows = np.flatnonzero(which.ravel() == member)
+            found += [rows[chain] for chain in self.base.chains(points[rows, :n])]
+        return found
+
+    def check_points(self, points: np.ndarray) -> None:
+        """Refuse positions far from the body, and properties that its materials do not allow."""
+        points = np.asarray(points, dtype=float)
+        n = len(self.base.ranges)
+        self.base.check_points(points[:, :n])
+        for values in np.unique(points[:, n:], axis=0):
+            self.member(values)
+
+    def __str__(self) -> str:
+        return f"{self.base}\n  varied   {', '.join(str(one.range) for one in self.varied)}"
+
+
+class FamilySolver:
+    """The finite elements of the member that was asked last.
+
+    Parameters
+    ----------
+    problem : FamilyProblem
+    """
+
+    def __init__(self, problem: FamilyProblem) -> None:
+        self._problem = problem
+        self._values: tuple[float, ...] | None = None
+        self._solver: SolidSolver | None = None
+        self._slopes: list[_EnergySlope] = []
+
+    def reset(self) -> None:
+        """Forget all earlier solves."""
+        if self._solver is not None:
+            self._solver.reset()
+
+    def solve(self, x: Any) -> SolidSolution:
+        """Equilibrium under inputs x (n + k,).
+
+        Raises
+        ------
+        UsageError
+            If `x` has not one finite number per input, or a material does not allow its value.
+        """
+        x = np.asarray(x, dtype=float)
+        n, k = len(self._problem.base.ranges), len(self._problem.varied)
+        if x.shape != (n + k,) or not np.isfinite(x).all():
+            raise UsageError(
+                f"The inputs {x} do not fit.",
+                why=f"The problem has the inputs {', '.join(r.name for r in self._problem.ranges)}.",
+                fix=f"Give {n + k} finite numbers.",
+            )
+        solver = self._of(tuple(x[n:].tolist()))
+        found = solver.solve(x[:n])
+        gradient = np.full((n + k, n + k), np.nan)
+        gradient[:n, :n] = found.response_gradient
+        slopes = [s.at(found.state) if found.converged else np.nan for s in self._slopes]
+        return replace(
+            found,
+            ranges=self._problem.ranges,
+            inputs=x,
+            response=np.concatenate([found.response, -np.asarray(slopes)]),
+            response_gradient=gradient,
+            reached=np.concatenate([found.reached, x[n:]]),
+        )
+
+    def _of(self, values: tuple[float, ...]) -> SolidSolver:
+        if self._solver is None or values != self._values:
+            self._solver = None  # at most one is open: each takes hundreds of megabytes
+            member = self._problem.member(values)
+            solver = member.open()
+            self._slopes = [
+                _EnergySlope(solver, member.body, one, value)
+                for one, value in zip(self._problem.varied, values, strict=True)
+            ]
+            self._solver, self._values = solver, values
+        return self._solver
+
+
+class _EnergySlope:
+    """∂U/∂p at an equilibrium: the difference of the body's energy at one displacement."""
+
+    def __init__(self, solver: SolidSolver, body: Body, varied: Varied, value: float) -> None:
+        model = solver.model
+        self._step = STEP * abs(value) or STEP
+        free = np.zeros(model.field.size, dtype=bool)
+        ends = (varied.of(body, value - self._step), varied.of(body, value + self._step))
+        self._low, self._high = (
+            System(model.field, material_energies(model.field, end.materials, {}), free, "") for end in ends
+        )
+        self._base = self._difference(model.base)
+
+    def at(self, z: np.ndarray) -> float:
+        """∂U/∂p at the unknowns z (dof,) of an equilibrium."""
+        return self._difference(z) - self._base
+
+    def _difference(self, z: np.ndarray) -> float:
+        return (self._high.potential(z) - self._low.potential(z)) / (2 * self._step)

@@ -1,0 +1,100 @@
+"""Properties of a body's materials that are inputs, so that one sweep serves a family of bodies."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from palpate.errors import UsageError
+from palpate.units import Range
+
+if TYPE_CHECKING:
+    from palpate.physics.solid.body import Body
+
+__all__ = ["Varied", "with_values"]
+
+UNITS = {"young": "Pa", "bulk": "Pa", "mu": "Pa", "c10": "Pa", "c01": "Pa", "poisson": "", "alpha": ""}
+BESIDE = frozenset({"density"})  # acts through gravity, not through the energy
+
+
+@dataclass(frozen=True)
+class Varied:
+    """A number of a material that is an input.
+
+    Attributes
+    ----------
+    path : str
+        ``"REGION.PROPERTY"``, for example ``"fat.young"``; of a body of one region the property alone will do.
+        A material inside another is one more step: ``"fat.base.young"``.
+    low, high : float
+        Ends of its range, in SI units.
+    name : str
+        Of the input, by default the path.
+    unit : str
+        By default that of the property, where it is known.
+    """
+
+    path: str
+    low: float
+    high: float
+    name: str = ""
+    unit: str = ""
+
+    @property
+    def range(self) -> Range:
+        """The input.
+
+        Raises
+        ------
+        UsageError
+            If the ends are not finite or not in order.
+        """
+        unit = self.unit or UNITS.get(self.path.rpartition(".")[2], "")
+        return Range(self.name or self.path, self.low, self.high, unit)
+
+    def of(self, body: Body, value: float) -> Body:
+        """The body with this property at a value.
+
+        Raises
+        ------
+        UsageError
+            If the body has no such number, or its material does not allow the value.
+        """
+        materials = body.materials
+        region, _, rest = self.path.partition(".")
+        if region not in materials and len(materials) == 1:
+            region, rest = next(iter(materials)), self.path
+        if region not in materials or not rest:
+            raise UsageError(
+                f"{self.path!r} names no property of this body.",
+                why=f"Its regions are {', '.join(materials)}.",
+                fix=f'Write region and property, for example "{next(iter(materials))}.young".',
+            )
+        materials[region] = _replaced(materials[region], rest.split("."), value, self.path)
+        return replace(body, material=materials)
+
+
+def with_values(body: Body, varied: tuple[Varied, ...], values: tuple[float, ...]) -> Body:
+    """The member of the family with these values."""
+    for one, value in zip(varied, values, strict=True):
+        body = one.of(body, value)
+    return body
+
+
+def _replaced(material: Any, path: list[str], value: float, whole: str) -> Any:
+    name, rest = path[0], path[1:]
+    known = [f.name for f in fields(material)] if is_dataclass(material) else []
+    inner = getattr(material, name) if name in known else None
+    if rest and is_dataclass(inner):
+        return replace(material, **{name: _replaced(inner, rest, value, whole)})
+    if rest or name in BESIDE or isinstance(inner, bool) or not isinstance(inner, int | float):
+        numbers = [n for n in known if isinstance(getattr(material, n), float) and n not in BESIDE]
+        raise UsageError(
+            f"{whole!r} can't vary: {name!r} is no number in the energy of {material.name}.",
+            why=f"Its numbers are {', '.join(numbers) or 'none'}.",
+            fix="Name one of these, or make one sweep for each value.",
+        )
+    if not math.isfinite(value):
+        raise UsageError(f"The value {value} of {whole!r} is not finite.", fix="Give a finite number.")
+    return replace(material, **{name: float(value)})

@@ -1,0 +1,114 @@
+"""Bodies that differ in their materials, as one problem."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import palpate as pp
+from palpate.errors import UsageError
+from palpate.physics.geometry import Block, LayeredBlock
+from palpate.physics.interactions import SphereProbe
+from palpate.physics.materials import NeoHookean
+from palpate.physics.solid import Body, BodyFamily, FamilyProblem, SolidProblem, Varied
+
+PROBE = SphereProbe(0.01, depth=(0.0, 0.006), over=((0.03, 0.03), (0.05, 0.05)))
+CENTRE = (0.042, 0.037, 0.045)  # 5 mm deep
+
+
+def layered() -> Body:
+    shape = LayeredBlock((0.08, 0.08), (("fat", 0.015), ("muscle", 0.025)), element=0.02)
+    return Body(
+        shape,
+        {"fat": NeoHookean(4e3, 0.45, 1000.0), "muscle": NeoHookean(15e3, 0.45, 1000.0)},
+        fixed="bottom",
+    )
+
+
+FAMILY = BodyFamily(layered(), (Varied("fat.young", 2e3, 8e3), Varied("muscle.poisson", 0.3, 0.47)))
+
+
+def problem() -> FamilyProblem:
+    return FAMILY.problem(PROBE, element=0.012)
+
+
+def test_a_member_answers_as_the_body_that_it_is() -> None:
+    member = FAMILY.member((5e3, 0.4))
+    assert member.materials["fat"].young == 5e3
+    assert member.materials["muscle"].poisson == 0.4
+    assert member.materials["muscle"].young == 15e3
+    alone = member.problem(PROBE, element=0.012).solve(CENTRE)
+    found = problem().solve((*CENTRE, 5e3, 0.4))
+    assert found.potential_energy == alone.potential_energy
+    np.testing.assert_array_equal(found.response[:3], alone.response)
+    np.testing.assert_array_equal(found.response_gradient[:3, :3], alone.response_gradient)
+    assert np.isnan(found.response_gradient[3:]).all()
+    np.testing.assert_array_equal(found.inputs, (*CENTRE, 5e3, 0.4))
+
+
+@pytest.mark.parametrize("gravity", [(0.0, 0.0, 0.0), (0.0, 0.0, -9.81)])
+def test_the_response_to_a_property_is_the_slope_of_the_energy(gravity: tuple[float, float, float]) -> None:
+    # envelope theorem: ∂U/∂p at the equilibrium is the partial derivative at the same displacement
+    family = BodyFamily(dataclasses.replace(layered(), gravity=gravity), FAMILY.varied)
+    solver = family.problem(PROBE, element=0.012).open()
+    x = np.array([*CENTRE, 4e3, 0.42])
+    response = solver.solve(x).response
+    for i, step in ((3, 20.0), (4, 5e-4)):
+        ends = []
+        for sign in (-1, 1):
+            solver.reset()
+            at = x.copy()
+            at[i] += sign * step
+            ends.append(solver.solve(at).potential_energy)
+        slope = (ends[1] - ends[0]) / (2 * step)
+        assert slope > 0  # stiffer in fat and less compressible: more energy at the same depth
+        # differences of second order: (step/p)² of the slope, and the solver's energy to 1e-9 over the step
+        assert response[i] == pytest.approx(-slope, rel=1e-4)
+
+
+def test_columns_each_belong_to_one_member() -> None:
+    family = problem()
+    points = family.design(24, seed=3)
+    chains = family.chains(points)
+    assert sorted(np.concatenate(chains).tolist()) == list(range(24))
+    for rows in chains:
+        assert len(np.unique(points[rows, 3:], axis=0)) == 1
+        assert (np.diff(points[rows, 2]) < 0).all()
+    values = np.array([points[rows[0], 3:] for rows in chains])
+    assert len(np.unique(values, axis=0)) == len(chains)
+    low, high = np.array([2e3, 0.3]), np.array([8e3, 0.47])
+    assert (values >= low).all()
+    assert (values <= high).all()
+
+
+def test_a_sweep_over_a_family_is_a_dataset_like_any() -> None:
+    shape = Block((0.06, 0.06, 0.03), element=0.02)
+    family = BodyFamily(Body(shape, NeoHookean(9e3, 0.4)), Varied("young", 5e3, 15e3))
+    probe = SphereProbe(0.01, depth=(0.001, 0.004), over=((0.03, 0.03), (0.04, 0.04)))
+    small = family.problem(probe, element=0.015)
+    data = pp.sweep(small, samples=6, seed=1, workers=1, progress=False)
+    assert data.ok.X.shape == (6, 4)
+    assert [r.name for r in data.ranges] == ["c_x", "c_y", "c_z", "young"]
+    assert data.ranges[3].unit == "Pa"
+    row = data.take([4])
+    again = small.solve(row.X[0])
+    assert row["potential_energy"][0] == pytest.approx(again.potential_energy, rel=1e-7)
+
+
+def test_what_can_not_vary_is_said() -> None:
+    body = layered()
+    with pytest.raises(UsageError, match="names no property"):
+        BodyFamily(body, Varied("bone.young", 1e3, 2e3))
+    with pytest.raises(UsageError, match="young, poisson"):
+        BodyFamily(body, Varied("fat.stiffness", 1e3, 2e3))
+    with pytest.raises(UsageError, match="no number in the energy"):
+        BodyFamily(body, Varied("fat.density", 900.0, 1100.0))
+    with pytest.raises(UsageError, match="each once"):
+        BodyFamily(body, (Varied("fat.young", 1e3, 2e3), Varied("fat.young", 1e3, 2e3)))
+    with pytest.raises(UsageError, match=r"[Pp]oisson"):
+        BodyFamily(body, Varied("fat.poisson", 0.3, 0.6))
+    with pytest.raises(UsageError, match="4 finite numbers"):
+        BodyFamily(body, Varied("fat.young", 1e3, 2e3)).problem(PROBE).solve(CENTRE)
+    assert isinstance(problem().member((4e3, 0.4)), SolidProblem)

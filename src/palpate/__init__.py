@@ -66,7 +66,7 @@ if TYPE_CHECKING:
         roller,
     )
     from palpate.physics.massspring import MassSpringBody
-    from palpate.study import Study, preset_study, read_study
+    from palpate.study import Study, TouchStudy, preset_study, read_study
     from palpate.surrogates import TouchedBody, TouchedSurface, TouchModel, TouchSurrogate
     from palpate.sweeps import ExternalProblem, Space, local_cluster, sweep
     from palpate.units import Quantity, Range
@@ -128,6 +128,7 @@ _HOMES = {
     "SurfaceTraction": "physics",
     "TipLoad": "physics",
     "TouchModel": "surrogates",
+    "TouchStudy": "study",
     "TouchSurrogate": "surrogates",
     "TouchedBody": "surrogates",
     "TouchedSurface": "surrogates",
@@ -203,6 +204,7 @@ __all__ = [
     "SurfaceTraction",
     "TipLoad",
     "TouchModel",
+    "TouchStudy",
     "TouchSurrogate",
     "TouchedBody",
     "TouchedSurface",

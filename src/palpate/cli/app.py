@@ -51,23 +51,27 @@ def _root(
 @app.command()
 def demo(
     names: Annotated[
-        list[str] | None, typer.Argument(help="Studies to run; by default both founding beams.")
+        list[str] | None,
+        typer.Argument(help="Studies to run, such as block; by default both founding beams."),
     ] = None,
     folder: Annotated[Path, typer.Option(help="Where files go.")] = Path("palpate-demo"),
     view: Annotated[bool, typer.Option("--view/--no-view", help="Serve the page at the end.")] = True,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Coarse elements and few touches: under two minutes.")
+    ] = False,
     workers: Workers = None,
     port: Port = None,
     browser: Browser = True,
     as_json: Json = False,
 ) -> None:
-    """Run the founding cantilevers from finite elements to the fingertip: under a minute."""
+    """Run studies with a name from finite elements to the fingertip; the founding beams take under a minute."""
     from palpate.cli.demo import run_demo
 
-    run_demo(names or ["beam-copper", "beam-nylon"], folder, workers, Console(as_json))
     console = Console(as_json)
+    models = run_demo(names or ["beam-copper", "beam-nylon"], folder, workers, console, quick=quick)
     if view and not as_json:
         if sys.stdout.isatty():
-            _serve(folder / f"{(names or ['beam-nylon'])[-1]}.palpate", port=port, browser=browser)
+            _serve(models[-1], port=port, browser=browser)
         else:
             console.say("No terminal, so no page is served: `palpate view FILE` does it.")
 
@@ -101,11 +105,13 @@ def init(
 
 
 @app.command()
-def schema() -> None:
+def schema(
+    kind: Annotated[str, typer.Argument(help="beam, or touch for studies of pressed bodies.")] = "beam",
+) -> None:
     """Print the JSON schema of study files."""
     from palpate.study import study_schema
 
-    typer.echo(study_schema())
+    typer.echo(study_schema(kind))
 
 
 @app.command()
@@ -124,7 +130,7 @@ def sweep(study: StudyFile = STUDY, workers: Workers = None, as_json: Json = Fal
     failed = rows - len(data.ok) - (len(random.ok) if random else 0)
     console.result(
         f"{data}\n{paths.data}"
-        + (f"\n{paths.random}: {len(random)} random loads for testing" if random else ""),
+        + (f"\n{paths.random}: {len(random)} further solves for testing" if random else ""),
         {
             "data": str(paths.data),
             "random": str(paths.random) if random else None,
@@ -136,27 +142,22 @@ def sweep(study: StudyFile = STUDY, workers: Workers = None, as_json: Json = Fal
 
 @app.command()
 def learn(study: StudyFile = STUDY, as_json: Json = False) -> None:
-    """Learn the study's dataset: sequential filter, then refinement."""
+    """Learn the study's dataset: networks that grow and prune themselves, then refinement."""
     from palpate.study import read_study
-    from palpate.study.pipeline import judged, learn_study, validate_study
+    from palpate.study.stages import stages_of
 
     console = Console(as_json)
     record = read_study(study)
     paths = _paths(study, record.name)
-    train, test = _datasets(record, paths)
+    stages = stages_of(record)
+    train, test = stages.parted(record, paths)
     console.say(f"Learning from {len(train)} solves …")
-    touch, history = learn_study(record, train, test)
-    validation = validate_study(record, touch, test, history)
-    touch = judged(touch, validation)
-    touch.save(paths.model)
-    history.save(paths.history)
-    units = {name: network.units for name, network in touch.networks.items()}
-    errors = {name: e.relative for name, e in validation.networks.items()}
-    said = "\n".join(f"  {name}: RMSE {e:.1e} of full scale on unseen solves" for name, e in errors.items())
-    console.result(
-        f"{touch}\n{history}\n{said}\n{paths.model}",
-        {"model": str(paths.model), "units": units, "rmse": errors},
-    )
+    touch, history = stages.learnt(record, train, test, None, lambda stage: console.say(f"{stage} …"))
+    validation = stages.validated(record, touch, test, history)
+    touch = stages.judged(touch, validation)
+    stages.save(paths, touch, history)
+    said, figures = stages.told(touch, validation)
+    console.result(f"{touch}\n{history}\n{said}\n{paths.model}", {"model": str(paths.model), **figures})
     console.say(f"Next: palpate validate {study}, palpate view {paths.model}")
 
 
@@ -186,20 +187,15 @@ def validate(
 
 
 def _validate_study(study: Path, report: bool, console: Console) -> None:
-    from palpate.learning import History
     from palpate.study import read_study
-    from palpate.study.pipeline import Outcome, report_study, validate_study
-    from palpate.study.rows import check_model
-    from palpate.surrogates import TouchModel
+    from palpate.study.pipeline import Outcome, report_study
+    from palpate.study.stages import stages_of
 
     record = read_study(study)
-    paths = _paths(study, record.name)
-    train, test = _datasets(record, paths)
-    touch, history = (
-        check_model(TouchModel.load(paths.model), train, paths.model),
-        History.load(paths.history),
-    )
-    validation = validate_study(record, touch, test, history)
+    paths, stages = _paths(study, record.name), stages_of(record)
+    train, test = stages.parted(record, paths)
+    touch, history = stages.load(paths, train)
+    validation = stages.validated(record, touch, test, history)
     text = str(validation)
     if report:
         report_study(paths.report, [Outcome(record, touch, train, test, validation, history)])
@@ -293,10 +289,10 @@ def doctor(as_json: Json = False) -> None:
 
 
 def _serve(model: Path, *, port: int | None, browser: bool, strict_port: bool = False) -> None:
-    from palpate.surrogates import TouchModel
+    from palpate.runtime.touchable import load_touchable
     from palpate.viewer import serve
 
-    settings = TouchModel.load(model).meta.get("runtime", {})
+    settings = load_touchable(model).meta.get("runtime", {})
     serve(
         model,
         port=settings.get("port", 8080) if port is None else port,
@@ -308,7 +304,7 @@ def _serve(model: Path, *, port: int | None, browser: bool, strict_port: bool = 
 
 
 def _paths(study: Path, name: str) -> Any:
-    from palpate.study.pipeline import Paths
+    from palpate.study.paths import Paths
 
     return Paths(study.parent, name)
 
@@ -317,15 +313,6 @@ def _with_workers(study: Any, workers: int | None) -> Any:
     if workers is None:
         return study
     return study.model_copy(update={"sweep": study.sweep.model_copy(update={"workers": workers})})
-
-
-def _datasets(study: Any, paths: Any) -> Any:
-    from palpate.dataset import Dataset
-    from palpate.study.rows import check_data, train_and_test
-
-    data = check_data(study, Dataset.open(paths.data), paths.data)
-    random = check_data(study, Dataset.open(paths.random), paths.random) if study.test.random else None
-    return train_and_test(study, data, random)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -8,22 +8,30 @@ from pathlib import Path
 
 from palpate.cli.console import Console
 from palpate.errors import AccuracyError, UsageError
-from palpate.study import Study, preset_study
+from palpate.study import preset_study
 from palpate.study.pipeline import Outcome, Paths, carry_out, report_study
+from palpate.study.stages import AnyStudy
 from palpate.sweeps import LocalCluster, local_cluster
 
 __all__ = ["run_demo"]
 
 
-def run_demo(names: Sequence[str], folder: Path, workers: int | None, console: Console) -> None:
+def run_demo(
+    names: Sequence[str], folder: Path, workers: int | None, console: Console, *, quick: bool = False
+) -> list[Path]:
     """Carry out studies one after the other on one cluster, and report on all of them together.
+
+    Returns
+    -------
+    list of Path
+        The models' files.
 
     Raises
     ------
     AccuracyError
         After everything is written, if a study missed its target.
     """
-    studies = [preset_study(name) for name in names]
+    studies = [preset_study(name, quick=quick) for name in names]
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -37,9 +45,10 @@ def run_demo(names: Sequence[str], folder: Path, workers: int | None, console: C
     seconds = time.perf_counter() - began
     console.result(_summary(outcomes, report, seconds), _content(outcomes, report, seconds))
     _judge(outcomes)
+    return [Paths(folder, study.name).model for study in studies]
 
 
-def _carried_out(study: Study, folder: Path, cluster: LocalCluster, console: Console) -> Outcome:
+def _carried_out(study: AnyStudy, folder: Path, cluster: LocalCluster, console: Console) -> Outcome:
     return carry_out(
         study,
         Paths(folder, study.name),

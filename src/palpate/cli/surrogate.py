@@ -41,20 +41,21 @@ def validate_file(
     """
     from palpate.dataset import Dataset
     from palpate.network import load_archive
-    from palpate.surrogates import TouchSurrogate
-    from palpate.surrogates.touch_file import KIND
+    from palpate.surrogates import TouchedBody, TouchSurrogate
     from palpate.validation import SurrogateChapter, validate, write_report
     from palpate.validation.surrogate import unseen_solves
 
-    if (kind := load_archive(path).kind) != KIND:
+    kinds = {"touch-surrogate": TouchSurrogate, "touched-body": TouchedBody}
+    if (kind := load_archive(path).kind) not in kinds:
         raise UsageError(
             f"{path} holds {kind!r}, which is not judged by itself.",
             why="A touch model of a held body is judged together with its study.",
             fix="Give the study file: palpate validate study.toml",
         )
-    surrogate = TouchSurrogate.load(path)
+    model = kinds[kind].load(path)
+    surrogate = model.touch if isinstance(model, TouchedBody) else model
     data, fine = _test(path, test), None if refined is None else Dataset.open(refined)
-    validation = validate(surrogate, data, refined=fine)
+    validation = validate(model, data, refined=fine)
     text, target = str(validation), path.with_suffix(".html") if report else None
     if target is not None:
         solves, _ = unseen_solves(surrogate, data)

@@ -1,26 +1,27 @@
-"""What a study says. Every record is frozen, unknown keys are errors, and quantities may carry units."""
+"""What a study of a beam says. Every record is frozen, unknown keys are errors, and quantities may carry units."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import partial
-from typing import Annotated, Any, Literal
+from dataclasses import replace
+from typing import Literal
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    GetCoreSchemaHandler,
-    GetJsonSchemaHandler,
-    field_validator,
-    model_validator,
-)
-from pydantic_core import CoreSchema, core_schema
+from pydantic import Field, field_validator, model_validator
 
 from palpate.errors import UsageError
 from palpate.learning import FEWEST, PRESETS, Refinement, Settings
 from palpate.physics import named_material
-from palpate.units import to_si
+from palpate.study.record import (
+    Densities,
+    Metres,
+    Newtons,
+    Pascals,
+    QuarticMetres,
+    Record,
+    RuntimeRecord,
+    SquareMetres,
+    Stiffness,
+    Unit,
+)
 
 __all__ = [
     "BodyRecord",
@@ -36,50 +37,6 @@ __all__ = [
     "TestRecord",
     "Unit",
 ]
-
-
-@dataclass(frozen=True)
-class Unit:
-    """Makes a float field a quantity: a number in this unit, or text with a unit of the same dimension.
-
-    Attributes
-    ----------
-    name : str
-        SI unit.
-    """
-
-    name: str
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_before_validator_function(partial(_in_si, unit=self.name), handler(source))
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, _: GetJsonSchemaHandler) -> dict[str, Any]:
-        text = f"a number in {self.name}, or a quantity with its unit, such as '1 {self.name}'"
-        return {"anyOf": [{"type": "number"}, {"type": "string"}], "description": text}
-
-
-def _in_si(value: Any, unit: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-        raise ValueError(f"{value!r} is not a quantity in {unit}")  # noqa: TRY004 - pydantic collects ValueError
-    try:
-        return to_si(value, unit)
-    except UsageError as error:
-        raise ValueError(str(error).replace("\n", " ")) from error
-
-
-Metres = Annotated[float, Unit("m")]
-SquareMetres = Annotated[float, Unit("m^2")]
-QuarticMetres = Annotated[float, Unit("m^4")]
-Newtons = Annotated[float, Unit("N")]
-Pascals = Annotated[float, Unit("Pa")]
-Densities = Annotated[float, Unit("kg/m^3")]
-Stiffness = Annotated[float, Unit("N/m")]
-
-
-class Record(BaseModel):
-    """Base of all parts of a study: frozen, and unknown keys are errors."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class MaterialRecord(Record):
@@ -252,14 +209,6 @@ class TargetRecord(Record):
     filter_relapse: float = Field(2.0, ge=0, description="its error over its best so far; 0: not asked")
     force_median: float = Field(0.01, gt=0, description="relative force error, median")
     force_p95: float = Field(0.035, gt=0, description="relative force error, 95th percentile")
-
-
-class RuntimeRecord(Record):
-    """The 1 kHz loop and the page: what `palpate view` and `palpate run` do unless told otherwise."""
-
-    rate: float = Field(1000.0, ge=10, le=10000, description="Hz")
-    max_force: Newtons = Field(12.0, gt=0, description="the force is clamped to this")
-    port: int = Field(8080, ge=0, le=65535, description="of the page; a busy one moves on to the next")
 
 
 class Study(Record):

@@ -1,4 +1,4 @@
-"""Studies that have a name: the founding study's cantilevers, and two with several loads."""
+"""Studies that have a name: the founding study's cantilevers, two with several loads, and bodies to be pressed."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from palpate.errors import UsageError
 from palpate.physics import Cantilever, Circle, PointLoad
 from palpate.physics.beam.presets import PRESETS, preset
 from palpate.study.models import Study
+from palpate.study.stages import AnyStudy
+from palpate.study.touching.presets import TOUCHED, touched_preset
 
 __all__ = ["named", "preset_names", "preset_study"]
 
@@ -24,10 +26,10 @@ _SEVERAL: dict[str, Any] = {
 
 def preset_names() -> tuple[str, ...]:
     """Names that `preset_study` knows."""
-    return tuple(PRESETS)
+    return (*PRESETS, *TOUCHED)
 
 
-def named(study: Study, name: str) -> Study:
+def named(study: AnyStudy, name: str) -> AnyStudy:
     """The study under another name.
 
     Raises
@@ -36,7 +38,7 @@ def named(study: Study, name: str) -> Study:
         If files can't have that name.
     """
     try:
-        return Study.model_validate(study.model_dump() | {"name": name})
+        return type(study).model_validate(study.model_dump() | {"name": name})
     except ValidationError as error:
         raise UsageError(
             f"{name!r} can't name a study and its files.",
@@ -44,16 +46,24 @@ def named(study: Study, name: str) -> Study:
         ) from error
 
 
-def preset_study(name: str) -> Study:
-    """The study of that name.
+def preset_study(name: str, *, quick: bool = False) -> AnyStudy:
+    """The study of that name; of a pressed body also in a quick form, with coarse elements and few touches.
+
+    A beam has no quick form: all of it takes less than a minute.
 
     Raises
     ------
     UsageError
         If the name is not known; the message lists the names that are.
     """
+    if name in TOUCHED:
+        return touched_preset(name, quick=quick)
     if name not in PRESETS:
         raise _no_study(name)
+    return _beam(name)
+
+
+def _beam(name: str) -> Study:
     found = preset(name)
     body, loads = found.body, [load for load in found.loads if isinstance(load, PointLoad)]
     content: dict[str, Any] = {
@@ -83,10 +93,10 @@ def preset_study(name: str) -> Study:
 
 
 def _no_study(name: str) -> UsageError:
-    close = difflib.get_close_matches(name, PRESETS, n=1)
+    close = difflib.get_close_matches(name, preset_names(), n=1)
     return UsageError(
         f"There is no study called {name!r}.",
-        why=f"Known studies: {', '.join(PRESETS)}.",
+        why=f"Known studies: {', '.join(preset_names())}.",
         fix=f"Did you mean {close[0]!r}?" if close else "Choose one of these, or write a study file.",
     )
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,9 +13,8 @@ from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.study.build import body_of, loads_of
 from palpate.study.models import Study
-from palpate.surrogates import TouchModel
 
-__all__ = ["check_data", "check_model", "train_and_test"]
+__all__ = ["check_data", "check_hash", "refuse_other", "train_and_test"]
 
 
 def check_data(study: Study, data: Dataset, path: Path) -> Dataset:
@@ -28,29 +29,33 @@ def check_data(study: Study, data: Dataset, path: Path) -> Dataset:
     found = data.provenance["problem"]
     # compared as the file has it: tuples are lists there
     if json.loads(json.dumps(wanted)) != found:
-        raise UsageError(
-            f"{path} is not of this study's body and loads.",
-            why="The study was changed after the sweep.",
-            fix="Delete it and run `palpate sweep`, or give the changed study another name.",
-        )
+        raise refuse_other(path)
     return data
 
 
-def check_model(touch: TouchModel, train: Dataset, path: Path) -> TouchModel:
-    """The model, if it was learnt from just these training rows.
+def refuse_other(path: Path) -> UsageError:
+    """The error of a file that has the study's name, but whose study was changed since."""
+    return UsageError(
+        f"{path} is not of this study's body and loads.",
+        why="The study was changed after the sweep.",
+        fix="Delete it and run `palpate sweep`, or give the changed study another name.",
+    )
+
+
+def check_hash(meta: Mapping[str, Any], train: Dataset, path: Path) -> None:
+    """Refuse a model, by what it tells of itself, that was not learnt from just these training rows.
 
     Raises
     ------
     UsageError
         If it was not: rows that it has seen might be taken for unseen ones.
     """
-    if touch.meta.get("dataset", {}).get("hash") != train.hash:
+    if meta.get("dataset", {}).get("hash") != train.hash:
         raise UsageError(
             f"{path} was learnt from other solves than this study trains with.",
             why="The sweep or its split was changed since, and what is unseen here may have been seen there.",
             fix="Run `palpate learn` again.",
         )
-    return touch
 
 
 def train_and_test(study: Study, data: Dataset, random: Dataset | None) -> tuple[Dataset, Dataset]:

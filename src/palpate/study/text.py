@@ -12,14 +12,18 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from palpate.errors import StudyError
-from palpate.study.models import Study, Unit
+from palpate.errors import StudyError, UsageError
+from palpate.study.models import Study
+from palpate.study.record import Unit
+from palpate.study.stages import AnyStudy
+from palpate.study.touching import TouchStudy
+from palpate.study.touching.shapes import KINDS
 
 __all__ = ["read_study", "study_schema", "to_toml"]
 
 
-def read_study(path: str | os.PathLike[str]) -> Study:
-    """Read a study file.
+def read_study(path: str | os.PathLike[str]) -> AnyStudy:
+    """Read a study file; the kind of its body tells whether it is of a beam or of a pressed body.
 
     Raises
     ------
@@ -41,22 +45,47 @@ def read_study(path: str | os.PathLike[str]) -> Study:
         twice = "overwrite" in str(error)
         fix = "A key or a table stands there twice: keep one." if twice else "Mend that line."
         raise StudyError(f"{path} is not valid TOML.", why=f"{error}.", fix=fix) from error
+    record = _record_for(content, path)
     try:
-        return Study.model_validate(content)
+        return record.model_validate(content)
     except ValidationError as error:
         raise StudyError(
             f"{path} does not describe a study:",
-            why="\n".join(f"  {line}" for line in _complaints(error)),
+            why="\n".join(f"  {line}" for line in _complaints(error, record)),
             fix="`palpate init --print` shows every key with its meaning; `palpate schema` is for editors.",
         ) from error
 
 
-def study_schema() -> str:
-    """JSON schema of a study file, for editors."""
-    return json.dumps(Study.model_json_schema(), indent=2)
+def _record_for(content: dict[str, Any], path: Path) -> type[Study | TouchStudy]:
+    """What a file is to be read as: by the kind of its body, else by whether it has a probe."""
+    body = content.get("body")
+    kind = body.get("kind") if isinstance(body, dict) else None
+    known = ("cantilever", *KINDS)
+    if kind is not None and kind not in known:
+        close = difflib.get_close_matches(str(kind), known, n=1)
+        raise StudyError(
+            f"{path} does not describe a study:",
+            why=f"  body.kind: there is no kind of body {kind!r}; there are {', '.join(known)}",
+            fix=f"Did you mean {close[0]!r}?" if close else "Choose one of these.",
+        )
+    return TouchStudy if kind in KINDS or (kind is None and "probe" in content) else Study
 
 
-def to_toml(study: Study) -> str:
+def study_schema(kind: str = "beam") -> str:
+    """JSON schema of a study file, for editors: of a ``"beam"``, or of a ``"touch"`` for pressed bodies.
+
+    Raises
+    ------
+    UsageError
+        For another kind.
+    """
+    records: dict[str, type[BaseModel]] = {"beam": Study, "touch": TouchStudy}
+    if kind not in records:
+        raise UsageError(f"There is no kind of study {kind!r}.", fix="Choose beam or touch.")
+    return json.dumps(records[kind].model_json_schema(), indent=2)
+
+
+def to_toml(study: AnyStudy) -> str:
     """The study as a commented TOML file that `read_study` reads back as the same study."""
     lines = [
         "# A palpate study: what is solved, learnt, checked and touched.",
@@ -90,6 +119,8 @@ def _scalars(record: BaseModel) -> Iterator[str]:
                 yield f"{name} = {{ {', '.join(f'{k} = {_toml(v)}' for k, v in value.items())} }}"
             continue
         comment = f"  # {field.description}" if field.description else ""
+        if value is None and not field.examples:
+            continue
         if value is None:  # TOML has no such value: an example stands there as a comment
             yield f"# {name} = {_toml((field.examples or [''])[0])}{comment}"
             continue
@@ -100,10 +131,17 @@ def _scalars(record: BaseModel) -> Iterator[str]:
 def _tables(prefix: str, record: BaseModel) -> Iterator[str]:
     for name in type(record).model_fields:
         value = getattr(record, name)
+        if isinstance(value, tuple) and value and isinstance(value[0], BaseModel):
+            for item in value:
+                yield ""
+                yield f"[[{prefix}.{name}]]"
+                yield from _scalars(item)
+                yield from _tables(f"{prefix}.{name}", item)
         if isinstance(value, BaseModel):
             yield ""
             yield f"[{prefix}.{name}]"
             yield from _scalars(value)
+            yield from _tables(f"{prefix}.{name}", value)
 
 
 def _unit(parts: Iterable[Any]) -> str | None:
@@ -128,24 +166,29 @@ def _toml(value: Any, unit: str | None = None) -> str:
     return repr(value)
 
 
-def _complaints(error: ValidationError) -> Iterator[str]:
+def _complaints(error: ValidationError, record: type[BaseModel]) -> Iterator[str]:
     """One line per mistake: where, what, and the nearest key that exists."""
     items = [(_place(item["loc"]), item) for item in error.errors(include_url=False)]
     for place, item in items:
         # what is wrong with a whole because of one of its parts, or of another form it might have had, is no news
         if any(other != place and other[: len(place)] == place for other, _ in items):
             continue
-        yield f"{'.'.join(place) or 'study'}: {_words(item)}"
+        yield f"{'.'.join(place) or 'study'}: {_words(item, record)}"
 
 
 def _place(location: tuple[int | str, ...]) -> tuple[str, ...]:
     """Keys that lead to a mistake; a union's tag is no key of the file."""
-    return tuple(str(p) for p in location if not str(p).endswith("Record") and p not in {"str", "float"})
+    told = [str(p) for i, p in enumerate(location) if not (i == 1 and location[0] == "body" and p in KINDS)]
+    return tuple(p for p in told if not _is_tag(p))
 
 
-def _words(item: Any) -> str:
+def _is_tag(part: str) -> bool:
+    return part.endswith("Record") or part in {"str", "float"} or part.startswith("function-")
+
+
+def _words(item: Any, record: type[BaseModel]) -> str:
     if item["type"] == "extra_forbidden":
-        close = difflib.get_close_matches(str(item["loc"][-1]), _known_keys(Study), n=1)
+        close = difflib.get_close_matches(str(item["loc"][-1]), _known_keys(record), n=1)
         return "there is no such key" + (f"; did you mean {close[0]!r}?" if close else "")
     if item["type"] == "string_pattern_mismatch":
         return f"{item['input']!r} can't name files: letters, digits, dots, dashes and underscores can"

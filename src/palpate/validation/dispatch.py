@@ -8,7 +8,7 @@ from typing import overload
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.learning import History
-from palpate.surrogates import TouchModel, TouchSurrogate
+from palpate.surrogates import TouchedBody, TouchModel, TouchSurrogate
 from palpate.validation.judgement import Judgement
 from palpate.validation.limits import Limits
 from palpate.validation.result import Validation, validate_model
@@ -26,7 +26,7 @@ def validate(
 
 @overload
 def validate(
-    model: TouchSurrogate | TouchFunction,
+    model: TouchedBody | TouchSurrogate | TouchFunction,
     test: Dataset | TouchSolves,
     *,
     refined: Dataset | TouchSolves | None = None,
@@ -37,7 +37,7 @@ def validate(
 
 
 def validate(
-    model: TouchModel | TouchSurrogate | TouchFunction,
+    model: TouchModel | TouchedBody | TouchSurrogate | TouchFunction,
     test: Dataset | TouchSolves,
     *,
     history: History | None = None,
@@ -50,8 +50,9 @@ def validate(
 
     Parameters
     ----------
-    model : TouchModel, TouchSurrogate or TouchFunction
-        A body held at one node; a body touched anywhere; any force as a function of the probe's centre.
+    model : TouchModel, TouchedBody, TouchSurrogate or TouchFunction
+        A body held at one node; a body touched anywhere, with its shape or without; any force as a function of the
+        probe's centre.
     test : Dataset or TouchSolves
         Rows that did not converge are left out. `TouchSolves` holds arrays.
     history : History, optional

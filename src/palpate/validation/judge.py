@@ -13,6 +13,7 @@ from palpate.validation.loops import LoopWork
 from palpate.validation.mesh_error import MeshErrors
 from palpate.validation.outputs import OutputErrors
 from palpate.validation.region import Worst
+from palpate.validation.shown import ShownErrors
 from palpate.validation.stiffness import StiffnessErrors
 from palpate.validation.strokes import Smoothness
 
@@ -88,9 +89,13 @@ def surrogate_figures(
     smooth: Smoothness | None,
     held: Coverage | None,
     mesh: MeshErrors | None,
+    shape: ShownErrors | None = None,
 ) -> dict[str, Figure]:
     """The same of a touch surrogate."""
     possible = _touch(force, stiffness, loops)
+    if shape:
+        possible["displacement_mean"] = (shape.mean, None)
+        possible["displacement_max"] = (shape.max, shape.worst)
     if border:
         possible["border_loop_work"] = (border.max, None)
     if smooth:

@@ -10,7 +10,7 @@ import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
-from palpate.surrogates import TouchSurrogate
+from palpate.surrogates import TouchedBody, TouchSurrogate
 from palpate.units import bounds
 from palpate.validation.coverage import Coverage, coverage
 from palpate.validation.force import ForceErrors, ForceSamples, force_errors
@@ -20,6 +20,7 @@ from palpate.validation.limits import Limits
 from palpate.validation.loops import LoopWork, function_work
 from palpate.validation.mesh_error import ASKED, MeshErrors, mesh_errors
 from palpate.validation.parts import Case, Part, parts, worst_cases
+from palpate.validation.shown import ShownErrors, shown_errors
 from palpate.validation.solves import TouchFunction, TouchSolves
 from palpate.validation.stiffness import StiffnessErrors, matrix_errors
 from palpate.validation.strokes import Smoothness, smoothness
@@ -49,6 +50,8 @@ class SurrogateValidation(Judgement):
     loops, border_loops : LoopWork or None
         Between places of the test, and across the border of what was trained.
     mesh : MeshErrors or None
+    shape : ShownErrors or None
+        Of the displacement that is shown.
     parts : tuple of Part
         All solves, the shallow and the deep third, the edge of the ranges, what counts as outside.
     worst : tuple of Case
@@ -64,6 +67,7 @@ class SurrogateValidation(Judgement):
     loops: LoopWork | None
     border_loops: LoopWork | None
     mesh: MeshErrors | None
+    shape: ShownErrors | None
     parts: tuple[Part, ...]
     worst: tuple[Case, ...]
 
@@ -86,7 +90,7 @@ class SurrogateValidation(Judgement):
 
 
 def validate_surrogate(
-    model: TouchSurrogate | TouchFunction,
+    model: TouchedBody | TouchSurrogate | TouchFunction,
     test: Dataset | TouchSolves,
     *,
     refined: Dataset | TouchSolves | None = None,
@@ -98,7 +102,7 @@ def validate_surrogate(
 
     Parameters
     ----------
-    model : TouchSurrogate or TouchFunction
+    model : TouchedBody, TouchSurrogate or TouchFunction
     test : Dataset or TouchSolves
         Rows that did not converge are left out, and rows that a surrogate was trained on.
     refined : Dataset or TouchSolves, optional
@@ -119,6 +123,7 @@ def validate_surrogate(
     UsageError
         If the solves are of another body or probe, or were all trained on, or none has a force.
     """
+    body, model = (model, model.touch) if isinstance(model, TouchedBody) else (None, model)
     function = TouchFunction.of(model)
     solves, seen = unseen_solves(model, test)
     samples = probe_samples(function, solves)
@@ -133,9 +138,10 @@ def validate_surrogate(
     if refined is not None:
         _refuse_radius(model, refined)
         mesh = mesh_errors(function, solves, TouchSolves.of(refined, function.inputs), samples.light)
+    shape = _told(_shape(body, test), notes)
     notes += _notes(force, loops, border, mesh, seen)
     energy = _energy(function, solves)
-    figures = surrogate_figures(force, stiffness, loops, border, smooth, held, mesh)
+    figures = surrogate_figures(force, stiffness, loops, border, smooth, held, mesh, shape)
     return SurrogateValidation(
         name=function.name,
         samples=len(solves),
@@ -150,6 +156,7 @@ def validate_surrogate(
         loops=loops,
         border_loops=border,
         mesh=mesh,
+        shape=shape,
         parts=parts(function, solves, samples, _relative_stiffness(function, solves)),
         worst=worst_cases(function, solves, samples, function.inputs),
     )
@@ -179,6 +186,14 @@ def unseen_solves(
             fix="Test with solves that training left out.",
         )
     return (solves.take(~seen), int(seen.sum())) if seen.any() else (solves, 0)
+
+
+def _shape(body: TouchedBody | None, test: Dataset | TouchSolves) -> ShownErrors | str:
+    if body is None or "displacement" not in body.fields:
+        return "Displacement is not judged: the model answers none."
+    if not isinstance(test, Dataset):
+        return "Displacement is not judged: the solves are given without theirs."
+    return shown_errors(body.fields["displacement"], test)
 
 
 def _refuse_radius(model: TouchSurrogate | TouchFunction, data: Dataset | TouchSolves) -> None:
@@ -251,7 +266,6 @@ def _notes(
         for one in (loops, border)
         if one is not None and one.open > max(0.1 * one.max, 1e-10)
     ]
-    found.append("Displacement is not judged: the model answers none.")
     return found
 
 

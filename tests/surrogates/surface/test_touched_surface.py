@@ -298,3 +298,26 @@ def test_mistaken_lengths_are_refused(lengths):
 def test_places_of_another_shape_are_refused():
     with pytest.raises(UsageError, match="shape"):
         face().at(np.zeros(3))
+
+
+def test_with_a_shoulder_the_distance_is_the_height_right_up_to_the_border():
+    side, rho = 0.04, 0.004
+    points = np.array([[0, 0, 0], [side, 0, 0], [side, side, 0], [0, side, 0]], float)
+    surface = TouchedSurface.of(points, np.array([[0, 1, 2], [0, 2, 3]]), radius=0.01, shoulder=rho)
+    rng = np.random.default_rng(2)
+    C = rng.random((500, 3)) * [side, side, 0.013] - [0, 0, 0.003]
+    C[:100, 0], C[100:200, 1] = side, 0.0  # on the border itself
+    d, g, H = surface.at(C)
+    # the shoulder begins with the fourth power of the way t beyond, t⁴ / (8 (ρ/2)² (z + ρ)): a spline feels one cell of it
+    start = surface.spacing**4 / (8 * (rho / 2) ** 2 * (rho - 0.003))
+    assert np.abs(d - C[:, 2]).max() < start
+    assert np.abs(g - [0, 0, 1]).max() < 4 * start / surface.spacing
+    assert np.abs(H).max() < 12 * start / surface.spacing**2
+    # beyond it falls as it rolls off, and ends
+    t = np.linspace(0.0, 0.02, 41)
+    line = np.stack([side + t, np.full(41, side / 2), np.full(41, 0.002)], axis=1)
+    b = np.sqrt(t**2 + (rho / 2) ** 2) - rho / 2
+    np.testing.assert_allclose(
+        surface.at(line)[0][:18], (np.hypot(b, 0.002 + rho) - rho)[:18], atol=1e-3 * 0.01
+    )
+    assert (surface.depth(line[30:], 0.01) <= 0).all()

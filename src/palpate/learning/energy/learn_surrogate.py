@@ -85,8 +85,8 @@ def learn_surrogate(
         Centre of the probe (m), then further inputs.
     energy : (N,)
         U(c), J; zero without contact.
-    force : (N, 3)
-        On the probe, N.
+    force : (N, 3) or (N, n)
+        On the probe, N; then −∂U/∂p by further inputs p, not-a-number where it is not known.
     stiffness : (N, 3, 3), optional
         ∂F/∂c, N/m; not-a-number where unknown.
     surface : TouchedSurface

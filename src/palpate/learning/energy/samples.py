@@ -5,7 +5,8 @@ With λ = ln U₀, F = −∂U/∂c and K = ∂F/∂c, exactly:
     ℓ = ln U − λ         ∇ℓ = −F/U − λ'∇s         ∇²ℓ = −K/U − FFᵀ/U² − λ''∇s∇sᵀ − λ'∇²s
 
 An error of ℓ is a relative one of U; an error δ of ∇ℓ one of the force, U δ/‖F‖; one of ∇²ℓ one of the stiffness,
-U δ/‖K‖. These quotients are the rows' natural weights.
+U δ/‖K‖. These quotients are the rows' natural weights. Where ∂U/∂p is known of a further input p, ∂ℓ/∂p = ∂U/∂p / U
+counts by the relative energy error that it makes over half the input's range.
 
 A mesh shows through where the contact's radius √(2Rs) is less than an element: there all rows of a sample count less,
 by 1 + (s₀/s)³ for elements of size √(2R s₀).
@@ -39,8 +40,8 @@ class EnergySamples:
         Centre of the probe (m), then further inputs.
     energy : (N,)
         U > 0, J.
-    force : (N, 3)
-        On the probe, N.
+    force : (N, n)
+        −∂U by the inputs: on the probe, N, then by the further inputs; not-a-number where it is not known.
     stiffness : (N, 3, 3)
         ∂F/∂c, N/m; not-a-number where it is not known.
     depth, slope, bend : (N,), (N, 3), (N, 3, 3)
@@ -78,7 +79,7 @@ class EnergySamples:
         """
         X = numbers("Inputs X", X, (None, len(inputs)))
         N = len(X)
-        U, F = numbers("Energies", energy, (N,)), numbers("Forces", force, (N, 3))
+        U, F = numbers("Energies", energy, (N,)), _responses(force, N, len(inputs))
         K = np.full((N, 3, 3), np.nan) if stiffness is None else np.asarray(stiffness, float)
         K = numbers("Stiffnesses", K.reshape(N, -1), (N, 9), finite=False).reshape(N, 3, 3)
         distance, gradient, hessian = surface.at(np.ascontiguousarray(X[:, :3]))
@@ -117,14 +118,15 @@ class EnergySamples:
     def targets(self, law: ContactLaw) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """ℓ (N, 1), its slopes (N, 1, n) and curvatures (N, 1, n(n+1)/2) by scaled inputs; unknown ones zero."""
         value, first, second = law.log(self.depth)
-        g = -self.force / self.energy[:, None]
+        by_all = -np.nan_to_num(self.force) / self.energy[:, None]
+        g = by_all[:, :3]
         slopes = g - first[:, None] * self.slope
         bends = -self.stiffness / self.energy[:, None, None] - g[:, :, None] * g[:, None]
         bends -= second[:, None, None] * self.slope[:, :, None] * self.slope[:, None]
         bends -= first[:, None, None] * self.bend
         half, n = self._half, len(self.inputs)
         i, j = pairs(n)
-        all_slopes, all_bends = np.zeros((len(self), n)), np.zeros((len(self), n, n))
+        all_slopes, all_bends = by_all * half, np.zeros((len(self), n, n))
         all_slopes[:, :3], all_bends[:, :3, :3] = slopes * half[:3], bends * half[:3, None] * half[:3]
         return (np.log(self.energy) - value)[:, None], all_slopes[:, None], all_bends[:, None, i, j]
 
@@ -139,17 +141,15 @@ class EnergySamples:
         Y, slopes, curvatures = self.targets(law)
         half, n = self._half, len(self.inputs)
         i, j = pairs(n)
-        by_force = (self.energy / np.linalg.norm(self.force, axis=1))[:, None]
+        by_force = (self.energy / np.linalg.norm(self.force[:, :3], axis=1))[:, None]
         by_stiffness = (self.energy / np.linalg.norm(self.stiffness, axis=(1, 2)))[:, None]
-        own = (
-            np.arange(n) < 3
-        )  # nothing is known of how a touch changes with further inputs but by other touches
+        own = np.arange(n) < 3
         curvature_weight = curvature_share * (by_stiffness / (half[i] * half[j])) ** 2 * (own[i] & own[j])
         return {
             "Y": Y,
             "weights": 1.0 / (1.0 + (resolved / self.depth) ** 3),
             "slopes": slopes,
-            "slope_weight": (by_force / half) ** 2 * own,
+            "slope_weight": np.where(own, (by_force / half) ** 2, 1.0) * np.isfinite(self.force),
             "curvatures": curvatures,
             "curvature_weight": np.nan_to_num(curvature_weight, nan=0.0),
         }
@@ -158,3 +158,13 @@ class EnergySamples:
     def _half(self) -> np.ndarray:
         low, high = bounds(self.inputs)
         return np.asarray((high - low) / 2)
+
+
+def _responses(force: Any, N: int, n: int) -> np.ndarray:
+    """(N, n) from forces (N, 3), or from forces and what is known of −∂U by the further inputs (N, n)."""
+    F = np.asarray(force, float)
+    if F.ndim == 2 and F.shape[1] == 3:
+        return np.hstack([numbers("Forces", F, (N, 3)), np.full((N, n - 3), np.nan)])
+    F = numbers("Forces and responses to further inputs", F, (N, n), finite=False)
+    numbers("Forces", F[:, :3], (N, 3))
+    return F

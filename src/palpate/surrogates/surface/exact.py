@@ -6,9 +6,17 @@ normal there.
 
 **Beyond a crease or the border**, d is the distance to that line.
 
-**Below the border.** At height z = −ζ under the surface's tangent plane and a beyond its border, r² = a² + ζ², the
-nearest thing is still the border, r away: that is the distance of a probe that passes beside the body. Under the
-surface d is −ζ. The jump between them is bridged by
+**With a shoulder** of radius ρ the surface is thought to roll off beyond its border. At height z over the tangent plane
+and a beyond the border
+
+    d = √(b² + (z + ρ)²) − ρ,   b = √(a² + (ρ/2)²) − ρ/2,   for z ≥ −ρ, and z + b below,
+
+so that d and three derivatives are those of the plane right up to the border, and nothing is bridged; a probe that
+leaves the surface sideways feels it for some ρ longer.
+
+**Below the border**, without a shoulder. At height z = −ζ under the surface's tangent plane and a beyond its border,
+r² = a² + ζ², the nearest thing is still the border, r away: that is the distance of a probe that passes beside the
+body. Under the surface d is −ζ. The jump between them is bridged by
 
     d = −ζ + G (r + ζ),   G = a²/r² + (ζ²/r²) w(r)   beyond the border,   G = w(ζ) (1 − σ(e/R))   e within it,
 
@@ -50,20 +58,23 @@ class Exact:
         Their tree.
     radius : float
         R in m: of the smallest probe.
+    shoulder : float
+        ρ in m; 0 for none.
     """
 
     pieces: Pieces
     boxes: np.ndarray
     radius: float
+    shoulder: float = 0.0
 
     @classmethod
-    def of(cls, skin: Skin, radius: float) -> Exact:
+    def of(cls, skin: Skin, radius: float, shoulder: float = 0.0) -> Exact:
         """The curved surface behind a mesh, for probes from a radius in m on."""
         p = pieces_of(skin)
         order = ordered(p.corners)
         corners = np.ascontiguousarray(p.corners[order])
         pieces = Pieces(corners, p.normals[order], p.places[order], p.kinds, p.outward, p.border)
-        return cls(pieces, boxes_of(corners), radius)
+        return cls(pieces, boxes_of(corners), radius, shoulder)
 
     def at(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Signed distances in m and their kinds (PLAIN, ROUNDED, BRIDGED) at places (N, 3), each of shape (N,).
@@ -75,7 +86,7 @@ class Exact:
         p = self.pieces
         _measure_into(
             places, distances, kinds, self.boxes, p.corners, p.normals, p.places, p.kinds, p.outward,
-            p.border, self.radius,
+            p.border, self.radius, self.shoulder,
         )  # fmt: skip
         return distances, kinds
 
@@ -143,6 +154,16 @@ def _beyond(height: float, r: float, radius: float) -> tuple[float, int]:
 
 
 @_jit
+def _rolled(height: float, r: float, shoulder: float) -> tuple[float, int]:
+    """Distance to the shoulder where the nearest point is on the border."""
+    start = shoulder / 2.0
+    b = np.sqrt(max(r * r - height * height, 0.0) + start * start) - start
+    if height < -shoulder:
+        return height + b, BRIDGED
+    return np.sqrt(b * b + (height + shoulder) ** 2) - shoulder, PLAIN
+
+
+@_jit
 def _within(c: np.ndarray, d: float, border: np.ndarray, radius: float) -> tuple[float, int]:
     """Distance where the nearest point is inside the surface, d away."""
     if d > -START * radius or border.shape[0] == 0:
@@ -167,6 +188,7 @@ def _measure_into(
     outward: np.ndarray,
     border: np.ndarray,
     radius: float,
+    shoulder: float,
 ) -> None:
     """Fill distances (N,) and kinds (N,) at places (N, 3)."""
     waiting, foot, trial, n = np.empty(DEEP, np.int64), np.empty(3), np.empty(3), np.empty(3)
@@ -188,7 +210,10 @@ def _measure_into(
         if feature_kinds[row] == SMOOTH:
             if abs(height) < RESOLVED * r:
                 height = np.copysign(RESOLVED * r, height)
-            distances[k], kinds[k] = _within(c, height, border, radius)
+            if shoulder > 0.0:
+                distances[k], kinds[k] = height, PLAIN
+            else:
+                distances[k], kinds[k] = _within(c, height, border, radius)
             continue
         kinds[k] = ROUNDED
         facing = outward[row, 0] ** 2 + outward[row, 1] ** 2 + outward[row, 2] ** 2
@@ -198,7 +223,9 @@ def _measure_into(
                 at = foot[0] * corners[t, 0, x] + foot[1] * corners[t, 1, x] + foot[2] * corners[t, 2, x]
                 height += (c[x] - at) * outward[row, x]
             height /= np.sqrt(facing)
-        if feature_kinds[row] == END:
+        if feature_kinds[row] == END and shoulder > 0.0:
+            distances[k], kinds[k] = _rolled(height, r, shoulder)
+        elif feature_kinds[row] == END:
             distances[k], kinds[k] = _beyond(height, r, radius)
         else:
             distances[k] = np.copysign(r, height)

@@ -70,6 +70,7 @@ class TouchedSurface:
         reach: float | None = None,
         inner: float | None = None,
         spacing: float | None = None,
+        shoulder: float = 0.0,
     ) -> TouchedSurface:
         """The field of a surface given by triangles, open or closed.
 
@@ -88,6 +89,10 @@ class TouchedSurface:
         spacing : float, optional
             Of the grid, in m. By default a tenth of the radius (a sixth for a surface without edges), refined
             where curvature asks and the grid stays under 2 million nodes.
+        shoulder : float, optional
+            Radius in m with which the surface rolls off beyond its border; 0 for an edge. With a shoulder the distance
+            is as smooth right up to the border as in the middle, which learning asks for; a probe that leaves the
+            surface sideways feels it for some `shoulder` longer.
 
         Raises
         ------
@@ -105,7 +110,11 @@ class TouchedSurface:
                 f"A reach of {reach:g} m is less than the probe's radius of {radius:g} m.",
                 fix="A probe is in touch from its radius on: reach at least as far.",
             )
-        exact = Exact.of(Skin.of(points, triangles), radius)
+        if not (np.isfinite(shoulder) and shoulder >= 0):
+            raise UsageError(
+                f"A shoulder of {shoulder} m is no length.", fix="Pass 0 or a positive length in m."
+            )
+        exact = Exact.of(Skin.of(points, triangles), radius, shoulder)
         return _built(exact, reach, inner, spacing)
 
     @property

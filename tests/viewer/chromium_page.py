@@ -32,7 +32,9 @@ READ = """() => ({
 })"""
 
 
-def open_page(browser: Browser, viewer: Viewer, complaints: list[str], **options: Any) -> Page:
+def open_page(
+    browser: Browser, viewer: Viewer, complaints: list[str], ready: str = "tip", **options: Any
+) -> Page:
     """The page of a viewer, in a context of its own; errors and foreign requests go to `complaints`."""
     options.setdefault("viewport", {"width": 860, "height": 520})
     page = browser.new_context(**options).new_page()
@@ -41,7 +43,7 @@ def open_page(browser: Browser, viewer: Viewer, complaints: list[str], **options
     local = (viewer.url, "data:", "blob:")
     page.on("request", lambda r: None if r.url.startswith(local) else complaints.append(f"asks {r.url}"))
     page.goto(viewer.url)
-    page.wait_for_selector("html[data-tick][data-tip]")
+    page.wait_for_selector(f"html[data-tick][data-{ready}]")
     return page
 
 

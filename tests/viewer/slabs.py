@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+
 import pressed
 from models import linear_network
-
-from palpate.surrogates import FieldSurrogate, TouchedBody
+from palpate.surrogates import ContactLaw, Continuation, FieldSurrogate, TouchedBody, TouchSurrogate
 from palpate.surrogates.field import Dimple, Rise
 from palpate.surrogates.field.dimple import splines
-from palpate.units import Quantity
+from palpate.units import Quantity, Range
 
 HALF, HIGH = 0.03, 0.02  # m: 60 × 60 × 20 mm
 DEVIATION = 0.03
@@ -85,3 +85,17 @@ def _table(components: int) -> np.ndarray:
     if components == 3:
         table[1, :-3] = -0.1 * pressed.DEEPEST * table[0, :-3] / scale  # drawn in a little
     return table
+
+
+def family() -> TouchSurrogate:
+    """The slab's energy, e times stiffer at one end of a further input than at the other; it relaxes to 60 %."""
+    inputs = (*pressed.INPUTS, Range("firmness", 0.5, 2.0, ""))
+    tail = np.array([[np.log(pressed.A), pressed.B * 0.02, 0.0, 0.0, 0.5]])
+    return TouchSurrogate(
+        linear_network(list(inputs), [Quantity("ln U/U0")], tail),
+        ContactLaw("pad"),
+        pressed.face(),
+        radius=pressed.RADIUS,
+        continuation=Continuation.of(inputs, deepest=pressed.DEEPEST),
+        meta={"name": "family", "relaxation": {"terms": [[0.4, 0.05]]}},
+    )

@@ -70,7 +70,15 @@ def test_generated_typescript_is_up_to_date():
 
 
 def test_the_built_page_is_of_these_sources():
-    own = ["body.html", "index.html", "package-lock.json", "package.json", "pressed.html", "tsconfig.json", "vite.config.js"]
+    own = [
+        "body.html",
+        "index.html",
+        "package-lock.json",
+        "package.json",
+        "pressed.html",
+        "tsconfig.json",
+        "vite.config.js",
+    ]
     inside = [f"{folder}/{p.name}" for folder in ("public", "src") for p in (CLIENT / folder).iterdir()]
     digest = hashlib.sha256()
     for name in sorted([*own, *inside]):

@@ -36,12 +36,13 @@ export default defineConfig({
     modulePreload: { polyfill: false },
     chunkSizeWarningLimit: 1000,
     rollupOptions: {
-      // the messages stay a module of their own, whole, so that tests can speak through them
+      // messages and fields stay modules of their own, whole, so that tests can speak through them
       input: {
         page: join(here, "index.html"),
         pressed: join(here, "pressed.html"),
         body: join(here, "body.html"),
         messages: join(here, "src/messages.ts"),
+        field: join(here, "src/field.ts"),
       },
       preserveEntrySignatures: "strict",
       output: {

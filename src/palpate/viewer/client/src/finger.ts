@@ -141,8 +141,9 @@ export class Finger {
       this.slide(e.offsetX, e.offsetY);
       if (e.pointerType === "pen" && e.pressure > 0) this.force = e.pressure;
     } else if (e.pointerType !== "touch" && !this.pressing && e.buttons === 0) {
-      this.at = [e.offsetX, e.offsetY];
-      this.hover(this.view.spotAt(e.offsetX, e.offsetY));
+      const spot = this.view.spotAt(e.offsetX, e.offsetY);
+      if (spot?.touchable) this.at = [e.offsetX, e.offsetY];
+      this.hover(spot);
     }
   }
 
@@ -196,9 +197,9 @@ export class Finger {
     this.at = [u, v];
   }
 
-  /** Where the keys begin: where the pointer was, else in the middle of the touched place. */
+  /** Where the keys begin: where the pointer last was on the body, else in the middle of the touched place. */
   private pointed(): [number, number] {
-    if (!this.at) {
+    if (!this.at || !this.view!.spotAt(...this.at)?.touchable) {
       const { x, y } = this.view!.middle(this.hello!.centre);
       this.at = [x, y];
     }

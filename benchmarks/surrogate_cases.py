@@ -165,4 +165,4 @@ def _surface(study: TouchStudy) -> TouchedSurface:
         a, b, z = geometry.size
         points = np.array([[0.0, 0.0, z], [a, 0.0, z], [a, b, z], [0.0, b, z]])
         triangles = np.array([[0, 1, 2], [0, 2, 3]])
-    return TouchedSurface.of(points, triangles, radius=RADIUS, inner=2.0 * study.depth)
+    return TouchedSurface.of(points, triangles, radius=RADIUS, inner=2.0 * study.depth, shoulder=RADIUS / 3)

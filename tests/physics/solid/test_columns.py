@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from solids import PROBE, RADIUS, SIZE, pressed
@@ -108,3 +110,35 @@ def test_other_interactions_leave_the_design_to_the_caller():
     with pytest.raises(UsageError):
         problem.design(4)
     assert [list(chain) for chain in problem.chains(np.zeros((3, 1)))] == [[0, 1, 2]]
+
+
+def test_footprints_are_denser_where_the_surface_ends():
+    whole = SphereProbe(0.01, depth=(0.0, 0.005), over=((0.0, 0.0), (0.1, 0.1)))
+    corner = replace(whole, over=((0.05, 0.0), (0.1, 0.05)))
+    middle = replace(whole, over=((0.02, 0.02), (0.08, 0.08)))
+    geometry = Block((0.1, 0.1, 0.05))
+    for probe, laws in (
+        (whole, (arcsine, arcsine)),
+        (corner, (late, early)),
+        (middle, (lambda x: (x - 0.2) / 0.6,) * 2),
+    ):
+        feet = probe.design(geometry, 256, seed=1, depths=1)[:, :2]
+        for axis, law in enumerate(laws):
+            # 256 points of a scrambled Sobol sequence: one in each of 256 intervals of equal probability
+            share = np.sort(law(feet[:, axis] / 0.1))
+            assert np.abs(share - (np.arange(256) + 0.5) / 256).max() <= 0.5 / 256 + 1e-9
+
+
+def arcsine(x):
+    """Distribution of Chebyshev's points on 0 … 1."""
+    return np.arccos(1 - 2 * x) / np.pi
+
+
+def late(x):
+    """The same of 0.5 … 1, from x = 0.5 on."""
+    return 2 / np.pi * np.arcsin(2 * x - 1)
+
+
+def early(x):
+    """The same of 0 … 0.5."""
+    return 2 / np.pi * np.arccos(1 - 2 * x)

@@ -308,7 +308,7 @@ def test_with_a_shoulder_the_distance_is_the_height_right_up_to_the_border():
     C = rng.random((500, 3)) * [side, side, 0.013] - [0, 0, 0.003]
     C[:100, 0], C[100:200, 1] = side, 0.0  # on the border itself
     d, g, H = surface.at(C)
-    # the shoulder begins with the fourth power of the way t beyond, t⁴ / (8 (ρ/2)² (z + ρ)): a spline feels one cell of it
+    # it begins with the fourth power of the way t beyond, t⁴ / (8 (ρ/2)² (z + ρ)): a spline feels one cell of it
     start = surface.spacing**4 / (8 * (rho / 2) ** 2 * (rho - 0.003))
     assert np.abs(d - C[:, 2]).max() < start
     assert np.abs(g - [0, 0, 1]).max() < 4 * start / surface.spacing

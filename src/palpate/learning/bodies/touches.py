@@ -21,6 +21,9 @@ UPRIGHT = ("x_min", "x_max", "y_min", "y_max")  # what "side" of a box means
 PROBES = ("SphereProbe",)
 DISSIPATING = ("Plastic",)
 SAME_FOOT = 0.02  # of the radius: solves that share a footprint are one column
+SHOULDER = (
+    1 / 3
+)  # of the radius: how the touched surface rolls off where it ends, as smooth in the middle as at its border
 
 
 def is_touched(data: Dataset) -> bool:
@@ -90,7 +93,7 @@ class Touches:
             data,
             radius,
             _widened(data.ranges, matrices, about),
-            TouchedSurface.of(rest, touched, radius=radius),
+            TouchedSurface.of(rest, touched, radius=radius, shoulder=SHOULDER * radius),
             rest[nodes],
             own.reshape(-1, 3),
             matrices,

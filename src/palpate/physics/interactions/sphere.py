@@ -28,6 +28,7 @@ __all__ = ["SphereProbe"]
 ELEMENT = 0.5  # element size under the probe over its radius: the force then ripples by < 0.2 % from 0.1 R of depth on
 ROUND_ELEMENT = 0.4  # the same on curved surfaces, where the elements' shape adds to the error
 MARGIN = 1.3  # how far beyond the footprint of its centres the probe may touch, over its radius
+END = 1e-3  # of the radius: as near as that a footprint ends where the surface does
 INSET = 3.0  # distance of the footprint from the surface's rim over the radius, unless it is given
 MOST_INSET = 0.4  # the same, at most, over the surface's width
 SIDEWAYS = 3.0  # how much dearer a move across is than one along the normal
@@ -118,8 +119,8 @@ class SphereProbe:
         """Positions (samples, 3) in m in columns, each from shallow to deep.
 
         The footprints are a scrambled Sobol sequence (Sobol 1967; Owen 1998) over the footprint of the touched
-        surface; the depths of a column are evenly spaced, all shifted by a random share of their distance. `depths` is
-        their number in a column, by default about ¾ √samples.
+        surface, denser towards sides where the surface ends; the depths of a column are evenly spaced, all shifted by a
+        random share of their distance. `depths` is their number in a column, by default about ¾ √samples.
         """
         from scipy.stats import qmc
 
@@ -190,6 +191,10 @@ class SphereProbe:
         axis = int(np.argmax(np.abs(patch.facing)))
         if _is_open(patch):
             across = [i for i in range(3) if i != axis]
+            ends = [
+                np.abs(a - b)[across] < END * self.radius for a, b in zip((low, high), patch.box, strict=True)
+            ]
+            unit = _denser(unit, *ends)
             places = low[across] + unit * (high - low)[across]
             feet = patch.cast(axis, float(np.sign(patch.facing[axis])), places)
         else:
@@ -251,6 +256,15 @@ class _Approach:
 
 
 _GRID = np.stack(np.meshgrid(np.linspace(0, 1, 9), np.linspace(0, 1, 9)), axis=-1).reshape(-1, 2)
+
+
+def _denser(unit: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Places (N, 2) of the unit square, closer together at those sides (2,) that are ends of the body.
+
+    There the body gives way within a few mm, and nothing is known beyond: the density is that of Chebyshev's points.
+    """
+    both, first, last = (1 - np.cos(np.pi * unit)) / 2, 1 - np.cos(np.pi / 2 * unit), np.sin(np.pi / 2 * unit)
+    return np.where(low & high, both, np.where(low, first, np.where(high, last, unit)))
 
 
 def _is_open(patch: Patch) -> bool:

@@ -29,6 +29,7 @@ def curves(rows: list[dict[str, Any]], springs: dict[str, Any] | None, title: st
     path : Path
     """
     from matplotlib import pyplot
+    from matplotlib.ticker import LogLocator
 
     figure, axes = pyplot.subplots(1, 2, figsize=(8.4, 3.4), sharex=True, layout="constrained")
     for axis, key, name in zip(axes, ("median", "p95"), ("median", "95th percentile"), strict=True):
@@ -49,6 +50,9 @@ def curves(rows: list[dict[str, Any]], springs: dict[str, Any] | None, title: st
         axis.set(xlabel="training solves", ylabel="force error, %", title=f"{title}: {name}")
         axis.set_xticks(sizes, [str(n) for n in sizes])
         axis.set_xticks((), minor=True)
+        axis.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axis.yaxis.set_major_formatter("{x:g}")
+        axis.yaxis.set_minor_formatter("")
         axis.grid(visible=True, which="both", alpha=0.3)
     axes[1].legend(fontsize="x-small")
     figure.savefig(path, dpi=80)

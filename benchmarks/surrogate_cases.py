@@ -31,12 +31,20 @@ class Training:
     energy : (N,) array
     force : (N, 3) array
     stiffness : (N, 3, 3) array
+    beside : (N, n − 3) array
+        −∂U by the further inputs.
     """
 
     X: np.ndarray
     energy: np.ndarray
     force: np.ndarray
     stiffness: np.ndarray
+    beside: np.ndarray
+
+    @property
+    def responses(self) -> np.ndarray:
+        """−∂U (N, n) by all inputs."""
+        return np.hstack([self.force, self.beside])
 
     def __len__(self) -> int:
         return len(self.X)
@@ -87,7 +95,8 @@ class Case:
     def training(self, count: int) -> Training:
         """So many training solves."""
         rows = self.training_rows(count)
-        return Training(*(self.arrays[k][rows] for k in ("inputs", "energy", "force", "stiffness")))
+        known = {"beside": np.empty((len(self.arrays["energy"]), 0)), **self.arrays}
+        return Training(*(known[k][rows] for k in ("inputs", "energy", "force", "stiffness", "beside")))
 
     def training_rows(self, count: int) -> np.ndarray:
         """Rows of so many training solves: the first columns, of each about ∛N depths spread over it."""
@@ -131,7 +140,7 @@ class Case:
         centres = self.images(self.arrays["inputs"])[0].reshape(-1, self.arrays["inputs"].shape[1])[:, :3]
         low, high = centres.min(axis=0), centres.max(axis=0)
         box = [Range(f"c_{a}", float(p), float(q), "m") for a, p, q in zip("xyz", low, high, strict=True)]
-        return (*box, *(Range(*one) for one in self.study.inputs))
+        return (*box, *(one.range for one in self.study.inputs))
 
     def images(self, X: np.ndarray, F: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Images of inputs (N, n) and forces (N, 3): arrays (N, images, n) and (N, images, 3)."""
@@ -157,7 +166,7 @@ def symmetry_of(kind: str) -> tuple[np.ndarray, ...]:
 
 def _surface(study: TouchStudy) -> TouchedSurface:
     """Distance to the touched surface: of a rectangle, or of the curved elements."""
-    geometry = study.problem(tuple(low for _, low, _, _ in study.inputs)).body.geometry
+    geometry = study.body().geometry
     if getattr(geometry, "curved", False):
         patch = surface_of(geometry, study.touches, study.probe.refinements(geometry))
         points, triangles = patch.points, patch.triangles

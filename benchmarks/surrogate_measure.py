@@ -101,7 +101,7 @@ def learnt(case: Case, size: int, seconds: float) -> TouchSurrogate:
     return learn_surrogate(
         training.X,
         training.energy,
-        training.force,
+        training.responses,
         training.stiffness,
         surface=case.surface,
         radius=case.radius,

@@ -10,6 +10,7 @@ import numpy as np
 
 from benchmarks.surrogate_cases import Case, Training
 from palpate.physics.massspring import MassSpringBody
+from palpate.physics.solid import FamilyProblem
 from palpate.validation import TouchSolves
 
 __all__ = ["Springs", "identified"]
@@ -54,8 +55,8 @@ class Springs:
         return F, K
 
     def _solver(self, values: tuple[float, ...]) -> Any:
-        problem = self.case.study.problem(values)
-        body = problem.body
+        problem = self.case.study.problem()
+        body = problem.member(values).body if isinstance(problem, FamilyProblem) else problem.body
         material = {
             region: replace(law, young=factor * law.young)
             for (region, law), factor in zip(body.material, self.factors, strict=True)

@@ -27,7 +27,7 @@ __all__ = ["Column", "columns_of", "join", "main"]
 
 FINER = 2.0  # of the refined solves
 NODES = 300  # of the displacement field that are kept in a joined file
-PER_ROW = ("inputs", "energy", "force", "stiffness", "column", "role", "seconds", "displacement")
+PER_ROW = ("inputs", "energy", "force", "stiffness", "beside", "column", "role", "seconds", "displacement")
 
 
 @dataclass(frozen=True)
@@ -76,9 +76,7 @@ def columns_of(study: TouchStudy, count: int, depths: int, seed: int, role: str)
         if not training:
             d = np.sort(np.random.default_rng([seed, 1, row]).random(depths))
         d = LEAST + (study.depth - LEAST) * d
-        values = tuple(
-            low + (high - low) * u for (_, low, high, _), u in zip(study.inputs, unit[row, 3:], strict=True)
-        )
+        values = tuple(v.low + (v.high - v.low) * u for v, u in zip(study.inputs, unit[row, 3:], strict=True))
         found.append(Column(len(found), foot, normal, d, values, _turn(study, unit[row, 1])))
         if len(found) == count:
             return found
@@ -94,7 +92,7 @@ def _turn(study: TouchStudy, share: float) -> np.ndarray:
 
 def _feet(study: TouchStudy, unit: np.ndarray) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
     """Row of `unit` (N, 2), footprint and normal (3,) of those that lie in the study's part of the surface."""
-    geometry = study.problem(tuple(low for _, low, _, _ in study.inputs)).body.geometry
+    geometry = study.body().geometry
     patch = surface_of(geometry, study.touches, study.probe.refinements(geometry))
     low, high = (corner[:2] for corner in (study.over if study.over is not None else patch.box))
     low, high = np.asarray(low), np.asarray(high)
@@ -165,14 +163,12 @@ def solve_columns(study: TouchStudy, options: argparse.Namespace, columns: Seque
     finer = FINER if options.role == "refined" else 1.0
     keys = ("study", "depths", "seed", "role", "fields")
     solved = Solved(options.out, {key: getattr(options, key) for key in keys})
-    solver, opened = None, None
+    problem = study.problem(finer=finer)
+    solver = problem.open()
     for column in columns:
         if column.number in solved:
             continue
         start = time.process_time()
-        if solver is None or opened != column.values:
-            problem = study.problem(column.values, finer=finer)
-            solver, opened = problem.open(), column.values
         solver.reset()
         rows = _solve(solver, column, options)
         mesh = problem.mesh
@@ -190,7 +186,7 @@ def _solve(solver: Any, column: Column, options: argparse.Namespace) -> list[dic
     rows = []
     for depth, centre in zip(column.depths, column.centres, strict=True):
         start = time.process_time()
-        found = solver.solve(centre)
+        found = solver.solve(np.r_[centre, column.values])
         if not found.converged:
             print(f"  failed at {1e3 * centre} mm, depth {1e3 * depth:.2f} mm: {found.message}", flush=True)
             solver.reset()
@@ -198,8 +194,9 @@ def _solve(solver: Any, column: Column, options: argparse.Namespace) -> list[dic
         row: dict[str, Any] = {
             "inputs": np.r_[column.turn @ centre, column.values],
             "energy": float(found.potential_energy),
-            "force": column.turn @ np.asarray(found.response),
-            "stiffness": column.turn @ np.asarray(found.response_gradient) @ column.turn.T,
+            "force": column.turn @ found.response[:3],
+            "stiffness": column.turn @ found.response_gradient[:3, :3] @ column.turn.T,
+            "beside": found.response[3:],
             "column": column.number,
             "role": options.role,
             "seconds": time.process_time() - start,
@@ -216,7 +213,7 @@ def join(study: str, files: Sequence[Path], out: Path) -> None:
     wrong = [p for p in parts if json.loads(str(p["plan"]))["study"] != study]
     if wrong:
         raise SystemExit(f"not of {study}: {[str(p['plan']) for p in wrong]}")
-    keys = [k for k in PER_ROW if k != "displacement"]
+    keys = [k for k in PER_ROW if k != "displacement" and all(k in p for p in parts)]
     arrays: dict[str, Any] = {key: np.concatenate([p[key] for p in parts]) for key in keys}
     # order of columns, whichever part a column was in; training first
     rank = {"train": 0, "test": 1, "refined": 2}
@@ -255,9 +252,9 @@ def _spread(points: np.ndarray, among: np.ndarray, count: int) -> np.ndarray:
 
 def _provenance(study: str, parts: Sequence[Any]) -> str:
     found = STUDIES[study]
-    problem = found.problem(tuple(low for _, low, _, _ in found.inputs))
+    problem = found.problem()
     plans = sorted({str(part["plan"]) for part in parts})
-    inputs = [f"{name} {low:g} to {high:g} {unit}" for name, low, high, unit in found.inputs]
+    inputs = [str(one.range) for one in found.inputs]
     return "\n".join(
         [
             f"Finite elements of palpate, study {study}: python -m benchmarks.touch_data {study}",

@@ -15,7 +15,7 @@ import numpy as np
 from palpate.physics.geometry import Block, Dome, LayeredBlock, Organ
 from palpate.physics.interactions import SphereProbe
 from palpate.physics.materials import NeoHookean
-from palpate.physics.solid import Body, SolidProblem
+from palpate.physics.solid import Body, BodyFamily, FamilyProblem, SolidProblem, Varied
 
 __all__ = ["STUDIES", "TouchStudy"]
 
@@ -23,8 +23,6 @@ RADIUS, PAD, STIFF_PAD, STOP = 0.01, 2e6, 2e7, 0.004
 POISSON = 0.45
 LEAST = 2e-4  # m: depths begin here, where the force is a thousandth of the largest
 CLEAR = 0.012  # m of a named surface around a footprint: half the widest contact
-
-Values = tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -34,7 +32,7 @@ class TouchStudy:
     Attributes
     ----------
     body : callable
-        Further inputs → Body.
+        () → Body.
     touches : str
         Surface that is pressed.
     depth : float
@@ -52,8 +50,8 @@ class TouchStudy:
         within a few mm (by the sine, as Chebyshev's points are).
     within : float
         Farthest footprint from that axis, in m.
-    inputs : tuple of (name, low, high, unit)
-        Beyond the position.
+    inputs : tuple of Varied
+        Beyond the position: properties of the materials.
     element : float, optional
         Size of the elements that are pressed, in m; half the sphere's radius by default.
     wanted : int
@@ -62,7 +60,7 @@ class TouchStudy:
         Median and 95th percentile of the relative force error that are asked for; NaN where nothing is.
     """
 
-    body: Callable[..., Body]
+    body: Callable[[], Body]
     touches: str = "top"
     depth: float = 0.012
     over: Any = None
@@ -71,7 +69,7 @@ class TouchStudy:
     about: tuple[float, float] = (0.0, 0.0)
     to_edges: bool = False
     within: float = np.inf
-    inputs: tuple[tuple[str, float, float, str], ...] = ()
+    inputs: tuple[Varied, ...] = ()
     element: float | None = None
     wanted: int = 80
     target: tuple[float, float] = (0.005, 0.02)
@@ -88,22 +86,23 @@ class TouchStudy:
             over=self.over,
         )
 
-    def problem(self, values: Values = (), *, finer: float = 1.0) -> SolidProblem:
-        """The body of these inputs under the probe; elements `finer` times smaller where it is pressed."""
-        body, probe = self.body(*values), self.probe
+    def problem(self, *, finer: float = 1.0) -> SolidProblem | FamilyProblem:
+        """The body under the probe; elements `finer` times smaller where it is pressed."""
+        body, probe = self.body(), self.probe
         element = self.element
         if finer != 1.0:
             element = (element or min(f.element for f in probe.refinements(body.geometry))) / finer
-        return body.problem(probe, element=element)
+        whole = BodyFamily(body, self.inputs) if self.inputs else body
+        return whole.problem(probe, element=element)
 
 
 def _block() -> Body:
     return Body(Block((0.1, 0.1, 0.05)), NeoHookean(9e3, POISSON), fixed="bottom")
 
 
-def _layered(fat: float = 4e3, muscle: float = 15e3) -> Body:
+def _layered() -> Body:
     layers = (("skin", 0.003), ("fat", 0.009), ("muscle", 0.028))
-    moduli = {"skin": 30e3, "fat": fat, "muscle": muscle}
+    moduli = {"skin": 30e3, "fat": 4e3, "muscle": 15e3}
     materials = {name: NeoHookean(modulus, POISSON) for name, modulus in moduli.items()}
     return Body(LayeredBlock((0.1, 0.1), layers), materials, fixed="bottom")
 
@@ -139,7 +138,7 @@ STUDIES: dict[str, TouchStudy] = {
     ),
     "family": replace(
         _LAYERED,
-        inputs=(("E_fat", 2e3, 8e3, "Pa"), ("E_muscle", 8e3, 30e3, "Pa")),
+        inputs=(Varied("fat.young", 2e3, 8e3), Varied("muscle.young", 8e3, 30e3)),
         wanted=200,
         target=(np.nan, 0.03),
     ),

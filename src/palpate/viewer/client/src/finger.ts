@@ -8,6 +8,7 @@ import type { PressView, Spot } from "./pressview";
 
 const BEAT = 50; // ms between heartbeats
 const SINK = 90; // ms, time constant with which the probe takes a new depth: a press and no blow
+const ARRIVED = 1e-4; // of the deepest press: nearer than this is there
 const NOTCH = 0.05; // of the deepest trained depth, a step of the wheel or a key
 const STEP = 12; // px, a step of the arrow keys
 const SMALL_STEP = 3;
@@ -74,6 +75,9 @@ export class Finger {
     if (!this.pressing) return;
     const goal = Number.isNaN(this.force) ? this.wanted : this.force * this.most;
     this.depth += (goal - this.depth) * (1 - Math.exp(-elapsed / SINK));
+    if (Math.abs(goal - this.depth) < ARRIVED * this.most) this.depth = goal;
+    // for programs that drive the page: whether the probe is still on its way
+    document.documentElement.dataset["sinking"] = String(this.depth !== goal);
     this.send();
   }
 
@@ -82,6 +86,7 @@ export class Finger {
     this.force = NaN;
     if (!this.pressing) return;
     this.pressing = false;
+    document.documentElement.dataset["sinking"] = "false";
     this.canvas.dataset["cursor"] = "";
     if (this.view) this.view.turnable = true;
     this.send();
@@ -127,6 +132,7 @@ export class Finger {
 
   private press(spot: Spot): void {
     [this.spot, this.depth, this.pressing] = [spot, 0, true];
+    document.documentElement.dataset["sinking"] = "true";
     this.canvas.dataset["cursor"] = "grabbing";
     if (this.view) {
       this.view.turnable = false;

@@ -43,7 +43,7 @@ export class PressPanel {
     [this.start_depth, this.most] = [AT_FIRST * hello.deepest, MOST * hello.deepest];
     element("model-name").textContent = hello.name;
     element("model-line").replaceChildren(
-      `probe of radius ${measured(hello.radius, "m")}, trained to ${measured(hello.deepest, "m")} deep`,
+      ...[`probe of radius ${measured(hello.radius, "m")}`, ", ", `trained to ${measured(hello.deepest, "m")} deep`].map(whole),
       ...(hello.parameters.length ? [", ", ...hello.parameters.flatMap(trained)] : []),
       hello.relaxes ? `; ${hello.relaxes}` : "",
     );
@@ -92,7 +92,7 @@ export class PressPanel {
     if (!look) return;
     const { size, unit } = multiple(Math.max(Math.abs(look.low), Math.abs(look.high)), look.unit);
     const most = values.reduce((a, b) => Math.max(a, b), -Infinity);
-    element("largest-title").textContent = `Largest ${look.name}`;
+    element("largest-title").textContent = look.name.startsWith("largest") ? look.name : `Largest ${look.name}`;
     element("largest").textContent = `${tidy(most / size)} ${unit}`;
     document.documentElement.dataset["largest"] = String(most);
   }
@@ -124,6 +124,13 @@ export class PressPanel {
     data["depth"] = String(frame.depth);
     data["deviation"] = String(frame.deviation);
   }
+}
+
+/** Words that no line break parts. */
+function whole(words: string): HTMLElement {
+  const span = document.createElement("span");
+  [span.className, span.textContent] = ["whole", words];
+  return span;
 }
 
 /** How far the force may be off, in words. */

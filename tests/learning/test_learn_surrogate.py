@@ -179,3 +179,35 @@ def test_what_makes_no_sense_is_refused(surface):
         learn_surrogate(X, np.where(np.arange(6) == 2, 0.0, U), F, K, **given)
     with pytest.raises(UsageError, match="allow no learning"):
         learn_surrogate(X, U, F, K, **given, seconds=0.0)
+
+
+MODULUS = Range("E", 5e3, 20e3, "Pa")
+
+
+def family(count, seed):
+    """Touches of bodies whose energy goes with E^0.8, softer ones more so at depth; −∂U by all four inputs."""
+    X, U, F, K = touches(count, seed)
+    E = np.random.default_rng(seed + 100).uniform(5e3, 20e3, count)
+    z = (X[:, 2] - MIDDLE[2]) / (SIDE / 2)
+    power = 0.8 + 0.1 * z
+    times = (E / 1e4) ** power
+    # ∂ times/∂z, and by E
+    F = F * times[:, None] - np.outer(U * times * np.log(E / 1e4) * 0.1 / (SIDE / 2), [0, 0, 1])
+    return np.c_[X, E], U * times, np.c_[F, -U * times * power / E]
+
+
+def test_what_is_known_of_a_property_is_a_slope_of_the_factor(surface):
+    X, U, response = family(12, 3)
+    response[5, 3] = np.nan
+    inputs = (*INPUTS, MODULUS)
+    samples = EnergySamples.of(X, U, response, None, surface=surface, radius=RADIUS, inputs=inputs)
+    rows = samples.rows(LAW, resolved=0.0)
+    z = (X[:, 2] - MIDDLE[2]) / (SIDE / 2)
+    by_scaled = (0.8 + 0.1 * z) / X[:, 3] * 7.5e3
+    known = np.arange(12) != 5
+    np.testing.assert_allclose(rows["slopes"][known, 0, 3], by_scaled[known], rtol=1e-9)
+    np.testing.assert_array_equal(rows["slope_weight"][:, 3] > 0, known)
+    problem = Problem(samples.scaled, rows, None, "")
+    arrays = dict(rows)
+    all_rows = Rows.of(problem.regressors("rotated", "gaussian"), problem.X, arrays.pop("Y"), **arrays)
+    assert len(all_rows.targets) == 12 * 4 + 11

@@ -197,6 +197,13 @@ def specimen(text: str, folder: Path) -> None:
     assert (folder / "specimen.palpate").stat().st_size > 1000
 
 
+def bent(text: str, folder: Path) -> None:
+    learnt, elastic = (float(v) for v in re.findall(r"error [\d.]+% median, ([\d.]+)% p95", text))
+    assert learnt < 1.0 < 10.0 < elastic
+    assert 50 < float(re.search(r"stays at (\d+) mm", text)[1]) < 90
+    assert (folder / "copper-rod.palpate").stat().st_size > 1000
+
+
 CHECKS: dict[str, Callable[[str, Path], None]] = {
     "01_cantilever.py": cantilever,
     "02_two_loads.py": two_loads,
@@ -210,6 +217,7 @@ CHECKS: dict[str, Callable[[str, Path], None]] = {
     "10_creeping_nylon.py": nylon,
     "11_press_soft_tissue.py": tissue,
     "12_correct_from_a_specimen.py": specimen,
+    "14_bent_and_stays_bent.py": bent,
 }
 QUICK = {"04_filter_by_hand.py"}
 

@@ -67,7 +67,9 @@ def test_reloading_goes_back_by_the_way_of_unloading() -> None:
 def test_steps_of_any_length_end_in_the_same_force() -> None:
     dents = Dents(P, Q, KAPPA, PLACES, 0.7)
     once, often = dents.memory(), dents.memory()
-    np.testing.assert_allclose(lead(often, down(*np.linspace(0, 1.5, 50)))[-1], lead(once, down(1.5))[0], rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(
+        lead(often, down(*np.linspace(0, 1.5, 50)))[-1], lead(once, down(1.5))[0], rtol=1e-12, atol=1e-15
+    )
 
 
 def test_a_dent_stays_where_it_was_made() -> None:
@@ -78,7 +80,8 @@ def test_a_dent_stays_where_it_was_made() -> None:
     here = lead(memory, down(0.7))[0]
     away = lead(memory, down(0.7, x=4.0))[0]
     assert here[2] < 0.9 * virgin[2]
-    np.testing.assert_allclose(away, virgin, rtol=1e-5)  # e^{−(4/0.5)²/2 …}: the dent's reach is w
+    # what is left of the dent there is e^{−(3.5² − 0.5²)/2w²} of it, w = 0.5
+    np.testing.assert_allclose(away, virgin, atol=1e-5 * virgin[2])
 
 
 def test_the_force_is_the_gradient_of_what_is_stored() -> None:
@@ -100,22 +103,25 @@ def test_the_force_is_the_gradient_of_what_is_stored() -> None:
 
 def test_closed_ways_over_a_print_take_nothing() -> None:
     memory = Dents(P, Q, KAPPA, PLACES, 0.8).memory()
-    lead(memory, down(1.8, 0.9))
-    t = np.linspace(0, 2 * np.pi, 400)
-    circle = np.stack([0.3 * np.sin(t), 0.2 * np.sin(t), -0.9 - 0.1 * (1 - np.cos(t))], axis=1)
+    lead(memory, down(1.8, 1.4))
+    t = np.linspace(0, 2 * np.pi, 257)
+    circle = np.stack([0.15 * np.sin(t), 0.1 * np.sin(t), -1.45 + 0.05 * np.cos(t)], axis=1)
+    lead(memory, circle[:1])
     lost, work = memory.lost, memory.work
     force = lead(memory, circle)
-    assert memory.lost - lost <= 1e-15 * lost
+    assert memory.lost == lost
     assert abs(memory.work - work) <= 1e-9 * work
-    # the sum of the forces themselves: a periodic trapezoid converges faster than any power
-    ds = np.gradient(circle[:-1], axis=0, edge_order=1)
-    ds[[0, -1]] = (circle[1] - circle[-2]) / 2, (circle[0] - circle[-3]) / 2
-    assert abs((force[:-1] * ds).sum()) < 1e-4 * np.abs(force[:-1] * ds).sum()
+    # ∮ F·dc by the trapezoid in t, which for a smooth periodic integrand errs by rounding only
+    rate = np.stack([0.15 * np.cos(t), 0.1 * np.cos(t), -0.05 * np.sin(t)], axis=1)
+    power = (force * rate).sum(axis=1)[:-1]
+    assert abs(power.sum()) < 1e-9 * np.abs(power).sum()
+    assert force[:, 2].min() > 0
 
 
 def test_a_random_drive_never_gives_energy() -> None:
     rng, memory = np.random.default_rng(5), Dents(P, Q, KAPPA, PLACES, 0.8).memory()
     knots = rng.uniform((-3, -1, -2.0), (3, 1, 0.4), (60, 3))
+    knots[0, 2] = 0.4  # from outside
     t = np.linspace(0, 59, 6000)
     way = np.stack([np.interp(t, np.arange(60), k) for k in knots.T], axis=1)
     force, worst = np.zeros(3), 0.0

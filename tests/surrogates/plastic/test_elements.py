@@ -11,7 +11,9 @@ from palpate.errors import UsageError
 from palpate.surrogates.plastic import Elements
 from palpate.surrogates.plastic.element_kernels import advance, free_step
 
-SLIDERS = Elements.sliders(np.array([2.0, 3.0, 1.0]), np.array([math.inf, 0.1, 0.3]), np.array([0.0, 0.2, 0.0]))
+SLIDERS = Elements.sliders(
+    np.array([2.0, 3.0, 1.0]), np.array([math.inf, 0.1, 0.3]), np.array([0.0, 0.2, 0.0])
+)
 DASHPOTS = Elements.dashpots(np.array([5.0, 3.0, 2.0]), np.array([math.inf, 0.1, 2.0]))
 
 
@@ -32,7 +34,9 @@ def test_steps_of_any_length_end_in_the_same_state_on_a_straight_way() -> None:
     np.testing.assert_allclose(parts[-1], whole[-1], atol=1e-12)
     times = np.linspace(0, 0.5, 1001)
     even = DASHPOTS.elongations(0.8 * times, times)
-    np.testing.assert_allclose(DASHPOTS.elongations(np.array([0.4]), np.array([0.5]))[-1], even[-1], atol=1e-12)
+    np.testing.assert_allclose(
+        DASHPOTS.elongations(np.array([0.4]), np.array([0.5]))[-1], even[-1], atol=1e-12
+    )
 
 
 def test_a_held_stretch_relaxes_by_the_prony_series() -> None:

@@ -1,9 +1,9 @@
 """From presses at one place to the tables of a dent.
 
-With the elastic answer known, U and ∇U at the same positions, a press at one place is a sequence of amplitudes q = √(2U)
-asked and a = q F·(−∇U)/|∇U|² felt. `Dents` says a = κ(p) (q − p)₊, with p the dent that the largest q so far left. First
-yield, the shares dp/dQ between knots and κ at the knots are found by least squares on the force (Branch, Coleman & Li 1999),
-within bounds that keep what `Dents` promises.
+With the elastic answer known, U and ∇U at the same positions, a press at one place is a sequence of amplitudes asked,
+q = √(2U), and felt, a = q F·(−∇U)/|∇U|². `Dents` says a = κ(p) (q − p)₊, with p the dent that the largest q so far left.
+First yield, the shares dp/dQ between knots and κ at the knots are found by least squares on the force (Branch, Coleman &
+Li 1999), within bounds that keep what `Dents` promises.
 """
 
 from __future__ import annotations
@@ -76,7 +76,8 @@ def learn_dents(
     points : (n, 3), optional
         Where dents are kept, m; by default one dent that travels with the probe.
     width : float
-        Of a dent's weights, m; for a sphere of radius R pressed to the depth s about ½ √(R s), half the radius of contact.
+        Of a dent's weights, m; for a sphere of radius R pressed to the depth s about ½ √(R s), half the
+        radius of contact.
     knots : int
         Of the tables beyond first yield.
 

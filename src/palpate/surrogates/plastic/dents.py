@@ -72,9 +72,13 @@ class Dents:
             object.__setattr__(self, name, array)
         p, Q, k = self.dent, self.reach, self.stiffening
         shaped = p.ndim == 1 and len(p) > 1 and Q.shape == k.shape == p.shape
-        placed = self.points.ndim == 2 and self.points.shape[1] == 3 and len(self.points) > 0 and self.width > 0
+        placed = (
+            self.points.ndim == 2 and self.points.shape[1] == 3 and len(self.points) > 0 and self.width > 0
+        )
         sound = shaped and placed and all(np.isfinite(a).all() for a in (p, Q, k, self.points))
-        sound = sound and p[0] == 0 and bool((np.diff(p) > 0).all() and (np.diff(Q) > 0).all() and (Q > p).all())
+        sound = (
+            sound and p[0] == 0 and bool((np.diff(p) > 0).all() and (np.diff(Q) > 0).all() and (p < Q).all())
+        )
         if not (sound and k[0] == 1 and (k > 0).all()):
             raise UsageError(
                 f"These are no tables of a dent: p {p}, Q {Q}, κ {k}, at {self.points.shape}, width {self.width}.",

@@ -1,0 +1,130 @@
+"""Learning held bodies from histories made by known elements, and dents from known tables."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from palpate.errors import FileFormatError, UsageError
+from palpate.learning.plastic import (
+    HeldPath,
+    HeldPaths,
+    Press,
+    learn_dents,
+    learn_held,
+    random_times,
+    random_turns,
+)
+from palpate.learning.plastic.learn_held import HIGHEST, LIMITS, LOWEST, PER_DECADE
+from palpate.surrogates.plastic import Dents, Elements
+
+YIELDS = Elements.sliders(
+    np.array([15.0, 60.0, 40.0]), np.array([math.inf, 0.083, 0.21]), np.array([0.0, 0.1, 0.0])
+)
+CREEPS = Elements.dashpots(np.array([60.0, 25.0, 20.0]), np.array([math.inf, 0.1, 2.0]))
+
+
+def stretch(w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """h = w exp(w²/4) and its slope."""
+    return w * np.exp(w * w / 4), (1 + w * w / 2) * np.exp(w * w / 4)
+
+
+def path(elements: Elements, w: np.ndarray, times: np.ndarray | None = None) -> HeldPath:
+    h, slope = stretch(w)
+    force = slope * (elements.elongations(h, times) @ elements.stiffness)
+    shape = np.zeros((len(w), 2, 2))
+    shape[:, 1, 1] = -w
+    nothing = np.zeros(len(w))
+    clock = np.arange(1.0, 1.0 + len(w)) if times is None else times
+    return HeldPath(clock, w, force, elements.total * h * h / 2, nothing, shape)
+
+
+def paths(*several: HeldPath) -> HeldPaths:
+    return HeldPaths(
+        np.array([[0.0, 0], [1.0, 0]]), 1, np.array([0.0, -1.0]), several, nodes_of_interest=(1,)
+    )
+
+
+def twin(elements: Elements) -> HeldPath:
+    spring = Elements.sliders(np.array([elements.total]), np.array([math.inf]), np.zeros(1))
+    return path(spring, np.linspace(0.02, 0.55, 30))
+
+
+def test_sliders_are_found_to_the_grid_and_answer_unseen_histories() -> None:
+    rng = np.random.default_rng(4)
+
+    def walk(outward: float) -> HeldPath:
+        return path(YIELDS, random_turns(rng, -0.5, 0.5, turns=6, step=0.02, outward=outward))
+
+    body, fit = learn_held(paths(walk(3.0), walk(3.0), walk(3.0)), twin(YIELDS))
+    # a limit between two of the grid is at most half their distance from one of them
+    half = 0.5 * ((HIGHEST / LOWEST) ** (1 / (LIMITS - 1)) - 1)
+    worst = half * float(np.sum(YIELDS.stiffness[1:] * YIELDS.limit[1:]) * stretch(np.array([0.5]))[1][0])
+    for unseen in (walk(0.0), walk(0.0)):
+        force, stored, lost = body.follow(unseen.place)
+        assert np.abs(force - unseen.force).max() < worst
+        assert stored.min() >= 0
+        assert (np.diff(lost) >= 0).all()
+    assert body.elements.total == pytest.approx(YIELDS.total, rel=0.01)
+    assert fit.stretch_error < 1e-3
+    assert "elements" in str(fit)
+
+
+def test_dashpots_are_found_to_the_grid() -> None:
+    rng = np.random.default_rng(6)
+
+    def drive() -> HeldPath:
+        times, w = random_times(rng, -0.5, 0.5, span=8.0, step=0.04)
+        return path(CREEPS, w, times)
+
+    body, _ = learn_held(paths(drive(), drive()), twin(CREEPS), relaxes=True)
+    unseen = drive()
+    force = body.follow(unseen.place, unseen.times)[0]
+    # two exponentials of the grid stand for one between them: to the square of half their distance
+    half = 0.5 * math.log(10) / PER_DECADE
+    assert np.abs(force - unseen.force).max() < half**2 * np.abs(unseen.force).max()
+    relaxed = body.elements.stiffness[np.isinf(body.elements.time)].sum() / body.elements.total
+    assert relaxed == pytest.approx(60 / 105, abs=0.02)
+
+
+def test_histories_come_back_from_their_file(tmp_path: Path) -> None:
+    some = paths(path(YIELDS, np.array([0.1, 0.3])), path(YIELDS, np.array([0.2, -0.1, 0.0])))
+    found = HeldPaths.load(some.save(tmp_path / "some.palpate"))
+    assert str(found) == str(some)
+    for one, other in zip(some.paths, found.paths, strict=True):
+        np.testing.assert_array_equal(one.force, other.force)
+        np.testing.assert_array_equal(one.displacement, other.displacement)
+    with pytest.raises(FileFormatError):
+        HeldPaths.load(tmp_path / "none.palpate")
+
+
+def test_histories_that_fit_nothing_are_refused() -> None:
+    good = path(YIELDS, np.array([0.1, 0.3]))
+    with pytest.raises(UsageError, match="no history"):
+        HeldPath(good.times[::-1], good.place, good.force, good.stored, good.lost, good.displacement)
+    with pytest.raises(UsageError, match="twin was led"):
+        learn_held(paths(path(YIELDS, np.array([0.1, 0.9]))), twin(YIELDS))
+    with pytest.raises(UsageError, match="too few"):
+        learn_held(paths(), twin(YIELDS))
+
+
+def test_the_tables_of_a_dent_come_back() -> None:
+    """Knots where the search has its own: what it finds must be what made the presses."""
+    reach = np.array([0.5, 1.0, 1.5]) * 2
+    made = Dents.single(np.array([0.0, 0.4, 1.1]), reach, np.array([1.0, 1.1, 1.05]))
+    s = np.concatenate([np.linspace(0.1, 1.8, 30), np.linspace(1.8, 0.5, 20), np.linspace(0.5, 2.4, 30)])
+    s = np.append(s, np.linspace(2.4, 0.5, 20)) * (3.0**0.8 / 2.4)  # q = s^(5/4), to 3
+    energy, slope = 0.5 * s**2.5, np.zeros((len(s), 3))
+    slope[:, 2] = -1.25 * s**1.5
+    memory, force = made.memory(), np.zeros((len(s), 3))
+    for i in range(len(s)):
+        memory.step(np.array([0.0, 0.0, -s[i]]), float(energy[i]), slope[i])
+        force[i] = memory.force
+    found, error = learn_dents([Press(energy, slope, force)], knots=2)
+    assert error < 1e-6
+    np.testing.assert_allclose(found.reach, made.reach, rtol=1e-4)
+    np.testing.assert_allclose(found.dent, made.dent, atol=1e-4)
+    np.testing.assert_allclose(found.stiffening, made.stiffening, rtol=1e-3)

@@ -19,15 +19,9 @@ SQUARE = tuple(
 """The eight isometries of a square about z."""
 
 ANCHORS = np.array(
-    [
-        [0.05, 0.05, -0.02],
-        [-0.05, 0.05, -0.02],
-        [0.05, -0.05, -0.02],
-        [-0.05, -0.05, -0.02],
-        [0.0, 0.0, -0.05],
-    ]
+    [[0.1, 0.1, -0.1], [-0.1, 0.1, -0.1], [0.1, -0.1, -0.1], [-0.1, -0.1, -0.1], [0.0, 0.0, -0.1]]
 )
-SPRINGS = np.array([60.0, 60.0, 60.0, 60.0, 80.0])  # N/m
+SPRINGS = np.array([80.0, 80.0, 80.0, 80.0, 40.0])  # N/m
 
 
 def held(X: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -9,6 +9,7 @@ from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.learning import History
 from palpate.surrogates import TouchedBody, TouchModel, TouchSurrogate
+from palpate.surrogates.grasp import GraspSurrogate
 from palpate.validation.judgement import Judgement
 from palpate.validation.limits import Limits
 from palpate.validation.result import Validation, validate_model
@@ -26,7 +27,7 @@ def validate(
 
 @overload
 def validate(
-    model: TouchedBody | TouchSurrogate | TouchFunction,
+    model: TouchedBody | TouchSurrogate | GraspSurrogate | TouchFunction,
     test: Dataset | TouchSolves,
     *,
     refined: Dataset | TouchSolves | None = None,
@@ -37,7 +38,7 @@ def validate(
 
 
 def validate(
-    model: TouchModel | TouchedBody | TouchSurrogate | TouchFunction,
+    model: TouchModel | TouchedBody | TouchSurrogate | GraspSurrogate | TouchFunction,
     test: Dataset | TouchSolves,
     *,
     history: History | None = None,
@@ -50,7 +51,7 @@ def validate(
 
     Parameters
     ----------
-    model : TouchModel, TouchedBody, TouchSurrogate or TouchFunction
+    model : TouchModel, TouchedBody, TouchSurrogate, GraspSurrogate or TouchFunction
         A body held at one node; a body touched anywhere, with its shape or without; any force as a function of the
         probe's centre.
     test : Dataset or TouchSolves

@@ -9,7 +9,9 @@ import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
+from palpate.learning.grasp.solves import HeldSolves
 from palpate.surrogates import TouchSurrogate
+from palpate.surrogates.grasp import GraspSurrogate
 from palpate.units import Range
 
 __all__ = ["TouchFunction", "TouchSolves"]
@@ -94,6 +96,12 @@ class TouchSolves:
         if isinstance(test, TouchSolves):
             _refuse_inputs([f"input {i}" for i in range(test.X.shape[1])], inputs, len(inputs))
             return test
+        if [r.name for r in test.ranges] != (names := [r.name for r in inputs]) and {"d_x", "d_y", "d_z"} <= {
+            name.split()[-1] for name in names
+        }:
+            held = HeldSolves.of(test)
+            _refuse_inputs([r.name for r in held.inputs], inputs, names)
+            return cls(held.X, held.force[:, :3], held.energy, held.stiffness[:, :3, :3])
         test = test.ok
         _refuse_inputs([r.name for r in test.ranges], inputs, [r.name for r in inputs])
         if not len(test):
@@ -145,17 +153,18 @@ class TouchFunction:
     units: int = 0
 
     @classmethod
-    def of(cls, model: TouchSurrogate | TouchFunction) -> TouchFunction:
+    def of(cls, model: TouchSurrogate | GraspSurrogate | TouchFunction) -> TouchFunction:
         """What a surrogate answers; a function as it is."""
         if isinstance(model, TouchFunction):
             return model
+        touched = isinstance(model, TouchSurrogate)
         return cls(
-            str(model.meta.get("name", "touch surrogate")),
+            str(model.meta.get("name", "touch surrogate" if touched else "grasp surrogate")),
             model.inputs,
             model.force,
             model.energy,
             model.stiffness,
-            model.depth,
+            model.depth if isinstance(model, TouchSurrogate) else None,
             model.inside,
             None if model.root is None else model.deviation,
             model.network.units,

@@ -11,6 +11,7 @@ import numpy as np
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.surrogates import TouchedBody, TouchSurrogate
+from palpate.surrogates.grasp import GraspSurrogate
 from palpate.units import bounds
 from palpate.validation.coverage import Coverage, coverage
 from palpate.validation.force import ForceErrors, ForceSamples, force_errors
@@ -90,7 +91,7 @@ class SurrogateValidation(Judgement):
 
 
 def validate_surrogate(
-    model: TouchedBody | TouchSurrogate | TouchFunction,
+    model: TouchedBody | TouchSurrogate | GraspSurrogate | TouchFunction,
     test: Dataset | TouchSolves,
     *,
     refined: Dataset | TouchSolves | None = None,
@@ -102,7 +103,7 @@ def validate_surrogate(
 
     Parameters
     ----------
-    model : TouchedBody, TouchSurrogate or TouchFunction
+    model : TouchedBody, TouchSurrogate, GraspSurrogate or TouchFunction
     test : Dataset or TouchSolves
         Rows that did not converge are left out, and rows that a surrogate was trained on.
     refined : Dataset or TouchSolves, optional
@@ -168,7 +169,7 @@ def probe_samples(model: TouchFunction, solves: TouchSolves) -> ForceSamples:
 
 
 def unseen_solves(
-    model: TouchSurrogate | TouchFunction, test: Dataset | TouchSolves
+    model: TouchSurrogate | GraspSurrogate | TouchFunction, test: Dataset | TouchSolves
 ) -> tuple[TouchSolves, int]:
     """The solves that a model was not trained on, and how many were left out for that.
 
@@ -196,7 +197,9 @@ def _shape(body: TouchedBody | None, test: Dataset | TouchSolves) -> ShownErrors
     return shown_errors(body.fields["displacement"], test)
 
 
-def _refuse_radius(model: TouchSurrogate | TouchFunction, data: Dataset | TouchSolves) -> None:
+def _refuse_radius(
+    model: TouchSurrogate | GraspSurrogate | TouchFunction, data: Dataset | TouchSolves
+) -> None:
     """Solves with another probe than the surrogate's are no test of it."""
     if (
         not isinstance(model, TouchSurrogate)

@@ -57,7 +57,7 @@ def trust_of(refined: Refined, problem: Problem, samples: Touches, ridge: float 
     fit = project(rows, refined.theta, ridge * rows.total)
     span = span_of_units(rows, refined.theta, fit) if len(refined.theta) else None
     missed = left_out_rows(rows, fit, basis=span, most=_MOST) @ rows.modes
-    Q, N = fit.Q, len(problem.X)
+    Q = fit.Q
     to_force, at = _to_force(rows, samples), _slope_rows(rows)
     errors, sizes = np.empty(len(at)), np.empty(len(at))
     for k, (i, first) in enumerate(at):

@@ -16,7 +16,7 @@ from palpate.learning.energy.learn_surrogate import _meta, _region, _searched, _
 from palpate.learning.energy.search import EnergyTrial, Problem
 from palpate.learning.energy.trust import trust_of
 from palpate.learning.grasp.images import hold_images
-from palpate.learning.grasp.rest import found_rest
+from palpate.learning.grasp.rest import found_law
 from palpate.learning.grasp.samples import GraspSamples
 from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction
 from palpate.surrogates.grasp import GraspSurrogate
@@ -40,15 +40,15 @@ class LearntGrasp:
         Relative force error of each solve with a displaced pad when it is left out.
     loo : float
         Leave-one-solve-out error of the network chosen, as in its trial.
-    rest_errors : dict
-        Error on solves left out of a quadratic ℓ, by the degree of the stiffness at rest.
+    law_errors : dict
+        What S and P alone miss of solves left out, by the degrees of both.
     """
 
     surrogate: GraspSurrogate
     trials: tuple[EnergyTrial, ...]
     errors: np.ndarray
     loo: float
-    rest_errors: dict[int, float]
+    law_errors: dict[tuple[int, int], float]
 
 
 def learn_grasp(
@@ -62,6 +62,7 @@ def learn_grasp(
     symmetry: Sequence[np.ndarray] = (),
     about: np.ndarray | None = None,
     degree: Degree = "auto",
+    stiffening: Literal["auto", 0, 1, 2, 3, 4, 5] = "auto",
     units_max: int = 192,
     target: float = 1e-3,
     seconds: float = 60.0,
@@ -90,6 +91,8 @@ def learn_grasp(
         The point that they leave where it is, m; the middle of the place's ranges by default.
     degree : {"auto", 0, 1, 2}
         Of the stiffness at rest as a polynomial of place and further inputs.
+    stiffening : {"auto", 0 … 5}
+        Degree of the polynomial P of all inputs.
     units_max : int
         Most units; images count.
     target : float
@@ -111,23 +114,31 @@ def learn_grasp(
     UsageError
         If samples, symmetry or options do not fit.
     """
-    begun, inputs = time.monotonic(), tuple(inputs)
+    inputs = tuple(inputs)
     _require(seconds, units_max, radial, axes, len(inputs))
     samples = GraspSamples.of(X, energy, force, stiffness, inputs=inputs)
     images = hold_images(symmetry, about, inputs, axes)
     with threadpool_limits(1):  # small matrices: more BLAS threads cost time and the bits of the result
-        rest, errors = found_rest(samples, images, symmetry, None if degree == "auto" else degree)
-        problem = Problem(
-            samples.scaled, samples.rows(rest), images, f"rest stiffness of degree {rest.degree}"
+        found = found_law(
+            samples,
+            images,
+            symmetry,
+            None if degree == "auto" else degree,
+            None if stiffening == "auto" else stiffening,
         )
-        search = _searched(problem, begun + seconds, form, radial, units_max, target, seed)
+        rows = samples.rows(found.rest, found.stiffening)
+        law = f"degrees {found.rest.degree} and {found.stiffening.degree}"
+        problem = Problem(samples.scaled, rows, images, law)
+        search = _searched(problem, time.monotonic() + seconds, form, radial, units_max, target, seed)
         best = search.best
         assert best is not None  # the tail at least was tried
         trust = trust_of(best, problem, samples)
     meta: dict[str, Any] = _meta(samples, images, best, search.error, trust.errors)
     network, root = _written_out(best, trust.root, samples, meta)
-    surrogate = GraspSurrogate(network, rest, region=_region(samples, images), root=root, meta=meta)
-    return LearntGrasp(surrogate, tuple(search.trials), trust.errors, search.error, errors)
+    surrogate = GraspSurrogate(
+        network, found.rest, found.stiffening, region=_region(samples, images), root=root, meta=meta
+    )
+    return LearntGrasp(surrogate, tuple(search.trials), trust.errors, search.error, found.errors)
 
 
 def _require(seconds: float, units_max: int, radial: str, axes: Sequence[int], inputs: int) -> None:

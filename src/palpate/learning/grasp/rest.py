@@ -1,14 +1,16 @@
-"""The stiffness at rest from solves: where ℓ is a quadratic polynomial, which S leaves it the least to explain.
+"""The stiffness at rest and the stiffening from solves: the S that leaves ln(U/½ ‖S d‖²) most like a polynomial.
 
 For given S all that is observed is linear in the polynomial's coefficients, so those are the least-squares solution
 and only S is searched (variable projection, Golub & Pereyra 1973). A symmetry leaves S the polynomials with
-S(ζ') = M S(ζ) Mᵀ, and ℓ those that do not change.
+S(ζ') = M S(ζ) Mᵀ, and P those that do not change. The degrees are those that miss least of solves left out.
 """
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -17,47 +19,70 @@ from palpate.learning.grasp.samples import GraspSamples
 from palpate.learning.units.regressors import pairs
 from palpate.learning.units.symmetric import Images
 from palpate.surrogates.grasp.rest import MOST, RestStiffness, monomials
+from palpate.surrogates.grasp.stiffening import HIGHEST, Stiffening, exponents, powers
 
-__all__ = ["found_rest"]
+__all__ = ["FoundLaw", "found_law"]
 
 _I, _J = np.triu_indices(3)
-_RIDGE = 1e-3  # of the polynomial's coefficients: few solves do not decide all of them
+_RIDGE = 1e-2  # of the polynomial's coefficients: few solves do not decide all of them
 _FIRST = 1e-2  # holds S where the polynomial of ℓ says the same
 _FOLDS, _LEAST = 5, 6
+_QUADRATIC = 2  # degree of P while S is searched
 _BETTER = 0.9  # of the error left out, for a higher degree
 _SEED = 0
 
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """S, what it was found with, and the coefficients of ℓ."""
+    """S, what it was found with, and the coefficients of P."""
 
     rest: RestStiffness
     unknowns: np.ndarray
     polynomial: np.ndarray
 
 
-def found_rest(
+@dataclass(frozen=True, eq=False)
+class FoundLaw:
+    """S and P, and what they miss of solves left out, by the degrees of both."""
+
+    rest: RestStiffness
+    stiffening: Stiffening
+    errors: dict[tuple[int, int], float]
+
+
+def found_law(
     samples: GraspSamples,
     images: Images | None,
     isometries: Sequence[np.ndarray],
     degree: int | None = None,
+    stiffening: int | None = None,
     **shares: float,
-) -> tuple[RestStiffness, dict[int, float]]:
-    """S of a degree, or of that whose error on solves left out is least, and those errors by degree."""
-    k = len(samples.inputs) - 3
-    highest = MOST if k and len(samples) >= _LEAST else 0
-    choice = range(highest + 1) if degree is None else [degree]
+) -> FoundLaw:
+    """S and P of given degrees, or of those whose error on solves left out is least."""
+    n, enough = len(samples.inputs), len(samples) >= _LEAST
+    highest = MOST if n > 3 and enough else 0
+    search = {d: _Search(d, images, isometries, n - 3, shares) for d in range(MOST + 1)}
     fits, errors = {}, {}
-    for d in choice:
-        search = _Search(d, images, isometries, k, shares)
-        fits[d] = search.fitted(samples)
-        if len(choice) > 1:
-            errors[d] = search.left_out(samples, fits[d].unknowns)
-    best = choice[0]
-    for d in errors:
+    for d in range(highest + 1) if degree is None else [degree]:
+        fits[d] = search[d].fitted(samples)
+        errors[d, _QUADRATIC] = search[d].left_out(samples, fits[d].unknowns) if enough else 0.0
+    d = _least({d: errors[d, _QUADRATIC] for d in fits})
+    for q in (range(_QUADRATIC + 1, HIGHEST + 1) if enough else ()) if stiffening is None else [stiffening]:
+        errors[d, q] = search[d].of_degree(q).left_out(samples, fits[d].unknowns, rounds=0) if enough else 0.0
+    best = (
+        _least({q: errors[d, q] for _, q in errors if (d, q) in errors}) if stiffening is None else stiffening
+    )
+    found = search[d].of_degree(best).fitted(samples, fits[d].unknowns, rounds=0 if best > MOST else 30)
+    polynomial = Stiffening.of(search[d].of_degree(best).kept @ found.polynomial, n, best)
+    return FoundLaw(found.rest, polynomial, errors)
+
+
+def _least(errors: dict[int, float]) -> int:
+    """The degree of least error; a higher one must be better by a tenth."""
+    best = min(errors)
+    for d in sorted(errors):
         best = d if errors[d] < _BETTER * errors[best] else best
-    return fits[best].rest, errors
+    return best
 
 
 class _Search:
@@ -71,9 +96,20 @@ class _Search:
         count: int,
         shares: dict[str, float],
     ) -> None:
-        self.count, self.shares = count, shares
+        self.count, self.shares, self.images = count, shares, images
         self.basis = _equivariant(degree, images, isometries, count)
-        self.kept = _unchanged(images, 3 + count)
+        self._set(_QUADRATIC)
+
+    def _set(self, degree: int) -> None:
+        self.exponents = exponents(3 + self.count, degree)
+        self.kept = _unchanged(self.images, self.exponents)
+
+    @cache  # noqa: B019 - lives as long as the search for one law
+    def of_degree(self, degree: int) -> _Search:
+        """The same for P of another degree."""
+        other = copy.copy(self)
+        other._set(degree)
+        return other
 
     def fitted(self, samples: GraspSamples, start: np.ndarray | None = None, rounds: int = 30) -> _Fit:
         """The best S, from a start or from the mean stiffness."""
@@ -82,6 +118,9 @@ class _Search:
         theta = self._start(samples) if start is None else start
         size = max(float(np.linalg.norm(self._start(samples))), 1e-300)
         columns = self._columns(samples)
+        if not rounds:
+            rest = self._rest(theta)
+            return _Fit(rest, theta, _solved(columns, samples.rows(rest, **self.shares))[0])
 
         def missed(unknowns: np.ndarray) -> np.ndarray:
             rows = samples.rows(self._rest(unknowns), **self.shares)
@@ -91,13 +130,13 @@ class _Search:
         rest = self._rest(found)
         return _Fit(rest, found, _solved(columns, samples.rows(rest, **self.shares))[0])
 
-    def left_out(self, samples: GraspSamples, start: np.ndarray) -> float:
+    def left_out(self, samples: GraspSamples, start: np.ndarray, rounds: int = 4) -> float:
         """Root of the mean over solves of the weighted squares that they miss when left out, a fifth at a time."""
         order, total = np.random.default_rng(_SEED).permutation(len(samples)), 0.0
         for k in range(_FOLDS):
             out = np.zeros(len(samples), dtype=bool)
             out[order[k::_FOLDS]] = True
-            fit = self.fitted(samples.take(~out), start, rounds=4)
+            fit = self.fitted(samples.take(~out), start, rounds)
             others = samples.take(out)
             rows = others.rows(fit.rest, **self.shares)
             A, y, w = _stacked(self._columns(others), rows)
@@ -124,7 +163,7 @@ class _Search:
         return np.asarray(np.linalg.lstsq(flat.T, even.ravel(), rcond=None)[0])
 
     def _columns(self, samples: GraspSamples) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        value, slope, bend = monomials(samples.scaled, 2)
+        value, slope, bend = powers(samples.scaled, self.exponents)
         i, j = pairs(len(samples.inputs))
         kept = self.kept
         return (
@@ -162,16 +201,22 @@ def _solved(columns: tuple[np.ndarray, ...], rows: dict[str, Any]) -> tuple[np.n
     return coefficients, t - B @ coefficients
 
 
-def _unchanged(images: Images | None, count: int) -> np.ndarray:
-    """Orthonormal basis (m, r) of the quadratic polynomials of ξ (count,) that the images leave as they are."""
-    m = (count + 1) * (count + 2) // 2
+def _unchanged(images: Images | None, E: np.ndarray) -> np.ndarray:
+    """Orthonormal basis (m, r) of the polynomials of exponents E (m, n) that the images leave as they are."""
+    m, n = E.shape
     if images is None:
         return np.eye(m)
-    X = np.random.default_rng(_SEED).uniform(-1, 1, (3 * m, count))
-    at = monomials(X, 2)[0]
-    mean = np.mean([np.linalg.lstsq(at, monomials(Y, 2)[0], rcond=None)[0] for Y in images.of(X)], axis=0)
+    X = np.random.default_rng(_SEED).uniform(-1, 1, (3 * m, n))
+    many = images.of(X)
+    mean = np.linalg.lstsq(_values(X, E), np.mean([_values(Y, E) for Y in many], axis=0), rcond=None)[0]
     U, sizes, _ = np.linalg.svd(mean)  # columns of `mean` are the averaged polynomials
     return np.asarray(U[:, sizes > 0.5])
+
+
+def _values(X: np.ndarray, E: np.ndarray) -> np.ndarray:
+    """Monomials (N, m)."""
+    table = X[:, :, None] ** np.arange(E.max(initial=0) + 1)
+    return np.asarray(np.prod([table[:, i, E[:, i]] for i in range(E.shape[1])], axis=0))
 
 
 def _equivariant(

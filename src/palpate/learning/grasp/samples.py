@@ -1,11 +1,11 @@
-"""Energies, forces and stiffnesses of a held pad, as values, slopes and curvatures of ℓ = ln(U/U₀), U₀ = ½ ‖S d‖².
+"""Energies, forces and stiffnesses of a held pad, as values, slopes and curvatures of ℓ = ln(U/U₀) − P.
 
-With Q the force −∂U/∂x that belongs to the inputs x = (d, y), its first three components the force F on the hand, and
-with R = ∂Q/∂x, exactly:
+With U₀ = ½ ‖S d‖², Q the force −∂U/∂x that belongs to the inputs x = (d, y), its first three components the force F
+on the hand, and with R = ∂Q/∂x, exactly:
 
-    ℓ = ln U − ln U₀     ∇ℓ = −Q/U − ∇U₀/U₀     ∇²ℓ = −R/U − QQᵀ/U² − ∇²U₀/U₀ + ∇U₀∇U₀ᵀ/U₀²
+    ℓ + P = ln U − ln U₀     ∇(ℓ + P) = −Q/U − ∇U₀/U₀     ∇²(ℓ + P) = −R/U − QQᵀ/U² − ∇²U₀/U₀ + ∇U₀∇U₀ᵀ/U₀²
 
-A pad at rest, d = 0, has neither energy nor force, but its stiffness tells ℓ: exp ℓ = tr(A⁻¹(−∂F/∂d))/3, A = S².
+A pad at rest, d = 0, has neither energy nor force, but its stiffness tells ℓ: exp(P + ℓ) = tr(A⁻¹(−∂F/∂d))/3, A = S².
 
 The rows' natural weights make an error of ℓ one of the energy, of ∂ℓ/∂d one of the force, of ∂²ℓ/∂d² one of the
 stiffness, all relative. How energy and force change with place is known too, from the same solve.
@@ -23,6 +23,7 @@ from palpate.learning.checks import numbers
 from palpate.learning.energy.samples import CURVATURE_SHARE
 from palpate.learning.units.regressors import pairs
 from palpate.surrogates.grasp.rest import _ALL, RestStiffness, monomials
+from palpate.surrogates.grasp.stiffening import Stiffening
 from palpate.units import Range, bounds
 
 __all__ = ["PLACE_SHARE", "GraspSamples"]
@@ -112,7 +113,9 @@ class GraspSamples:
         own = ("X", "energy", "force", "stiffness")
         return replace(self, **{name: getattr(self, name)[which] for name in own})
 
-    def targets(self, rest: RestStiffness) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def targets(
+        self, rest: RestStiffness, stiffening: Stiffening | None = None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """ℓ (N, 1), its slopes (N, 1, n) and curvatures (N, 1, n(n+1)/2) by scaled inputs; unknown ones zero."""
         half, moved = self._half, self.moved
         U0, first, second = _logarithm(rest, self.X[:, :3], self.scaled[:, 3:], half)
@@ -128,12 +131,16 @@ class GraspSamples:
         for row in np.flatnonzero(~moved):
             S = rest.root(self.scaled[row : row + 1, 3:])[0]
             value[row] = np.log(np.trace(np.linalg.solve(S @ S, -self.stiffness[row, :3, :3])) / 3)
+        if stiffening is not None:
+            P, by_inputs, twice = stiffening.at(self.scaled)
+            value, slopes, bends = value - P, slopes - by_inputs, bends - twice[:, i, j]
         slopes[~moved], bends[~moved] = 0.0, 0.0
         return value[:, None], np.nan_to_num(slopes)[:, None], np.nan_to_num(bends)[:, None]
 
     def rows(
         self,
         rest: RestStiffness,
+        stiffening: Stiffening | None = None,
         *,
         curvature_share: float = CURVATURE_SHARE,
         place_share: float = PLACE_SHARE,
@@ -143,7 +150,7 @@ class GraspSamples:
         `curvature_share` is what a stiffness counts beside a force, `place_share` what a change with place counts
         beside energy and force.
         """
-        Y, slopes, curvatures = self.targets(rest)
+        Y, slopes, curvatures = self.targets(rest, stiffening)
         half, n = self._half, len(self.inputs)
         i, j = pairs(n)
         by_force = (self.energy / np.linalg.norm(self.force[:, :3], axis=1).clip(1e-300))[:, None]

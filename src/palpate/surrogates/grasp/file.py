@@ -5,10 +5,13 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import numpy as np
+
 from palpate.errors import FileFormatError, UsageError
 from palpate.network import Archive, TrainedRegion, load_archive, save_archive
 from palpate.surrogates.continuation import Continuation
 from palpate.surrogates.grasp.rest import RestStiffness
+from palpate.surrogates.grasp.stiffening import Stiffening
 from palpate.surrogates.grasp.surrogate import GraspSurrogate
 from palpate.surrogates.touch_file import _doubles, _number
 
@@ -33,7 +36,13 @@ def archive_of(surrogate: GraspSurrogate) -> Archive:
     """What its file holds."""
     going, region = surrogate.continuation, surrogate.region
     assert going is not None
-    arrays = {"widths": going.widths, "rest": surrogate.rest.coefficients}
+    assert surrogate.stiffening is not None
+    arrays = {
+        "widths": going.widths,
+        "rest": surrogate.rest.coefficients,
+        "stiffening": surrogate.stiffening.coefficients,
+        "exponents": surrogate.stiffening.exponents,
+    }
     if region is not None:
         arrays["region"] = region.points
     if surrogate.root is not None:
@@ -77,13 +86,21 @@ def grasp_of(archive: Archive) -> GraspSurrogate:
     region, root = arrays.pop("region", None), arrays.pop("root", None)
     going = Continuation(_doubles(arrays.pop("widths")))
     rest = RestStiffness(_doubles(arrays.pop("rest")), len(network.inputs) - 3)
+    stiffening = Stiffening(_doubles(arrays.pop("stiffening")), _whole(arrays.pop("exponents")))
     if arrays:
         raise ValueError(f"it holds {sorted(arrays)}, which belong to nothing")
     return GraspSurrogate(
         network=network,
         rest=rest,
+        stiffening=stiffening,
         region=None if region is None else TrainedRegion(_doubles(region), _number(meta, "region_radius")),
         continuation=going,
         root=None if root is None else _doubles(root),
         meta=meta["meta"],
     )
+
+
+def _whole(array: np.ndarray) -> np.ndarray:
+    if array.dtype != np.int64:
+        raise TypeError(f"its exponents are {array.dtype} numbers, not whole ones")
+    return array

@@ -1,6 +1,6 @@
 """One held pad: energy, force and stiffness by its displacement, in one pass and without allocation.
 
-With v = S d, a = S v, κ = exp ℓ and g = ∇ℓ, all derivatives by d,
+With v = S d, a = S v, ℓ the network's and the polynomial's sum, κ = exp ℓ and g = ∇ℓ, all derivatives by d,
 
     U = ½ κ v·v       F = −κ (a + ½ v·v g)       ∂F/∂d = −κ [S² + a gᵀ + g aᵀ + ½ v·v (g gᵀ + ∇²ℓ)]
 
@@ -16,6 +16,7 @@ from numba import njit
 
 from palpate.network.second_order import second_order_into
 from palpate.surrogates.grasp.rest import root_at
+from palpate.surrogates.grasp.stiffening import stiffening_into
 from palpate.surrogates.touch_kernels import _boxed, _gathered, _near, _through_box
 
 __all__ = ["grasp_into", "grasps_into"]
@@ -25,7 +26,7 @@ _jit = njit(cache=True, nogil=True, error_model="numpy")
 _SLACK = 1e-9  # of a range: round-off at its edge is still inside
 _ROOT, _LOG, _, _, _VECTORS, _MORE = range(6)  # places in `small`
 _LAST = 2  # row of small[MORE]
-_ZETA = 4  # line in which the scaled further inputs are
+_SCALED = 4  # line in which the scaled inputs are
 
 
 @_jit
@@ -63,7 +64,7 @@ def _inside(lines, limits, points, radius, scales, small) -> bool:  # type: igno
 
 
 @_jit
-def grasp_into(d, y, answer, lines, small, radius, limits, points, rest, grams, net) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def grasp_into(d, y, answer, lines, small, radius, limits, points, laws, grams, net) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Fill `answer` at a displacement d (3,) and further inputs y; whether that is inside the trained region.
 
     Where an input is not finite the whole answer is not-a-number.
@@ -74,21 +75,22 @@ def grasp_into(d, y, answer, lines, small, radius, limits, points, rest, grams, 
         return False
     lines[1, :] = lines[0, :]
     _boxed(lines, limits)
-    zeta, scales = lines[_ZETA], net[3]
-    for i in range(3, lines.shape[1]):
-        zeta[i - 3] = (lines[1, i] - scales[0, i]) / scales[1, i]
-    root_at(zeta, small[_ROOT], *rest)
+    xi, scales = lines[_SCALED], net[3]
+    for i in range(lines.shape[1]):
+        xi[i] = (lines[1, i] - scales[0, i]) / scales[1, i]
+    root_at(xi[3:], small[_ROOT], *laws[0])
     g = small[_VECTORS, 1]
     log_kappa = second_order_into(lines[1], g, small[_LOG], grams, *net)
+    log_kappa += stiffening_into(xi, g, small[_LOG], scales, *laws[1])
     _through_box(g, small[_LOG], lines)
     _assemble(answer, lines[0], math.exp(log_kappa), small)
     return _inside(lines, limits, points, radius, scales, small)
 
 
 @_jit
-def grasps_into(X, answers, inside, lines, small, radius, limits, points, rest, grams, net) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def grasps_into(X, answers, inside, lines, small, radius, limits, points, laws, grams, net) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """`grasp_into` for each row of X (N, n), into answers (N, 14) and inside (N,)."""
     for i in range(X.shape[0]):
         inside[i] = grasp_into(
-            X[i, :3], X[i, 3:], answers[i], lines, small, radius, limits, points, rest, grams, net
+            X[i, :3], X[i, 3:], answers[i], lines, small, radius, limits, points, laws, grams, net
         )

@@ -110,7 +110,7 @@ class RestStiffness:
         return np.asarray((monomials(Z, self.degree)[0] @ self.coefficients)[:, _ALL])
 
     def least(self, Z: np.ndarray) -> float:
-        """Least |eigenvalue| of S over its largest one, over points Z (N, k): zero where a direction has no stiffness."""
+        """Least |eigenvalue| of S over its largest, over Z (N, k): zero where a direction has no stiffness."""
         values = np.abs(np.linalg.eigvalsh(self.root(Z)))
         return float((values.min(axis=1) / values.max(axis=1)).min())
 

@@ -1,9 +1,10 @@
 """A body held by a glued pad as one energy, learnt: nothing at rest, and its force a gradient for every place.
 
-    U(p, d) = ½ ‖S(y) d‖² exp ℓ(d, y),      F = −∂U/∂d at fixed y
+    U(p, d) = ½ ‖S(y) d‖² exp(P(d, y) + ℓ(d, y)),      F = −∂U/∂d at fixed y
 
 d is the displacement of the pad (m), y its place p on the surface and any further inputs of a family of bodies, S a
-symmetric root of the stiffness at rest (`rest`), ℓ a network of one output. F is the force on the hand.
+symmetric root of the stiffness at rest (`rest`), P a polynomial (`stiffening`), ℓ a network of one output. F is the
+force on the hand.
 """
 
 from __future__ import annotations
@@ -25,12 +26,15 @@ from palpate.surrogates.continuation import Continuation
 from palpate.surrogates.grasp.evaluator import GraspEvaluator
 from palpate.surrogates.grasp.kernels import grasps_into
 from palpate.surrogates.grasp.rest import RestStiffness
+from palpate.surrogates.grasp.stiffening import Stiffening
 from palpate.surrogates.touch_kernels import ANSWER, FORCE, SMALL, STIFFNESS
 from palpate.surrogates.touch_surrogate import _history
 from palpate.surrogates.touch_trust import trusts_into
 from palpate.units import Range, bounds
 
 __all__ = ["GraspSurrogate"]
+
+_SHARE = 0.1  # of a range: how far a polynomial may be followed beyond it
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,10 +47,12 @@ class GraspSurrogate:
         ℓ of (d_x, d_y, d_z, y…), one output; its inputs' ranges are the trained ones.
     rest : RestStiffness
         S of the inputs after the displacement.
+    stiffening : Stiffening, optional
+        P of all scaled inputs; zero unless given.
     region : TrainedRegion, optional
         Of the scaled training inputs; without it the ranges alone are the trained region.
     continuation : Continuation, optional
-        How far ℓ and S are followed beyond their training; of the network's ranges unless given.
+        How far ℓ, P and S are followed beyond their training; a tenth of each range unless given.
     root : (1 + n + h, z), optional
         Root of the covariance of ℓ's tail and weights, in the network's scaled output: what `deviation` needs.
     meta : mapping
@@ -60,6 +66,7 @@ class GraspSurrogate:
 
     network: Network
     rest: RestStiffness
+    stiffening: Stiffening | None = None
     region: TrainedRegion | None = None
     continuation: Continuation | None = None
     root: np.ndarray | None = None
@@ -70,7 +77,9 @@ class GraspSurrogate:
         if enough and self.network.basis is not None:
             object.__setattr__(self, "network", self.network.select([0]))
         if self.continuation is None and enough:
-            object.__setattr__(self, "continuation", Continuation.of(self.network.inputs))
+            object.__setattr__(self, "continuation", Continuation.of(self.network.inputs, share=_SHARE))
+        if self.stiffening is None:
+            object.__setattr__(self, "stiffening", Stiffening.none(len(self.network.inputs)))
         if self.root is not None:
             root = np.array(self.root, dtype=np.float64, order="C")
             root.flags.writeable = False
@@ -89,10 +98,14 @@ class GraspSurrogate:
             return f"its network has {n} inputs and {m} outputs, not 3 or more and one"
         if self.rest.count != n - 3:
             return f"its stiffness at rest depends on {self.rest.count} inputs, its network on {n - 3}"
-        if self.region is not None and self.region.points.shape[1] != n:
-            return f"its region has {self.region.points.shape[1]} inputs, its network {n}"
-        if self.continuation is not None and self.continuation.widths.shape != (n,):
-            return f"its continuation has {self.continuation.widths.size} widths for {n} inputs"
+        stiffening, region, going = self.stiffening, self.region, self.continuation
+        for what, count in (
+            ("polynomial", n if stiffening is None else stiffening.exponents.shape[1]),
+            ("region", n if region is None else region.points.shape[1]),
+            ("continuation", n if going is None else len(going.widths)),
+        ):
+            if count != n:
+                return f"its {what} has {count} inputs, its network {n}"
         rows, root = 1 + n + self.network.units, self.root
         if root is not None and not (root.ndim == 2 and len(root) == rows and np.isfinite(root).all()):
             return f"its posterior has shape {root.shape}, not {rows} finite rows"
@@ -107,7 +120,9 @@ class GraspSurrogate:
             f"{self.network.units} {self.network.form} units" if self.network.units else "an affine factor"
         )
         even = ("the same everywhere", "linear in place", "quadratic in place")[self.rest.degree]
-        return f"GraspSurrogate: {names}; stiffness at rest {even}; {units}{_history(self.meta)}"
+        assert self.stiffening is not None
+        law = f"stiffness at rest {even}, polynomial of degree {self.stiffening.degree}"
+        return f"GraspSurrogate: {names}; {law}; {units}{_history(self.meta)}"
 
     @property
     def inputs(self) -> tuple[Range, ...]:
@@ -121,14 +136,15 @@ class GraspSurrogate:
 
     @cached_property
     def _fixed(self) -> tuple[Any, ...]:
-        """What never changes of the kernels' arguments: radius, limits, points, stiffness at rest, grams."""
-        going, region = self.continuation, self.region
+        """What never changes of the kernels' arguments: radius, limits, points, both laws, grams."""
+        going, region, stiffening = self.continuation, self.region, self.stiffening
         assert going is not None
+        assert stiffening is not None
         low, high = bounds(self.inputs)
         radius = math.inf if region is None else region.radius
         points = np.zeros((0, len(self.inputs))) if region is None else region.points
         limits = np.array([low, high, going.widths])
-        return radius, limits, points, self.rest.compiled(), gram(self.network, 3)
+        return radius, limits, points, (self.rest.compiled(), stiffening.compiled()), gram(self.network, 3)
 
     @cached_property
     def _root(self) -> np.ndarray:

@@ -1,0 +1,68 @@
+"""Solves of a held body from a dataset, the displacement's inputs first."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.dataset import Dataset
+from palpate.errors import UsageError
+from palpate.units import Range
+
+__all__ = ["HeldSolves"]
+
+_MOVES = ("d_x", "d_y", "d_z")
+_AXES = {"p_x": 0, "p_y": 1, "p_z": 2}
+
+
+@dataclass(frozen=True, eq=False)
+class HeldSolves:
+    """Converged solves of a body under one glued pad.
+
+    Attributes
+    ----------
+    X : (N, n)
+        Displacement (m), then place (m), then further inputs.
+    energy, force, stiffness : (N,), (N, n), (N, n, n)
+        U, −∂U/∂x and its derivative.
+    inputs : n ranges
+    axes : tuple of int
+        Along which axes the place's coordinates are.
+    """
+
+    X: np.ndarray
+    energy: np.ndarray
+    force: np.ndarray
+    stiffness: np.ndarray
+    inputs: tuple[Range, ...]
+    axes: tuple[int, ...]
+
+    @classmethod
+    def of(cls, data: Dataset) -> HeldSolves:
+        """The converged rows of a dataset.
+
+        Raises
+        ------
+        UsageError
+            If its inputs are not the three components of one pad's displacement, and others.
+        """
+        data = data.ok
+        own = [r.name.split()[-1] for r in data.ranges]
+        if any(own.count(move) != 1 for move in _MOVES):
+            raise UsageError(
+                f"These solves of {', '.join(r.name for r in data.ranges)} are not those of one held pad.",
+                why="A pad is held with all three components of its displacement as inputs.",
+                fix="Sweep with pp.GluedPad(..., displacement=((low, high),) * 3).",
+            )
+        moves = [own.index(move) for move in _MOVES]
+        places = [i for i, name in enumerate(own) if name in _AXES]
+        order = moves + places + [i for i in range(len(own)) if i not in (*moves, *places)]
+        return cls(
+            data.X[:, order],
+            data.potential_energy,
+            data.response[:, order],
+            data.response_gradient[:, order][:, :, order],
+            tuple(data.ranges[i] for i in order),
+            tuple(_AXES[own[i]] for i in places),
+        )

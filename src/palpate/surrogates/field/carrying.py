@@ -1,6 +1,6 @@
 """Values at the nodes of one surface mesh, carried to other places on the same surface.
 
-Locally, by cubic radial functions |r|³ with a linear tail in the tangent plane (Duchon 1977; Wendland 2005, ch. 11),
+Locally, by cubic radial functions |r|³ with a quadratic tail in the tangent plane (Duchon 1977; Wendland 2005, ch. 11),
 through the nearest nodes that face the same way: of third order between nodes, exact at them. Straight facets would
 cut off the bottom of a dimple by h²/8R, a third of a millimetre for elements of 5 mm under a ball of 10 mm.
 """
@@ -15,7 +15,8 @@ __all__ = ["Carrier", "node_normals"]
 
 NEAREST = 20  # nodes that decide a value
 FACING = 0.5  # how far a normal turned by 1 rad sets a node back, over the distance of nodes around
-RIDGE = 1e-10  # of the kernel matrix: where nodes coincide in the tangent plane
+TAIL = 6  # terms of a quadratic in two coordinates
+RIDGE = 1e-10  # of the system: where nodes coincide or lie on a conic in the tangent plane
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,14 +78,13 @@ def _weights(offsets: np.ndarray, facing: np.ndarray) -> np.ndarray:
     offsets = offsets / size[:, None, None]
     apart = np.linalg.norm(offsets[:, :, None] - offsets[:, None], axis=3) ** 3
     first, second = _tangents(facing)
-    tail = np.stack(
-        [np.ones((Q, k)), (offsets @ first[:, :, None])[..., 0], (offsets @ second[:, :, None])[..., 0]],
-        axis=2,
-    )
-    system = np.zeros((Q, k + 3, k + 3))
+    a, b = ((offsets @ along[:, :, None])[..., 0] for along in (first, second))
+    tail = np.stack([np.ones((Q, k)), a, b, a * a, a * b, b * b], axis=2)
+    system = np.zeros((Q, k + TAIL, k + TAIL))
     system[:, :k, :k] = apart + RIDGE * np.eye(k)
     system[:, :k, k:], system[:, k:, :k] = tail, tail.transpose(0, 2, 1)
-    right = np.zeros((Q, k + 3, 1))
+    system[:, k:, k:] = -RIDGE * np.eye(TAIL)
+    right = np.zeros((Q, k + TAIL, 1))
     right[:, :k, 0] = np.linalg.norm(offsets, axis=2) ** 3
     right[:, k, 0] = 1.0
     return np.asarray(np.linalg.solve(system, right)[:, :k, 0])

@@ -1,0 +1,225 @@
+"""A sweep of touches made into a body: images of displacements, symmetry, and what is refused."""
+
+from __future__ import annotations
+
+import functools
+import json
+import math
+
+import numpy as np
+import pytest
+
+import palpate as pp
+import pressed
+from palpate.dataset import Dataset, assemble
+from palpate.dataset.fields import complete
+from palpate.errors import UsageError
+from palpate.learning import TouchHistory, learn_body, learn_dataset
+from palpate.learning.bodies import Touches
+from palpate.learning.bodies.images import shapes_of
+from palpate.physics.solid.symmetry import fundamental_part
+from palpate.surrogates import ContactLaw, TouchedBody, TouchModel
+from palpate.surrogates.field.carrying import Carrier
+from palpate.sweeps import sweep
+from palpate.sweeps.provenance import provenance
+from palpate.validation import validate
+
+RADIUS = 0.010
+
+
+def grid(count: int, size: float = 1.0, *, jitter: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes and triangles of a flat square, the inner nodes moved at random."""
+    axis = np.linspace(0.0, size, count)
+    points = np.stack([*np.meshgrid(axis, axis, indexing="ij"), np.zeros((count, count))], axis=2)
+    shift = np.random.default_rng(0).uniform(-jitter, jitter, (count, count, 2)) * size / count
+    points[1:-1, 1:-1, :2] += shift[1:-1, 1:-1]
+    corner = np.arange(count * count).reshape(count, count)[:-1, :-1].ravel()
+    squares = [
+        [corner, corner + count, corner + count + 1],
+        [corner, corner + count + 1, corner + 1],
+    ]
+    return points.reshape(-1, 3), np.concatenate([np.stack(s, axis=1) for s in squares])
+
+
+def carried_error(count: int) -> float:
+    """Largest error of a smooth function carried from a mesh with `count` nodes on a side."""
+    points, triangles = grid(count, jitter=0.3)
+    places = np.random.default_rng(1).uniform(0.2, 0.8, (200, 3)) * (1.0, 1.0, 0.0)
+    carrier = Carrier.of(points, triangles, places, np.tile([0.0, 0.0, 1.0], (200, 1)))
+    truth, values = (np.sin(3 * p[:, 0]) * np.cos(4 * p[:, 1]) for p in (places, points))
+    return float(np.abs(carrier(values[None, :, None])[0, :, 0] - truth).max())
+
+
+def test_carried_values_are_exact_at_nodes_and_of_third_order_between():
+    points, triangles = grid(9, jitter=0.3)
+    up = np.tile([0.0, 0.0, 1.0], (len(points), 1))
+    values = np.random.default_rng(2).normal(size=(2, len(points), 3))
+    np.testing.assert_allclose(Carrier.of(points, triangles, points, up)(values), values, atol=1e-6)
+    order = math.log2(carried_error(13) / carried_error(25))
+    assert order > 2.0, f"linear interpolation has order 2, these {order:.2f}"
+
+
+def test_a_linear_field_is_carried_as_it_is():
+    points, triangles = grid(9, jitter=0.3)
+    places = np.random.default_rng(1).uniform(0, 1, (50, 3)) * (1.0, 1.0, 0.0)
+    carrier = Carrier.of(points, triangles, places, np.tile([0.0, 0.0, 1.0], (50, 1)))
+    slope = np.array([[1.0, 2.0, 0.0], [0.5, -1.0, 0.0]])
+    np.testing.assert_allclose(carrier((points @ slope.T)[None])[0], places @ slope.T, atol=1e-9)
+
+
+MIDDLE = np.array([0.03, 0.03, 0.03])
+A, B, WIDE = 1e4, 400.0, 0.012  # J/m³, 1/m², m
+
+
+def block() -> tuple[pp.Body, pp.SphereProbe]:
+    """A small square block with coarse elements."""
+    body = pp.Body(pp.Block((0.06, 0.06, 0.03), element=0.02), pp.NeoHookean(9e3, 0.45), fixed="bottom")
+    return body, pp.SphereProbe(RADIUS, depth=(5e-4, 0.004), over=((0.01, 0.01), (0.05, 0.05)))
+
+
+def answers(X: np.ndarray, points: np.ndarray) -> dict[str, np.ndarray]:
+    """Of a body as symmetric as the block: U = A s³ exp(B ρ²), ρ from the axis; a dimple under the ball."""
+    across = (X - MIDDLE) * (1.0, 1.0, 0.0)
+    s = RADIUS + MIDDLE[2] - X[:, 2]
+    U = A * s**3 * np.exp(B * (across**2).sum(axis=1))
+    g = 2 * B * across - 3 * np.outer(1 / s, (0.0, 0.0, 1.0))  # ∇ ln U
+    bend = np.diag([2 * B, 2 * B, 0.0]) - 3 * (1 / s**2)[:, None, None] * np.diag([0.0, 0.0, 1.0])
+    hessian = U[:, None, None] * (g[:, :, None] * g[:, None] + bend)
+    feet = X * (1.0, 1.0, 0.0) + MIDDLE * (0.0, 0.0, 1.0)
+    away = points - feet[:, None]
+    fall = (s[:, None] * np.exp(-(away**2).sum(axis=2) / WIDE**2))[..., None]
+    return {
+        "potential_energy": U,
+        "response": -U[:, None] * g,
+        "response_gradient": -hessian,
+        "displacement": fall * (0.3 * away / WIDE - (0.0, 0.0, 1.0)),
+    }
+
+
+@functools.cache
+def touches() -> Dataset:
+    """24 touches of the part of the block that is no image of another, in columns of four; by formula."""
+    body, probe = block()
+    problem = body.problem(fundamental_part(body, probe), element=0.006)
+    X = problem.interactions[0].design(body.geometry, 24, 0, 4)
+    columns = {field.name: field.empty(len(X)) for field in complete(problem.schema)}
+    columns |= answers(X, problem.mesh.points) | {"converged": np.ones(len(X), dtype=bool)}
+    origin = provenance(problem, X, "points", 0)
+    return assemble(problem.ranges, problem.layout, X, columns, origin, schema=problem.schema)
+
+
+def test_ranges_and_symmetry_are_those_of_the_whole():
+    """Solved is a quadrant; the surrogate's inputs are all of it."""
+    found = Touches.of(touches())
+    assert len(found.matrices) == 8
+    assert touches().X[:, :2].min() > 0.03
+    for r in found.inputs[:2]:
+        assert (r.low, r.high) == pytest.approx((0.01, 0.05), abs=1e-9)
+    columns = found.columns.reshape(6, 4)
+    assert (columns == columns[:, :1]).all()
+    assert len(np.unique(columns)) == 6
+
+
+def test_images_of_a_displacement_are_displacements_of_the_images():
+    """All eight images, shown on a mesh that is fine everywhere, against the formula at the image of the touch."""
+    body, probe = block()
+    layout = body.problem(probe, element=0.006).layout
+    shapes = shapes_of(Touches.of(touches(), layout))
+    assert len(shapes.X) == 8 * 24
+    truth = answers(shapes.X, layout.rest[np.unique(layout.triangles)])["displacement"]
+    miss = np.linalg.norm(shapes.values - truth, axis=2)
+    size = np.linalg.norm(truth, axis=2).max()
+    # cubic in h/w = ½, with a factor below one: the dimple's width is two elements
+    assert miss.max() < 0.1 * size
+    assert miss.mean() < 0.005 * size
+
+
+def test_too_many_images_are_thinned_by_whole_columns():
+    shapes = shapes_of(Touches.of(touches()), most=60)
+    counts = [np.sum(shapes.groups == g) for g in np.unique(shapes.groups)]
+    assert len(counts) == 6
+    assert all(count % 4 == 0 for count in counts)
+    assert sum(counts) < 100
+
+
+@pytest.mark.slow
+def test_a_body_is_learnt_judged_and_kept(tmp_path):
+    """The lines of the first page on a body known by formula: learn, validate, save, load."""
+    body, probe = block()
+    train, test = touches().take(np.arange(20)), touches().take(np.arange(20, 24))
+    layout = body.problem(probe, element=0.006).layout
+    touch, history = learn_dataset(train, layout=layout, seconds=4.0, law=ContactLaw("pad"))
+    assert isinstance(touch, TouchedBody)
+    assert isinstance(history, TouchHistory)
+    judged = validate(touch, test)
+    assert judged.shape is not None
+    assert judged.shape.mean < 1e-4
+    assert judged.force.median < 0.01
+    assert "Displacement is not judged" not in " ".join(judged.notes)
+    loaded = TouchedBody.load(touch.save(tmp_path / "block.palpate"))
+    np.testing.assert_array_equal(loaded.touch.force(test.X), touch.touch.force(test.X))
+    # eight images of a touch feel eight images of one force, which no solve told
+    found, X = Touches.of(touches()), test.X[:1]
+    F = touch.touch.force(X)
+    for matrix in found.matrices:
+        image = found.about + (X - found.about) @ matrix.T
+        # the surface's own spline is symmetric to its spacing's rounding only
+        np.testing.assert_allclose(touch.touch.force(image), F @ matrix.T, atol=1e-6 * np.abs(F).max())
+
+
+def closed_form(**problem) -> Dataset:
+    """Touches of a body whose energy is known, without its shape."""
+    data = pressed.dataset(pressed.solves(pressed.places(40)))
+    origin = json.loads(data.data.attrs["provenance"])
+    acting = {"type": "SphereProbe", "radius": pressed.RADIUS, "touches": "top"}
+    origin["problem"] = {"interactions": [acting], "body": {}} | problem
+    return Dataset(data.data.assign_attrs(provenance=json.dumps(origin)))
+
+
+@pytest.mark.parametrize(
+    ("problem", "words"),
+    [
+        ({"interactions": []}, "not of a body under one probe"),
+        ({"body": {"gravity": [0, 0, -9.81]}}, "constant loads"),
+        ({"body": {"material": {"body": {"type": "Plastic"}}}}, "yields"),
+    ],
+)
+def test_data_that_no_body_can_be_learnt_from_says_why(problem, words):
+    with pytest.raises(UsageError, match=words):
+        learn_body(closed_form(**problem))
+
+
+def test_too_few_solves_are_refused():
+    with pytest.raises(UsageError, match="5 converged solves are too few"):
+        learn_body(closed_form().take(np.arange(5)))
+
+
+def test_data_without_energies_is_refused():
+    data = closed_form()
+    with pytest.raises(UsageError, match="no potential energy"):
+        learn_body(Dataset(data.data.drop_vars("potential_energy")))
+
+
+def test_a_beam_is_still_learnt_as_a_beam():
+    beam = pp.Cantilever(1.0, pp.Circle(0.005), pp.named_material("nylon"), elements=6)
+    data = sweep(beam, pp.TipLoad(0.0, 1.0), samples=9, design="grid", workers=1, progress=False)
+    touch, _ = pp.learn(data, passes=1, refinement=pp.Refinement(samples=9, units_max=1, starts=1))
+    assert isinstance(touch, TouchModel)
+
+
+def test_a_family_of_bodies_is_learnt_as_one():
+    """Elements of a body and of its family: the modulus becomes an input of what is touched."""
+    body, probe = block()
+    family = pp.physics.solid.BodyFamily(body, pp.physics.solid.Varied("young", 5e3, 15e3))
+    small = family.problem(fundamental_part(body, probe), element=0.012)
+    data = sweep(small, samples=16, seed=2, workers=1, progress=False)
+    touch, _ = learn_body(data, seconds=8.0, shape=False)
+    assert [r.name for r in touch.surrogate.parameters] == ["young"]
+    unseen = np.array([[0.035, 0.032, 0.0368, 7e3], [0.033, 0.041, 0.0375, 13e3]])
+    solver = small.open()
+    truth = np.array([solver.solve(x).response[:3] for x in unseen])
+    error = np.linalg.norm(touch.surrogate.force(unseen) - truth, axis=1) / np.linalg.norm(truth, axis=1)
+    # five members, each pressed thrice, tell more of the modulus than the force changes by a few per cent
+    assert error.max() < 0.05
+    soft, stiff = (touch.surrogate.force(np.array([[0.035, 0.032, 0.0368, E]]))[0, 2] for E in (6e3, 12e3))
+    assert 1.3 < stiff / soft < 2.0  # less than twice: the pad in front of it stays as it is

@@ -1,0 +1,113 @@
+"""Studies of pressed bodies: text and back, what is refused, and the objects that they mean."""
+
+from __future__ import annotations
+
+import pytest
+
+from palpate.errors import StudyError
+from palpate.study import Study, TouchStudy, named, preset_study, read_study, to_toml
+from palpate.study.touching.build import limits_of, points_of, probe_of, problem_of, solid_of
+from palpate.study.touching.presets import TOUCHED
+
+ALL = [(name, quick) for name in TOUCHED for quick in (False, True)]
+
+
+@pytest.mark.parametrize(("name", "quick"), ALL)
+def test_every_preset_reads_back_and_builds_its_body(name, quick, tmp_path):
+    study = preset_study(name, quick=quick)
+    path = tmp_path / "s.toml"
+    path.write_text(to_toml(study), encoding="utf-8")
+    assert read_study(path) == study
+    assert study.name == name + ("-quick" if quick else "")
+    body = solid_of(study)
+    assert set(body.materials) == set(body.geometry.regions)
+    assert probe_of(study).touches in body.geometry.surfaces
+
+
+def test_a_quick_study_solves_less_and_asks_less():
+    for name in TOUCHED:
+        whole, quick = preset_study(name), preset_study(name, quick=True)
+        assert quick.sweep.samples < whole.sweep.samples
+        assert quick.sweep.element > whole.probe.radius / 2
+        assert quick.probe.depth[1] < whole.probe.depth[1]
+        for key, value in quick.target:
+            if key not in {"smoothness", "coverage", "loop_work"}:
+                assert value >= getattr(whole.target, key), key
+
+
+def study_file(tmp_path, text: str):
+    path = tmp_path / "s.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_units_are_allowed_and_kept_in_si(tmp_path):
+    study = read_study(
+        study_file(
+            tmp_path,
+            """
+            name = "cube"
+            [body]
+            kind = "block"
+            size = ["4 cm", "40 mm", 0.04]
+            material = { young = "12 kPa", poisson = 0.4 }
+            [probe]
+            radius = "6 mm"
+            pad = "3 N/mm^3"
+            over = [["1 cm", "1 cm"], ["3 cm", "3 cm"]]
+            [sweep]
+            element = "4 mm"
+            """,
+        )
+    )
+    assert isinstance(study, TouchStudy)
+    assert study.body.size == pytest.approx((0.04, 0.04, 0.04))
+    assert study.probe.pad == pytest.approx(3e9)
+    assert solid_of(study).materials["body"].young == pytest.approx(12e3)
+    # a quarter is solved, the whole is shown
+    assert problem_of(study).interactions[0].over == ((0.02, 0.02), (0.03, 0.03))
+    assert problem_of(study, whole=True).interactions[0].over == ((0.01, 0.01), (0.03, 0.03))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('[body]\nkind = "blok"', "no kind of body 'blok'"),
+        ('[body]\nkind = "block"\nsiez = [1, 1, 1]', "did you mean 'size'"),
+        ('[body]\nkind = "block"\nfixed = "botom"', "no surface 'botom'"),
+        ('[body]\nkind = "dome"\nmaterial = "ecoflex"', "There is no material called 'ecoflex'"),
+        ('[body]\nkind = "block"\n[probe]\nradius = "1 kg"', "probe.radius: '1 kg' is not a quantity in m"),
+        ('[body]\nkind = "block"\n[probe]\ndepth = [0.01, 0.002]', "is no range"),
+        ('[body]\nkind = "block"\n[sweep]\nsamples = 8\ndepths = 9', "no column"),
+        ('[body]\nkind = "block"\n[learning]\nsecond = 3', "learning.second: there is no such key"),
+        ('[body]\nkind = "layered"', "body.layers"),
+    ],
+)
+def test_mistakes_are_told_by_their_place(tmp_path, text, words):
+    with pytest.raises(StudyError) as caught:
+        read_study(study_file(tmp_path, text))
+    assert words in str(caught.value)
+
+
+def test_a_file_without_a_kind_is_a_beam_unless_it_has_a_probe(tmp_path):
+    assert isinstance(read_study(study_file(tmp_path, 'name = "b"')), Study)
+
+
+def test_a_target_of_zero_asks_nothing():
+    limits = limits_of(preset_study("block", quick=True))
+    assert limits.smoothness is None
+    assert limits.interval_coverage is None
+    assert limits_of(preset_study("block")).interval_coverage == (0.80, 0.97)
+
+
+def test_columns_have_their_depths_and_tests_have_other_places():
+    study = preset_study("block", quick=True)
+    problem = problem_of(study)
+    train, test = points_of(study, problem), points_of(study, problem, test=True)
+    assert (len(train), len(test)) == (study.sweep.samples, study.test.samples)
+    assert [len(rows) for rows in problem.chains(train)] == [study.sweep.depths] * 8
+    assert not {tuple(p) for p in train[:, :2]} & {tuple(p) for p in test[:, :2]}
+
+
+def test_a_touch_study_takes_another_name():
+    assert named(preset_study("block"), "mine").name == "mine"

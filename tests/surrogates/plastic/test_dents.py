@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -126,7 +127,7 @@ def test_a_random_drive_never_gives_energy() -> None:
     way = np.stack([np.interp(t, np.arange(60), k) for k in knots.T], axis=1)
     force, worst = np.zeros(3), 0.0
     work = 0.0
-    for last, c in zip(way[:-1], way[1:], strict=True):
+    for last, c in itertools.pairwise(way):
         memory.step(c, *bowl(c))
         work -= float((force + memory.force) @ (c - last)) / 2
         force = memory.force.copy()

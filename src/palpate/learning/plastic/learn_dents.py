@@ -1,9 +1,9 @@
 """From presses at one place to the tables of a dent.
 
-With the elastic answer known, U and ∇U at the same positions, a press at one place is a sequence of amplitudes asked,
-q = √(2U), and felt, a = q F·(−∇U)/|∇U|². `Dents` says a = κ(p) (q − p)₊, with p the dent that the largest q so far left.
-First yield, the shares dp/dQ between knots and κ at the knots are found by least squares on the force (Branch, Coleman &
-Li 1999), within bounds that keep what `Dents` promises.
+With the elastic answer known, U and ∇U at the same positions, a press at one place is a sequence of amplitudes
+asked, q = √(2U), and felt, a = q F·(−∇U)/|∇U|². `Dents` says a = κ(p) (q − p)₊, with p the dent that the largest q so
+far left. First yield, the shares dp/dQ between knots and κ at the knots are found by least squares on the force (Branch,
+Coleman & Li 1999), within bounds that keep what `Dents` promises.
 """
 
 from __future__ import annotations
@@ -44,20 +44,23 @@ class Press:
     @property
     def asked(self) -> np.ndarray:
         """q (N,) in √J."""
-        return np.sqrt(2 * np.maximum(self.energy, 0.0))
+        return np.asarray(np.sqrt(2 * np.maximum(self.energy, 0.0)))
 
     @property
     def felt(self) -> np.ndarray:
         """a (N,) in √J; 0 without contact."""
         square = (self.slope**2).sum(1)
         along = -(self.force * self.slope).sum(1)
-        return np.divide(self.asked * along, square, out=np.zeros_like(square), where=square > 0)
+        felt: np.ndarray = np.divide(self.asked * along, square, out=np.zeros_like(square), where=square > 0)
+        return felt
 
     @property
     def weight(self) -> np.ndarray:
         """Force in N per felt amplitude, (N,)."""
         q = self.asked
-        return np.divide(np.linalg.norm(self.slope, axis=1), q, out=np.zeros_like(q), where=q > 0)
+        steep = np.linalg.norm(self.slope, axis=1)
+        weight: np.ndarray = np.divide(steep, q, out=np.zeros_like(q), where=q > 0)
+        return weight
 
 
 def learn_dents(

@@ -5,22 +5,22 @@ p, and the body answers as an elastic one of another size from where the dent en
 
     V = ½ κ(p) (q − p)₊²        F = −∂V/∂c
 
-so the force vanishes at q = p, which is the residual depth, and comes back on the way by which it went. The dent grows where
-q would pass Q(p): pressing goes along the virgin curve q = Q(p). Both Q and κ are tables over p, with Q(0) the first yield,
-Q rising and κ(0) = 1. κ ≠ 1 says by how much stiffer the wider print makes the contact.
+so the force vanishes at q = p, which is the residual depth, and comes back on the way by which it went. The dent
+grows where q would pass Q(p): pressing goes along the virgin curve q = Q(p). Both Q and κ are tables over p, with Q(0)
+the first yield, Q rising and κ(0) = 1. κ ≠ 1 says by how much stiffer the wider print makes the contact.
 
 **Places.** Dents p_j stand at points x_j of the touched surface, and the probe meets their mean
 
     p(c) = Σ w_j(c) p_j        w_j ∝ exp(−|c − x_j|²/2w²),  Σ w_j = 1
 
-A dent left behind stays; a probe beside it meets a part of it, and is drawn along the slope of p. Growth shares itself out
-by the same weights, ṗ_j = λ w_j.
+A dent left behind stays; a probe beside it meets a part of it, and is drawn along the slope of p. Growth shares
+itself out by the same weights, ṗ_j = λ w_j.
 
-**Passive.** V ≥ 0; at kept dents F is the gradient of V, so a closed path that nothing yields on takes nothing. Growth lowers
-V: dV = −(−∂V/∂p) Σ w_j dp_j, with Σ w_j dp_j = λ Σ w_j² ≥ 0 and −∂V/∂p = κ (q − p) − ½ κ′ (q − p)² > 0, which `Dents` demands of its
-tables wherever q ≤ Q(p). A step moves the probe at once at kept dents, and lets the dents grow at a kept probe; what V loses then
-is booked as lost. The scheme is explicit in neither: a closed return to Q(p) = q, stable at any step. What is lost is that
-of the moves, first-order in the step; forces on a straight press don't depend on the step at all.
+**Passive.** V ≥ 0; at kept dents F is the gradient of V, so a closed path that nothing yields on takes nothing. Growth
+lowers V: dV = (∂V/∂p) Σ w_j dp_j, with Σ w_j dp_j = Σ w_j² dλ ≥ 0 and −∂V/∂p = κ (q − p) − ½ κ′ (q − p)² > 0, which
+`Dents` demands of its tables wherever q ≤ Q(p). A step moves the probe at once at kept dents, and lets the dents grow at
+a kept probe, to Q(p) = q in closed form, so it is stable at any length; what V loses then is booked as lost. That is of
+first order in the step, while the forces of a straight press don't depend on the step at all.
 """
 
 from __future__ import annotations

@@ -10,7 +10,9 @@ from typing import Any, get_args
 from pydantic import BaseModel
 
 from palpate.learning import Settings, default, founding
-from palpate.study.models import MaterialRecord, SectionRecord, Study, Unit
+from palpate.study.models import MaterialRecord, SectionRecord, Study
+from palpate.study.record import Unit
+from palpate.study.touching import TouchStudy, shapes
 
 PAGE = Path(__file__).parent / "guide" / "study-file.md"
 BEGIN, END = "<!-- generated: begin -->", "<!-- generated: end -->"
@@ -38,6 +40,27 @@ def _tables() -> Iterator[str]:
                 yield from _table("`[body.material]`", MaterialRecord, about)
             if name == "filter":
                 yield from _settings()
+    yield from _touched()
+
+
+def _touched() -> Iterator[str]:
+    yield "## Reference of a pressed body"
+    yield ""
+    for kind in shapes.KINDS:
+        record = next(r for r in get_args(shapes.ShapeRecord) if r.model_fields["kind"].default == kind)
+        yield from _table(f'`[body]`, `kind = "{kind}"`', record, (record.__doc__ or "").splitlines()[0])
+    for title, record in (
+        ("`[body.material]` and other materials, in place of a name", shapes.SoftRecord),
+        ("`[[body.layers]]`, once per layer", shapes.LayerRecord),
+        ("`[body.skin]`, of a dome", shapes.SkinRecord),
+        ("`[body.inclusion]`, of a dome", shapes.InclusionRecord),
+    ):
+        yield from _table(title, record, (record.__doc__ or "").splitlines()[0])
+    for name, field in TouchStudy.model_fields.items():
+        annotation = field.annotation
+        # the runtime's part is that of a beam
+        if name != "runtime" and isinstance(annotation, type) and issubclass(annotation, BaseModel):
+            yield from _table(f"`[{name}]`", annotation, (annotation.__doc__ or "").splitlines()[0])
 
 
 def _table(title: str, record: type[BaseModel], about: str) -> Iterator[str]:
@@ -59,7 +82,9 @@ def _table(title: str, record: type[BaseModel], about: str) -> Iterator[str]:
 
 
 def _is_table(name: str, annotation: Any) -> bool:
-    return name == "loads" or (isinstance(annotation, type) and issubclass(annotation, BaseModel))
+    parts = (annotation, *get_args(annotation))
+    own = name != "material" and any(isinstance(p, type) and issubclass(p, BaseModel) for p in parts)
+    return own or name in {"loads", "layers"}
 
 
 def _unit(parts: Any) -> str:
@@ -81,7 +106,8 @@ def _kind(schema: dict[str, Any], unit: str) -> str:
         return f"`{json.dumps(schema['const'])}`"
     if "enum" in schema:
         return ", ".join(f"`{json.dumps(word)}`" for word in schema["enum"])
-    many = "list of " if schema.get("type") == "array" else ""
+    kinds = [schema.get("type"), *(part.get("type") for part in schema.get("anyOf", ()))]
+    many = "list of " if "array" in kinds else ""
     if unit:
         return many + f"{unit}" + "".join(f", {b}" for b in bounds)
     words = {
@@ -90,8 +116,9 @@ def _kind(schema: dict[str, Any], unit: str) -> str:
         "boolean": "true or false",
         "string": "text",
         "object": "table",
+        "array": "list",
     }
-    if many:
+    if many and "string" not in kinds:
         return "list of numbers"
     if "anyOf" in schema:
         kinds = [
@@ -105,6 +132,9 @@ def _kind(schema: dict[str, Any], unit: str) -> str:
 def _shown(value: Any) -> str:
     if value is None or value in ((), {}):
         return "–"
+    if isinstance(value, BaseModel):
+        told = value.model_dump(exclude_unset=True)
+        return "`{ " + ", ".join(f"{k} = {v:g}" for k, v in told.items()) + " }`"
     if isinstance(value, tuple):
         return "`[" + ", ".join(map(repr, value)) + "]`"
     if isinstance(value, float):

@@ -2,8 +2,8 @@
 
 With the elastic answer known, U and ∇U at the same positions, a press at one place is a sequence of amplitudes
 asked, q = √(2U), and felt, a = q F·(−∇U)/|∇U|². `Dents` says a = κ(p) (q − p)₊, with p the dent that the largest q so
-far left. First yield, the shares dp/dQ between knots and κ at the knots are found by least squares on the force (Branch,
-Coleman & Li 1999), within bounds that keep what `Dents` promises.
+far left. First yield, the shares dp/dQ between knots and κ at the knots are found by least squares on the force
+(Branch, Coleman & Li 1999), within bounds that keep what `Dents` promises.
 """
 
 from __future__ import annotations

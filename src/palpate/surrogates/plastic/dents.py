@@ -18,9 +18,9 @@ itself out by the same weights, ṗ_j = λ w_j.
 
 **Passive.** V ≥ 0; at kept dents F is the gradient of V, so a closed path that nothing yields on takes nothing. Growth
 lowers V: dV = (∂V/∂p) Σ w_j dp_j, with Σ w_j dp_j = Σ w_j² dλ ≥ 0 and −∂V/∂p = κ (q − p) − ½ κ′ (q − p)² > 0, which
-`Dents` demands of its tables wherever q ≤ Q(p). A step moves the probe at once at kept dents, and lets the dents grow at
-a kept probe, to Q(p) = q in closed form, so it is stable at any length; what V loses then is booked as lost. That is of
-first order in the step, while the forces of a straight press don't depend on the step at all.
+`Dents` demands of its tables wherever q ≤ Q(p). A step moves the probe at once at kept dents, and lets the dents grow
+at a kept probe, to Q(p) = q in closed form, so it is stable at any length; what V loses then is booked as lost.
+That is of first order in the step, while the forces of a straight press don't depend on the step at all.
 """
 
 from __future__ import annotations

@@ -38,6 +38,7 @@ class Springs:
     def answers(self, X: np.ndarray, *, stiffness: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Forces (N, 3) and ∂F/∂c (N, 3, 3); not-a-number where there is no equilibrium or none was asked for."""
         F, K = np.full((len(X), 3), np.nan), np.full((len(X), 3, 3), np.nan)
+        X, turns = self._turned(X)
         solver, values = None, None
         for i, x in enumerate(X):
             if solver is None or values != tuple(x[3:]):
@@ -49,10 +50,24 @@ class Springs:
             if not found.converged:
                 solver.reset()
                 continue
-            F[i] = found.response
+            F[i] = turns[i] @ found.response
             if stiffness:
-                K[i] = found.response_gradient
+                K[i] = turns[i] @ found.response_gradient @ turns[i].T
         return F, K
+
+    def _turned(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Inputs where the mesh is fine, and the rotations (N, 3, 3) that lead back; of a round body only."""
+        turns = np.tile(np.eye(3), (len(X), 1, 1))
+        if self.case.study.symmetry != "round":
+            return X, turns
+        out = X[:, :2] - self.case.about[:2]
+        angle = np.arctan2(out[:, 1], out[:, 0])
+        X = X.copy()
+        X[:, 0], X[:, 1] = self.case.about[0] + np.hypot(*out.T), self.case.about[1]
+        turns[:, 0, 0] = turns[:, 1, 1] = np.cos(angle)
+        turns[:, 1, 0] = np.sin(angle)
+        turns[:, 0, 1] = -turns[:, 1, 0]
+        return X, turns
 
     def _solver(self, values: tuple[float, ...]) -> Any:
         problem = self.case.study.problem()
@@ -76,7 +91,7 @@ def identified(case: Case, training: Training) -> Springs:
         # what has no equilibrium counts as no force
         return np.asarray(((np.nan_to_num(found) - F) * weight[:, None]).ravel())
 
-    body = case.study.body(*training.X[0, 3:])
+    body = case.study.body()
     logs = np.zeros(len(body.material))
     best, r = logs, residual(logs)
     for _ in range(ITERATIONS):

@@ -124,7 +124,7 @@ def _rival_table(result: Measured, beside: list[dict[str, Any]], size: int, mark
         notes=(
             "stiffness of others by central differences of 1 µm; ours and springs have their own; a query of ours is "
             "force and stiffness, of others the force",
-            "ours learns from energies, forces and stiffnesses of the solves, the others from forces: all they take",
+            "ours learns from energies, their slopes and stiffnesses, the others from forces, which is all they take",
             "closed-loop work: |∮F·dx| over ½∮|F·dx| of random triangles to pentagons, by one quadrature that goes on "
             "until it has converged; –: a query of springs is an equilibrium, too slow for it",
             "springs: Young's modulus of each region identified on up to 10 of the solves, errors on 40 of the test; "
@@ -193,6 +193,10 @@ def _symmetry(case: Case) -> str:
     return f"all learn from each solve and its {count} images" if count else "no symmetry"
 
 
+def _denser(case: Case) -> str:
+    return ", denser towards its edges (by the sine)" if case.study.to_edges else ""
+
+
 def _domain(case: Case) -> str:
     """Where the probe was in training and test."""
     train, test = (case.arrays["inputs"][case.rows(role)] for role in ("train", "test"))
@@ -200,8 +204,8 @@ def _domain(case: Case) -> str:
     spans = [f"{np.min(d):.2g} to {np.max(d):.3g} mm deep" for d in depths]
     columns = [len(np.unique(case.arrays["column"][case.rows(role)])) for role in ("train", "test")]
     return (
-        f"training footprints: {columns[0]} of a scrambled Sobol sequence over the surface, depths evenly spaced and "
-        f"shifted, {spans[0]}; test: {columns[1]} other footprints, depths uniform at random, {spans[1]}"
+        f"training footprints: {columns[0]} of a scrambled Sobol sequence over the surface{_denser(case)}, depths "
+        f"evenly spaced and shifted, {spans[0]}; test: {columns[1]} other footprints, depths uniform at random, {spans[1]}"
     )
 
 

@@ -201,6 +201,16 @@ def test_springs_find_the_modulus_that_made_their_data():
     assert found.factors[0] == pytest.approx(1.3, rel=1e-3)
 
 
+def test_touches_of_a_round_body_are_turned_to_where_its_mesh_is_fine(case):
+    round_case = replace(case, study=replace(STUDY, symmetry="round"))
+    X = case.training(20).X
+    turned, back = Springs(round_case, (1.0,))._turned(X)
+    assert np.allclose(turned[:, 1], 0.02)
+    assert (turned[:, 0] >= 0.02).all()
+    about = np.array([0.02, 0.02, 0.0])
+    assert np.allclose(np.einsum("nij,nj->ni", back, turned - about) + about, X, atol=1e-15)
+
+
 def test_relaxation_finds_the_branches_that_made_its_data(tmp_path, monkeypatch):
     touch, height = (0.03, 0.03, 0.04), 0.03
     times = np.geomspace(0.02, 14, 16)

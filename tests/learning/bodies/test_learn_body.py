@@ -214,12 +214,12 @@ def test_a_family_of_bodies_is_learnt_as_one():
     small = family.problem(fundamental_part(body, probe), element=0.012)
     data = sweep(small, samples=16, seed=2, workers=1, progress=False)
     touch, _ = learn_body(data, seconds=8.0, shape=False)
-    assert [r.name for r in touch.surrogate.parameters] == ["young"]
+    assert [r.name for r in touch.touch.parameters] == ["young"]
     unseen = np.array([[0.035, 0.032, 0.0368, 7e3], [0.033, 0.041, 0.0375, 13e3]])
     solver = small.open()
     truth = np.array([solver.solve(x).response[:3] for x in unseen])
-    error = np.linalg.norm(touch.surrogate.force(unseen) - truth, axis=1) / np.linalg.norm(truth, axis=1)
+    error = np.linalg.norm(touch.touch.force(unseen) - truth, axis=1) / np.linalg.norm(truth, axis=1)
     # five members, each pressed thrice, tell more of the modulus than the force changes by a few per cent
     assert error.max() < 0.05
-    soft, stiff = (touch.surrogate.force(np.array([[0.035, 0.032, 0.0368, E]]))[0, 2] for E in (6e3, 12e3))
+    soft, stiff = (touch.touch.force(np.array([[0.035, 0.032, 0.0368, E]]))[0, 2] for E in (6e3, 12e3))
     assert 1.3 < stiff / soft < 2.0  # less than twice: the pad in front of it stays as it is

@@ -127,7 +127,7 @@ def _energy(touches: Touches, options: dict[str, Any]) -> LearntSurrogate:
     return learn_surrogate(
         data.X,
         data.potential_energy,
-        data.response[:, :3],
+        data.response,
         K,
         **{
             "surface": touches.surface,

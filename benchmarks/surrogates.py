@@ -205,7 +205,8 @@ def _domain(case: Case) -> str:
     columns = [len(np.unique(case.arrays["column"][case.rows(role)])) for role in ("train", "test")]
     return (
         f"training footprints: {columns[0]} of a scrambled Sobol sequence over the surface{_denser(case)}, depths "
-        f"evenly spaced and shifted, {spans[0]}; test: {columns[1]} other footprints, depths uniform at random, {spans[1]}"
+        f"evenly spaced and shifted, {spans[0]}; test: {columns[1]} other footprints, depths uniform at random, "
+        f"{spans[1]}"
     )
 
 

@@ -104,6 +104,7 @@ def test_holding_the_button_presses_and_the_numbers_are_the_surrogates(page: Pag
     assert float(released["data"]["largest"]) == 0.0, "back at rest"
 
 
+@pytest.mark.slow
 def test_moving_slides_the_probe_at_its_depth(page: Page, slab: TouchedBody):
     x, y = middle(page)
     page.mouse.move(x, y + 10)
@@ -115,6 +116,7 @@ def test_moving_slides_the_probe_at_its_depth(page: Page, slab: TouchedBody):
     assert after[0, 2] == pytest.approx(before[0, 2], abs=1e-5)
 
 
+@pytest.mark.slow
 def test_the_wheel_presses_deeper_and_beyond_the_training_says_so(page: Page, keep, slab: TouchedBody):
     x, y = middle(page)
     page.mouse.move(x, y + 10)
@@ -131,6 +133,7 @@ def test_the_wheel_presses_deeper_and_beyond_the_training_says_so(page: Page, ke
     page.locator("#depth-wanted").fill(str(shallow))
 
 
+@pytest.mark.slow
 def test_space_presses_arrows_slide_and_escape_lets_go(page: Page, slab: TouchedBody):
     page.focus("#view")
     page.keyboard.down("Space")
@@ -169,6 +172,7 @@ def test_beside_the_touched_surface_the_view_turns_instead(page: Page):
     assert middle(page) == pytest.approx((x, y), abs=0.5)
 
 
+@pytest.mark.slow
 def test_colours_are_chosen_with_their_own_scale(page: Page, keep, slab: TouchedBody):
     assert page.inner_text("#legend-title") == "displacement (mm)"
     x, y = middle(page)

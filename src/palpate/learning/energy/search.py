@@ -30,7 +30,7 @@ __all__ = ["EnergyTrial", "Problem", "Search"]
 
 _WIDTHS = (0.2, 1.0)  # of first units, in scaled inputs: from an edge's reach to the whole range
 _TOLERANCE = 1e-5
-_RIDGE = 1e-10
+_RIDGE = 1e-7  # with 1e-10 some networks bend wildly between solves, with 1e-5 all miss more
 _MOST = 0.98  # leverage; what a solve decides alone is judged by fifty times its residual
 _PASSES = 5
 _STEP = 1.4  # growth of the number of units from one size to the next
@@ -61,12 +61,13 @@ class EnergyTrial:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Scaled inputs ξ (N, n), what `refine` takes besides them, and the images of every solve."""
+    """Scaled inputs ξ (N, n), what `refine` takes besides them, the images of every solve, a penalty on weights."""
 
     X: np.ndarray
     rows: dict[str, np.ndarray]
     images: Images | None
     law: str
+    ridge: float = _RIDGE
 
     def regressors(self, form: str, radial: RadialFunction) -> Regressors:
         """Units of a form, with their images where there is a symmetry."""
@@ -85,7 +86,7 @@ class Problem:
         return refine(
             *(self.X, known.pop("Y"), theta, regressors),
             **known,
-            ridge=_RIDGE,
+            ridge=self.ridge,
             iterations=iterations,
             seconds=seconds,
             tolerance=_TOLERANCE,
@@ -95,7 +96,7 @@ class Problem:
         """Mean over solves of the error of all that is known of one, when it is left out; infinite beyond `room`."""
         known: dict[str, Any] = dict(self.rows)
         rows = Rows.of(refined.regressors, self.X, known.pop("Y"), **known)
-        fit = project(rows, refined.theta, _RIDGE * rows.total)
+        fit = project(rows, refined.theta, self.ridge * rows.total)
         if refined.theta.size + len(fit.tau) >= len(rows.targets):
             return float("inf")
         span = span_of_units(rows, refined.theta, fit) if len(refined.theta) else None

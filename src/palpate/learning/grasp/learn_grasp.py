@@ -24,6 +24,8 @@ from palpate.units import Range
 
 __all__ = ["LearntGrasp", "learn_grasp"]
 
+_RIDGE = 1e-4  # on the units' squared weights: few solves do not decide on large ones in five dimensions
+
 Degree = Literal["auto", 0, 1, 2]
 
 
@@ -128,11 +130,11 @@ def learn_grasp(
         )
         rows = samples.rows(found.rest, found.stiffening)
         law = f"degrees {found.rest.degree} and {found.stiffening.degree}"
-        problem = Problem(samples.scaled, rows, images, law)
+        problem = Problem(samples.scaled, rows, images, law, _RIDGE)
         search = _searched(problem, time.monotonic() + seconds, form, radial, units_max, target, seed)
         best = search.best
         assert best is not None  # the tail at least was tried
-        trust = trust_of(best, problem, samples)
+        trust = trust_of(best, problem, samples, _RIDGE)
     meta: dict[str, Any] = _meta(samples, images, best, search.error, trust.errors)
     network, root = _written_out(best, trust.root, samples, meta)
     surrogate = GraspSurrogate(

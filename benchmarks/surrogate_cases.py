@@ -99,10 +99,10 @@ class Case:
         return Training(*(known[k][rows] for k in ("inputs", "energy", "force", "stiffness", "beside")))
 
     def training_rows(self, count: int) -> np.ndarray:
-        """Rows of so many training solves: the first columns, of each about ∛N depths spread over it."""
+        """Rows of so many training solves: the first columns, of each about ∛N − 1 depths spread over it."""
         rows = self.rows("train")
         columns = [rows[self.arrays["column"][rows] == j] for j in np.unique(self.arrays["column"][rows])]
-        depths = max(1, round(count ** (1 / 3)))
+        depths = max(1, round(count ** (1 / 3)) - 1)
         while sum(min(depths, len(c)) for c in columns) < count and depths < max(map(len, columns)):
             depths += 1
         chosen: list[int] = []

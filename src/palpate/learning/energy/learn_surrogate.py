@@ -28,9 +28,10 @@ from palpate.units import Quantity, Range, bounds
 __all__ = ["LearntSurrogate", "learn_surrogate"]
 
 _LAW_SHARE, _FORM_SHARE = 0.15, 0.35  # of the time
-_FORMS = ("rotated", "rank-2", "axis-aligned", "rank-1")
+_FORMS = ("rotated", "axis-aligned", "rank-2")  # the last for more inputs than the position
 _RADIALS: tuple[RadialFunction, ...] = ("inverse-multiquadric", "matern-5/2", "gaussian")
 _FIRST = 6  # units by which forms are compared
+_SPREAD = (0.6, 1.4)  # sizes of further networks over that of the best
 _COPIES = 512  # points of a region are kept at most; more images would only be thinned again
 Law = ContactLaw | Literal["auto"]
 
@@ -166,7 +167,7 @@ def _searched(
     target: float,
     seed: int,
 ) -> Search:
-    """Every kind of unit at one size, then growth of the best two, and what time is left for other starts."""
+    """Every kind of unit at one size, then growth of the best two, and what time is left for starts of any size."""
     search = Search(problem, deadline, seed)
     copies = 1 if problem.images is None else len(problem.images.turns)
     most, n = units_max // copies, problem.X.shape[1]
@@ -183,9 +184,11 @@ def _searched(
         search.deadline = time.monotonic() + max(search.left, 0.0) / (len(found[:2]) - i)
         search.grow(one, most, target)
         search.deadline = rest
+    rng = np.random.default_rng([seed, len(found)])
     while search.left > 0 and search.error > target and search.best is not None and len(search.best.theta):
-        of, h = search.best.regressors, len(search.best.theta)
-        search.tried(search.random(of, h), of, "random")
+        of = found[int(rng.integers(min(3, len(found))))][0].regressors
+        h = round(len(search.best.theta) * rng.uniform(*_SPREAD))
+        search.tried(search.random(of, min(max(h, 1), most, problem.room(of))), of, "random")
     return search
 
 
@@ -193,7 +196,7 @@ def _kinds(
     form: str, radial: RadialFunction | Literal["auto"], inputs: int
 ) -> list[tuple[str, RadialFunction]]:
     """Forms and radial functions to try: the first of each list with all of the other."""
-    forms = [f for f in _FORMS if f != "rank-2" or inputs > 2] if form == "auto" else [form]
+    forms = [f for f in _FORMS if f != "rank-2" or inputs > 3] if form == "auto" else [form]
     radials = list(_RADIALS) if radial == "auto" else [radial]
     return [(forms[0], r) for r in radials] + [(f, r) for f in forms[1:] for r in radials[:2]]
 

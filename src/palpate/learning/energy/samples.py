@@ -8,6 +8,9 @@ An error of ℓ is a relative one of U; an error δ of ∇ℓ one of the force, 
 U δ/‖K‖. These quotients are the rows' natural weights. Where ∂U/∂p is known of a further input p, ∂ℓ/∂p = ∂U/∂p / U
 counts by the relative energy error that it makes over half the input's range.
 
+What is left out together is a column of depths over one place: with a part of it in the fit, the rest would tell
+nothing of places that were not solved.
+
 A mesh shows through where the contact's radius √(2Rs) is less than an element: there all rows of a sample count less,
 by 1 + (s₀/s)³ for elements of size √(2R s₀).
 """
@@ -27,6 +30,7 @@ from palpate.units import Range, bounds
 
 __all__ = ["CURVATURE_SHARE", "EnergySamples"]
 
+_SAME_FOOT = 0.02  # of the radius
 CURVATURE_SHARE = 0.1  # of a stiffness row's weight: its error level is about three times a force's
 
 
@@ -46,6 +50,8 @@ class EnergySamples:
         ∂F/∂c, N/m; not-a-number where it is not known.
     depth, slope, bend : (N,), (N, 3), (N, 3, 3)
         s, ∇s and ∇²s of the rigid probe into the surface at rest.
+    columns : (N,) int
+        Number of the column that a solve belongs to: solves over one place with the same further inputs.
     inputs : n ranges
     """
 
@@ -56,6 +62,7 @@ class EnergySamples:
     depth: np.ndarray
     slope: np.ndarray
     bend: np.ndarray
+    columns: np.ndarray
     inputs: tuple[Range, ...]
 
     @classmethod
@@ -99,7 +106,8 @@ class EnergySamples:
                 fix="Pass the touched surface of the body at rest, and energies less those without contact.",
             )
         K = (K + K.transpose(0, 2, 1)) / 2
-        return cls(X, U, F, K, s, -gradient, -hessian, tuple(inputs)).take(touching)
+        columns = _columns(X, distance, gradient, radius)
+        return cls(X, U, F, K, s, -gradient, -hessian, columns, tuple(inputs)).take(touching)
 
     def __len__(self) -> int:
         return len(self.X)
@@ -112,7 +120,7 @@ class EnergySamples:
 
     def take(self, which: np.ndarray) -> EnergySamples:
         """Some of them, by index or mask."""
-        own = ("X", "energy", "force", "stiffness", "depth", "slope", "bend")
+        own = ("X", "energy", "force", "stiffness", "depth", "slope", "bend", "columns")
         return replace(self, **{name: getattr(self, name)[which] for name in own})
 
     def targets(self, law: ContactLaw) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -152,12 +160,19 @@ class EnergySamples:
             "slope_weight": np.where(own, (by_force / half) ** 2, 1.0) * np.isfinite(self.force),
             "curvatures": curvatures,
             "curvature_weight": np.nan_to_num(curvature_weight, nan=0.0),
+            "groups": self.columns,
         }
 
     @property
     def _half(self) -> np.ndarray:
         low, high = bounds(self.inputs)
         return np.asarray((high - low) / 2)
+
+
+def _columns(X: np.ndarray, distance: np.ndarray, gradient: np.ndarray, radius: float) -> np.ndarray:
+    """Number (N,) of each solve's column, by its foot on the surface to a share of the radius."""
+    feet = np.round((X[:, :3] - distance[:, None] * gradient) / (_SAME_FOOT * radius))
+    return np.asarray(np.unique(np.hstack([feet, X[:, 3:]]), axis=0, return_inverse=True)[1].ravel())
 
 
 def _responses(force: Any, N: int, n: int) -> np.ndarray:

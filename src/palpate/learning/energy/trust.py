@@ -1,8 +1,9 @@
 """The posterior of the linear weights of ℓ, and the factor that makes it cover the errors of solves left out.
 
-Given the units, the weights have the covariance M = (ΦᵀΦ + λ)⁻¹ times a variance. Leaving solve i out, its rows have
-the covariance H_ii (I − H_ii)⁻¹ (Cook & Weisberg 1982), and its force the relative error that its left-out residual
-has. The variance is chosen such that nine tenths of those errors are below 1.645 deviations.
+Given the units, the weights have the covariance M = (ΦᵀΦ + λ)⁻¹ times a variance. Leaving a group i of solves out, such
+as a column of depths, its rows have the covariance H_ii (I − H_ii)⁻¹ (Cook & Weisberg 1982), and the force of each solve
+the relative error that its left-out residual has. The variance is chosen such that nine tenths of those errors are below
+1.645 deviations.
 """
 
 from __future__ import annotations
@@ -43,29 +44,37 @@ class Trust:
 class Touches(Protocol):
     """What is asked of samples: energy (N,), force (N, 3 or more), and half of each input's range."""
 
-    energy: np.ndarray
-    force: np.ndarray
+    @property
+    def energy(self) -> np.ndarray: ...
+
+    @property
+    def force(self) -> np.ndarray: ...
 
     @property
     def _half(self) -> np.ndarray: ...
 
 
-def trust_of(refined: Refined, problem: Problem, samples: Touches, ridge: float = 1e-10) -> Trust:
+def trust_of(refined: Refined, problem: Problem, samples: Touches, ridge: float | None = None) -> Trust:
     """From the solves that the network was refined on."""
     known: dict[str, Any] = dict(problem.rows)
     rows = Rows.of(refined.regressors, problem.X, known.pop("Y"), **known)
-    fit = project(rows, refined.theta, ridge * rows.total)
+    fit = project(rows, refined.theta, (problem.ridge if ridge is None else ridge) * rows.total)
     span = span_of_units(rows, refined.theta, fit) if len(refined.theta) else None
     missed = left_out_rows(rows, fit, basis=span, most=_MOST) @ rows.modes
     Q = fit.Q
     to_force, at = _to_force(rows, samples), _slope_rows(rows)
     errors, sizes = np.empty(len(at)), np.empty(len(at))
-    for k, (i, first) in enumerate(at):
-        block = np.r_[i, first + np.arange(3)]
-        errors[k] = np.linalg.norm(to_force[k] @ missed[block, 0])
-        values, V = np.linalg.eigh(Q[block] @ Q[block].T)
+    together = rows.groups[rows.samples]
+    for group in np.unique(rows.groups[[i for i, _ in at]]):
+        members = np.flatnonzero(together == group)
+        values, V = np.linalg.eigh(Q[members] @ Q[members].T)
         values = np.clip(values, 0.0, _MOST)
-        sizes[k] = np.linalg.norm(to_force[k] @ (V * np.sqrt(values / (1.0 - values))))
+        spread = V * np.sqrt(values / (1.0 - values))
+        for k, (i, first) in enumerate(at):
+            if rows.groups[i] == group:
+                block = np.r_[i, first + np.arange(3)]
+                errors[k] = np.linalg.norm(to_force[k] @ missed[block, 0])
+                sizes[k] = np.linalg.norm(to_force[k] @ spread[np.searchsorted(members, block)])
     ratio = float(np.quantile(errors / np.maximum(sizes, 1e-300), 0.9)) / _NINE_TENTHS
     triangle = np.linalg.cholesky(fit.inverse + 1e-14 * np.trace(fit.inverse) * np.eye(len(fit.tau)))
     return Trust(ratio * triangle, errors)

@@ -4,6 +4,8 @@ The pad is glued around a point of the top and displaced by up to 4 mm in every 
 inputs; the block's square symmetry makes eight solves of each.
 """
 
+from itertools import pairwise
+
 import numpy as np
 
 import palpate as pp
@@ -45,7 +47,7 @@ for lift in (0.0, 0.001, 0.002, 0.004):
 corners = np.array([[0.003, 0, 0], [0, 0.003, 0.002], [-0.002, 0, -0.003], [0.003, 0, 0]])
 at, weight = np.polynomial.legendre.leggauss(24)
 work = 0.0
-for a, b in zip(corners[:-1], corners[1:], strict=True):
+for a, b in pairwise(corners):
     for t, w in zip(at, weight, strict=True):
         held(a + (t + 1) / 2 * (b - a), place)
         work += w / 2 * held.force @ (b - a)

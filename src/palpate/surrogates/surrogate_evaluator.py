@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -41,7 +41,7 @@ class SurrogateEvaluator:
         An input of the surrogate.
     """
 
-    _kernel = staticmethod(touch_into)
+    _kernel: Callable[..., bool] = staticmethod(touch_into)
 
     def __init__(self, compiled: tuple[Any, ...], root: np.ndarray, somewhere: Sequence[float]) -> None:
         self._answer = np.zeros(ANSWER)

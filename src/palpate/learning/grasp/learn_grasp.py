@@ -135,10 +135,11 @@ def learn_grasp(
         best = search.best
         assert best is not None  # the tail at least was tried
         trust = trust_of(best, problem, samples, _RIDGE)
-    meta: dict[str, Any] = _meta(samples, images, best, search.error, trust.errors)
-    network, root = _written_out(best, trust.root, samples, meta)
+    seen: Any = samples  # like those of touches where it matters
+    meta: dict[str, Any] = _meta(seen, images, best, search.error, trust.errors)
+    network, root = _written_out(best, trust.root, seen, meta)
     surrogate = GraspSurrogate(
-        network, found.rest, found.stiffening, region=_region(samples, images), root=root, meta=meta
+        network, found.rest, found.stiffening, region=_region(seen, images), root=root, meta=meta
     )
     return LearntGrasp(surrogate, tuple(search.trials), trust.errors, search.error, found.errors)
 

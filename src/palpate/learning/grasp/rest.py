@@ -56,12 +56,11 @@ def found_law(
     isometries: Sequence[np.ndarray],
     degree: int | None = None,
     stiffening: int | None = None,
-    **shares: float,
 ) -> FoundLaw:
     """S and P of given degrees, or of those whose error on solves left out is least."""
     n, enough = len(samples.inputs), len(samples) >= _LEAST
     highest = MOST if n > 3 and enough else 0
-    search = {d: _Search(d, images, isometries, n - 3, shares) for d in range(MOST + 1)}
+    search = {d: _Search(d, images, isometries, n - 3) for d in range(MOST + 1)}
     fits, errors = {}, {}
     for d in range(highest + 1) if degree is None else [degree]:
         fits[d] = search[d].fitted(samples)
@@ -94,9 +93,8 @@ class _Search:
         images: Images | None,
         isometries: Sequence[np.ndarray],
         count: int,
-        shares: dict[str, float],
     ) -> None:
-        self.count, self.shares, self.images = count, shares, images
+        self.count, self.images = count, images
         self.basis = _equivariant(degree, images, isometries, count)
         self._set(_QUADRATIC)
 
@@ -120,15 +118,15 @@ class _Search:
         columns = self._columns(samples)
         if not rounds:
             rest = self._rest(theta)
-            return _Fit(rest, theta, _solved(columns, samples.rows(rest, **self.shares))[0])
+            return _Fit(rest, theta, _solved(columns, samples.rows(rest))[0])
 
         def missed(unknowns: np.ndarray) -> np.ndarray:
-            rows = samples.rows(self._rest(unknowns), **self.shares)
-            return np.r_[_solved(columns, rows)[1], _FIRST * (unknowns - theta) / size]
+            rows = samples.rows(self._rest(unknowns))
+            return np.concatenate([_solved(columns, rows)[1], _FIRST * (unknowns - theta) / size])
 
         found = least_squares(missed, theta, x_scale=size, max_nfev=rounds, ftol=1e-6, xtol=1e-8).x
         rest = self._rest(found)
-        return _Fit(rest, found, _solved(columns, samples.rows(rest, **self.shares))[0])
+        return _Fit(rest, found, _solved(columns, samples.rows(rest))[0])
 
     def left_out(self, samples: GraspSamples, start: np.ndarray, rounds: int = 4) -> float:
         """Root of the mean over solves of the weighted squares that they miss when left out, a fifth at a time."""
@@ -138,7 +136,7 @@ class _Search:
             out[order[k::_FOLDS]] = True
             fit = self.fitted(samples.take(~out), start, rounds)
             others = samples.take(out)
-            rows = others.rows(fit.rest, **self.shares)
+            rows = others.rows(fit.rest)
             A, y, w = _stacked(self._columns(others), rows)
             total += float((w * (y - A @ fit.polynomial) ** 2).sum())
         return float(np.sqrt(total / len(samples)))

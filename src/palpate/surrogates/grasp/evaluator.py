@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from palpate.surrogates.grasp.kernels import grasp_into
 from palpate.surrogates.surrogate_evaluator import SurrogateEvaluator
 
@@ -16,7 +18,7 @@ class GraspEvaluator(SurrogateEvaluator):
     held changes the energy, by no work of the hand: to hold elsewhere is a new grasp.
     """
 
-    _kernel = staticmethod(grasp_into)
+    _kernel: Callable[..., bool] = staticmethod(grasp_into)
 
     def __repr__(self) -> str:
         where = "inside" if self.inside else "outside"

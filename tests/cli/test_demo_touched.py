@@ -12,7 +12,8 @@ import pytest
 from palpate.dataset import Dataset
 from palpate.surrogates import TouchedBody
 
-pytestmark = pytest.mark.slow
+# a minute on two free cores; a busy machine is no failure
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
 
 @pytest.fixture(scope="module")

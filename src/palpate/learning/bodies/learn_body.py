@@ -124,21 +124,15 @@ def learn_body(
 def _energy(touches: Touches, options: dict[str, Any]) -> LearntSurrogate:
     data = touches.data
     K = data.response_gradient[:, :3, :3] if "response_gradient" in data else None
-    return learn_surrogate(
-        data.X,
-        data.potential_energy,
-        data.response,
-        K,
-        **{
-            "surface": touches.surface,
-            "radius": touches.radius,
-            "inputs": touches.inputs,
-            "symmetry": touches.matrices if len(touches.matrices) > 1 else (),
-            "about": touches.about,
-            "resolved": touches.resolved,
-        }
-        | options,
-    )
+    known: dict[str, Any] = {
+        "surface": touches.surface,
+        "radius": touches.radius,
+        "inputs": touches.inputs,
+        "symmetry": touches.matrices if len(touches.matrices) > 1 else (),
+        "about": touches.about,
+        "resolved": touches.resolved,
+    }
+    return learn_surrogate(data.X, data.potential_energy, data.response, K, **(known | options))
 
 
 def _shape(touches: Touches, seconds: float, seed: int) -> LearntField:

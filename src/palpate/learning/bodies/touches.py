@@ -147,10 +147,10 @@ def _surface(data: Dataset, layout: Layout | None, name: str) -> tuple[np.ndarra
         rest, triangles = data.rest, data.triangles
         surfaces, of = data["surface"].tolist(), data["surface_of"]
     else:
-        rest, triangles, surfaces = layout.rest, layout.triangles, list(layout.surfaces)
-        of = layout.surface_of
-    assert triangles is not None
-    assert of is not None
+        assert layout.triangles is not None
+        assert layout.surface_of is not None
+        rest, triangles, of = layout.rest, layout.triangles, layout.surface_of
+        surfaces = list(layout.surfaces)
     names = (name,) if name in surfaces else UPRIGHT if name == "side" else ()
     touched = np.isin(of, [i for i, one in enumerate(surfaces) if one in names])
     if not touched.any():

@@ -41,7 +41,7 @@ class Carrier:
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
         """Values (N, P, c) at the places, (N, Q, c)."""
-        carried = np.zeros((len(values), len(self.nodes), values.shape[2]))
+        carried: np.ndarray = np.zeros((len(values), len(self.nodes), values.shape[2]))
         for node, weight in zip(self.nodes.T, self.weights.T, strict=True):
             carried += weight[:, None] * values[:, node]
         return carried
@@ -55,7 +55,7 @@ def node_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     for corner in triangles.T:
         np.add.at(normals, corner, areas)
     length = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.divide(normals, length, out=normals, where=length > 0)
+    return np.asarray(np.divide(normals, length, out=normals, where=length > 0))
 
 
 def _neighbours(

@@ -186,7 +186,7 @@ MODULUS = Range("E", 5e3, 20e3, "Pa")
 
 def family(count, seed):
     """Touches of bodies whose energy goes with E^0.8, softer ones more so at depth; −∂U by all four inputs."""
-    X, U, F, K = touches(count, seed)
+    X, U, F, _ = touches(count, seed)
     E = np.random.default_rng(seed + 100).uniform(5e3, 20e3, count)
     z = (X[:, 2] - MIDDLE[2]) / (SIDE / 2)
     power = 0.8 + 0.1 * z

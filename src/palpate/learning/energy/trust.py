@@ -1,9 +1,9 @@
 """The posterior of the linear weights of ℓ, and the factor that makes it cover the errors of solves left out.
 
-Given the units, the weights have the covariance M = (ΦᵀΦ + λ)⁻¹ times a variance. Leaving a group i of solves out, such
-as a column of depths, its rows have the covariance H_ii (I − H_ii)⁻¹ (Cook & Weisberg 1982), and the force of each solve
-the relative error that its left-out residual has. The variance is chosen such that nine tenths of those errors are below
-1.645 deviations.
+Given the units, the weights have the covariance M = (ΦᵀΦ + λ)⁻¹ times a variance. Leaving a group i of solves
+out, such as a column of depths, its rows have the covariance H_ii (I − H_ii)⁻¹ (Cook & Weisberg 1982), and the
+force of each solve the relative error that its left-out residual has. The variance is chosen such that nine
+tenths of those errors are below 1.645 deviations.
 """
 
 from __future__ import annotations

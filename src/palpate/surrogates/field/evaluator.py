@@ -89,7 +89,7 @@ class FieldEvaluator:
 
     @property
     def place(self) -> np.ndarray:
-        """Where the last call evaluated (8,): depth s (m), f, then foot (m) and normal; all zero but s without contact."""
+        """Where the last call was (8,): depth s (m), f, foot (m) and normal; all zero but s without contact."""
         return self._place
 
     @property

@@ -9,15 +9,12 @@ from itertools import pairwise
 import numpy as np
 
 import palpate as pp
-from palpate.learning.grasp import HeldSolves, learn_grasp
-from palpate.surrogates.grasp import GraspSurrogate
 
 tissue = pp.Body(pp.Block((0.06, 0.06, 0.03)), pp.NeoHookean(young=9e3, poisson=0.45), fixed="bottom")
 cup = pp.GluedPad(
     radius=0.012, over=((0.025, 0.025), (0.035, 0.035)), displacement=((-0.004, 0.004),) * 3, element=0.012
 )
-solves = HeldSolves.of(pp.sweep(tissue, cup, samples=8, seed=0))
-print(", ".join(map(str, solves.inputs)))
+solves = pp.sweep(tissue, cup, samples=8, seed=0)
 
 square = [
     np.array(m, dtype=float)
@@ -25,17 +22,11 @@ square = [
     for t in (1, -1)
     for m in ([[s, 0, 0], [0, t, 0], [0, 0, 1]], [[0, s, 0], [t, 0, 0], [0, 0, 1]])
 ]
-found = learn_grasp(
-    *(solves.X, solves.energy, solves.force, solves.stiffness),
-    inputs=solves.inputs,
-    axes=solves.axes,
-    symmetry=square,
-    seconds=3.0,
-)
-print(found.surrogate)
+surrogate, found = pp.learn(solves, symmetry=square, seconds=3.0)
+print(surrogate)
 print(f"left-out force error: {100 * np.median(found.errors):.2f} % median")
 
-held = GraspSurrogate.load(found.surrogate.save("held.palpate")).evaluator()
+held = pp.GraspSurrogate.load(surrogate.save("held.palpate")).evaluator()
 place = np.array([0.030, 0.028])
 for lift in (0.0, 0.001, 0.002, 0.004):
     held(np.array([0.0, 0.0, lift]), place)

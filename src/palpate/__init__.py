@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from palpate.physics import (
         Block,
         Body,
+        BodyFamily,
         BodyForce,
         Cantilever,
         Circle,
@@ -59,6 +60,7 @@ if TYPE_CHECKING:
         TipLoad,
         Tube,
         UserMaterial,
+        Varied,
         Viscoelastic,
         VoceHardening,
         Yeoh,
@@ -68,6 +70,8 @@ if TYPE_CHECKING:
     from palpate.physics.massspring import MassSpringBody
     from palpate.study import Study, TouchStudy, preset_study, read_study
     from palpate.surrogates import TouchedBody, TouchedSurface, TouchModel, TouchSurrogate
+    from palpate.surrogates.grasp import GraspSurrogate
+    from palpate.surrogates.plastic import HeldBody
     from palpate.sweeps import ExternalProblem, Space, local_cluster, sweep
     from palpate.units import Quantity, Range
     from palpate.validation import validate, write_report
@@ -78,6 +82,7 @@ __version__ = "0.1.0"
 _HOMES = {
     "Block": "physics",
     "Body": "physics",
+    "BodyFamily": "physics",
     "BodyForce": "physics",
     "Cantilever": "physics",
     "Circle": "physics",
@@ -90,7 +95,9 @@ _HOMES = {
     "Field": "dataset",
     "Fitted": "learning",
     "GluedPad": "physics",
+    "GraspSurrogate": "surrogates.grasp",
     "Held": "physics",
+    "HeldBody": "surrogates.plastic",
     "ImportedMesh": "physics",
     "ImportedSolid": "physics",
     "Inclusion": "physics",
@@ -134,6 +141,7 @@ _HOMES = {
     "TouchedSurface": "surrogates",
     "Tube": "physics",
     "UserMaterial": "physics",
+    "Varied": "physics",
     "Viscoelastic": "physics",
     "VoceHardening": "physics",
     "Yeoh": "physics",
@@ -154,6 +162,7 @@ _HOMES = {
 __all__ = [
     "Block",
     "Body",
+    "BodyFamily",
     "BodyForce",
     "Cantilever",
     "Circle",
@@ -166,7 +175,9 @@ __all__ = [
     "Field",
     "Fitted",
     "GluedPad",
+    "GraspSurrogate",
     "Held",
+    "HeldBody",
     "ImportedMesh",
     "ImportedSolid",
     "Inclusion",
@@ -210,6 +221,7 @@ __all__ = [
     "TouchedSurface",
     "Tube",
     "UserMaterial",
+    "Varied",
     "Viscoelastic",
     "VoceHardening",
     "Yeoh",

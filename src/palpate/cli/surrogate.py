@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from palpate.cli.console import Console
 from palpate.errors import UsageError
@@ -42,10 +42,15 @@ def validate_file(
     from palpate.dataset import Dataset
     from palpate.network import load_archive
     from palpate.surrogates import TouchedBody, TouchSurrogate
+    from palpate.surrogates.grasp import GraspSurrogate
     from palpate.validation import SurrogateChapter, validate, write_report
     from palpate.validation.surrogate import unseen_solves
 
-    kinds = {"touch-surrogate": TouchSurrogate, "touched-body": TouchedBody}
+    kinds: dict[str, Any] = {
+        "touch-surrogate": TouchSurrogate,
+        "touched-body": TouchedBody,
+        "grasp-surrogate": GraspSurrogate,
+    }
     if (kind := load_archive(path).kind) not in kinds:
         raise UsageError(
             f"{path} holds {kind!r}, which is not judged by itself.",
@@ -57,6 +62,8 @@ def validate_file(
     data, fine = _test(path, test), None if refined is None else Dataset.open(refined)
     validation = validate(model, data, refined=fine)
     text, target = str(validation), path.with_suffix(".html") if report else None
+    if isinstance(surrogate, GraspSurrogate):
+        target = None  # the report's pictures are of touches on a surface
     if target is not None:
         solves, _ = unseen_solves(surrogate, data)
         told = {"settings": surrogate.meta, "provenance": data.provenance}

@@ -83,8 +83,11 @@ from palpate.physics.materials import (
 )
 from palpate.physics.solid import (
     Body,
+    BodyFamily,
+    FamilyProblem,
     SolidProblem,
     SolidSolution,
+    Varied,
 )
 
 __all__ = [
@@ -94,12 +97,14 @@ __all__ = [
     "BeamProblem",
     "Block",
     "Body",
+    "BodyFamily",
     "BodyForce",
     "BodyMesh",
     "Cantilever",
     "Circle",
     "Cylinder",
     "Dome",
+    "FamilyProblem",
     "FibreFamily",
     "FibreReinforced",
     "FineMesh",
@@ -141,6 +146,7 @@ __all__ = [
     "TipLoad",
     "Tube",
     "UserMaterial",
+    "Varied",
     "Viscoelastic",
     "VoceHardening",
     "Yeoh",

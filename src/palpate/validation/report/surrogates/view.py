@@ -12,6 +12,7 @@ __all__ = ["View", "at_depth", "feet"]
 
 AXES = ("x", "y", "z")
 ALONG = 0.9  # cosine from which a direction of the view is called by an axis
+TILT = 0.05  # a view so little off an axis is still drawn with x across
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +30,7 @@ class View:
         length = float(np.linalg.norm(out))
         out = out / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
         # the axis that is most across becomes the page's, so that a flat block is seen as it is drawn
-        axis = np.eye(3)[int(np.argmin(np.abs(out) + 1e-6 * np.arange(3)))]
+        axis = np.eye(3)[int(np.argmin(np.abs(out) + TILT * np.arange(3)))]
         across = axis - (axis @ out) * out
         across /= np.linalg.norm(across)
         return cls(across, np.cross(out, across), out)

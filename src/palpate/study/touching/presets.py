@@ -1,6 +1,6 @@
 """Bodies that have a name, and for each a quick form that shows the whole way within two minutes.
 
-The quick form has coarse elements, few touches and less depth; it asks what a person can notice, not more.
+The quick form has coarse elements, few touches and less depth, and asks for less: it shows the way, not what can be had.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ TOUCHED: dict[str, dict[str, Any]] = {
     "block": {
         "body": {"kind": "block", "size": (0.10, 0.10, 0.05), "material": {"young": 9e3, "name": "tissue"}},
         "probe": {"depth": (2e-4, 0.012), "over": ((0.0, 0.0), (0.10, 0.10))},
-        "sweep": {"samples": 40, "depths": 5},
+        "sweep": {"samples": 40, "depths": 2},  # places tell more than depths
     },
     "layered": {
         "body": {
             "kind": "layered",
             "extent": (0.10, 0.10),
             "layers": (
-                {"name": "skin", "thickness": 0.002, "material": {"young": 30e3, "name": "skin"}},
-                {"name": "fat", "thickness": 0.010, "material": {"young": 4e3, "name": "fat"}},
+                {"name": "skin", "thickness": 0.003, "material": {"young": 30e3, "name": "skin"}},
+                {"name": "fat", "thickness": 0.009, "material": {"young": 4e3, "name": "fat"}},
                 {"name": "muscle", "thickness": 0.028, "material": {"young": 15e3, "name": "muscle"}},
             ),
         },
         "probe": {"depth": (2e-4, 0.012), "over": ((0.02, 0.02), (0.08, 0.08))},
-        "sweep": {"samples": 80, "depths": 5},
+        "sweep": {"samples": 80, "depths": 3},
     },
     "breast-dome": {
         "body": {
@@ -39,15 +39,15 @@ TOUCHED: dict[str, dict[str, Any]] = {
             "radius": 0.06,
             "height": 0.045,
             "material": {"young": 6e3, "name": "gland and fat"},
-            "skin": {"thickness": 0.002, "material": {"young": 20e3, "name": "skin"}},
+            "skin": {"thickness": 0.003, "material": {"young": 20e3, "name": "skin"}},
         },
         "probe": {"depth": (2e-4, 0.012), "over": ((-0.045, -0.045), (0.045, 0.045))},
-        "sweep": {"samples": 80, "depths": 5},
+        "sweep": {"samples": 80, "depths": 3},
     },
     "liver": {
         "body": {"kind": "organ", "length": 0.20, "material": {"young": 6e3, "name": "liver"}},
         "probe": {"touches": "front", "depth": (2e-4, 0.015)},
-        "sweep": {"samples": 200, "depths": 5},
+        "sweep": {"samples": 200, "depths": 3},
         "learning": {"seconds": 120.0, "units_max": 120},
     },
     "phantom": {
@@ -59,7 +59,7 @@ TOUCHED: dict[str, dict[str, Any]] = {
             "inclusion": {"centre": (0.0, 0.0, 0.02), "radius": 0.008, "material": "dragon skin 30"},
         },
         "probe": {"depth": (2e-4, 0.010), "over": ((-0.03, -0.03), (0.03, 0.03))},
-        "sweep": {"samples": 80, "depths": 5},
+        "sweep": {"samples": 80, "depths": 3},
     },
 }
 """What each study says; everything else is the record's default."""
@@ -75,7 +75,7 @@ _COARSE: dict[str, tuple[float, float, float]] = {
 _QUICK: dict[str, Any] = {
     "test": {"samples": 24, "depths": 4},
     "learning": {"seconds": 10.0, "units_max": 64},
-    # limits of what a person notices (Jones 1989 and others, see palpate.validation.limits), and no more
+    # coarse elements show through and few touches can't tell them from the body: softer limits than a whole study's
     "target": {
         "force_median": 0.035,
         "force_p95": 0.10,
@@ -84,7 +84,7 @@ _QUICK: dict[str, Any] = {
         "direction_p95": 10.0,
         "displacement_mean": 3.5e-4,
         "displacement_max": 2e-3,
-        "smoothness": 0.0,  # coarse elements show through, and few touches can't tell them from the body
+        "smoothness": 0.0,
         "coverage": (0.0, 1.0),
     },
 }
@@ -100,7 +100,7 @@ def touched_preset(name: str, *, quick: bool = False) -> TouchStudy:
     content["name"] = name + QUICK
     content["body"] = {**content["body"], "element": coarse}
     content["probe"] = {**content["probe"], "depth": (2e-4, depth)}
-    content["sweep"] = {"samples": 32, "depths": 4, "element": element}
+    content["sweep"] = {"samples": 32, "depths": 2, "element": element}
     if name != "block":  # thin layers and round bodies keep more elements, so that a solve takes longer
         content["sweep"] |= {"samples": 24}
         content["test"] = {"samples": 12, "depths": 4}

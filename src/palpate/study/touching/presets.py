@@ -1,6 +1,7 @@
 """Bodies that have a name, and for each a quick form that shows the whole way within two minutes.
 
-The quick form has coarse elements, few touches and less depth, and asks for less: it shows the way, not what can be had.
+The quick form has coarse elements, few touches and less depth, and asks for less: it shows the way, not what can be
+reached.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@
     solves     what a touched body is judged by                   dispatch  `validate`
     strokes    smoothness of the force at 1 kHz                   coverage  does the interval hold what it says
     quadrature work around closed paths, converged                mesh_error the mesh's error apart
-    parts      shallow, deep, edge, worst cases
+    parts      shallow, deep, edge, worst cases                   held     of a held body that remembers
     report/    one self-contained page with figures and tables
 
 Names are loaded when they are first used: Matplotlib and Jinja2 cost time that only a report needs.
@@ -22,8 +22,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from palpate.validation.dispatch import validate
+    from palpate.validation.held import HeldLimits, HeldValidation, validate_held
     from palpate.validation.limits import Check, Limits
-    from palpate.validation.report import Chapter, SurrogateChapter, write_report
+    from palpate.validation.report import Chapter, HeldChapter, SurrogateChapter, write_report
     from palpate.validation.result import Validation
     from palpate.validation.solves import TouchFunction, TouchSolves
     from palpate.validation.surrogate import SurrogateValidation
@@ -31,6 +32,9 @@ if TYPE_CHECKING:
 __all__ = [
     "Chapter",
     "Check",
+    "HeldChapter",
+    "HeldLimits",
+    "HeldValidation",
     "Limits",
     "SurrogateChapter",
     "SurrogateValidation",
@@ -38,6 +42,7 @@ __all__ = [
     "TouchSolves",
     "Validation",
     "validate",
+    "validate_held",
     "write_report",
 ]
 
@@ -45,6 +50,9 @@ _HOMES = {
     "Check": "limits",
     "Limits": "limits",
     "Chapter": "report",
+    "HeldChapter": "report",
+    "HeldLimits": "held",
+    "HeldValidation": "held",
     "SurrogateChapter": "report",
     "SurrogateValidation": "surrogate",
     "TouchFunction": "solves",
@@ -52,6 +60,7 @@ _HOMES = {
     "write_report": "report",
     "Validation": "result",
     "validate": "dispatch",
+    "validate_held": "held",
 }
 
 

@@ -79,8 +79,11 @@ def flat(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str
 
 def sources(validations: Sequence[Judgement]) -> list[tuple[str, str]]:
     """What was judged anywhere, and where its threshold comes from."""
-    keys = {c.criterion.key for v in validations for c in v.checks}
-    return [(c.label, c.source) for c in CRITERIA if c.key in keys]
+    judged = {c.criterion.key: c.criterion for v in validations for c in v.checks}
+    known = [c.key for c in CRITERIA]
+    # in the order of the table of limits, then those of a kind's own
+    keys = [k for k in known if k in judged] + [k for k in judged if k not in known]
+    return [(judged[k].label, judged[k].source) for k in keys]
 
 
 def _text(value: Any) -> str:

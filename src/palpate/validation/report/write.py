@@ -7,10 +7,12 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from palpate.errors import UsageError
 from palpate.validation.report.chapter import Chapter
+from palpate.validation.report.held import HeldChapter
+from palpate.validation.report.held.told import held_told
 from palpate.validation.report.networks import network_rows
 from palpate.validation.report.pictures import pictures
 from palpate.validation.report.summary import story
@@ -26,10 +28,12 @@ __all__ = ["render", "write_report"]
 
 TITLE = "What the hand will feel"
 
+AnyChapter: TypeAlias = Chapter | SurrogateChapter | HeldChapter
+
 
 def write_report(
     path: str | os.PathLike[str],
-    chapters: Sequence[Chapter | SurrogateChapter],
+    chapters: Sequence[AnyChapter],
     *,
     title: str = TITLE,
     machine: Mapping[str, Any] | None = None,
@@ -40,7 +44,7 @@ def write_report(
     ----------
     path : path
         Of the file; its folder is made if need be.
-    chapters : sequence of Chapter or SurrogateChapter
+    chapters : sequence of Chapter, SurrogateChapter or HeldChapter
         One per body.
     title : str
     machine : mapping, optional
@@ -74,7 +78,7 @@ def write_report(
 
 
 def render(
-    chapters: Sequence[Chapter | SurrogateChapter],
+    chapters: Sequence[AnyChapter],
     *,
     title: str = TITLE,
     machine: Mapping[str, Any] | None = None,
@@ -119,9 +123,11 @@ def _prose(text: str) -> Markup:
     return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(bound(text)))))
 
 
-def _told(chapter: Chapter | SurrogateChapter, key: str) -> dict[str, Any]:
+def _told(chapter: AnyChapter, key: str) -> dict[str, Any]:
     if isinstance(chapter, SurrogateChapter):
         return surrogate_told(chapter, key)
+    if isinstance(chapter, HeldChapter):
+        return held_told(chapter, key)
     head, rows = node_rows(chapter.validation)
     return {
         "key": key,

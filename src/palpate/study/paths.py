@@ -26,6 +26,16 @@ class Paths:
         return self.folder / f"{self.name}-random.zarr"
 
     @property
+    def histories(self) -> Path:
+        """Histories that a body that remembers was learnt from."""
+        return self.folder / f"{self.name}-histories.palpate"
+
+    @property
+    def unseen_histories(self) -> Path:
+        """Its histories for testing only."""
+        return self.folder / f"{self.name}-unseen.palpate"
+
+    @property
     def model(self) -> Path:
         """The touch model."""
         return self.folder / f"{self.name}.palpate"

@@ -18,7 +18,7 @@ from palpate import __version__
 from palpate.dataset import Dataset
 from palpate.study.models import Study
 from palpate.study.paths import Paths
-from palpate.study.stages import AnyStudy, stages_of
+from palpate.study.stages import AnyStudy, Rows, stages_of
 from palpate.validation import write_report
 
 __all__ = [
@@ -41,11 +41,11 @@ class Outcome:
 
     Attributes
     ----------
-    study : Study or TouchStudy
-    touch : TouchModel or TouchedBody
-    train, test : Dataset
-    validation : Validation or SurrogateValidation
-    history : History, TouchHistory or None
+    study : Study, TouchStudy or HeldStudy
+    touch : TouchModel, TouchedBody or HeldBody
+    train, test : Dataset or HeldPaths
+    validation : Validation, SurrogateValidation or HeldValidation
+    history : History, TouchHistory, Fit or None
     rivals : mapping of name to History
         The founding form beside ours, for studies with one input.
     timings : mapping of stage to seconds
@@ -53,8 +53,8 @@ class Outcome:
 
     study: AnyStudy
     touch: Any
-    train: Dataset
-    test: Dataset
+    train: Rows
+    test: Rows
     validation: Any
     history: Any = None
     rivals: Mapping[str, Any] = field(default_factory=dict)
@@ -132,7 +132,7 @@ def carry_out(
 
     Parameters
     ----------
-    study : Study or TouchStudy
+    study : Study, TouchStudy or HeldStudy
     paths : Paths
     cluster : optional
         A running `local_cluster`, to share between studies.

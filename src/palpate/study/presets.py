@@ -1,4 +1,4 @@
-"""Studies that have a name: the founding study's cantilevers, two with several loads, and bodies to be pressed."""
+"""Studies that have a name: the founding study's cantilevers, others that remember, and bodies to be pressed."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from palpate.errors import UsageError
 from palpate.physics import Cantilever, Circle, PointLoad
 from palpate.physics.beam.presets import PRESETS, preset
+from palpate.study.held.presets import HELD, held_preset
 from palpate.study.models import Study
 from palpate.study.stages import AnyStudy
 from palpate.study.touching.presets import TOUCHED, touched_preset
@@ -25,7 +26,7 @@ _SEVERAL: dict[str, Any] = {
 
 
 def preset_names() -> tuple[str, ...]:
-    """Names that `preset_study` knows."""
+    """Names of studies that a study file can begin with."""
     return (*PRESETS, *TOUCHED)
 
 
@@ -47,9 +48,9 @@ def named(study: AnyStudy, name: str) -> AnyStudy:
 
 
 def preset_study(name: str, *, quick: bool = False) -> AnyStudy:
-    """The study of that name; of a pressed body also in a quick form, with coarse elements and few touches.
+    """The study of that name; of a pressed body or one that remembers also in a quick form.
 
-    A beam has no quick form: all of it takes less than a minute.
+    A beam that remembers nothing has no quick form: all of it takes less than a minute.
 
     Raises
     ------
@@ -58,6 +59,8 @@ def preset_study(name: str, *, quick: bool = False) -> AnyStudy:
     """
     if name in TOUCHED:
         return touched_preset(name, quick=quick)
+    if name in HELD:
+        return held_preset(name, quick=quick)
     if name not in PRESETS:
         raise _no_study(name)
     return _beam(name)
@@ -93,10 +96,11 @@ def _beam(name: str) -> Study:
 
 
 def _no_study(name: str) -> UsageError:
-    close = difflib.get_close_matches(name, preset_names(), n=1)
+    known = (*preset_names(), *HELD)
+    close = difflib.get_close_matches(name, known, n=1)
     return UsageError(
         f"There is no study called {name!r}.",
-        why=f"Known studies: {', '.join(preset_names())}.",
+        why=f"Known studies: {', '.join(known)}.",
         fix=f"Did you mean {close[0]!r}?" if close else "Choose one of these, or write a study file.",
     )
 

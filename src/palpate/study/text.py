@@ -13,6 +13,7 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 
 from palpate.errors import StudyError, UsageError
+from palpate.study.held import HeldStudy
 from palpate.study.models import Study
 from palpate.study.record import Unit
 from palpate.study.stages import AnyStudy
@@ -86,7 +87,19 @@ def study_schema(kind: str = "beam") -> str:
 
 
 def to_toml(study: AnyStudy) -> str:
-    """The study as a commented TOML file that `read_study` reads back as the same study."""
+    """The study as a commented TOML file that `read_study` reads back as the same study.
+
+    Raises
+    ------
+    UsageError
+        If it is of a body that remembers: those are ready-made and have no file.
+    """
+    if isinstance(study, HeldStudy):
+        raise UsageError(
+            f"{study.name} has no study file.",
+            why="Studies of bodies that remember are ready-made.",
+            fix=f"Run it: palpate demo {study.preset}. Others: palpate.learning.plastic.",
+        )
     lines = [
         "# A palpate study: what is solved, learnt, checked and touched.",
         '# Quantities are numbers in SI units, or text with a unit: "5 mm", "2 GPa".',

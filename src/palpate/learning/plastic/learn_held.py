@@ -109,7 +109,7 @@ def _learn(
 ) -> tuple[HeldBody, Fit]:
     _check(train, twin, mirrors)
     stretch, stretch_error = _stretch(twin, mirrors, seed)
-    shape, shape_error = _shape(train, seed)
+    shape, shape_error = _shape(train, mirrors, seed)
     rest = np.zeros((len(train.rest), 3))
     rest[:, :2] = train.rest
     places = np.concatenate([path.place for path in train.paths])
@@ -177,10 +177,15 @@ def _stretch(twin: HeldPath, mirrors: bool, seed: int) -> tuple[Network, float]:
     return network, float(np.abs(found - P).max() / np.abs(P).max())
 
 
-def _shape(train: HeldPaths, seed: int) -> tuple[Network, float]:
-    """Displacement of all nodes over (w, P)."""
+def _shape(train: HeldPaths, mirrors: bool, seed: int) -> tuple[Network, float]:
+    """Displacement of all nodes over (w, P); histories that kept to one side tell of the other too."""
     X = np.concatenate([np.stack([path.place, path.force], axis=1) for path in train.paths])
-    Y = np.concatenate([path.displacement.reshape(len(path), -1) for path in train.paths])
+    moved = np.concatenate([path.displacement for path in train.paths])
+    along = np.asarray(train.direction, dtype=float)
+    if mirrors and np.allclose(train.rest @ along, train.rest[0] @ along):  # a straight body across the load
+        mirrored = moved - 2 * (moved @ along)[..., None] * along
+        X, moved = np.concatenate([X, -X]), np.concatenate([moved, mirrored])
+    Y = moved.reshape(len(moved), -1)
     rows = np.unique(np.linspace(0, len(X) - 1, SHAPES).round().astype(int))
     names = ("w", "m"), ("P", "N")
     ranges = [

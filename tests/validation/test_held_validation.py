@@ -1,0 +1,113 @@
+"""Judging a held body by histories whose answer is known."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from palpate.errors import AccuracyError, UsageError
+from palpate.learning.plastic import HeldPath, HeldPaths
+from palpate.network import Network, Scaling
+from palpate.surrogates.plastic import Elements, HeldBody
+from palpate.units import Quantity, Range
+from palpate.validation import HeldChapter, HeldLimits, validate_held, write_report
+
+REST = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+OFF = 0.02
+"""What the solved force is made to be more than the body's, N."""
+
+
+def affine(inputs: list[Range], names: list[str], tail: np.ndarray) -> Network:
+    n, m = len(inputs), len(names)
+    scaling = Scaling(np.zeros(n), np.ones(n), np.zeros(m), np.ones(m))
+    none = {"centres": np.zeros((0, n)), "widths": np.zeros((0, n)), "weights": np.zeros((m, 0))}
+    outputs = [Quantity(name, "m") for name in names]
+    return Network.axis_aligned(inputs, outputs, tail=tail, scaling=scaling, **none)
+
+
+def rod() -> HeldBody:
+    """h = w: a spring and a slider of 100 N/m each, which slips at 10 mm; the tip goes down by w."""
+    tail = np.zeros((4, 3))
+    tail[3, 1] = -1.0
+    return HeldBody(
+        name="rod",
+        stretch=affine([Range("w²", 0.0, 0.01, "m²")], ["ℓ"], np.zeros((1, 2))),
+        shape=affine([Range("w", -0.1, 0.1, "m"), Range("P", -20.0, 20.0, "N")], list("abcd"), tail),
+        elements=Elements.sliders(np.full(2, 100.0), np.array([math.inf, 0.01]), np.zeros(2)),
+        mirrors=True,
+        rest=REST,
+        nodes_of_interest=np.array([1]),
+        touch_node=1,
+        directions=np.array([[0.0, -1.0, 0.0]]),
+        reach=0.1,
+    ).checked()
+
+
+def solved(off: float = OFF, dented: float = 0.0) -> HeldPaths:
+    """To 30 mm, where 4 N hold it and 20 mm have slipped, and back to 10 mm, where nothing does."""
+    place = np.concatenate([np.linspace(0.001, 0.03, 30), np.linspace(0.029, 0.01, 20)])
+    force, stored, lost = rod().follow(place)
+    force = force + off
+    force[-1] = 0.0
+    shape = np.zeros((len(place), 2, 2))
+    shape[:, 1, 1] = -place - dented
+    path = HeldPath(np.arange(1.0, 1.0 + len(place)), place, force, stored, lost, shape)
+    return HeldPaths(REST[:, :2], 1, np.array([0.0, -1.0]), (path,))
+
+
+def test_each_figure_is_what_was_put_in() -> None:
+    found = validate_held(rod(), solved(dented=0.003))
+    assert found.passed
+    assert found.largest_force == pytest.approx(4.0 + OFF)
+    assert found.force_median == pytest.approx(OFF / (4.0 + OFF))
+    assert found.force_max == pytest.approx(OFF / (4.0 + OFF))
+    # let go, both springs pull by as much against each other: 20 mm back from 30 mm
+    assert found.residual_largest == pytest.approx(0.01)
+    assert found.residual_max == pytest.approx(0.0, abs=1e-12)
+    assert found.lost == pytest.approx(100.0 * 0.01 * 0.02)
+    assert found.lost_error == 0
+    # the clamped node is where it was solved, the tip 3 mm off
+    assert found.shape_mean == pytest.approx(0.0015)
+    assert found.shape_max == pytest.approx(0.003)
+    # elastic: 200 N/m all the way, by 2 N too much at the end of slipping and of unloading
+    assert found.elastic_p95 == pytest.approx(2.0 / (4.0 + OFF), rel=0.02)
+    assert f"{found.elastic_p95 / found.force_p95:.0f}" in str(found)
+
+
+def test_a_miss_is_an_error_with_the_worst_place() -> None:
+    found = validate_held(rod(), solved(), limits=HeldLimits(force_median=OFF / 5, force_p95=OFF / 5))
+    assert [c.criterion.key for c in found.failures] == ["held_force_median", "held_force_p95"]
+    with pytest.raises(AccuracyError, match="misses 2 of 3 limits"):
+        found.raise_if_failed()
+    assert "in history 1 at w =" in str(found.failures[1])
+
+
+def test_energy_that_comes_back_is_a_miss() -> None:
+    """Elements are checked when made; a body that was tampered with is not believed."""
+    made = rod()
+    wrong = made.elements
+    object.__setattr__(wrong, "stiffness", np.array([300.0, -100.0]))
+    found = validate_held(replace(made, elements=wrong), solved())
+    assert "held_energy" in [c.criterion.key for c in found.failures]
+
+
+def test_histories_of_another_mesh_are_refused() -> None:
+    with pytest.raises(UsageError, match="are not the 2 nodes"):
+        validate_held(rod(), replace(solved(), rest=REST[:, :2] + 0.1))
+    with pytest.raises(UsageError, match="no history"):
+        validate_held(rod(), replace(solved(), paths=()))
+
+
+def test_the_report_tells_of_it(tmp_path: Path) -> None:
+    found = validate_held(rod(), solved())
+    chapter = HeldChapter("bent <rod>", rod(), solved(), found, timings={"validate": 1.0})
+    page = write_report(tmp_path / "report.html", [chapter]).read_text(encoding="utf-8")
+    assert "bent &lt;rod&gt;" in page
+    assert "<rod>" not in page
+    for heading in ("Force against displacement", "Energy stored and lost", "Where the limits come from"):
+        assert page.count(f">{heading}<") == 1
+    assert "second law of thermodynamics" in page

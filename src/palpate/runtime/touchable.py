@@ -7,11 +7,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeAlias
 
+from palpate.errors import FileFormatError
 from palpate.network import load_archive
 from palpate.runtime.pressed import PressedBody
 from palpate.runtime.workspace import Workspace
 from palpate.surrogates import TouchedBody, TouchModel, TouchSurrogate
 from palpate.surrogates.field.touched_body import KIND as BODY
+from palpate.surrogates.plastic.held_file import KIND as REMEMBERS
 from palpate.surrogates.touch_file import KIND as SURROGATE
 
 __all__ = ["Touchable", "load_touchable", "touchable", "workspace_for"]
@@ -38,7 +40,14 @@ def load_touchable(path: str | os.PathLike[str]) -> Touchable:
         If the file is missing, corrupt, foreign, or of something that no hand can be laid on.
     """
     path = Path(path)
-    load = _PRESSED.get(load_archive(path).kind)
+    kind = load_archive(path).kind
+    if kind == REMEMBERS:
+        raise FileFormatError(
+            f"{path} holds a body that remembers, which neither the page nor the loop takes.",
+            why="They don't let go of it, and an idle hand would bend it back.",
+            fix="Touch it from Python: HeldBody.load(file).evaluator(), with step and release.",
+        )
+    load = _PRESSED.get(kind)
     return TouchModel.load(path) if load is None else PressedBody.of(load(path), path.stem)
 
 

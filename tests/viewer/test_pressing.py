@@ -18,7 +18,8 @@ from palpate.runtime.pressed import PressedBody
 from palpate.runtime.workspace import Workspace
 from palpate.surrogates import TouchedBody
 from palpate.viewer import Viewer
-from palpate.viewer.messages import Credit, Hand, Hold, Modes, Press, Skin, Touched
+from palpate.viewer.messages import Credit, Hand, Hold
+from palpate.viewer.pressed_messages import Modes, Press, Skin, Touched
 from palpate.viewer.pressing import PressedExhibit
 from palpate.viewer.skins import relief
 

@@ -11,9 +11,9 @@ The conversation, over one websocket at ``/touch``:
 4. Only one page holds the hand at a time; `Frame.hold` tells each page where it stands.
 5. Rare events in plain words are `Notice` (JSON).
 
-A body pressed anywhere says `Touched` in place of `Hello`, and its frames are `Press`: where the probe is, and the
-coefficients of the modes of every field. The page asks for the body's surface once, as `Skin` at ``/skin``, and for the
-modes of each field as `Modes` at ``/fields/N``, and sums them itself. There z is up.
+A body pressed anywhere (`pressed_messages`) says `Touched` in place of `Hello`, and its frames are `Press`: where the
+probe is, and the coefficients of the modes of every field. The page asks for the body's surface once, as `Skin` at
+``/skin``, and for the modes of each field as `Modes` at ``/fields/N``, and sums them itself. There z is up.
 
 A body that is only looked at needs no conversation: its page asks for `Shown` (JSON) at ``/shown``, for `Surface` at
 ``/surface`` and for each `Step` when it is wanted at ``/steps/N``. There z is up.
@@ -44,18 +44,13 @@ __all__ = [
     "Hand",
     "Hello",
     "Hold",
-    "Look",
     "Loop",
-    "Modes",
     "Notice",
-    "Press",
     "RangeInfo",
     "Shown",
-    "Skin",
     "Step",
     "StepInfo",
     "Surface",
-    "Touched",
 ]
 
 PROTOCOL = 2  # a page of another protocol reloads itself
@@ -171,54 +166,6 @@ class Step(Binary):
     ]
 
 
-@dataclass(frozen=True, eq=False)
-class Press(Beat):
-    """One picture of a body pressed anywhere, server to page."""
-
-    KIND: ClassVar[int] = 6
-
-    depth: Annotated[float, Wire("f32", "m, of the rigid probe in the surface at rest; negative in the air")]
-    stiffness: Annotated[float, Wire("f32", "N/m, along the force")]
-    deviation: Annotated[
-        float, Wire("f32", "standard deviation of the force relative to it, NaN where unknown")
-    ]
-    drawn: Annotated[float, Wire("f32", "m, depth of the shape drawn: after release it goes back to 0")]
-    foot: Annotated[Vec3, Wire("vec3", "m, of the dimple at rest")]
-    normal: Annotated[Vec3, Wire("vec3", "of the surface there")]
-    coefficients: Annotated[
-        np.ndarray, Wire("floats", "for each field its growth with depth and its modes' coefficients")
-    ]
-
-
-@dataclass(frozen=True, eq=False)
-class Skin(Binary):
-    """The surface of a touchable body at rest, server to page. Points are split along sharp edges."""
-
-    KIND: ClassVar[int] = 7
-
-    rest: Annotated[np.ndarray, Wire("floats", "m, x y z of each point")]
-    triangles: Annotated[np.ndarray, Wire("floats", "three points each; exact up to 16 million")]
-    creases: Annotated[np.ndarray, Wire("floats", "two points for each sharp edge")]
-    touchable: Annotated[np.ndarray, Wire("floats", "1 for each triangle that a probe may touch, else 0")]
-
-
-@dataclass(frozen=True, eq=False)
-class Modes(Binary):
-    """A field on a Skin's points, server to page: rest + coefficients · modes + growth · dimple."""
-
-    KIND: ClassVar[int] = 8
-
-    deepest: Annotated[float, Wire("f32", "m, depth at which the dimple's table ends")]
-    reach: Annotated[float, Wire("f32", "m, of the dimple from its foot; 0 for none")]
-    parts: Annotated[int, Wire("u16", "of the table: 2 of a vector, along and across the normal")]
-    rows: Annotated[int, Wire("u16", "splines of the distance from the foot")]
-    columns: Annotated[int, Wire("u16", "splines of the depth")]
-    rest: Annotated[np.ndarray, Wire("floats", "components of each point")]
-    modes: Annotated[np.ndarray, Wire("floats", "the same of each mode")]
-    table: Annotated[np.ndarray, Wire("floats", "parts · rows · columns")]
-    touched: Annotated[np.ndarray, Wire("floats", "points that the dimple may move")]
-
-
 @dataclass(frozen=True)
 class RangeInfo:
     """A named interval."""
@@ -276,77 +223,6 @@ class Hello(Json):
     workspace: float
     max_force: float
     rate: float
-    faults: tuple[str, ...]
-    meta: Mapping[str, Any]
-
-
-@dataclass(frozen=True)
-class Look:
-    """A field that deforms or colours a touched body, and its range over the trained region."""
-
-    name: str
-    unit: str
-    low: float
-    high: float
-    components: int
-    modes: int
-
-
-@dataclass(frozen=True)
-class Touched(Json):
-    """A body pressed anywhere and its loop, once per connection, server to page.
-
-    Attributes
-    ----------
-    protocol : int
-    name : str
-    inputs, parameters : ranges
-        All inputs; those that the hand does not drive.
-    radius : float
-        Of the probe, m.
-    radius_parameter : int
-        Which parameter that is; -1 where none.
-    deepest : float
-        Deepest trained depth, m.
-    force_max : float
-        Largest force of the trained region, N.
-    stiffness_max : float
-        Largest stiffness of the trained region, N/m.
-    centre : (3,)
-        The device's centre in the body's coordinates, m.
-    scale : float
-        Body metres per metre of hand.
-    workspace : float
-        Radius of the hand's workspace, m.
-    max_force : float
-        The force limit, N.
-    rate : float
-        Hz, what the loop aims at.
-    fields : looks
-        The first moves the surface where it has three components; none where the file holds no field.
-    relaxes : str
-        How the force relaxes, in words; empty where it does not.
-    faults : words for fault codes, by code
-    meta : mapping
-        What the file says of its making.
-    """
-
-    protocol: int
-    name: str
-    inputs: tuple[RangeInfo, ...]
-    parameters: tuple[RangeInfo, ...]
-    radius: float
-    radius_parameter: int
-    deepest: float
-    force_max: float
-    stiffness_max: float
-    centre: Vec3
-    scale: float
-    workspace: float
-    max_force: float
-    rate: float
-    fields: tuple[Look, ...]
-    relaxes: str
     faults: tuple[str, ...]
     meta: Mapping[str, Any]
 

@@ -17,7 +17,8 @@ from palpate.runtime.pressed import PressedBody
 from palpate.runtime.shared import State, now
 from palpate.surrogates import FieldSurrogate
 from palpate.viewer.exhibits import loop_facts, ranges, vector
-from palpate.viewer.messages import PROTOCOL, Look, Modes, Press, Skin, Touched
+from palpate.viewer.messages import PROTOCOL
+from palpate.viewer.pressed_messages import Look, Modes, Press, Skin, Touched
 from palpate.viewer.skins import relief, touchable_triangles
 from palpate.viewer.surfaces import split
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from enum import IntEnum
 from typing import Any
 
-from palpate.viewer import messages
+from palpate.viewer import messages, pressed_messages
 from palpate.viewer.wire import CODES, Binary, Json, Wire
 
 __all__ = ["generate"]
@@ -19,12 +19,12 @@ BINARY: tuple[type[Binary], ...] = (
     messages.Credit,
     messages.Surface,
     messages.Step,
-    messages.Press,
-    messages.Skin,
-    messages.Modes,
+    pressed_messages.Press,
+    pressed_messages.Skin,
+    pressed_messages.Modes,
 )
-JSON: tuple[type[Json], ...] = (messages.Hello, messages.Touched, messages.Notice, messages.Shown)
-RECORDS: tuple[type, ...] = (messages.RangeInfo, messages.Look, messages.FieldInfo, messages.StepInfo)
+JSON: tuple[type[Json], ...] = (messages.Hello, pressed_messages.Touched, messages.Notice, messages.Shown)
+RECORDS: tuple[type, ...] = (messages.RangeInfo, pressed_messages.Look, messages.FieldInfo, messages.StepInfo)
 ENUMS: tuple[type[IntEnum], ...] = (messages.Loop, messages.Hold)
 
 # wire type → TypeScript type, DataView suffix, bytes of one number

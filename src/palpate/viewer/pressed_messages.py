@@ -1,0 +1,133 @@
+"""What is said between the server and the page of a body pressed anywhere; see `messages` for the conversation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+
+from palpate.viewer.messages import Beat, RangeInfo, Vec3
+from palpate.viewer.wire import Binary, Json, Wire
+
+__all__ = ["Look", "Modes", "Press", "Skin", "Touched"]
+
+
+@dataclass(frozen=True, eq=False)
+class Press(Beat):
+    """One picture of a body pressed anywhere, server to page."""
+
+    KIND: ClassVar[int] = 6
+
+    depth: Annotated[float, Wire("f32", "m, of the rigid probe in the surface at rest; negative in the air")]
+    stiffness: Annotated[float, Wire("f32", "N/m, along the force")]
+    deviation: Annotated[
+        float, Wire("f32", "standard deviation of the force relative to it, NaN where unknown")
+    ]
+    drawn: Annotated[float, Wire("f32", "m, depth of the shape drawn: after release it goes back to 0")]
+    foot: Annotated[Vec3, Wire("vec3", "m, of the dimple at rest")]
+    normal: Annotated[Vec3, Wire("vec3", "of the surface there")]
+    coefficients: Annotated[
+        np.ndarray, Wire("floats", "for each field its growth with depth and its modes' coefficients")
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class Skin(Binary):
+    """The surface of a touchable body at rest, server to page. Points are split along sharp edges."""
+
+    KIND: ClassVar[int] = 7
+
+    rest: Annotated[np.ndarray, Wire("floats", "m, x y z of each point")]
+    triangles: Annotated[np.ndarray, Wire("floats", "three points each; exact up to 16 million")]
+    creases: Annotated[np.ndarray, Wire("floats", "two points for each sharp edge")]
+    touchable: Annotated[np.ndarray, Wire("floats", "1 for each triangle that a probe may touch, else 0")]
+
+
+@dataclass(frozen=True, eq=False)
+class Modes(Binary):
+    """A field on a Skin's points, server to page: rest + coefficients · modes + growth · dimple."""
+
+    KIND: ClassVar[int] = 8
+
+    deepest: Annotated[float, Wire("f32", "m, depth at which the dimple's table ends")]
+    reach: Annotated[float, Wire("f32", "m, of the dimple from its foot; 0 for none")]
+    parts: Annotated[int, Wire("u16", "of the table: 2 of a vector, along and across the normal")]
+    rows: Annotated[int, Wire("u16", "splines of the distance from the foot")]
+    columns: Annotated[int, Wire("u16", "splines of the depth")]
+    rest: Annotated[np.ndarray, Wire("floats", "components of each point")]
+    modes: Annotated[np.ndarray, Wire("floats", "the same of each mode")]
+    table: Annotated[np.ndarray, Wire("floats", "parts · rows · columns")]
+    touched: Annotated[np.ndarray, Wire("floats", "points that the dimple may move")]
+
+
+@dataclass(frozen=True)
+class Look:
+    """A field that deforms or colours a touched body, and its range over the trained region."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    components: int
+    modes: int
+
+
+@dataclass(frozen=True)
+class Touched(Json):
+    """A body pressed anywhere and its loop, once per connection, server to page.
+
+    Attributes
+    ----------
+    protocol : int
+    name : str
+    inputs, parameters : ranges
+        All inputs; those that the hand does not drive.
+    radius : float
+        Of the probe, m.
+    radius_parameter : int
+        Which parameter that is; -1 where none.
+    deepest : float
+        Deepest trained depth, m.
+    force_max : float
+        Largest force of the trained region, N.
+    stiffness_max : float
+        Largest stiffness of the trained region, N/m.
+    centre : (3,)
+        The device's centre in the body's coordinates, m.
+    scale : float
+        Body metres per metre of hand.
+    workspace : float
+        Radius of the hand's workspace, m.
+    max_force : float
+        The force limit, N.
+    rate : float
+        Hz, what the loop aims at.
+    fields : looks
+        The first moves the surface where it has three components; none where the file holds no field.
+    relaxes : str
+        How the force relaxes, in words; empty where it does not.
+    faults : words for fault codes, by code
+    meta : mapping
+        What the file says of its making.
+    """
+
+    protocol: int
+    name: str
+    inputs: tuple[RangeInfo, ...]
+    parameters: tuple[RangeInfo, ...]
+    radius: float
+    radius_parameter: int
+    deepest: float
+    force_max: float
+    stiffness_max: float
+    centre: Vec3
+    scale: float
+    workspace: float
+    max_force: float
+    rate: float
+    fields: tuple[Look, ...]
+    relaxes: str
+    faults: tuple[str, ...]
+    meta: Mapping[str, Any]

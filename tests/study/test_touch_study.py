@@ -105,7 +105,8 @@ def test_columns_have_their_depths_and_tests_have_other_places():
     problem = problem_of(study)
     train, test = points_of(study, problem), points_of(study, problem, test=True)
     assert (len(train), len(test)) == (study.sweep.samples, study.test.samples)
-    assert [len(rows) for rows in problem.chains(train)] == [study.sweep.depths] * 8
+    columns = study.sweep.samples // study.sweep.depths
+    assert [len(rows) for rows in problem.chains(train)] == [study.sweep.depths] * columns
     assert not {tuple(p) for p in train[:, :2]} & {tuple(p) for p in test[:, :2]}
 
 

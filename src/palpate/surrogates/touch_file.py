@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from palpate.errors import FileFormatError, UsageError
-from palpate.network import Archive, TrainedRegion, load_archive, save_archive
+from palpate.network import Archive, TrainedRegion, save_archive
 from palpate.surrogates.continuation import Continuation
+from palpate.surrogates.file_parts import doubles, finite, number, read
 from palpate.surrogates.laws import ContactLaw
 from palpate.surrogates.surface import TouchedSurface
 
@@ -48,11 +45,11 @@ def archive_of(surrogate: TouchSurrogate) -> Archive:
         arrays["root"] = surrogate.root
     meta = {
         "law": surrogate.law.name,
-        "length": _finite(surrogate.law.length),
-        "radius": _finite(surrogate.radius),
+        "length": finite(surrogate.law.length),
+        "radius": finite(surrogate.radius),
         "radius_input": surrogate.radius_input,
         "region_radius": None if region is None else region.radius,
-        "deepest": _finite(going.deepest),
+        "deepest": finite(going.deepest),
         "depth_width": going.depth_width,
         "meta": dict(surrogate.meta),
     }
@@ -67,15 +64,7 @@ def load_surrogate(path: str | os.PathLike[str]) -> TouchSurrogate:
     FileFormatError
         If the file is missing, corrupt, foreign or from a later version, or its parts do not fit.
     """
-    archive = load_archive(path, kind=KIND)
-    try:
-        return surrogate_of(archive)
-    except (KeyError, TypeError, ValueError, IndexError, OverflowError, UsageError) as error:
-        raise FileFormatError(
-            f"{path} does not describe a touch surrogate.",
-            why=f"{type(error).__name__}: {error}",
-            fix="Copy the file again, or learn the surrogate anew.",
-        ) from error
+    return read(path, KIND, "a touch surrogate", surrogate_of)
 
 
 def surrogate_of(archive: Archive) -> TouchSurrogate:
@@ -97,39 +86,19 @@ def surrogate_of(archive: Archive) -> TouchSurrogate:
     surface = {k.removeprefix(_SURFACE): arrays.pop(k) for k in list(arrays) if k.startswith(_SURFACE)}
     region = arrays.pop("region", None)
     going = Continuation(
-        _doubles(arrays.pop("widths")), _number(meta, "deepest", math.inf), _number(meta, "depth_width")
+        doubles(arrays.pop("widths")), number(meta, "deepest", math.inf), number(meta, "depth_width")
     )
     root = arrays.pop("root", None)
     if arrays:
         raise ValueError(f"it holds {sorted(arrays)}, which belong to nothing")
     return TouchSurrogate(
         network=archive.networks[_NETWORK],
-        law=ContactLaw(meta["law"], _number(meta, "length", math.inf)),
+        law=ContactLaw(meta["law"], number(meta, "length", math.inf)),
         surface=TouchedSurface.from_arrays(surface),
-        radius=_number(meta, "radius", math.nan),
+        radius=number(meta, "radius", math.nan),
         radius_input=own,
-        region=None if region is None else TrainedRegion(_doubles(region), _number(meta, "region_radius")),
+        region=None if region is None else TrainedRegion(doubles(region), number(meta, "region_radius")),
         continuation=going,
-        root=None if root is None else _doubles(root),
+        root=None if root is None else doubles(root),
         meta=meta["meta"],
     )
-
-
-def _finite(number: float) -> float | None:
-    """What JSON can hold: None for a number that is not finite."""
-    return number if math.isfinite(number) else None
-
-
-def _number(meta: Mapping[str, Any], key: str, missing: float | None = None) -> float:
-    found = meta[key]
-    if found is None and missing is not None:
-        return missing
-    if type(found) not in {int, float} or not math.isfinite(found):
-        raise TypeError(f"its {key} is {found!r:.40}, not a finite number")
-    return float(found)
-
-
-def _doubles(array: np.ndarray) -> np.ndarray:
-    if array.dtype != np.float64:
-        raise TypeError(f"it holds {array.dtype} numbers; double precision is needed")
-    return array

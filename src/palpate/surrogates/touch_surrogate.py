@@ -23,11 +23,11 @@ from palpate.network import Network, TrainedRegion
 from palpate.network.second_order import gram
 from palpate.surrogates.continuation import Continuation
 from palpate.surrogates.laws import ContactLaw
+from palpate.surrogates.learnt_energy import LearntEnergy, history_in_words
 from palpate.surrogates.surface import TouchedSurface
 from palpate.surrogates.surrogate_evaluator import SurrogateEvaluator
-from palpate.surrogates.touch_kernels import ANSWER, FORCE, SMALL, STIFFNESS, touches_into
-from palpate.surrogates.touch_trust import trusts_into
-from palpate.units import Range, bounds
+from palpate.surrogates.touch_kernels import SMALL, touches_into
+from palpate.units import bounds
 
 __all__ = ["TouchSurrogate"]
 
@@ -35,7 +35,7 @@ _STEP = 1e-3  # of the radius: the difference that finds the third derivative of
 
 
 @dataclass(frozen=True, eq=False)
-class TouchSurrogate:
+class TouchSurrogate(LearntEnergy):
     """Energy, force and stiffness of a touch as a value: `save` and `load` give it back bit for bit.
 
     Attributes
@@ -63,6 +63,8 @@ class TouchSurrogate:
     UsageError
         If the parts do not fit together.
     """
+
+    WORDS = "touch surrogate"
 
     network: Network
     law: ContactLaw
@@ -133,17 +135,7 @@ class TouchSurrogate:
         units = (
             f"{self.network.units} {self.network.form} units" if self.network.units else "an affine factor"
         )
-        return f"TouchSurrogate: {names}; sphere {probe}; {self.law}; {units}{_history(self.meta)}"
-
-    @property
-    def inputs(self) -> tuple[Range, ...]:
-        """Names and trained ranges of all inputs: the centre's coordinates (m), then the further ones."""
-        return self.network.inputs
-
-    @property
-    def parameters(self) -> tuple[Range, ...]:
-        """The inputs after the centre's coordinates."""
-        return self.network.inputs[3:]
+        return f"TouchSurrogate: {names}; sphere {probe}; {self.law}; {units}{history_in_words(self.meta)}"
 
     @cached_property
     def _fixed(self) -> tuple[Any, ...]:
@@ -167,78 +159,17 @@ class TouchSurrogate:
         points = np.zeros((0, len(self.inputs))) if region is None else region.points
         return numbers, np.array([low, high, going.widths]), points, gram(self.network, 3)
 
-    @cached_property
-    def _root(self) -> np.ndarray:
-        """The posterior's root in units of ℓ."""
-        if self.root is None:
-            return np.zeros((0, 0))
-        return np.asarray(self.root * self.network.scaling.output_scale[0])
-
     def compiled(self) -> tuple[Any, ...]:
         """What `touch_into` takes after its answer, with scratch for one thread."""
         scratch = (np.zeros((4, len(self.inputs))), np.zeros((SMALL, 3, 3)))
         return (*scratch, *self._fixed, self.surface.compiled(), self.network.compiled())
 
-    def _answers(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Checked inputs (N, n), answers (N, 14) and inside (N,)."""
-        X = np.ascontiguousarray(X, dtype=np.float64)
-        if X.ndim != 2 or X.shape[1] != len(self.inputs):
-            raise UsageError(
-                f"Inputs of shape {X.shape} came to a touch surrogate of {len(self.inputs)} inputs.",
-                why=f"They are {', '.join(r.name for r in self.inputs)}.",
-                fix=f"Pass an array of shape (N, {len(self.inputs)}), in SI units.",
-            )
-        answers, inside = np.empty((len(X), ANSWER)), np.empty(len(X), dtype=np.bool_)
+    def _fill(self, X: np.ndarray, answers: np.ndarray, inside: np.ndarray) -> None:
         touches_into(X, answers, inside, *self.compiled())
-        return X, answers, inside
-
-    def energy(self, X: np.ndarray) -> np.ndarray:
-        """U (N,) at inputs X (N, n), J.
-
-        Raises
-        ------
-        UsageError
-            If X has another number of columns; so do all that take X.
-        """
-        return self._answers(X)[1][:, 0].copy()
 
     def depth(self, X: np.ndarray) -> np.ndarray:
         """s (N,) of the rigid probe into the surface at rest, m; negative without contact."""
         return self._answers(X)[1][:, 1].copy()
-
-    def force(self, X: np.ndarray) -> np.ndarray:
-        """F = −∂U/∂c (N, 3) on the probe, N."""
-        return self._answers(X)[1][:, FORCE].copy()
-
-    def stiffness(self, X: np.ndarray) -> np.ndarray:
-        """∂F/∂c (N, 3, 3), symmetric, N/m; a body that resists has negative eigenvalues."""
-        return self._answers(X)[1][:, STIFFNESS].reshape(-1, 3, 3).copy()
-
-    def inside(self, X: np.ndarray) -> np.ndarray:
-        """Whether the answers (N,) are of the trained region: in all ranges, no deeper, near a training input.
-
-        Without contact the answer, zero, is exact, and counts as inside.
-        """
-        return self._answers(X)[2]
-
-    def deviation(self, X: np.ndarray) -> np.ndarray:
-        """Standard deviation (N,) of the force relative to its size; zero without contact.
-
-        Raises
-        ------
-        UsageError
-            If the surrogate has no posterior.
-        """
-        if self.root is None:
-            raise UsageError(
-                "This surrogate does not know its deviation.",
-                why="It has no posterior of its weights.",
-                fix="Learn it with one, or give `root`.",
-            )
-        X, answers, _ = self._answers(X)
-        out, columns = np.empty(len(X)), np.zeros((4, self._root.shape[1]))
-        trusts_into(X, answers, out, self._root, columns, self.network.compiled())
-        return out
 
     def evaluator(self) -> SurrogateEvaluator:
         """The allocation-free evaluator of the 1 kHz path."""
@@ -268,16 +199,3 @@ class TouchSurrogate:
         from palpate.surrogates.touch_file import load_surrogate
 
         return load_surrogate(path)
-
-
-def _history(meta: Mapping[str, Any]) -> str:
-    """What `meta` tells of the training, in words."""
-    words = ""
-    if "solves" in meta:
-        words += f"; trained with {meta['solves']} solves"
-        if meta.get("samples", meta["solves"]) != meta["solves"]:
-            words += f" ({meta['samples']} samples by symmetry)"
-    error = meta.get("force_error")
-    if isinstance(error, Mapping) and {"median", "p95"} <= error.keys():
-        words += f"; force error {100 * error['median']:.2g} % median, {100 * error['p95']:.2g} % p95"
-    return words

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.errors import FileFormatError, UsageError
-from palpate.network import Archive, Network, load_archive, save_archive
+from palpate.network import Archive, Network, save_archive
 from palpate.surrogates.continuation import Continuation
 from palpate.surrogates.field.dimple import Dimple
 from palpate.surrogates.field.rise import Rise
+from palpate.surrogates.file_parts import finite, number, read
 from palpate.surrogates.surface import TouchedSurface
 
 if TYPE_CHECKING:
@@ -49,19 +49,15 @@ def load_field(path: str | os.PathLike[str]) -> FieldSurrogate:
     FileFormatError
         If the file is missing, corrupt, foreign or from a later version, or its parts do not fit.
     """
-    archive = load_archive(path, kind=KIND)
-    try:
-        arrays = dict(archive.arrays)
-        taken = {k: arrays.pop(k) for k in list(arrays) if k.startswith(_SURFACE)}
-        surface = TouchedSurface.from_arrays({k.removeprefix(_SURFACE): v for k, v in taken.items()})
-        (network,) = archive.networks.values()
-        return field_of(network, arrays, archive.meta, surface)
-    except (KeyError, TypeError, ValueError, IndexError, OverflowError, UsageError) as error:
-        raise FileFormatError(
-            f"{path} does not describe a field.",
-            why=f"{type(error).__name__}: {error}",
-            fix="Copy the file again, or learn the field anew.",
-        ) from error
+    return read(path, KIND, "a field", _alone)
+
+
+def _alone(archive: Archive) -> FieldSurrogate:
+    arrays = dict(archive.arrays)
+    taken = {k: arrays.pop(k) for k in list(arrays) if k.startswith(_SURFACE)}
+    surface = TouchedSurface.from_arrays({k.removeprefix(_SURFACE): v for k, v in taken.items()})
+    (network,) = archive.networks.values()
+    return field_of(network, arrays, archive.meta, surface)
 
 
 def arrays_of(field: FieldSurrogate) -> dict[str, np.ndarray]:
@@ -81,12 +77,12 @@ def described(field: FieldSurrogate) -> dict[str, Any]:
         "unit": field.unit,
         "rise": rise.name,
         "deepest": rise.deepest,
-        "length": _finite(rise.length),
-        "radius": _finite(field.radius),
+        "length": finite(rise.length),
+        "radius": finite(field.radius),
         "radius_input": field.radius_input,
         "reach": None if dimple is None else dimple.reach,
         "widths": going.widths.tolist(),
-        "trained": _finite(going.deepest),
+        "trained": finite(going.deepest),
         "trained_width": going.depth_width,
         "meta": dict(field.meta),
     }
@@ -118,32 +114,18 @@ def field_of(
             raise TypeError(f"its {name} holds {array.dtype} numbers")
     dimple = None
     if meta["reach"] is not None:
-        dimple = Dimple(arrays["table"], _number(meta, "reach"), arrays["touched"])
-    widths = np.array([_number({"width": w}, "width") for w in meta["widths"]])
+        dimple = Dimple(arrays["table"], number(meta, "reach"), arrays["touched"])
+    widths = np.array([number({"width": w}, "width") for w in meta["widths"]])
     return FieldSurrogate(
         name=meta["name"],
         unit=meta["unit"],
         network=network,
         **{name: arrays[name] for name in _OWN},
-        rise=Rise(meta["rise"], _number(meta, "deepest"), _number(meta, "length", math.inf)),
+        rise=Rise(meta["rise"], number(meta, "deepest"), number(meta, "length", math.inf)),
         surface=surface,
-        radius=_number(meta, "radius", math.nan),
+        radius=number(meta, "radius", math.nan),
         dimple=dimple,
         radius_input=own,
-        continuation=Continuation(widths, _number(meta, "trained", math.inf), _number(meta, "trained_width")),
+        continuation=Continuation(widths, number(meta, "trained", math.inf), number(meta, "trained_width")),
         meta=meta["meta"],
     )
-
-
-def _finite(number: float) -> float | None:
-    """What JSON can hold: None for a number that is not finite."""
-    return number if math.isfinite(number) else None
-
-
-def _number(meta: Mapping[str, Any], key: str, missing: float | None = None) -> float:
-    found = meta[key]
-    if found is None and missing is not None:
-        return missing
-    if type(found) not in {int, float} or not math.isfinite(found):
-        raise TypeError(f"its {key} is {found!r:.40}, not a finite number")
-    return float(found)

@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from palpate.errors import FileFormatError, UsageError
-from palpate.network import Archive, load_archive, save_archive
+from palpate.errors import UsageError
+from palpate.network import Archive, save_archive
 from palpate.surrogates.field.field import FieldSurrogate
 from palpate.surrogates.field.field_file import arrays_of, described, field_of
+from palpate.surrogates.file_parts import read
 from palpate.surrogates.touch_file import archive_of, surrogate_of
 from palpate.surrogates.touch_surrogate import TouchSurrogate
 
@@ -88,15 +89,7 @@ class TouchedBody:
         FileFormatError
             If the file is missing, corrupt, foreign or from a later version, or its parts do not fit.
         """
-        archive = load_archive(path, kind=KIND)
-        try:
-            return cls(*_parts(archive))
-        except (KeyError, TypeError, ValueError, IndexError, OverflowError, UsageError) as error:
-            raise FileFormatError(
-                f"{path} does not describe a touched body.",
-                why=f"{type(error).__name__}: {error}",
-                fix="Copy the file again, or learn the body anew.",
-            ) from error
+        return read(path, KIND, "a touched body", lambda archive: cls(*_parts(archive)))
 
 
 def _parts(archive: Archive) -> tuple[TouchSurrogate, dict[str, FieldSurrogate]]:

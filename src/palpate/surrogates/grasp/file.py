@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate.errors import FileFormatError, UsageError
-from palpate.network import Archive, TrainedRegion, load_archive, save_archive
+from palpate.network import Archive, TrainedRegion, save_archive
 from palpate.surrogates.continuation import Continuation
+from palpate.surrogates.file_parts import doubles, number, read
 from palpate.surrogates.grasp.rest import RestStiffness
 from palpate.surrogates.grasp.stiffening import Stiffening
 from palpate.surrogates.grasp.surrogate import GraspSurrogate
-from palpate.surrogates.touch_file import _doubles, _number
 
 __all__ = ["KIND", "archive_of", "grasp_of", "load_grasp", "save_grasp"]
 
@@ -59,15 +58,7 @@ def load_grasp(path: str | os.PathLike[str]) -> GraspSurrogate:
     FileFormatError
         If the file is missing, corrupt, foreign or from a later version, or its parts do not fit.
     """
-    archive = load_archive(path, kind=KIND)
-    try:
-        return grasp_of(archive)
-    except (KeyError, TypeError, ValueError, IndexError, OverflowError, UsageError) as error:
-        raise FileFormatError(
-            f"{path} does not describe a grasp surrogate.",
-            why=f"{type(error).__name__}: {error}",
-            fix="Copy the file again, or learn the surrogate anew.",
-        ) from error
+    return read(path, KIND, "a grasp surrogate", grasp_of)
 
 
 def grasp_of(archive: Archive) -> GraspSurrogate:
@@ -84,18 +75,18 @@ def grasp_of(archive: Archive) -> GraspSurrogate:
         raise ValueError("it is not described as one")
     network = archive.networks[_NETWORK]
     region, root = arrays.pop("region", None), arrays.pop("root", None)
-    going = Continuation(_doubles(arrays.pop("widths")))
-    rest = RestStiffness(_doubles(arrays.pop("rest")), len(network.inputs) - 3)
-    stiffening = Stiffening(_doubles(arrays.pop("stiffening")), _whole(arrays.pop("exponents")))
+    going = Continuation(doubles(arrays.pop("widths")))
+    rest = RestStiffness(doubles(arrays.pop("rest")), len(network.inputs) - 3)
+    stiffening = Stiffening(doubles(arrays.pop("stiffening")), _whole(arrays.pop("exponents")))
     if arrays:
         raise ValueError(f"it holds {sorted(arrays)}, which belong to nothing")
     return GraspSurrogate(
         network=network,
         rest=rest,
         stiffening=stiffening,
-        region=None if region is None else TrainedRegion(_doubles(region), _number(meta, "region_radius")),
+        region=None if region is None else TrainedRegion(doubles(region), number(meta, "region_radius")),
         continuation=going,
-        root=None if root is None else _doubles(root),
+        root=None if root is None else doubles(root),
         meta=meta["meta"],
     )
 

@@ -27,10 +27,9 @@ from palpate.surrogates.grasp.evaluator import GraspEvaluator
 from palpate.surrogates.grasp.kernels import grasps_into
 from palpate.surrogates.grasp.rest import RestStiffness
 from palpate.surrogates.grasp.stiffening import Stiffening
-from palpate.surrogates.touch_kernels import ANSWER, FORCE, SMALL, STIFFNESS
-from palpate.surrogates.touch_surrogate import _history
-from palpate.surrogates.touch_trust import trusts_into
-from palpate.units import Range, bounds
+from palpate.surrogates.learnt_energy import LearntEnergy, history_in_words
+from palpate.surrogates.touch_kernels import SMALL
+from palpate.units import bounds
 
 __all__ = ["GraspSurrogate"]
 
@@ -38,7 +37,7 @@ _SHARE = 0.1  # of a range: how far a polynomial may be followed beyond it
 
 
 @dataclass(frozen=True, eq=False)
-class GraspSurrogate:
+class GraspSurrogate(LearntEnergy):
     """Energy, force and stiffness of a held body as a value: `save` and `load` give it back bit for bit.
 
     Attributes
@@ -63,6 +62,8 @@ class GraspSurrogate:
     UsageError
         If the parts do not fit together.
     """
+
+    WORDS = "grasp surrogate"
 
     network: Network
     rest: RestStiffness
@@ -122,17 +123,7 @@ class GraspSurrogate:
         even = ("the same everywhere", "linear in place", "quadratic in place")[self.rest.degree]
         assert self.stiffening is not None
         law = f"stiffness at rest {even}, polynomial of degree {self.stiffening.degree}"
-        return f"GraspSurrogate: {names}; {law}; {units}{_history(self.meta)}"
-
-    @property
-    def inputs(self) -> tuple[Range, ...]:
-        """Names and trained ranges of all inputs: the displacement's components (m), then the further ones."""
-        return self.network.inputs
-
-    @property
-    def parameters(self) -> tuple[Range, ...]:
-        """The inputs after the displacement: the place on the surface, then any others."""
-        return self.network.inputs[3:]
+        return f"GraspSurrogate: {names}; {law}; {units}{history_in_words(self.meta)}"
 
     @cached_property
     def _fixed(self) -> tuple[Any, ...]:
@@ -146,71 +137,13 @@ class GraspSurrogate:
         limits = np.array([low, high, going.widths])
         return radius, limits, points, (self.rest.compiled(), stiffening.compiled()), gram(self.network, 3)
 
-    @cached_property
-    def _root(self) -> np.ndarray:
-        """The posterior's root in units of ℓ."""
-        if self.root is None:
-            return np.zeros((0, 0))
-        return np.asarray(self.root * self.network.scaling.output_scale[0])
-
     def compiled(self) -> tuple[Any, ...]:
         """What `grasp_into` takes after its answer, with scratch for one thread."""
         scratch = (np.zeros((5, len(self.inputs))), np.zeros((SMALL, 3, 3)))
         return (*scratch, *self._fixed, self.network.compiled())
 
-    def _answers(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Checked inputs (N, n), answers (N, 14) and inside (N,)."""
-        X = np.ascontiguousarray(X, dtype=np.float64)
-        if X.ndim != 2 or X.shape[1] != len(self.inputs):
-            raise UsageError(
-                f"Inputs of shape {X.shape} came to a grasp surrogate of {len(self.inputs)} inputs.",
-                why=f"They are {', '.join(r.name for r in self.inputs)}.",
-                fix=f"Pass an array of shape (N, {len(self.inputs)}), in SI units.",
-            )
-        answers, inside = np.empty((len(X), ANSWER)), np.empty(len(X), dtype=np.bool_)
+    def _fill(self, X: np.ndarray, answers: np.ndarray, inside: np.ndarray) -> None:
         grasps_into(X, answers, inside, *self.compiled())
-        return X, answers, inside
-
-    def energy(self, X: np.ndarray) -> np.ndarray:
-        """U (N,) at inputs X (N, n), J: what the hand gave to bring the pad from rest to d at this place.
-
-        Raises
-        ------
-        UsageError
-            If X has another number of columns; so do all that take X.
-        """
-        return self._answers(X)[1][:, 0].copy()
-
-    def force(self, X: np.ndarray) -> np.ndarray:
-        """F = −∂U/∂d (N, 3) on the hand, N."""
-        return self._answers(X)[1][:, FORCE].copy()
-
-    def stiffness(self, X: np.ndarray) -> np.ndarray:
-        """∂F/∂d (N, 3, 3), symmetric, N/m; a body that resists has negative eigenvalues."""
-        return self._answers(X)[1][:, STIFFNESS].reshape(-1, 3, 3).copy()
-
-    def inside(self, X: np.ndarray) -> np.ndarray:
-        """Whether the answers (N,) are of the trained region: in all ranges, and near a training input."""
-        return self._answers(X)[2]
-
-    def deviation(self, X: np.ndarray) -> np.ndarray:
-        """Standard deviation (N,) of the force relative to its size; zero at rest.
-
-        Raises
-        ------
-        UsageError
-            If the surrogate has no posterior.
-        """
-        if self.root is None:
-            raise UsageError(
-                "This surrogate does not know its deviation.",
-                why="It has no posterior of its weights.",
-                fix="Learn it with one, or give `root`.",
-            )
-        X, answers, _ = self._answers(X)
-        out, columns = np.empty(len(X)), np.zeros((4, self._root.shape[1]))
-        trusts_into(X, answers, out, self._root, columns, self.network.compiled())
-        return out
 
     def evaluator(self) -> GraspEvaluator:
         """The allocation-free evaluator of the 1 kHz path."""

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.errors import FileFormatError, UsageError
-from palpate.network import Archive, load_archive, save_archive
+from palpate.network import Archive, save_archive
+from palpate.surrogates.file_parts import read
 from palpate.surrogates.plastic.elements import Elements
 
 if TYPE_CHECKING:
@@ -44,22 +44,18 @@ def load_held(path: str | os.PathLike[str]) -> HeldBody:
     FileFormatError
         If the file is missing, corrupt, foreign or from a later version, or its parts do not fit.
     """
+    return read(path, KIND, "a held body", _held)
+
+
+def _held(archive: Archive) -> HeldBody:
     from palpate.surrogates.plastic.held_body import HeldBody
 
-    archive = load_archive(path, kind=KIND)
-    try:
-        given: dict[str, Any] = {name: archive.arrays[name] for name in _ARRAYS}
-        given |= {name: archive.meta[name] for name in (*_PLAIN, "meta")}
-        numbers = archive.arrays["elements"].astype(np.float64)
-        return HeldBody(
-            stretch=archive.networks["stretch"],
-            shape=archive.networks["shape"],
-            elements=Elements(*numbers),
-            **given,
-        ).checked()
-    except (KeyError, TypeError, ValueError, IndexError, UsageError) as error:
-        raise FileFormatError(
-            f"{path} does not describe a held body.",
-            why=f"{type(error).__name__}: {error}",
-            fix="Copy the file again, or learn the body anew.",
-        ) from error
+    given: dict[str, Any] = {name: archive.arrays[name] for name in _ARRAYS}
+    given |= {name: archive.meta[name] for name in (*_PLAIN, "meta")}
+    numbers = archive.arrays["elements"].astype(np.float64)
+    return HeldBody(
+        stretch=archive.networks["stretch"],
+        shape=archive.networks["shape"],
+        elements=Elements(*numbers),
+        **given,
+    ).checked()

@@ -1,0 +1,125 @@
+"""What every energy that a hand feels answers: energy, force, stiffness, whether and how far it may be trusted.
+
+Where its inputs are and what they mean (a probe's centre, a pad's displacement) is told by the surrogate itself; the
+kernels of both fill the same answer (`touch_kernels`).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.network import Network
+from palpate.surrogates.touch_kernels import ANSWER, FORCE, STIFFNESS
+from palpate.surrogates.touch_trust import trusts_into
+from palpate.units import Range
+
+__all__ = ["LearntEnergy", "history_in_words"]
+
+
+class LearntEnergy(ABC):
+    """An energy U of n inputs x, the first three of them places in m whose force −∂U/∂x is felt."""
+
+    WORDS: ClassVar[str]
+    network: Network
+    root: np.ndarray | None
+
+    @property
+    def inputs(self) -> tuple[Range, ...]:
+        """Names and trained ranges of all inputs: three coordinates (m), then the further ones."""
+        return self.network.inputs
+
+    @property
+    def parameters(self) -> tuple[Range, ...]:
+        """The inputs after the first three."""
+        return self.network.inputs[3:]
+
+    @abstractmethod
+    def compiled(self) -> tuple[Any, ...]:
+        """What the kernel takes after its answer, with scratch for one thread; the network's arrays last."""
+
+    @abstractmethod
+    def _fill(self, X: np.ndarray, answers: np.ndarray, inside: np.ndarray) -> None:
+        """Answers (N, 14) and inside (N,) of inputs X (N, n)."""
+
+    def _answers(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Checked inputs (N, n), answers (N, 14) and inside (N,)."""
+        X = np.ascontiguousarray(X, dtype=np.float64)
+        if X.ndim != 2 or X.shape[1] != len(self.inputs):
+            raise UsageError(
+                f"Inputs of shape {X.shape} came to a {self.WORDS} of {len(self.inputs)} inputs.",
+                why=f"They are {', '.join(r.name for r in self.inputs)}.",
+                fix=f"Pass an array of shape (N, {len(self.inputs)}), in SI units.",
+            )
+        answers, inside = np.empty((len(X), ANSWER)), np.empty(len(X), dtype=np.bool_)
+        self._fill(X, answers, inside)
+        return X, answers, inside
+
+    def energy(self, X: np.ndarray) -> np.ndarray:
+        """U (N,) at inputs X (N, n), J: what the hand gave on its way there.
+
+        Raises
+        ------
+        UsageError
+            If X has another number of columns; so do all that take X.
+        """
+        return self._answers(X)[1][:, 0].copy()
+
+    def force(self, X: np.ndarray) -> np.ndarray:
+        """F = −∂U/∂x (N, 3) by the first three inputs, N."""
+        return self._answers(X)[1][:, FORCE].copy()
+
+    def stiffness(self, X: np.ndarray) -> np.ndarray:
+        """∂F/∂x (N, 3, 3), symmetric, N/m; a body that resists has negative eigenvalues."""
+        return self._answers(X)[1][:, STIFFNESS].reshape(-1, 3, 3).copy()
+
+    def inside(self, X: np.ndarray) -> np.ndarray:
+        """Whether the answers (N,) are of the trained region: in all ranges, and near a training input.
+
+        Without contact a touch's answer, zero, is exact, and counts as inside.
+        """
+        return self._answers(X)[2]
+
+    def deviation(self, X: np.ndarray) -> np.ndarray:
+        """Standard deviation (N,) of the force relative to its size; zero where there is none.
+
+        Raises
+        ------
+        UsageError
+            If the surrogate has no posterior.
+        """
+        if self.root is None:
+            raise UsageError(
+                "This surrogate does not know its deviation.",
+                why="It has no posterior of its weights.",
+                fix="Learn it with one, or give `root`.",
+            )
+        X, answers, _ = self._answers(X)
+        out, columns = np.empty(len(X)), np.zeros((4, self._root.shape[1]))
+        trusts_into(X, answers, out, self._root, columns, self.network.compiled())
+        return out
+
+    @cached_property
+    def _root(self) -> np.ndarray:
+        """The posterior's root in units of ℓ; (0, 0) without one."""
+        if self.root is None:
+            return np.zeros((0, 0))
+        return np.asarray(self.root * self.network.scaling.output_scale[0])
+
+
+def history_in_words(meta: Mapping[str, Any]) -> str:
+    """What `meta` tells of the training."""
+    words = ""
+    if "solves" in meta:
+        words += f"; trained with {meta['solves']} solves"
+        if meta.get("samples", meta["solves"]) != meta["solves"]:
+            words += f" ({meta['samples']} samples by symmetry)"
+    error = meta.get("force_error")
+    if isinstance(error, Mapping) and {"median", "p95"} <= error.keys():
+        words += f"; force error {100 * error['median']:.2g} % median, {100 * error['p95']:.2g} % p95"
+    return words

@@ -30,7 +30,18 @@ from palpate.surrogates.continuation import saturated
 from palpate.surrogates.laws import law_at
 from palpate.surrogates.surface import distance_into
 
-__all__ = ["ANSWER", "FORCE", "SMALL", "STIFFNESS", "touch_into", "touches_into"]
+__all__ = [
+    "ANSWER",
+    "FORCE",
+    "SMALL",
+    "STIFFNESS",
+    "boxed",
+    "gathered",
+    "near",
+    "through_box",
+    "touch_into",
+    "touches_into",
+]
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
 
@@ -45,7 +56,7 @@ SMALL = 6
 
 
 @_jit
-def _boxed(lines, limits) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def boxed(lines, limits) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Every input of line 1 saturates beyond its range; slopes and curvatures into lines 2 and 3."""
     for i in range(lines.shape[1]):
         t, low, high, width = lines[1, i], limits[0, i], limits[1, i], limits[2, i]
@@ -57,7 +68,7 @@ def _boxed(lines, limits) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN0
 
 
 @_jit
-def _through_box(g, H, lines) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def through_box(g, H, lines) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """∇ℓ and ∇²ℓ by what came before the saturation of the ranges."""
     for i in range(3):
         for j in range(3):
@@ -129,7 +140,7 @@ def _assemble(answer, kappa, law, small) -> None:  # type: ignore[no-untyped-def
 
 
 @_jit
-def _near(x, points, radius, last) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def near(x, points, radius, last) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Whether a trained point is within the radius; hands move little: the search begins where it last ended."""
     S = points.shape[0]
     bound, start = radius * radius * (1.0 + _SLACK), int(last[0])
@@ -154,11 +165,11 @@ def _inside(lines, limits, s, numbers, points, scales, small) -> bool:  # type: 
         if lines[0, i] < limits[0, i] - slack or lines[0, i] > limits[1, i] + slack:
             return False
         lines[1, i] = (lines[0, i] - scales[0, i]) / scales[1, i]
-    return bool(_near(lines[1], points, numbers[_REGION], small[_MORE, _LAST]))
+    return bool(near(lines[1], points, numbers[_REGION], small[_MORE, _LAST]))
 
 
 @_jit
-def _gathered(position, parameters, lines) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def gathered(position, parameters, lines) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """x into line 0; whether all of it is finite."""
     for i in range(3):
         lines[0, i] = position[i]
@@ -178,7 +189,7 @@ def touch_into(c, p, answer, lines, small, numbers, limits, points, grams, surfa
     whole answer is not-a-number.
     """
     answer[:] = 0.0
-    if not _gathered(c, p, lines):
+    if not gathered(c, p, lines):
         answer[:] = math.nan
         return False
     d, g = small[_VECTORS, 0], small[_VECTORS, 1]
@@ -192,9 +203,9 @@ def touch_into(c, p, answer, lines, small, numbers, limits, points, grams, surfa
     lines[1, :] = lines[0, :]
     for i in range(3):
         lines[1, i] += (s - depth) * d[i]
-    _boxed(lines, limits)
+    boxed(lines, limits)
     log_kappa = second_order_into(lines[1], g, small[_LOG], grams, *net)
-    _through_box(g, small[_LOG], lines)
+    through_box(g, small[_LOG], lines)
     if s > depth:
         _through_depth(c, s - depth, slope, curvature, small, numbers[_STEP], surface)
     law = law_at(s, numbers[_TWICE], numbers[_FACTOR], numbers[_LENGTH])

@@ -3,8 +3,10 @@
 samples          (U, F, ∂F/∂c) as values, slopes and curvatures of ℓ, each weighted to make its error relative
 images           a body's symmetry, in scaled inputs
 search           starts, growth and choice by the leave-one-solve-out error
+strategy         in which order it goes
 laws             which contact law, and where it crosses over
 trust            the posterior of the linear weights, calibrated by what leaving solves out has shown
+written          what was found, as the parts of a surrogate
 learn_surrogate  all of it
 """
 

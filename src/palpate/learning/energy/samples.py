@@ -132,7 +132,7 @@ class EnergySamples:
         bends = -self.stiffness / self.energy[:, None, None] - g[:, :, None] * g[:, None]
         bends -= second[:, None, None] * self.slope[:, :, None] * self.slope[:, None]
         bends -= first[:, None, None] * self.bend
-        half, n = self._half, len(self.inputs)
+        half, n = self.half, len(self.inputs)
         i, j = pairs(n)
         all_slopes, all_bends = by_all * half, np.zeros((len(self), n, n))
         all_slopes[:, :3], all_bends[:, :3, :3] = slopes * half[:3], bends * half[:3, None] * half[:3]
@@ -147,7 +147,7 @@ class EnergySamples:
         a force.
         """
         Y, slopes, curvatures = self.targets(law)
-        half, n = self._half, len(self.inputs)
+        half, n = self.half, len(self.inputs)
         i, j = pairs(n)
         by_force = (self.energy / np.linalg.norm(self.force[:, :3], axis=1))[:, None]
         by_stiffness = (self.energy / np.linalg.norm(self.stiffness, axis=(1, 2)))[:, None]
@@ -164,7 +164,8 @@ class EnergySamples:
         }
 
     @property
-    def _half(self) -> np.ndarray:
+    def half(self) -> np.ndarray:
+        """Half (n,) of each input's range."""
         low, high = bounds(self.inputs)
         return np.asarray((high - low) / 2)
 

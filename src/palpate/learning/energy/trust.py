@@ -9,11 +9,12 @@ tenths of those errors are below 1.645 deviations.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from palpate.learning.energy.search import Problem
+from palpate.learning.energy.written import Solves
 from palpate.learning.refinement.leave_one_out import left_out_rows
 from palpate.learning.refinement.projection import project, span_of_units
 from palpate.learning.refinement.refine import Refined
@@ -41,24 +42,11 @@ class Trust:
     errors: np.ndarray
 
 
-class Touches(Protocol):
-    """What is asked of samples: energy (N,), force (N, 3 or more), and half of each input's range."""
-
-    @property
-    def energy(self) -> np.ndarray: ...
-
-    @property
-    def force(self) -> np.ndarray: ...
-
-    @property
-    def _half(self) -> np.ndarray: ...
-
-
-def trust_of(refined: Refined, problem: Problem, samples: Touches, ridge: float | None = None) -> Trust:
+def trust_of(refined: Refined, problem: Problem, samples: Solves) -> Trust:
     """From the solves that the network was refined on."""
     known: dict[str, Any] = dict(problem.rows)
     rows = Rows.of(refined.regressors, problem.X, known.pop("Y"), **known)
-    fit = project(rows, refined.theta, (problem.ridge if ridge is None else ridge) * rows.total)
+    fit = project(rows, refined.theta, problem.ridge * rows.total)
     span = span_of_units(rows, refined.theta, fit) if len(refined.theta) else None
     missed = left_out_rows(rows, fit, basis=span, most=_MOST) @ rows.modes
     Q = fit.Q
@@ -87,14 +75,14 @@ def _slope_rows(rows: Rows) -> list[tuple[int, int]]:
     return [(int(i), int(start)) for i, start in zip(rows.sloped, starts, strict=True)]
 
 
-def _to_force(rows: Rows, samples: Touches) -> np.ndarray:
+def _to_force(rows: Rows, samples: Solves) -> np.ndarray:
     """(S, 3, 4): what errors of a solve's weighted value and slope rows make of its force, relative to its size."""
     known = rows.sloped
     force = samples.force[known, :3]
     size = np.linalg.norm(force, axis=1)
     found = np.zeros((len(known), 3, 4))
     found[:, :, 0] = force / (size * rows.scale[known])[:, None]
-    half = samples._half[:3]
+    half = samples.half[:3]
     for i in range(3):
         found[:, i, 1 + i] = -samples.energy[known] / (size * rows.slope_scale[:, i] * half[i])
     return found

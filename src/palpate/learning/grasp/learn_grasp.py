@@ -6,15 +6,16 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from palpate.errors import UsageError
-from palpate.learning.energy.learn_surrogate import _meta, _region, _searched, _written_out
 from palpate.learning.energy.search import EnergyTrial, Problem
+from palpate.learning.energy.strategy import searched
 from palpate.learning.energy.trust import trust_of
+from palpate.learning.energy.written import trained_region, training_meta, written_out
 from palpate.learning.grasp.images import hold_images
 from palpate.learning.grasp.rest import found_law
 from palpate.learning.grasp.samples import GraspSamples
@@ -131,15 +132,14 @@ def learn_grasp(
         rows = samples.rows(found.rest, found.stiffening)
         law = f"degrees {found.rest.degree} and {found.stiffening.degree}"
         problem = Problem(samples.scaled, rows, images, law, _RIDGE)
-        search = _searched(problem, time.monotonic() + seconds, form, radial, units_max, target, seed)
+        search = searched(problem, time.monotonic() + seconds, form, radial, units_max, target, seed)
         best = search.best
         assert best is not None  # the tail at least was tried
-        trust = trust_of(best, problem, samples, _RIDGE)
-    seen: Any = samples  # like those of touches where it matters
-    meta: dict[str, Any] = _meta(seen, images, best, search.error, trust.errors)
-    network, root = _written_out(best, trust.root, seen, meta)
+        trust = trust_of(best, problem, samples)
+    meta = training_meta(samples, images, best, search.error, trust.errors)
+    network, root = written_out(best, trust.root, samples, meta)
     surrogate = GraspSurrogate(
-        network, found.rest, found.stiffening, region=_region(seen, images), root=root, meta=meta
+        network, found.rest, found.stiffening, region=trained_region(samples, images), root=root, meta=meta
     )
     return LearntGrasp(surrogate, tuple(search.trials), trust.errors, search.error, found.errors)
 

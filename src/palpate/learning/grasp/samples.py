@@ -22,7 +22,7 @@ from palpate.errors import UsageError
 from palpate.learning.checks import numbers
 from palpate.learning.energy.samples import CURVATURE_SHARE
 from palpate.learning.units.regressors import pairs
-from palpate.surrogates.grasp.rest import _ALL, RestStiffness, monomials
+from palpate.surrogates.grasp.rest import ENTRIES, RestStiffness, monomials
 from palpate.surrogates.grasp.stiffening import Stiffening
 from palpate.units import Range, bounds
 
@@ -117,7 +117,7 @@ class GraspSamples:
         self, rest: RestStiffness, stiffening: Stiffening | None = None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """ℓ (N, 1), its slopes (N, 1, n) and curvatures (N, 1, n(n+1)/2) by scaled inputs; unknown ones zero."""
-        half, moved = self._half, self.moved
+        half, moved = self.half, self.moved
         U0, first, second = _logarithm(rest, self.X[:, :3], self.scaled[:, 3:], half)
         i, j = pairs(len(half))
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -151,7 +151,7 @@ class GraspSamples:
         beside energy and force.
         """
         Y, slopes, curvatures = self.targets(rest, stiffening)
-        half, n = self._half, len(self.inputs)
+        half, n = self.half, len(self.inputs)
         i, j = pairs(n)
         by_force = (self.energy / np.linalg.norm(self.force[:, :3], axis=1).clip(1e-300))[:, None]
         by_stiffness = (self.energy / np.linalg.norm(self.stiffness[:, :3, :3], axis=(1, 2)))[:, None]
@@ -174,7 +174,8 @@ class GraspSamples:
         }
 
     @property
-    def _half(self) -> np.ndarray:
+    def half(self) -> np.ndarray:
+        """Half (n,) of each input's range."""
         low, high = bounds(self.inputs)
         return np.asarray((high - low) / 2)
 
@@ -186,9 +187,9 @@ def _logarithm(
     N, n = len(d), len(half)
     value, slope, bend = monomials(Z, rest.degree)
     C = rest.coefficients
-    S = (value @ C)[:, _ALL]
-    by_place = np.einsum("nmk,me->nek", slope, C)[:, _ALL]  # (N, 3, 3, k)
-    twice = np.einsum("nmkl,me->nekl", bend, C)[:, _ALL]
+    S = (value @ C)[:, ENTRIES]
+    by_place = np.einsum("nmk,me->nek", slope, C)[:, ENTRIES]  # (N, 3, 3, k)
+    twice = np.einsum("nmkl,me->nekl", bend, C)[:, ENTRIES]
     v = np.einsum("nij,nj->ni", S, d)
     J, B = np.zeros((N, 3, n)), np.zeros((N, 3, n, n))
     J[:, :, :3] = S * half[:3]

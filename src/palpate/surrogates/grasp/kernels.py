@@ -17,7 +17,7 @@ from numba import njit
 from palpate.network.second_order import second_order_into
 from palpate.surrogates.grasp.rest import root_at
 from palpate.surrogates.grasp.stiffening import stiffening_into
-from palpate.surrogates.touch_kernels import _boxed, _gathered, _near, _through_box
+from palpate.surrogates.touch_kernels import boxed, gathered, near, through_box
 
 __all__ = ["grasp_into", "grasps_into"]
 
@@ -60,7 +60,7 @@ def _inside(lines, limits, points, radius, scales, small) -> bool:  # type: igno
         if lines[0, i] < limits[0, i] - slack or lines[0, i] > limits[1, i] + slack:
             return False
         lines[1, i] = (lines[0, i] - scales[0, i]) / scales[1, i]
-    return bool(_near(lines[1], points, radius, small[_MORE, _LAST]))
+    return bool(near(lines[1], points, radius, small[_MORE, _LAST]))
 
 
 @_jit
@@ -70,11 +70,11 @@ def grasp_into(d, y, answer, lines, small, radius, limits, points, laws, grams, 
     Where an input is not finite the whole answer is not-a-number.
     """
     answer[:] = 0.0
-    if not _gathered(d, y, lines):
+    if not gathered(d, y, lines):
         answer[:] = math.nan
         return False
     lines[1, :] = lines[0, :]
-    _boxed(lines, limits)
+    boxed(lines, limits)
     xi, scales = lines[_SCALED], net[3]
     for i in range(lines.shape[1]):
         xi[i] = (lines[1, i] - scales[0, i]) / scales[1, i]
@@ -82,7 +82,7 @@ def grasp_into(d, y, answer, lines, small, radius, limits, points, laws, grams, 
     g = small[_VECTORS, 1]
     log_kappa = second_order_into(lines[1], g, small[_LOG], grams, *net)
     log_kappa += stiffening_into(xi, g, small[_LOG], scales, *laws[1])
-    _through_box(g, small[_LOG], lines)
+    through_box(g, small[_LOG], lines)
     _assemble(answer, lines[0], math.exp(log_kappa), small)
     return _inside(lines, limits, points, radius, scales, small)
 

@@ -23,7 +23,7 @@ __all__ = ["RestStiffness", "monomials", "root_at", "terms"]
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
 _I, _J = np.triu_indices(3)
-_ALL = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])  # where the six entries of a symmetric matrix are
+ENTRIES = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])  # where the six entries of a symmetric matrix are
 MOST = 2  # highest degree
 
 
@@ -107,7 +107,7 @@ class RestStiffness:
 
     def root(self, Z: np.ndarray) -> np.ndarray:
         """S (N, 3, 3) at scaled inputs Z (N, k)."""
-        return np.asarray((monomials(Z, self.degree)[0] @ self.coefficients)[:, _ALL])
+        return np.asarray((monomials(Z, self.degree)[0] @ self.coefficients)[:, ENTRIES])
 
     def least(self, Z: np.ndarray) -> float:
         """Least |eigenvalue| of S over its largest, over Z (N, k): zero where a direction has no stiffness."""

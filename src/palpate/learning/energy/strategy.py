@@ -1,0 +1,63 @@
+"""In which order a search of the energy's network spends its time."""
+
+from __future__ import annotations
+
+import time
+from typing import Literal
+
+import numpy as np
+
+from palpate.learning.energy.search import Problem, Search
+from palpate.learning.refinement.refine import Refined
+from palpate.network.radial import RadialFunction
+
+__all__ = ["searched"]
+
+_FORM_SHARE = 0.35  # of the time
+_FORMS = ("rotated", "axis-aligned", "rank-2")  # the last for more inputs than the position
+_RADIALS: tuple[RadialFunction, ...] = ("inverse-multiquadric", "matern-5/2", "gaussian")
+_FIRST = 6  # units by which forms are compared
+_SPREAD = (0.6, 1.4)  # sizes of further networks over that of the best
+
+
+def searched(
+    problem: Problem,
+    deadline: float,
+    form: str,
+    radial: RadialFunction | Literal["auto"],
+    units_max: int,
+    target: float,
+    seed: int,
+) -> Search:
+    """Every kind of unit at one size, then growth of the best two, and what time is left for starts of any size."""
+    search = Search(problem, deadline, seed)
+    copies = 1 if problem.images is None else len(problem.images.turns)
+    most, n = units_max // copies, problem.X.shape[1]
+    found: list[tuple[Refined, float]] = []
+    until = time.monotonic() + _FORM_SHARE * search.left
+    for kind in _kinds(form, radial, n):
+        of = problem.regressors(*kind)
+        h = min(_FIRST, most, problem.room(of))
+        if not found or time.monotonic() < until:
+            found.append(search.tried(search.random(of, h), of, "kind", 80))
+    found.sort(key=lambda one: one[1])
+    for i, (one, _) in enumerate(found[:2]):
+        rest = search.deadline
+        search.deadline = time.monotonic() + max(search.left, 0.0) / (len(found[:2]) - i)
+        search.grow(one, most, target)
+        search.deadline = rest
+    rng = np.random.default_rng([seed, len(found)])
+    while search.left > 0 and search.error > target and search.best is not None and len(search.best.theta):
+        of = found[int(rng.integers(min(3, len(found))))][0].regressors
+        h = round(len(search.best.theta) * rng.uniform(*_SPREAD))
+        search.tried(search.random(of, min(max(h, 1), most, problem.room(of))), of, "random")
+    return search
+
+
+def _kinds(
+    form: str, radial: RadialFunction | Literal["auto"], inputs: int
+) -> list[tuple[str, RadialFunction]]:
+    """Forms and radial functions to try: the first of each list with all of the other."""
+    forms = [f for f in _FORMS if f != "rank-2" or inputs > 3] if form == "auto" else [form]
+    radials = list(_RADIALS) if radial == "auto" else [radial]
+    return [(forms[0], r) for r in radials] + [(f, r) for f in forms[1:] for r in radials[:2]]

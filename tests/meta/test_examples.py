@@ -197,6 +197,18 @@ def specimen(text: str, folder: Path) -> None:
     assert (folder / "specimen.palpate").stat().st_size > 1000
 
 
+def grasp(text: str, folder: Path) -> None:
+    rows = np.array(re.findall(r"lifted (\d) mm: force +(\S+) N, stiffness +(\S+) N/m", text), dtype=float)
+    lift, force, stiffness = rows[:, 0] * 1e-3, rows[:, 1], rows[:, 2]
+    assert force[0] == 0.0
+    # the pull back grows as the stiffness says: by the trapezoid of the slopes, to what their printed digits allow
+    np.testing.assert_allclose(
+        np.diff(-force), np.diff(lift) * (stiffness[1:] + stiffness[:-1]) / 2, rtol=0.01
+    )
+    assert float(re.search(r"closed path: (\S+) of", text)[1]) < 1e-9
+    assert (folder / "held.palpate").stat().st_size > 1000
+
+
 def bent(text: str, folder: Path) -> None:
     learnt, elastic = (float(v) for v in re.findall(r"error [\d.]+% median, ([\d.]+)% p95", text))
     assert learnt < 1.0 < 10.0 < elastic
@@ -217,6 +229,7 @@ CHECKS: dict[str, Callable[[str, Path], None]] = {
     "10_creeping_nylon.py": nylon,
     "11_press_soft_tissue.py": tissue,
     "12_correct_from_a_specimen.py": specimen,
+    "13_hold_soft_tissue.py": grasp,
     "14_bent_and_stays_bent.py": bent,
 }
 QUICK = {"04_filter_by_hand.py"}

@@ -179,3 +179,18 @@ def test_a_standing_loop_is_noticed(rod: TouchModel):
         frame = client.frame()
         os.kill(viewer.loop.pid, signal.SIGCONT)
         assert (frame.loop, frame.force) == (Loop.FROZEN, (0.0, 0.0, 0.0))
+
+
+def test_a_loop_that_stands_in_the_midst_of_a_tick_is_frozen_too(
+    rod: TouchModel, monkeypatch: pytest.MonkeyPatch
+):
+    with Viewer(rod, port=0) as viewer, client_of(viewer) as client:
+        held(client, -0.3)
+        os.kill(viewer.loop.pid, signal.SIGSTOP)
+        with monkeypatch.context() as midst:
+            midst.setattr(viewer.loop.shared.state, "fetch", lambda: False)  # as where a write never ends
+            client.grant(1)
+            frame = client.frame()
+        os.kill(viewer.loop.pid, signal.SIGCONT)
+        assert (frame.loop, frame.force) == (Loop.FROZEN, (0.0, 0.0, 0.0))
+        assert held(client, -0.3).loop == Loop.RUNNING

@@ -170,8 +170,8 @@ class Session:
             return self._state, Loop.ENDED
         try:
             self._state = self.loop.shared.read_state()
-        except DeviceError:  # killed while publishing: `watch` will say so
-            return self._state, Loop.ENDED
+        except DeviceError:  # stopped, or just killed, while publishing; `watch` says which
+            return self._state, Loop.FROZEN
         return self._state, Loop.RUNNING if now() - self._state.time < STALE else Loop.FROZEN
 
     async def _show(self, page: Page) -> None:

@@ -17,6 +17,8 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.perceptron import perceptron
+
 __all__ = ["MISSING", "RIVALS", "Model"]
 
 Predictor = Callable[[np.ndarray], np.ndarray]
@@ -162,27 +164,12 @@ _TRAINED: list[tuple[np.ndarray, np.ndarray, Any, str]] = []  # the last percept
 
 
 def _perceptron(X: np.ndarray, Y: np.ndarray) -> tuple[Any, str]:
-    from sklearn.neural_network import MLPRegressor
-
     if _TRAINED and np.array_equal(_TRAINED[0][0], X) and np.array_equal(_TRAINED[0][1], Y):
         return _TRAINED[0][2:]
 
     def of(decay: float, steps: int) -> Fit:
         def fit(X: np.ndarray, Y: np.ndarray) -> Model:
-            model = MLPRegressor(
-                hidden_layer_sizes=(100, 100),
-                activation="tanh",
-                solver="lbfgs",
-                alpha=decay,
-                tol=1e-10,
-                max_iter=steps,
-                max_fun=2 * steps,
-                random_state=0,
-            )
-            with warnings.catch_warnings():
-                # the number of steps is the training budget
-                warnings.simplefilter("ignore")
-                model.fit(X, Y)
+            model = perceptron(X, Y, layers=(100, 100), decay=decay, steps=steps)
             return Model(model.predict, model, f"decay {decay:g}")
 
         return fit

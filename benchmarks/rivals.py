@@ -13,6 +13,8 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from benchmarks.perceptron import perceptron
+
 __all__ = ["RIVALS", "Predictor", "gaussian_process", "mlp", "rbf_interpolator"]
 
 Predictor = Callable[[np.ndarray], np.ndarray]
@@ -98,24 +100,12 @@ def gaussian_process(x: np.ndarray, Y: np.ndarray) -> Predictor:
 
 def mlp(x: np.ndarray, Y: np.ndarray) -> Predictor:
     """scikit-learn's `MLPRegressor`: tanh, L-BFGS until it stops by itself; layers and start by hold-out."""
-    from sklearn.neural_network import MLPRegressor
 
     def of(layers: tuple[int, ...], seed: int) -> Fit:
         def fit(x: np.ndarray, Y: np.ndarray) -> Predictor:
-            model = MLPRegressor(
-                hidden_layer_sizes=layers,
-                activation="tanh",
-                solver="lbfgs",
-                alpha=0.0,
-                tol=1e-12,
-                max_iter=3000,
-                max_fun=30000,
-                random_state=seed,
+            model = perceptron(
+                x[:, None], Y, layers=layers, decay=0.0, steps=3000, tolerance=1e-12, calls=30000, seed=seed
             )
-            with warnings.catch_warnings():
-                # the iteration limit is the training budget
-                warnings.simplefilter("ignore")
-                model.fit(x[:, None], Y)
             return lambda q: model.predict(q[:, None])
 
         return fit

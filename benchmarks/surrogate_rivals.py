@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from benchmarks.perceptron import perceptron
 from benchmarks.surrogate_cases import Case, Training
 from palpate.units import bounds
 from palpate.validation import TouchFunction
@@ -62,25 +63,10 @@ def gaussian_process(x: np.ndarray, Y: np.ndarray) -> Predictor:
 
 def mlp(x: np.ndarray, Y: np.ndarray) -> Predictor:
     """scikit-learn's `MLPRegressor`: two layers of 64 tanh, L-BFGS; weight decay by hold-out."""
-    from sklearn.neural_network import MLPRegressor
 
     def of(decay: float, steps: int) -> Fit:
         def fit(x: np.ndarray, Y: np.ndarray) -> Predictor:
-            model = MLPRegressor(
-                hidden_layer_sizes=(64, 64),
-                activation="tanh",
-                solver="lbfgs",
-                alpha=decay,
-                tol=1e-10,
-                max_iter=steps,
-                max_fun=2 * steps,
-                random_state=0,
-            )
-            with warnings.catch_warnings():
-                # the number of steps is the training budget
-                warnings.simplefilter("ignore")
-                model.fit(x, Y)
-            return model.predict
+            return perceptron(x, Y, layers=(64, 64), decay=decay, steps=steps).predict
 
         return fit
 

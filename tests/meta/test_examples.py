@@ -199,6 +199,7 @@ def specimen(text: str, folder: Path) -> None:
 
 def grasp(text: str, folder: Path) -> None:
     rows = np.array(re.findall(r"lifted (\d) mm: force +(\S+) N, stiffness +(\S+) N/m", text), dtype=float)
+    assert "8 solves (64 samples by symmetry)" in text
     lift, force, stiffness = rows[:, 0] * 1e-3, rows[:, 1], rows[:, 2]
     assert force[0] == 0.0
     # the pull back grows as the stiffness says: by the trapezoid of the slopes, to what their printed digits allow

@@ -47,6 +47,7 @@ def learn_dataset(train: Dataset, **options: Any) -> Learnt:
         return learn_body(train, **options)
     if isinstance(train, Dataset) and _is_held(train):
         solves = HeldSolves.of(train)
+        told = {"symmetry": solves.matrices, "about": solves.about} if len(solves.matrices) > 1 else {}
         found = learn_grasp(
             solves.X,
             solves.energy,
@@ -54,7 +55,7 @@ def learn_dataset(train: Dataset, **options: Any) -> Learnt:
             solves.stiffness,
             inputs=solves.inputs,
             axes=solves.axes,
-            **options,
+            **(told | options),
         )
         return found.surrogate, found
     return learn_touch(train, **options)

@@ -7,14 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from palpate.errors import UsageError
+from palpate.surrogates.arguments import NONE, touch_at
 from palpate.surrogates.touch_kernels import ANSWER, FORCE, STIFFNESS, touch_into
 from palpate.surrogates.touch_trust import trust_at
 
 __all__ = ["SurrogateEvaluator"]
-
-_NONE = np.zeros(0)
-_DOUBLE = np.dtype(np.float64)
 
 
 class SurrogateEvaluator:
@@ -54,7 +51,7 @@ class SurrogateEvaluator:
         # compile now, not in the loop
         self.trust(np.array(somewhere[:3], dtype=float), np.array(somewhere[3:], dtype=float))
 
-    def __call__(self, position: np.ndarray, parameters: np.ndarray = _NONE) -> None:
+    def __call__(self, position: np.ndarray, parameters: np.ndarray = NONE) -> None:
         """Evaluate at a centre; float64 arrays are taken as they are, other sequences are converted.
 
         Parameters
@@ -69,18 +66,10 @@ class SurrogateEvaluator:
         UsageError
             If there are not three coordinates and p parameters.
         """
-        if type(position) is not np.ndarray or position.dtype is not _DOUBLE:
-            position = np.asarray(position, np.float64)
-        if type(parameters) is not np.ndarray or parameters.dtype is not _DOUBLE:
-            parameters = np.asarray(parameters, np.float64)
-        if position.shape != (3,) or parameters.shape != self._shape:
-            raise UsageError(
-                f"A probe at {position.shape} with parameters {parameters.shape} can't be answered.",
-                fix=f"Give its centre (3,) in m and parameters {self._shape}.",
-            )
+        position, parameters = touch_at(position, parameters, self._shape)
         self.inside = self._kernel(position, parameters, *self._arguments)
 
-    def trust(self, position: np.ndarray, parameters: np.ndarray = _NONE) -> float:
+    def trust(self, position: np.ndarray, parameters: np.ndarray = NONE) -> float:
         """Standard deviation of the force relative to its size; evaluates there first.
 
         Zero without contact, where the answer is exact; not-a-number in contact where the surrogate has no

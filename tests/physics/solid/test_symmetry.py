@@ -12,6 +12,7 @@ from palpate.physics import (
     Dome,
     FibreFamily,
     FibreReinforced,
+    GluedPad,
     Inclusion,
     LayeredBlock,
     NeoHookean,
@@ -71,6 +72,30 @@ def test_isometries_take_surfaces_where_they_say(shape, count):
 )
 def test_supports_surface_gravity_and_fibres_break_a_symmetry(body, touches, count):
     assert len(symmetry_of(body, touches)) == count
+
+
+@pytest.mark.parametrize(
+    ("shape", "pad", "count"),
+    [
+        (CUBE, {"radius": 0.02, "over": ((0.04, 0.04), (0.06, 0.06))}, 8),
+        (CUBE, {"radius": 0.02, "at": (0.05, 0.05, 0.1)}, 8),
+        (CUBE, {"radius": 0.02, "at": (0.06, 0.05, 0.1)}, 2),
+        (CUBE, {"radius": 0.02, "at": (0.06, 0.04, 0.1)}, 2),
+        (CUBE, {"radius": 0.02, "at": (0.06, 0.055, 0.1)}, 1),
+        (CUBE, {}, 8),
+        (Block((0.1, 0.08, 0.05)), {"radius": 0.01, "over": ((0.03, 0.03), (0.06, 0.05))}, 4),
+        # seen along x, a round side keeps the isometries that leave x a line
+        (Cylinder(0.05, 0.1), {"touches": "side", "radius": 0.01, "at": (0.05, 0.0, 0.05)}, 2),
+    ],
+)
+def test_a_pad_keeps_what_leaves_its_places_where_they_are(shape, pad, count):
+    body = Body(shape, SOFT, fixed="bottom")
+    told = body.problem(GluedPad(**pad, element=0.02)).symmetry
+    assert len(told["isometries"]) == count
+    M = np.array(told["isometries"])
+    for one in M:  # a group
+        for other in M:
+            assert np.isclose(M, one @ other).all(axis=(1, 2)).any()
 
 
 def test_images_of_the_fundamental_part_are_the_whole_footprint():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -11,8 +10,10 @@ import numpy as np
 
 from palpate.dataset import Dataset, Layout
 from palpate.errors import UsageError
+from palpate.learning.energy.columns import columns_of
+from palpate.learning.symmetry import symmetry_told, widened
 from palpate.surrogates import TouchedSurface
-from palpate.units import Range, bounds
+from palpate.units import Range
 
 __all__ = ["FEWEST", "Touches", "is_touched"]
 
@@ -20,7 +21,6 @@ FEWEST = 6  # solves in contact: what the law and an affine network have to be f
 UPRIGHT = ("x_min", "x_max", "y_min", "y_max")  # what "side" of a box means
 PROBES = ("SphereProbe",)
 DISSIPATING = ("Plastic",)
-SAME_FOOT = 0.02  # of the radius: solves that share a footprint are one column
 SHOULDER = (
     1 / 3
 )  # of the radius: how the touched surface rolls off where it ends, as smooth in the middle as at its border
@@ -87,12 +87,12 @@ class Touches:
         rest, triangles, touched = _surface(data, layout, str(probe["touches"]))
         nodes, own = np.unique(triangles, return_inverse=True)
         radius = float(probe["radius"])
-        matrices, about = _symmetry(data)
+        matrices, about = symmetry_told(data)
         element = data.provenance["problem"].get("element")
         return cls(
             data,
             radius,
-            _widened(data.ranges, matrices, about),
+            (*widened(data.ranges[:3], matrices, about), *data.ranges[3:]),
             TouchedSurface.of(rest, touched, radius=radius, shoulder=SHOULDER * radius),
             rest[nodes],
             own.reshape(-1, 3),
@@ -103,11 +103,8 @@ class Touches:
 
     @property
     def columns(self) -> np.ndarray:
-        """For each solve (N,) the number of its column: solves with one footprint."""
-        C = np.ascontiguousarray(self.data.X[:, :3])
-        distance, gradient, _ = self.surface.at(C)
-        feet = np.round((C - distance[:, None] * gradient) / (SAME_FOOT * self.radius))
-        return np.asarray(np.unique(feet, axis=0, return_inverse=True)[1].ravel())
+        """For each solve (N,) the number of its column, whatever its further inputs are."""
+        return columns_of(self.data.X[:, :3], self.surface, self.radius)
 
 
 def _checked_probe(data: Dataset) -> Mapping[str, Any]:
@@ -158,20 +155,3 @@ def _surface(data: Dataset, layout: Layout | None, name: str) -> tuple[np.ndarra
             f"The mesh has no surface called {name!r}.", why=f"It has {', '.join(map(str, surfaces))}."
         )
     return rest, triangles, triangles[touched]
-
-
-def _symmetry(data: Dataset) -> tuple[np.ndarray, np.ndarray]:
-    told = data.provenance.get("symmetry") or {"about": [0.0, 0.0, 0.0], "isometries": [np.eye(3).tolist()]}
-    return np.array(told["isometries"], dtype=float), np.array(told["about"], dtype=float)
-
-
-def _widened(ranges: tuple[Range, ...], matrices: np.ndarray, about: np.ndarray) -> tuple[Range, ...]:
-    """The ranges of places, so that all images of their box are inside; others as they are."""
-    low, high = bounds(ranges[:3])
-    corners = np.array(list(itertools.product(*zip(low, high, strict=True))))
-    images = about + (corners - about) @ matrices.transpose(0, 2, 1)
-    least, most = images.min(axis=(0, 1)), images.max(axis=(0, 1))
-    places = tuple(
-        Range(r.name, float(a), float(b), r.unit) for r, a, b in zip(ranges, least, most, strict=False)
-    )
-    return (*places, *ranges[3:])

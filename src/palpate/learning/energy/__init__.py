@@ -1,6 +1,7 @@
 """A touch surrogate from energies, forces and stiffnesses: everything observed is of one scalar, ℓ = ln(U/U₀).
 
 samples          (U, F, ∂F/∂c) as values, slopes and curvatures of ℓ, each weighted to make its error relative
+columns          which solves lie over one place
 images           a body's symmetry, in scaled inputs
 search           starts, growth and choice by the leave-one-solve-out error
 strategy         in which order it goes

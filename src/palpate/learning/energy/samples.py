@@ -24,13 +24,13 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.learning.checks import numbers
+from palpate.learning.energy.columns import columns_of
 from palpate.learning.units.regressors import pairs
 from palpate.surrogates import ContactLaw, TouchedSurface
 from palpate.units import Range, bounds
 
 __all__ = ["CURVATURE_SHARE", "EnergySamples"]
 
-_SAME_FOOT = 0.02  # of the radius
 CURVATURE_SHARE = 0.1  # of a stiffness row's weight: its error level is about three times a force's
 
 
@@ -106,7 +106,7 @@ class EnergySamples:
                 fix="Pass the touched surface of the body at rest, and energies less those without contact.",
             )
         K = (K + K.transpose(0, 2, 1)) / 2
-        columns = _columns(X, distance, gradient, radius)
+        columns = columns_of(X, surface, radius)
         return cls(X, U, F, K, s, -gradient, -hessian, columns, tuple(inputs)).take(touching)
 
     def __len__(self) -> int:
@@ -168,12 +168,6 @@ class EnergySamples:
         """Half (n,) of each input's range."""
         low, high = bounds(self.inputs)
         return np.asarray((high - low) / 2)
-
-
-def _columns(X: np.ndarray, distance: np.ndarray, gradient: np.ndarray, radius: float) -> np.ndarray:
-    """Number (N,) of each solve's column, by its foot on the surface to a share of the radius."""
-    feet = np.round((X[:, :3] - distance[:, None] * gradient) / (_SAME_FOOT * radius))
-    return np.asarray(np.unique(np.hstack([feet, X[:, 3:]]), axis=0, return_inverse=True)[1].ravel())
 
 
 def _responses(force: Any, N: int, n: int) -> np.ndarray:

@@ -8,6 +8,7 @@ import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
+from palpate.learning.symmetry import symmetry_told, widened
 from palpate.units import Range
 
 __all__ = ["HeldSolves"]
@@ -27,8 +28,11 @@ class HeldSolves:
     energy, force, stiffness : (N,), (N, n), (N, n, n)
         U, −∂U/∂x and its derivative.
     inputs : n ranges
+        Widened to all images under the symmetry.
     axes : tuple of int
         Along which axes the place's coordinates are.
+    matrices, about : (k, 3, 3), (3,) arrays
+        The body's symmetry, the identity among it, and the point that stays (m).
     """
 
     X: np.ndarray
@@ -37,6 +41,8 @@ class HeldSolves:
     stiffness: np.ndarray
     inputs: tuple[Range, ...]
     axes: tuple[int, ...]
+    matrices: np.ndarray
+    about: np.ndarray
 
     @classmethod
     def of(cls, data: Dataset) -> HeldSolves:
@@ -58,11 +64,22 @@ class HeldSolves:
         moves = [own.index(move) for move in _MOVES]
         places = [i for i, name in enumerate(own) if name in _AXES]
         order = moves + places + [i for i in range(len(own)) if i not in (*moves, *places)]
+        axes = tuple(_AXES[own[i]] for i in places)
+        matrices, about = symmetry_told(data)
+        ranges = tuple(data.ranges[i] for i in order)
+        end, k = 3 + len(axes), list(axes)
+        inputs = (
+            *widened(ranges[:3], matrices, np.zeros(3)),
+            *(widened(ranges[3:end], matrices[:, k][:, :, k], about[k]) if axes else ()),
+            *ranges[end:],
+        )
         return cls(
             data.X[:, order],
             data.potential_energy,
             data.response[:, order],
             data.response_gradient[:, order][:, :, order],
-            tuple(data.ranges[i] for i in order),
-            tuple(_AXES[own[i]] for i in places),
+            inputs,
+            axes,
+            matrices,
+            about,
         )

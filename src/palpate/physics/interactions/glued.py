@@ -128,6 +128,19 @@ class GluedPad:
         """Its fields, with ``"type": "GluedPad"``."""
         return {"type": "GluedPad", **asdict(self)}
 
+    def keeps(self, matrix: np.ndarray, about: np.ndarray, geometry: Any) -> bool:
+        """Whether an isometry M about a point (m) of the body leaves the pads' energy and places the same.
+
+        The footprint is seen along one axis, so that must stay; a fixed place must stay where it is. A place that
+        is an input, and the displacement, turn with M.
+        """
+        chart = _placed(self, geometry.rest())[0]
+        if chart is None:
+            return True
+        at = about if self.at is None else np.asarray(self.at)
+        along = abs(matrix[chart.axis, chart.axis])
+        return bool(np.isclose(along, 1.0) and np.allclose(about + matrix @ (at - about), at))
+
     def refinements(self, geometry: Any) -> tuple[FineMesh, ...]:
         """Fine elements wherever the footprint may be."""
         chart, lower, upper = _placed(self, geometry.rest())

@@ -15,6 +15,7 @@ from palpate.errors import UsageError
 from palpate.physics.arguments import require_positive
 from palpate.physics.geometry.checks import require_known
 from palpate.physics.interactions.estimate import advise_on_pad
+from palpate.physics.interactions.glued import GluedPad
 from palpate.physics.interactions.interaction import Interaction, Planned
 from palpate.physics.interactions.sphere import SphereProbe
 from palpate.physics.solid.lengths import (
@@ -142,11 +143,14 @@ class SolidProblem:
 
     @property
     def symmetry(self) -> dict[str, Any] | None:
-        """Isometries of body, supports and touched surface as plain data, None for more than a probe."""
-        probe = self.interactions[0]
-        if len(self.interactions) > 1 or not isinstance(probe, SphereProbe):
+        """Isometries of body, supports and touched surface as plain data; None but for one probe or glued pad."""
+        acting = self.interactions[0]
+        if len(self.interactions) > 1 or not isinstance(acting, SphereProbe | GluedPad):
             return None
-        return symmetry_of(self.body, probe.touches).describe()
+        found = symmetry_of(self.body, acting.touches)
+        if isinstance(acting, GluedPad):
+            found = found.part(acting.keeps(one, found.about, self.body.geometry) for one in found.matrices)
+        return found.describe()
 
     @property
     def words(self) -> str:

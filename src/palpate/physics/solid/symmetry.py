@@ -5,6 +5,7 @@ A touch at a place then tells of the touches at all images of that place: U(c) =
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -42,6 +43,10 @@ class Symmetry:
 
     def __len__(self) -> int:
         return len(self.matrices)
+
+    def part(self, kept: Iterable[bool]) -> Symmetry:
+        """Those that are kept; they must be a group too."""
+        return Symmetry(self.matrices[list(kept)], self.about)
 
     def describe(self) -> dict[str, Any]:
         """As plain data for a JSON file."""

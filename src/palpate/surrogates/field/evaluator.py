@@ -8,15 +8,13 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.network.compiled import PRECISIONS, Precision
+from palpate.surrogates.arguments import NONE, touch_at
 from palpate.surrogates.field.kernels import FRAME, coefficients_into, field_into
 
 if TYPE_CHECKING:
     from palpate.surrogates.field.field import FieldSurrogate
 
 __all__ = ["FieldEvaluator"]
-
-_NONE = np.zeros(0)
-_DOUBLE = np.dtype(np.float64)
 
 
 class FieldEvaluator:
@@ -58,7 +56,7 @@ class FieldEvaluator:
         self(low[:3], low[3:])  # compile now, not in the loop
         self.field()
 
-    def __call__(self, position: np.ndarray, parameters: np.ndarray = _NONE) -> bool:
+    def __call__(self, position: np.ndarray, parameters: np.ndarray = NONE) -> bool:
         """Find the coefficients at a centre (3,) in m and parameters (p,); whether there is contact.
 
         Raises
@@ -66,15 +64,7 @@ class FieldEvaluator:
         UsageError
             If there are not three coordinates and p parameters.
         """
-        if type(position) is not np.ndarray or position.dtype is not _DOUBLE:
-            position = np.asarray(position, np.float64)
-        if type(parameters) is not np.ndarray or parameters.dtype is not _DOUBLE:
-            parameters = np.asarray(parameters, np.float64)
-        if position.shape != (3,) or parameters.shape != self._shape:
-            raise UsageError(
-                f"A probe at {position.shape} with parameters {parameters.shape} can't be answered.",
-                fix=f"Give its centre (3,) in m and parameters {self._shape}.",
-            )
+        position, parameters = touch_at(position, parameters, self._shape)
         return bool(coefficients_into(position, parameters, *self._first))
 
     def field(self) -> np.ndarray:

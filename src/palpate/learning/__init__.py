@@ -11,8 +11,14 @@ modes        the few directions in which many outputs move
 checks       samples as arrays that fit together         measures     errors relative to the outputs' spread
 freezing     a network value of what was learnt, and the hash of its samples
 touch        a dataset of beam loads made into a body that can be touched
-bodies       the same of a body pressed anywhere
-dispatch     `palpate.learn`: which of the two
+energy       an energy of touch from solved energies, forces and stiffnesses
+bodies       a dataset of touches made into a body that can be pressed anywhere
+fields       how it deforms: modes that travel with the touch
+grasp        a body held by a glued pad
+plastic      a body that stays bent, and how it got there
+correction   a learnt body bent to what a specimen answers
+symmetry     isometries that a dataset tells, and how far its images reach
+dispatch     `palpate.learn`: whichever fits the dataset
 """
 
 from palpate.learning.bodies import TouchHistory, learn_body

@@ -39,6 +39,8 @@ def drives() -> dict[str, Drive]:
         "sine": sinusoid(TOUCH, 0.003, 0.002, 0.5, 0.1, cycles=1.5),
         "slide": _slide(),
         "random": random_drive(TOUCH, 0.005, 0.008, seconds=20, dt=0.07, seed=3, band=0.7),
+        # the patches' width was chosen on those above
+        "unseen": random_drive(TOUCH, 0.005, 0.008, seconds=20, dt=0.07, seed=4, band=0.7),
     }
 
 

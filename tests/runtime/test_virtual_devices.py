@@ -63,6 +63,19 @@ def page(shared):
     return PageDevice(shared.command)
 
 
+def test_a_hand_takes_hold_where_it_is(page, shared):
+    """And not on the way there: what leads from the centre to it would go through the body, or bend it."""
+    shared.write_command(grabbed=True, target=(0.01, -0.02, 0.0))
+    np.testing.assert_array_equal(page.read(0.0).position, [0.01, -0.02, 0.0])
+    shared.write_command(grabbed=False)
+    for k in range(1, 500):
+        page.read(k * TICK)
+    shared.write_command(grabbed=True, target=(-0.03, 0.0, 0.0))
+    np.testing.assert_array_equal(page.read(0.5).position, [-0.03, 0.0, 0.0])
+    shared.write_command(grabbed=True, target=(-0.04, 0.0, 0.0))
+    assert page.read(0.5 + TICK).position[0] > -0.035
+
+
 def test_frames_arrive_in_full(page, shared):
     shared.write_command(grabbed=True, target=(0.01, -0.02, 0.0))
     for k in range(60):
@@ -70,7 +83,7 @@ def test_frames_arrive_in_full(page, shared):
     np.testing.assert_allclose(sample.position, [0.01, -0.02, 0.0])
 
 
-def test_release_springs_back_and_the_next_grab_starts_there(page, shared):
+def test_release_springs_back_and_a_grab_without_a_target_starts_there(page, shared):
     shared.write_command(grabbed=True, target=(0.0, -0.05, 0.0))
     for k in range(100):
         page.read(k * TICK)

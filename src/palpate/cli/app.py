@@ -70,9 +70,7 @@ def demo(
     console = Console(as_json)
     models = run_demo(names or ["beam-copper", "beam-nylon"], folder, workers, console, quick=quick)
     if view and not as_json:
-        if not models:
-            console.say("No page: bodies that remember are touched from Python (`HeldBody.evaluator`).")
-        elif sys.stdout.isatty():
+        if sys.stdout.isatty():
             _serve(models[-1], port=port, browser=browser)
         else:
             console.say("No terminal, so no page is served: `palpate view FILE` does it.")

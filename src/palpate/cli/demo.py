@@ -8,7 +8,7 @@ from pathlib import Path
 
 from palpate.cli.console import Console
 from palpate.errors import AccuracyError, UsageError
-from palpate.study import HeldStudy, preset_study
+from palpate.study import preset_study
 from palpate.study.pipeline import Outcome, Paths, carry_out, report_study
 from palpate.study.stages import AnyStudy
 from palpate.sweeps import LocalCluster, local_cluster
@@ -24,7 +24,7 @@ def run_demo(
     Returns
     -------
     list of Path
-        The models' files that a page can be served for.
+        The models' files.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def run_demo(
     seconds = time.perf_counter() - began
     console.result(_summary(outcomes, report, seconds), _content(outcomes, report, seconds))
     _judge(outcomes)
-    return [Paths(folder, study.name).model for study in studies if not isinstance(study, HeldStudy)]
+    return [Paths(folder, study.name).model for study in studies]
 
 
 def _carried_out(study: AnyStudy, folder: Path, cluster: LocalCluster, console: Console) -> Outcome:
@@ -62,8 +62,9 @@ def _summary(outcomes: Sequence[Outcome], report: Path, seconds: float) -> str:
     parts = [f"\n{o.validation}" for o in outcomes]
     last = outcomes[-1].study
     model = Paths(report.parent, last.name).model
-    to_touch = "HeldBody.load reads it" if isinstance(last, HeldStudy) else f"palpate view {model}"
-    return "\n".join([*parts, "", f"report  {report}", f"model   {model}   ({to_touch})", f"{seconds:.0f} s"])
+    return "\n".join(
+        [*parts, "", f"report  {report}", f"model   {model}   (palpate view {model})", f"{seconds:.0f} s"]
+    )
 
 
 def _content(outcomes: Sequence[Outcome], report: Path, seconds: float) -> dict[str, object]:

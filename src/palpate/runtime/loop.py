@@ -27,6 +27,7 @@ from palpate.runtime.devices import Device
 from palpate.runtime.faults import Fault
 from palpate.runtime.pressed import PressedEvaluator
 from palpate.runtime.publisher import Publisher
+from palpate.runtime.remembering import RememberingEvaluator
 from palpate.runtime.safety import Limits, Safety, stalled
 from palpate.runtime.shared import MAX_INPUTS, Shared
 from palpate.runtime.workspace import Workspace
@@ -36,7 +37,10 @@ __all__ = ["Evaluator", "Loop", "Model"]
 
 
 class Evaluator(Protocol):
-    """What answers the hand; `palpate.surrogates.TouchEvaluator` and `PressedEvaluator` do.
+    """What answers the hand; `palpate.surrogates.TouchEvaluator`, `PressedEvaluator` and `RememberingEvaluator` do.
+
+    The latter two also ask how long it was since the last call (`elapsed`), and `place` what the hand's place means to
+    them, above all that of a hand that holds nothing.
 
     Attributes
     ----------
@@ -119,7 +123,9 @@ class Loop:
                 f"The loop can't run at {rate:g} Hz.", fix="Choose 10 … 10000 Hz; 1000 is usual."
             )
         self.evaluator, self.device, self.workspace = model.evaluator(), device, workspace
-        self.pressed = self.evaluator if isinstance(self.evaluator, PressedEvaluator) else None
+        answer = self.evaluator
+        self.placing = answer if isinstance(answer, PressedEvaluator | RememberingEvaluator) else None
+        self.pressed = answer if isinstance(answer, PressedEvaluator) else None
         if max(len(self.evaluator.loads), len(model.parameters)) > MAX_INPUTS:
             raise UsageError(
                 f"The model has {len(self.evaluator.loads)} inputs; the runtime carries {MAX_INPUTS}.",
@@ -210,8 +216,9 @@ class Loop:
     def map(self) -> None:
         """Hand metres to body metres; parameters that were set to those the model takes."""
         self.workspace.to_body(self.out.hand, self.out.position)
-        if self.pressed is not None and not self.holding:
-            self.out.position[:] = self.pressed.away  # a way back to the centre could lead through the body
+        if self.placing is not None:
+            believed = self.fault is Fault.NONE
+            self.placing.place(self.out.position, holding=self.holding, believed=believed)
         for i in range(len(self.parameters)):
             wish = float(self._wished[i])
             if math.isfinite(wish):
@@ -222,8 +229,8 @@ class Loop:
         if self.fault is not Fault.NONE:
             return
         answer, pressed = self.evaluator, self.pressed
-        if pressed is not None:
-            pressed.elapsed = max(0.0, self.now - self._answered)
+        if self.placing is not None:
+            self.placing.elapsed = max(0.0, self.now - self._answered)
         self._answered = self.now
         try:
             answer(self.out.position, self.parameters)

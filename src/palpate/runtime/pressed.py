@@ -199,7 +199,7 @@ class PressedBody:
         X = self.presses
         near = np.argmin(np.abs(self.touch.depth(X) - depth))
         energy = float(self.touch.energy(X[near : near + 1])[0])
-        width = 0.5 * math.sqrt(self.radius * depth)
+        width = Patches.width_at(self.radius, depth)
         return Patches.over(skin.points, corners, float(spacing), width=width, energy=energy)
 
     def evaluator(self) -> PressedEvaluator:
@@ -251,6 +251,12 @@ class PressedEvaluator:
         self.inside, self.mirrored = True, False
         self.depth, self.stiffness, self.elapsed = -math.inf, 0.0, 0.0
         _along(elastic.force, elastic.stiffness)  # compile now, not in the loop
+
+    def place(self, position: np.ndarray, *, holding: bool, believed: bool) -> None:
+        """Keep a probe that nobody holds `away`: a way back to the centre could lead through the body."""
+        del believed  # what can't be believed isn't answered
+        if not holding:
+            position[:] = self.away
 
     def __call__(self, position: np.ndarray, parameters: np.ndarray) -> None:
         """Renew the attributes for a probe at `position` (3,), m, and the further inputs (p,)."""

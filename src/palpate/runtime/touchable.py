@@ -1,4 +1,4 @@
-"""What a hand can be laid on: a body held at one node, or one pressed anywhere; told apart by its file's kind."""
+"""What a hand can be laid on, told apart by its file's kind: held at one node, with or without memory, or pressed."""
 
 from __future__ import annotations
 
@@ -7,27 +7,32 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeAlias
 
-from palpate.errors import FileFormatError
 from palpate.network import load_archive
 from palpate.runtime.pressed import PressedBody
+from palpate.runtime.remembering import RememberingBody
 from palpate.runtime.workspace import Workspace
 from palpate.surrogates import TouchedBody, TouchModel, TouchSurrogate
 from palpate.surrogates.field.touched_body import KIND as BODY
+from palpate.surrogates.plastic import HeldBody
 from palpate.surrogates.plastic.held_file import KIND as REMEMBERS
 from palpate.surrogates.touch_file import KIND as SURROGATE
 
-__all__ = ["Touchable", "load_touchable", "touchable", "workspace_for"]
+__all__ = ["Learnt", "Touchable", "load_touchable", "touchable", "workspace_for"]
 
-Touchable: TypeAlias = TouchModel | PressedBody
+Touchable: TypeAlias = TouchModel | PressedBody | RememberingBody
+Learnt: TypeAlias = TouchModel | TouchedBody | TouchSurrogate | HeldBody
 
-_PRESSED: dict[str, Callable[[Path], TouchedBody | TouchSurrogate]] = {
+_LOAD: dict[str, Callable[[Path], Learnt]] = {
     BODY: TouchedBody.load,
     SURROGATE: TouchSurrogate.load,
+    REMEMBERS: HeldBody.load,
 }
 
 
-def touchable(model: Touchable | TouchedBody | TouchSurrogate, name: str = "") -> Touchable:
+def touchable(model: Learnt, name: str = "") -> Touchable:
     """A model as the loop takes it; `name` where a body's own record has none."""
+    if isinstance(model, HeldBody):
+        return RememberingBody(model)
     return PressedBody.of(model, name) if isinstance(model, TouchedBody | TouchSurrogate) else model
 
 
@@ -40,15 +45,8 @@ def load_touchable(path: str | os.PathLike[str]) -> Touchable:
         If the file is missing, corrupt, foreign, or of something that no hand can be laid on.
     """
     path = Path(path)
-    kind = load_archive(path).kind
-    if kind == REMEMBERS:
-        raise FileFormatError(
-            f"{path} holds a body that remembers, which neither the page nor the loop takes.",
-            why="They don't let go of it, and an idle hand would bend it back.",
-            fix="Touch it from Python: HeldBody.load(file).evaluator(), with step and release.",
-        )
-    load = _PRESSED.get(kind)
-    return TouchModel.load(path) if load is None else PressedBody.of(load(path), path.stem)
+    load = _LOAD.get(load_archive(path).kind, TouchModel.load)
+    return touchable(load(path), path.stem)
 
 
 def workspace_for(model: Touchable, radius: float) -> Workspace:

@@ -1,4 +1,4 @@
-"""What a page is told of a body, and the pictures it is sent: a body held at one node, or one pressed anywhere."""
+"""What a page is told of a body, and the pictures it is sent: a body held at one node, that remembers, or pressed."""
 
 from __future__ import annotations
 
@@ -9,13 +9,15 @@ import numpy as np
 
 from palpate.runtime.faults import Fault
 from palpate.runtime.pressed import PressedBody
+from palpate.runtime.remembering import RememberingBody
 from palpate.runtime.shared import State, now
 from palpate.runtime.touchable import Touchable
 from palpate.surrogates import TouchModel
+from palpate.surrogates.plastic import HeldBody
 from palpate.units import Range
 from palpate.viewer.messages import PROTOCOL, Beat, Frame, Hello, RangeInfo, Vec3
 from palpate.viewer.picture import Picture
-from palpate.viewer.travel import travel
+from palpate.viewer.travel import travel, travel_of_memory
 from palpate.viewer.wire import Json
 
 __all__ = ["Exhibit", "HeldExhibit", "exhibit_of", "loop_facts", "ranges", "vector"]
@@ -50,25 +52,11 @@ class HeldExhibit:
     def __init__(self, model: TouchModel) -> None:
         self.model = model
         self._picture = Picture(model)
-        self._travel = tuple(vector(corner) for corner in travel(model))
+        self._travel = travel(model)
 
     def hello(self, state: State, rate: float) -> Hello:
         """See `Exhibit`."""
-        model = self.model
-        return Hello(
-            protocol=PROTOCOL,
-            name=model.name,
-            rest=tuple(vector(node) for node in model.rest),
-            radius=model.radius,
-            touch_node=model.touch_node,
-            nodes_of_interest=tuple(int(i) for i in model.nodes_of_interest),
-            inputs=ranges(model.inputs),
-            parameters=ranges(model.parameters),
-            reach=model.reach,
-            travel=self._travel,
-            meta=model.meta,
-            **loop_facts(state, rate),
-        )
+        return _greeting(self.model, self._travel, state, rate)
 
     def frame(self, beat: Mapping[str, Any], state: State, held: bool, parameters: np.ndarray) -> Frame:
         """See `Exhibit`."""
@@ -80,11 +68,49 @@ class HeldExhibit:
         return Frame(**beat, contact=vector(shape.contact), displacement=shape.displacement)
 
 
+class RememberingExhibit:
+    """A body held at one node that remembers: drawn as it lies, held or not."""
+
+    def __init__(self, model: HeldBody) -> None:
+        self.model = model
+        self._travel = travel_of_memory(model)
+
+    def hello(self, state: State, rate: float) -> Hello:
+        """See `Exhibit`."""
+        return _greeting(self.model, self._travel, state, rate)
+
+    def frame(self, beat: Mapping[str, Any], state: State, held: bool, parameters: np.ndarray) -> Frame:
+        """See `Exhibit`."""
+        del held, parameters
+        shape = self.model.displacement(state.loads[: len(self.model.inputs)])
+        return Frame(**beat, contact=vector(state.contact), displacement=shape)
+
+
 def exhibit_of(model: Touchable) -> Exhibit:
     """The exhibit of a model."""
     from palpate.viewer.pressing import PressedExhibit
 
+    if isinstance(model, RememberingBody):
+        return RememberingExhibit(model.body)
     return PressedExhibit(model) if isinstance(model, PressedBody) else HeldExhibit(model)
+
+
+def _greeting(model: TouchModel | HeldBody, corners: np.ndarray, state: State, rate: float) -> Hello:
+    """What the page of a body held at one node is told first; `corners` (2, 3) of the held node's way, m."""
+    return Hello(
+        protocol=PROTOCOL,
+        name=model.name,
+        rest=tuple(vector(node) for node in model.rest),
+        radius=model.radius,
+        touch_node=model.touch_node,
+        nodes_of_interest=tuple(int(i) for i in model.nodes_of_interest),
+        inputs=ranges(model.inputs),
+        parameters=ranges(model.parameters),
+        reach=model.reach,
+        travel=tuple(vector(corner) for corner in corners),
+        meta=model.meta,
+        **loop_facts(state, rate),
+    )
 
 
 def loop_facts(state: State, rate: float) -> dict[str, Any]:

@@ -27,8 +27,7 @@ from starlette.staticfiles import StaticFiles
 
 from palpate.runtime import LoopProcess
 from palpate.runtime.pressed import PressedBody
-from palpate.runtime.touchable import load_touchable, touchable
-from palpate.surrogates import TouchedBody, TouchModel, TouchSurrogate
+from palpate.runtime.touchable import Learnt, load_touchable, touchable
 from palpate.viewer.guard import Guard
 from palpate.viewer.ports import listen
 from palpate.viewer.pressing import PressedExhibit
@@ -68,7 +67,7 @@ class Viewer:
 
     Parameters
     ----------
-    model : TouchModel, TouchedBody, TouchSurrogate or path
+    model : TouchModel, TouchedBody, TouchSurrogate, HeldBody or path
     port : int
         The port wanted; 0 takes any free one.
     host : str
@@ -84,7 +83,7 @@ class Viewer:
 
     Attributes
     ----------
-    model : TouchModel or PressedBody
+    model : TouchModel, PressedBody or RememberingBody
     loop : LoopProcess
         The real-time process, once started.
     port : int
@@ -98,7 +97,7 @@ class Viewer:
 
     def __init__(
         self,
-        model: TouchModel | TouchedBody | TouchSurrogate | str | os.PathLike[str],
+        model: Learnt | str | os.PathLike[str],
         *,
         port: int = 8080,
         host: str = "127.0.0.1",
@@ -172,7 +171,7 @@ class Viewer:
 
 
 def serve(
-    model: TouchModel | TouchedBody | TouchSurrogate | str | os.PathLike[str],
+    model: Learnt | str | os.PathLike[str],
     *,
     port: int = 8080,
     host: str = "127.0.0.1",

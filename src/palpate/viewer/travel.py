@@ -9,8 +9,11 @@ import numpy as np
 
 if TYPE_CHECKING:
     from palpate.surrogates import TouchModel
+    from palpate.surrogates.plastic import HeldBody
 
-__all__ = ["travel"]
+__all__ = ["travel", "travel_of_memory"]
+
+LEAD = 9  # places on the way to an end
 
 
 def travel(model: TouchModel) -> np.ndarray:
@@ -29,3 +32,16 @@ def travel(model: TouchModel) -> np.ndarray:
         along = offsets @ model.directions[0]
         offsets = np.vstack([offsets, offsets - 2.0 * np.outer(along, model.directions[0])])
     return np.array([offsets.min(axis=0), offsets.max(axis=0)])
+
+
+def travel_of_memory(body: HeldBody) -> np.ndarray:
+    """The same of a body that remembers: led from rest to both ends of what it was trained on, and let go there."""
+    hand, ends = body.evaluator(), body.inputs[0]
+    offsets = [np.zeros(3)]
+    for end in (ends.low, ends.high):
+        for w in np.linspace(hand.loads[0], end, LEAD):
+            hand.step(w * body.directions[0], 0.0)
+            offsets.append(hand.contact.copy())
+        hand.release(0.0)
+        offsets.append(hand.contact.copy())
+    return np.array([np.min(offsets, axis=0), np.max(offsets, axis=0)])

@@ -10,47 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bent import CREEPS, REACH, YIELDS, D, body
 from palpate.errors import FileFormatError, UsageError
-from palpate.network import Network, Scaling
 from palpate.surrogates.plastic import Elements, HeldBody
-from palpate.units import Quantity, Range
-
-D = np.array([0.0, -1.0, 0.0])
-REACH = 0.4
-YIELDS = Elements.sliders(
-    np.array([20.0, 60.0, 40.0]), np.array([math.inf, 0.1, 0.2]), np.array([0.0, 0.1, 0.0])
-)
-CREEPS = Elements.dashpots(np.array([60.0, 40.0]), np.array([math.inf, 0.5]))
-
-
-def affine(inputs: list[Range], names: list[str], tail: np.ndarray) -> Network:
-    n, m = len(inputs), len(names)
-    scaling = Scaling(np.zeros(n), np.ones(n), np.zeros(m), np.ones(m))
-    outputs = [Quantity(name, "m") for name in names]
-    empty = np.zeros((0, n))
-    return Network.axis_aligned(
-        inputs, outputs, centres=empty, widths=empty, weights=np.zeros((m, 0)), tail=tail, scaling=scaling
-    )
-
-
-def body(elements: Elements = YIELDS) -> HeldBody:
-    """ℓ = ½ w²: h = w exp(w²/2), h' = (1 + w²) exp(w²/2); the tip goes down by w."""
-    stretch = affine([Range("w²", 0.0, REACH**2, "m²")], ["ℓ"], np.array([[0.0, 0.5]]))
-    tail = np.zeros((4, 3))
-    tail[3, 1] = -1.0
-    shape = affine([Range("w", -REACH, REACH, "m"), Range("P", -99.0, 99.0, "N")], list("abcd"), tail)
-    return HeldBody(
-        name="made",
-        stretch=stretch,
-        shape=shape,
-        elements=elements,
-        mirrors=True,
-        rest=np.array([[0.0, 0, 0], [1.0, 0, 0]]),
-        nodes_of_interest=np.array([1]),
-        touch_node=1,
-        directions=D[None],
-        reach=REACH,
-    ).checked()
 
 
 def test_below_first_yield_the_force_is_the_gradient_of_the_elastic_energy() -> None:

@@ -47,7 +47,7 @@ def test_held_and_slid_the_branches_follow_the_transient_solve():
         square,
         np.array([[0, 1, 2], [0, 2, 3]]),
         0.0025,
-        width=0.5 * np.sqrt(RADIUS * DEPTH),
+        width=Patches.width_at(RADIUS, DEPTH),
         energy=energies[0],
     )
 

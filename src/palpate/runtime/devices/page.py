@@ -59,6 +59,12 @@ class FrameInterpolator:
         self._from[:] = self.position
         np.subtract(target, self._from, out=self._step)
 
+    def start(self, target: np.ndarray, now: float) -> None:
+        """The input takes hold at `target` (3,), m, at `now`, s: nothing leads there."""
+        self._arrived = now
+        self._from[:] = self.position[:] = target
+        self._step[:] = 0.0
+
     def move(self, now: float) -> None:
         """Renew `position` for `now`, s."""
         share = min(1.0, max(0.0, (now - self._arrived) / self._frame))
@@ -93,7 +99,7 @@ class PageDevice:
         self._target = commands.record["target"]
         self.sample = Sample(page_patience(0.0))
         self._path = FrameInterpolator(self.sample.position)
-        self._seen, self._last = -1, -math.inf
+        self._seen, self._last, self._held = -1, -math.inf, False
 
     @classmethod
     def open(cls, commands: Block, options: Mapping[str, str]) -> PageDevice:
@@ -110,13 +116,15 @@ class PageDevice:
         sample.holding = bool(self._grabbed)
         sequence = int(self._sequence)
         if sample.holding:
-            if sequence != self._seen:
+            if sequence != self._seen and not self._held:
+                path.start(self._target, now)
+            elif sequence != self._seen or not self._held:  # an old target is approached, not jumped to
                 path.aim(self._target, now)
-                self._seen = sequence
+            self._seen, self._held = sequence, True
             path.move(now)
         else:
             path.relax(now - self._last)
-            self._seen = -1  # the next grab aims afresh
+            self._held = False
         self._last = now
         return sample
 

@@ -5,17 +5,18 @@ At a probe's centre c, patch j at x_j carries the share σ_j of the elastic ener
     σ_j = exp(−|x_j − c|²/2w²) / Σ_k exp(−|x_k − c|²/2w²)        Σ σ_j = 1
 
 On a plane the distance of c from it cancels, and σ is a Gaussian of width w about the foot point. It widens with the
-area of contact. A sphere of radius R at depth s touches a Hertzian body over a radius a = √(R s), and half of it
-follows transient solves best; with U ~ s³ for the pad in front
+area of contact. A sphere of radius R at depth s touches a Hertzian body over a radius a = √(R s), and a little less
+than half of it follows transient solves best; with U ~ s³ for the pad in front
 
-    w² = w₁² (U/U₁)^(1/3) + w₀²        w₁ = ½ √(R s₁)        U₁ = U(s₁)
+    w² = w₁² (U/U₁)^(1/3) + w₀²        w₁ = 0.45 √(R s₁)        U₁ = U(s₁)
 
-where w₀ keeps the patterns wider than the patches are apart. With a single patch the memory is a scalar that travels
-with the probe.
+where w₀, 0.7 times the patches' spacing, keeps the patterns of light touches wider than the patches are apart. With a
+single patch the memory is a scalar that travels with the probe.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +26,8 @@ from palpate.errors import UsageError
 __all__ = ["Patches"]
 
 FINE = 0.5  # distance of the points that a patch is the mean of, over the patches' spacing
-LEAST = 0.4  # w₀ over the spacing: patterns narrower than that jump from patch to patch
+LEAST = 0.7  # w₀ over the spacing: narrower patterns jump from patch to patch
+SHARE = 0.45  # w over the radius of a Hertzian contact
 MOST = 20_000  # patches: 1 ms of work and more, far beyond what a loop at 1 kHz can spend
 
 
@@ -38,7 +40,7 @@ class Patches:
     points : (M, 3)
         x_j in m, at rest.
     width : float
-        w₁ in m, at the energy U₁; ½ √(R s₁) for a sphere of radius R at a depth s₁ that is typical.
+        w₁ in m, at the energy U₁; `width_at` tells it for a depth s₁ that is typical.
     energy : float
         U₁ in J; 0 for a width that doesn't change.
     least : float
@@ -77,6 +79,11 @@ class Patches:
     def single(cls) -> Patches:
         """One patch, the same everywhere: a memory that travels with the probe."""
         return cls(np.zeros((1, 3)), 1.0)
+
+    @staticmethod
+    def width_at(radius: float, depth: float) -> float:
+        """w₁ in m, of a sphere of this radius at this depth, both in m."""
+        return SHARE * math.sqrt(radius * depth)
 
     @classmethod
     def over(

@@ -1,0 +1,160 @@
+"""A body that remembers, in the loop and in its real process; the body is a closed form (`tests/bent.py`)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_process import watch
+
+from bent import CREEPS, D, body
+from palpate.runtime import LoopProcess, now
+from palpate.runtime.devices.device import Sample, Traits
+from palpate.runtime.loop import Loop
+from palpate.runtime.remembering import RememberingBody
+from palpate.runtime.safety import Limits
+from palpate.runtime.shared import Shared
+from palpate.runtime.touchable import load_touchable, touchable, workspace_for
+
+TICK, STRONG = 1e-3, Limits(1e3, 1e9)
+PAST_YIELD = 0.3  # m
+
+
+class Plain:
+    """A device that is where it is told."""
+
+    traits = Traits(0.075, 20.0, None, "for tests")
+
+    def __init__(self) -> None:
+        self.sample = Sample()
+
+    def read(self, now: float) -> Sample:
+        self.sample.time = now
+        return self.sample
+
+    def write(self, force: np.ndarray) -> None:
+        pass
+
+    def close(self) -> None:
+        pass
+
+
+class Hand:
+    """A loop without a process, whose hand is led tick by tick."""
+
+    def __init__(self, model: RememberingBody) -> None:
+        self.shared, self.device, self.time = Shared.private(), Plain(), 0.0
+        space = workspace_for(model, 0.075)
+        self.loop = Loop(model, self.device, self.shared, space, STRONG)
+        self.to_hand = space.to_hand
+
+    def tick(self, w: float | None) -> None:
+        """One tick with the hand at w along the load, or without a hand."""
+        self.time += TICK
+        self.device.sample.holding = w is not None
+        if w is not None:
+            self.device.sample.position[:] = self.to_hand(w * D)
+        self.loop.tick(self.time)
+
+    def lead(self, start: float, end: float, ticks: int = 100) -> None:
+        for w in np.linspace(start, end, ticks):
+            self.tick(float(w))
+
+    @property
+    def where(self) -> float:
+        """w of the held node, m."""
+        return float(self.loop.evaluator.loads[0])
+
+    @property
+    def asked(self) -> float:
+        """Force of the body before safety, along the load, N."""
+        return float(D @ self.loop.evaluator.force)
+
+
+@pytest.fixture
+def bent() -> Hand:
+    """Bent past yield and let go."""
+    hand = Hand(RememberingBody(body()))
+    hand.lead(0.0, PAST_YIELD)
+    hand.tick(None)
+    return hand
+
+
+def test_a_rod_bent_past_yield_stays_where_nothing_pulls(bent: Hand):
+    alone = body().evaluator()
+    for w in np.linspace(0.0, PAST_YIELD, 100):
+        alone.step(w * D, TICK)
+    alone.release(TICK)
+    assert bent.where == pytest.approx(alone.loads[0], rel=1e-9)
+    assert 0.05 < bent.where < PAST_YIELD
+    assert bent.asked == 0.0
+    before = bent.where
+    for _ in range(50):
+        bent.tick(None)
+    assert bent.where == pytest.approx(before, abs=1e-12)
+
+
+def test_a_hand_takes_hold_where_the_node_is(bent: Hand):
+    """From any place: no jump, and then a node that moves as the hand does, on the line of unloading."""
+    lies = bent.where
+    bent.tick(-0.1)
+    assert bent.where == pytest.approx(lies, abs=1e-12)
+    assert bent.asked == pytest.approx(0.0, abs=1e-9)
+    bent.lead(-0.1, -0.08)
+    assert bent.where == pytest.approx(lies + 0.02, abs=1e-9)
+    assert bent.asked < -0.5
+    bent.lead(-0.08, -0.1)
+    assert bent.asked == pytest.approx(0.0, abs=1e-9), "reloading and unloading are one elastic line"
+
+
+def test_a_hand_that_cannot_be_believed_takes_hold_anew(bent: Hand):
+    bent.lead(0.0, 0.01)
+    pulled, lies = bent.asked, bent.where
+    bent.tick(np.nan)
+    assert not bent.shared.state.record["force"].any()
+    bent.tick(-0.2)  # meanwhile the hand went elsewhere
+    assert bent.where == pytest.approx(lies, abs=1e-12)
+    assert bent.asked == pytest.approx(pulled, rel=1e-9)
+
+
+def test_a_rod_that_creeps_comes_back_in_time():
+    hand = Hand(RememberingBody(body(CREEPS)))
+    hand.lead(0.0, 0.2, 500)
+    hand.tick(None)
+    first, path = hand.where, []
+    assert 0.0 < first < 0.2
+    for _ in range(4000):
+        hand.tick(None)
+        path.append(hand.where)
+    assert np.all(np.diff(path) < 0)
+    assert path[-1] < 0.02 * first
+
+
+def test_a_body_and_its_file_are_told_from_others(tmp_path):
+    made = body()
+    again = load_touchable(made.save(tmp_path / "rod.palpate"))
+    assert isinstance(again, RememberingBody)
+    assert isinstance(touchable(made), RememberingBody)
+    assert (again.name, again.reach, again.parameters) == (made.name, made.reach, ())
+    assert again.stiffness_max == made.stiffness_max
+
+
+def test_in_the_real_process_it_stays_bent(tmp_path):
+    path = body().save(tmp_path / "rod.palpate")
+    with LoopProcess(path, max_force=1e3) as loop:
+        to_hand = workspace_for(load_touchable(path), loop.read().radius).to_hand
+        for w in np.linspace(0.0, PAST_YIELD, 60):
+            loop.shared.write_command(beat=now() + 60, grabbed=True, target=to_hand(w * D))
+            held = watch(loop, 0.02)[-1]
+        loop.shared.write_command(beat=now() + 60, grabbed=True, target=to_hand(PAST_YIELD * D))
+        held = watch(loop, 0.2)[-1]
+        assert held.loads[0] == pytest.approx(PAST_YIELD, abs=1e-9)
+        assert -held.force @ D == pytest.approx(held.loads[1], rel=1e-6)
+        loop.shared.write_command(grabbed=False)
+        free = watch(loop, 0.2)[-1]
+        assert not free.force.any()
+        assert 0.05 < free.loads[0] < 0.25
+        np.testing.assert_allclose(free.contact, free.loads[0] * D, atol=1e-12)
+        assert watch(loop, 0.2)[-1].loads[0] == pytest.approx(free.loads[0], abs=1e-12)
+    report = loop.report()
+    assert report.foreign == ()
+    assert report.work_p50 < 150e-6

@@ -1,0 +1,82 @@
+"""A rod that stays bent, on the page: pulled past yield, let go, taken hold of again."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+from chromium_page import drag, number, settled, tip, vector
+from websocket_page import Client, client_of
+
+from bent import D, body
+from palpate.viewer import Viewer
+from palpate.viewer.messages import Frame
+
+pytestmark = pytest.mark.timeout(120)
+
+ROD = body(nodes=21)
+
+
+def said(client: Client, y: float, *, grabbed: bool, seconds: float = 0.5) -> Frame:
+    """The last frame, after the hand was at y (m) for a while, or there was none."""
+    until = time.perf_counter() + seconds
+    while time.perf_counter() < until:
+        client.hand(0.0, y, grabbed=grabbed)
+        client.grant(1)
+        frame = client.frame()
+        time.sleep(0.01)
+    return frame
+
+
+def test_the_picture_is_that_of_the_place_and_the_force():
+    with Viewer(ROD, port=0, max_force=100.0) as viewer, client_of(viewer) as client:
+        assert client.hello.travel[0][1] == pytest.approx(-ROD.reach)
+        said(client, 0.0, grabbed=True)
+        for y in np.linspace(0.0, -0.3, 20):
+            held = said(client, float(y), grabbed=True, seconds=0.03)
+        held = said(client, -0.3, grabbed=True)
+        assert held.contact[1] == pytest.approx(-0.3, abs=1e-6)
+        assert held.force[1] > 5.0
+        np.testing.assert_allclose(
+            np.reshape(held.displacement, (-1, 3)),
+            ROD.displacement(np.array([0.3, held.force[1]])),
+            atol=1e-6,
+        )
+        free = said(client, 0.0, grabbed=False)
+        assert free.force == (0.0, 0.0, 0.0)
+        assert -0.25 < free.contact[1] < -0.05
+        np.testing.assert_allclose(
+            np.reshape(free.displacement, (-1, 3)),
+            ROD.displacement(np.array([-free.contact[1], 0.0])),
+            atol=1e-6,
+        )
+        # the hand comes from elsewhere
+        again = said(client, 0.1, grabbed=True)
+        np.testing.assert_allclose(again.contact, free.contact, atol=1e-6)
+        np.testing.assert_allclose(again.force, 0.0, atol=1e-4)
+
+
+def test_the_page_shows_it_bent(visit, keep):
+    with Viewer(ROD, port=0, max_force=100.0) as viewer:
+        page = visit(viewer)
+        y = tip(page)[1]
+        drag(page, 0, 80, steps=40)
+        shown = settled(page, "inside")
+        keep(page, "bending")
+        deepest = vector(shown["data"], "contact") @ D
+        assert number(shown["text"]["force-norm"]) > 1.0
+        page.mouse.up()
+        free = settled(page, "free")
+        keep(page, "stays-bent")
+        assert number(free["text"]["force-norm"]) == 0.0
+        lies = vector(free["data"], "contact") @ D
+        assert 0.2 * deepest < lies < deepest
+        assert tip(page)[1] > y + 20
+        # taken by its tip where that lies now: no force until it moves
+        drag(page, 0, 0, steps=1)
+        again = settled(page, "inside")
+        assert vector(again["data"], "contact") @ D == pytest.approx(lies, abs=1e-5)
+        assert number(again["text"]["force-norm"]) < 0.01
+        page.mouse.up()
+        page.context.close()

@@ -11,8 +11,8 @@ import palpate as pp
 flesh = pp.LayeredBlock(extent=(0.08, 0.08), layers=(("skin", 0.002), ("fat", 0.010), ("muscle", 0.020)))
 tissue = {
     "skin": pp.NeoHookean(young=60e3, poisson=0.45),
-    "fat": pp.NeoHookean(young=4e3, poisson=0.49),
-    "muscle": pp.NeoHookean(young=20e3, poisson=0.49),
+    "fat": pp.NeoHookean(young=4e3, poisson=0.47),
+    "muscle": pp.NeoHookean(young=20e3, poisson=0.47),
 }
 body = pp.Body(flesh, tissue, fixed="bottom")
 ball = pp.SphereProbe(radius=0.010, touches="top", depth=(0.0, 0.006), over=((0.03, 0.03), (0.05, 0.05)))
@@ -38,7 +38,7 @@ print(f"force from differences of the energy: {-(above - below) / (2 * step):.4f
 pressed.plot("von_mises", cut="y").save("tissue.png")
 pressed.to_vtu("tissue.vtu")  # for ParaView
 
-data = pp.sweep(body, ball, samples=8, seed=0, path="tissue.zarr")
+data = pp.sweep(body, ball, samples=4, seed=0, path="tissue.zarr")
 print(data)
 deepest = np.argmax(np.linalg.norm(data.force, axis=1))
 print(f"largest force: {np.linalg.norm(data.force[deepest]):.4f} N at {1e3 * data.X[deepest]} mm")

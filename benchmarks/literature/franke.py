@@ -79,8 +79,8 @@ def table(*, quick: bool) -> Table:
     draws, fewer = (1, 1) if quick else (30, 10)
     one = [problem(s, 200) for s in range(draws)]
     ten = [problem(s, 200, 10) for s in range(draws)]
-    fifty = [problem(s, 200, 50) for s in range(1 if quick else 5)]
-    large = [problem(s, 1000) for s in range(fewer)]
+    fifty = [problem(s, 200, 12 if quick else 50) for s in range(1 if quick else 5)]
+    large = [problem(s, 300 if quick else 1000) for s in range(fewer)]
     mran_by, emran_by = (partial(filtered, settings=SETTINGS[name]) for name in ("MRAN", "EMRAN"))
     once = scores(one[:fewer], partial(ours, passes=1))
     often = scores(one[:fewer], partial(ours, passes=10))

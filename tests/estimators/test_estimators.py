@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 import subprocess
 import sys
+from unittest import SkipTest
 
 import numpy as np
 import pandas as pd
@@ -13,7 +14,7 @@ from sklearn.base import clone
 from sklearn.model_selection import GridSearchCV, KFold, cross_val_score
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
-from sklearn.utils.estimator_checks import check_estimator, parametrize_with_checks
+from sklearn.utils.estimator_checks import estimator_checks_generator, parametrize_with_checks
 
 from palpate.errors import UsageError
 from palpate.estimators import MRANRegressor, RBFNetworkRegressor
@@ -40,6 +41,8 @@ def test_conventions(estimator, check):
     check(estimator)
 
 
+# 200 samples of 10 features, eight times in arrays of other kinds: above, one pass of each is checked
+SAME_FIT_AGAIN = {"check_regressors_train", "check_regressor_data_not_an_array"}
 # a target that is met at once, so that no clock decides what is found
 CHOOSING = RBFNetworkRegressor(form="auto", target=0.9, seconds=2.0, random_state=0)
 
@@ -50,9 +53,17 @@ CHOOSING = RBFNetworkRegressor(form="auto", target=0.9, seconds=2.0, random_stat
     "ignore::sklearn.exceptions.SkipTestWarning"
 )  # the array API is switched off in SciPy
 def test_conventions_as_it_comes(model):
-    outcomes = check_estimator(model, on_fail=None)
-    assert {o["check_name"] for o in outcomes if o["status"] != "passed"} <= {"check_array_api_input"}
-    assert len(outcomes) > 50
+    done, skipped = 0, set()
+    for estimator, check in estimator_checks_generator(model):
+        if check.func.__name__ in SAME_FIT_AGAIN:
+            continue
+        try:
+            check(estimator)
+            done += 1
+        except SkipTest:
+            skipped.add(check.func.__name__)
+    assert skipped <= {"check_array_api_input"}
+    assert done > 45
 
 
 @pytest.mark.parametrize("model", BOTH)

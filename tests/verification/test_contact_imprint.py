@@ -13,7 +13,7 @@ from palpate.physics.solid import Body
 
 SIZE, RADIUS = (0.10, 0.10, 0.05), 0.010
 GEL = NeoHookean(9e3, 0.45)
-PLACES = np.linspace(0.045, 0.055, 11)  # m along x: more than an element under the probe
+PLACES = np.linspace(0.045, 0.055, 7)  # m along x: more than an element under the probe
 ASIDE = 0.053  # m, off the plane of symmetry
 
 

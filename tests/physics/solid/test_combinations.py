@@ -71,9 +71,9 @@ def dome(_):
 
 
 def organ(_):
-    shape = Organ(length=0.15, element=0.04)
+    shape = Organ(length=0.15, element=0.05)
     body = Body(shape, gel(), fixed="attached")
-    problem = body.problem(SphereProbe(0.02, touches="front"), element=0.018)
+    problem = body.problem(SphereProbe(0.02, touches="front"), element=0.024)
     patch = surface_of(shape, "front", problem.refinements)
     foot, normal, _ = patch.nearest(patch.corners.mean(axis=(0, 1)) + 0.2 * patch.facing)
     return problem, foot + 0.02 * normal, normal

@@ -24,6 +24,12 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.learning.units.chained import chained
+from palpate.learning.units.derivative_kernels import (
+    Derivatives,
+    Pattern,
+    curvatures_by_factors,
+    slopes_by_factors,
+)
 from palpate.learning.units.forms import Form
 from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction, radial, third
 
@@ -97,59 +103,53 @@ class Regressors:
 
     def slopes(self, X: np.ndarray, theta: np.ndarray) -> np.ndarray:
         """∂φ_k/∂x_i (N, n, h)."""
-        A, b = self.form.factors(theta)
-        v = self._v(X, A, b)
-        g1 = radial(self.radial, np.einsum("nkr,nkr->nk", v, v))[1]
-        return np.asarray(np.einsum("nkr,kri->nik", 2.0 * g1[..., None] * v, A))
+        return self._slopes_at(X[None], np.eye(self.form.inputs)[None], theta)[0]
 
     def slopes_by_theta(self, X: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """∂φ_k/∂x_i (N, n, h) and its derivatives by θ_k (N, n, h, p)."""
-        rows, columns = self.form.rows, self.form.columns
+        found, *by = self._slopes_at(X[None], np.eye(self.form.inputs)[None], theta, self._pattern)
+        return found, self.form.pull(theta, *by)
+
+    def _slopes_at(
+        self, points: np.ndarray, turns: np.ndarray, theta: np.ndarray, pattern: Pattern | None = None
+    ) -> Derivatives:
+        """The same, summed over images (c, N, n) of the samples, whose slopes `turns` (c, n, n) turn back."""
         A, b = self.form.factors(theta)
-        v = self._v(X, A, b)
-        _, g1, g2 = radial(self.radial, np.einsum("nkr,nkr->nk", v, v))
-        u = np.einsum("nkr,kri->nik", v, A)
-        two, four = 2.0 * g1[:, None, :, None], 4.0 * g2[:, None, :, None]
-        through_q = four * u[..., None] * v[:, None]  # (N, n, h, r)
-        through_u = two * A.transpose(2, 0, 1)[None]  # ∂u_i/∂v_a = A_ai
-        by_v = through_q + through_u
-        by_entry = by_v[..., rows] * X[:, None, None, columns]
-        same = columns == np.arange(self.form.inputs)[:, None]  # (n, e): δ_ij
-        by_entry += two * same[:, None, :] * v[:, None][..., rows]
-        return 2.0 * g1[:, None] * u, self.form.pull(theta, by_entry, -by_v)
+        v, (_, g1, g2) = self._v_and_radial(points, A, b)
+        return slopes_by_factors(points, turns, v, (g1, g2), A, pattern)
 
     def curvatures(self, X: np.ndarray, theta: np.ndarray) -> np.ndarray:
         """∂²φ_k/∂x_i∂x_j (N, n(n+1)/2, h), i ≤ j."""
-        A, b = self.form.factors(theta)
-        v = self._v(X, A, b)
-        _, g1, g2 = radial(self.radial, np.einsum("nkr,nkr->nk", v, v))
-        u = np.einsum("nkr,kri->nik", v, A)
-        i, j = pairs(self.form.inputs)
-        B = np.einsum("kre,kre->ek", A[:, :, i], A[:, :, j])
-        return np.asarray(4.0 * g2[:, None] * u[:, i] * u[:, j] + 2.0 * g1[:, None] * B)
+        return self._curvatures_at(X[None], np.eye(len(self._pairs[0]))[None], theta)[0]
 
     def curvatures_by_theta(self, X: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """∂²φ_k/∂x_i∂x_j (N, n(n+1)/2, h), i ≤ j, and its derivatives by θ_k (N, n(n+1)/2, h, p)."""
-        rows, columns = self.form.rows, self.form.columns
+        found, *by = self._curvatures_at(X[None], np.eye(len(self._pairs[0]))[None], theta, self._pattern)
+        return found, self.form.pull(theta, *by)
+
+    def _curvatures_at(
+        self, points: np.ndarray, turns: np.ndarray, theta: np.ndarray, pattern: Pattern | None = None
+    ) -> Derivatives:
+        """The same, summed over images (c, N, n); `turns` (c, q, q) turn the q pairs back."""
         A, b = self.form.factors(theta)
-        v = self._v(X, A, b)
-        q = np.einsum("nkr,nkr->nk", v, v)
-        _, g1, g2 = radial(self.radial, q)
-        two, four = 2.0 * g1[:, None, :, None], 4.0 * g2[:, None, :, None]
-        eight = 8.0 * third(self.radial, q)[:, None, :, None]
-        u = np.einsum("nkr,kri->nik", v, A)
-        i, j = pairs(self.form.inputs)
-        ui, uj = u[:, i, :, None], u[:, j, :, None]  # (N, pairs, h, 1)
-        Ai, Aj = A.transpose(2, 0, 1)[i], A.transpose(2, 0, 1)[j]  # (pairs, h, r)
-        B = (Ai * Aj).sum(axis=2, keepdims=True)
-        by_v = (eight * ui * uj + four * B) * v[:, None] + four * (Ai * uj + ui * Aj)
-        by_entry = by_v[..., rows] * X[:, None, None, columns]
-        for e, (a, column) in enumerate(zip(rows, columns, strict=True)):
-            for own, u_other, A_other in ((i, uj, Aj), (j, ui, Ai)):
-                at = np.flatnonzero(own == column)
-                direct = four[..., 0] * v[:, None, :, a] * u_other[:, at, :][..., 0]
-                by_entry[..., e][:, at] += direct + two[..., 0] * A_other[..., a][at]
-        return (four * ui * uj + two * B)[..., 0], self.form.pull(theta, by_entry, -by_v)
+        v, (_, g1, g2) = self._v_and_radial(points, A, b)
+        g3 = third(self.radial, np.einsum("cnkr,cnkr->cnk", v, v)) if pattern else g2  # of no use without
+        return curvatures_by_factors(points, turns, v, (g1, g2, g3), A, pattern, self._pairs)
+
+    @property
+    def _pattern(self) -> Pattern:
+        return self.form.rows, self.form.columns
+
+    @property
+    def _pairs(self) -> Pattern:
+        return pairs(self.form.inputs)
+
+    def _v_and_radial(
+        self, points: np.ndarray, A: np.ndarray, b: np.ndarray
+    ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """v (c, N, h, r) at points (c, N, n), and g, g', g'' (c, N, h)."""
+        v = self._v(points.reshape(-1, points.shape[2]), A, b).reshape(*points.shape[:2], *b.shape)
+        return v, radial(self.radial, np.einsum("cnkr,cnkr->cnk", v, v))
 
     def tail_rows(self, X: np.ndarray) -> np.ndarray:
         """The tail's regressors (N, p_t): the first columns of [1, x]."""

@@ -16,6 +16,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.learning.units.regressors import Regressors, pairs
+from palpate.network.radial import radial
 
 __all__ = ["Images", "SymmetricRegressors"]
 
@@ -112,31 +113,34 @@ class SymmetricRegressors(Regressors):
 
     def scaled_by_theta(self, X: np.ndarray, theta: np.ndarray, scale: np.ndarray, out: np.ndarray) -> None:
         """∂φ_k/∂θ_k times scale (N,) into out (N, h, p)."""
-        one = np.empty_like(out)
-        out[:] = 0.0
+        form, (A, b) = self.form, self.form.factors(theta)
+        by_entry = np.zeros((len(X), len(theta), form.rows.size))
+        by_shift = np.zeros((len(X), *b.shape))
         for image in self._images.of(X):
-            super().scaled_by_theta(image, theta, scale, one)
-            out += one
+            v = self._v(image, A, b)
+            g1 = radial(self.radial, np.einsum("nkr,nkr->nk", v, v))[1]
+            v *= (2.0 * g1 * scale[:, None])[..., None]
+            by_entry += v[..., form.rows] * image[:, None, form.columns]
+            by_shift -= v
+        out[:] = form.pull(theta, by_entry, by_shift)
 
     def slopes(self, X: np.ndarray, theta: np.ndarray) -> np.ndarray:
         """∂φ_k/∂x_i (N, n, h)."""
-        return self._pulled(super().slopes(self._all(X), theta), self._images.turns)
+        return self._slopes_at(self._images.of(X), self._images.turns, theta)[0]
 
     def slopes_by_theta(self, X: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """∂φ_k/∂x_i (N, n, h) and its derivatives by θ_k (N, n, h, p)."""
-        slopes, by_theta = super().slopes_by_theta(self._all(X), theta)
-        turns = self._images.turns
-        return self._pulled(slopes, turns), self._pulled(by_theta, turns)
+        found, *by = self._slopes_at(self._images.of(X), self._images.turns, theta, self._pattern)
+        return found, self.form.pull(theta, *by)
 
     def curvatures(self, X: np.ndarray, theta: np.ndarray) -> np.ndarray:
         """∂²φ_k/∂x_i∂x_j (N, n(n+1)/2, h), i ≤ j."""
-        return self._pulled(super().curvatures(self._all(X), theta), self._turns_of_pairs)
+        return self._curvatures_at(self._images.of(X), self._turns_of_pairs, theta)[0]
 
     def curvatures_by_theta(self, X: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """∂²φ_k/∂x_i∂x_j (N, n(n+1)/2, h), i ≤ j, and its derivatives by θ_k (N, n(n+1)/2, h, p)."""
-        curvatures, by_theta = super().curvatures_by_theta(self._all(X), theta)
-        turns = self._turns_of_pairs
-        return self._pulled(curvatures, turns), self._pulled(by_theta, turns)
+        found, *by = self._curvatures_at(self._images.of(X), self._turns_of_pairs, theta, self._pattern)
+        return found, self.form.pull(theta, *by)
 
     def tail_rows(self, X: np.ndarray) -> np.ndarray:
         """The tail's regressors (N, p_t)."""
@@ -163,7 +167,7 @@ class SymmetricRegressors(Regressors):
         tail = self._images.unchanged[:, :p_t] @ coefficients[:p_t]
         return factors, places, np.vstack([tail, np.tile(coefficients[p_t:], (len(turns), 1))])
 
-    @property
+    @cached_property
     def _turns_of_pairs(self) -> np.ndarray:
         """How curvatures of an image, pair by pair, make those of the point: (c, n(n+1)/2, n(n+1)/2)."""
         turns = self._images.turns
@@ -178,11 +182,3 @@ class SymmetricRegressors(Regressors):
     def _summed(self, found: np.ndarray) -> np.ndarray:
         c = len(self._images.turns)
         return np.asarray(found.reshape(c, len(found) // c, *found.shape[1:]).sum(axis=0))
-
-    def _pulled(self, found: np.ndarray, turns: np.ndarray) -> np.ndarray:
-        """Σ_c turns[c, a, i] found[c, N, a, …] (N, i, …)."""
-        c, q = turns.shape[:2]
-        parts = found.reshape(c, len(found) // c, q, int(np.prod(found.shape[2:])))
-        return np.asarray(np.einsum("cai,cNaz->Niz", turns, parts, optimize=True)).reshape(
-            parts.shape[1], q, *found.shape[2:]
-        )

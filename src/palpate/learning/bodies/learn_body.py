@@ -63,7 +63,7 @@ def learn_body(
     name: str = "body",
     layout: Layout | None = None,
     seconds: float = 60.0,
-    units_max: int = 96,
+    units_max: int = 160,
     target: float = 1e-3,
     shape: bool = True,
     seed: int = 0,

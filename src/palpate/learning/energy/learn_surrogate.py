@@ -63,7 +63,7 @@ def learn_surrogate(
     about: np.ndarray | None = None,
     law: Law = "auto",
     length: float | None = None,
-    units_max: int = 96,
+    units_max: int = 160,
     target: float = 1e-3,
     seconds: float = 60.0,
     resolved: float | None = None,

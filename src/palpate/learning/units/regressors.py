@@ -18,6 +18,7 @@ by row of the upper triangle (see `pairs`).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal, get_args
 
 import numpy as np
@@ -38,9 +39,12 @@ __all__ = ["Regressors", "Tail", "pairs"]
 Tail = Literal["affine", "constant", "none"]
 
 
+@lru_cache(maxsize=64)
 def pairs(inputs: int) -> tuple[np.ndarray, np.ndarray]:
     """The pairs i ≤ j of n inputs, n (n + 1)/2 of each index: 00, 01, …, 11, 12, …."""
-    return np.triu_indices(inputs)
+    i, j = np.triu_indices(inputs)
+    i.flags.writeable = j.flags.writeable = False  # everybody's
+    return i, j
 
 
 @dataclass(frozen=True)

@@ -109,7 +109,7 @@ def beam_fields(nodes: int) -> tuple[Field, ...]:
     )
 
 
-def solid_fields(nodes: int, ranges: Sequence[Range]) -> tuple[Field, ...]:
+def solid_fields(nodes: int, ranges: Sequence[Range], *, stress: bool = False) -> tuple[Field, ...]:
     """Answers of a solid with so many nodes under an interaction with n inputs.
 
     With U(q) the least energy of body and interaction at the inputs q, less that without contact, the response
@@ -119,12 +119,16 @@ def solid_fields(nodes: int, ranges: Sequence[Range]) -> tuple[Field, ...]:
     ----------
     nodes : int
     ranges : n ranges
+    stress : bool
+        Whether von Mises stress at the nodes is among them.
     """
     n, units = len(ranges), [conjugate_unit(r.unit) for r in ranges]
     slopes = {f"{of}/{by.unit}" for of in units for by in ranges}
     slope = slopes.pop() if len(slopes) == 1 else "unit of the response per unit of the input"
+    seen = (Field("von_mises", ("node",), (nodes,), "Pa", "von Mises stress"),) if stress else ()
     return (
         Field("displacement", ("node", "component"), (nodes, 3), "m", "offset from the rest position"),
+        *seen,
         Field("potential_energy", unit="J", meaning="energy U of body and interaction, without contact 0"),
         Field("strain_energy", unit="J", meaning="energy in the body: elastic, and the plastic work"),
         Field("response", ("input",), (n,), ", ".join(units), "−∂U/∂input: on a probe the force"),

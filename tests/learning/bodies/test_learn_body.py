@@ -68,7 +68,7 @@ def test_a_linear_field_is_carried_as_it_is():
 
 
 MIDDLE = np.array([0.03, 0.03, 0.03])
-A, B, WIDE = 1e4, 400.0, 0.012  # J/m³, 1/m², m
+A, B, WIDE, STRESS = 1e4, 400.0, 0.012, 3e5  # J/m³, 1/m², m, Pa/m
 
 
 def block() -> tuple[pp.Body, pp.SphereProbe]:
@@ -78,7 +78,7 @@ def block() -> tuple[pp.Body, pp.SphereProbe]:
 
 
 def answers(X: np.ndarray, points: np.ndarray) -> dict[str, np.ndarray]:
-    """Of a body as symmetric as the block: U = A s³ exp(B ρ²), ρ from the axis; a dimple under the ball."""
+    """Of a body as symmetric as the block: U = A s³ exp(B ρ²), ρ from the axis; a dimple under the ball, stressed."""
     across = (X - MIDDLE) * (1.0, 1.0, 0.0)
     s = RADIUS + MIDDLE[2] - X[:, 2]
     U = A * s**3 * np.exp(B * (across**2).sum(axis=1))
@@ -93,6 +93,7 @@ def answers(X: np.ndarray, points: np.ndarray) -> dict[str, np.ndarray]:
         "response": -U[:, None] * g,
         "response_gradient": -hessian,
         "displacement": fall * (0.3 * away / WIDE - (0.0, 0.0, 1.0)),
+        "von_mises": STRESS * fall[..., 0],
     }
 
 
@@ -100,7 +101,7 @@ def answers(X: np.ndarray, points: np.ndarray) -> dict[str, np.ndarray]:
 def touches() -> Dataset:
     """24 touches of the part of the block that is no image of another, in columns of four; by formula."""
     body, probe = block()
-    problem = body.problem(fundamental_part(body, probe), element=0.006)
+    problem = body.problem(fundamental_part(body, probe), element=0.006, stress=True)
     X = problem.interactions[0].design(body.geometry, 24, 0, 4)
     columns = {field.name: field.empty(len(X)) for field in complete(problem.schema)}
     columns |= answers(X, problem.mesh.points) | {"converged": np.ones(len(X), dtype=bool)}
@@ -120,13 +121,14 @@ def test_ranges_and_symmetry_are_those_of_the_whole():
     assert len(np.unique(columns)) == 6
 
 
-def test_images_of_a_displacement_are_displacements_of_the_images():
+@pytest.mark.parametrize("field", ["displacement", "von_mises"])
+def test_images_of_a_field_are_fields_of_the_images(field):
     """All eight images, shown on a mesh that is fine everywhere, against the formula at the image of the touch."""
     body, probe = block()
     layout = body.problem(probe, element=0.006).layout
-    shapes = shapes_of(Touches.of(touches(), layout))
+    shapes = shapes_of(Touches.of(touches(), layout), field)
     assert len(shapes.X) == 8 * 24
-    truth = answers(shapes.X, layout.rest[np.unique(layout.triangles)])["displacement"]
+    truth = answers(shapes.X, layout.rest[np.unique(layout.triangles)])[field].reshape(shapes.values.shape)
     miss = np.linalg.norm(shapes.values - truth, axis=2)
     size = np.linalg.norm(truth, axis=2).max()
     # cubic in h/w = ½, with a factor below one: the dimple's width is two elements
@@ -156,6 +158,11 @@ def test_a_body_is_learnt_judged_and_kept(tmp_path):
     assert judged.shape.mean < 1e-4
     assert judged.force.median < 0.01
     assert "Displacement is not judged" not in " ".join(judged.notes)
+    stress = touch.fields["von_mises"]
+    truth = answers(test.X, stress.points)["von_mises"]
+    assert stress.unit == "Pa"
+    assert np.abs(stress.values(test.X)[..., 0] - truth).mean() < 0.05 * truth.max()
+    assert "von Mises stress" in str(history)
     loaded = TouchedBody.load(touch.save(tmp_path / "block.palpate"))
     np.testing.assert_array_equal(loaded.touch.force(test.X), touch.touch.force(test.X))
     # eight images of a touch feel eight images of one force, which no solve told

@@ -112,3 +112,15 @@ def test_what_can_not_vary_is_said() -> None:
     with pytest.raises(UsageError, match="4 finite numbers"):
         BodyFamily(body, Varied("fat.young", 1e3, 2e3)).problem(PROBE).solve(CENTRE)
     assert isinstance(problem().member((4e3, 0.4)), SolidProblem)
+
+
+def test_stress_is_in_every_row_that_asks_for_it() -> None:
+    """Of a body and of a family; which questions are asked of a problem is part of its identity."""
+    for whole, places in ((layered(), (CENTRE,)), (FAMILY, ((*CENTRE, 5e3, 0.4),))):
+        plain, asked = (whole.problem(PROBE, element=0.014, stress=stress) for stress in (False, True))
+        assert "von_mises" not in {field.name for field in plain.schema}
+        assert plain.describe() != asked.describe()
+        data = pp.sweep(asked, points=places, workers=1, progress=False)
+        seen = asked.solve(places[0])
+        np.testing.assert_allclose(data["von_mises"][0], seen.von_mises, rtol=1e-6, atol=1e-3)
+        assert data["von_mises"][0].max() > 100.0  # Pa, under a ball pressed 5 mm deep

@@ -1,4 +1,4 @@
-"""Displacements of a symmetric body at the mirror images of the solved places: u(M c)(M X) = M u(c)(X)."""
+"""Fields of a symmetric body at mirror images of the solved places: u(M c)(M X) = M u(c)(X); numbers stay the same."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ MOST = 400  # shapes to learn a field from; more images of one solve tell little
 
 @dataclass(frozen=True, eq=False)
 class Shapes:
-    """Displacements of a surface's nodes, images among them.
+    """A field at a surface's nodes, images among them.
 
     Attributes
     ----------
     X : (N, n) array
-    values : (N, P, 3) array
-        In m.
+    values : (N, P, 3) or (N, P, 1) array
+        Of vectors, which turn with the body, or of numbers.
     groups : (N,) array of int
         Column of the solve that each comes from.
     """
@@ -32,12 +32,12 @@ class Shapes:
     groups: np.ndarray
 
 
-def shapes_of(touches: Touches, *, seed: int = 0, most: int = MOST) -> Shapes:
+def shapes_of(touches: Touches, field: str = "displacement", *, seed: int = 0, most: int = MOST) -> Shapes:
     """All solves as they are and their images, of which whole columns are drawn at random if they are too many."""
     data, columns = touches.data, touches.columns
     nodes, own = np.unique(data.triangles, return_inverse=True)
     points, triangles = data.rest[nodes], own.reshape(-1, 3)
-    solved = data.displacement[:, nodes]
+    solved = np.asarray(data[field])[:, nodes].reshape(len(data), len(nodes), -1)
     facing = node_normals(touches.points, touches.triangles)
     chosen = _chosen(columns, len(touches.matrices), most, seed)
     X, values, groups = [], [], []
@@ -50,7 +50,7 @@ def shapes_of(touches: Touches, *, seed: int = 0, most: int = MOST) -> Shapes:
         image = data.X[rows].copy()
         image[:, :3] = touches.about + (image[:, :3] - touches.about) @ matrix.T
         X.append(image)
-        values.append(carried @ matrix.T)
+        values.append(carried @ matrix.T if solved.shape[2] == 3 else carried)
         groups.append(columns[rows])
     return Shapes(np.concatenate(X), np.concatenate(values), np.concatenate(groups))
 

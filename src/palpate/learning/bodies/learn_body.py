@@ -30,6 +30,8 @@ class TouchHistory:
         The energy, every network that was tried, and the error of each solve when it is left out.
     shape : LearntField or None
         The same of the displacement; None if only the force was asked for.
+    stress : LearntField or None
+        The same of the von Mises stress; None if the sweep has none.
     solves : int
         That were learnt from.
     seconds : float
@@ -39,6 +41,7 @@ class TouchHistory:
     shape: LearntField | None
     solves: int
     seconds: float
+    stress: LearntField | None = None
 
     def __str__(self) -> str:
         tried = len(self.energy.trials)
@@ -52,6 +55,11 @@ class TouchHistory:
         if self.shape is not None:
             modes = self.shape.field.meta["modes"]
             words += f"; shape: {modes} modes, which miss {1e3 * self.shape.truncation:.2g} mm"
+        if self.stress is not None:
+            field = self.stress.field
+            words += (
+                f"; von Mises stress: {field.meta['modes']} modes, which miss {self.stress.truncation:.2g} Pa"
+            )
         return words
 
     __repr__ = __str__
@@ -80,13 +88,13 @@ def learn_body(
     layout : Layout, optional
         Of a mesh that is fine wherever the body shall be touched, where the sweep's is fine in a part only.
     seconds : float
-        To search the network of the energy; half as long for the shape.
+        To search the network of the energy; half as long for the shape, and for the stress where the sweep has it.
     units_max : int
         Most units of the energy; mirror images count.
     target : float
         Leave-one-solve-out error of the energy at which no more units are added.
     shape : bool
-        Whether to learn the displacement of the surface too.
+        Whether to learn the displacement of the surface too, and the stress there if it is in the dataset.
     seed : int
     say : callable
         Told what begins, as one line.
@@ -110,14 +118,18 @@ def learn_body(
     energy = _energy(
         touches, {"seconds": seconds, "units_max": units_max, "target": target, "seed": seed} | options
     )
-    found = None
+    found, stress = None, None
     if shape:
         say("shape")
-        found = _shape(touches, SHARE * seconds, seed)
+        found = _field(touches, "displacement", "m", SHARE * seconds, seed)
+    if shape and "von_mises" in touches.data:
+        say("stress")
+        stress = _field(touches, "von_mises", "Pa", SHARE * seconds, seed)
     meta = {**energy.surrogate.meta, "name": name, "dataset": _origin(touches.data)}
     touch = replace(energy.surrogate, meta=meta)
-    fields = {} if found is None else {"displacement": found.field}
-    history = TouchHistory(energy, found, len(touches.data), time.monotonic() - began)
+    learnt = {"displacement": found, "von_mises": stress}
+    fields = {name: one.field for name, one in learnt.items() if one is not None}
+    history = TouchHistory(energy, found, len(touches.data), time.monotonic() - began, stress)
     return TouchedBody(touch, fields), history
 
 
@@ -135,8 +147,8 @@ def _energy(touches: Touches, options: dict[str, Any]) -> LearntSurrogate:
     return learn_surrogate(data.X, data.potential_energy, data.response, K, **(known | options))
 
 
-def _shape(touches: Touches, seconds: float, seed: int) -> LearntField:
-    shapes = shapes_of(touches, seed=seed)
+def _field(touches: Touches, name: str, unit: str, seconds: float, seed: int) -> LearntField:
+    shapes = shapes_of(touches, name, seed=seed)
     return learn_field(
         shapes.X,
         shapes.values,
@@ -146,6 +158,8 @@ def _shape(touches: Touches, seconds: float, seed: int) -> LearntField:
         surface=touches.surface,
         radius=touches.radius,
         groups=shapes.groups,
+        name=name,
+        unit=unit,
         seconds=seconds,
         seed=seed,
     )

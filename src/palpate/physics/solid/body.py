@@ -163,7 +163,9 @@ class Body:
         lines += [f"  held     {held}" for held in self.held]
         return "\n".join(lines)
 
-    def problem(self, *interactions: Interaction, element: float | None = None) -> SolidProblem:
+    def problem(
+        self, *interactions: Interaction, element: float | None = None, stress: bool = False
+    ) -> SolidProblem:
         """The body under interactions whose inputs vary.
 
         Parameters
@@ -172,6 +174,8 @@ class Body:
             At least one; their inputs follow each other in this order.
         element : float, optional
             Element size in m where the interactions need a fine mesh, in place of their own.
+        stress : bool
+            Whether every answer, and so every row of a sweep, has von Mises stress at the nodes.
 
         Raises
         ------
@@ -180,7 +184,7 @@ class Body:
         """
         from palpate.physics.solid.problem import SolidProblem
 
-        return SolidProblem(self, _flat(interactions), element)
+        return SolidProblem(self, _flat(interactions), element, stress)
 
 
 def _flat(interactions: Sequence[Any]) -> tuple[Interaction, ...]:

@@ -75,9 +75,11 @@ class BodyFamily:
         for one in self.varied:
             _ = one.range
 
-    def problem(self, *interactions: Interaction, element: float | None = None) -> FamilyProblem:
+    def problem(
+        self, *interactions: Interaction, element: float | None = None, stress: bool = False
+    ) -> FamilyProblem:
         """The family under interactions; see `Body.problem`."""
-        return FamilyProblem(self.body.problem(*interactions, element=element), self.varied)
+        return FamilyProblem(self.body.problem(*interactions, element=element, stress=stress), self.varied)
 
     def member(self, values: Sequence[float]) -> Body:
         """The body of these values."""
@@ -116,7 +118,7 @@ class FamilyProblem:
     @property
     def schema(self) -> tuple[Field, ...]:
         """What each solve answers."""
-        return solid_fields(len(self.base.mesh.points), self.ranges)
+        return solid_fields(len(self.base.mesh.points), self.ranges, stress=self.base.stress)
 
     @property
     def design_name(self) -> str | None:

@@ -50,11 +50,14 @@ class SolidProblem:
     interactions : tuple of Interaction
     element : float or None
         Element size in m where the interactions need a fine mesh, in place of their own.
+    stress : bool
+        Whether every answer, and so every row of a sweep, has von Mises stress and stretch at the nodes.
     """
 
     body: Body
     interactions: tuple[Interaction, ...]
     element: float | None = None
+    stress: bool = False
 
     def __post_init__(self) -> None:
         if not self.interactions:
@@ -125,7 +128,7 @@ class SolidProblem:
     @property
     def schema(self) -> tuple[Field, ...]:
         """What each solve answers; a sweep asks for it."""
-        return solid_fields(len(self.mesh.points), self.ranges)
+        return solid_fields(len(self.mesh.points), self.ranges, stress=self.stress)
 
     @property
     def design_name(self) -> str | None:
@@ -139,6 +142,7 @@ class SolidProblem:
             "body": self.body.describe(),
             "interactions": [interaction.describe() for interaction in self.interactions],
             "element": self.element,
+            **({"stress": True} if self.stress else {}),
         }
 
     @property

@@ -89,7 +89,7 @@ class SolidSolver:
             Without it, such a body is loaded from rest, in an instant, along the approach path, and what it
             remembers of other solves is left as it was.
         fields : bool
-            Whether to give stress and stretch at the nodes.
+            Whether to give stress and stretch at the nodes; a problem with `stress` always does.
 
         Returns
         -------
@@ -219,6 +219,7 @@ class SolidSolver:
         if doubt.stop is not Stop.CONVERGED:
             last = followed.last.before or followed.last
             return self._answers.failure(q, Followed(last, doubt, followed.log))
+        fields = fields or self._problem.stress
         found = self._answers.equilibrium(q, followed, residual, fields=fields)
         known = Known(q, followed.last.z, found.slope, followed.last.before)
         self._known = [*(k.alone() for k in self._known[-KEPT + 1 :]), known]

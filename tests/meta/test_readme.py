@@ -57,12 +57,6 @@ def titled(title: str) -> str:
 @pytest.mark.timeout(620)
 def test_the_program_for_soft_bodies_runs(tmp_path: Path):
     text = titled("Soft bodies")
-    assert "samples=24" in text
-    # that it runs, not how well it learns: half as many touches, less deep, of a quarter of the place
-    smaller = ("(0.03, 0.03), (0.07", "(0.05, 0.05), (0.07")
-    for given, less in (("=24", "=12"), ("0.010), over", "0.006), over"), smaller):
-        assert text.count(given) == 1
-        text = text.replace(given, less)
     printed = run_program(text, tmp_path, 600)
     assert printed.startswith("Solid of ")
     assert {path.name for path in tmp_path.iterdir()} >= {"pressed.png", "pressed.vtu", "block.zarr"}

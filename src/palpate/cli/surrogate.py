@@ -54,8 +54,9 @@ def validate_file(
     if (kind := load_archive(path).kind) not in kinds:
         raise UsageError(
             f"{path} holds {kind!r}, which is not judged by itself.",
-            why="A touch model of a held body is judged together with its study.",
-            fix="Give the study file: palpate validate study.toml",
+            why="A touch model of a beam is judged together with its study; a body that remembers by histories.",
+            fix="Give the study file, palpate validate study.toml; of a ready-made study run `palpate demo NAME` "
+            "again, or judge it in Python: palpate.validation.validate_held(body, HeldPaths.load(file)).",
         )
     model = kinds[kind].load(path)
     surrogate = model.touch if isinstance(model, TouchedBody) else model

@@ -33,6 +33,17 @@ from palpate.network.soundness import flaw
 __all__ = ["Archive", "load_alone", "load_archive", "save_archive"]
 
 VERSION = 2
+_LOADERS = {
+    "networks": "palpate.Network.load or palpate.Fitted.load",
+    "touch": "palpate.TouchModel.load",
+    "touched-body": "palpate.TouchedBody.load",
+    "touch-surrogate": "palpate.TouchSurrogate.load",
+    "field-surrogate": "palpate.surrogates.FieldSurrogate.load",
+    "grasp-surrogate": "palpate.GraspSurrogate.load",
+    "held-body": "palpate.HeldBody.load",
+    "held-paths": "palpate.learning.plastic.HeldPaths.load",
+}
+"""What reads a file of a kind, for the message where it is given to another."""
 _KINDS = {"BOOL", "U8", "I8", "U16", "I16", "U32", "I32", "U64", "I64", "F16", "F32", "F64"}
 _MAKE = "Copy the file again, or make it anew with `palpate learn`."
 
@@ -221,8 +232,8 @@ def _check_header(path: Path, header: Mapping[str, str], kind: str | None) -> No
     if kind is not None and header["palpate"] != kind:
         raise FileFormatError(
             f"{path} holds {header['palpate']!r}; {kind!r} is needed here.",
-            why="A touch model is a body with several networks; a file of networks is what was learnt of arrays.",
-            fix="`palpate learn` makes touch models; `palpate.Network.load` and `palpate.Fitted.load` read networks.",
+            why="What was learnt of a beam, of a pressed or held body and of arrays are files of different kinds.",
+            fix=f"Read it with {_LOADERS.get(header['palpate'], 'what wrote it')}, or give a file of the other kind.",
         )
 
 

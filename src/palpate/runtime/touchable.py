@@ -7,12 +7,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeAlias
 
+from palpate.errors import FileFormatError
 from palpate.network import load_archive
 from palpate.runtime.pressed import PressedBody
 from palpate.runtime.remembering import RememberingBody
 from palpate.runtime.workspace import Workspace
 from palpate.surrogates import TouchedBody, TouchModel, TouchSurrogate
 from palpate.surrogates.field.touched_body import KIND as BODY
+from palpate.surrogates.grasp.file import KIND as HELD_BY_PAD
 from palpate.surrogates.plastic import HeldBody
 from palpate.surrogates.plastic.held_file import KIND as REMEMBERS
 from palpate.surrogates.touch_file import KIND as SURROGATE
@@ -45,7 +47,13 @@ def load_touchable(path: str | os.PathLike[str]) -> Touchable:
         If the file is missing, corrupt, foreign, or of something that no hand can be laid on.
     """
     path = Path(path)
-    load = _LOAD.get(load_archive(path).kind, TouchModel.load)
+    kind = load_archive(path).kind
+    if kind == HELD_BY_PAD:
+        raise FileFormatError(
+            f"{path} holds a body held by a pad, which has no page and no loop yet.",
+            fix="Touch it from Python: GraspSurrogate.load(file).evaluator().",
+        )
+    load = _LOAD.get(kind, TouchModel.load)
     return touchable(load(path), path.stem)
 
 

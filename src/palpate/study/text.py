@@ -96,7 +96,7 @@ def to_toml(study: AnyStudy) -> str:
     """
     if isinstance(study, HeldStudy):
         raise UsageError(
-            f"{study.name} has no study file.",
+            f"{study.preset} has no study file.",
             why="Studies of bodies that remember are ready-made.",
             fix=f"Run it: palpate demo {study.preset}. Others: palpate.learning.plastic.",
         )

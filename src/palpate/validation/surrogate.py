@@ -177,10 +177,7 @@ def unseen_solves(
     """
     _refuse_radius(model, test)
     solves = TouchSolves.of(test, model.inputs)
-    if isinstance(model, TouchFunction) or model.region is None:
-        return solves, 0
-    low, high = bounds(model.inputs)
-    seen = model.region.distances(2 * (solves.X - low) / (high - low) - 1) < SEEN
+    seen = _seen(model, solves.X)
     if seen.all():
         raise UsageError(
             f"The surrogate was trained on all {len(solves)} solves, or on mirror images of them.",
@@ -189,12 +186,22 @@ def unseen_solves(
     return (solves.take(~seen), int(seen.sum())) if seen.any() else (solves, 0)
 
 
+def _seen(model: TouchSurrogate | GraspSurrogate | TouchFunction, X: np.ndarray) -> np.ndarray:
+    """Which of the inputs (N, n) a model was trained on, as far as it remembers."""
+    if isinstance(model, TouchFunction) or model.region is None:
+        return np.zeros(len(X), dtype=bool)
+    low, high = bounds(model.inputs)
+    return np.asarray(model.region.distances(2 * (X - low) / (high - low) - 1) < SEEN)
+
+
 def _shape(body: TouchedBody | None, test: Dataset | TouchSolves) -> ShownErrors | str:
     if body is None or "displacement" not in body.fields:
         return "Displacement is not judged: the model answers none."
     if not isinstance(test, Dataset):
         return "Displacement is not judged: the solves are given without theirs."
-    return shown_errors(body.fields["displacement"], test)
+    test = test.ok
+    unseen = np.flatnonzero(~_seen(body.touch, test.X))
+    return shown_errors(body.fields["displacement"], test.take(unseen))
 
 
 def _refuse_radius(

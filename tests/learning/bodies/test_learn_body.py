@@ -163,6 +163,10 @@ def test_a_body_is_learnt_judged_and_kept(tmp_path):
     assert stress.unit == "Pa"
     assert np.abs(stress.values(test.X)[..., 0] - truth).mean() < 0.05 * truth.max()
     assert "von Mises stress" in str(history)
+    # the trained touches among a whole sweep are no test, of the shape neither
+    whole = validate(touch, touches())
+    assert whole.samples == judged.samples
+    assert whole.shape.mean == pytest.approx(judged.shape.mean)
     loaded = TouchedBody.load(touch.save(tmp_path / "block.palpate"))
     np.testing.assert_array_equal(loaded.touch.force(test.X), touch.touch.force(test.X))
     # eight images of a touch feel eight images of one force, which no solve told

@@ -53,6 +53,15 @@ class LearntGrasp:
     loo: float
     law_errors: dict[tuple[int, int], float]
 
+    def __str__(self) -> str:
+        median, p95 = (100 * float(np.quantile(self.errors, q)) for q in (0.5, 0.95))
+        return (
+            f"{self.surrogate.meta['solves']} solves, {len(self.trials)} networks of the energy tried; a solve left "
+            f"out is missed by {median:.2g} % of its force (median), {p95:.2g} % (95th percentile)"
+        )
+
+    __repr__ = __str__
+
 
 def learn_grasp(
     X: np.ndarray,

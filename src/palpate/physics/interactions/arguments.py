@@ -43,7 +43,7 @@ def interval(what: str, value: Any, unit: str) -> Interval:
     low, high = float(ends[0]), float(ends[1])
     if low >= high:
         raise UsageError(
-            f"The range of {what} is empty: {low:g} … {high:g} {unit}.",
+            f"The range of {what[0].lower()}{what[1:]} is empty: {low:g} … {high:g} {unit}.",
             why="A range needs two ends, the lower one first.",
             fix="Swap the ends, or give one number for a value that stays.",
         )

@@ -28,11 +28,11 @@ def along(drive):
 
 
 def bed(spacing=0.003):
-    """Patches on a square of 60 mm, as wide as half the radius of contact."""
+    """Patches on a square of 60 mm, as wide as a contact of 4 mm asks for."""
     corners = 0.03 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
     triangles = np.array([[0, 1, 2], [0, 2, 3]])
     energy = elastic(touching(0, 0, -0.004))[0]
-    return Patches.over(corners, triangles, spacing, width=0.5 * np.sqrt(RADIUS * 0.004), energy=energy)
+    return Patches.over(corners, triangles, spacing, width=Patches.width_at(RADIUS, 0.004), energy=energy)
 
 
 KINDS = ("scalar", "patches", "scalar behind a pad", "patches behind a pad")

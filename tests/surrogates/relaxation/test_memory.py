@@ -150,12 +150,12 @@ def test_tissue_does_not_stick_and_comes_back(memory):
 def test_fresh_material_comes_under_a_sliding_probe():
     """Far from where it was held for long, a probe that arrives at once feels the elastic force, and drag before.
 
-    Patterns 26 mm apart of width w = 3.3 mm overlap by exp(−Δ²/8w²) = 4.6e-4, of which half is remembered; the slope
-    of that along x is Δ/4w² times as much, 4e-4 of the force.
+    Patterns Δ = 31 mm apart of width w = 3.5 mm overlap by exp(−Δ²/8w²) = 7e-5, of which half is remembered; the slope
+    of that along x is Δ/4w² times as much, 1e-4 of the force.
     """
     memory = Memory(Branches(TERMS), bed())
     led(memory, step_hold(touching(-0.012, 0, 0), 0.004, [20.0]))
-    near, far = touching(-0.009, 0, -0.004), touching(0.014, 0, -0.004)
+    near, far = touching(-0.009, 0, -0.004), touching(0.019, 0, -0.004)
     memory.step(near, *elastic(near), 0.0)
     assert memory.force[0] < -0.02 * memory.force[2]
     memory.step(far, *elastic(far), 0.0)

@@ -39,8 +39,10 @@ __all__ = [
     "PROTOCOL",
     "Beat",
     "Credit",
+    "Faceted",
     "FieldInfo",
     "Frame",
+    "Greeting",
     "Hand",
     "Hello",
     "Hold",
@@ -139,14 +141,20 @@ class Credit(Binary):
 
 
 @dataclass(frozen=True, eq=False)
-class Surface(Binary):
-    """The surface of a body at rest, server to page. Points are split along sharp edges."""
-
-    KIND: ClassVar[int] = 4
+class Faceted(Binary):
+    """A surface at rest, as every kind of body has one. Points are split along sharp edges."""
 
     rest: Annotated[np.ndarray, Wire("floats", "m, x y z of each point")]
     triangles: Annotated[np.ndarray, Wire("floats", "three points each; exact up to 16 million")]
     creases: Annotated[np.ndarray, Wire("floats", "two points for each sharp edge")]
+
+
+@dataclass(frozen=True, eq=False)
+class Surface(Faceted):
+    """The surface of a body at rest, server to page. Points are split along sharp edges."""
+
+    KIND: ClassVar[int] = 4
+
     fixed: Annotated[np.ndarray, Wire("floats", "two points for each edge around the fixed surfaces")]
 
 
@@ -177,25 +185,15 @@ class RangeInfo:
 
 
 @dataclass(frozen=True)
-class Hello(Json):
-    """The body and the loop, once per connection, server to page.
+class Greeting(Json):
+    """What every page is told of its body and of the loop, once per connection, server to page.
 
     Attributes
     ----------
     protocol : int
     name : str
-    rest : (N, 3)
-        Rest positions of the nodes along the body's axis, m.
-    radius : float
-        Of the body, for drawing, m.
-    touch_node : int
-    nodes_of_interest : indices into rest
     inputs, parameters : ranges
-        All loads; those that the hand does not drive.
-    reach : float
-        Largest trained displacement of the held node, m.
-    travel : (2, 3)
-        Lower and upper corner of the box of the held node's offsets under all trained loads, m.
+        All inputs; those that the hand does not drive.
     scale : float
         Body metres per metre of hand.
     workspace : float
@@ -211,20 +209,40 @@ class Hello(Json):
 
     protocol: int
     name: str
-    rest: tuple[Vec3, ...]
-    radius: float
-    touch_node: int
-    nodes_of_interest: tuple[int, ...]
     inputs: tuple[RangeInfo, ...]
     parameters: tuple[RangeInfo, ...]
-    reach: float
-    travel: tuple[Vec3, ...]
     scale: float
     workspace: float
     max_force: float
     rate: float
     faults: tuple[str, ...]
     meta: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Hello(Greeting):
+    """A body held at one node and its loop, once per connection, server to page.
+
+    Attributes
+    ----------
+    rest : (N, 3)
+        Rest positions of the nodes along the body's axis, m.
+    radius : float
+        Of the body, for drawing, m.
+    touch_node : int
+    nodes_of_interest : indices into rest
+    reach : float
+        Largest trained displacement of the held node, m.
+    travel : (2, 3)
+        Lower and upper corner of the box of the held node's offsets under all trained loads, m.
+    """
+
+    rest: tuple[Vec3, ...]
+    radius: float
+    touch_node: int
+    nodes_of_interest: tuple[int, ...]
+    reach: float
+    travel: tuple[Vec3, ...]
 
 
 @dataclass(frozen=True)

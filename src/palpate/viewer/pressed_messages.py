@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
-from palpate.viewer.messages import Beat, RangeInfo, Vec3
-from palpate.viewer.wire import Binary, Json, Wire
+from palpate.viewer.messages import Beat, Faceted, Greeting, Vec3
+from palpate.viewer.wire import Binary, Wire
 
 __all__ = ["Look", "Modes", "Press", "Skin", "Touched"]
 
@@ -34,14 +33,11 @@ class Press(Beat):
 
 
 @dataclass(frozen=True, eq=False)
-class Skin(Binary):
+class Skin(Faceted):
     """The surface of a touchable body at rest, server to page. Points are split along sharp edges."""
 
     KIND: ClassVar[int] = 7
 
-    rest: Annotated[np.ndarray, Wire("floats", "m, x y z of each point")]
-    triangles: Annotated[np.ndarray, Wire("floats", "three points each; exact up to 16 million")]
-    creases: Annotated[np.ndarray, Wire("floats", "two points for each sharp edge")]
     touchable: Annotated[np.ndarray, Wire("floats", "1 for each triangle that a probe may touch, else 0")]
 
 
@@ -75,15 +71,11 @@ class Look:
 
 
 @dataclass(frozen=True)
-class Touched(Json):
+class Touched(Greeting):
     """A body pressed anywhere and its loop, once per connection, server to page.
 
     Attributes
     ----------
-    protocol : int
-    name : str
-    inputs, parameters : ranges
-        All inputs; those that the hand does not drive.
     radius : float
         Of the probe, m.
     radius_parameter : int
@@ -96,38 +88,17 @@ class Touched(Json):
         Largest stiffness of the trained region, N/m.
     centre : (3,)
         The device's centre in the body's coordinates, m.
-    scale : float
-        Body metres per metre of hand.
-    workspace : float
-        Radius of the hand's workspace, m.
-    max_force : float
-        The force limit, N.
-    rate : float
-        Hz, what the loop aims at.
     fields : looks
         The first moves the surface where it has three components; none where the file holds no field.
     relaxes : str
         How the force relaxes, in words; empty where it does not.
-    faults : words for fault codes, by code
-    meta : mapping
-        What the file says of its making.
     """
 
-    protocol: int
-    name: str
-    inputs: tuple[RangeInfo, ...]
-    parameters: tuple[RangeInfo, ...]
     radius: float
     radius_parameter: int
     deepest: float
     force_max: float
     stiffness_max: float
     centre: Vec3
-    scale: float
-    workspace: float
-    max_force: float
-    rate: float
     fields: tuple[Look, ...]
     relaxes: str
-    faults: tuple[str, ...]
-    meta: Mapping[str, Any]

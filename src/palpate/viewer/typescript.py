@@ -41,7 +41,7 @@ TYPES = {
 }
 
 HEAD = """\
-// Generated from palpate/viewer/messages.py; change it there, then
+// Generated from palpate/viewer/messages.py and pressed_messages.py; change it there, then
 //   python -m palpate.viewer.messages > src/palpate/viewer/client/src/messages.ts
 
 export type Vec3 = [number, number, number];

@@ -25,6 +25,7 @@ from palpate.units import Range
 
 __all__ = ["LearntGrasp", "learn_grasp"]
 
+FEWEST = 4  # solves: stiffness at rest and its stiffening have to be found from them, and judged by them
 _RIDGE = 1e-4  # on the units' squared weights: few solves do not decide on large ones in five dimensions
 
 Degree = Literal["auto", 0, 1, 2]
@@ -124,10 +125,15 @@ def learn_grasp(
     Raises
     ------
     UsageError
-        If samples, symmetry or options do not fit.
+        If samples, symmetry or options do not fit, or there are fewer than four samples.
     """
     inputs = tuple(inputs)
     _require(seconds, units_max, radial, axes, len(inputs))
+    if len(X) < FEWEST:
+        raise UsageError(
+            f"{len(X)} converged solves are too few to learn a held body from.",
+            fix=f"Sweep at least {FEWEST}, better 20 or more.",
+        )
     samples = GraspSamples.of(X, energy, force, stiffness, inputs=inputs)
     images = hold_images(symmetry, about, inputs, axes)
     with threadpool_limits(1):  # small matrices: more BLAS threads cost time and the bits of the result

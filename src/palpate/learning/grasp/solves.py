@@ -13,7 +13,6 @@ from palpate.units import Range
 
 __all__ = ["HeldSolves"]
 
-FEWEST = 4  # solves: stiffness at rest and its stiffening have to be found from them, and judged by them
 _MOVES = ("d_x", "d_y", "d_z")
 _AXES = {"p_x": 0, "p_y": 1, "p_z": 2}
 
@@ -52,14 +51,9 @@ class HeldSolves:
         Raises
         ------
         UsageError
-            If its inputs are not the three components of one pad's displacement, and others, or solves are too few.
+            If its inputs are not the three components of one pad's displacement, and others.
         """
         data = data.ok
-        if len(data) < FEWEST:
-            raise UsageError(
-                f"{len(data)} converged solves are too few to learn a held body from.",
-                fix=f"Sweep at least {FEWEST}, better 20 or more.",
-            )
         own = [r.name.split()[-1] for r in data.ranges]
         if any(own.count(move) != 1 for move in _MOVES):
             raise UsageError(

@@ -51,7 +51,7 @@ class SolidProblem:
     element : float or None
         Element size in m where the interactions need a fine mesh, in place of their own.
     stress : bool
-        Whether every answer, and so every row of a sweep, has von Mises stress and stretch at the nodes.
+        Whether every answer, and so every row of a sweep, has von Mises stress at the nodes.
     """
 
     body: Body

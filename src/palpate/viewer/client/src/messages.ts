@@ -1,4 +1,4 @@
-// Generated from palpate/viewer/messages.py; change it there, then
+// Generated from palpate/viewer/messages.py and pressed_messages.py; change it there, then
 //   python -m palpate.viewer.messages > src/palpate/viewer/client/src/messages.ts
 
 export type Vec3 = [number, number, number];
@@ -51,24 +51,24 @@ export interface StepInfo {
   figures: Record<string, unknown>;
 }
 
-/** The body and the loop, once per connection, server to page. */
+/** A body held at one node and its loop, once per connection, server to page. */
 export interface Hello {
   protocol: number;
   name: string;
-  rest: Vec3[];
-  radius: number;
-  touch_node: number;
-  nodes_of_interest: number[];
   inputs: RangeInfo[];
   parameters: RangeInfo[];
-  reach: number;
-  travel: Vec3[];
   scale: number;
   workspace: number;
   max_force: number;
   rate: number;
   faults: string[];
   meta: Record<string, unknown>;
+  rest: Vec3[];
+  radius: number;
+  touch_node: number;
+  nodes_of_interest: number[];
+  reach: number;
+  travel: Vec3[];
 }
 
 /** A body pressed anywhere and its loop, once per connection, server to page. */
@@ -77,20 +77,20 @@ export interface Touched {
   name: string;
   inputs: RangeInfo[];
   parameters: RangeInfo[];
+  scale: number;
+  workspace: number;
+  max_force: number;
+  rate: number;
+  faults: string[];
+  meta: Record<string, unknown>;
   radius: number;
   radius_parameter: number;
   deepest: number;
   force_max: number;
   stiffness_max: number;
   centre: Vec3;
-  scale: number;
-  workspace: number;
-  max_force: number;
-  rate: number;
   fields: Look[];
   relaxes: string;
-  faults: string[];
-  meta: Record<string, unknown>;
 }
 
 /** An event in plain words, server to page. */

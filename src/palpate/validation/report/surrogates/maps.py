@@ -25,6 +25,7 @@ MARKED = 5
 def plot_errors(surrogate: TouchSurrogate, test: TouchSolves, samples: ForceSamples) -> Figure:
     """One dot per unseen solve, where the probe touches: shallow third, middle, deep third side by side."""
     fig, axes = figure(1, 3, size=(9.4, 3.5), sharex=True, sharey=True)
+    fig.set_layout_engine("compressed")
     view = View.of(surrogate, test.X)
     places, depth = 1e3 * view.flat(feet(surrogate, test.X)), surrogate.depth(test.X)
     against = np.where(samples.heavy, samples.relative, samples.error / samples.light)
@@ -38,22 +39,30 @@ def plot_errors(surrogate: TouchSurrogate, test: TouchSolves, samples: ForceSamp
         drawn = axis.scatter(
             *places[some].T, c=100 * against[some], s=22, cmap=loads_map(), vmin=0.0, vmax=top, linewidths=0
         )
-        for number, row in enumerate(worst, 1):
-            if some[row]:
-                axis.annotate(
-                    str(number), places[row], (5, 4), textcoords="offset points", fontsize=8.5, weight="bold"
-                )
+        for place, numbers in _marks(places, worst, some).items():
+            axis.annotate(numbers, place, (5, 4), textcoords="offset points", fontsize=8.5, weight="bold")
         axis.set_title(f"{name}, to {1e3 * ends[k + 1]:.1f} mm")
         _framed(axis, view)
     axes[0, 1].set_ylabel("")
     axes[0, 2].set_ylabel("")
-    fig.colorbar(drawn, ax=axes, label="force error / % (of f₀ up to f₀)", shrink=0.85, aspect=30, pad=0.02)
+    fig.colorbar(drawn, ax=axes, label="force error / %", shrink=0.85, aspect=30, pad=0.02)
     return fig
+
+
+def _marks(places: np.ndarray, worst: np.ndarray, some: np.ndarray) -> dict[tuple[float, ...], str]:
+    """Numbers of the worst solves among `some` by their place (2,) in mm; those above one foot stand together."""
+    found: dict[tuple[float, ...], str] = {}
+    for number, row in enumerate(worst, 1):
+        if some[row]:
+            place = tuple(np.round(places[row], 1).tolist())
+            found[place] = f"{found[place]}, {number}" if place in found else str(number)
+    return found
 
 
 def plot_trust(surrogate: TouchSurrogate, test: TouchSolves) -> Figure:
     """Deviation of the force at half and at the full depth of the test; hatched where training ended."""
     fig, axes = figure(1, 2, size=(9.4, 3.7), sharex=True, sharey=True)
+    fig.set_layout_engine("compressed")
     view, depth = View.of(surrogate, test.X), surrogate.depth(test.X)
     touched = view.flat(feet(surrogate, test.X[depth > 0]))
     low, high = touched.min(axis=0), touched.max(axis=0)

@@ -62,7 +62,8 @@ def _pictures(chapter: SurrogateChapter, key: str) -> list[Picture]:
             f"{key}-map",
             "Error on the touched surface",
             f"Force error of {chapter.name} at each unseen solve, on the surface seen from outside. {off}",
-            f"One dot per unseen solve, where the probe touches. Numbers mark the worst cases of the table. {off}",
+            "One dot per unseen solve, where the probe touches; forces up to f₀ are judged against f₀. Numbers mark "
+            f"the worst cases of the table. {off}",
             lambda: plot_errors(surrogate, test, samples),
         ),
         picture(

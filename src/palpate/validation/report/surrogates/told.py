@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import Any
 
 from palpate.validation.report.forces import plot_force_errors
@@ -93,11 +95,19 @@ def _part_rows(v: SurrogateValidation) -> tuple[list[str], list[list[str]]]:
 
 
 def _case_rows(v: SurrogateValidation) -> tuple[list[str], list[list[str]]]:
-    head = ["", "force error", "JND", "depth", "finite elements / N", "surrogate / N", "inputs"]
+    named = v.worst[0].at.inputs if v.worst else ()
+    where = [f"{name} / {unit}" if unit else name for name, _, unit in named]
+    head = ["", "force error", "JND", "depth", "finite elements / N", "surrogate / N", *where]
     rows = []
     for i, c in enumerate(v.worst, 1):
-        forces = (", ".join(f"{f:.3g}" for f in force) for force in (c.truth, c.answer))
         deep = "–" if c.depth is None else f"{plain(1e3 * c.depth, 3)} mm"
-        where = str(c.at).removeprefix("at ")
-        rows.append([str(i), share(c.relative), plain(c.jnd), deep, *forces, where])
+        at = [f"{value:.4g}" for _, value, _ in c.at.inputs]
+        rows.append([str(i), share(c.relative), plain(c.jnd), deep, *_vectors(c.truth, c.answer), *at])
     return head, rows
+
+
+def _vectors(*forces: Sequence[float]) -> list[str]:
+    """Vectors in N, all to a thousandth of the longest: smaller parts of theirs say nothing."""
+    longest = max(math.hypot(*force) for force in forces)
+    places = max(3 - math.ceil(math.log10(longest)), 0) if longest > 0 else 0
+    return [", ".join(f"{round(part, places) + 0.0:.{places}f}" for part in force) for force in forces]

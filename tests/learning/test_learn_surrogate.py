@@ -109,7 +109,7 @@ def test_the_leave_one_solve_out_error_is_that_of_fits_without_each_solve(surfac
     problem = Problem(samples.scaled, samples.rows(LAW, resolved=1e-3), images_of(SQUARE, MIDDLE, INPUTS), "")
     of = problem.regressors("rotated", "gaussian")
     none = np.zeros((0, of.form.size))
-    found = problem.left_out(problem.refined(none, of, iterations=0, seconds=1.0))
+    found = problem.missed(problem.refined(none, of, iterations=0, seconds=1.0)).mean
     known = dict(problem.rows)
     rows = Rows.of(of, problem.X, known.pop("Y"), **known)
     A, b, total = rows.matrix(none), rows.targets, 0.0
@@ -161,7 +161,7 @@ def test_what_is_learnt_has_the_symmetry_exactly(learnt):
 
 def test_the_record_tells_what_was_tried(learnt):
     assert {t.start for t in learnt.trials} >= {"kind", "filter", "random"}
-    assert learnt.loo == pytest.approx(min(t.loo for t in learnt.trials))
+    assert learnt.loo <= min(t.loo for t in learnt.trials)
     assert learnt.surrogate.meta["solves"] == 14
     assert learnt.surrogate.meta["samples"] == 8 * 14
 
@@ -179,6 +179,8 @@ def test_what_makes_no_sense_is_refused(surface):
         learn_surrogate(X, np.where(np.arange(6) == 2, 0.0, U), F, K, **given)
     with pytest.raises(UsageError, match="allow no learning"):
         learn_surrogate(X, U, F, K, **given, seconds=0.0)
+    with pytest.raises(UsageError, match="networks=0"):
+        learn_surrogate(X, U, F, K, **given, networks=0)
 
 
 MODULUS = Range("E", 5e3, 20e3, "Pa")
@@ -211,3 +213,36 @@ def test_what_is_known_of_a_property_is_a_slope_of_the_factor(surface):
     arrays = dict(rows)
     all_rows = Rows.of(problem.regressors("rotated", "gaussian"), problem.X, arrays.pop("Y"), **arrays)
     assert len(all_rows.targets) == 12 * 4 + 11
+
+
+def sized(count, seed):
+    """Touches by spheres of 8 to 10 mm whose energy at one depth goes with the root of the radius, as Hertz's does."""
+    X, _, _, K = touches(count, seed)
+    R = np.random.default_rng(seed + 200).uniform(0.008, 0.010, count)
+
+    def energy_of(c, r):
+        s = r - c[:, 2]
+        return s**3 / np.sqrt(1 + s / LAW.length) * np.sqrt(r / RADIUS) * np.exp(factor(c))
+
+    X[:, 2] += R - RADIUS
+    F = [-energy_of(X + 1j * STEP * e, R).imag / STEP for e in np.eye(3)]
+    by_radius = energy_of(X, R + 1j * STEP).imag / STEP
+    return np.c_[X, R], energy_of(X, R), np.stack([*F, -by_radius], axis=1), np.full_like(K, np.nan)
+
+
+def test_the_probes_radius_may_be_an_input(surface):
+    X, U, response, K = sized(40, 5)
+    inputs = (*INPUTS[:2], Range("z", 0.002, 0.010, "m"), Range("R", 0.008, 0.010, "m"))
+    known = {"surface": surface, "radius": 0.009, "inputs": inputs, "radius_input": 3}
+    samples = EnergySamples.of(X, U, response, None, **known)
+    np.testing.assert_allclose(samples.depth, X[:, 3] - X[:, 2], atol=1e-9)
+    # ∂ℓ/∂R = 1/2R: the depth's part of ∂U/∂R is the law's
+    slopes = samples.targets(LAW)[1][:, 0, 3]
+    np.testing.assert_allclose(slopes, 0.5 / X[:, 3] * 1e-3, rtol=1e-6)
+    given = np.where(np.arange(4) < 3, response, np.nan)  # as finite elements tell it
+    learnt = learn_surrogate(X, U, given, K, **known, law=LAW, units_max=8, seconds=4.0, form="axis-aligned")
+    s = learnt.surrogate
+    assert s.radius_input == 3
+    X, U, response, _ = sized(100, 6)
+    size = np.linalg.norm(response[:, :3], axis=1)
+    assert np.quantile(np.linalg.norm(s.force(X) - response[:, :3], axis=1) / size, 0.95) < 0.02

@@ -97,6 +97,48 @@ def test_a_sweep_over_a_family_is_a_dataset_like_any() -> None:
     assert row["potential_energy"][0] == pytest.approx(again.potential_energy, rel=1e-7)
 
 
+def test_layers_of_other_thickness_have_the_same_elements_moved() -> None:
+    family = BodyFamily(layered(), Varied("fat.thickness", 0.010, 0.020))
+    whole = family.problem(PROBE, element=0.008)
+    member = whole.member((0.019,))
+    assert member.body.geometry.layers == (("fat", 0.019), ("muscle", pytest.approx(0.021)))
+    rest, moved = whole.mesh, member.mesh
+    np.testing.assert_array_equal(moved.triangles, rest.triangles)
+    np.testing.assert_array_equal(moved.points[:, :2], rest.points[:, :2])
+    heights = np.interp(rest.points[:, 2], [0.0, 0.025, 0.040], [0.0, 0.021, 0.040])
+    np.testing.assert_allclose(moved.points[:, 2], heights, atol=1e-12)
+    # the touched surface stays, and the answers are those of a block that is meshed as it is
+    top = np.unique(rest.triangles_of("top"))
+    np.testing.assert_array_equal(moved.points[top], rest.points[top])
+    found = whole.solve((*CENTRE, 0.019))
+    drawn = LayeredBlock((0.08, 0.08), (("fat", 0.019), ("muscle", 0.021)), element=0.02)
+    alone = dataclasses.replace(layered(), geometry=drawn).problem(PROBE, element=0.008).solve(CENTRE)
+    np.testing.assert_allclose(found.response[:3], alone.response, atol=0.03 * alone.response[2])
+    assert found.response[2] < whole.solve((*CENTRE, 0.011)).response[2]  # more fat is softer
+    assert np.isnan(found.response[3])
+    assert family.problem(PROBE).describe()["varied"] == [{"path": "fat.thickness", "range": [0.010, 0.020]}]
+
+
+def test_a_probe_of_any_size_lies_as_deep_over_the_same_places() -> None:
+    family = BodyFamily(layered(), (Varied("fat.young", 2e3, 8e3), Varied("probe.radius", 0.008, 0.012)))
+    whole = family.problem(PROBE, element=0.012)
+    assert [r.name for r in whole.ranges] == ["c_x", "c_y", "c_z", "fat.young", "probe.radius"]
+    assert (whole.ranges[2].low, whole.ranges[2].high) == pytest.approx((0.04 + 0.008 - 0.006, 0.04 + 0.012))
+    points = whole.design(24, seed=1)
+    depth = points[:, 4] - (points[:, 2] - 0.04)
+    assert 0 < depth.min() < 0.001
+    assert 0.005 < depth.max() < 0.006
+    assert {len(np.unique(points[rows, 4])) for rows in whole.chains(points)} == {1}
+    # a member is what a probe of that size would be, on the family's mesh
+    x = (0.042, 0.037, 0.04 + 0.0115 - 0.005, 5e3, 0.0115)
+    member = whole.member(x[3:])
+    assert member.interactions[0].radius == 0.0115
+    np.testing.assert_array_equal(member.mesh.points, whole.mesh.points)
+    assert whole.solve(x).response[:3] == pytest.approx(member.solve(x[:3]).response, rel=1e-9)
+    with pytest.raises(UsageError, match="no one probe"):
+        family.problem(PROBE, PROBE)
+
+
 def test_what_can_not_vary_is_said() -> None:
     body = layered()
     with pytest.raises(UsageError, match="names no property"):
@@ -109,6 +151,12 @@ def test_what_can_not_vary_is_said() -> None:
         BodyFamily(body, (Varied("fat.young", 1e3, 2e3), Varied("fat.young", 1e3, 2e3)))
     with pytest.raises(UsageError, match=r"[Pp]oisson"):
         BodyFamily(body, Varied("fat.poisson", 0.3, 0.6))
+    with pytest.raises(UsageError, match="no layers"):
+        BodyFamily(
+            Body(Block((0.06, 0.06, 0.03)), NeoHookean(9e3, 0.4)), Varied("body.thickness", 0.01, 0.02)
+        )
+    with pytest.raises(UsageError, match="40 mm"):
+        BodyFamily(body, Varied("fat.thickness", 0.01, 0.05))
     with pytest.raises(UsageError, match="4 finite numbers"):
         BodyFamily(body, Varied("fat.young", 1e3, 2e3)).problem(PROBE).solve(CENTRE)
     assert isinstance(problem().member((4e3, 0.4)), SolidProblem)

@@ -139,6 +139,7 @@ def _energy(touches: Touches, options: dict[str, Any]) -> LearntSurrogate:
     known: dict[str, Any] = {
         "surface": touches.surface,
         "radius": touches.radius,
+        "radius_input": touches.radius_input,
         "inputs": touches.inputs,
         "symmetry": touches.matrices if len(touches.matrices) > 1 else (),
         "about": touches.about,
@@ -157,6 +158,7 @@ def _field(touches: Touches, name: str, unit: str, seconds: float, seed: int) ->
         triangles=touches.triangles,
         surface=touches.surface,
         radius=touches.radius,
+        radius_input=touches.radius_input,
         groups=shapes.groups,
         name=name,
         unit=unit,

@@ -20,6 +20,7 @@ __all__ = ["FEWEST", "Touches", "is_touched"]
 FEWEST = 6  # solves in contact: what the law and an affine network have to be found from, and judged by
 UPRIGHT = ("x_min", "x_max", "y_min", "y_max")  # what "side" of a box means
 PROBES = ("SphereProbe",)
+RADIUS = "probe.radius"  # what a family calls it
 DISSIPATING = ("Plastic",)
 SHOULDER = (
     1 / 3
@@ -46,7 +47,9 @@ class Touches:
     data : Dataset
         Converged rows.
     radius : float
-        Of the probe, m.
+        Of the probe, m; where it is an input, the middle of its range.
+    radius_input : int or None
+        The input that it is.
     inputs : n ranges
         Those of the data, widened to all mirror images.
     surface : TouchedSurface
@@ -60,6 +63,7 @@ class Touches:
 
     data: Dataset
     radius: float
+    radius_input: int | None
     inputs: tuple[Range, ...]
     surface: TouchedSurface
     points: np.ndarray
@@ -86,14 +90,17 @@ class Touches:
             )
         rest, triangles, touched = _surface(data, layout, str(probe["touches"]))
         nodes, own = np.unique(triangles, return_inverse=True)
-        radius = float(probe["radius"])
+        which, radius = _radius_input(data), float(probe["radius"])
+        largest = radius if which is None else data.ranges[which].high
+        radius = radius if which is None else (data.ranges[which].low + largest) / 2
         matrices, about = symmetry_told(data)
         element = data.provenance["problem"].get("element")
         return cls(
             data,
             radius,
+            which,
             (*widened(data.ranges[:3], matrices, about), *data.ranges[3:]),
-            TouchedSurface.of(rest, touched, radius=radius, shoulder=SHOULDER * radius),
+            TouchedSurface.of(rest, touched, radius=largest, shoulder=SHOULDER * radius),
             rest[nodes],
             own.reshape(-1, 3),
             matrices,
@@ -105,6 +112,12 @@ class Touches:
     def columns(self) -> np.ndarray:
         """For each solve (N,) the number of its column, whatever its further inputs are."""
         return columns_of(self.data.X[:, :3], self.surface, self.radius)
+
+
+def _radius_input(data: Dataset) -> int | None:
+    """Which input is the probe's radius, by what the provenance says of a family's."""
+    varied = [one["path"] for one in data.provenance["problem"].get("varied", ())]
+    return 3 + varied.index(RADIUS) if RADIUS in varied else None
 
 
 def _checked_probe(data: Dataset) -> Mapping[str, Any]:

@@ -6,7 +6,8 @@ With λ = ln U₀, F = −∂U/∂c and K = ∂F/∂c, exactly:
 
 An error of ℓ is a relative one of U; an error δ of ∇ℓ one of the force, U δ/‖F‖; one of ∇²ℓ one of the stiffness,
 U δ/‖K‖. These quotients are the rows' natural weights. Where ∂U/∂p is known of a further input p, ∂ℓ/∂p = ∂U/∂p / U
-counts by the relative energy error that it makes over half the input's range.
+counts by the relative energy error that it makes over half the input's range. Where p is the probe's radius, s grows
+with it: ∂ℓ/∂R = ∂U/∂R / U − λ'.
 
 What is left out together is a column of depths over one place: with a part of it in the fit, the rest would tell
 nothing of places that were not solved.
@@ -53,6 +54,8 @@ class EnergySamples:
     columns : (N,) int
         Number of the column that a solve belongs to: solves over one place with the same further inputs.
     inputs : n ranges
+    radius_input : int or None
+        Which of them is the probe's radius.
     """
 
     X: np.ndarray
@@ -64,6 +67,7 @@ class EnergySamples:
     bend: np.ndarray
     columns: np.ndarray
     inputs: tuple[Range, ...]
+    radius_input: int | None = None
 
     @classmethod
     def of(
@@ -76,8 +80,11 @@ class EnergySamples:
         surface: TouchedSurface,
         radius: float,
         inputs: tuple[Range, ...],
+        radius_input: int | None = None,
     ) -> EnergySamples:
         """From all solves; those without contact, whose energy is zero whatever is learnt, are left out.
+
+        `radius` is the probe's, m, or where it is an input, a usual one.
 
         Raises
         ------
@@ -90,7 +97,7 @@ class EnergySamples:
         K = np.full((N, 3, 3), np.nan) if stiffness is None else np.asarray(stiffness, float)
         K = numbers("Stiffnesses", K.reshape(N, -1), (N, 9), finite=False).reshape(N, 3, 3)
         distance, gradient, hessian = surface.at(np.ascontiguousarray(X[:, :3]))
-        s = radius - distance
+        s = (radius if radius_input is None else X[:, radius_input]) - distance
         touching = (s > 0) & (U > 0)
         if not touching.any():
             raise UsageError(
@@ -107,7 +114,7 @@ class EnergySamples:
             )
         K = (K + K.transpose(0, 2, 1)) / 2
         columns = columns_of(X, surface, radius)
-        return cls(X, U, F, K, s, -gradient, -hessian, columns, tuple(inputs)).take(touching)
+        return cls(X, U, F, K, s, -gradient, -hessian, columns, tuple(inputs), radius_input).take(touching)
 
     def __len__(self) -> int:
         return len(self.X)
@@ -134,6 +141,8 @@ class EnergySamples:
         bends -= first[:, None, None] * self.bend
         half, n = self.half, len(self.inputs)
         i, j = pairs(n)
+        if self.radius_input is not None:  # the sphere grows into the body
+            by_all[:, self.radius_input] -= first
         all_slopes, all_bends = by_all * half, np.zeros((len(self), n, n))
         all_slopes[:, :3], all_bends[:, :3, :3] = slopes * half[:3], bends * half[:3, None] * half[:3]
         return (np.log(self.energy) - value)[:, None], all_slopes[:, None], all_bends[:, None, i, j]

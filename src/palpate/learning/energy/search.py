@@ -18,7 +18,7 @@ from palpate.learning.filter.presets import default
 from palpate.learning.filter.state import initial
 from palpate.learning.filter.step import observe
 from palpate.learning.refinement.leave_one_out import left_out_rows
-from palpate.learning.refinement.projection import project, span_of_units
+from palpate.learning.refinement.projection import Fit, project, span_of_units
 from palpate.learning.refinement.refine import Refined, refine
 from palpate.learning.refinement.rows import Rows
 from palpate.learning.units.forms import form as form_of
@@ -26,7 +26,7 @@ from palpate.learning.units.regressors import Regressors
 from palpate.learning.units.symmetric import Images, SymmetricRegressors
 from palpate.network.radial import RadialFunction
 
-__all__ = ["EnergyTrial", "Problem", "Search"]
+__all__ = ["EnergyTrial", "LeftOut", "Problem", "Search"]
 
 _WIDTHS = (0.2, 1.0)  # of first units, in scaled inputs: from an edge's reach to the whole range
 _TOLERANCE = 1e-5
@@ -92,17 +92,19 @@ class Problem:
             tolerance=_TOLERANCE,
         )
 
-    def left_out(self, refined: Refined) -> float:
-        """Mean over solves of the error of all that is known of one, when it is left out; infinite beyond `room`."""
+    def fitted(self, refined: Refined) -> tuple[Rows, Fit]:
+        """The least-squares problem of a refinement's units, and its solution."""
         known: dict[str, Any] = dict(self.rows)
         rows = Rows.of(refined.regressors, self.X, known.pop("Y"), **known)
-        fit = project(rows, refined.theta, self.ridge * rows.total)
+        return rows, project(rows, refined.theta, self.ridge * rows.total)
+
+    def missed(self, refined: Refined) -> LeftOut:
+        """What a network misses of each solve that is left out; anything where its unknowns could fit all."""
+        rows, fit = self.fitted(refined)
         if refined.theta.size + len(fit.tau) >= len(rows.targets):
-            return float("inf")
+            return LeftOut(rows, fit, np.full(rows.targets.shape, np.inf))
         span = span_of_units(rows, refined.theta, fit) if len(refined.theta) else None
-        missed = left_out_rows(rows, fit, basis=span, most=_MOST)
-        squares = np.bincount(rows.samples, (missed**2).sum(axis=1))
-        return float(np.sqrt(squares / rows.scale**2) @ rows.scale**2 / rows.total)
+        return LeftOut(rows, fit, left_out_rows(rows, fit, basis=span, most=_MOST))
 
     def room(self, regressors: Regressors) -> int:
         """How many units so many solves can decide on: half as many unknowns as numbers known."""
@@ -114,9 +116,26 @@ class Problem:
         return int(sum(q) * len(self.X) / 2 / (1 + regressors.form.size))
 
 
+@dataclass(frozen=True, eq=False)
+class LeftOut:
+    """Errors (R, 1) of every weighted row when its solve is left out, with the fit that they are of."""
+
+    rows: Rows
+    fit: Fit
+    errors: np.ndarray
+
+    @property
+    def mean(self) -> float:
+        """Over solves, of the error of all that is known of one."""
+        if not np.isfinite(self.errors).all():
+            return float("inf")
+        squares = np.bincount(self.rows.samples, (self.errors**2).sum(axis=1))
+        return float(np.sqrt(squares / self.rows.scale**2) @ self.rows.scale**2 / self.rows.total)
+
+
 @dataclass(eq=False)
 class Search:
-    """A search that keeps what it tried, and stops when its time is over.
+    """A search that keeps what it tried (`found`, with errors), and stops when its time is over.
 
     Attributes
     ----------
@@ -132,6 +151,7 @@ class Search:
 
     def __post_init__(self) -> None:
         self.trials: list[EnergyTrial] = []
+        self.found: list[tuple[float, Refined]] = []
         self.best: Refined | None = None
         self.error = np.inf
         self._rng = np.random.default_rng(self.seed)
@@ -147,7 +167,8 @@ class Search:
         """A refinement from a start, recorded, and its error."""
         begun = time.monotonic()
         found = self.problem.refined(theta, regressors, iterations=iterations, seconds=max(self.left, 0.1))
-        error = self.problem.left_out(found)
+        error = self.problem.missed(found).mean
+        self.found.append((error, found))
         took = time.monotonic() - begun
         form, radial = regressors.form.name, regressors.radial
         self.trials.append(EnergyTrial(self.problem.law, form, radial, start, len(found.theta), error, took))
@@ -184,7 +205,7 @@ class Search:
 
     def grow(self, begin: Refined, units_max: int, target: float) -> None:
         """Sizes upwards from a network, each from the last one and more units, the filter's, and random ones."""
-        best, error, regressors = begin, self.problem.left_out(begin), begin.regressors
+        best, error, regressors = begin, self.problem.missed(begin).mean, begin.regressors
         most = min(units_max, self.problem.room(regressors))
         for h in _sizes(len(begin.theta), most):
             for start, theta in self._starts(best, regressors, h):

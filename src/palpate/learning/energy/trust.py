@@ -1,23 +1,20 @@
 """The posterior of the linear weights of ℓ, and the factor that makes it cover the errors of solves left out.
 
-Given the units, the weights have the covariance M = (ΦᵀΦ + λ)⁻¹ times a variance. Leaving a group i of solves
-out, such as a column of depths, its rows have the covariance H_ii (I − H_ii)⁻¹ (Cook & Weisberg 1982), and the
-force of each solve the relative error that its left-out residual has. The variance is chosen such that nine
+Given the units, the weights of a network have the covariance M = (ΦᵀΦ + λ)⁻¹ times a variance. A mean of networks has
+the shape of its best one's: they learnt from the same solves, and miss where there are none. Leaving a group i of
+solves out, such as a column of depths, its rows have the covariance H_ii (I − H_ii)⁻¹ (Cook & Weisberg 1982), and
+the force of each solve the relative error that its left-out residual has. The variance is chosen such that nine
 tenths of those errors are below 1.645 deviations.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from palpate.learning.energy.search import Problem
+from palpate.learning.energy.average import Average
 from palpate.learning.energy.written import Solves
-from palpate.learning.refinement.leave_one_out import left_out_rows
-from palpate.learning.refinement.projection import project, span_of_units
-from palpate.learning.refinement.refine import Refined
 from palpate.learning.refinement.rows import Rows
 
 __all__ = ["Trust", "trust_of"]
@@ -32,8 +29,8 @@ class Trust:
 
     Attributes
     ----------
-    root : (c, c)
-        Of the covariance of the coefficients, tail first; calibrated.
+    root : (c, z)
+        Of the covariance of the coefficients, tail first; calibrated. Zero for all units but the best network's.
     errors : (N,)
         Relative force error of each solve whose force is known, when it is left out.
     """
@@ -42,14 +39,10 @@ class Trust:
     errors: np.ndarray
 
 
-def trust_of(refined: Refined, problem: Problem, samples: Solves) -> Trust:
-    """From the solves that the network was refined on."""
-    known: dict[str, Any] = dict(problem.rows)
-    rows = Rows.of(refined.regressors, problem.X, known.pop("Y"), **known)
-    fit = project(rows, refined.theta, problem.ridge * rows.total)
-    span = span_of_units(rows, refined.theta, fit) if len(refined.theta) else None
-    missed = left_out_rows(rows, fit, basis=span, most=_MOST) @ rows.modes
-    Q = fit.Q
+def trust_of(found: Average, samples: Solves) -> Trust:
+    """From what a mean of networks misses of the solves that they were refined on."""
+    rows, fit = found.left_out.rows, found.left_out.fit
+    missed, Q = found.left_out.errors @ rows.modes, fit.Q
     to_force, at = _to_force(rows, samples), _slope_rows(rows)
     errors, sizes = np.empty(len(at)), np.empty(len(at))
     together = rows.groups[rows.samples]
@@ -65,7 +58,8 @@ def trust_of(refined: Refined, problem: Problem, samples: Solves) -> Trust:
                 sizes[k] = np.linalg.norm(to_force[k] @ spread[np.searchsorted(members, block)])
     ratio = float(np.quantile(errors / np.maximum(sizes, 1e-300), 0.9)) / _NINE_TENTHS
     triangle = np.linalg.cholesky(fit.inverse + 1e-14 * np.trace(fit.inverse) * np.eye(len(fit.tau)))
-    return Trust(ratio * triangle, errors)
+    others = np.zeros((len(found.coefficients) - len(triangle), triangle.shape[1]))
+    return Trust(ratio * np.vstack([triangle, others]), errors)
 
 
 def _slope_rows(rows: Rows) -> list[tuple[int, int]]:

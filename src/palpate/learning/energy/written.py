@@ -7,8 +7,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from palpate.learning.energy.average import Average
 from palpate.learning.freezing import training_record
-from palpate.learning.refinement.refine import Refined
 from palpate.learning.units.symmetric import Images, SymmetricRegressors
 from palpate.network import Network, Scaling, TrainedRegion
 from palpate.units import Quantity, Range, bounds
@@ -49,16 +49,16 @@ class Solves(Protocol):
 
 
 def written_out(
-    best: Refined, root: np.ndarray, samples: Solves, meta: dict[str, Any]
+    found: Average, root: np.ndarray, samples: Solves, meta: dict[str, Any]
 ) -> tuple[Network, np.ndarray]:
     """The network with every unit's images as units of their own, and the root of its weights' covariance."""
-    of, n = best.regressors, len(samples.inputs)
+    of, n = found.regressors, len(samples.inputs)
     if isinstance(of, SymmetricRegressors):
-        factors, shifts, coefficients = of.expanded(best.theta, best.coefficients)
-        root = of.expanded(best.theta, root)[2]
+        factors, shifts, coefficients = of.expanded(found.theta, found.coefficients)
+        root = of.expanded(found.theta, root)[2]
     else:
-        factors, shifts = of.form.factors(best.theta)
-        coefficients = best.coefficients
+        factors, shifts = of.form.factors(found.theta)
+        coefficients = found.coefficients
     low, high = bounds(samples.inputs)
     scaling = Scaling((low + high) / 2, (high - low) / 2, np.zeros(1), np.ones(1))
     network = Network(
@@ -82,7 +82,7 @@ def trained_region(samples: Solves, images: Images | None) -> TrainedRegion:
 
 
 def training_meta(
-    samples: Solves, images: Images | None, best: Refined, loo: float, errors: np.ndarray
+    samples: Solves, images: Images | None, found: Average, errors: np.ndarray
 ) -> dict[str, Any]:
     """What a surrogate's file tells of its training."""
     copies = 1 if images is None else len(images.turns)
@@ -90,8 +90,9 @@ def training_meta(
         **training_record(samples.X, samples.energy[:, None], samples.inputs),
         "solves": len(samples),
         "samples": copies * len(samples),
-        "form": best.regressors.form.name,
-        "radial": best.regressors.radial,
-        "loo": loo if math.isfinite(loo) else None,
+        "form": found.regressors.form.name,
+        "radial": found.regressors.radial,
+        "networks": found.networks,
+        "loo": found.error if math.isfinite(found.error) else None,
         "left_out": {"median": float(np.median(errors)), "p95": float(np.quantile(errors, 0.95))},
     }

@@ -67,6 +67,7 @@ class _Solves:
     radius: float
     points: np.ndarray
     mass: np.ndarray
+    radius_input: int | None = None
 
     @property
     def scaled(self) -> np.ndarray:
@@ -111,6 +112,7 @@ def learn_field(
     triangles: np.ndarray,
     surface: TouchedSurface,
     radius: float,
+    radius_input: int | None = None,
     name: str = "displacement",
     unit: str = "m",
     rest: np.ndarray | None = None,
@@ -140,7 +142,9 @@ def learn_field(
         Of the surface, in these nodes.
     surface : TouchedSurface
     radius : float
-        Of the probe, m.
+        Of the probe, m; where it is an input, a usual one, by which the travelling part is as wide.
+    radius_input : int, optional
+        The input, 3 or later, that is the probe's radius.
     name, unit : str
     rest : (nodes, components), optional
         The field without contact; zero by default. A largest stretch rests at one.
@@ -181,7 +185,9 @@ def learn_field(
             f"seconds={seconds}, modes_max={modes_max}, units_max={units_max}, radius={radius} allow no learning.",
             fix="Give positive numbers.",
         )
-    solves, rest = _checked(X, values, tuple(inputs), points, triangles, surface, radius, rest, mass, groups)
+    solves, rest = _checked(
+        X, values, tuple(inputs), points, triangles, surface, radius, radius_input, rest, mass, groups
+    )
     if tolerance is None:
         tolerance = _TOLERANCE * float(np.sqrt(((solves.values**2).sum(axis=2) @ solves.mass).mean()))
     length = radius / 10.0 if length is None else length
@@ -206,7 +212,8 @@ def learn_field(
         *(best.modes.modes, rest, solves.points, triangles, solves.mass),
         rise=best.rise,
         surface=surface,
-        radius=radius,
+        radius=radius if radius_input is None else math.nan,
+        radius_input=radius_input,
         dimple=best.dimple,
         meta=meta,
     )
@@ -221,6 +228,7 @@ def _checked(
     triangles: np.ndarray,
     surface: TouchedSurface,
     radius: float,
+    radius_input: int | None,
     rest: np.ndarray | None,
     mass: np.ndarray | None,
     groups: np.ndarray | None,
@@ -239,7 +247,7 @@ def _checked(
     rest = np.zeros(values.shape[1:]) if rest is None else np.asarray(rest, float).reshape(values.shape[1:])
     mass = lumped_mass(points, triangles) if mass is None else numbers("Masses", mass, (nodes,))
     groups = np.arange(N) if groups is None else np.asarray(groups)
-    depth = surface.depth(X[:, :3], radius)
+    depth = surface.depth(X[:, :3], radius if radius_input is None else X[:, radius_input])
     touching = depth > 0
     if not touching.any():
         raise UsageError(
@@ -248,7 +256,7 @@ def _checked(
             fix="Press deeper, or check the surface and the probe's radius.",
         )
     parts = (X[touching], (values - rest)[touching], depth[touching], groups[touching])
-    return _Solves(*parts, inputs, surface, radius, points, mass / mass.sum()), rest
+    return _Solves(*parts, inputs, surface, radius, points, mass / mass.sum(), radius_input), rest
 
 
 def _parted(

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
+
+import numpy as np
 
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_positive
@@ -12,6 +15,7 @@ from palpate.physics.geometry.block import name_sides, name_upright_faces
 from palpate.physics.geometry.checks import require_name, require_size
 from palpate.physics.geometry.groups import UPRIGHT
 from palpate.physics.geometry.isometries import Isometry, box_isometries
+from palpate.physics.geometry.refinement import FineMesh
 from palpate.physics.geometry.shape import Solid
 from palpate.physics.words import millimetres
 
@@ -37,6 +41,9 @@ class LayeredBlock(Solid):
     element : float, optional
         Largest element size in m, by default a third of the least extent. In a thin layer elements have at most
         3 times its thickness.
+    meshed : tuple of float, optional
+        Thickness in m for which the mesh is made, of each layer; its nodes are then moved to where the layers are. So
+        blocks of other thicknesses have the same elements. Their heights must add up to the same.
 
     Raises
     ------
@@ -47,10 +54,13 @@ class LayeredBlock(Solid):
     extent: tuple[float, float] = (0.10, 0.10)
     layers: tuple[tuple[str, float], ...] = (("skin", 0.003), ("fat", 0.012), ("muscle", 0.035))
     element: float | None = None
+    meshed: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "extent", _pair(self.extent))
         object.__setattr__(self, "layers", _layers(self.layers))
+        if self.meshed is not None:
+            object.__setattr__(self, "meshed", _as_thick(self.meshed, self.layers))
         require_size("The layered block", max(self.size))
         self._check_element()
 
@@ -67,8 +77,7 @@ class LayeredBlock(Solid):
     @property
     def levels(self) -> tuple[float, ...]:
         """Heights z in m of the faces between the layers, from the top to 0."""
-        thickness = [t for _, t in self.layers]
-        return tuple(sum(thickness[i:]) for i in range(len(thickness) + 1))
+        return _levels([t for _, t in self.layers])
 
     @property
     def size(self) -> tuple[float, float, float]:
@@ -83,6 +92,57 @@ class LayeredBlock(Solid):
     def __str__(self) -> str:
         layers = ", ".join(f"{name} {millimetres(thickness)}" for name, thickness in self.layers)
         return f"layered block {millimetres(*self.size)} ({layers})"
+
+    def thick(self, layer: str, thickness: float) -> LayeredBlock:
+        """The block with one layer of this thickness in m, the same height and the same elements, moved.
+
+        What the layer takes, the deepest one gives; of the deepest one, the layer above it.
+
+        Raises
+        ------
+        UsageError
+            If there is no such layer or no other, or nothing would be left of the one that gives.
+        """
+        names = [name for name, _ in self.layers]
+        if layer not in names or len(names) < 2:
+            raise UsageError(
+                f"{layer!r} is no layer whose thickness can change.",
+                why=f"The layers are {', '.join(names)}; what one takes, another gives.",
+                fix="Name one of two or more layers.",
+            )
+        own, giving = names.index(layer), -2 if layer == names[-1] else len(names) - 1
+        old = [t for _, t in self.layers]
+        new = old.copy()
+        new[own] = float(thickness)
+        new[giving] = old[giving] + old[own] - new[own]
+        if not (new[own] > 0 and new[giving] > 0):
+            raise UsageError(
+                f"The layer {layer!r} can't be {millimetres(thickness)} thick.",
+                why=f"It and {names[giving]!r} together are {millimetres(old[own] + old[giving])}.",
+                fix="Give a thickness between these ends.",
+            )
+        return replace(
+            self,
+            layers=tuple(zip(names, new, strict=True)),
+            meshed=tuple(old) if self.meshed is None else self.meshed,
+        )
+
+    def describe(self) -> dict[str, Any]:
+        """Everything that decides the mesh, as plain data for a JSON file."""
+        told = super().describe()
+        return told if self.meshed is not None else {k: v for k, v in told.items() if k != "meshed"}
+
+    def generate(self, refinements: tuple[FineMesh, ...]) -> Any:
+        """A new `netgen.meshing.Mesh` in m, whose names of surfaces and regions are set."""
+        if self.meshed is None:
+            return super().generate(refinements)
+        names = [name for name, _ in self.layers]
+        drawn = replace(self, layers=tuple(zip(names, self.meshed, strict=True)), meshed=None)
+        mesh = drawn.generate(refinements)
+        was, now = drawn.levels[::-1], self.levels[::-1]
+        for point in mesh.Points():
+            point[2] = float(np.interp(point[2], was, now))
+        return mesh
 
     def solid(self) -> Any:
         """The layers, glued; their faces named."""
@@ -101,6 +161,23 @@ class LayeredBlock(Solid):
             if face.name == "side":
                 face.name = "between layers"
         return block
+
+
+def _levels(thickness: Sequence[float]) -> tuple[float, ...]:
+    return tuple(sum(thickness[i:]) for i in range(len(thickness) + 1))
+
+
+def _as_thick(value: Any, layers: tuple[tuple[str, float], ...]) -> tuple[float, ...]:
+    """Thickness of each layer as it is meshed, of the same sum."""
+    meshed: tuple[float, ...] = tuple(float(t) for t in value)
+    height = sum(t for _, t in layers)
+    if len(meshed) != len(layers) or min(meshed) <= 0 or abs(sum(meshed) - height) > 1e-9 * height:
+        raise UsageError(
+            f"A mesh for layers of {meshed} m does not fit layers of {tuple(t for _, t in layers)} m.",
+            why="Both need as many layers, all of some thickness, that are equally high together.",
+            fix="Leave `meshed` out, or use `LayeredBlock.thick`.",
+        )
+    return meshed
 
 
 def _pair(value: Any) -> tuple[float, float]:

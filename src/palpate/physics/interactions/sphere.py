@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -140,6 +140,17 @@ class SphereProbe:
         centres = np.asarray(points, dtype=float)
         feet, distance = columns.footprints_of(self._patch(geometry), centres)
         return columns.group(centres, feet, distance, self.radius)
+
+    def sized(self, geometry: Geometry, radius: float) -> SphereProbe:
+        """A probe of another radius in m that visits the same footprints to the same depths."""
+        low, high = self._footprint(self._patch(geometry))
+        return replace(self, radius=radius, over=(tuple(low.tolist()), tuple(high.tolist())))
+
+    def moved(self, geometry: Geometry, centres: np.ndarray, radius: float) -> np.ndarray:
+        """Positions (N, 3) in m of a probe of another radius that lies over the same places as deep."""
+        patch = self._patch(geometry)
+        normals = np.array([patch.nearest(centre)[1] for centre in centres])
+        return np.asarray(centres + (radius - self.radius) * normals)
 
     def attach(self, field: Field) -> Attached:
         """Its contact energy on an opened body."""

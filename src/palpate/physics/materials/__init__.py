@@ -6,6 +6,7 @@
     moduli         isotropic moduli from one another, checks on constants
     linear, st_venant, neo_hooke, mooney_rivlin, ogden, yeoh, fibres    elastic laws, one a file
     isochoric      what the laws of constant volume share
+    pre_stretched  a law in tension before anything touches it
     user           one's own law, from one function
     viscous, prony, dashpots, scaled    Prony viscoelasticity over an elastic law
     plastic, hardening, metals          J2 plasticity, how a metal hardens, metals by name
@@ -27,6 +28,7 @@ from palpate.physics.materials.mooney_rivlin import MooneyRivlin
 from palpate.physics.materials.neo_hooke import NeoHookean
 from palpate.physics.materials.ogden import Ogden
 from palpate.physics.materials.plastic import Plastic
+from palpate.physics.materials.pre_stretched import PreStretched
 from palpate.physics.materials.prony import PronySeries
 from palpate.physics.materials.st_venant import StVenantKirchhoff
 from palpate.physics.materials.stability import ModeStability, Stability
@@ -47,6 +49,7 @@ __all__ = [
     "NeoHookean",
     "Ogden",
     "Plastic",
+    "PreStretched",
     "PronySeries",
     "StVenantKirchhoff",
     "Stability",

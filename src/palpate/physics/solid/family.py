@@ -1,8 +1,8 @@
-"""Bodies that differ in their materials, as one problem: positions and properties are its inputs.
+"""Bodies that differ in a few numbers, as one problem: positions and these numbers are its inputs.
 
 The body's energy U(c, p) at the equilibrium has the slope ∂U/∂p that its energy has at the same displacement: what the
 equilibrium adds is of second order (envelope theorem). So each solve also tells how its energy changes with every
-property, for two evaluations of an integral.
+number of a material, for two evaluations of an integral. All members have the same elements: layers move their nodes.
 """
 
 from __future__ import annotations
@@ -16,10 +16,12 @@ import numpy as np
 
 from palpate.dataset import Field, solid_fields
 from palpate.errors import UsageError
+from palpate.physics.geometry.refinement import FineMesh
 from palpate.physics.interactions.interaction import Interaction
+from palpate.physics.interactions.sphere import SphereProbe
 from palpate.physics.solid.density import material_energies
 from palpate.physics.solid.system import System
-from palpate.physics.solid.varied import Varied, with_values
+from palpate.physics.solid.varied import RADIUS, Varied, with_values
 from palpate.units import Range
 
 if TYPE_CHECKING:
@@ -36,13 +38,14 @@ STEP = 1e-4  # of a property, in the central difference of the energy: most laws
 
 @dataclass(frozen=True)
 class BodyFamily:
-    """A body some of whose properties are inputs.
+    """A body some of whose numbers are inputs.
 
     Attributes
     ----------
     body : Body
         What all members have in common; its own values of what varies do not matter.
     varied : tuple of Varied
+        Numbers of materials, thicknesses of layers, the probe's radius.
 
     Raises
     ------
@@ -91,10 +94,10 @@ class BodyFamily:
 
 @dataclass(frozen=True)
 class FamilyProblem:
-    """A family under interactions: inputs are theirs, n of them, and then the k properties.
+    """A family under interactions: inputs are theirs, n of them, and then the k numbers that vary.
 
-    The response to a property is −∂U/∂p as well. Of the stiffness only what belongs to the interactions is known; the
-    rest is NaN.
+    The response to a number of a material is −∂U/∂p as well; that to a thickness or a radius is NaN, which says that it
+    is not known. Of the stiffness only what belongs to the interactions is.
 
     Attributes
     ----------
@@ -105,10 +108,50 @@ class FamilyProblem:
     base: SolidProblem
     varied: tuple[Varied, ...]
 
+    def __post_init__(self) -> None:
+        if self._radius is None:
+            return
+        probe = self._probe
+        ends = (self.varied[self._radius].low, self.varied[self._radius].high)
+        sized = [probe.sized(self.base.body.geometry, radius) for radius in ends]
+        wanted = [replace(self.base, interactions=(one,)).refinements for one in sized]
+        object.__setattr__(self, "base", replace(self.base, fine=_both(*wanted)))
+
+    @property
+    def _radius(self) -> int | None:
+        """Which of what varies is the probe's radius."""
+        paths = [one.path for one in self.varied]
+        return paths.index(RADIUS) if RADIUS in paths else None
+
+    @property
+    def _probe(self) -> SphereProbe:
+        """The only interaction, whose radius varies."""
+        acting = self.base.interactions
+        if len(acting) == 1 and isinstance(acting[0], SphereProbe):
+            return acting[0]
+        raise UsageError(
+            "There is no one probe whose radius could vary.",
+            why=f"What acts is {', '.join(map(str, acting))}.",
+            fix="Press the family with one SphereProbe.",
+        )
+
     @cached_property
     def ranges(self) -> tuple[Range, ...]:
         """Name, range and unit of each input."""
-        return (*self.base.ranges, *(one.range for one in self.varied))
+        return (*self._places, *(one.range for one in self.varied))
+
+    @property
+    def _places(self) -> tuple[Range, ...]:
+        """Ranges of the interactions' inputs, for all radii of a probe."""
+        if self._radius is None:
+            return self.base.ranges
+        one, body = self.varied[self._radius], self.base.body
+        ends = [
+            self._probe.sized(body.geometry, radius).ranges(body.geometry) for radius in (one.low, one.high)
+        ]
+        return tuple(
+            replace(a, low=min(a.low, b.low), high=max(a.high, b.high)) for a, b in zip(*ends, strict=True)
+        )
 
     @property
     def layout(self) -> Layout:
@@ -142,9 +185,12 @@ class FamilyProblem:
 
     def member(self, values: Sequence[float]) -> SolidProblem:
         """The problem of the body with these values."""
-        return replace(
-            self.base, body=with_values(self.base.body, self.varied, tuple(float(v) for v in values))
-        )
+        values = tuple(float(v) for v in values)
+        body = with_values(self.base.body, self.varied, values)
+        if self._radius is None:
+            return replace(self.base, body=body)
+        probe = self._probe.sized(self.base.body.geometry, values[self._radius])
+        return replace(self.base, body=body, interactions=(probe,))
 
     def describe(self) -> dict[str, Any]:
         """Everything that decides the answers, as plain data for a JSON file."""
@@ -177,6 +223,9 @@ class FamilyProblem:
         values = np.empty((len(points), k))
         for rows, u in zip(chains, unit, strict=False):
             values[rows] = low + u * (high - low)
+            if self._radius is not None:
+                radius, geometry = values[rows[0], self._radius], self.base.body.geometry
+                points[rows] = self._probe.moved(geometry, points[rows], radius)
         return np.hstack([points, values])
 
     def chains(self, points: Any) -> list[np.ndarray]:
@@ -213,7 +262,7 @@ class FamilySolver:
         self._problem = problem
         self._values: tuple[float, ...] | None = None
         self._solver: SolidSolver | None = None
-        self._slopes: list[_EnergySlope] = []
+        self._slopes: list[_EnergySlope | None] = []
 
     def reset(self) -> None:
         """Forget all earlier solves."""
@@ -240,7 +289,7 @@ class FamilySolver:
         found = solver.solve(x[:n])
         gradient = np.full((n + k, n + k), np.nan)
         gradient[:n, :n] = found.response_gradient
-        slopes = [s.at(found.state) if found.converged else np.nan for s in self._slopes]
+        slopes = [s.at(found.state) if s is not None and found.converged else np.nan for s in self._slopes]
         return replace(
             found,
             ranges=self._problem.ranges,
@@ -256,11 +305,26 @@ class FamilySolver:
             member = self._problem.member(values)
             solver = member.open()
             self._slopes = [
-                _EnergySlope(solver, member.body, one, value)
+                _EnergySlope(solver, member.body, one, value) if one.is_material else None
                 for one, value in zip(self._problem.varied, values, strict=True)
             ]
             self._solver, self._values = solver, values
         return self._solver
+
+
+def _both(one: tuple[FineMesh, ...], other: tuple[FineMesh, ...]) -> tuple[FineMesh, ...]:
+    """What satisfies two wishes for a fine mesh of the same surfaces: the smaller elements, in both boxes."""
+    return tuple(
+        a
+        if a.lower is None or a.upper is None or b.lower is None or b.upper is None
+        else FineMesh(
+            a.surface,
+            min(a.element, b.element),
+            tuple(np.minimum(a.lower, b.lower).tolist()),
+            tuple(np.maximum(a.upper, b.upper).tolist()),
+        )
+        for a, b in zip(one, other, strict=True)
+    )
 
 
 class _EnergySlope:

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from palpate.errors import UsageError
 from palpate.physics.equilibrium.stop import Stop
 from palpate.physics.interactions.interaction import Attached
 from palpate.physics.interactions.rigid import require_held
+from palpate.physics.materials.pre_stretched import PreStretched
 from palpate.physics.solid.density import material_energies
 from palpate.physics.solid.field import SolidField
 from palpate.physics.solid.history import History
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Opened", "open_problem"]
 
+BALANCED = 1e-6  # of all forces on nodes: rounding
 SETTLED = 1e9  # s that constant loads have acted before an interaction comes: all relaxation is over
 
 
@@ -91,8 +94,23 @@ def open_problem(problem: SolidProblem, solver: str, tolerance: float) -> Opened
     if not constants:
         require_held(field, varied)
     opened = model(constants, varied, base)
+    if any(isinstance(material, PreStretched) for material in body.materials.values()):
+        _require_balance(opened, base)
     opened.spans = np.array([r.high - r.low for r in problem.ranges])
     return Opened(opened, settled)
+
+
+def _require_balance(model: SolidModel, base: np.ndarray) -> None:
+    """Refuse a tense body that would move before anything touches it: depths are measured to it as it is drawn."""
+    forces = model.system.gradient(base)
+    least = BALANCED * model.measures.shear_modulus * model.measures.volume ** (2 / 3)
+    left = np.linalg.norm(forces * model.system.free) / max(np.linalg.norm(forces), least)
+    if left > BALANCED:
+        raise UsageError(
+            f"The pre-stretched body is not in balance: {left:.2g} of its forces at rest are held by nothing.",
+            why="A stretched part pulls at its sides; one that is free would shrink before it is touched.",
+            fix='Fix its sides too, for example fixed=("bottom", "side").',
+        )
 
 
 def _settle(model: SolidModel, constants: list[Constant]) -> Followed:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -52,12 +52,15 @@ class SolidProblem:
         Element size in m where the interactions need a fine mesh, in place of their own.
     stress : bool
         Whether every answer, and so every row of a sweep, has von Mises stress at the nodes.
+    fine : tuple of FineMesh, optional
+        Where the mesh is fine, in place of what the interactions want: so that several problems share one.
     """
 
     body: Body
     interactions: tuple[Interaction, ...]
     element: float | None = None
     stress: bool = False
+    fine: tuple[FineMesh, ...] | None = None
 
     def __post_init__(self) -> None:
         if not self.interactions:
@@ -106,6 +109,8 @@ class SolidProblem:
     @cached_property
     def refinements(self) -> tuple[FineMesh, ...]:
         """Where the mesh is fine."""
+        if self.fine is not None:
+            return self.fine
         parts = (*self.interactions, *(held.interaction for held in self.body.held))
         wanted = [r for part in parts for r in part.refinements(self.body.geometry)]
         if self.element is not None:
@@ -143,6 +148,7 @@ class SolidProblem:
             "interactions": [interaction.describe() for interaction in self.interactions],
             "element": self.element,
             **({"stress": True} if self.stress else {}),
+            **({} if self.fine is None else {"fine": [asdict(one) for one in self.fine]}),
         }
 
     @property

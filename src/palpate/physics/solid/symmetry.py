@@ -15,6 +15,7 @@ from palpate.physics.geometry.groups import members
 from palpate.physics.geometry.isometries import NO_ISOMETRIES, Isometry
 from palpate.physics.interactions.sphere import SphereProbe
 from palpate.physics.materials.fibres import FibreReinforced
+from palpate.physics.materials.pre_stretched import PreStretched
 from palpate.physics.materials.user import UserMaterial
 
 if TYPE_CHECKING:
@@ -57,7 +58,8 @@ def symmetry_of(body: Body, touches: str) -> Symmetry:
     """The isometries of a body that is touched on a surface; the identity alone where there is no symmetry.
 
     Fixed surfaces and the touched one must stay where they are as a whole, gravity must keep its direction, and no
-    material may have directions. Bodies that are held by interactions are not looked into.
+    material may have directions; of one that is stretched beforehand the stretches must stay. Bodies that are held by
+    interactions are not looked into.
     """
     shape = body.geometry
     whole: tuple[Isometry, ...] = getattr(shape, "isometries", NO_ISOMETRIES)
@@ -66,12 +68,14 @@ def symmetry_of(body: Body, touches: str) -> Symmetry:
     fixed = {name for one in body.fixed for name in members(one, shape.surfaces)}
     touched = set(members(touches, shape.surfaces))
     gravity = np.array(body.gravity)
+    stretches = [np.diag(m.stretches) for m in body.materials.values() if isinstance(m, PreStretched)]
     kept = [
         one
         for one in whole
         if {one.surface(name) for name in fixed} == fixed
         and {one.surface(name) for name in touched} == touched
         and np.allclose(one.matrix @ gravity, gravity)
+        and all(np.allclose(one.matrix @ S @ one.matrix.T, S) for S in stretches)
     ]
     return Symmetry(np.array([one.matrix for one in kept]), np.array(kept[0].about))
 

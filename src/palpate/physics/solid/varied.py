@@ -1,4 +1,4 @@
-"""Properties of a body's materials that are inputs, so that one sweep serves a family of bodies."""
+"""Numbers of a body, and of the probe that presses it, that are inputs: one sweep serves a family of them."""
 
 from __future__ import annotations
 
@@ -7,26 +7,35 @@ from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from palpate.errors import UsageError
+from palpate.physics.geometry.layers import LayeredBlock
 from palpate.units import Range
 
 if TYPE_CHECKING:
     from palpate.physics.solid.body import Body
 
-__all__ = ["Varied", "with_values"]
+__all__ = ["RADIUS", "Varied", "with_values"]
 
-UNITS = {"young": "Pa", "bulk": "Pa", "mu": "Pa", "c10": "Pa", "c01": "Pa", "poisson": "", "alpha": ""}
+RADIUS = "probe.radius"
+THICKNESS = "thickness"
+UNITS = {
+    **dict.fromkeys(("young", "bulk", "mu", "c10", "c01"), "Pa"),
+    **dict.fromkeys(("poisson", "alpha"), ""),
+    **dict.fromkeys(("radius", THICKNESS), "m"),
+}
 BESIDE = frozenset({"density"})  # acts through gravity, not through the energy
 
 
 @dataclass(frozen=True)
 class Varied:
-    """A number of a material that is an input.
+    """A number of a material, the thickness of a layer or the radius of the probe, which is an input.
 
     Attributes
     ----------
     path : str
         ``"REGION.PROPERTY"``, for example ``"fat.young"``; of a body of one region the property alone will do.
-        A material inside another is one more step: ``"fat.base.young"``.
+        A material inside another is one more step: ``"fat.base.young"``. ``"LAYER.thickness"`` of a `LayeredBlock`:
+        what a layer takes, the deepest one gives, so the touched surface stays. ``"probe.radius"``: footprints and
+        depths stay.
     low, high : float
         Ends of its range, in SI units.
     name : str
@@ -53,14 +62,23 @@ class Varied:
         unit = self.unit or UNITS.get(self.path.rpartition(".")[2], "")
         return Range(self.name or self.path, self.low, self.high, unit)
 
+    @property
+    def is_material(self) -> bool:
+        """Whether it is a number of a material, whose slope of the energy is one of an integral."""
+        return self.path != RADIUS and not self.path.endswith(f".{THICKNESS}")
+
     def of(self, body: Body, value: float) -> Body:
-        """The body with this property at a value.
+        """The body with this property at a value; as it is for the probe's radius.
 
         Raises
         ------
         UsageError
             If the body has no such number, or its material does not allow the value.
         """
+        if self.path == RADIUS:
+            return body
+        if not self.is_material:
+            return replace(body, geometry=_layered(body, self.path).thick(self.path.partition(".")[0], value))
         materials = body.materials
         region, _, rest = self.path.partition(".")
         if region not in materials and len(materials) == 1:
@@ -80,6 +98,16 @@ def with_values(body: Body, varied: tuple[Varied, ...], values: tuple[float, ...
     for one, value in zip(varied, values, strict=True):
         body = one.of(body, value)
     return body
+
+
+def _layered(body: Body, path: str) -> LayeredBlock:
+    if isinstance(body.geometry, LayeredBlock):
+        return body.geometry
+    raise UsageError(
+        f"{path!r} can't vary: {body.geometry} has no layers.",
+        why="The mesh of a layered block is moved with its layers; other shapes would need one for each value.",
+        fix="Use a LayeredBlock, or make one sweep for each value.",
+    )
 
 
 def _replaced(material: Any, path: list[str], value: float, whole: str) -> Any:

@@ -11,12 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.learning.energy.search import LeftOut, Search
+from palpate.learning.energy.search import LeftOut, Problem, Search
 from palpate.learning.refinement.refine import Refined
 from palpate.learning.units.regressors import Regressors
 
 __all__ = ["Average", "average"]
 
+_AS_GOOD = 1.1  # the error of solves left out flatters the one network that it has chosen
 _UNITS = 320  # of a mean, images counted: a query costs about 25 ns for each
 
 
@@ -49,29 +50,38 @@ class Average:
 
 
 def average(search: Search, most: int, units: int = _UNITS) -> Average:
-    """The mean that misses least of what is left out, of the best 1, 2, … `most` networks of each kind.
+    """The mean of networks of that kind of which the best 1, 2, … or `most` miss least of what is left out.
 
-    Further ones are added while all their units, images counted, are no more than `units`.
+    It is of as many as miss no more than a tenth more than these, and have no more than `units`, images counted.
     """
     kinds: dict[tuple[str, str], list[tuple[float, Refined]]] = defaultdict(list)
     for error, found in search.found:
         kinds[found.regressors.form.name, found.regressors.radial].append((error, found))
     images = search.problem.images
     copies = 1 if images is None else len(images.turns)
-    means: list[tuple[LeftOut, list[Refined]]] = []
-    for same in kinds.values():
-        members: list[Refined] = []
-        for _, found in sorted(same, key=lambda one: one[0])[:most]:
-            if members and copies * sum(len(one.theta) for one in (*members, found)) > units:
-                break
-            one = search.problem.missed(found)
-            if members:
-                best, k = means[-1][0], len(members)
-                one = replace(best, errors=(k * best.errors + one.errors) / (k + 1))
-            members = [*members, found]
-            means.append((one, members))
-    left_out, chosen = min(means, key=lambda one: one[0].mean)
-    return _together(left_out, chosen)
+    means = [
+        _means(search.problem, sorted(same, key=lambda one: one[0])[:most], units // copies)
+        for same in kinds.values()
+    ]
+    least, kind = min((min(one.mean for one in kind), i) for i, kind in enumerate(means))
+    count = max(k for k, one in enumerate(means[kind], 1) if one.mean <= _AS_GOOD * least)
+    ordered = sorted(list(kinds.values())[kind], key=lambda one: one[0])
+    return _together(means[kind][count - 1], [found for _, found in ordered[:count]])
+
+
+def _means(problem: Problem, best: list[tuple[float, Refined]], units: int) -> list[LeftOut]:
+    """What the means of the best 1, 2, … networks miss, while they have no more than so many units."""
+    means: list[LeftOut] = []
+    size = 0
+    for _, found in best:
+        size += len(found.theta)
+        if means and size > units:
+            break
+        one, k = problem.missed(found), len(means)
+        means.append(
+            one if not k else replace(means[-1], errors=(k * means[-1].errors + one.errors) / (k + 1))
+        )
+    return means
 
 
 def _together(left_out: LeftOut, networks: list[Refined]) -> Average:

@@ -17,6 +17,9 @@ _FORM_SHARE = 0.35  # of the time
 _FORMS = ("rotated", "axis-aligned", "rank-2")  # the last for more inputs than the position
 _RADIALS: tuple[RadialFunction, ...] = ("inverse-multiquadric", "matern-5/2", "gaussian")
 _FIRST = 6  # units by which forms are compared
+_SAME_KIND = (
+    0.5  # share of further networks that are of the best one's kind, so that a mean has some to choose from
+)
 _SPREAD = (0.6, 1.4)  # sizes of further networks over that of the best
 
 
@@ -48,7 +51,8 @@ def searched(
         search.deadline = rest
     rng = np.random.default_rng([seed, len(found)])
     while search.left > 0 and search.error > target and search.best is not None and len(search.best.theta):
-        of = found[int(rng.integers(min(3, len(found))))][0].regressors
+        another = found[int(rng.integers(min(3, len(found))))][0]
+        of = (search.best if rng.random() < _SAME_KIND else another).regressors
         h = round(len(search.best.theta) * rng.uniform(*_SPREAD))
         search.tried(search.random(of, min(max(h, 1), most, problem.room(of))), of, "random")
     return search

@@ -183,7 +183,7 @@ def tissue(text: str, folder: Path) -> None:
     assert float(re.search(r"differences of the energy: ([\d.]+) N", text)[1]) == pytest.approx(
         force[-1], abs=2e-4
     )
-    assert "Dataset of 4 solves of layered block 80 × 80 × 32 mm" in text
+    assert "Dataset of 4 solves of layered block 60 × 60 × 33 mm" in text
     assert (folder / "tissue.png").read_bytes().startswith(b"\x89PNG")
     assert (folder / "tissue.vtu").stat().st_size > 10000
     assert (folder / "tissue.zarr" / "zarr.json").is_file()

@@ -13,7 +13,7 @@ from palpate.physics.solid import Body
 
 SIZE, RADIUS = (0.10, 0.10, 0.05), 0.010
 GEL = NeoHookean(9e3, 0.45)
-PLACES = np.linspace(0.045, 0.055, 7)  # m along x: more than an element under the probe
+PLACES = np.linspace(0.046, 0.054, 6)  # m along x: more than an element under the probe
 ASIDE = 0.053  # m, off the plane of symmetry
 
 
@@ -23,7 +23,7 @@ def centre(x, y, depth):
 
 def slid(places, element=None):
     """Forces (place, 3) in N at a depth of 2 mm, on the mesh that the probe asks for or on a given one."""
-    probe = SphereProbe(RADIUS, over=((0.045, ASIDE), (0.055, ASIDE + 1e-4)), depth=(0.0, 0.005))
+    probe = SphereProbe(RADIUS, over=((0.046, ASIDE), (0.054, ASIDE + 1e-4)), depth=(0.0, 0.005))
     solver = Body(Block(SIZE), GEL).problem(probe, element=element).open()
     found = [solver.solve(centre(x, ASIDE, 0.002)) for x in places]
     assert all(one.converged for one in found)

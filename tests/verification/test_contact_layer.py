@@ -19,7 +19,7 @@ YOUNG = 9e3
 RADIUS = 0.5  # m, a hundred times the contact's: what theory leaves out is of the order of their ratio
 CONTACT = 0.005  # m, √(Rδ)
 DEPTH = CONTACT**2 / RADIUS
-ACROSS = 6  # elements across the contact's radius
+ACROSS = 5  # elements across the contact's radius
 STIFF = 300.0  # the pad's k over E/((1 - ν²) √(Rδ))
 FAR = 10.0
 

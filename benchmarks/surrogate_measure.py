@@ -11,7 +11,7 @@ import numpy as np
 
 from benchmarks.surrogate_cases import Case
 from benchmarks.surrogate_rivals import RIVALS
-from benchmarks.surrogate_springs import identified, some
+from benchmarks.surrogate_springs import counts, identified, some
 from palpate.learning.energy import learn_surrogate
 from palpate.surrogates import TouchSurrogate
 from palpate.validation import TouchFunction, TouchSolves
@@ -24,7 +24,6 @@ OURS, SPRINGS = "palpate", "mass–spring body"
 SIZES = (6, 10, 20, 40, 80, 150, 300)
 SEED = 0
 QUERIES = 200
-SPRUNG = 40  # test solves that springs are asked for: each query is an equilibrium
 Row = dict[str, Any]
 
 
@@ -143,8 +142,9 @@ def sprung(case: Case, size: int, report: Callable[[str], None]) -> Row:
     """The same of springs, on some of the test: each query is an equilibrium."""
     found = case.solves("test")
     assert found is not None
-    test, begun = some(found, SPRUNG), time.process_time()
-    springs = identified(case, case.training(size))
+    solves, asked = counts(case)
+    test, begun = some(found, asked), time.process_time()
+    springs = identified(case, case.training(size), solves)
     spent, begun = time.process_time() - begun, time.process_time()
     F, K = springs.answers(test.X, stiffness=True)
     query = 1e6 * (time.process_time() - begun) / len(test)
@@ -154,6 +154,8 @@ def sprung(case: Case, size: int, report: Callable[[str], None]) -> Row:
     return {
         "method": SPRINGS,
         "solves": size,
+        "identified_on": solves,
+        "asked": asked,
         "learning": spent,
         "query": query,
         "factors": springs.factors,

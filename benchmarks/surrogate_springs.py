@@ -13,9 +13,11 @@ from palpate.physics.massspring import MassSpringBody
 from palpate.physics.solid import FamilyProblem
 from palpate.validation import TouchSolves
 
-__all__ = ["Springs", "identified"]
+__all__ = ["Springs", "counts", "identified", "some"]
 
-SOLVES = 10  # that the moduli are identified on: there are one to three of them
+SOLVES, ASKED = 10, 40  # that the moduli are identified on, there are one to three of them; test solves they are asked
+LARGE = 2000  # nodes from which an equilibrium of springs takes tens of seconds
+SOLVES_OF_LARGE, ASKED_OF_LARGE = 3, 10
 ITERATIONS = 3  # of Gauss–Newton
 MOVE = 0.05  # of ln E: difference for its derivative
 LIGHT = 0.05  # of the largest force: smaller ones weigh no more than that
@@ -79,9 +81,15 @@ class Springs:
         return MassSpringBody(problem.mesh, material, fixed=body.fixed).open(self.case.study.probe)
 
 
-def identified(case: Case, training: Training) -> Springs:
+def counts(case: Case) -> tuple[int, int]:
+    """Solves that moduli are identified on, and test solves that springs are asked for: each is an equilibrium."""
+    large = len(case.study.problem().mesh.points) > LARGE
+    return (SOLVES_OF_LARGE, ASKED_OF_LARGE) if large else (SOLVES, ASKED)
+
+
+def identified(case: Case, training: Training, solves: int) -> Springs:
     """Springs whose moduli fit some of the training's forces best, by Gauss–Newton's method on ln E."""
-    rows = np.unique(np.linspace(0, len(training) - 1, SOLVES).astype(int))
+    rows = np.unique(np.linspace(0, len(training) - 1, solves).astype(int))
     X, F = training.X[rows], training.force[rows]
     size = np.linalg.norm(F, axis=1)
     weight = 1 / np.maximum(size, LIGHT * size.max())

@@ -127,7 +127,11 @@ def _rival_table(result: Measured, beside: list[dict[str, Any]], size: int, mark
             "ours learns from energies, their slopes and stiffnesses, the others from forces, which is all they take",
             "closed-loop work: |∮F·dx| over ½∮|F·dx| of random triangles to pentagons, by one quadrature that goes on "
             "until it has converged; –: a query of springs is an equilibrium, too slow for it",
-            "springs: Young's modulus of each region identified on up to 10 of the solves, errors on 40 of the test; "
+            *(
+                f"springs: Young's modulus of each region identified on {row['identified_on']} of the solves, errors on "
+                f"{row['asked']} of the test"
+                for row in beside
+            ),
             "force linear in depth: per footprint from the shallowest third of the depths",
             "no row for POD + RBF: of the force it is the RBF, and the file holds no displacement fields"
             if "displacement_mm" not in result.case.arrays

@@ -197,7 +197,7 @@ def test_springs_find_the_modulus_that_made_their_data():
     train = true.case.training(6)
     F, _ = true.answers(train.X)
     assert np.isfinite(F).all()
-    found = identified(true.case, replace(train, force=F))
+    found = identified(true.case, replace(train, force=F), 10)
     assert found.factors[0] == pytest.approx(1.3, rel=1e-3)
 
 

@@ -175,7 +175,7 @@ def test_a_surrogate_alone_is_drawn_from_its_distance():
 def test_a_family_hears_its_slider_and_relaxes(tmp_path):
     with Viewer(family().save(tmp_path / "family.palpate"), port=0) as viewer, client_of(viewer) as client:
         assert [r.name for r in client.hello.parameters] == ["firmness"]
-        assert "relaxes by 0.4 in 0.05 s" in client.hello.relaxes
+        assert "relaxes by 0.4 in 0.05 s" in client.hello.remembers
         place = [0.0, 0.0, pressed.RADIUS - 0.004]
         client.say(None, [1.25])
         soft = client.held(place, [0.5])

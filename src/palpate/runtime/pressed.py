@@ -1,13 +1,8 @@
 """A body pressed anywhere, as the loop and the page need it: where the hand rests, how deep and stiff it is.
 
 The probe's centre c is the hand's place itself, in the body's coordinates, z up. Nothing of the body's answer is
-made here: energy, force and stiffness are the surrogate's, and memory, where its file tells of branches, is
-`palpate.surrogates.relaxation`. A file tells of them in its ``meta``,
-
-    relaxation = {"terms": [[share, time in s], …], "pad": energy in J, "spacing": m}
-
-where the pad is 0 unless given, and with a spacing the memory stays in patches of the surface that far apart
-instead of travelling with the probe.
+made here: energy, force and stiffness are the surrogate's, and memory, where its file tells of one (`recorded`), is
+`palpate.surrogates.relaxation` or `palpate.surrogates.plastic`.
 """
 
 from __future__ import annotations
@@ -22,7 +17,9 @@ import numpy as np
 from numba import njit
 
 from palpate.errors import FileFormatError, UsageError
+from palpate.runtime.recorded import branches_told, dents_told, spacing_told
 from palpate.surrogates import FieldSurrogate, SurrogateEvaluator, TouchedBody, TouchSurrogate
+from palpate.surrogates.plastic import DentMemory, Dents
 from palpate.surrogates.relaxation import Branches, Memory, Patches
 from palpate.units import Range, bounds
 
@@ -165,42 +162,51 @@ class PressedBody:
         Raises
         ------
         FileFormatError
-            If it says so in other words than this module knows.
+            If it says so in other words than `recorded` knows.
         """
-        told = self.meta.get("relaxation")
-        if told is None:
-            return None
-        try:
-            return Branches(
-                tuple((float(s), float(t)) for s, t in told["terms"]), float(told.get("pad", 0.0))
-            )
-        except (KeyError, TypeError, ValueError, AttributeError, UsageError) as error:
-            raise FileFormatError(
-                "The file does not say how the body relaxes.",
-                why=f"{type(error).__name__}: {error}",
-                fix='Its record holds relaxation = {"terms": [[share, seconds], …], "pad": joules}.',
-            ) from error
+        return branches_told(self.meta)
 
-    def memory(self) -> Memory | None:
+    @cached_property
+    def dents(self) -> Dents | None:
+        """How it yields, where its file says so.
+
+        Raises
+        ------
+        FileFormatError
+            If it says so in other words than `recorded` knows, or that it relaxes too.
+        """
+        if "yielding" in self.meta and "relaxation" in self.meta:
+            raise FileFormatError(
+                "The file says that the body yields and that it relaxes.",
+                why="A print and branches on one energy are not made to go together.",
+                fix="Save it with one of them.",
+            )
+        places = None if "yielding" not in self.meta else self._places(width=1.0, energy=0.0)
+        return dents_told(self.meta, None if places is None else places.points)
+
+    def memory(self) -> Memory | DentMemory | None:
         """A body's memory at rest, or None for one that forgets nothing."""
+        if self.dents is not None:
+            return self.dents.memory()
         if self.branches is None or not self.branches.terms:
             return None
-        return Memory(self.branches, self._patches())
+        if spacing_told(self.meta) is None:
+            return Memory(self.branches)
+        depth = self.deepest / 2.0  # typical
+        X = self.presses
+        near = np.argmin(np.abs(self.touch.depth(X) - depth))
+        energy = float(self.touch.energy(X[near : near + 1])[0])
+        return Memory(self.branches, self._places(Patches.width_at(self.radius, depth), energy))
 
-    def _patches(self) -> Patches | None:
-        spacing = self.meta["relaxation"].get("spacing")
-        skin = next(iter(self.fields.values()), None)
+    def _places(self, width: float, energy: float) -> Patches | None:
+        """Places of the memory on the touched surface; None where it travels with the probe."""
+        spacing, skin = spacing_told(self.meta), next(iter(self.fields.values()), None)
         if spacing is None or skin is None:
             return None
         corners = skin.triangles
         if skin.dimple is not None:
             corners = corners[skin.dimple.touched[corners].all(axis=1)]
-        depth = self.deepest / 2.0  # typical
-        X = self.presses
-        near = np.argmin(np.abs(self.touch.depth(X) - depth))
-        energy = float(self.touch.energy(X[near : near + 1])[0])
-        width = Patches.width_at(self.radius, depth)
-        return Patches.over(skin.points, corners, float(spacing), width=width, energy=energy)
+        return Patches.over(skin.points, corners, spacing, width=width, energy=energy)
 
     def evaluator(self) -> PressedEvaluator:
         """The allocation-free evaluator of the 1 kHz path."""
@@ -243,7 +249,9 @@ class PressedEvaluator:
         Where a probe is that nobody holds, m.
     """
 
-    def __init__(self, elastic: SurrogateEvaluator, memory: Memory | None, away: np.ndarray) -> None:
+    def __init__(
+        self, elastic: SurrogateEvaluator, memory: Memory | DentMemory | None, away: np.ndarray
+    ) -> None:
         self._elastic, self._memory = elastic, memory
         self.force = elastic.force if memory is None else memory.force
         self._slope = np.zeros(3)

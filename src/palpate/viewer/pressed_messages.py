@@ -90,8 +90,8 @@ class Touched(Greeting):
         The device's centre in the body's coordinates, m.
     fields : looks
         The first moves the surface where it has three components; none where the file holds no field.
-    relaxes : str
-        How the force relaxes, in words; empty where it does not.
+    remembers : str
+        How the force relaxes, or prints stay, in words; empty where neither does.
     """
 
     radius: float
@@ -101,4 +101,4 @@ class Touched(Greeting):
     stiffness_max: float
     centre: Vec3
     fields: tuple[Look, ...]
-    relaxes: str
+    remembers: str

@@ -94,7 +94,7 @@ class PressedExhibit:
             stiffness_max=body.stiffness_max,
             centre=vector(body.home),
             fields=self._looks,
-            relaxes="" if body.branches is None else str(body.branches),
+            remembers=str(body.dents or body.branches or ""),
             meta=body.meta,
             **loop_facts(state, rate),
         )

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,10 @@ from palpate.surrogates.field.field_file import arrays_of, described, field_of
 from palpate.surrogates.file_parts import read
 from palpate.surrogates.touch_file import archive_of, surrogate_of
 from palpate.surrogates.touch_surrogate import TouchSurrogate
+
+if TYPE_CHECKING:
+    from palpate.surrogates.plastic import Dents
+    from palpate.surrogates.relaxation import Branches
 
 __all__ = ["TouchedBody"]
 
@@ -62,6 +66,54 @@ class TouchedBody:
         return "\n".join([str(self.touch), *(f"  {one}" for one in self.fields.values())])
 
     __repr__ = __str__
+
+    def relaxing(self, branches: Branches, *, spacing: float | None = None) -> TouchedBody:
+        """The same body whose force relaxes, in the loop and on the page.
+
+        Parameters
+        ----------
+        branches : Branches
+            Of `palpate.surrogates.relaxation.identify`, for example.
+        spacing : float, optional
+            How far apart the places of the surface are that remember, m, a quarter of the probe's radius for example;
+            without it the memory travels with the probe.
+        """
+        told = {"terms": [list(term) for term in branches.terms], "pad": branches.pad, "spacing": spacing}
+        return self._told(relaxation=told)
+
+    def yielding(
+        self, dents: Dents, *, spacing: float | None = None, width: float | None = None
+    ) -> TouchedBody:
+        """The same body that keeps prints, in the loop and on the page.
+
+        Parameters
+        ----------
+        dents : Dents
+            Of `palpate.learning.plastic.learn_dents`, for example; its places count as `spacing` says.
+        spacing : float, optional
+            How far apart the places of the surface are that keep a print, m; without it the print travels with the
+            probe.
+        width : float, optional
+            w of a print's weights, m; that of the dents by default. About ½ √(R s) for a sphere of radius R at depth s.
+
+        Raises
+        ------
+        UsageError
+            If the width is no size for places that far apart.
+        """
+        width = dents.width if width is None else float(width)
+        if spacing is not None and not 0 < 0.3 * spacing <= width <= 30 * spacing:
+            raise UsageError(
+                f"Prints of width {width:g} m do not fit places {spacing:g} m apart.",
+                why="Narrower ones would fall between the places, wider ones would be felt everywhere.",
+                fix="Give `width`, about half the radius of contact, and a spacing of that size.",
+            )
+        tables = {name: getattr(dents, name).tolist() for name in ("dent", "reach", "stiffening")}
+        return self._told(yielding={**tables, "width": width, "spacing": spacing})
+
+    def _told(self, **memory: Any) -> TouchedBody:
+        plain = {k: v for k, v in self.touch.meta.items() if k not in {"relaxation", "yielding"}}
+        return replace(self, touch=replace(self.touch, meta=plain | memory))
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write all of it to one file; the surface stands there once.

@@ -90,7 +90,7 @@ export interface Touched {
   stiffness_max: number;
   centre: Vec3;
   fields: Look[];
-  relaxes: string;
+  remembers: string;
 }
 
 /** An event in plain words, server to page. */

@@ -45,7 +45,7 @@ export class PressPanel {
     element("model-line").replaceChildren(
       ...[`probe of radius ${measured(hello.radius, "m")}`, ", ", `trained to ${measured(hello.deepest, "m")} deep`].map(whole),
       ...(hello.parameters.length ? [", ", ...hello.parameters.flatMap(trained)] : []),
-      hello.relaxes ? `; ${hello.relaxes}` : "",
+      hello.remembers ? `; ${hello.remembers}` : "",
     );
     document.title = `${hello.name} · palpate`;
     sliders(hello.parameters, told.moved);

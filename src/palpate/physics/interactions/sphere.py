@@ -14,6 +14,7 @@ from palpate.physics.geometry.refinement import FineMesh
 from palpate.physics.interactions import columns
 from palpate.physics.interactions.arguments import range_of
 from palpate.physics.interactions.curved import surface_of
+from palpate.physics.interactions.fit import require_fit
 from palpate.physics.interactions.interaction import Attached, Energy, Field
 from palpate.physics.interactions.patch import Patch
 from palpate.physics.words import millimetres, number
@@ -71,7 +72,8 @@ class SphereProbe:
     Raises
     ------
     UsageError
-        For sizes that are not positive, or a depth or box whose ends are not in order.
+        For sizes that are not positive, or a depth or box whose ends are not in order. On a plane surface also, once
+        it has a body, for a box that reaches beyond it or a depth that is all of the body's thickness.
     """
 
     radius: float
@@ -101,6 +103,7 @@ class SphereProbe:
     def ranges(self, geometry: Geometry) -> tuple[Range, ...]:
         """Ranges of c_x, c_y and c_z in m: the box around all its positions."""
         patch = self._patch(geometry)
+        require_fit(patch, geometry.rest().points, self.over, max(self.depth), END * self.radius)
         feet, normals, _ = self._feet(patch, _GRID)
         ends = [feet + normals * (self.radius - d) for d in self.depth]
         low, high = np.concatenate(ends).min(axis=0), np.concatenate(ends).max(axis=0)

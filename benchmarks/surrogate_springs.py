@@ -15,7 +15,10 @@ from palpate.validation import TouchSolves
 
 __all__ = ["Springs", "counts", "identified", "some"]
 
-SOLVES, ASKED = 10, 40  # that the moduli are identified on, there are one to three of them; test solves they are asked
+SOLVES, ASKED = (
+    10,
+    40,
+)  # that the moduli are identified on, there are one to three of them; test solves they are asked
 LARGE = 2000  # nodes from which an equilibrium of springs takes tens of seconds
 SOLVES_OF_LARGE, ASKED_OF_LARGE = 3, 10
 ITERATIONS = 3  # of Gauss–Newton

@@ -292,7 +292,7 @@ CRITERIA = (
         1.5,
         _ROUGH,
         "The force ripples: learn from more solves, or with fewer or wider units. Under the law s² its slope jumps at "
-        "first touch: learn with `law=ContactLaw(\"series\", length)`.",
+        'first touch: learn with `law=ContactLaw("series", length)`.',
     ),
     Criterion(
         "interval_coverage",

@@ -128,7 +128,7 @@ def _rival_table(result: Measured, beside: list[dict[str, Any]], size: int, mark
             "closed-loop work: |∮F·dx| over ½∮|F·dx| of random triangles to pentagons, by one quadrature that goes on "
             "until it has converged; –: a query of springs is an equilibrium, too slow for it",
             *(
-                f"springs: Young's modulus of each region identified on {row['identified_on']} of the solves, errors on "
+                f"springs: Young's modulus of each region identified on {row['identified_on']} solves, errors on "
                 f"{row['asked']} of the test"
                 for row in beside
             ),

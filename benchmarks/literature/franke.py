@@ -79,14 +79,14 @@ def table(*, quick: bool) -> Table:
     draws, fewer = (1, 1) if quick else (30, 10)
     one = [problem(s, 200) for s in range(draws)]
     ten = [problem(s, 200, 10) for s in range(draws)]
-    fifty = [problem(s, 200, 12 if quick else 50) for s in range(1 if quick else 5)]
-    large = [problem(s, 300 if quick else 1000) for s in range(fewer)]
+    fifty = [problem(s, 60 if quick else 200, 12 if quick else 50) for s in range(1 if quick else 5)]
+    large = [problem(s, 150 if quick else 1000) for s in range(fewer)]
     mran_by, emran_by = (partial(filtered, settings=SETTINGS[name]) for name in ("MRAN", "EMRAN"))
     once = scores(one[:fewer], partial(ours, passes=1))
     often = scores(one[:fewer], partial(ours, passes=10))
     once_large = scores(large, partial(ours, passes=1))
     stream = scores(one[:fewer], partial(streamed, every=1))
-    best = scores(one[:fewer], partial(refined, units=40, target=1e-6))
+    best = scores(one[:fewer], partial(refined, units=10 if quick else 40, target=1e-6))
     return Table(
         "literature-franke",
         f"L5 Franke's surface, 200 samples: normalised RMSE, median and range of up to {draws} draws",

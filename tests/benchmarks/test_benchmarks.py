@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from benchmarks.surrogate_rivals import RIVALS
 
 ROOT = Path(__file__).parents[2]
 
@@ -133,6 +134,14 @@ def test_touching_is_measured_in_all_respects(tables):
     (size,) = tables["touching-sizes"]["rows"]
     assert size["displacement"] > size["mixed"] > 0  # it locks
     assert tables["touching-imprint"]["rows"][0]["stiffness"] < 0
+
+
+def test_surrogates_are_measured_beside_every_rival(tables):
+    found = {row["method"]: row for row in tables["surrogates-block-rivals"]["rows"]}
+    assert set(found) == {"palpate", *RIVALS}
+    # its force is a gradient, whatever was learnt
+    assert found["palpate"]["loop"] < 1e-9
+    assert found["cubic RBF (SciPy)"]["loop"] > 1e-6
 
 
 def test_documentation_holds_a_block_for_every_table(tables):

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.runner import main
 from benchmarks.surrogate_cases import Case, symmetry_of
 from benchmarks.surrogate_measure import _errors
 from benchmarks.surrogate_rivals import RIVALS, _rows, cubic_rbf, learnt, linear_in_depth
@@ -239,20 +237,6 @@ def test_relaxation_finds_the_branches_that_made_its_data(tmp_path, monkeypatch)
     assert row["p95"] < 0.02
     assert row["times"] > 3
     assert all(claim.met == 1.0 for claim in table.claims)
-
-
-def test_all_of_it_runs_on_a_study(tmp_path, monkeypatch, capsys):
-    monkeypatch.setitem(STUDIES, "block", STUDY)
-    monkeypatch.setattr(surrogate_cases, "DATA", tmp_path)
-    np.savez(tmp_path / "touch_block.npz", **file_of())
-    assert main(["--only", "surrogates", "--study", "block", "--quick", "--json"]) == 0
-    tables = {t["name"]: t for t in json.loads(capsys.readouterr().out)["tables"]}
-    assert set(tables) == {"surrogates-block", "surrogates-block-curve", "surrogates-block-rivals"}
-    rows = {row["method"]: row for row in tables["surrogates-block-rivals"]["rows"]}
-    assert set(rows) == {"palpate", *RIVALS}
-    # its force is a gradient, whatever was learnt
-    assert rows["palpate"]["loop"] < 1e-9
-    assert rows["cubic RBF (SciPy)"]["loop"] > 1e-6
 
 
 def test_every_study_and_its_tables_are_documented():

@@ -26,6 +26,7 @@ Rival = Callable[[Case, Training], TouchFunction]
 STEP = 1e-6  # m: of the differences that give a stiffness where a rival has no derivative
 ROWS = 1000  # queries at a time: matrices against thousands of samples
 LIKELY = 400  # samples by which a kernel's lengths are found
+SAME_PLACE = 3e-4  # m: footprints nearer to each other are one
 STEPS = 2000  # of a perceptron's L-BFGS
 
 
@@ -131,9 +132,9 @@ def linear_in_depth(case: Case, training: Training) -> TouchFunction:
     feet, depth = _feet(case, X)
     shallow = depth < max(case.study.depth / 3, np.sort(depth)[max(0, len(depth) // 3 - 1)])
     feet, depth, F = feet[shallow], depth[shallow], F[shallow]
-    keys, place = np.unique(np.round(feet / 1e-6).astype(np.int64), axis=0, return_inverse=True)
-    k = np.array([lstsq(depth[place == i, None], F[place == i])[0][0] for i in range(len(keys))])
-    at, size = np.array([feet[place == i].mean(axis=0) for i in range(len(keys))]), float(np.abs(k).max())
+    place = _places(feet)
+    k = np.array([lstsq(depth[place == i, None], F[place == i])[0][0] for i in np.unique(place)])
+    at, size = np.array([feet[place == i].mean(axis=0) for i in np.unique(place)]), float(np.abs(k).max())
     low, high = at.min(axis=0), at.max(axis=0)
     width = np.where(high > low, high - low, 1.0)
     predict = cubic_rbf((at - low) / width, k / size)
@@ -143,6 +144,17 @@ def linear_in_depth(case: Case, training: Training) -> TouchFunction:
         return size * depth[:, None] * _chunked(predict, (feet - low) / width)
 
     return function(case, "force linear in depth", force)
+
+
+def _places(feet: np.ndarray) -> np.ndarray:
+    """Number (N,) of the place that each footprint is at: on a curved body those of one column differ a little."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    pairs = cKDTree(feet).query_pairs(SAME_PLACE, output_type="ndarray")
+    near = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(feet), len(feet)))
+    return np.asarray(connected_components(near, directed=False)[1])
 
 
 def _feet(case: Case, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

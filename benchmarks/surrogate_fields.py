@@ -33,7 +33,7 @@ def field_table(case: Case, size: int, seconds: float, mark: str) -> list[Table]
     rows = []
     for name, of in (("palpate", _ours), ("POD + cubic RBF", _pod)):
         begun = time.process_time()
-        answer = of(case, X[train], u[train], seconds)(X[test])
+        answer = of(case, X[train], u[train], case.arrays["column"][train], seconds)(X[test])
         distance = np.linalg.norm(answer - truth, axis=2)
         rows.append(
             {
@@ -69,7 +69,7 @@ def field_table(case: Case, size: int, seconds: float, mark: str) -> list[Table]
     ]
 
 
-def _ours(case: Case, X: np.ndarray, u: np.ndarray, seconds: float) -> Any:
+def _ours(case: Case, X: np.ndarray, u: np.ndarray, columns: np.ndarray, seconds: float) -> Any:
     points = case.arrays["nodes"]
     return learn_field(
         X,
@@ -81,11 +81,12 @@ def _ours(case: Case, X: np.ndarray, u: np.ndarray, seconds: float) -> Any:
         mass=np.full(len(points), 1.0 / len(points)),
         surface=case.surface,
         radius=case.radius,
+        groups=columns,
         seconds=seconds,
     ).field.values
 
 
-def _pod(case: Case, X: np.ndarray, u: np.ndarray, seconds: float) -> Any:
+def _pod(case: Case, X: np.ndarray, u: np.ndarray, columns: np.ndarray, seconds: float) -> Any:
     """Modes by singular values, coefficients by cubic radial basis functions."""
     low, high = bounds(case.inputs)
     flat = u.reshape(len(u), -1)

@@ -2,7 +2,8 @@
 
 modes        proper orthogonal decomposition in the mean over the surface
 dimples      the part that travels with the probe
-search       the network of the modes' coefficients, by the leave-one-solve-out error
+kernel       the modes' coefficients by a unit at every solve
+search       the same by a few units that move; which of both is decided by solves left out
 learn_field  all of it
 """
 

@@ -14,11 +14,12 @@ from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.learning.checks import numbers
 from palpate.learning.fields.dimples import fitted_dimple, touched_nodes, travelling_values
+from palpate.learning.fields.kernel import at_solves
 from palpate.learning.fields.modes import SurfaceModes, left_out, lumped_mass
 from palpate.learning.fields.search import Coefficients, FieldTrial, searched
 from palpate.learning.freezing import freeze_refined, training_record
-from palpate.learning.refinement.refine import Refined
 from palpate.network import Network, Scaling
+from palpate.network.radial import RadialFunction
 from palpate.surrogates import FieldSurrogate, TouchedSurface
 from palpate.surrogates.field import Dimple, Rise
 from palpate.surrogates.field.rise import RISES
@@ -27,7 +28,7 @@ from palpate.units import Quantity, Range, bounds
 __all__ = ["LearntField", "learn_displacement", "learn_field"]
 
 _TOLERANCE = 5e-3  # of the snapshots' root mean square
-_SHARE = 0.25  # of the time, to compare how a field rises
+_TO_COMPARE: tuple[RadialFunction, ...] = ("matern-5/2",)  # how fields rise
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +45,7 @@ class LearntField:
     truncation_left_out : float
         The same of solves that the modes were not made of (but the travelling part was).
     learning_left_out : float
-        Leave-one-solve-out error of the coefficients, likewise.
+        Left-out error of the coefficients, likewise.
     """
 
     field: FieldSurrogate
@@ -164,7 +165,7 @@ def learn_field(
         Solves of one group, such as a column, are left out together.
     units_max : int
     seconds : float
-        For the search of the network; the result depends on it.
+        For the search of a small network, which is taken where it misses less than a unit at every solve.
     seed : int
 
     Returns
@@ -193,9 +194,8 @@ def learn_field(
     length = radius / 10.0 if length is None else length
     with threadpool_limits(1):  # small matrices: more BLAS threads cost time and the bits of the result
         names = RISES if rise == "auto" else (rise,)
-        best = _best_part(solves, names, length, tolerance, modes_max, travelling, seconds, seed)
-        options = {"units_max": units_max, "seconds": seconds, "target": 0.1 * best.truncation, "seed": seed}
-        found, error, trials = searched(best.problem, **options)  # type: ignore[arg-type]
+        best = _best_part(solves, names, length, tolerance, modes_max, travelling)
+        network, error, trials = _learnt(best, solves.inputs, units_max, seconds, seed)
     meta = {
         **training_record(X, np.reshape(values, (len(X), -1)), solves.inputs),
         "solves": len(solves.X),
@@ -206,7 +206,6 @@ def learn_field(
         "truncation_left_out": _real(best.truncation_left_out),
         "learning_left_out": _real(error),
     }
-    network = _network(found, best, solves.inputs)
     field = FieldSurrogate(
         *(name, unit, network),
         *(best.modes.modes, rest, solves.points, triangles, solves.mass),
@@ -291,8 +290,6 @@ def _best_part(
     tolerance: float,
     most: int,
     travelling: bool,
-    seconds: float,
-    seed: int,
 ) -> _Parted:
     """First whether the border travels too, then the rise: what misses least of solves left out."""
 
@@ -300,10 +297,9 @@ def _best_part(
         return _parted(solves, name, length, tolerance, most, travelling, border)
 
     borders = (True, False) if travelling else (True,)
-    each = _SHARE * seconds / (len(borders) + len(names))
-    first = _chosen([of(names[-1], border) for border in borders], each, seed)
+    first = _chosen([of(names[-1], border) for border in borders])
     border = first.dimple is None or bool(_same_touched(first, solves))
-    return _chosen([first, *(of(name, border) for name in names[:-1])], each, seed)
+    return _chosen([first, *(of(name, border) for name in names[:-1])])
 
 
 def _same_touched(part: _Parted, solves: _Solves) -> bool:
@@ -312,25 +308,39 @@ def _same_touched(part: _Parted, solves: _Solves) -> bool:
     return bool((part.dimple.touched == touched_nodes(solves.surface, solves.points, solves.radius)).all())
 
 
-def _chosen(parted: list[_Parted], seconds: float, seed: int) -> _Parted:
-    """The one of which affine coefficients and a few units miss least when a solve is left out; seconds for each."""
+def _chosen(parted: list[_Parted]) -> _Parted:
+    """The one of which coefficients by a unit at each solve miss least when solves are left out."""
     if len(parted) == 1:
         return parted[0]
     missed = [
-        searched(p.problem, units_max=2, seconds=seconds, target=0.0, seed=seed)[1] ** 2
-        + np.nan_to_num(p.truncation_left_out) ** 2
+        at_solves(p.problem, radials=_TO_COMPARE).error ** 2 + np.nan_to_num(p.truncation_left_out) ** 2
         for p in parted
     ]
     return parted[int(np.argmin(missed))]
 
 
-def _network(found: Refined, best: _Parted, inputs: tuple[Range, ...]) -> Network:
+def _learnt(
+    best: _Parted, inputs: tuple[Range, ...], units_max: int, seconds: float, seed: int
+) -> tuple[Network, float, tuple[FieldTrial, ...]]:
+    """The coefficients' network, its left-out error and what was tried: a unit at each solve, or a few that move."""
+    whole = at_solves(best.problem)
+    target = 0.1 * best.truncation
+    found, error, trials = searched(
+        best.problem, units_max=units_max, seconds=seconds, target=target, seed=seed
+    )
+    names, scaling = _outputs(best, inputs)
+    if whole.error < error:
+        return whole.network(inputs, names, scaling), whole.error, (*whole.trials, *trials)
+    network = replace(freeze_refined(found, inputs, names, scaling), meta={})
+    return network, error, (*whole.trials, *trials)
+
+
+def _outputs(best: _Parted, inputs: tuple[Range, ...]) -> tuple[list[Quantity], Scaling]:
     low, high = bounds(inputs)
     k = best.problem.along.shape[1]
     scale = np.full(k, best.problem.scale)
     scaling = Scaling((low + high) / 2, (high - low) / 2, np.zeros(k), scale)
-    names = [Quantity(f"coefficient {i}", "") for i in range(1, k + 1)]
-    return replace(freeze_refined(found, inputs, names, scaling), meta={})
+    return [Quantity(f"coefficient {i}", "") for i in range(1, k + 1)], scaling
 
 
 def _real(number: float) -> float | None:

@@ -18,7 +18,7 @@ from palpate.learning.units.forms import form as form_of
 from palpate.learning.units.regressors import Regressors
 from palpate.network.radial import RadialFunction
 
-__all__ = ["Coefficients", "FieldTrial", "searched"]
+__all__ = ["Coefficients", "FieldTrial", "parts_of", "searched"]
 
 _RIDGE = 1e-9
 _KINDS: tuple[tuple[str, RadialFunction], ...] = (
@@ -39,6 +39,7 @@ class FieldTrial:
     Attributes
     ----------
     form, radial : str
+        "at solves" for a unit at each.
     units : int
     loo : float
         Error of the field within its modes at solves left out: root mean square, in the field's unit.
@@ -100,19 +101,24 @@ class Coefficients:
         Root mean square over surface and solves; infinite where time is over. Leaving rows out of the linear
         weights alone would be cheaper, but says too little of few solves: there units overfit.
         """
-        _, own = np.unique(self.groups, return_inverse=True)
-        folds, total = min(_FOLDS, int(own.max()) + 1), 0.0
-        if folds < 2:
+        parts, total = parts_of(self.groups), 0.0
+        if len(parts) < 2:
             return float("inf")
-        for fold in range(folds):
+        for out in parts:
             left = deadline - time.monotonic()
             if left <= 0:
                 return float("inf")
-            out = own % folds == fold
             found = self._refined(theta, of, left, ~out)
             answered = found.predict(self.X[out]) * (self.scale * self.rise[out])[:, None]
             total += float(((answered - self.along[out]) ** 2).sum())
         return float(np.sqrt(total / len(self.X)))
+
+
+def parts_of(groups: np.ndarray) -> list[np.ndarray]:
+    """Masks (N,) of the solves that are left out together: whole groups, at most six parts."""
+    _, own = np.unique(groups, return_inverse=True)
+    folds = min(_FOLDS, int(own.max()) + 1)
+    return [own.ravel() % folds == fold for fold in range(folds)]
 
 
 def searched(

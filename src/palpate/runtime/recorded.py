@@ -9,8 +9,8 @@ given. With a spacing the memory stays at places of the surface that far apart; 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from palpate.surrogates.relaxation import Branches
 
 __all__ = ["branches_told", "dents_told", "spacing_told"]
 
-_FAULTS = (KeyError, TypeError, ValueError, AttributeError, UsageError)
+T = TypeVar("T")
 
 
 def branches_told(meta: Mapping[str, Any]) -> Branches | None:
@@ -31,17 +31,12 @@ def branches_told(meta: Mapping[str, Any]) -> Branches | None:
     FileFormatError
         If it says so in other words than this module knows.
     """
-    told = meta.get("relaxation")
-    if told is None:
-        return None
-    try:
+
+    def made(told: Mapping[str, Any]) -> Branches:
         return Branches(tuple((float(s), float(t)) for s, t in told["terms"]), float(told.get("pad", 0.0)))
-    except _FAULTS as error:
-        raise FileFormatError(
-            "The file does not say how the body relaxes.",
-            why=f"{type(error).__name__}: {error}",
-            fix='Its record holds relaxation = {"terms": [[share, seconds], …], "pad": joules}.',
-        ) from error
+
+    fix = 'Its record holds relaxation = {"terms": [[share, seconds], …], "pad": joules}.'
+    return _told(meta, "relaxation", "relaxes", made, fix)
 
 
 def dents_told(meta: Mapping[str, Any], points: np.ndarray | None) -> Dents | None:
@@ -52,21 +47,26 @@ def dents_told(meta: Mapping[str, Any], points: np.ndarray | None) -> Dents | No
     FileFormatError
         If it says so in other words than this module knows.
     """
-    told = meta.get("yielding")
-    if told is None:
+
+    def made(told: Mapping[str, Any]) -> Dents:
+        dent, reach, stiffening = (np.array(told[k], dtype=float) for k in ("dent", "reach", "stiffening"))
+        if points is None:
+            return Dents.single(dent, reach, stiffening)
+        return Dents(dent, reach, stiffening, points, float(told["width"]))
+
+    return _told(
+        meta, "yielding", "yields", made, "Its record holds yielding as `TouchedBody.yielding` writes it."
+    )
+
+
+def _told(meta: Mapping[str, Any], key: str, does: str, made: Callable[[Any], T], fix: str) -> T | None:
+    if meta.get(key) is None:
         return None
     try:
-        tables = [np.array(told[name], dtype=float) for name in ("dent", "reach", "stiffening")]
-        return (
-            Dents.single(*tables)
-            if points is None
-            else Dents(tables[0], tables[1], tables[2], points, float(told["width"]))
-        )
-    except _FAULTS as error:
+        return made(meta[key])
+    except (KeyError, TypeError, ValueError, AttributeError, UsageError) as error:
         raise FileFormatError(
-            "The file does not say how the body yields.",
-            why=f"{type(error).__name__}: {error}",
-            fix="Its record holds yielding as `TouchedBody.yielding` writes it.",
+            f"The file does not say how the body {does}.", why=f"{type(error).__name__}: {error}", fix=fix
         ) from error
 
 

@@ -155,6 +155,8 @@ def test_what_can_not_vary_is_said() -> None:
         BodyFamily(
             Body(Block((0.06, 0.06, 0.03)), NeoHookean(9e3, 0.4)), Varied("body.thickness", 0.01, 0.02)
         )
+    with pytest.raises(UsageError, match="above the deepest"):
+        BodyFamily(body, Varied("muscle.thickness", 0.02, 0.03))
     with pytest.raises(UsageError, match="40 mm"):
         BodyFamily(body, Varied("fat.thickness", 0.01, 0.05))
     with pytest.raises(UsageError, match="4 finite numbers"):

@@ -103,7 +103,7 @@ def learn_surrogate(
     units_max : int
         Most units of one network; images count.
     networks : int
-        How many at most make one surrogate, as their mean; one answers faster, four miss about a third less.
+        How many at most make one surrogate, as their mean; one answers faster, four miss less.
     target : float
         Leave-one-solve-out error at which no more units are added.
     seconds : float

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -77,7 +76,8 @@ class LayeredBlock(Solid):
     @property
     def levels(self) -> tuple[float, ...]:
         """Heights z in m of the faces between the layers, from the top to 0."""
-        return _levels([t for _, t in self.layers])
+        thickness = [t for _, t in self.layers]
+        return tuple(sum(thickness[i:]) for i in range(len(thickness) + 1))
 
     @property
     def size(self) -> tuple[float, float, float]:
@@ -96,30 +96,28 @@ class LayeredBlock(Solid):
     def thick(self, layer: str, thickness: float) -> LayeredBlock:
         """The block with one layer of this thickness in m, the same height and the same elements, moved.
 
-        What the layer takes, the deepest one gives; of the deepest one, the layer above it.
+        What the layer takes, the deepest one gives.
 
         Raises
         ------
         UsageError
-            If there is no such layer or no other, or nothing would be left of the one that gives.
+            If there is no such layer above the deepest, or nothing would be left of one.
         """
-        names = [name for name, _ in self.layers]
-        if layer not in names or len(names) < 2:
+        names, old = [name for name, _ in self.layers], [t for _, t in self.layers]
+        if layer not in names[:-1]:
             raise UsageError(
                 f"{layer!r} is no layer whose thickness can change.",
-                why=f"The layers are {', '.join(names)}; what one takes, another gives.",
-                fix="Name one of two or more layers.",
+                why=f"The layers are {', '.join(names)}; what one takes, the deepest gives.",
+                fix="Name a layer above the deepest.",
             )
-        own, giving = names.index(layer), -2 if layer == names[-1] else len(names) - 1
-        old = [t for _, t in self.layers]
-        new = old.copy()
+        own, new = names.index(layer), old.copy()
         new[own] = float(thickness)
-        new[giving] = old[giving] + old[own] - new[own]
-        if not (new[own] > 0 and new[giving] > 0):
+        new[-1] = old[-1] + old[own] - new[own]
+        if not (new[own] > 0 and new[-1] > 0):
             raise UsageError(
                 f"The layer {layer!r} can't be {millimetres(thickness)} thick.",
-                why=f"It and {names[giving]!r} together are {millimetres(old[own] + old[giving])}.",
-                fix="Give a thickness between these ends.",
+                why=f"It and {names[-1]!r} together are {millimetres(old[own] + old[-1])}.",
+                fix="Give a thickness between 0 and that.",
             )
         return replace(
             self,
@@ -161,10 +159,6 @@ class LayeredBlock(Solid):
             if face.name == "side":
                 face.name = "between layers"
         return block
-
-
-def _levels(thickness: Sequence[float]) -> tuple[float, ...]:
-    return tuple(sum(thickness[i:]) for i in range(len(thickness) + 1))
 
 
 def _as_thick(value: Any, layers: tuple[tuple[str, float], ...]) -> tuple[float, ...]:

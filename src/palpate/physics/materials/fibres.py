@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_positive
 from palpate.physics.materials.isochoric import isochoric_first
-from palpate.physics.materials.material import NO_STATE, Elastic, Material, StateVariable, Volumetric
+from palpate.physics.materials.material import NO_STATE, MadeFrom, Material, StateVariable, Volumetric
 from palpate.physics.materials.moduli import require_numbers
 from palpate.physics.materials.tensors import (
     Scalar,
@@ -99,7 +99,7 @@ class FibreFamily:
 
 
 @dataclass(frozen=True)
-class FibreReinforced(Elastic):
+class FibreReinforced(MadeFrom):
     """A matrix of any large-strain law with families of fibres, their energies added.
 
     Moduli, density, volumetric part and history are the matrix's: undeformed fibres bear no compression, so the moduli
@@ -147,34 +147,14 @@ class FibreReinforced(Elastic):
             )
 
     @property
-    def density(self) -> float:  # type: ignore[override]  # a field in other laws
-        """The matrix's density in kg/m³."""
-        return self.matrix.density
+    def origin(self) -> Material:
+        """The matrix."""
+        return self.matrix
 
     @property
     def states(self) -> tuple[StateVariable, ...]:  # type: ignore[override]  # none in other laws
         """The matrix's internal variables."""
         return self.matrix.states
-
-    @property
-    def young(self) -> float:
-        """The matrix's initial Young's modulus in Pa."""
-        return self.matrix.young
-
-    @property
-    def poisson(self) -> float:
-        """The matrix's initial Poisson's ratio."""
-        return self.matrix.poisson
-
-    @property
-    def shear_modulus(self) -> float:
-        """The matrix's initial shear modulus in Pa."""
-        return self.matrix.shear_modulus
-
-    @property
-    def bulk_modulus(self) -> float:
-        """The matrix's initial bulk modulus in Pa."""
-        return self.matrix.bulk_modulus
 
     @property
     def volumetric(self) -> Volumetric | None:

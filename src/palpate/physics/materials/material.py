@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = [
     "NO_STATE",
     "Elastic",
+    "MadeFrom",
     "Material",
     "StateVariable",
     "Volumetric",
@@ -227,6 +228,43 @@ class Elastic:
     def __str__(self) -> str:
         """The law, the initial moduli and the source, in words."""
         return in_words(self)
+
+
+class MadeFrom(Elastic):
+    """What laws share that are made from another one, and have its moduli: of what relaxes, those of an instant.
+
+    A law gives `origin`.
+    """
+
+    @property
+    def origin(self) -> Material:
+        """The law that it is made from."""
+        raise NotImplementedError
+
+    @property
+    def density(self) -> float:  # type: ignore[override]  # a field in other laws
+        """In kg/m³."""
+        return self.origin.density
+
+    @property
+    def young(self) -> float:
+        """E in Pa, that of the origin."""
+        return self.origin.young
+
+    @property
+    def poisson(self) -> float:
+        """ν, that of the origin."""
+        return self.origin.poisson
+
+    @property
+    def shear_modulus(self) -> float:
+        """G in Pa, that of the origin."""
+        return self.origin.shear_modulus
+
+    @property
+    def bulk_modulus(self) -> float:
+        """K in Pa, that of the origin."""
+        return self.origin.bulk_modulus
 
 
 def in_words(material: Any, more: str = "", *, at_once: bool = False) -> str:

@@ -23,7 +23,8 @@ from palpate.physics.materials.hardening import Hardening, require_hardening
 from palpate.physics.materials.linear import LinearElastic
 from palpate.physics.materials.material import (
     NO_STATE,
-    Elastic,
+    MadeFrom,
+    Material,
     StateVariable,
     Volumetric,
     in_words,
@@ -47,7 +48,7 @@ _ZERO = ((0.0, 0.0, 0.0),) * 3
 
 
 @dataclass(frozen=True)
-class Plastic(Elastic):
+class Plastic(MadeFrom):
     """A linear elastic material that yields by von Mises' rule and hardens isotropically.
 
     For strains of a few percent without large rotations. The energy counts all plastic work since the virgin state
@@ -92,29 +93,9 @@ class Plastic(Elastic):
             object.__setattr__(self, key, getattr(self, key) or getattr(self.elastic, key))
 
     @property
-    def density(self) -> float:  # type: ignore[override]
-        """In kg/m³."""
-        return self.elastic.density
-
-    @property
-    def young(self) -> float:
-        """Elastic E in Pa."""
-        return self.elastic.young
-
-    @property
-    def poisson(self) -> float:
-        """Elastic ν."""
-        return self.elastic.poisson
-
-    @property
-    def shear_modulus(self) -> float:
-        """Elastic G in Pa."""
-        return self.elastic.shear_modulus
-
-    @property
-    def bulk_modulus(self) -> float:
-        """Elastic K in Pa."""
-        return self.elastic.bulk_modulus
+    def origin(self) -> Material:
+        """The elastic law."""
+        return self.elastic
 
     @property
     def volumetric(self) -> Volumetric:

@@ -22,7 +22,7 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_positive
 from palpate.physics.materials.homogeneous import is_incompressible
-from palpate.physics.materials.material import NO_STATE, Elastic, Material
+from palpate.physics.materials.material import NO_STATE, MadeFrom, Material
 from palpate.physics.materials.relaxing import relaxed
 from palpate.physics.materials.tensors import Scalar, Tensor, constant, matmul
 
@@ -30,7 +30,7 @@ __all__ = ["PreStretched"]
 
 
 @dataclass(frozen=True)
-class PreStretched(Elastic):
+class PreStretched(MadeFrom):
     """The law `base` under a stretch along x and y, with no stress along z.
 
     Tension must be held: fix the sides of the body. The moduli that it tells are those of the base law at rest; the
@@ -68,6 +68,11 @@ class PreStretched(Elastic):
             )
 
     @property
+    def origin(self) -> Material:
+        """The base law."""
+        return self.base
+
+    @property
     def _along(self) -> tuple[float, float]:
         return self.stretch_x, self.stretch_x if self.stretch_y is None else self.stretch_y
 
@@ -102,27 +107,7 @@ class PreStretched(Elastic):
     @property
     def density(self) -> float:  # type: ignore[override]
         """Of the drawn shape, in kg/m³."""
-        return self.base.density / float(np.prod(self.stretches))
-
-    @property
-    def young(self) -> float:
-        """The base law's, in Pa."""
-        return self.base.young
-
-    @property
-    def poisson(self) -> float:
-        """The base law's, a pure number."""
-        return self.base.poisson
-
-    @property
-    def shear_modulus(self) -> float:
-        """The base law's, in Pa."""
-        return self.base.shear_modulus
-
-    @property
-    def bulk_modulus(self) -> float:
-        """The base law's, in Pa."""
-        return self.base.bulk_modulus
+        return self.origin.density / float(np.prod(self.stretches))
 
     def distortion(self, F: Tensor, state: Mapping[str, Any] = NO_STATE, dt: Any = None) -> Scalar:
         """Energy density beyond that of the stretch, per volume of the drawn shape, in J/m³."""

@@ -28,7 +28,7 @@ from palpate.physics.materials.compiling import compiled
 from palpate.physics.materials.dashpots import dashpot_loss, spring_energy
 from palpate.physics.materials.material import (
     NO_STATE,
-    Elastic,
+    MadeFrom,
     Material,
     StateVariable,
     Volumetric,
@@ -55,7 +55,7 @@ _ZERO = ((0.0, 0.0, 0.0),) * 3
 
 
 @dataclass(frozen=True)
-class Viscoelastic(Elastic):
+class Viscoelastic(MadeFrom):
     """An elastic law that relaxes by a Prony series.
 
     The base law is the instantaneous one: what a sudden deformation meets. A separate volumetric part stays elastic
@@ -120,39 +120,19 @@ class Viscoelastic(Elastic):
         return cls(Scaled(law, 1 / series.equilibrium), series.terms, name=law.name, source=law.source)
 
     @property
+    def origin(self) -> Material:
+        """The base law."""
+        return self.base
+
+    @property
     def prony(self) -> PronySeries:
         """The series."""
         return PronySeries(self.terms)
 
     @property
-    def density(self) -> float:  # type: ignore[override]
-        """In kg/m³."""
-        return self.base.density
-
-    @property
     def kinematics(self) -> Literal["large", "small"]:  # type: ignore[override]
         """Those of the base law."""
         return self.base.kinematics
-
-    @property
-    def young(self) -> float:
-        """Instantaneous E in Pa."""
-        return self.base.young
-
-    @property
-    def poisson(self) -> float:
-        """Instantaneous ν."""
-        return self.base.poisson
-
-    @property
-    def shear_modulus(self) -> float:
-        """Instantaneous G in Pa."""
-        return self.base.shear_modulus
-
-    @property
-    def bulk_modulus(self) -> float:
-        """Instantaneous K in Pa."""
-        return self.base.bulk_modulus
 
     @property
     def volumetric(self) -> Volumetric | None:

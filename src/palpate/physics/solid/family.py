@@ -313,18 +313,17 @@ class FamilySolver:
 
 
 def _both(one: tuple[FineMesh, ...], other: tuple[FineMesh, ...]) -> tuple[FineMesh, ...]:
-    """What satisfies two wishes for a fine mesh of the same surfaces: the smaller elements, in both boxes."""
-    return tuple(
-        a
-        if a.lower is None or a.upper is None or b.lower is None or b.upper is None
-        else FineMesh(
-            a.surface,
-            min(a.element, b.element),
-            tuple(np.minimum(a.lower, b.lower).tolist()),
-            tuple(np.maximum(a.upper, b.upper).tolist()),
-        )
-        for a, b in zip(one, other, strict=True)
-    )
+    """What satisfies two wishes for a fine mesh of one surface: the smaller elements, in a box around both."""
+    found = []
+    for a, b in zip(one, other, strict=True):
+        if a == b:  # wanted by what holds the body
+            found.append(a)
+            continue
+        # a probe wants it in a box around its footprints
+        lower = np.minimum(np.array(a.lower), np.array(b.lower)).tolist()
+        upper = np.maximum(np.array(a.upper), np.array(b.upper)).tolist()
+        found.append(FineMesh(a.surface, min(a.element, b.element), tuple(lower), tuple(upper)))
+    return tuple(found)
 
 
 class _EnergySlope:

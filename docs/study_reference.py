@@ -12,7 +12,7 @@ from pydantic import BaseModel
 from palpate.learning import Settings, default, founding
 from palpate.study.models import MaterialRecord, SectionRecord, Study
 from palpate.study.record import Unit
-from palpate.study.touching import TouchStudy, shapes
+from palpate.study.touching import TouchStudy, records, shapes
 
 PAGE = Path(__file__).parent / "guide" / "study-file.md"
 BEGIN, END = "<!-- generated: begin -->", "<!-- generated: end -->"
@@ -61,6 +61,9 @@ def _touched() -> Iterator[str]:
         # the runtime's part is that of a beam
         if name != "runtime" and isinstance(annotation, type) and issubclass(annotation, BaseModel):
             yield from _table(f"`[{name}]`", annotation, (annotation.__doc__ or "").splitlines()[0])
+            if name == "probe":
+                about = (records.VariedRecord.__doc__ or "").splitlines()[0]
+                yield from _table("`[[varied]]`, once per number", records.VariedRecord, about)
 
 
 def _table(title: str, record: type[BaseModel], about: str) -> Iterator[str]:

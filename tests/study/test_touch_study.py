@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from palpate.errors import StudyError
+from palpate.errors import StudyError, UsageError
 from palpate.study import Study, TouchStudy, named, preset_study, read_study, to_toml
 from palpate.study.touching.build import limits_of, points_of, probe_of, problem_of, solid_of
 from palpate.study.touching.presets import TOUCHED
@@ -81,6 +81,8 @@ def test_units_are_allowed_and_kept_in_si(tmp_path):
         ('[body]\nkind = "block"\n[sweep]\nsamples = 8\ndepths = 9', "no column"),
         ('[body]\nkind = "block"\n[learning]\nsecond = 3', "learning.second: there is no such key"),
         ('[body]\nkind = "layered"', "body.layers"),
+        ('[body]\nkind = "block"\n[[varied]]\npath = "young"\nlow = "2 mm"\nhigh = 1', "varied.0.low"),
+        ('[body]\nkind = "block"\n[[varied]]\npath = "young"\nlow = 2\nhigh = 1', "is no range"),
     ],
 )
 def test_mistakes_are_told_by_their_place(tmp_path, text, words):
@@ -108,6 +110,54 @@ def test_columns_have_their_depths_and_tests_have_other_places():
     columns = study.sweep.samples // study.sweep.depths
     assert [len(rows) for rows in problem.chains(train)] == [study.sweep.depths] * columns
     assert not {tuple(p) for p in train[:, :2]} & {tuple(p) for p in test[:, :2]}
+
+
+FAMILY = """
+[body]
+kind = "layered"
+layers = [
+    { name = "fat", thickness = "9 mm", material = { young = "4 kPa" } },
+    { name = "muscle", thickness = "31 mm", material = { young = "15 kPa" } },
+]
+[probe]
+over = [["20 mm", "20 mm"], ["80 mm", "80 mm"]]
+[[varied]]
+path = "fat.thickness"
+low = "7 mm"
+high = "11 mm"
+[[varied]]
+path = "muscle.young"
+low = "8 kPa"
+high = 30e3
+[sweep]
+samples = 12
+depths = 3
+[test]
+samples = 8
+depths = 2
+"""
+
+
+def test_a_family_of_bodies_has_its_numbers_as_inputs(tmp_path):
+    study = read_study(study_file(tmp_path, FAMILY))
+    assert read_study(study_file(tmp_path, to_toml(study))) == study
+    problem = problem_of(study)
+    assert [(r.name, r.low, r.high, r.unit) for r in problem.ranges[3:]] == [
+        ("fat.thickness", 0.007, 0.011, "m"),
+        ("muscle.young", 8e3, 30e3, "Pa"),
+    ]
+    train, test = points_of(study, problem), points_of(study, problem, test=True)
+    assert (train.shape, test.shape) == ((12, 5), (8, 5))
+    # each column is of a body of its own, and those of the test are others
+    assert len({tuple(x) for x in train[:, 3:]}) == 4
+    assert not {tuple(x) for x in train[:, 3:]} & {tuple(x) for x in test[:, 3:]}
+    assert problem.member(train[0, 3:]).body.geometry.layers[0][1] == pytest.approx(train[0, 3])
+
+
+def test_what_can_vary_is_told_where_a_path_names_nothing(tmp_path):
+    study = read_study(study_file(tmp_path, FAMILY.replace("muscle.young", "bone.young")))
+    with pytest.raises(UsageError, match="Its regions are fat, muscle"):
+        problem_of(study)
 
 
 def test_a_touch_study_takes_another_name():

@@ -113,19 +113,31 @@ def to_toml(study: AnyStudy) -> str:
         elif isinstance(value, tuple):
             for item in value:
                 lines += ["", f"# {_purpose(item)}", f"[[{name}]]", *_scalars(item)]
+            if not value and (item := _rows_of(type(study), name)):
+                lines += ["", f"# {_purpose(item)}", f"# [[{name}]]", *_example(item)]
     return "\n".join(lines) + "\n"
 
 
-def _purpose(record: BaseModel) -> str:
-    return (type(record).__doc__ or "").strip().splitlines()[0]
+def _purpose(record: BaseModel | type[BaseModel]) -> str:
+    return (record.__doc__ or "").strip().splitlines()[0]
+
+
+def _rows_of(record: type[BaseModel], name: str) -> type[BaseModel] | None:
+    """The record that a list of tables is of; None of other keys."""
+    kinds = get_args(record.model_fields[name].annotation)
+    return next((k for k in kinds if isinstance(k, type) and issubclass(k, BaseModel)), None)
+
+
+def _example(record: type[BaseModel]) -> Iterator[str]:
+    """Commented keys of a table that may stand there."""
+    for name, field in record.model_fields.items():
+        yield f"# {name} = {_toml((field.examples or [''])[0])}  # {field.description}"
 
 
 def _scalars(record: BaseModel) -> Iterator[str]:
     for name, field in type(record).model_fields.items():
         value = getattr(record, name)
-        if isinstance(value, BaseModel) or (
-            isinstance(value, tuple) and value and isinstance(value[0], BaseModel)
-        ):
+        if isinstance(value, BaseModel) or (isinstance(value, tuple) and _rows_of(type(record), name)):
             continue
         if isinstance(value, dict):
             if value:

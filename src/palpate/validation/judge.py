@@ -20,16 +20,16 @@ from palpate.validation.strokes import Smoothness
 __all__ = ["SURROGATE_FIXES", "checks", "figures", "surrogate_figures"]
 
 _MORE = (
-    "Learn from more solves, placed where the worst cases are, or let learning take longer (`seconds` and `units_max` "
-    "of learn_surrogate)."
+    "Learn from more solves, placed where the worst cases are, or let learning take longer: `samples` in [sweep], "
+    "`seconds` and `units_max` in [learning], or of learn_surrogate."
 )
-SURROGATE_FIXES = dict.fromkeys(
-    ("force_median", "force_p95", "light_force_p95", "stiffness_p95", "direction_p95"), _MORE
-) | {
+_LEARNT = ("force_median", "force_p95", "light_force_p95", "stiffness_p95", "direction_p95")
+_SHAPE = ("displacement_mean", "displacement_max")
+SURROGATE_FIXES = dict.fromkeys((*_LEARNT, *_SHAPE), _MORE) | {
     "loop_work": "The force is not the gradient of an energy: learn the energy and take its gradient, as a "
     "TouchSurrogate does."
 }
-"""What to do about a miss of a touch surrogate, where no study file is at hand."""
+"""What to do about a miss of a touch surrogate, with a study file or without."""
 
 Figure = tuple[float, Worst | None]
 Possible = tuple[float | None, Worst | None]

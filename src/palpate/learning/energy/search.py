@@ -204,22 +204,25 @@ class Search:
         return state.theta
 
     def grow(self, begin: Refined, units_max: int, target: float) -> None:
-        """Sizes upwards from a network, each from the last one and more units, the filter's, and random ones."""
+        """Sizes upwards from a network, each from the last one and more units, and random ones; first the filter's."""
         best, error, regressors = begin, self.problem.missed(begin).mean, begin.regressors
-        most = min(units_max, self.problem.room(regressors))
-        for h in _sizes(len(begin.theta), most):
-            for start, theta in self._starts(best, regressors, h):
+        sizes = _sizes(len(begin.theta), min(units_max, self.problem.room(regressors)))
+        for h in sizes:
+            for start, theta in self._starts(best, regressors, h, filtered=h == sizes[0]):
                 if self.left <= 0 or error <= target:
                     return
                 found, missed = self.tried(theta, regressors, start)
                 if missed < error:
                     best, error = found, missed
 
-    def _starts(self, best: Refined, regressors: Regressors, h: int) -> Iterator[tuple[str, np.ndarray]]:
+    def _starts(
+        self, best: Refined, regressors: Regressors, h: int, *, filtered: bool
+    ) -> Iterator[tuple[str, np.ndarray]]:
         more = h - len(best.theta)
         if more > 0:
             yield "grown", np.vstack([best.theta, self.random(regressors, more)])
-        if h >= 4 and (units := self.filtered(regressors, h)).size:
+        # a start of the filter is as good as a random one, and of many solves takes as long as several of these
+        if filtered and h >= 4 and (units := self.filtered(regressors, h)).size:
             yield "filter", units
         yield "random", self.random(regressors, h)
 

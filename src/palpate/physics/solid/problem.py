@@ -222,8 +222,10 @@ class SolidProblem:
         """
         return self.open().solve(x, dt=dt, fields=fields)
 
-    def design(self, samples: int, seed: int = 0) -> np.ndarray:
+    def design(self, samples: int, seed: int = 0, **options: Any) -> np.ndarray:
         """Inputs (samples, n) that this problem solves well, in the order of its chains.
+
+        `options` are those of the interaction's own design, such as a probe's `depths`.
 
         Raises
         ------
@@ -237,7 +239,7 @@ class SolidProblem:
                 why="Only a single interaction such as a probe knows the order in which it is solved well.",
                 fix="Choose a design such as sobol over its ranges.",
             )
-        return np.asarray(planned.design(self.body.geometry, samples, seed))
+        return np.asarray(planned.design(self.body.geometry, samples, seed, **options))
 
     def chains(self, points: Any) -> list[np.ndarray]:
         """Rows of `points` (N, n) to be solved one after the other by one solver, chain by chain."""

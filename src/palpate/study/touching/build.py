@@ -9,6 +9,7 @@ import numpy as np
 from palpate.physics import (
     Block,
     Body,
+    BodyFamily,
     Cylinder,
     Dome,
     Inclusion,
@@ -16,8 +17,10 @@ from palpate.physics import (
     NeoHookean,
     Organ,
     SphereProbe,
+    Varied,
     named_material,
 )
+from palpate.physics.solid import FamilyProblem
 from palpate.physics.solid.problem import SolidProblem
 from palpate.physics.solid.symmetry import fundamental_part
 from palpate.study.touching.records import TouchStudy
@@ -74,20 +77,20 @@ def probe_of(study: TouchStudy) -> SphereProbe:
     return SphereProbe(p.radius, touches=p.touches, pad=p.pad, stop=p.stop, depth=p.depth, over=p.over)
 
 
-def problem_of(study: TouchStudy, *, whole: bool = False) -> SolidProblem:
-    """Body under probe; over the part that is solved, unless the `whole` is asked for."""
+def problem_of(study: TouchStudy, *, whole: bool = False) -> SolidProblem | FamilyProblem:
+    """Body or family under the probe; over the part that is solved, unless the `whole` is asked for."""
     body, probe = solid_of(study), probe_of(study)
     if study.sweep.symmetric and not whole:
         probe = fundamental_part(body, probe)
-    return body.problem(probe, element=study.sweep.element)
+    varied = tuple(Varied(one.path, one.low, one.high) for one in study.varied)
+    family = BodyFamily(body, varied) if varied else body
+    return family.problem(probe, element=study.sweep.element)
 
 
-def points_of(study: TouchStudy, problem: SolidProblem, *, test: bool = False) -> np.ndarray:
-    """Positions (N, 3) of the ball's centre in m, column by column: to learn from, or to test with."""
+def points_of(study: TouchStudy, problem: SolidProblem | FamilyProblem, *, test: bool = False) -> np.ndarray:
+    """Inputs (N, n), of which the first 3 are the ball's centre in m, column by column: to learn from, or to test."""
     part = study.test if test else study.sweep
-    probe = problem.interactions[0]
-    assert isinstance(probe, SphereProbe)
-    return probe.design(problem.body.geometry, part.samples, part.seed, part.depths)
+    return problem.design(part.samples, part.seed, depths=part.depths)
 
 
 def limits_of(study: TouchStudy) -> Limits:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from palpate.errors import UsageError
 from palpate.learning.bodies.touches import FEWEST
 from palpate.physics.geometry.groups import members
+from palpate.physics.solid.varied import UNITS
 from palpate.study.record import Metres, PadStiffness, Record, RuntimeRecord
 from palpate.study.touching.shapes import ShapeRecord, known_material
+from palpate.units import to_si
 
 __all__ = [
     "ProbeRecord",
@@ -18,6 +21,7 @@ __all__ = [
     "TouchSweepRecord",
     "TouchTargetRecord",
     "TouchTestRecord",
+    "VariedRecord",
     "known_material",
 ]
 
@@ -44,6 +48,36 @@ class ProbeRecord(Record):
             raise ValueError(f"the depth {self.depth[0]:g} … {self.depth[1]:g} m is no range from 0 on")
         if self.over and not all(a < b for a, b in zip(*self.over, strict=True)):
             raise ValueError("the corners of `over` are not in order: the lower one comes first")
+        return self
+
+
+class VariedRecord(Record):
+    """A number of the body or of the ball that is an input beside the position: one model of a family of bodies."""
+
+    path: str = Field(
+        min_length=1,
+        description="REGION.young or another number of its material, LAYER.thickness, or probe.radius",
+        examples=["fat.young"],
+    )
+    low: float = Field(description='its least value, in SI units or such as "2 kPa"', examples=["2 kPa"])
+    high: float = Field(description="its largest value, likewise", examples=["8 kPa"])
+
+    @field_validator("low", "high", mode="before")
+    @classmethod
+    def _in_si(cls, value: Any, info: ValidationInfo) -> Any:
+        """A quantity in the unit of what varies."""
+        unit = UNITS.get(str(info.data.get("path", "")).rpartition(".")[2], "")
+        if not isinstance(value, str):
+            return value
+        try:
+            return to_si(value, unit)
+        except UsageError as error:
+            raise ValueError(str(error).replace("\n", " ")) from error
+
+    @model_validator(mode="after")
+    def _in_order(self) -> VariedRecord:
+        if not self.low < self.high:
+            raise ValueError(f"{self.low:g} … {self.high:g} is no range: low is less than high")
         return self
 
 
@@ -110,6 +144,7 @@ class TouchStudy(Record):
     )
     body: Annotated[ShapeRecord, Field(discriminator="kind")]
     probe: ProbeRecord = ProbeRecord()
+    varied: tuple[VariedRecord, ...] = Field((), description="what makes a family of bodies, if anything")
     sweep: TouchSweepRecord = TouchSweepRecord()
     test: TouchTestRecord = TouchTestRecord()
     learning: TouchLearningRecord = TouchLearningRecord()
@@ -124,9 +159,12 @@ class TouchStudy(Record):
         return value
 
     @model_validator(mode="after")
-    def _surfaces_exist(self) -> TouchStudy:
+    def _parts_fit_together(self) -> TouchStudy:
         known = self.body.surface_names()
         for name in (self.probe.touches, *self.body.fixed_names()):
             if not members(name, known):
                 raise ValueError(f"a {self.body.kind} has no surface {name!r}; it has {', '.join(known)}")
+        paths = [one.path for one in self.varied]
+        if len(set(paths)) < len(paths):
+            raise ValueError(f"of {', '.join(paths)} one varies twice")
         return self

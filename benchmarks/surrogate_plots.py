@@ -1,75 +1,108 @@
-"""Curves of error against the number of solves, from what the benchmark wrote as JSON.
+"""Error against the number of solves, a panel for each study, from what the benchmark wrote as JSON.
 
 python -m benchmarks --only surrogates --json > figures.json
-python -m benchmarks.surrogate_plots figures.json docs/images
+python -m benchmarks.surrogate_plots figures.json docs/images/surrogates.png
 """
 
 from __future__ import annotations
 
 import json
+import math
 import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+from benchmarks.surrogate_measure import OURS, SIZES, SPRINGS
+from benchmarks.touch_studies import STUDIES
 
 __all__ = ["curves"]
 
 MARKERS = "osD^vP"
+ACROSS = 3
+Table = dict[str, Any]
 
 
-def curves(rows: list[dict[str, Any]], springs: dict[str, Any] | None, title: str, path: Path) -> None:
-    """Median and 95th percentile of the force error of every method, as a PNG.
+def curves(tables: Mapping[str, Table], path: Path) -> None:
+    """The 95th percentile of the force error of every method, study by study, as a PNG.
 
     Parameters
     ----------
-    rows : list of mappings
-        Of the curve's table.
-    springs : mapping, optional
-        The row of springs, which do not improve with more solves.
-    title : str
+    tables : mapping of name to table
+        As plain data, of one run or of several; those that are no curves are passed over but for the springs.
     path : Path
     """
-    from matplotlib import pyplot
-    from matplotlib.ticker import LogLocator
-
-    figure, axes = pyplot.subplots(1, 2, figsize=(8.4, 3.4), sharex=True, layout="constrained")
-    for axis, key, name in zip(axes, ("median", "p95"), ("median", "95th percentile"), strict=True):
-        for row, marker in zip(rows, MARKERS, strict=False):
-            sizes = sorted(int(k.removesuffix(f"_{key}")) for k in row if k.endswith(f"_{key}"))
-            ours = row["method"] == "palpate"
-            axis.loglog(
-                sizes,
-                [100 * row[f"{n}_{key}"] for n in sizes],
-                marker=marker,
-                markersize=4,
-                color="black" if ours else None,
-                linewidth=2.2 if ours else 1.2,
-                label=row["method"],
-            )
-        if springs is not None:
-            axis.axhline(100 * springs[key], color="grey", linestyle="--", label=springs["method"])
-        axis.set(xlabel="training solves", ylabel="force error, %", title=f"{title}: {name}")
-        axis.set_xticks(sizes, [str(n) for n in sizes])
-        axis.set_xticks((), minor=True)
-        axis.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-        axis.yaxis.set_major_formatter("{x:g}")
-        axis.yaxis.set_minor_formatter("")
-        axis.grid(visible=True, which="both", alpha=0.3)
-    axes[1].legend(fontsize="x-small")
-    figure.savefig(path, dpi=80)
-    pyplot.close(figure)
-
-
-def _main(source: str, folder: str) -> int:
     import matplotlib as mpl
 
     mpl.use("agg")
-    tables = {t["name"]: t for t in json.loads(Path(source).read_text(encoding="utf-8"))["tables"]}
-    for name, table in tables.items():
-        if name.endswith("-curve"):
-            study = name.removeprefix("surrogates-").removesuffix("-curve")
-            beside = tables.get(f"surrogates-{study}-rivals", {"rows": []})["rows"]
-            springs = next((r for r in beside if r["method"].startswith("mass")), None)
-            curves(table["rows"], springs, study, Path(folder) / f"surrogates-{study}.png")
+    from matplotlib import pyplot
+
+    names = [name for name in STUDIES if _of(name, "-curve") in tables]
+    down = math.ceil(len(names) / ACROSS)
+    figure, grid = pyplot.subplots(
+        down,
+        ACROSS,
+        figsize=(10.5, 2.9 * down),
+        layout="constrained",
+        squeeze=False,
+        sharex=True,
+        sharey=True,
+    )
+    lines: dict[str, Any] = {}
+    for name, axis in zip(names, grid.flat, strict=False):
+        beside = tables.get(_of(name, "-rivals"), {"rows": []})["rows"]
+        lines |= _panel(axis, name, tables[_of(name, "-curve")]["rows"], beside)
+    spare = list(grid.flat)[len(names) :]
+    for axis in spare:
+        axis.axis("off")
+    for axis in grid.flat:
+        axis.tick_params(labelbottom=True)
+    place = {"handles": list(lines.values()), "labels": list(lines), "fontsize": "small"}
+    if spare:
+        spare[0].legend(**place, loc="center", frameon=False)
+    else:
+        figure.legend(**place, loc="outside lower center", ncols=4)
+    figure.savefig(path, dpi=90)
+    pyplot.close(figure)
+
+
+def _of(study: str, kind: str) -> str:
+    return f"surrogates-{study}{kind}"
+
+
+def _panel(axis: Any, name: str, rows: Sequence[Table], beside: Sequence[Table]) -> dict[str, Any]:
+    """One study; its lines by name."""
+    from matplotlib.ticker import LogLocator
+
+    lines = {}
+    for row, marker in zip(rows, MARKERS, strict=False):
+        sizes = sorted(int(k.removesuffix("_p95")) for k in row if k.endswith("_p95"))
+        look: Table = {"color": "black", "linewidth": 2.2, "zorder": 3} if row["method"] == OURS else {}
+        errors = [100 * row[f"{n}_p95"] for n in sizes]
+        (lines[row["method"]],) = axis.loglog(
+            sizes, errors, **{"marker": marker, "markersize": 4, "linewidth": 1.2, **look}
+        )
+    for row in beside:
+        if row["method"] == SPRINGS:
+            lines[SPRINGS] = axis.axhline(100 * row["p95"], color="grey", linestyle="--")
+    study = STUDIES[name]
+    (lines["asked"],) = axis.plot(
+        study.wanted, 100 * study.target[1], "*", color="red", markersize=11, zorder=4
+    )
+    axis.set(title=name, xlabel="training solves")
+    axis.set_xticks(SIZES, [str(n) for n in SIZES])
+    axis.set_xticks((), minor=True)
+    axis.set_ylabel("force error, p95, %" if axis.get_subplotspec().is_first_col() else "")
+    axis.yaxis.set_major_locator(LogLocator())
+    axis.yaxis.set_major_formatter("{x:g}")
+    axis.grid(visible=True, which="both", alpha=0.25)
+    return lines
+
+
+def _main(*arguments: str) -> int:
+    *sources, picture = arguments
+    found = [json.loads(Path(one).read_text(encoding="utf-8"))["tables"] for one in sources]
+    curves({table["name"]: table for tables in found for table in tables}, Path(picture))
     return 0
 
 

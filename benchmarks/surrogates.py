@@ -29,7 +29,7 @@ from palpate.validation.words import shown
 
 __all__ = ["tables"]
 
-SECONDS, LOOPS = 20.0, 20
+SECONDS, LOOPS = 60.0, 20
 QUICK_SECONDS, QUICK_SIZE = 1.0, 10
 STIFFNESS = 0.04  # asked for on the block
 

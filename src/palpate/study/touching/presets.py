@@ -32,7 +32,7 @@ TOUCHED: dict[str, dict[str, Any]] = {
             ),
         },
         "probe": {"depth": (2e-4, 0.012), "over": ((0.02, 0.02), (0.08, 0.08))},
-        "sweep": {"samples": 80, "depths": 3},
+        "sweep": {"samples": 80, "depths": 3, "element": 0.0025},  # two through the skin
     },
     "breast-dome": {
         "body": {

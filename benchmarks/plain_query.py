@@ -115,8 +115,11 @@ def _microseconds(
     return 1e6 * best
 
 
-def _example(units: int = 40, inputs: int = 3) -> TouchSurrogate:
-    """A plane touched by a sphere of 10 mm, with random rotated units, 512 training inputs and a posterior."""
+def example(units: int = 40, inputs: int = 3, rank: int | None = None) -> TouchSurrogate:
+    """A plane touched by a sphere of 10 mm, with random rotated units, 512 training inputs and a posterior.
+
+    Its `rank` is the number of weights by default; with a symmetry those of one orbit are one.
+    """
     from palpate.network import Network, Scaling, TrainedRegion
     from palpate.surrogates import ContactLaw, TouchedSurface
     from palpate.units import Quantity, Range
@@ -147,7 +150,7 @@ def _example(units: int = 40, inputs: int = 3) -> TouchSurrogate:
         surface,
         radius=0.01,
         region=TrainedRegion.of(rng.uniform(-1, 1, (512, inputs))),
-        root=0.01 * rng.normal(size=(1 + inputs + units, 1 + inputs + units)),
+        root=0.01 * rng.normal(size=(1 + inputs + units, rank or 1 + inputs + units)),
     )
 
 
@@ -156,7 +159,7 @@ def main() -> None:
     names = ("units", "inputs", "answer µs", "plain", "ratio", "trust µs", "plain", "ratio")
     print("  ".join(f"{name:>9}" for name in names))
     for units, inputs in ((10, 3), (40, 3), (40, 6), (100, 3)):
-        surrogate = _example(units, inputs)
+        surrogate = example(units, inputs)
         low, high = bounds(surrogate.inputs)
         X = np.random.default_rng(2).uniform(low, high, (1000, inputs))
         X[:, 2] = np.linspace(0.009, -0.001, len(X))

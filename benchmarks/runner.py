@@ -93,7 +93,10 @@ def _parser(only: str | None) -> argparse.ArgumentParser:
     parser.add_argument("--into", type=Path, metavar="FILE", help="replace the blocks in this Markdown file")
     if only in {None, "surrogates"}:
         parser.add_argument(
-            "--study", nargs="+", metavar="NAME", help="of the surrogates: some of the studies"
+            "--study",
+            nargs="+",
+            metavar="NAME",
+            help="of the surrogates: some of the studies, query or relaxation",
         )
     else:
         parser.set_defaults(study=None)

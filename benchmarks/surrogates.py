@@ -1,6 +1,6 @@
 """Surrogates of touched bodies: error against the number of solves, beside every rival; what a hand feels; time.
 
-python -m benchmarks --only surrogates [--study block layered] [--quick] [--json | --markdown] [--into FILE]
+python -m benchmarks --only surrogates [--study block layered query] [--quick] [--json | --markdown] [--into FILE]
 python -m benchmarks.surrogate_plots figures.json docs/images      the curves, from what --json wrote
 
 Data come from ``benchmarks/data``, made by `benchmarks.touch_data`; a study without a file is left out.
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -32,18 +32,25 @@ __all__ = ["tables"]
 SECONDS, LOOPS = 60.0, 20
 QUICK_SECONDS, QUICK_SIZE = 1.0, 10
 STIFFNESS = 0.04  # asked for on the block
+# what is of no study, by the name on the command line
+BESIDE: dict[str, Callable[[bool], list[Table]]] = {
+    "query": lambda quick: [query_table(quick)],
+    "relaxation": relaxation_table,
+}
 
 
 def tables(*, quick: bool = False, studies: Sequence[str] = ()) -> list[Table]:
     """The tables; `quick` learns the block once, from few solves, for a second, without springs."""
     found: list[Table] = []
-    for name in studies or (("block",) if quick else STUDIES):
+    for name in studies or (*(("block",) if quick else STUDIES), *BESIDE):
+        if name in BESIDE:
+            found += BESIDE[name](quick)
+            continue
         case = Case.load(name)
         if case is None:
             print(f"no data for {name}", file=sys.stderr)
             continue
         found += _study(case, quick)
-    found += [] if studies else [query_table(quick), *relaxation_table(quick)]
     return found
 
 

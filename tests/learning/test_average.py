@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -42,12 +43,6 @@ def search():
     return search
 
 
-def best_of(search, regressors):
-    """Networks of a kind, the best first."""
-    ordered = sorted(search.found, key=lambda one: one[0])
-    return [one for _, one in ordered if one.regressors.radial == regressors.radial]
-
-
 def answers(found, X):
     """Of a mean's units and tail (N, 1)."""
     of = found.regressors
@@ -57,21 +52,19 @@ def answers(found, X):
 def test_a_mean_answers_what_its_networks_do_on_average(search):
     found = average(search, 4)
     assert found.networks > 1
-    same = best_of(search, found.regressors)
     X = np.random.default_rng(5).uniform(-1, 1, (30, 2))
     answer = answers(found, X)
-    members = [one.predict(X) for one in same[: found.networks]]
+    members = [one.predict(X) for one in found.members]
     np.testing.assert_allclose(answer, np.mean(members, axis=0), rtol=1e-10, atol=1e-12)
 
 
 def test_what_a_mean_misses_of_a_solve_left_out_is_the_mean_of_what_its_networks_miss(search):
     found = average(search, 4)
-    same = best_of(search, found.regressors)
-    missed = np.mean([search.problem.missed(one).errors for one in same[: found.networks]], axis=0)
-    rows = search.problem.missed(same[0]).rows
+    missed = np.mean([search.problem.missed(one).errors for one in found.members], axis=0)
+    rows = search.problem.missed(found.members[0]).rows
     by_solve = [np.linalg.norm(missed[rows.samples == i]) for i in range(25)]
     assert found.error == pytest.approx(np.mean(by_solve), rel=1e-9)
-    alone = [error for error, one in search.found if one in same[: found.networks]]
+    alone = [error for error, one in search.found if any(one is member for member in found.members)]
     assert found.error < np.mean(alone)
     assert found.error <= 1.1 * search.error  # of the best network alone
 
@@ -80,8 +73,7 @@ def test_unseen_answers_are_nearer_than_the_networks_on_average(search):
     """The error of a mean is below the mean of the squared errors, by what its networks differ (Krogh & Vedelsby)."""
     found = average(search, 4)
     X, rows = waves(200, 1)
-    same = best_of(search, found.regressors)
-    squares = [np.mean((one.predict(X) - rows["Y"]) ** 2) for one in same[: found.networks]]
+    squares = [np.mean((one.predict(X) - rows["Y"]) ** 2) for one in found.members]
     answer = answers(found, X)
     assert np.mean((answer - rows["Y"]) ** 2) < np.mean(squares)
 
@@ -90,6 +82,18 @@ def test_one_network_is_the_best(search):
     found = average(search, 1)
     assert (found.networks, found.error) == (1, search.error)
     np.testing.assert_array_equal(found.theta, search.best.theta)
+
+
+def test_the_second_network_is_that_with_which_the_mean_misses_least(search):
+    found = average(search, 2)
+    best = found.members[0]
+    same = [one for _, one in search.found if one.regressors.radial == best.regressors.radial]
+    alone = search.problem.missed(best)
+
+    def missed(other):
+        return replace(alone, errors=(alone.errors + search.problem.missed(other).errors) / 2).mean
+
+    assert found.error == pytest.approx(min(missed(one) for one in same if one is not best), rel=1e-12)
 
 
 def test_no_more_units_than_a_query_has_time_for(search):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from palpate.learning.units.regressors import Regressors
 __all__ = ["Average", "average"]
 
 _AS_GOOD = 1.1  # the error of solves left out flatters the one network that it has chosen
+_POOL = 16  # of a kind: further ones miss too much
 _UNITS = 320  # of a mean, images counted: a query costs about 25 ns for each
 
 
@@ -27,21 +29,36 @@ class Average:
 
     Attributes
     ----------
-    regressors : Regressors
-    theta : (h, p)
-        Units of all of them, the best one's first.
-    coefficients : (p_t + h, 1)
+    members : tuple of Refined
+        The best one first.
     left_out : LeftOut
         Rows and fit of the best one, and what the mean misses of solves that are left out.
-    networks : int
-        How many.
     """
 
-    regressors: Regressors
-    theta: np.ndarray
-    coefficients: np.ndarray
+    members: tuple[Refined, ...]
     left_out: LeftOut
-    networks: int
+
+    @property
+    def networks(self) -> int:
+        """How many."""
+        return len(self.members)
+
+    @property
+    def regressors(self) -> Regressors:
+        """Of all of them."""
+        return self.members[0].regressors
+
+    @cached_property
+    def theta(self) -> np.ndarray:
+        """Units (h, p) of all of them, the best one's first."""
+        return np.vstack([one.theta for one in self.members])
+
+    @cached_property
+    def coefficients(self) -> np.ndarray:
+        """Of tail and units (p_t + h, 1)."""
+        tails = np.mean([one.tail for one in self.members], axis=0)
+        weights = np.vstack([one.weights for one in self.members]) / self.networks
+        return np.vstack([tails, weights])
 
     @property
     def error(self) -> float:
@@ -50,43 +67,34 @@ class Average:
 
 
 def average(search: Search, most: int, units: int = _UNITS) -> Average:
-    """The mean of networks of that kind of which the best 1, 2, … or `most` miss least of what is left out.
+    """The mean of 1, 2, … or `most` networks of one kind that misses least of what is left out.
 
-    It is of as many as miss no more than a tenth more than these, and have no more than `units`, images counted.
+    To the best network of a kind is added, one after another, the one with which the mean misses least (Caruana,
+    Niculescu-Mizil, Crew & Ksikes 2004): one that errs elsewhere, where the next best often only grew from the best.
+    It is of as many as miss no more than a tenth more than the least, and have no more than `units`, images counted.
     """
     kinds: dict[tuple[str, str], list[tuple[float, Refined]]] = defaultdict(list)
     for error, found in search.found:
         kinds[found.regressors.form.name, found.regressors.radial].append((error, found))
     images = search.problem.images
     copies = 1 if images is None else len(images.turns)
-    means = [
-        _means(search.problem, sorted(same, key=lambda one: one[0])[:most], units // copies)
-        for same in kinds.values()
-    ]
-    least, kind = min((min(one.mean for one in kind), i) for i, kind in enumerate(means))
-    count = max(k for k, one in enumerate(means[kind], 1) if one.mean <= _AS_GOOD * least)
-    ordered = sorted(list(kinds.values())[kind], key=lambda one: one[0])
-    return _together(means[kind][count - 1], [found for _, found in ordered[:count]])
+    means = [_means(search.problem, same, most, units // copies) for same in kinds.values()]
+    least, kind = min((min(one.error for one in kind), i) for i, kind in enumerate(means))
+    return next(one for one in reversed(means[kind]) if one.error <= _AS_GOOD * least)
 
 
-def _means(problem: Problem, best: list[tuple[float, Refined]], units: int) -> list[LeftOut]:
-    """What the means of the best 1, 2, … networks miss, while they have no more than so many units."""
-    means: list[LeftOut] = []
-    size = 0
-    for _, found in best:
-        size += len(found.theta)
-        if means and size > units:
+def _means(problem: Problem, same: list[tuple[float, Refined]], most: int, units: int) -> list[Average]:
+    """Means of 1, 2, … networks of a kind, while they have no more than so many units."""
+    pool = [found for _, found in sorted(same, key=lambda one: one[0])[:_POOL]]
+    alone = [problem.missed(found) for found in pool]
+    chosen, means = [0], [Average((pool[0],), alone[0])]
+    while len(chosen) < most:
+        left, k = units - sum(len(pool[i].theta) for i in chosen), len(chosen)
+        fitting = [i for i in range(len(pool)) if i not in chosen and len(pool[i].theta) <= left]
+        if not fitting:
             break
-        one, k = problem.missed(found), len(means)
-        means.append(
-            one if not k else replace(means[-1], errors=(k * means[-1].errors + one.errors) / (k + 1))
-        )
+        sums = means[-1].left_out.errors * k
+        tried = {i: replace(alone[0], errors=(sums + alone[i].errors) / (k + 1)) for i in fitting}
+        chosen.append(min(tried, key=lambda i: tried[i].mean))
+        means.append(Average(tuple(pool[i] for i in chosen), tried[chosen[-1]]))
     return means
-
-
-def _together(left_out: LeftOut, networks: list[Refined]) -> Average:
-    k, tail = len(networks), len(networks[0].coefficients) - len(networks[0].theta)
-    weights = np.vstack([one.coefficients[tail:] for one in networks]) / k
-    tails = sum(one.coefficients[:tail] for one in networks) / k
-    theta = np.vstack([one.theta for one in networks])
-    return Average(networks[0].regressors, theta, np.vstack([tails, weights]), left_out, k)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from benchmarks.surrogate_cases import Case
-from benchmarks.surrogate_rivals import cubic_rbf
+from benchmarks.surrogate_rivals import Predictor, cubic_rbf
 from benchmarks.table import Claim, Column, Table
 from palpate.learning.fields import learn_field
 from palpate.units import bounds
@@ -31,9 +32,14 @@ def field_table(case: Case, size: int, seconds: float, mark: str) -> list[Table]
         return []
     X, truth = case.arrays["inputs"], u[test]
     rows = []
-    for name, of in (("palpate", _ours), ("POD + cubic RBF", _pod)):
+    columns = case.arrays["column"][train]
+    methods: dict[str, Callable[[], Predictor]] = {
+        "palpate": lambda: _ours(case, X[train], u[train], columns, seconds),
+        "POD + cubic RBF": lambda: _pod(case, X[train], u[train]),
+    }
+    for name, learnt in methods.items():
         begun = time.process_time()
-        answer = of(case, X[train], u[train], case.arrays["column"][train], seconds)(X[test])
+        answer = learnt()(X[test])
         distance = np.linalg.norm(answer - truth, axis=2)
         rows.append(
             {
@@ -69,7 +75,7 @@ def field_table(case: Case, size: int, seconds: float, mark: str) -> list[Table]
     ]
 
 
-def _ours(case: Case, X: np.ndarray, u: np.ndarray, columns: np.ndarray, seconds: float) -> Any:
+def _ours(case: Case, X: np.ndarray, u: np.ndarray, columns: np.ndarray, seconds: float) -> Predictor:
     points = case.arrays["nodes"]
     return learn_field(
         X,
@@ -86,7 +92,7 @@ def _ours(case: Case, X: np.ndarray, u: np.ndarray, columns: np.ndarray, seconds
     ).field.values
 
 
-def _pod(case: Case, X: np.ndarray, u: np.ndarray, columns: np.ndarray, seconds: float) -> Any:
+def _pod(case: Case, X: np.ndarray, u: np.ndarray) -> Predictor:
     """Modes by singular values, coefficients by cubic radial basis functions."""
     low, high = bounds(case.inputs)
     flat = u.reshape(len(u), -1)

@@ -16,7 +16,8 @@ from palpate.units import bounds
 
 __all__ = ["query_table"]
 
-UNITS, ORBITS = (40, 320), 44  # one network of a body without symmetry; the most that a mean of four has
+UNITS = (40, 320)  # one network of a body without symmetry; the most that a mean has
+WEIGHTS = 44  # of a posterior: those of 40 units and a tail; with a symmetry those of an orbit are one
 RATIO, ROUNDS = 0.7, 7
 FRAME = 1e6 / 60  # µs of a picture at 60 Hz
 Case = tuple[str, Callable[[], object], Callable[[], object], float]
@@ -26,8 +27,8 @@ def query_table(quick: bool) -> Table:
     """Microseconds of an answer both ways."""
     repeats = 50 if quick else 1000
     cases: list[Case] = []
-    for units in UNITS:
-        surrogate = example(units, rank=ORBITS)
+    surrogates = {units: example(units, rank=WEIGHTS) for units in UNITS}
+    for units, surrogate in surrogates.items():
         low, high = bounds(surrogate.inputs)
         c = (low + high) / 2
         c[2] = 0.004
@@ -58,8 +59,7 @@ def query_table(quick: bool) -> Table:
     for what, ours, other, about in cases:
         a, b = _least(ours, repeats), _least(other, max(1, repeats // 10))
         rows.append({"what": what, "ours": a, "plain": b, "ratio": a / b, "about": about})
-    for units in UNITS:
-        surrogate = example(units, rank=ORBITS)
+    for units, surrogate in surrogates.items():
         low, high = bounds(surrogate.inputs)
         places = np.random.default_rng(0).uniform(low, high, (NODES, len(low)))
         took = _least(partial(surrogate.deviation, places), 1)
@@ -84,7 +84,7 @@ def query_table(quick: bool) -> Table:
             ),
         ),
         (
-            f"rotated units, three inputs, 512 training inputs, a posterior of {ORBITS} weights; the field: 20 modes, "
+            f"rotated units, three inputs, 512 training inputs, a posterior of {WEIGHTS} weights; the field: 20 modes, "
             "a moving dimple; plain NumPy as one would write it from the formulas (benchmarks/plain_query.py, "
             "plain_field.py); CPU time, the least of seven runs",
         ),

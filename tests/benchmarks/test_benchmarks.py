@@ -10,7 +10,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from benchmarks.surrogate_plots import curves
 from benchmarks.surrogate_rivals import RIVALS
+from benchmarks.touch_studies import STUDIES
 
 ROOT = Path(__file__).parents[2]
 
@@ -142,6 +144,16 @@ def test_surrogates_are_measured_beside_every_rival(tables):
     # its force is a gradient, whatever was learnt
     assert found["palpate"]["loop"] < 1e-9
     assert found["cubic RBF (SciPy)"]["loop"] > 1e-6
+
+
+def test_curves_of_error_are_drawn_for_the_studies_that_were_measured(tables, tmp_path):
+    few, all_of = tmp_path / "few.png", tmp_path / "all.png"
+    curves(tables, few)
+    block = tables["surrogates-block-curve"]
+    curves({f"surrogates-{name}-curve": block for name in STUDIES}, all_of)
+    # a row of panels for each three studies
+    heights = [int.from_bytes(path.read_bytes()[20:24], "big") for path in (few, all_of)]
+    assert heights[1] == math.ceil(len(STUDIES) / 3) * heights[0]
 
 
 def test_documentation_holds_a_block_for_every_table(tables):

@@ -64,7 +64,7 @@ def test_what_a_mean_misses_of_a_solve_left_out_is_the_mean_of_what_its_networks
     rows = search.problem.missed(found.members[0]).rows
     by_solve = [np.linalg.norm(missed[rows.samples == i]) for i in range(25)]
     assert found.error == pytest.approx(np.mean(by_solve), rel=1e-9)
-    alone = [error for error, one in search.found if any(one is member for member in found.members)]
+    alone = [one.error for one in search.found if any(one.network is member for member in found.members)]
     assert found.error < np.mean(alone)
     assert found.error <= 1.1 * search.error  # of the best network alone
 
@@ -87,7 +87,8 @@ def test_one_network_is_the_best(search):
 def test_the_second_network_is_that_with_which_the_mean_misses_least(search):
     found = average(search, 2)
     best = found.members[0]
-    same = [one for _, one in search.found if one.regressors.radial == best.regressors.radial]
+    networks = [one.network for one in search.found]
+    same = [one for one in networks if one.regressors.radial == best.regressors.radial]
     alone = search.problem.missed(best)
 
     def missed(other):

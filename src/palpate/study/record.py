@@ -24,6 +24,7 @@ __all__ = [
     "SquareMetres",
     "Stiffness",
     "Unit",
+    "in_si",
 ]
 
 
@@ -40,14 +41,21 @@ class Unit:
     name: str
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_before_validator_function(partial(_in_si, unit=self.name), handler(source))
+        return core_schema.no_info_before_validator_function(partial(in_si, unit=self.name), handler(source))
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, _: GetJsonSchemaHandler) -> dict[str, Any]:
         text = f"a number in {self.name}, or a quantity with its unit, such as '1 {self.name}'"
         return {"anyOf": [{"type": "number"}, {"type": "string"}], "description": text}
 
 
-def _in_si(value: Any, unit: str) -> float:
+def in_si(value: Any, unit: str) -> float:
+    """A quantity of a study file as a number in this unit.
+
+    Raises
+    ------
+    ValueError
+        If it is none: pydantic collects these.
+    """
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise ValueError(f"{value!r} is not a quantity in {unit}")  # noqa: TRY004 - pydantic collects ValueError
     try:

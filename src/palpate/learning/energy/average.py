@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from palpate.learning.energy.search import LeftOut, Problem, Search
+from palpate.learning.energy.search import Found, LeftOut, Problem, Search
 from palpate.learning.refinement.refine import Refined
 from palpate.learning.units.regressors import Regressors
 
@@ -73,9 +73,10 @@ def average(search: Search, most: int, units: int = _UNITS) -> Average:
     Niculescu-Mizil, Crew & Ksikes 2004): one that errs elsewhere, where the next best often only grew from the best.
     It is of as many as miss no more than a tenth more than the least, and have no more than `units`, images counted.
     """
-    kinds: dict[tuple[str, str], list[tuple[float, Refined]]] = defaultdict(list)
-    for error, found in search.found:
-        kinds[found.regressors.form.name, found.regressors.radial].append((error, found))
+    kinds: dict[tuple[str, str], list[Found]] = defaultdict(list)
+    for found in search.found:
+        of = found.network.regressors
+        kinds[of.form.name, of.radial].append(found)
     images = search.problem.images
     copies = 1 if images is None else len(images.turns)
     means = [_means(search.problem, same, most, units // copies) for same in kinds.values()]
@@ -83,18 +84,19 @@ def average(search: Search, most: int, units: int = _UNITS) -> Average:
     return next(one for one in reversed(means[kind]) if one.error <= _AS_GOOD * least)
 
 
-def _means(problem: Problem, same: list[tuple[float, Refined]], most: int, units: int) -> list[Average]:
+def _means(problem: Problem, same: list[Found], most: int, units: int) -> list[Average]:
     """Means of 1, 2, … networks of a kind, while they have no more than so many units."""
-    pool = [found for _, found in sorted(same, key=lambda one: one[0])[:_POOL]]
-    alone = [problem.missed(found) for found in pool]
-    chosen, means = [0], [Average((pool[0],), alone[0])]
+    pool = sorted(same, key=lambda one: one.error)[:_POOL]
+    best = problem.missed(pool[0].network)
+    chosen, means = [pool.pop(0)], [best]
     while len(chosen) < most:
-        left, k = units - sum(len(pool[i].theta) for i in chosen), len(chosen)
-        fitting = [i for i in range(len(pool)) if i not in chosen and len(pool[i].theta) <= left]
+        left, sums = units - sum(len(one.network.theta) for one in chosen), means[-1].errors * len(chosen)
+        fitting = [one for one in pool if len(one.network.theta) <= left]
         if not fitting:
             break
-        sums = means[-1].left_out.errors * k
-        tried = {i: replace(alone[0], errors=(sums + alone[i].errors) / (k + 1)) for i in fitting}
-        chosen.append(min(tried, key=lambda i: tried[i].mean))
-        means.append(Average(tuple(pool[i] for i in chosen), tried[chosen[-1]]))
-    return means
+        tried = [replace(best, errors=(sums + one.errors) / (len(chosen) + 1)) for one in fitting]
+        least = int(np.argmin([one.mean for one in tried]))
+        chosen.append(fitting[least])
+        pool.remove(fitting[least])
+        means.append(tried[least])
+    return [Average(tuple(one.network for one in chosen[: i + 1]), mean) for i, mean in enumerate(means)]

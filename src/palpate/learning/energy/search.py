@@ -26,7 +26,7 @@ from palpate.learning.units.regressors import Regressors
 from palpate.learning.units.symmetric import Images, SymmetricRegressors
 from palpate.network.radial import RadialFunction
 
-__all__ = ["EnergyTrial", "LeftOut", "Problem", "Search"]
+__all__ = ["EnergyTrial", "Found", "LeftOut", "Problem", "Search"]
 
 _WIDTHS = (0.2, 1.0)  # of first units, in scaled inputs: from an edge's reach to the whole range
 _TOLERANCE = 1e-5
@@ -133,9 +133,27 @@ class LeftOut:
         return float(np.sqrt(squares / self.rows.scale**2) @ self.rows.scale**2 / self.rows.total)
 
 
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A network that was tried, and what it misses of solves that are left out.
+
+    Attributes
+    ----------
+    network : Refined
+    errors : (R, 1)
+        As in `LeftOut`, without the fit that takes a hundred times the memory.
+    error : float
+        Their mean over solves.
+    """
+
+    network: Refined
+    errors: np.ndarray
+    error: float
+
+
 @dataclass(eq=False)
 class Search:
-    """A search that keeps what it tried (`found`, with errors), and stops when its time is over.
+    """A search that keeps what it tried (`found`), and stops when its time is over.
 
     Attributes
     ----------
@@ -151,7 +169,7 @@ class Search:
 
     def __post_init__(self) -> None:
         self.trials: list[EnergyTrial] = []
-        self.found: list[tuple[float, Refined]] = []
+        self.found: list[Found] = []
         self.best: Refined | None = None
         self.error = np.inf
         self._rng = np.random.default_rng(self.seed)
@@ -167,8 +185,9 @@ class Search:
         """A refinement from a start, recorded, and its error."""
         begun = time.monotonic()
         found = self.problem.refined(theta, regressors, iterations=iterations, seconds=max(self.left, 0.1))
-        error = self.problem.missed(found).mean
-        self.found.append((error, found))
+        left_out = self.problem.missed(found)
+        error = left_out.mean
+        self.found.append(Found(found, left_out.errors, error))
         took = time.monotonic() - begun
         form, radial = regressors.form.name, regressors.radial
         self.trials.append(EnergyTrial(self.problem.law, form, radial, start, len(found.theta), error, took))
@@ -203,9 +222,12 @@ class Search:
                 state, _event = observe(state, seen, settings)
         return state.theta
 
-    def grow(self, begin: Refined, units_max: int, target: float) -> None:
-        """Sizes upwards from a network, each from the last one and more units, and random ones; first the filter's."""
-        best, error, regressors = begin, self.problem.missed(begin).mean, begin.regressors
+    def grow(self, begin: Refined, error: float, units_max: int, target: float) -> None:
+        """Sizes upwards from a network of a left-out `error`, each from the last one and more units, and random ones.
+
+        The first size begins with the filter's units too.
+        """
+        best, regressors = begin, begin.regressors
         sizes = _sizes(len(begin.theta), min(units_max, self.problem.room(regressors)))
         for h in sizes:
             for start, theta in self._starts(best, regressors, h, filtered=h == sizes[0]):

@@ -44,10 +44,10 @@ def searched(
         if not found or time.monotonic() < until:
             found.append(search.tried(search.random(of, h), of, "kind", 80))
     found.sort(key=lambda one: one[1])
-    for i, (one, _) in enumerate(found[:2]):
+    for i, (one, error) in enumerate(found[:2]):
         rest = search.deadline
         search.deadline = time.monotonic() + max(search.left, 0.0) / (len(found[:2]) - i)
-        search.grow(one, most, target)
+        search.grow(one, error, most, target)
         search.deadline = rest
     rng = np.random.default_rng([seed, len(found)])
     while search.left > 0 and search.error > target and search.best is not None and len(search.best.theta):

@@ -6,13 +6,11 @@ from typing import Annotated, Any
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from palpate.errors import UsageError
 from palpate.learning.bodies.touches import FEWEST
 from palpate.physics.geometry.groups import members
 from palpate.physics.solid.varied import UNITS
-from palpate.study.record import Metres, PadStiffness, Record, RuntimeRecord
+from palpate.study.record import Metres, PadStiffness, Record, RuntimeRecord, in_si
 from palpate.study.touching.shapes import ShapeRecord, known_material
-from palpate.units import to_si
 
 __all__ = [
     "ProbeRecord",
@@ -66,13 +64,7 @@ class VariedRecord(Record):
     @classmethod
     def _in_si(cls, value: Any, info: ValidationInfo) -> Any:
         """A quantity in the unit of what varies."""
-        unit = UNITS.get(str(info.data.get("path", "")).rpartition(".")[2], "")
-        if not isinstance(value, str):
-            return value
-        try:
-            return to_si(value, unit)
-        except UsageError as error:
-            raise ValueError(str(error).replace("\n", " ")) from error
+        return in_si(value, UNITS.get(str(info.data.get("path", "")).rpartition(".")[2], ""))
 
     @model_validator(mode="after")
     def _in_order(self) -> VariedRecord:

@@ -8,11 +8,14 @@ from pathlib import Path
 import numpy as np
 from linear_bodies import history, tip_data, tip_model
 
+from models import linear_network
+from palpate.surrogates import ContactLaw, Continuation, TouchSurrogate
+from palpate.units import Quantity, Range
 from palpate.validation import Chapter, SurrogateChapter, TouchSolves, validate, write_report
-from palpate.validation.report.surrogates.curves import curves
+from palpate.validation.report.surrogates.curves import curves, plot_curves
 from palpate.validation.report.surrogates.view import View, at_depth, feet
 from palpate.validation.words import bound
-from pressed import DEEPEST, INPUTS, RADIUS, force, places, solves, steady, surrogate
+from pressed import DEEPEST, INPUTS, RADIUS, A, B, face, force, places, solves, steady, surrogate
 
 HOSTILE = '<script>window.hacked = 1</script> $\\frac{1}$ "&amp;'
 
@@ -45,6 +48,25 @@ def test_a_flat_face_is_seen_from_above() -> None:
     assert view.labels() == ("x / mm", "y / mm")
     there = at_depth(S, view, X[:, :2], X[0], 0.004)
     np.testing.assert_allclose(there, np.column_stack([X[:, :2], np.full(50, RADIUS - 0.004)]), atol=1e-6)
+
+
+def test_of_a_family_it_is_told_which_body_is_shown(tmp_path: Path) -> None:
+    inputs = (*INPUTS, Range("young", 5e3, 15e3, "Pa"))
+    network = linear_network(list(inputs), [Quantity("ln U/U0")], np.array([[np.log(A), B * 0.02, 0, 0, 0]]))
+    S = TouchSurrogate(
+        *(network, ContactLaw("pad"), face(), RADIUS), continuation=Continuation.of(inputs, deepest=DEEPEST)
+    )
+    alike = columns()
+    X = np.hstack([alike.X, np.repeat([[6e3], [8e3], [1e4], [1.2e4]], 5, axis=0)])
+    X[4, 2] -= 1e-5  # the first column's last touch is the deepest
+    test = TouchSolves(X, alike.force, alike.energy, alike.stiffness)
+    legend = plot_curves(S, test).axes[0].get_legend()
+    told = [text.get_text().partition("; ")[2] for text in legend.get_texts()]
+    assert sorted(told) == ["young = 1.2e+04 Pa", "young = 1e+04 Pa", "young = 6000 Pa", "young = 8000 Pa"]
+    text = write_report(tmp_path / "f.html", [SurrogateChapter("f", S, test, validate(S, test))]).read_text(
+        "utf-8"
+    )
+    assert "The surrogate states no deviation. Shown for young = 6000 Pa." in text
 
 
 def test_both_kinds_of_bodies_stand_in_one_report(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from palpate.surrogates import TouchSurrogate
 from palpate.validation.report.style import figure, series
+from palpate.validation.report.surrogates.view import further
 from palpate.validation.solves import TouchSolves
 
 if TYPE_CHECKING:
@@ -76,9 +77,10 @@ def plot_curves(surrogate: TouchSurrogate, test: TouchSolves) -> Figure:
     depth, size = surrogate.depth(test.X), np.linalg.norm(test.force, axis=1)
     names = [r.name for r in surrogate.inputs[:3]]
     for curve, style in zip(drawn, series(len(drawn)), strict=True):
-        place = test.X[curve.rows[0], :3]
-        label = ", ".join(f"{n} = {1e3 * v:.1f}" for n, v in zip(names, place, strict=True)) + " mm"
-        axis.plot(1e3 * curve.depth, curve.force, label=label.replace("-", "−"), **style)
+        x = test.X[curve.rows[0]]
+        place = ", ".join(f"{n} = {1e3 * v:.1f}" for n, v in zip(names, x[:3], strict=True)) + " mm"
+        label = "; ".join(filter(None, (place.replace("-", "−"), further(surrogate, x))))
+        axis.plot(1e3 * curve.depth, curve.force, label=label, **style)
         axis.plot(1e3 * depth[curve.rows], size[curve.rows], "o", color=style["color"], markersize=4.5)
     axis.set_xlabel("depth of the probe into the surface at rest / mm")
     axis.set_ylabel("‖F‖ / N")

@@ -9,7 +9,7 @@ import numpy as np
 from palpate.surrogates import TouchSurrogate
 from palpate.validation.force import ForceSamples
 from palpate.validation.report.style import INK, figure, loads_map
-from palpate.validation.report.surrogates.view import View, at_depth, feet
+from palpate.validation.report.surrogates.view import View, at_depth, deepest, feet
 from palpate.validation.solves import TouchSolves
 
 if TYPE_CHECKING:
@@ -60,7 +60,10 @@ def _marks(places: np.ndarray, worst: np.ndarray, some: np.ndarray) -> dict[tupl
 
 
 def plot_trust(surrogate: TouchSurrogate, test: TouchSolves) -> Figure:
-    """Deviation of the force at half and at the full depth of the test; hatched where training ended."""
+    """Deviation of the force at half and at the full depth of the test; hatched where training ended.
+
+    Of a family it is that of the body with the deepest touch.
+    """
     fig, axes = figure(1, 2, size=(9.4, 3.7), sharex=True, sharey=True)
     fig.set_layout_engine("compressed")
     view, depth = View.of(surrogate, test.X), surrogate.depth(test.X)
@@ -69,12 +72,11 @@ def plot_trust(surrogate: TouchSurrogate, test: TouchSolves) -> Figure:
     more = MARGIN * (high - low).max()
     sides = [np.linspace(a - more, b + more, GRID) for a, b in zip(low, high, strict=True)]
     places = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 2)
-    like = test.X[int(np.argmax(depth))]
-    deepest = 0.98 * float(depth.max())
-    found = [_trusted(surrogate, at_depth(surrogate, view, places, like, s)) for s in (deepest / 2, deepest)]
+    like, full = deepest(surrogate, test.X), 0.98 * float(depth.max())
+    found = [_trusted(surrogate, at_depth(surrogate, view, places, like, s)) for s in (full / 2, full)]
     trained = np.concatenate([d[i == 1] for d, i in found])
     top = 2 * float(trained.max()) if trained.size else 1.0  # far outside it grows without bound
-    for axis, s, (deviation, inside) in zip(axes[0], (deepest / 2, deepest), found, strict=True):
+    for axis, s, (deviation, inside) in zip(axes[0], (full / 2, full), found, strict=True):
         _draw_trust(axis, sides, deviation, inside, top)
         axis.plot(*(1e3 * touched.T), ".", color=INK, markersize=2, alpha=0.35)
         axis.set_title(f"{1e3 * s:.1f} mm deep")

@@ -12,6 +12,7 @@ from palpate.validation.report.surrogates.chapter import SurrogateChapter
 from palpate.validation.report.surrogates.curves import plot_curves
 from palpate.validation.report.surrogates.maps import plot_errors, plot_trust
 from palpate.validation.report.surrogates.story import surrogate_story
+from palpate.validation.report.surrogates.view import deepest, further
 from palpate.validation.report.svg import Picture
 from palpate.validation.report.tables import flat, judged_rows, timing_rows
 from palpate.validation.solves import TouchFunction
@@ -52,6 +53,8 @@ def _pictures(chapter: SurrogateChapter, key: str) -> list[Picture]:
     trust = "Colour: standard deviation of the force that the surrogate states."
     if surrogate.root is None:
         trust = "The surrogate states no deviation."
+    if body := further(surrogate, deepest(surrogate, test.X)):
+        trust += f" Shown for {body}."
     return [
         picture(
             f"{key}-curves",

@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.surrogates import TouchSurrogate
 
-__all__ = ["View", "at_depth", "feet"]
+__all__ = ["View", "at_depth", "deepest", "feet", "further"]
 
 AXES = ("x", "y", "z")
 ALONG = 0.9  # cosine from which a direction of the view is called by an axis
@@ -49,6 +49,17 @@ def _label(direction: np.ndarray, otherwise: str) -> str:
     if abs(direction[i]) < ALONG:
         return f"{otherwise} the view / mm"
     return f"{'−' if direction[i] < 0 else ''}{AXES[i]} / mm"
+
+
+def deepest(surrogate: TouchSurrogate, X: np.ndarray) -> np.ndarray:
+    """The inputs (n,) of the deepest of the touches X (N, n)."""
+    return np.asarray(X[int(np.argmax(surrogate.depth(X)))])
+
+
+def further(surrogate: TouchSurrogate, x: np.ndarray) -> str:
+    """The inputs beyond the place at x (n,), in words: which body of a family it is; empty for one body."""
+    named = zip(surrogate.parameters, x[3:], strict=True)
+    return ", ".join(f"{r.name} = {value:.4g} {r.unit}".rstrip() for r, value in named)
 
 
 def feet(surrogate: TouchSurrogate, X: np.ndarray) -> np.ndarray:

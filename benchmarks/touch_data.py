@@ -208,11 +208,14 @@ def _solve(solver: Any, column: Column, options: argparse.Namespace) -> list[dic
 
 
 def join(study: str, files: Sequence[Path], out: Path) -> None:
-    """One file of all parts and roles, its displacements at no more than `NODES` nodes."""
+    """One file of all parts and roles, its displacements at no more than `NODES` nodes.
+
+    A joined file without displacements may be a part of a new one.
+    """
     parts = [dict(np.load(file)) for file in files]
-    wrong = [p for p in parts if json.loads(str(p["plan"]))["study"] != study]
+    wrong = [str(file) for file, part in zip(files, parts, strict=True) if _study_of(part) != study]
     if wrong:
-        raise SystemExit(f"not of {study}: {[str(p['plan']) for p in wrong]}")
+        raise SystemExit(f"not of {study}: {', '.join(wrong)}")
     keys = [k for k in PER_ROW if k != "displacement" and all(k in p for p in parts)]
     arrays: dict[str, Any] = {key: np.concatenate([p[key] for p in parts]) for key in keys}
     # order of columns, whichever part a column was in; training first
@@ -225,6 +228,17 @@ def join(study: str, files: Sequence[Path], out: Path) -> None:
     arrays["provenance"] = _provenance(study, parts)
     np.savez_compressed(out, **arrays)
     print(f"{out}: {len(order)} rows, {out.stat().st_size / 1e6:.2f} MB", flush=True)
+
+
+def _plans(part: dict[str, Any]) -> list[str]:
+    """Plans by which a file was made: its own, or those of the files joined in it."""
+    if "plan" in part:
+        return [str(part["plan"])]
+    return [line for line in str(part["provenance"]).splitlines() if line.startswith("{")]
+
+
+def _study_of(part: dict[str, Any]) -> str:
+    return str(json.loads(_plans(part)[0])["study"])
 
 
 def _thinned(fields: Sequence[Any], parts: Sequence[Any], order: np.ndarray) -> dict[str, np.ndarray]:
@@ -253,7 +267,7 @@ def _spread(points: np.ndarray, among: np.ndarray, count: int) -> np.ndarray:
 def _provenance(study: str, parts: Sequence[Any]) -> str:
     found = STUDIES[study]
     problem = found.problem()
-    plans = sorted({str(part["plan"]) for part in parts})
+    plans = sorted({plan for part in parts for plan in _plans(part)})
     inputs = [str(one.range) for one in found.inputs]
     return "\n".join(
         [
@@ -275,7 +289,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     part, parts = map(int, options.part.split("/"))
     study = STUDIES[options.study]
     columns = columns_of(study, options.columns, options.depths, options.seed, options.role)
-    solve_columns(study, options, columns[part::parts])
+    solve_columns(study, options, columns[options.first :][part::parts])
     return 0
 
 
@@ -284,6 +298,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("study", choices=STUDIES)
     parser.add_argument("--out", type=Path, required=True, help="file of rows (.npz)")
     parser.add_argument("--columns", type=int, default=60)
+    parser.add_argument(
+        "--first", type=int, default=0, help="number of the first column; those before are left out"
+    )
     parser.add_argument("--depths", type=int, default=5, help="of each column")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--role", choices=("train", "test", "refined"), default="train")

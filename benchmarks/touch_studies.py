@@ -119,7 +119,15 @@ def _liver() -> Body:
 _WHOLE = ((0.05, 0.05), (0.1, 0.1))  # a quadrant of the whole top face
 _MIDDLE = ((0.05, 0.05), (0.08, 0.08))  # of its middle, 60 mm wide
 _MERIDIAN = ((0.0, -0.001), (0.045, 0.001))  # what is solved of a round body, and then turned
-_BLOCK = TouchStudy(_block, over=_WHOLE, to_edges=True, about=(0.05, 0.05), wanted=40, target=(0.003, 0.01))
+_BLOCK = TouchStudy(
+    _block,
+    over=_WHOLE,
+    to_edges=True,
+    about=(0.05, 0.05),
+    element=0.0035,
+    wanted=40,
+    target=(0.003, 0.01),
+)
 # a skin of 3 mm needs two elements through it: one alone makes it 2 to 5 % too stiff
 _LAYERED = TouchStudy(_layered, over=_MIDDLE, about=(0.05, 0.05), element=0.0025)
 _BREAST = TouchStudy(_dome, over=_MERIDIAN, symmetry="round", within=0.045)

@@ -109,6 +109,19 @@ def test_a_run_goes_on_where_it_was_and_parts_join(tmp_path, monkeypatch):
         assert data["role"].tolist() == ["train"] * 12 + ["test"] * 4
         assert data["column"].tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 0, 0, 1, 1]
         assert np.allclose(data["force"], energy(data["inputs"])[1])
+    # columns of another number of depths come to a joined file later
+    later = tmp_path / "later.npz"
+    touch_data.main(
+        ["block", "--depths", "3", "--seed", "3", "--columns", "8", "--first", "6", "--out", str(later)]
+    )
+    touch_data.main(["block", "--join", str(whole), str(later), "--out", str(tmp_path / "longer.npz")])
+    with np.load(whole) as short, np.load(tmp_path / "longer.npz") as data:
+        assert data["column"][:18].tolist() == [*short["column"][:12], 6, 6, 6, 7, 7, 7]
+        assert np.array_equal(data["force"][18:], short["force"][12:])
+        plans = str(data["provenance"])
+        assert all(word in plans for word in ('"depths": 2', '"depths": 3', '"role": "test"'))
+    with pytest.raises(SystemExit, match="not of layered"):
+        touch_data.main(["layered", "--join", str(whole), "--out", str(tmp_path / "wrong.npz")])
     with pytest.raises(SystemExit, match="name another file"):
         touch_data.main(["block", "--depths", "3", "--out", str(files[0])])
 

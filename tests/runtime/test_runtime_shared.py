@@ -12,10 +12,12 @@ import pytest
 
 from palpate.errors import DeviceError, UsageError
 from palpate.runtime import shared as module
+from palpate.runtime.records import MAX_PLACES, size_of
 from palpate.runtime.shared import STATE, Shared, State, now
 
 WRITER = """
 import sys
+from palpate.runtime.records import MAX_PLACES, size_of
 from palpate.runtime.shared import Shared, now
 shared = Shared.attach(sys.argv[1])
 record, k, until = shared.state.record, 0, now() + 60.0
@@ -73,13 +75,27 @@ def test_writer_that_died_writing_is_noticed(shared):
 
 
 def test_state_has_the_records_fields(shared):
-    assert [f.name for f in dataclasses.fields(State)] == list(STATE.names)
+    assert [f.name for f in dataclasses.fields(State)] == [*STATE.names, "prints"]
     state = shared.read_state()
     assert state.tick == 0
     assert state.grabbed is False
     assert state.force.shape == (3,)
     shared.state.record["force"] = 1.0
     assert not state.force.any(), "a state is a copy"
+
+
+def test_prints_travel_with_the_state(shared):
+    assert shared.read_state().prints.shape == (0,), "nothing has yielded"
+    loop = Shared.attach(shared.name)
+    for amplitude in (np.array([0.5]), np.linspace(0, 1, MAX_PLACES)):
+        loop.prints.record["count"] = len(amplitude)
+        loop.prints.record["amplitude"][: len(amplitude)] = amplitude
+        loop.prints.publish(size_of(loop.prints.record))
+        kept = shared.read_state().prints
+        np.testing.assert_array_equal(kept, amplitude.astype("f4"))
+    loop.prints._sequence[()] += 1  # died writing: those before it stand
+    np.testing.assert_array_equal(shared.read_state().prints, kept)
+    loop.close()
 
 
 def test_command_keeps_what_is_not_given(shared):

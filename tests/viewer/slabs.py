@@ -9,6 +9,7 @@ from models import linear_network
 from palpate.surrogates import ContactLaw, Continuation, FieldSurrogate, TouchedBody, TouchSurrogate
 from palpate.surrogates.field import Dimple, Rise
 from palpate.surrogates.field.dimple import splines
+from palpate.surrogates.plastic import Dents
 from palpate.units import Quantity, Range
 
 HALF, HIGH = 0.03, 0.02  # m: 60 × 60 × 20 mm
@@ -85,6 +86,13 @@ def _table(components: int) -> np.ndarray:
     if components == 3:
         table[1, :-3] = -0.1 * pressed.DEEPEST * table[0, :-3] / scale  # drawn in a little
     return table
+
+
+def dents(width: float) -> Dents:
+    """It yields from 1 mm on; pressed to 4 mm in the middle, a quarter of the amplitude stays."""
+    first, whole = (np.sqrt(2 * pressed.A * depth**3) for depth in (0.001, 0.004))
+    tables = np.array([0.0, 0.25 * whole]), np.array([first, whole]), np.array([1.0, 1.1])
+    return Dents(*tables, np.zeros((1, 3)), width)
 
 
 def family() -> TouchSurrogate:

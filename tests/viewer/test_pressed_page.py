@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from chromium_page import READ, assert_no, number, open_page, vector
 from playwright.sync_api import Browser, Page
-from slabs import DEVIATION, touched_slab
+from slabs import DEVIATION, dents, touched_slab
 
 import pressed
 from palpate.surrogates import TouchedBody
@@ -224,6 +224,34 @@ def test_the_browser_sums_a_field_as_numpy_does(page: Page, slab: TouchedBody):
             slack = 8 * np.finfo("f4").eps * np.abs(wanted).max()
             nodes = exhibit._nodes
             np.testing.assert_allclose(back, wanted[nodes], rtol=0, atol=slack)
+
+
+def test_a_print_stays_on_the_page_when_the_hand_has_gone(browser: Browser, keep):
+    complaints: list[str] = []
+    with Viewer(touched_slab().yielding(dents(0.002), spacing=0.002), port=0) as viewer:
+        page = open_page(browser, viewer, complaints, "middle")
+        x, y = middle(page)
+        page.mouse.move(x, y + 5)
+        page.mouse.down()
+        page.mouse.wheel(0, 300)  # deeper
+        shown = stand_still(page, "inside")
+        keep(page, "printed-held")
+        page.mouse.up()
+        page.mouse.move(2, 2)
+        left = stand_still(page, "free")
+        keep(page, "printed")
+        deep, kept = (float(one["data"]["largest"]) for one in (shown, left))
+        assert number(left["text"]["force-norm"]) == 0.0
+        assert 3e-4 < kept < 0.5 * deep
+        # pressed less deep than that it is not felt
+        page.mouse.move(x, y + 5)
+        page.mouse.down()
+        again = stand_still(page, "inside")
+        assert number(again["text"]["force-norm"]) == pytest.approx(
+            number(shown["text"]["force-norm"]), rel=0.02
+        )
+        page.context.close()
+    assert_no([c for c in complaints if "WebSocket" not in c])
 
 
 @pytest.mark.slow

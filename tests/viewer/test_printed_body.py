@@ -2,43 +2,41 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 
 import numpy as np
 import pytest
+import slabs
 from slabs import touched_slab
 
 import pressed
 from palpate.errors import FileFormatError, UsageError
 from palpate.runtime import LoopProcess, now
+from palpate.runtime.loop import Loop
 from palpate.runtime.pressed import PressedBody
+from palpate.runtime.records import MAX_PLACES
+from palpate.runtime.safety import Limits
+from palpate.runtime.shared import Shared
 from palpate.runtime.touchable import load_touchable, workspace_for
 from palpate.surrogates import TouchedBody
 from palpate.surrogates.plastic import Dents
 from palpate.surrogates.relaxation import Branches
+from palpate.viewer.messages import Beat
+from palpate.viewer.pressing import PressedExhibit
+from palpate.viewer.prints import Prints
 
 SPACING, NONE = 0.002, np.zeros(0)
+BEAT = {f.name: (0.0, 0.0, 0.0) if f.name in {"position", "force"} else 0 for f in dataclasses.fields(Beat)}
 
 
 def above(depth, x=0.0):
     return np.array([x, 0.0, pressed.RADIUS - depth])
 
 
-def amplitude(depth):
-    return float(np.sqrt(2 * touched_slab().touch.energy(above(depth)[None])[0]))
-
-
 @pytest.fixture(scope="module")
 def dents() -> Dents:
-    """Yields from 1 mm on; pressed to 4 mm, a quarter of the amplitude stays."""
-    first, whole = amplitude(0.001), amplitude(0.004)
-    return Dents(
-        np.array([0.0, 0.25 * whole]),
-        np.array([first, whole]),
-        np.array([1.0, 1.1]),
-        np.zeros((1, 3)),
-        SPACING,
-    )
+    return slabs.dents(SPACING)
 
 
 @pytest.fixture
@@ -111,6 +109,105 @@ def test_yielding_that_is_none_is_refused(wrong):
     both = {"yielding": wrong, "relaxation": {"terms": [[0.3, 0.1]]}}
     with pytest.raises(FileFormatError, match="that it relaxes"):
         PressedBody.of(pressed.surrogate(meta=both)).evaluator()
+
+
+@pytest.fixture
+def printed(file):
+    """A body pressed to 4 mm in its middle and left alone, its evaluator, and points along a line of its top."""
+    body = load_touchable(file)
+    answer = body.evaluator()
+    answer(above(0.004), NONE)
+    line = np.stack([np.linspace(-0.02, 0.02, 41), np.zeros(41), np.zeros(41)], axis=1)
+    return body, answer, line
+
+
+def test_a_print_is_drawn_as_deep_as_a_ball_rests_on_it(printed):
+    body, answer, line = printed
+    prints = Prints(body, line)
+    met = body.dents.shares(line) @ answer.prints
+    # U = A s³ exp(b x), so √(2U) = p at s = (p²/2A)^⅓ exp(−b x/3)
+    rests = np.cbrt(met**2 / (2 * pressed.A)) * np.exp(-pressed.B * line[:, 0] / 3)
+    np.testing.assert_allclose(prints.depths(answer.prints), rests, atol=1e-5)
+    assert prints.under(line[20], np.array([0.0, 0.0, 1.0]), answer.prints) == pytest.approx(
+        rests[20], abs=1e-5
+    )
+    # half a millimetre and more in the middle, next to nothing a centimetre off
+    assert rests[20] > 5e-4
+    assert prints.depths(answer.prints)[[10, 30]].max() < 0.03 * rests[20]
+    # and the loop agrees that there is no force down to there
+    kept = answer.prints.copy()
+    answer(above(rests[20] - 1e-6), NONE)
+    assert not answer.force.any()
+    answer(above(rests[20] + 1e-5), NONE)
+    assert answer.force[2] > 0
+    np.testing.assert_array_equal(answer.prints, kept)
+
+
+def test_a_virgin_body_draws_no_print(file):
+    body = load_touchable(file)
+    prints = Prints(body, np.zeros((1, 3)))
+    assert len(prints.depths(np.zeros(0))) == 0
+    assert prints.under(np.zeros(3), np.array([0.0, 0.0, 1.0]), np.zeros(0)) == 0.0
+    assert not prints.depths(np.zeros(len(body.dents.points))).any()
+
+
+def test_all_points_of_the_top_may_keep_a_print_and_no_others(file, dents, tmp_path):
+    exhibit = PressedExhibit(load_touchable(file))
+    own, rest = exhibit.skin.printable.astype(int), np.reshape(exhibit.skin.rest, (-1, 3))
+    # those of the sides' upper rims too: they stand at the top's own border
+    assert set(own) == set(np.flatnonzero(rest[:, 2] > -1e-9))
+    normals = np.reshape(exhibit.skin.normals, (-1, 3))
+    np.testing.assert_allclose(normals, np.tile([0.0, 0.0, 1.0], (len(own), 1)), atol=1e-9)
+    assert (
+        exhibit.hello(Shared.private().read_state(), 1e3).remembers
+        == "pressed deeper than 1 mm it keeps a print"
+    )
+    travelling = touched_slab().yielding(dents).save(tmp_path / "one.palpate")
+    assert len(PressedExhibit(load_touchable(travelling)).skin.printable) == 0
+
+
+def test_print_and_elastic_shape_together_touch_the_ball(file):
+    body = load_touchable(file)
+    exhibit, elastic = PressedExhibit(body), PressedExhibit(PressedBody.of(touched_slab()))
+    with LoopProcess(file) as loop:
+        space = workspace_for(body, loop.read().radius)
+
+        def picture(depth, held=True):
+            target = space.to_hand(above(depth))
+            loop.shared.write_command(beat=now() + 60, grabbed=held, target=target)
+            time.sleep(0.4)
+            state = loop.read()
+            return exhibit.frame(BEAT, state, held, NONE), elastic.frame(BEAT, state, held, NONE)
+
+        first, alone = picture(0.0005)
+        assert len(first.prints) == 0, "nothing has yielded yet"
+        np.testing.assert_array_equal(first.coefficients, alone.coefficients)
+        deep, alone = picture(0.004)
+        middle = np.argmin(np.linalg.norm(_printable(exhibit), axis=1))
+        kept = deep.prints[middle]
+        assert kept == deep.prints.max() > 5e-4
+        np.testing.assert_allclose(
+            deep.coefficients, (1 - kept / 0.004) * alone.coefficients, rtol=1e-3, atol=1e-9
+        )
+        light, _ = picture(0.5 * kept)
+        assert not light.coefficients.any(), "the ball is in the print and does not touch it"
+        np.testing.assert_array_equal(light.prints, deep.prints)
+        gone, _ = picture(0.004, held=False)
+        time.sleep(0.5)
+        gone, _ = picture(0.004, held=False)
+        assert not gone.coefficients.any()
+        np.testing.assert_array_equal(gone.prints, deep.prints)
+
+
+def _printable(exhibit):
+    return np.reshape(exhibit.skin.rest, (-1, 3))[exhibit.skin.printable.astype(int)]
+
+
+def test_more_places_than_the_shared_memory_carries_are_refused(dents):
+    body = PressedBody.of(touched_slab().yielding(dents, spacing=0.0007, width=0.002))
+    assert len(body.dents.points) > MAX_PLACES
+    with pytest.raises(UsageError, match=f"carries {MAX_PLACES}"):
+        Loop(body, object(), Shared.private(), workspace_for(body, 0.06), Limits(8.0))
 
 
 def test_prints_run_in_the_real_process(file):

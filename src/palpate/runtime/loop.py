@@ -27,6 +27,7 @@ from palpate.runtime.devices import Device
 from palpate.runtime.faults import Fault
 from palpate.runtime.pressed import PressedEvaluator
 from palpate.runtime.publisher import Publisher
+from palpate.runtime.records import MAX_PLACES
 from palpate.runtime.remembering import RememberingEvaluator
 from palpate.runtime.safety import Limits, Safety, stalled
 from palpate.runtime.shared import MAX_INPUTS, Shared
@@ -104,7 +105,8 @@ class Loop:
     Raises
     ------
     UsageError
-        If the model has more inputs than the shared memory carries, or the rate is out of range.
+        If the model has more inputs or keeps prints at more places than the shared memory carries, or the rate is out
+        of range.
     """
 
     def __init__(
@@ -132,7 +134,12 @@ class Loop:
                 fix="Learn it with fewer inputs.",
             )
         self.period = 1.0 / rate
-        self.out = Publisher(shared.state, len(self.evaluator.loads))
+        if self.pressed is not None and len(self.pressed.prints) > MAX_PLACES:
+            raise UsageError(
+                f"The body keeps prints at {len(self.pressed.prints)} places; the runtime carries {MAX_PLACES}.",
+                fix="Save it with a larger spacing.",
+            )
+        self.out = Publisher(shared, len(self.evaluator.loads))
         self.safety = Safety(limits, self.period, self.out.force)
         self.out.describe(workspace, limits)
         self.parameters = np.array([(r.low + r.high) / 2.0 for r in model.parameters])
@@ -243,6 +250,8 @@ class Loop:
             self.out.answer(answer.contact, answer.loads, inside=answer.inside, mirrored=answer.mirrored)
             if pressed is not None:
                 self.out.pressed(pressed.depth, pressed.stiffness)
+                if pressed.grew:
+                    self.out.printed(pressed.prints)
         else:
             self.fail(Fault.OUTPUT_NOT_FINITE)
 

@@ -247,12 +247,16 @@ class PressedEvaluator:
         Since the call before, s, to be set ahead of each call where the body has a memory.
     away : (3,)
         Where a probe is that nobody holds, m.
+    prints : (n,)
+        Amplitude of the print at each place that keeps one, √J; empty for a body that keeps none.
     """
 
     def __init__(
         self, elastic: SurrogateEvaluator, memory: Memory | DentMemory | None, away: np.ndarray
     ) -> None:
         self._elastic, self._memory = elastic, memory
+        self._yielding = memory if isinstance(memory, DentMemory) else None
+        self.prints = np.zeros(0) if self._yielding is None else self._yielding.now
         self.force = elastic.force if memory is None else memory.force
         self._slope = np.zeros(3)
         self.contact, self.loads, self.away = np.zeros(3), np.zeros(0), away
@@ -265,6 +269,11 @@ class PressedEvaluator:
         del believed  # what can't be believed isn't answered
         if not holding:
             position[:] = self.away
+
+    @property
+    def grew(self) -> bool:
+        """Whether the last call made a print grow."""
+        return self._yielding is not None and self._yielding.lost_in_step > 0.0
 
     def __call__(self, position: np.ndarray, parameters: np.ndarray) -> None:
         """Renew the attributes for a probe at `position` (3,), m, and the further inputs (p,)."""

@@ -214,7 +214,7 @@ class LoopProcess:
         try:
             return self.shared.read_state()
         except DeviceError:  # killed while publishing
-            return State.of(self.shared.state.record)
+            return State.of(self.shared.state.record, self.shared.prints.record)
 
     def report(self) -> LoopReport:
         """How the loop did, so far or in all; what the system granted is known once it has stopped."""

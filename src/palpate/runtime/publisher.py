@@ -1,4 +1,4 @@
-"""The loop's side of the state block: the record is filled through views made once, then published."""
+"""The loop's side of state and prints: the records are filled through views made once, then published."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import numpy as np
 
 from palpate.runtime.faults import Fault
 from palpate.runtime.histogram import Histogram
+from palpate.runtime.records import size_of
 from palpate.runtime.safety import Limits
-from palpate.runtime.shared import Block
+from palpate.runtime.shared import Shared
 from palpate.runtime.workspace import Workspace
 
 __all__ = ["Publisher"]
@@ -18,10 +19,11 @@ _EVERY = 100  # ticks between two updates of the rate: 10 Hz is what an eye can 
 
 
 class Publisher:
-    """Fills and publishes the state; the stages write to its views `hand`, `position` and `force` (3,)."""
+    """Fills and publishes state and prints; the stages write to its views `hand`, `position` and `force` (3,)."""
 
-    def __init__(self, block: Block, inputs: int) -> None:
-        self._block, record = block, block.record
+    def __init__(self, shared: Shared, inputs: int) -> None:
+        self._block, record = shared.state, shared.state.record
+        self._prints, self._amplitude = shared.prints, shared.prints.record["amplitude"]
         self._record = record
         self.hand, self.position, self.force = record["hand"], record["position"], record["force"]
         self._contact, self._loads = record["contact"], record["loads"][:inputs]
@@ -54,6 +56,13 @@ class Publisher:
     def pressed(self, depth: float, stiffness: float) -> None:
         """How deep a probe is (m), and how stiff the body is under it (N/m)."""
         self._depth[()], self._stiffness[()] = depth, stiffness
+
+    def printed(self, amplitude: np.ndarray) -> None:
+        """Publish the prints, amplitudes (n,) in √J; asked for only when one has grown."""
+        count = len(amplitude)
+        self._prints.record["count"] = count
+        self._amplitude[:count] = amplitude
+        self._prints.publish(size_of(self._prints.record))
 
     def clamped(self, acted: bool) -> None:
         """Whether the force limit acted."""

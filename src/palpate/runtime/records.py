@@ -1,4 +1,4 @@
-"""What the two shared blocks hold: the loop's state, and the commands to it."""
+"""What the shared blocks hold: the loop's state, prints that stay on the body, and the commands to the loop."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ import numpy as np
 
 from palpate.runtime.histogram import BINS, percentile
 
-__all__ = ["COMMAND", "MAX_INPUTS", "STATE", "State"]
+__all__ = ["COMMAND", "MAX_INPUTS", "MAX_PLACES", "PRINTS", "STATE", "State", "size_of"]
 
 MAX_INPUTS = 8
+MAX_PLACES = 4096
 FAULT_KINDS = 16
 
 STATE = np.dtype(
@@ -44,6 +45,14 @@ STATE = np.dtype(
         ("max_force", "f8"),  # N
         ("histogram", "i8", BINS),  # lateness, `Histogram` bins
         ("work_histogram", "i8", BINS),
+    ],
+    align=True,
+)
+
+PRINTS = np.dtype(
+    [
+        ("count", "i8"),  # places that keep a print; 0 where nothing has yielded
+        ("amplitude", "f4", MAX_PLACES),  # √J, of the print at each
     ],
     align=True,
 )
@@ -98,6 +107,9 @@ class State:
     max_force: float
     histogram: np.ndarray
     work_histogram: np.ndarray
+    prints: (
+        np.ndarray
+    )  # (n,) √J at each place that keeps a print, see `PRINTS`; empty where nothing has yielded
 
     @property
     def lateness_p50(self) -> float:
@@ -128,11 +140,16 @@ class State:
         return percentile(self.work_histogram, 0.99)
 
     @classmethod
-    def of(cls, record: np.ndarray) -> State:
-        """Copy a record of dtype `STATE`, shape ()."""
+    def of(cls, record: np.ndarray, prints: np.ndarray) -> State:
+        """Copy records of dtype `STATE` and `PRINTS`, shape ()."""
         flags = {"mirrored", "inside", "clamped", "grabbed", "stalled"}
         values: dict[str, Any] = {}
         for name in STATE.names or ():
             value = record[name]
             values[name] = value.copy() if value.ndim else bool(value) if name in flags else value.item()
-        return cls(**values)
+        return cls(**values, prints=prints["amplitude"][: prints["count"]].astype(float))
+
+
+def size_of(prints: np.ndarray) -> int:
+    """Bytes of a record of dtype `PRINTS` that hold something."""
+    return int(PRINTS.fields["amplitude"][1] + 4 * prints["count"])  # type: ignore[index]

@@ -1,6 +1,6 @@
-"""The memory that the real-time process shares with everyone else: one state block out, one command block in.
+"""The memory that the real-time process shares with everyone else: state and prints out, commands in.
 
-Both blocks live in one memory-mapped file (`network.mapped`), whose path is its name.
+All blocks live in one memory-mapped file (`network.mapped`), whose path is its name.
 """
 
 from __future__ import annotations
@@ -18,22 +18,23 @@ import numpy as np
 from palpate.errors import DeviceError, UsageError
 from palpate.network import mapped
 from palpate.network.seqlock import Block
-from palpate.runtime.records import COMMAND, MAX_INPUTS, STATE, State
+from palpate.runtime.records import COMMAND, MAX_INPUTS, PRINTS, STATE, State
 
 __all__ = ["COMMAND", "MAX_INPUTS", "STATE", "Block", "Shared", "State", "now"]
 
 now = time.perf_counter  # s; monotonic and the same for every process of the machine
 
 _PAGE = 4096
-_SIZE = 3 * _PAGE  # header, state, command
-_MAGIC = b"palpate runtime %08x\n" % zlib.crc32(repr((STATE.descr, COMMAND.descr)).encode())
+_PRINTS = 3 * _PAGE  # behind header, state and command
+_SIZE = _PRINTS + -(-(PRINTS.itemsize + Block.HEADER) // _PAGE) * _PAGE
+_MAGIC = b"palpate runtime %08x\n" % zlib.crc32(repr((STATE.descr, COMMAND.descr, PRINTS.descr)).encode())
 
 
 class Shared:
-    """The state and the command block under one name.
+    """The blocks of state, prints and commands under one name.
 
     `create` makes them (the parent: viewer or command line), `attach` joins them (the loop). The loop writes
-    `state` and reads `command`; everybody else calls `read_state` and `write_command`.
+    `state` and `prints` and reads `command`; everybody else calls `read_state` and `write_command`.
     """
 
     def __init__(self, name: str, memory: mmap.mmap) -> None:
@@ -42,12 +43,13 @@ class Shared:
         self._lock = threading.Lock()
         view = memoryview(memory)
         self.state = Block(view[_PAGE : 2 * _PAGE], STATE)
-        self.command = Block(view[2 * _PAGE :], COMMAND)
+        self.command = Block(view[2 * _PAGE : _PRINTS], COMMAND)
+        self.prints = Block(view[_PRINTS:], PRINTS)
         view.release()
 
     @classmethod
     def create(cls) -> Shared:
-        """Make both blocks, empty: tick 0, nothing grabbed, parameters not set.
+        """Make the blocks, empty: tick 0, nothing grabbed, parameters not set.
 
         Raises
         ------
@@ -66,6 +68,7 @@ class Shared:
         shared.command.record["parameters"] = np.nan
         shared.command.publish()
         shared.state.publish()
+        shared.prints.publish()
         return shared
 
     @classmethod
@@ -117,7 +120,8 @@ class Shared:
                         fix="Start it again.",
                     )
                 time.sleep(0)
-            return State.of(self.state.record)
+            self.prints.fetch()  # in the midst of a write those before it stand
+            return State.of(self.state.record, self.prints.record)
 
     def write_command(
         self,
@@ -171,6 +175,7 @@ class Shared:
         """Unmap; the name stays for others. Harmless when repeated."""
         self.state.release()
         self.command.release()
+        self.prints.release()
         self._map.close()
 
     def unlink(self) -> None:

@@ -30,6 +30,9 @@ class Press(Beat):
     coefficients: Annotated[
         np.ndarray, Wire("floats", "for each field its growth with depth and its modes' coefficients")
     ]
+    prints: Annotated[
+        np.ndarray, Wire("floats", "m, how deep it stays pressed at each of Skin.printable; empty if nowhere")
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +42,10 @@ class Skin(Faceted):
     KIND: ClassVar[int] = 7
 
     touchable: Annotated[np.ndarray, Wire("floats", "1 for each triangle that a probe may touch, else 0")]
+    printable: Annotated[
+        np.ndarray, Wire("floats", "points that keep prints; none where the body keeps none")
+    ]
+    normals: Annotated[np.ndarray, Wire("floats", "outward unit normal of each of them")]
 
 
 @dataclass(frozen=True, eq=False)

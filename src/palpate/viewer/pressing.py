@@ -19,6 +19,7 @@ from palpate.surrogates import FieldSurrogate
 from palpate.viewer.exhibits import loop_facts, ranges, vector
 from palpate.viewer.messages import PROTOCOL
 from palpate.viewer.pressed_messages import Look, Modes, Press, Skin, Touched
+from palpate.viewer.prints import Prints, yielding_in_words
 from palpate.viewer.skins import relief, touchable_triangles
 from palpate.viewer.surfaces import split
 
@@ -43,15 +44,15 @@ class PressedExhibit:
     def __init__(self, body: PressedBody) -> None:
         self.body = body
         self.fields = _shown(body.fields)
-        self.skin, self._nodes = self._made()
+        self.skin, self._nodes, self._prints = self._made()
         self._eyes = [one.evaluator() for one in self.fields]
         self._judge = body.touch.evaluator()
         self._looks = tuple(self._look(one) for one in self.fields)
         self._last, self._depth, self._released = body.home, 0.0, -math.inf
         self._normal = body.normal
 
-    def _made(self) -> tuple[Skin, np.ndarray]:
-        """The skin, and the field's node that each of its points stands for."""
+    def _made(self) -> tuple[Skin, np.ndarray, Prints | None]:
+        """The skin, the field's node that each of its points stands for, and the prints on it."""
         if self.fields:
             points, triangles = self.fields[0].points, self.fields[0].triangles
             mark = touchable_triangles(self.body, self.fields[0])
@@ -59,8 +60,24 @@ class PressedExhibit:
             points, triangles = relief(self.body)
             mark = np.ones(len(triangles), bool)
         parts = split(points, triangles, np.zeros(len(triangles), bool))
-        skin = Skin(points[parts.nodes].ravel(), parts.triangles.ravel(), parts.creases.ravel(), mark)
-        return skin, parts.nodes
+        own = np.zeros(0, dtype=int)
+        if self._keeps_prints:  # on both sides of a sharp edge, or it would tear
+            own = np.flatnonzero(np.isin(parts.nodes, parts.nodes[parts.triangles[mark > 0]]))
+        prints = Prints(self.body, points[parts.nodes[own]]) if len(own) else None
+        skin = Skin(
+            points[parts.nodes].ravel(),
+            parts.triangles.ravel(),
+            parts.creases.ravel(),
+            mark,
+            own,
+            np.zeros(0) if prints is None else prints.normals.ravel(),
+        )
+        return skin, parts.nodes, prints
+
+    @property
+    def _keeps_prints(self) -> bool:
+        """Whether prints stand at places; one that travels with the probe is nowhere when that is gone."""
+        return self.body.dents is not None and len(self.body.dents.points) > 1
 
     def modes(self, index: int) -> Modes:
         """What the page needs to sum up field `index`."""
@@ -94,7 +111,7 @@ class PressedExhibit:
             stiffness_max=body.stiffness_max,
             centre=vector(body.home),
             fields=self._looks,
-            remembers=str(body.dents or body.branches or ""),
+            remembers=yielding_in_words(body) or str(body.branches or ""),
             meta=body.meta,
             **loop_facts(state, rate),
         )
@@ -103,6 +120,10 @@ class PressedExhibit:
         """See `Exhibit`."""
         centre = self._pressed(state) if held else self._withdrawn()
         place, coefficients = self._coefficients(centre, parameters)
+        prints = np.zeros(0)
+        if self._prints is not None:
+            prints = self._prints.depths(state.prints)
+            coefficients *= self._elastic(place, state.prints)
         deviation = self._judge.trust(state.position, parameters) if held else 0.0
         if held and place is not None:
             self._normal = place[5:8].copy()
@@ -115,7 +136,15 @@ class PressedExhibit:
             foot=vector(np.zeros(3) if place is None else place[2:5]),
             normal=vector(np.zeros(3) if place is None else place[5:8]),
             coefficients=coefficients,
+            prints=prints,
         )
+
+    def _elastic(self, place: np.ndarray | None, amplitude: np.ndarray) -> float:
+        """Share of the elastic shape that is drawn on top of the print: none until the probe meets its bottom."""
+        if place is None or self._prints is None:
+            return 0.0
+        kept = self._prints.under(place[2:5], place[5:8], amplitude)
+        return max(0.0, 1.0 - kept / max(float(place[0]), 1e-12))
 
     def _pressed(self, state: State) -> np.ndarray:
         self._last, self._depth, self._released = state.position, state.depth, now()

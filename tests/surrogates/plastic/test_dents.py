@@ -163,3 +163,17 @@ def test_what_is_not_finite_changes_nothing() -> None:
     assert not memory.step(np.zeros(3), -1.0, np.zeros(3))
     np.testing.assert_array_equal(memory.depths, depths)
     assert not memory.force.any()
+
+
+def test_shares_are_what_a_probe_meets() -> None:
+    memory = Dents(P, Q, np.ones(3), PLACES, 0.7).memory()
+    memory.depths = np.random.default_rng(0).uniform(0.1, 0.4, len(PLACES))
+    before = memory.depths
+    for x in (-3.7, 0.0, 1.3):
+        c = down(0.6, x=x)[0]
+        memory.step(c, *bowl(c))
+        met = math.sqrt(2 * bowl(c)[0]) - math.sqrt(2 * memory.stored)
+        assert memory.dents.shares(c[None])[0] @ memory.depths == pytest.approx(met, rel=1e-12)
+    np.testing.assert_array_equal(memory.now, before)  # nothing yielded
+    with pytest.raises(ValueError, match="read-only"):
+        memory.now[0] = 1.0

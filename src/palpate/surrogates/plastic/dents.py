@@ -110,6 +110,12 @@ class Dents:
         """The state of a virgin body."""
         return DentMemory(self)
 
+    def shares(self, C: np.ndarray) -> np.ndarray:
+        """w_j (N, n) of probes' centres C (N, 3), m: p(c) = Σ w_j p_j."""
+        square = ((C[:, None] - self.points) ** 2).sum(axis=2)
+        weights = np.exp((square.min(axis=1, keepdims=True) - square) / (2.0 * self.width**2))
+        return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+
     def compiled(self) -> tuple[np.ndarray, ...]:
         """(p, Q, κ, points, width), as the kernels take them."""
         return self.dent, self.reach, self.stiffening, self.points, np.array([self.width])
@@ -122,6 +128,8 @@ class DentMemory:
     ----------
     force : (3,)
         On the probe, N; overwritten by each step.
+    now : (n,)
+        p_j in √J, read-only; overwritten by each step.
 
     Parameters
     ----------
@@ -133,6 +141,8 @@ class DentMemory:
         self.dents, self.force = dents, np.zeros(3)
         self._ledger = np.zeros(4)
         self._depths = np.zeros(n)
+        self.now = self._depths.view()
+        self.now.flags.writeable = False
         self._work = (np.zeros(n), np.zeros(3), np.zeros(3))
         self._constants = dents.compiled()
         self.step(np.zeros(3), 0.0, np.zeros(3))  # compile now, not in the loop

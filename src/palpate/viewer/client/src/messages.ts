@@ -512,10 +512,12 @@ export interface Press {
   parameters: Float32Array;
   /** for each field its growth with depth and its modes' coefficients */
   coefficients: Float32Array;
+  /** m, how deep it stays pressed at each of Skin.printable; empty if nowhere */
+  prints: Float32Array;
 }
 
 export function encodePress(m: Press): ArrayBuffer {
-  const view = new DataView(new ArrayBuffer(125 + 4 + 4 * m.parameters.length + 4 + 4 * m.coefficients.length));
+  const view = new DataView(new ArrayBuffer(125 + 4 + 4 * m.parameters.length + 4 + 4 * m.coefficients.length + 4 + 4 * m.prints.length));
   view.setUint8(0, 6);
   view.setFloat64(1, m.tick, true);
   view.setFloat64(9, m.time, true);
@@ -564,6 +566,12 @@ export function encodePress(m: Press): ArrayBuffer {
     view.setFloat32(at, value, true);
     at += 4;
   }
+  view.setUint32(at, m.prints.length, true);
+  at += 4;
+  for (const value of m.prints) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
   return view.buffer;
 }
 
@@ -573,6 +581,8 @@ export function decodePress(buffer: ArrayBuffer): Press {
   const parametersEnd = parametersAt + 4 + 4 * view.getUint32(parametersAt, true);
   const coefficientsAt = parametersEnd;
   const coefficientsEnd = coefficientsAt + 4 + 4 * view.getUint32(coefficientsAt, true);
+  const printsAt = coefficientsEnd;
+  const printsEnd = printsAt + 4 + 4 * view.getUint32(printsAt, true);
   return {
     tick: view.getFloat64(1, true),
     time: view.getFloat64(9, true),
@@ -602,6 +612,7 @@ export function decodePress(buffer: ArrayBuffer): Press {
     normal: [view.getFloat32(113, true), view.getFloat32(117, true), view.getFloat32(121, true)],
     parameters: new Float32Array(buffer.slice(parametersAt + 4, parametersEnd)),
     coefficients: new Float32Array(buffer.slice(coefficientsAt + 4, coefficientsEnd)),
+    prints: new Float32Array(buffer.slice(printsAt + 4, printsEnd)),
   };
 }
 
@@ -617,10 +628,14 @@ export interface Skin {
   creases: Float32Array;
   /** 1 for each triangle that a probe may touch, else 0 */
   touchable: Float32Array;
+  /** points that keep prints; none where the body keeps none */
+  printable: Float32Array;
+  /** outward unit normal of each of them */
+  normals: Float32Array;
 }
 
 export function encodeSkin(m: Skin): ArrayBuffer {
-  const view = new DataView(new ArrayBuffer(1 + 4 + 4 * m.rest.length + 4 + 4 * m.triangles.length + 4 + 4 * m.creases.length + 4 + 4 * m.touchable.length));
+  const view = new DataView(new ArrayBuffer(1 + 4 + 4 * m.rest.length + 4 + 4 * m.triangles.length + 4 + 4 * m.creases.length + 4 + 4 * m.touchable.length + 4 + 4 * m.printable.length + 4 + 4 * m.normals.length));
   view.setUint8(0, 7);
   let at = 1;
   view.setUint32(at, m.rest.length, true);
@@ -647,6 +662,18 @@ export function encodeSkin(m: Skin): ArrayBuffer {
     view.setFloat32(at, value, true);
     at += 4;
   }
+  view.setUint32(at, m.printable.length, true);
+  at += 4;
+  for (const value of m.printable) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
+  view.setUint32(at, m.normals.length, true);
+  at += 4;
+  for (const value of m.normals) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
   return view.buffer;
 }
 
@@ -660,11 +687,17 @@ export function decodeSkin(buffer: ArrayBuffer): Skin {
   const creasesEnd = creasesAt + 4 + 4 * view.getUint32(creasesAt, true);
   const touchableAt = creasesEnd;
   const touchableEnd = touchableAt + 4 + 4 * view.getUint32(touchableAt, true);
+  const printableAt = touchableEnd;
+  const printableEnd = printableAt + 4 + 4 * view.getUint32(printableAt, true);
+  const normalsAt = printableEnd;
+  const normalsEnd = normalsAt + 4 + 4 * view.getUint32(normalsAt, true);
   return {
     rest: new Float32Array(buffer.slice(restAt + 4, restEnd)),
     triangles: new Float32Array(buffer.slice(trianglesAt + 4, trianglesEnd)),
     creases: new Float32Array(buffer.slice(creasesAt + 4, creasesEnd)),
     touchable: new Float32Array(buffer.slice(touchableAt + 4, touchableEnd)),
+    printable: new Float32Array(buffer.slice(printableAt + 4, printableEnd)),
+    normals: new Float32Array(buffer.slice(normalsAt + 4, normalsEnd)),
   };
 }
 

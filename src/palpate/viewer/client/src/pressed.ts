@@ -8,6 +8,7 @@ import { decodeModes, decodePress, decodeSkin, isTouched } from "./messages";
 import type { Look, Press, Touched } from "./messages";
 import { PressPanel } from "./presspanel";
 import { PressView } from "./pressview";
+import { Prints } from "./prints";
 import { element } from "./readings";
 import { describe, say, status, warn } from "./telling";
 import { fixed, measured, multiple, tidy } from "./units";
@@ -22,6 +23,7 @@ const panel = new PressPanel();
 let view: PressView | null = null;
 let hello: Touched | null = null;
 let fields: Field[] = [];
+let prints: Prints | null = null;
 let chosen = 0;
 let latest: Press | null = null;
 let drawn: Press | null = null;
@@ -63,6 +65,7 @@ async function open(told: Touched): Promise<void> {
   const modes = await Promise.all(told.fields.map(async (_, i) => decodeModes(await get(`fields/${i}`))));
   fields = told.fields.map((look, i) => new Field(look, modes[i]!, skin.rest));
   still = new Float32Array(skin.rest.length);
+  prints = new Prints(skin);
   element("legend-bar").style.background = gradient();
   choices(told.fields);
   legend();
@@ -131,7 +134,9 @@ function show(): void {
     if (i === 0 || i === chosen) field.update(numbers, { depth: latest!.drawn, foot: latest!.foot, normal: latest!.normal });
   });
   const first = fields[0];
+  if (first?.look.components !== 3) still.fill(0);
   const moved = first?.look.components === 3 ? first.values : still;
+  prints?.into(moved, latest.prints);
   const field = fields[chosen];
   const values = field?.sizes();
   const span = field ? field.look.high - field.look.low : 1;
@@ -189,9 +194,10 @@ function where(of: PressView, frame: Press): void {
 function changed(a: Press, b: Press | null): boolean {
   if (!b || a.grabbed !== b.grabbed) return true;
   const differ = (p: ArrayLike<number>, q: ArrayLike<number>): boolean =>
-    Array.from(p).some((x, i) => Math.abs(x - q[i]!) > 1e-9);
+    p.length !== q.length || Array.from(p).some((x, i) => Math.abs(x - q[i]!) > 1e-9);
   return (
     differ(a.coefficients, b.coefficients) ||
+    differ(a.prints, b.prints) ||
     differ(a.foot, b.foot) ||
     differ(a.force, b.force) ||
     differ(a.position, b.position) ||

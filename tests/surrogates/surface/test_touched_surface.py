@@ -110,19 +110,39 @@ def test_below_the_border_the_depth_falls_steadily_to_that_of_the_border(height)
     assert d[-1] == pytest.approx(r[-1], abs=face().spacing ** 2 / (4 * R))
 
 
-def test_far_outside_nothing_is_felt():
-    v = directions(2000, 0)
-    v[:, 2] = np.abs(v[:, 2])
-    for far in (0.08, 1.0, 1e3, 1e9, 1e300):
-        assert (face().depth(far * v, face().reach) < 0).all()
-        assert (sphere().depth(-far * v, sphere().reach) < 0).all()
+@cache
+def shouldered():
+    return TouchedSurface.of(*plate(FACE, 2), radius=R, shoulder=R / 3)
 
 
-def test_under_an_open_surface_the_distance_falls_on():
-    z = -np.array([0.016, 0.02, 0.05, 1.0])
-    d, gradient, _ = face().at(np.column_stack([np.zeros((4, 2)), z]))
-    assert d == pytest.approx(z, rel=1e-9)
-    assert gradient == pytest.approx(np.tile([0, 0, 1], (4, 1)), abs=1e-9)
+@pytest.mark.parametrize("surface", [face, shouldered, sphere])
+def test_far_away_nothing_is_felt_on_any_side(surface):
+    v = np.vstack([directions(4000, 0), [[0, 0, -1], [1, 1, -1], [1, 1, -0.01], [-1, 1, 0]]])
+    for far in (0.12, 1.0, 1e3, 1e9, 1e300):
+        assert (surface().depth(far * v, surface().reach) < 0).all()
+
+
+@pytest.mark.parametrize(("surface", "shoulder"), [(face, 0.0), (shouldered, R / 3)])
+def test_beside_the_body_nothing_is_felt_at_any_height(surface, shoulder):
+    C = uniform([-0.3, -0.3, -0.3], [0.3, 0.3, 0.3], 200_000)
+    C[::2] *= 0.2
+    beyond = np.maximum(np.abs(C[:, :2]) - FACE / 2, 0)
+    beside = np.linalg.norm(beyond, axis=1) > R + 1.5 * shoulder + surface().spacing
+    assert beside.sum() > 50_000
+    assert (surface().depth(C[beside], R) < 0).all()
+
+
+@pytest.mark.parametrize("surface", [face, shouldered])
+def test_behind_an_open_surface_the_distance_turns_back(surface):
+    z = -np.linspace(surface().inner, surface().inner + 4 * R, 200)
+    d, gradient, _ = surface().at(np.column_stack([np.zeros((200, 2)), z]))
+    assert d[0] == pytest.approx(-surface().inner, rel=1e-4)
+    assert gradient[0] == pytest.approx([0, 0, 1], abs=1e-3)
+    turn = np.argmin(d)
+    assert (np.diff(d[: turn + 1]) < 0).all()
+    assert (np.diff(d[turn:]) > -1e-12).all(), "once"
+    assert d[turn] > -(surface().inner + 2 * R)
+    assert (d[z < -(surface().inner + 3 * R)] > surface().reach).all(), "and nothing is felt any more"
 
 
 @pytest.mark.parametrize("odd", [np.nan, np.inf, -np.inf])

@@ -100,7 +100,9 @@ class Touches:
             radius,
             which,
             (*widened(data.ranges[:3], matrices, about), *data.ranges[3:]),
-            TouchedSurface.of(rest, touched, radius=largest, shoulder=SHOULDER * radius),
+            TouchedSurface.of(
+                rest, touched, radius=largest, inner=_inner(probe, largest), shoulder=SHOULDER * radius
+            ),
             rest[nodes],
             own.reshape(-1, 3),
             matrices,
@@ -112,6 +114,11 @@ class Touches:
     def columns(self) -> np.ndarray:
         """For each solve (N,) the number of its column, whatever its further inputs are."""
         return columns_of(self.data.X[:, :3], self.surface, self.radius)
+
+
+def _inner(probe: Mapping[str, Any], radius: float) -> float:
+    """How deep the probe's centre may go before the surface's distance ends, m: there it is twice as deep as trained."""
+    return float(max(1.5 * radius, 2.0 * max(probe.get("depth") or (0.0,)) - radius))
 
 
 def _radius_input(data: Dataset) -> int | None:

@@ -9,10 +9,12 @@ normal there.
 **With a shoulder** of radius ρ the surface is thought to roll off beyond its border. At height z over the tangent plane
 and a beyond the border
 
-    d = √(b² + (z + ρ)²) − ρ,   b = √(a² + (ρ/2)²) − ρ/2,   for z ≥ −ρ, and z + b below,
+    d = √(b² + (z + ρ)²) − ρ,   b = √(a² + (ρ/2)²) − ρ/2,   for z ≥ −ρ,
+    d = b − ρ + (z + ρ) (1 − σ(b/R))                        below,
 
-so that d and three derivatives are those of the plane right up to the border, and nothing is bridged; a probe that
-leaves the surface sideways feels it for some ρ longer.
+σ the quintic smooth step and R the probe's radius, so that d and three derivatives are those of the plane right up to
+the border: a probe that leaves the surface sideways feels it for some ρ longer, and from there on nothing, however low
+it goes.
 
 **Below the border**, without a shoulder. At height z = −ζ under the surface's tangent plane and a beyond its border,
 r² = a² + ζ², the nearest thing is still the border, r away: that is the distance of a probe that passes beside the
@@ -23,6 +25,12 @@ body. Under the surface d is −ζ. The jump between them is bridged by
 σ the quintic smooth step, R the probe's radius, w a smooth step from 0 at r = R/2 to 1 at 0.85 R: farther out d is r,
 so that a probe feels nothing before it meets the border; nearer, the depth falls steadily from the full one to that
 of the border. Deeper than R/2, within R of its border, the inner side is not one any more.
+
+**Behind.** A surface does not tell how thick its body is. Inside, from a distance r = `behind` to its nearest point
+on, d turns back, and 2R later nothing is felt: a probe that comes from below meets no force in the air, and one that
+was pushed through the body is let go. There d is
+
+    d (1 − τ) + (behind + 2R) τ,   τ = σ((r − behind)/2R)
 """
 
 from __future__ import annotations
@@ -38,7 +46,8 @@ from palpate.surrogates.surface.skin import Skin
 
 __all__ = ["BRIDGED", "PLAIN", "ROUNDED", "Exact"]
 
-PLAIN, ROUNDED, BRIDGED = 0, 1, 2  # foot on a smooth piece, on a line; below the border
+PLAIN, ROUNDED, BRIDGED = 0, 1, 2  # foot on a smooth piece, on a line; below the border or behind
+TURN = 2.0  # of the radius: how far it takes to turn back behind
 START, FINISH = 0.5, 0.85  # of the radius: where the bridge below the border begins and ends
 # cosine between distance and normal, below which small triangles are too coarse for the normal
 RESOLVED = 0.98
@@ -60,21 +69,24 @@ class Exact:
         R in m: of the smallest probe.
     shoulder : float
         ρ in m; 0 for none.
+    behind : float
+        In m; infinite where d shall fall on.
     """
 
     pieces: Pieces
     boxes: np.ndarray
     radius: float
     shoulder: float = 0.0
+    behind: float = np.inf
 
     @classmethod
-    def of(cls, skin: Skin, radius: float, shoulder: float = 0.0) -> Exact:
+    def of(cls, skin: Skin, radius: float, shoulder: float = 0.0, behind: float = np.inf) -> Exact:
         """The curved surface behind a mesh, for probes from a radius in m on."""
         p = pieces_of(skin)
         order = ordered(p.corners)
         corners = np.ascontiguousarray(p.corners[order])
         pieces = Pieces(corners, p.normals[order], p.places[order], p.kinds, p.outward, p.border)
-        return cls(pieces, boxes_of(corners), radius, shoulder)
+        return cls(pieces, boxes_of(corners), radius, shoulder, behind)
 
     def at(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Signed distances in m and their kinds (PLAIN, ROUNDED, BRIDGED) at places (N, 3), each of shape (N,).
@@ -86,7 +98,7 @@ class Exact:
         p = self.pieces
         _measure_into(
             places, distances, kinds, self.boxes, p.corners, p.normals, p.places, p.kinds, p.outward,
-            p.border, self.radius, self.shoulder,
+            p.border, self.radius, self.shoulder, self.behind,
         )  # fmt: skip
         return distances, kinds
 
@@ -154,12 +166,12 @@ def _beyond(height: float, r: float, radius: float) -> tuple[float, int]:
 
 
 @_jit
-def _rolled(height: float, r: float, shoulder: float) -> tuple[float, int]:
+def _rolled(height: float, r: float, shoulder: float, radius: float) -> tuple[float, int]:
     """Distance to the shoulder where the nearest point is on the border."""
     start = shoulder / 2.0
     b = np.sqrt(max(r * r - height * height, 0.0) + start * start) - start
     if height < -shoulder:
-        return height + b, BRIDGED
+        return b - shoulder + (height + shoulder) * (1.0 - _step(b / radius)), BRIDGED
     return np.sqrt(b * b + (height + shoulder) ** 2) - shoulder, PLAIN
 
 
@@ -176,6 +188,25 @@ def _within(c: np.ndarray, d: float, border: np.ndarray, radius: float) -> tuple
 
 
 @_jit
+def _over(c: np.ndarray, foot: np.ndarray, corners: np.ndarray, outward: np.ndarray, height: float) -> float:
+    """Height of c over the tangent plane of the line that its foot is on; `height` where that has no direction."""
+    facing = outward[0] ** 2 + outward[1] ** 2 + outward[2] ** 2
+    if facing == 0.0:
+        return height
+    found = 0.0
+    for x in range(3):
+        at = foot[0] * corners[0, x] + foot[1] * corners[1, x] + foot[2] * corners[2, x]
+        found += (c[x] - at) * outward[x]
+    return float(found / np.sqrt(facing))
+
+
+@_jit
+def _turned(d: float, r: float, behind: float, end: float) -> float:
+    """Distance where the nearest point is farther away than `behind`, on the inner side."""
+    return d + (end - d) * _step((r - behind) / (end - behind))
+
+
+@_jit
 def _measure_into(
     places: np.ndarray,
     distances: np.ndarray,
@@ -189,8 +220,10 @@ def _measure_into(
     border: np.ndarray,
     radius: float,
     shoulder: float,
+    behind: float,
 ) -> None:
     """Fill distances (N,) and kinds (N,) at places (N, 3)."""
+    end = behind + TURN * radius
     waiting, foot, trial, n = np.empty(DEEP, np.int64), np.empty(3), np.empty(3), np.empty(3)
     t = 0
     for k in range(places.shape[0]):
@@ -207,25 +240,21 @@ def _measure_into(
             height += v * n[x]
             r += v * v
         r = np.sqrt(r)
-        if feature_kinds[row] == SMOOTH:
+        kind = feature_kinds[row]
+        if kind == SMOOTH:
             if abs(height) < RESOLVED * r:
                 height = np.copysign(RESOLVED * r, height)
-            if shoulder > 0.0:
-                distances[k], kinds[k] = height, PLAIN
-            else:
-                distances[k], kinds[k] = _within(c, height, border, radius)
-            continue
-        kinds[k] = ROUNDED
-        facing = outward[row, 0] ** 2 + outward[row, 1] ** 2 + outward[row, 2] ** 2
-        if facing > 0:
-            height = 0.0
-            for x in range(3):
-                at = foot[0] * corners[t, 0, x] + foot[1] * corners[t, 1, x] + foot[2] * corners[t, 2, x]
-                height += (c[x] - at) * outward[row, x]
-            height /= np.sqrt(facing)
-        if feature_kinds[row] == END and shoulder > 0.0:
-            distances[k], kinds[k] = _rolled(height, r, shoulder)
-        elif feature_kinds[row] == END:
+        else:
+            height = _over(c, foot, corners[t], outward[row], height)
+        if kind == SMOOTH and shoulder > 0.0:
+            distances[k], kinds[k] = height, PLAIN
+        elif kind == SMOOTH:
+            distances[k], kinds[k] = _within(c, height, border, radius)
+        elif kind == END and shoulder > 0.0:
+            distances[k], kinds[k] = _rolled(height, r, shoulder, radius)
+        elif kind == END:
             distances[k], kinds[k] = _beyond(height, r, radius)
         else:
-            distances[k] = np.copysign(r, height)
+            distances[k], kinds[k] = np.copysign(r, height), ROUNDED
+        if height < 0.0 and r > behind:
+            distances[k], kinds[k] = _turned(distances[k], r, behind, end), BRIDGED

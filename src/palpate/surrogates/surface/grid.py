@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.surrogates.surface.exact import BRIDGED, Exact
+from palpate.surrogates.surface.exact import BRIDGED, TURN, Exact
 
 __all__ = ["Grid", "sampled"]
 
@@ -25,6 +25,7 @@ SMOOTH, SHARP = 0.4, 0.8  # change of slope from cell to cell
 CLEAR = 4  # cells beyond the reach, within which the spline hears of what comes after
 LEVEL = 2  # cells by which the distance rises from there to its level
 COARSE = 4  # every so many nodes the distance is measured where it is large
+OUTERMOST = 5  # cells at the rim, where nothing changes any more
 PAD = 2  # nodes beyond the spline's own that its coefficients need
 AROUND = 3  # nodes to each side that lend a coefficient their values
 
@@ -48,22 +49,34 @@ class Grid:
     faithful: np.ndarray
 
 
-def shape_of(corners: np.ndarray, margin: float, spacing: float) -> tuple[np.ndarray, np.ndarray]:
-    """First node (3,) and number of nodes (3,) of a grid with a margin in m around corners (T, 3, 3)."""
-    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
-    cells = np.ceil((high - low + 2 * margin) / spacing).astype(np.int64)
+def shape_of(exact: Exact, margin: float, spacing: float) -> tuple[np.ndarray, np.ndarray]:
+    """First node (3,) and number of nodes (3,) of a grid with a margin in m around a surface and to behind it."""
+    corners = exact.pieces.corners
+    behind = corners - (exact.behind + TURN * exact.radius) * exact.pieces.normals
+    low, high = _box(corners, margin)
+    lower, upper = _box(behind, OUTERMOST * spacing)
+    low, high = np.minimum(low, lower), np.maximum(high, upper)
+    cells = np.ceil((high - low) / spacing).astype(np.int64)
     return (low + high) / 2 - cells * spacing / 2, cells + 1
 
 
-def margin_of(reach: float, inner: float, spacing: float) -> float:
-    """How far the grid goes beyond the surface, in m: all around, the distance has levelled off by then."""
-    return max(reach + (CLEAR + 2 * LEVEL) * spacing, inner) + 5 * spacing
+def _box(corners: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper corner (3,) of a box with a margin in m around points (T, 3, 3)."""
+    return corners.min(axis=(0, 1)) - margin, corners.max(axis=(0, 1)) + margin
+
+
+def margin_of(reach: float, inner: float, spacing: float, shoulder: float) -> float:
+    """How far the grid goes beyond the surface, in m: all around, the distance has levelled off by then.
+
+    Beyond the border it is 1.5 shoulders less than from the border itself.
+    """
+    return max(reach + 1.5 * shoulder + (CLEAR + 2 * LEVEL) * spacing, inner) + OUTERMOST * spacing
 
 
 def sampled(exact: Exact, reach: float, inner: float, spacing: float) -> Grid:
     """The field of a surface out to a reach and in to an inner reach, both in m."""
-    margin = margin_of(reach, inner, spacing)
-    first, nodes = shape_of(exact.pieces.corners, margin, spacing)
+    margin = margin_of(reach, inner, spacing, exact.shoulder)
+    first, nodes = shape_of(exact, margin, spacing)
     first, nodes = first - PAD * spacing, nodes + 2 * PAD
     f, true = _measured(exact, first, nodes, spacing, margin)
     last = reach + CLEAR * spacing

@@ -22,6 +22,7 @@ FEW = 6  # where there are none
 TRUE = 1e-3  # of that radius: the error to which the spacing is refined, where there is room
 MOST = 2_000_000  # nodes: 16 MB
 CHECKS = 20_000  # places at which the error is measured
+AFTER = 1.0  # of that radius: how much farther inside than `inner` the distance turns back, some cells
 COARSEST = 3  # cells to the radius, below which nothing is known of edges
 TRIALS = 3
 
@@ -33,7 +34,7 @@ class TouchedSurface:
     Exact over the interior of a plane, and within `error` elsewhere; rounded within some `spacing` of edges of the
     surface and of places inside that are equally far from two parts of it. Beyond the surface's border d is the
     distance to the border. Farther outside than `reach` it levels off above it: nothing is felt there. Farther
-    inside than `inner` it falls on; an open surface does not know what lies behind it.
+    inside than `inner` it soon turns back, and levels off two radii later: nothing is felt behind the body.
 
     Attributes
     ----------
@@ -114,7 +115,7 @@ class TouchedSurface:
             raise UsageError(
                 f"A shoulder of {shoulder} m is no length.", fix="Pass 0 or a positive length in m."
             )
-        exact = Exact.of(Skin.of(points, triangles), radius, shoulder)
+        exact = Exact.of(Skin.of(points, triangles), radius, shoulder, inner + AFTER * radius)
         return _built(exact, reach, inner, spacing)
 
     @property
@@ -226,8 +227,8 @@ def _finest(exact: Exact, reach: float, inner: float) -> float:
 def _nodes(exact: Exact, reach: float, inner: float, spacing: float) -> int:
     from palpate.surrogates.surface.grid import margin_of, shape_of
 
-    margin = margin_of(reach, inner, spacing)
-    return int(np.prod(shape_of(exact.pieces.corners, margin, spacing)[1].astype(object)))
+    margin = margin_of(reach, inner, spacing, exact.shoulder)
+    return int(np.prod(shape_of(exact, margin, spacing)[1].astype(object)))
 
 
 def _refuse_nodes(exact: Exact, reach: float, inner: float, spacing: float) -> None:

@@ -72,6 +72,7 @@ if TYPE_CHECKING:
     from palpate.study import Study, TouchStudy, preset_study, read_study
     from palpate.surrogates import TouchedBody, TouchedSurface, TouchModel, TouchSurrogate
     from palpate.surrogates.grasp import GraspSurrogate
+    from palpate.surrogates.loading import load
     from palpate.surrogates.plastic import HeldBody
     from palpate.sweeps import ExternalProblem, Space, local_cluster, sweep
     from palpate.units import Quantity, Range
@@ -149,6 +150,7 @@ _HOMES = {
     "Yeoh": "physics",
     "fit": "learning",
     "learn": "learning:learn_dataset",
+    "load": "surrogates.loading",
     "local_cluster": "sweeps",
     "named_material": "physics",
     "preset_study": "study",
@@ -230,6 +232,7 @@ __all__ = [
     "Yeoh",
     "fit",
     "learn",
+    "load",
     "local_cluster",
     "named_material",
     "preset_study",

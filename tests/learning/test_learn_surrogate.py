@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 
 from palpate.errors import UsageError
 from palpate.learning.energy import EnergySamples, learn_surrogate
 from palpate.learning.energy.images import images_of
-from palpate.learning.energy.search import Problem
+from palpate.learning.energy.search import Problem, Search
 from palpate.learning.refinement.rows import Rows
 from palpate.learning.units.regressors import pairs
 from palpate.surrogates import ContactLaw, TouchedSurface
@@ -118,6 +120,28 @@ def test_the_leave_one_solve_out_error_is_that_of_fits_without_each_solve(surfac
         C = np.linalg.lstsq(A[~out], b[~out], rcond=None)[0]
         total += rows.scale[i] * np.linalg.norm(b[out] - A[out] @ C)
     assert found == pytest.approx(total / rows.total, rel=1e-6)
+
+
+def test_no_unit_is_narrower_than_what_a_probe_can_feel(surface):
+    X, U, F, K = touches(12)
+    samples = EnergySamples.of(X, U, F, K, surface=surface, radius=RADIUS, inputs=INPUTS)
+    finest = samples.finest(RADIUS)
+    half = np.array([SIDE / 2, SIDE / 2, 0.003])
+    np.testing.assert_allclose(finest * half, RADIUS / 15)
+    problem = Problem(samples.scaled, samples.rows(LAW, resolved=1e-3), None, "", finest=finest)
+    of = problem.regressors("rotated", "inverse-multiquadric")
+    # a Gaussian exp(−|Aξ|²) of width w falls over w: just wide enough along all axes, or not along the last
+    ways = finest[2] * np.array([1.02, 0.98])
+    theta = np.array([of.form.unit(samples.scaled[3], w) for w in (*ways, 1.0)])
+    start = problem.refined(theta, of, iterations=0, seconds=1.0)
+    assert problem.needles(start).tolist() == [False, True, False]
+    search = Search(problem, time.monotonic() + 60.0)
+    for _ in range(4):
+        search.tried(np.vstack([theta, search.random(of, 3)]), of, "test")
+    assert search.found
+    for one in search.found:
+        factors = of.form.factors(one.network.theta)[0]
+        assert np.linalg.svd(factors * finest)[1].max() <= 1.0
 
 
 @pytest.fixture(scope="module")
@@ -240,7 +264,7 @@ def test_the_probes_radius_may_be_an_input(surface):
     slopes = samples.targets(LAW)[1][:, 0, 3]
     np.testing.assert_allclose(slopes, 0.5 / X[:, 3] * 1e-3, rtol=1e-6)
     given = np.where(np.arange(4) < 3, response, np.nan)  # as finite elements tell it
-    learnt = learn_surrogate(X, U, given, K, **known, law=LAW, units_max=8, seconds=4.0, form="axis-aligned")
+    learnt = learn_surrogate(X, U, given, K, **known, law=LAW, units_max=8, seconds=8.0, form="axis-aligned")
     s = learnt.surrogate
     assert s.radius_input == 3
     X, U, response, _ = sized(100, 6)

@@ -79,13 +79,18 @@ def demo(
 @app.command()
 def init(
     path: Annotated[Path, typer.Argument(help="File to write.")] = STUDY,
-    preset: Annotated[str, typer.Option(help="Study to start from.")] = "beam-nylon",
+    preset: Annotated[
+        str,
+        typer.Option(help="Study to start from, such as block, layered, breast-dome, liver, beam-copper."),
+    ] = "beam-nylon",
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
     show: Annotated[bool, typer.Option("--print", help="Print it instead of writing a file.")] = False,
 ) -> None:
     """Write a commented study file."""
     from palpate.study import named, preset_study, to_toml
 
+    if path.is_dir():
+        raise UsageError(f"{path} is a folder.", fix=f"Name a file, such as {path / STUDY}.")
     record = preset_study(preset)
     if (
         path != STUDY and not show
@@ -246,7 +251,7 @@ def run(
 
 @app.command()
 def correct(
-    model: Annotated[Path, typer.Argument(help="A file that a touch surrogate was saved to.")],
+    model: Annotated[Path, typer.Argument(help="The .palpate file of a body that is pressed.")],
     out: Annotated[Path, typer.Option(help="File to write the corrected surrogate to.")],
     file: Annotated[Path | None, typer.Option(help="Table of measured positions and forces.")] = None,
     stdin: Annotated[bool, typer.Option("--stdin", help="Lines of a sensor from standard input.")] = False,

@@ -14,7 +14,8 @@ from palpate.cli.console import Console
 from palpate.dataset.measured import Measured, lines_of, listening, measurements, read_measured
 from palpate.errors import UsageError
 from palpate.learning.correction import Corrected, Corrector, Discrepancy, Noise, correct, judged
-from palpate.surrogates import TouchSurrogate
+from palpate.surrogates import TouchedBody, TouchSurrogate
+from palpate.surrogates.loading import load
 from palpate.units import to_si
 
 __all__ = ["Source", "correct_model"]
@@ -66,7 +67,20 @@ def correct_model(
     DeviceError
         If nobody connects to the port.
     """
-    surrogate = TouchSurrogate.load(model)
+    body = load(model)
+    if not isinstance(body, TouchedBody | TouchSurrogate):
+        raise UsageError(
+            f"{model} holds no body that is pressed.",
+            why=f"It holds a {type(body).__name__}; measured forces correct what a probe presses.",
+            fix="Give the model of a study of touches, such as `palpate demo block` writes.",
+        )
+    surrogate = body.touch if isinstance(body, TouchedBody) else body
+    if out.exists() and out.samefile(model):
+        raise UsageError(
+            f"{out} is the model itself.",
+            why="The corrected one would take its place, and could not be corrected anew.",
+            fix="Choose another name for --out.",
+        )
     values = _parameters(surrogate, parameters)
     if not out.absolute().parent.is_dir():  # before anything is measured
         raise UsageError(f"There is no folder for {out}.", fix="Choose a folder that exists.")
@@ -77,7 +91,8 @@ def correct_model(
     else:
         corrector = Corrector(surrogate, parameters=values, discrepancy=discrepancy, noise=noise)
         done = _streamed(corrector, source, console)
-    path = done.surrogate.save(out)
+    found = done.surrogate
+    path = (body.felt_as(found) if isinstance(body, TouchedBody) else found).save(out)
     if done.warning:
         console.say(done.warning)
     console.result(f"{done}\n{path}", {**done.as_dict(), "warning": done.warning or None, "model": str(path)})

@@ -3,18 +3,48 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 from palpate.cli.console import Console
 from palpate.runtime import LoopProcess
 from palpate.runtime.devices import device_traits
 from palpate.runtime.pressed import PressedBody
+from palpate.runtime.shared import State
 from palpate.runtime.stability import stiffness_warning
 from palpate.runtime.touchable import Touchable, load_touchable, workspace_for
 
 __all__ = ["run_loop"]
+
+LOOK = 0.02  # s between two looks at the loop
+
+
+@dataclass
+class Peak:
+    """The largest force (N) and depth (m) that were seen."""
+
+    force: float = 0.0
+    depth: float = -math.inf
+
+    def see(self, state: State) -> None:
+        """One look at the loop."""
+        self.force = max(self.force, math.hypot(*state.force))
+        self.depth = max(self.depth, state.depth)
+
+    def words(self, pressed: bool) -> str:
+        """For a person."""
+        if self.force == 0.0:
+            return "  felt       nothing: the device did not reach the body"
+        return f"  felt       up to {self.force:.3g} N" + (
+            f", {1e3 * self.depth:.3g} mm deep" if pressed else ""
+        )
+
+    def as_dict(self) -> dict[str, float]:
+        """For a program."""
+        return {"largest_force": self.force, "largest_depth": max(self.depth, 0.0)}
 
 
 def run_loop(model: Path, seconds: float, device: str, rate: float | None, console: Console) -> None:
@@ -28,14 +58,17 @@ def run_loop(model: Path, seconds: float, device: str, rate: float | None, conso
     if warning := stiffness_warning(felt, traits.damping, rate):
         console.say(warning)
     limit = settings.get("max_force")
+    peak = Peak()
     # whoever stops it early still wants to know
     with (
         LoopProcess(model, device=device, rate=rate, max_force=limit) as loop,
         contextlib.suppress(KeyboardInterrupt),
     ):
-        _wait(loop, seconds, console)
+        _wait(loop, seconds, console, peak)
     report = loop.report()  # after the end: only then is it known what the system granted
-    console.result(str(report), report.as_dict())
+    console.result(
+        f"{report}\n{peak.words(isinstance(touch, PressedBody))}", report.as_dict() | peak.as_dict()
+    )
 
 
 def _aimed(device: str, touch: Touchable, scale: float) -> str:
@@ -53,14 +86,15 @@ def _aimed(device: str, touch: Touchable, scale: float) -> str:
     )
 
 
-def _wait(loop: LoopProcess, seconds: float, console: Console) -> None:
-    """Show the force while the loop runs, in a terminal."""
+def _wait(loop: LoopProcess, seconds: float, console: Console, peak: Peak) -> None:
+    """Look at the force while the loop runs, and show it in a terminal."""
     end = time.monotonic() + seconds
     shown = sys.stderr.isatty() and not console.as_json
     while (left := end - time.monotonic()) > 0:
-        time.sleep(min(left, 0.2))
+        time.sleep(min(left, LOOK))
+        state = loop.read()
+        peak.see(state)
         if shown:
-            state = loop.read()
             print(f"\r  force {_vector(state.force)} N   tick {state.tick}", end="", file=sys.stderr)  # noqa: T201
     if shown:
         print(file=sys.stderr)  # noqa: T201

@@ -102,19 +102,29 @@ def _attributes(path: Path) -> dict[str, Any]:
 def _load(path: Path) -> xarray.Dataset:
     import xarray
 
+    if torn := _without_metadata(path):
+        raise _corrupt(path, f"its part {torn} has no zarr.json.")
     try:
         with warnings.catch_warnings():
-            # Zarr only warns of a variable without metadata
-            warnings.filterwarnings("error", message=".*is not recognized as a component of a Zarr hierarchy")
+            # what a file manager leaves in a folder is no part of it
+            warnings.filterwarnings(
+                "ignore", message=".*is not recognized as a component of a Zarr hierarchy"
+            )
             data: xarray.Dataset = xarray.open_zarr(path, consolidated=False, chunks=None).load()
         wanted = data.attrs.pop("checksum", "none")
         found = _checksum(Dataset(data))
     # the kinds of errors that Zarr, its codecs and xarray raise on broken bytes
-    except (OSError, ValueError, KeyError, TypeError, RuntimeError, AttributeError, UserWarning) as error:
+    except (OSError, ValueError, KeyError, TypeError, RuntimeError, AttributeError) as error:
         raise _corrupt(path, f"it can't be decoded: {error!r}.") from error
     if found != wanted:
         raise _corrupt(path, f"its contents don't match its checksum ({found[:12]} against {wanted[:12]}).")
     return data
+
+
+def _without_metadata(path: Path) -> str:
+    """A variable that can't be known any more, of which Zarr only warns; "" if there is none."""
+    parts = sorted(p for p in path.iterdir() if p.is_dir() and not p.name.startswith((".", "_")))
+    return next((p.name for p in parts if not (p / "zarr.json").is_file()), "")
 
 
 def _checksum(dataset: Dataset) -> str:

@@ -19,6 +19,7 @@ from numba import njit
 from palpate.errors import FileFormatError, UsageError
 from palpate.runtime.recorded import branches_told, dents_told, spacing_told
 from palpate.surrogates import FieldSurrogate, SurrogateEvaluator, TouchedBody, TouchSurrogate
+from palpate.surrogates.learnt_energy import corrected_by
 from palpate.surrogates.plastic import DentMemory, Dents
 from palpate.surrogates.relaxation import Branches, Memory, Patches
 from palpate.units import Range, bounds
@@ -54,6 +55,8 @@ class PressedBody:
         alone = isinstance(body, TouchSurrogate)
         touch = body if isinstance(body, TouchSurrogate) else body.touch
         known = str(touch.meta.get("name", "")) or name or "body"
+        if (touches := corrected_by(touch.meta)) is not None:
+            known += f", corrected by {touches} touches"
         return cls(touch, {} if alone else dict(body.fields), known)  # type: ignore[union-attr]
 
     def __str__(self) -> str:

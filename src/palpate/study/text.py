@@ -53,8 +53,17 @@ def read_study(path: str | os.PathLike[str]) -> AnyStudy:
         raise StudyError(
             f"{path} does not describe a study:",
             why="\n".join(f"  {line}" for line in _complaints(error, record)),
-            fix="`palpate init --print` shows every key with its meaning; `palpate schema` is for editors.",
+            fix=_where_to_look(record, content),
         ) from error
+
+
+def _where_to_look(record: type[Study | TouchStudy], content: dict[str, Any]) -> str:
+    """Which example and which schema tell every key."""
+    if record is Study:
+        return "`palpate init --print` shows every key with its meaning; `palpate schema` is for editors."
+    kind = content.get("body", {}).get("kind")
+    preset = {"layered": "layered", "dome": "breast-dome", "organ": "liver"}.get(kind, "block")
+    return f"`palpate init --preset {preset} --print` shows every key; `palpate schema touch` is for editors."
 
 
 def _record_for(content: dict[str, Any], path: Path) -> type[Study | TouchStudy]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.units import Range
 
-__all__ = ["NONE", "touch_at"]
+__all__ = ["NONE", "rows_of", "touch_at"]
 
 NONE = np.zeros(0)
 _DOUBLE = np.dtype(np.float64)
@@ -32,3 +34,28 @@ def touch_at(position: Any, parameters: Any, shape: tuple[int, ...]) -> tuple[np
             fix=f"Give its centre (3,) in m and parameters {shape}.",
         )
     return position, parameters
+
+
+def rows_of(X: Any, inputs: Sequence[Range], words: str) -> np.ndarray:
+    """Inputs (N, n) in double precision; `words` calls what they are given to by its name.
+
+    Raises
+    ------
+    UsageError
+        If they are of another shape, no numbers, or not finite.
+    """
+    why = f"They are {', '.join(f'{r.name} ({r.unit})' if r.unit else r.name for r in inputs)}."
+    try:
+        X = np.ascontiguousarray(X, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise UsageError(f"Inputs of a {words} are numbers: {error}.", why=why) from error
+    if X.ndim != 2 or X.shape[1] != len(inputs):
+        raise UsageError(
+            f"Inputs of shape {X.shape} came to a {words} of {len(inputs)} inputs.",
+            why=why,
+            fix=f"Pass an array of shape (N, {len(inputs)}), in SI units; one row for a single place.",
+        )
+    if not np.isfinite(X).all():
+        row = int(np.flatnonzero(~np.isfinite(X).all(axis=1))[0])
+        raise UsageError(f"Row {row} of {len(X)} inputs is not finite: {X[row]}.", why=why)
+    return np.asarray(X)

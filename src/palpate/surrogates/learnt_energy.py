@@ -15,11 +15,12 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.network import Network
+from palpate.surrogates.arguments import rows_of
 from palpate.surrogates.touch_kernels import ANSWER, FORCE, STIFFNESS
 from palpate.surrogates.touch_trust import trusts_into
 from palpate.units import Range
 
-__all__ = ["LearntEnergy", "history_in_words"]
+__all__ = ["LearntEnergy", "corrected_by", "history_in_words"]
 
 
 class LearntEnergy(ABC):
@@ -49,13 +50,7 @@ class LearntEnergy(ABC):
 
     def _answers(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Checked inputs (N, n), answers (N, 14) and inside (N,)."""
-        X = np.ascontiguousarray(X, dtype=np.float64)
-        if X.ndim != 2 or X.shape[1] != len(self.inputs):
-            raise UsageError(
-                f"Inputs of shape {X.shape} came to a {self.WORDS} of {len(self.inputs)} inputs.",
-                why=f"They are {', '.join(r.name for r in self.inputs)}.",
-                fix=f"Pass an array of shape (N, {len(self.inputs)}), in SI units.",
-            )
+        X = rows_of(X, self.inputs, self.WORDS)
         answers, inside = np.empty((len(X), ANSWER)), np.empty(len(X), dtype=np.bool_)
         self._fill(X, answers, inside)
         return X, answers, inside
@@ -66,7 +61,7 @@ class LearntEnergy(ABC):
         Raises
         ------
         UsageError
-            If X has another number of columns; so do all that take X.
+            If X has another number of columns, or holds what is no finite number; so do all that take X.
         """
         return self._answers(X)[1][:, 0].copy()
 
@@ -122,4 +117,13 @@ def history_in_words(meta: Mapping[str, Any]) -> str:
     error = meta.get("force_error")
     if isinstance(error, Mapping) and {"median", "p95"} <= error.keys():
         words += f"; force error {100 * error['median']:.2g} % median, {100 * error['p95']:.2g} % p95"
+    if (touches := corrected_by(meta)) is not None:
+        words += f"; corrected by {touches} measured touches"
     return words
+
+
+def corrected_by(meta: Mapping[str, Any]) -> int | None:
+    """How many measured touches have corrected it; None for one as it was learnt."""
+    told = meta.get("correction")
+    counts = told.get("counts") if isinstance(told, Mapping) else None
+    return int(counts.get("learnt", 0)) if isinstance(counts, Mapping) else None

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import sys
+import time
 from collections.abc import Callable, Iterator
 
 __all__ = ["Report", "reporter"]
+
+SELDOM = 10.0  # s between two lines in a log
 
 Report = Callable[[int, int], None]
 """Called with the number of samples done and of all."""
@@ -14,18 +17,34 @@ Report = Callable[[int, int], None]
 
 @contextlib.contextmanager
 def reporter(progress: bool | Report) -> Iterator[Report]:
-    """Yield what to call: the caller's function, a bar on standard error if it is a terminal, or a no-op."""
+    """Yield what to call: the caller's function, a bar on standard error if it is a terminal, else a line now and then."""
     if callable(progress):
         yield progress
     elif progress and sys.stderr.isatty():
         with _bar() as report:
             yield report
+    elif progress:
+        yield _lines()
     else:
         yield _silent
 
 
 def _silent(done: int, total: int) -> None:
     """Report to nobody."""
+
+
+def _lines() -> Report:
+    """For a log: a line every so often, and at the end of what took that long."""
+    last, before = time.monotonic(), -1
+
+    def report(done: int, total: int) -> None:
+        nonlocal last, before
+        late = time.monotonic() - last > SELDOM
+        if late or (done == total and 0 <= before < total):
+            print(f"solved {done} of {total}", file=sys.stderr, flush=True)  # noqa: T201
+            last, before = time.monotonic(), done
+
+    return report
 
 
 @contextlib.contextmanager

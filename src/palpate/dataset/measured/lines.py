@@ -31,6 +31,7 @@ _EXAMPLE = f"palpate {VERSION} length=mm force=N time=s"
 def measurements(lines: Iterable[str], answer: Callable[[str], None]) -> Iterator[Measured]:
     """One measurement for each good line, until the lines end or say so."""
     columns: Columns | None = None
+    told = False
     for at, line in enumerate(lines, 1):
         words = line.split("#", 1)[0].replace(",", " ") if columns else line.split("#", 1)[0]
         cells = words.split()
@@ -45,6 +46,10 @@ def measurements(lines: Iterable[str], answer: Callable[[str], None]) -> Iterato
                 continue
             row = columns.values(cells)
         except UsageError as error:
+            if columns is None and cells[0] != "palpate":  # of data without a greeting one line tells enough
+                if told:
+                    continue
+                told = True
             answer(f"error line {at}: {error.what} {error.fix}".rstrip())
             continue
         yield Measured.of([row])

@@ -117,7 +117,7 @@ class Touches:
 
 
 def _inner(probe: Mapping[str, Any], radius: float) -> float:
-    """How deep the probe's centre may go before the surface's distance ends, m: there it is twice as deep as trained."""
+    """How deep the probe's centre may go before the distance ends, m: the probe is twice as deep there as trained."""
     return float(max(1.5 * radius, 2.0 * max(probe.get("depth") or (0.0,)) - radius))
 
 

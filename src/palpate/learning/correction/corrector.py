@@ -101,6 +101,12 @@ class Corrector:
         window: int = 500,
         memory: float | None = None,
     ) -> None:
+        if not isinstance(surrogate, TouchSurrogate):
+            raise UsageError(
+                f"A {type(surrogate).__name__} can't be corrected.",
+                why="Measured forces correct an energy of touch.",
+                fix="Pass `body.touch`, and put the result back by `body.felt_as(corrected)`.",
+            )
         p = np.array(parameters, dtype=np.float64)
         if p.shape != (len(surrogate.parameters),) or not np.isfinite(p).all():
             names = ", ".join(r.name for r in surrogate.parameters) or "none"

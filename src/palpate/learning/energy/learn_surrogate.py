@@ -144,7 +144,8 @@ def learn_surrogate(
             guess = radius / 10.0 if length is None else length
             share = _LAW_SHARE * seconds
             law, trials = chosen_law(samples, images, guess, resolved=resolved, seconds=share, seed=seed)
-        problem = Problem(samples.scaled, samples.rows(law, resolved=resolved), images, str(law))
+        rows = samples.rows(law, resolved=resolved)
+        problem = Problem(samples.scaled, rows, images, str(law), finest=samples.finest(radius))
         search = searched(problem, begun + seconds, form, radial, units_max, target, seed)
         found = average(search, networks)
         trust = trust_of(found, samples)

@@ -33,6 +33,7 @@ _TOLERANCE = 1e-5
 _RIDGE = 3e-6  # with 1e-10 some networks bend wildly between solves, with 1e-4 all miss more
 _MOST = 0.98  # leverage; what a solve decides alone is judged by fifty times its residual
 _PASSES = 3
+_COMBED, _AFTERWARDS = 2, 30  # times that needles are taken out, and iterations after that
 _STEP = 1.4  # growth of the number of units from one size to the next
 
 
@@ -61,13 +62,29 @@ class EnergyTrial:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Scaled inputs ξ (N, n), what `refine` takes besides them, the images of every solve, a penalty on weights."""
+    """What networks of ℓ are learnt from.
+
+    Attributes
+    ----------
+    X : (N, n)
+        Scaled inputs ξ.
+    rows : dict
+        What `refine` takes besides them.
+    images : Images or None
+        Of every solve.
+    law : str
+    ridge : float
+        A penalty on weights.
+    finest : (n,), optional
+        Of scaled inputs, the shortest way over which a unit may change; 0 for any, which is the default.
+    """
 
     X: np.ndarray
     rows: dict[str, np.ndarray]
     images: Images | None
     law: str
     ridge: float = _RIDGE
+    finest: np.ndarray | None = None
 
     def regressors(self, form: str, radial: RadialFunction) -> Regressors:
         """Units of a form, with their images where there is a symmetry."""
@@ -91,6 +108,13 @@ class Problem:
             seconds=seconds,
             tolerance=_TOLERANCE,
         )
+
+    def needles(self, refined: Refined) -> np.ndarray:
+        """Units (h,) that are narrower in some direction than anything that a probe could feel."""
+        if self.finest is None or not len(refined.theta):
+            return np.zeros(len(refined.theta), dtype=bool)
+        factors = refined.regressors.form.factors(refined.theta)[0]
+        return np.asarray(np.linalg.norm(factors * self.finest, 2, axis=(1, 2)) > 1.0)
 
     def fitted(self, refined: Refined) -> tuple[Rows, Fit]:
         """The least-squares problem of a refinement's units, and its solution."""
@@ -184,16 +208,34 @@ class Search:
     ) -> tuple[Refined, float]:
         """A refinement from a start, recorded, and its error."""
         begun = time.monotonic()
-        found = self.problem.refined(theta, regressors, iterations=iterations, seconds=max(self.left, 0.1))
+        found = self._refined(theta, regressors, iterations)
         left_out = self.problem.missed(found)
-        error = left_out.mean
-        self.found.append(Found(found, left_out.errors, error))
+        usable = not self.problem.needles(found).any()
+        error = left_out.mean if usable else float("inf")
+        if usable or not self.found:
+            self.found.append(Found(found, left_out.errors, error))
         took = time.monotonic() - begun
         form, radial = regressors.form.name, regressors.radial
         self.trials.append(EnergyTrial(self.problem.law, form, radial, start, len(found.theta), error, took))
         if self.best is None or error < self.error:
             self.best, self.error = found, error
         return found, error
+
+    def _refined(self, theta: np.ndarray, regressors: Regressors, iterations: int) -> Refined:
+        """A refinement, and once more without the needles in it.
+
+        A unit that stands on one solve alone and misses all others costs nothing where solves are left out, and makes
+        the force ripple between them.
+        """
+        found = self.problem.refined(theta, regressors, iterations=iterations, seconds=max(self.left, 0.1))
+        for _ in range(_COMBED):
+            if not (narrow := self.problem.needles(found)).any():
+                break
+            seconds = max(self.left, 0.1)
+            found = self.problem.refined(
+                found.theta[~narrow], regressors, iterations=_AFTERWARDS, seconds=seconds
+            )
+        return found
 
     def random(self, regressors: Regressors, count: int) -> np.ndarray:
         """Units (count, p) at samples drawn, of widths drawn."""

@@ -271,7 +271,10 @@ class SolidProblem:
 
     def __str__(self) -> str:
         acting = ", ".join(str(interaction) for interaction in self.interactions)
-        inputs = ", ".join(map(str, self.ranges))
+        try:
+            inputs = ", ".join(map(str, self.ranges))
+        except UsageError as error:  # what prints a value must not fail
+            inputs = f"none: {error.what}"
         return f"{self.body}\n  under    {acting}\n  inputs   {inputs}"
 
     def inputs(self, x: Any) -> np.ndarray:

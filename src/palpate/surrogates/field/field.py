@@ -22,6 +22,7 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.network import Network
 from palpate.network.compiled import Precision
+from palpate.surrogates.arguments import rows_of
 from palpate.surrogates.continuation import Continuation
 from palpate.surrogates.field.dimple import Dimple
 from palpate.surrogates.field.errors import FieldErrors, sizes_of
@@ -173,14 +174,7 @@ class FieldSurrogate:
         return table, np.zeros(table.shape[:2]), float(self.dimple.reach), nodes, points
 
     def _checked(self, X: np.ndarray) -> np.ndarray:
-        X = np.ascontiguousarray(X, dtype=np.float64)
-        if X.ndim != 2 or X.shape[1] != len(self.inputs):
-            raise UsageError(
-                f"Inputs of shape {X.shape} came to a field of {len(self.inputs)} inputs.",
-                why=f"They are {', '.join(r.name for r in self.inputs)}.",
-                fix=f"Pass an array of shape (N, {len(self.inputs)}), in SI units.",
-            )
-        return X
+        return rows_of(X, self.inputs, "field")
 
     def depth(self, X: np.ndarray) -> np.ndarray:
         """s (N,) of the rigid probe into the surface at rest, m; negative without contact."""

@@ -67,6 +67,13 @@ class TouchedBody:
 
     __repr__ = __str__
 
+    def felt_as(self, touch: TouchSurrogate) -> TouchedBody:
+        """The same fields with another energy, such as one that measured forces have corrected.
+
+        Where its surface lies higher or lower, the drawn body sinks from there.
+        """
+        return TouchedBody(touch, {k: replace(v, surface=touch.surface) for k, v in self.fields.items()})
+
     def relaxing(self, branches: Branches, *, spacing: float | None = None) -> TouchedBody:
         """The same body whose force relaxes, in the loop and on the page.
 

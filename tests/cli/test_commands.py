@@ -111,6 +111,11 @@ def test_run_reports_the_loop(palpate, carried_out):
     assert answer.code == 0
     report = json.loads(answer.out)
     assert report["ticks"] > 50
+    assert report["largest_force"] > 0
+    still = palpate(
+        "run", carried_out / "small.palpate", "--seconds", "0.3", "--device", "stroke:amplitude=0"
+    )
+    assert "did not reach the body" in still.out
 
 
 def test_doctor_has_a_remedy_for_each_miss(palpate):

@@ -14,7 +14,7 @@ import pytest
 
 from palpate.dataset.measured import write_measured
 from palpate.learning.correction import force_error
-from palpate.surrogates import TouchSurrogate
+from palpate.surrogates import TouchedBody, TouchSurrogate
 
 sys.path.append(str(Path(__file__).parents[1] / "learning" / "correction"))
 from correction_made import MODULUS, model, scaled, touches
@@ -74,6 +74,20 @@ def test_a_file_corrects_a_model(palpate, folder):
     content = json.loads(said.out)
     assert content["counts"]["learnt"] == 40
     assert content["left_out"]["median"] < 0.03
+
+
+def test_a_body_with_its_shape_stays_one(palpate, folder):
+    X, F = measured()
+    write_measured(folder / "specimen.csv", X, F)
+    TouchedBody(model(), {}).save(folder / "body.palpate")
+    words = ("correct", folder / "body.palpate", "--file", folder / "specimen.csv", "--out")
+    assert palpate(*words, folder / "new.palpate").code == 0
+    found = TouchedBody.load(folder / "new.palpate")
+    assert "corrected by 40 measured touches" in str(found)
+    X, F = measured(100, 9)
+    assert force_error(found.touch, X, F).median < 0.02
+    answer = palpate(*words, folder / "body.palpate")
+    assert (answer.code, "is the model itself" in answer.err) == (2, True)
 
 
 def test_standard_input_of_a_real_process(folder):

@@ -239,6 +239,19 @@ def test_every_damage_is_noticed_and_named(stored, damage):
     assert "answers.zarr" in str(caught.value)
 
 
+def test_what_a_file_manager_leaves_behind_is_no_damage(stored):
+    (stored / ".DS_Store").write_bytes(b"Bud1")
+    (stored / "desktop.ini").write_text("[.ShellClassInfo]")
+    (stored / ".ipynb_checkpoints").mkdir()
+    assert same(Dataset.open(stored), make(failed=(3,)))
+
+
+def test_a_variable_without_metadata_is_damage(stored):
+    (stored / "displacement" / "zarr.json").unlink()
+    with pytest.raises(FileFormatError, match=r"displacement has no zarr\.json"):
+        Dataset.open(stored)
+
+
 def test_a_missing_store_is_named(tmp_path):
     with pytest.raises(FileFormatError, match=r"nothing\.zarr"):
         Dataset.open(tmp_path / "nothing.zarr")

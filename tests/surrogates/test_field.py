@@ -11,11 +11,14 @@ from field_made import field, grid
 from touch_made import DEEPEST, PROBE, RADIUS, SOFT, around_points, ball, inside_points, surrogate
 
 from palpate.errors import FileFormatError, UsageError
+from palpate.learning.correction.written import raised
 from palpate.network import Archive, load_archive, save_archive
+from palpate.runtime.pressed import PressedBody
 from palpate.surrogates import FieldSurrogate, TouchedBody
 from palpate.surrogates.field import Dimple, Rise
 from palpate.surrogates.field.dimple import products
 from palpate.surrogates.field.rise import RISES
+from palpate.surrogates.loading import load
 
 
 def by_formula(F: FieldSurrogate, x: np.ndarray) -> np.ndarray:
@@ -175,6 +178,41 @@ def test_a_body_keeps_energy_and_fields_in_one_file_with_one_surface(tmp_path):
         assert again.fields[name].surface is again.touch.surface
     with pytest.raises(FileFormatError, match="touched-body"):
         FieldSurrogate.load(path)
+
+
+def test_a_body_is_felt_as_a_corrected_energy_says(tmp_path):
+    S, F = surrogate(), {"displacement": field()}
+    moved = raised(S.surface, 1e-4, RADIUS)
+    meta = dict(S.meta) | {"correction": {"counts": {"learnt": 40, "outlier": 2}}}
+    body = TouchedBody(S, F).felt_as(dataclasses.replace(S, surface=moved, meta=meta))
+    X = around_points(50)
+    np.testing.assert_allclose(body.fields["displacement"].depth(X), S.depth(X) + 1e-4, atol=1e-12)
+    assert "corrected by 40 measured touches" in str(body)
+    assert PressedBody.of(body, "block").name.endswith("corrected by 40 touches")
+    again = load(body.save(tmp_path / "b.palpate"))
+    assert isinstance(again, TouchedBody)
+    np.testing.assert_array_equal(again.touch.force(X), body.touch.force(X))
+
+
+def test_a_file_of_any_kind_is_loaded_as_what_it_is(tmp_path):
+    for one in (surrogate(), field(), TouchedBody(surrogate(), {})):
+        assert type(load(one.save(tmp_path / "one.palpate"))) is type(one)
+    with pytest.raises(FileFormatError, match="does not exist"):
+        load(tmp_path / "none.palpate")
+
+
+@pytest.mark.parametrize("what", ["energy", "force", "stiffness", "inside"])
+def test_inputs_that_are_no_numbers_are_refused(what):
+    X = around_points(5)
+    X[3, 1] = np.nan
+    with pytest.raises(UsageError, match="Row 3 of 5 inputs is not finite"):
+        getattr(surrogate(), what)(X)
+    with pytest.raises(UsageError, match="are numbers"):
+        getattr(surrogate(), what)("above")
+    with pytest.raises(UsageError, match="one row for a single place"):
+        getattr(surrogate(), what)(X[0])
+    with pytest.raises(UsageError, match="Row 3 of 5"):
+        field().values(X)
 
 
 def test_fields_of_another_body_are_refused():

@@ -243,6 +243,18 @@ def test_a_bar_starts_where_an_earlier_run_stopped(monkeypatch):
     assert seen == [{"completed": 20, "total": 64}]
 
 
+def test_a_log_gets_a_line_now_and_then(monkeypatch, capsys):
+    clock = iter([0.0, 1.0, 11.0, 11.0, 12.0, 13.0, 13.0])
+    monkeypatch.setattr("palpate.sweeps.progress.time.monotonic", lambda: next(clock))
+    with reporter(True) as report:
+        for done in (0, 3, 5, 9):
+            report(done, 9)
+    assert capsys.readouterr().err == "solved 3 of 9\nsolved 9 of 9\n"
+    with reporter(False) as report:
+        report(9, 9)
+    assert capsys.readouterr().err == ""
+
+
 def test_a_damaged_part_is_solved_again(cluster, tmp_path):
     arguments = {"body": Spring(), "samples": 64, "cluster": cluster, "path": tmp_path / "a.zarr"}
 

@@ -17,7 +17,7 @@ Report = Callable[[int, int], None]
 
 @contextlib.contextmanager
 def reporter(progress: bool | Report) -> Iterator[Report]:
-    """Yield what to call: the caller's function, a bar on standard error if it is a terminal, else a line now and then."""
+    """Yield what to call: the caller's function, a bar in a terminal, else a line on standard error now and then."""
     if callable(progress):
         yield progress
     elif progress and sys.stderr.isatty():

@@ -67,7 +67,8 @@ def test_a_malformed_line_is_answered_and_skipped(bad):
 def test_nothing_is_measured_before_a_greeting_that_names_its_units(bad):
     found, answers = taken(bad, "0 1 2 3 4 5 6", HELLO, "0 1 2 3 4 5 6", "end", "0 1 2 3 4 5 6")
     assert len(found) == 1
-    assert [a.split()[0] for a in answers] == ["error", "error", "ok"]
+    # of lines without any greeting the first is answered alone
+    assert [a.split()[0] for a in answers] == ["error"] * (1 if bad[0] == "0" else 2) + ["ok"]
 
 
 def test_a_stream_ends_when_it_closes_and_when_it_is_silent():
@@ -109,6 +110,12 @@ def served(stall=5.0, wait=5.0):
     thread = threading.Thread(target=serve, daemon=True)
     thread.start()
     return ports.get(timeout=5), found, thread
+
+
+def test_a_stream_without_a_greeting_is_told_once():
+    answers = []
+    assert not list(measurements(["1 2 3", "4 5 6", "palpate 2 length=mm", "end"], answers.append))
+    assert [a.split(":")[0] for a in answers] == ["error line 1", "error line 3"]
 
 
 def test_measurements_over_tcp_with_errors_answered():

@@ -300,4 +300,4 @@ def _mesh_line(mesh: MeshErrors) -> str:
 def _case_line(case: Case) -> str:
     deep = "" if case.depth is None else f", {plain(1e3 * case.depth, 3)} mm deep"
     truth, answer = (" ".join(f"{v:.4g}" for v in F) for F in (case.truth, case.answer))
-    return f"{share(case.relative)} ({plain(case.jnd)} JND) {case.at}{deep}: ({answer}) N for ({truth}) N"
+    return f"{share(case.relative)} ({plain(case.jnd)} JND) {case.at}{deep}: answered ({answer}) N, solved ({truth}) N"

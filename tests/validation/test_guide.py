@@ -31,7 +31,7 @@ def test_the_program_that_writes_a_report_runs(tmp_path: Path) -> None:
 def test_a_model_is_asked_as_the_guide_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import palpate as pp
 
-    (asking,) = (block for block in BLOCKS if "touch.evaluator()" in block)
+    (asking,) = (block for block in BLOCKS if 'TouchModel.load("beam.palpate")' in block)
     tip_model().save(tmp_path / "beam.palpate")
     monkeypatch.chdir(tmp_path)
     names = {"pp": pp}

@@ -260,7 +260,10 @@ def _notes(
     force: ForceErrors, loops: LoopWork | None, border: LoopWork | None, mesh: MeshErrors | None, seen: int
 ) -> list[str]:
     """What was not judged or must be known, beside the reasons of each figure."""
-    found = []
+    found = [
+        f"f₀ = {force.light:.3g} N, the smaller of 0.5 N and 5 % of the largest force: errors of fainter ones are "
+        "shares of it."
+    ]
     if mesh is None:
         found.append("The mesh's own error is not in these figures: no refined solves were given.")
     elif mesh.count < ASKED:
@@ -269,7 +272,8 @@ def _notes(
         found.append(f"{count(seen, 'solve')} left out: trained on, or the mirror image of one that was.")
     if force.outside:
         found.append(
-            f"{force.outside} of {force.count + force.light_count} count as outside what was trained."
+            f"{force.outside} of {force.count + force.light_count} count as outside what was trained, in no training "
+            "solve's neighbourhood; more solves bring them nearer."
         )
     found += [
         f"The quadrature around closed paths left {share(one.open)} open: the force jumps somewhere."

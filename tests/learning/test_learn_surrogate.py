@@ -127,7 +127,7 @@ def test_no_unit_is_narrower_than_what_a_probe_can_feel(surface):
     samples = EnergySamples.of(X, U, F, K, surface=surface, radius=RADIUS, inputs=INPUTS)
     finest = samples.finest(RADIUS)
     half = np.array([SIDE / 2, SIDE / 2, 0.003])
-    np.testing.assert_allclose(finest * half, RADIUS / 15)
+    np.testing.assert_allclose(finest * half, RADIUS / 40)
     problem = Problem(samples.scaled, samples.rows(LAW, resolved=1e-3), None, "", finest=finest)
     of = problem.regressors("rotated", "inverse-multiquadric")
     # a Gaussian exp(−|Aξ|²) of width w falls over w: just wide enough along all axes, or not along the last

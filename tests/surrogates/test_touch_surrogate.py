@@ -336,7 +336,7 @@ def test_parts_that_do_not_fit_are_refused(more, word):
 
 def test_inputs_of_another_shape_are_refused():
     S = surrogate()
-    with pytest.raises(UsageError, match="c_x, c_y, c_z"):
+    with pytest.raises(UsageError, match=r"c_x \(m\), c_y \(m\), c_z"):
         S.force(np.zeros((2, 4)))
     with pytest.raises(UsageError, match=r"\(3,\)"):
         S.evaluator()(np.zeros(2))

@@ -14,6 +14,7 @@ from palpate.errors import FileFormatError, UsageError
 from palpate.learning.correction.written import raised
 from palpate.network import Archive, load_archive, save_archive
 from palpate.runtime.pressed import PressedBody
+from palpate.runtime.touchable import load_touchable
 from palpate.surrogates import FieldSurrogate, TouchedBody
 from palpate.surrogates.field import Dimple, Rise
 from palpate.surrogates.field.dimple import products
@@ -199,6 +200,8 @@ def test_a_file_of_any_kind_is_loaded_as_what_it_is(tmp_path):
         assert type(load(one.save(tmp_path / "one.palpate"))) is type(one)
     with pytest.raises(FileFormatError, match="does not exist"):
         load(tmp_path / "none.palpate")
+    with pytest.raises(FileFormatError, match="a field alone"):
+        load_touchable(field().save(tmp_path / "one.palpate"))
 
 
 @pytest.mark.parametrize("what", ["energy", "force", "stiffness", "inside"])

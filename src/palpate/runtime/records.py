@@ -107,9 +107,7 @@ class State:
     max_force: float
     histogram: np.ndarray
     work_histogram: np.ndarray
-    prints: (
-        np.ndarray
-    )  # (n,) √J at each place that keeps a print, see `PRINTS`; empty where nothing has yielded
+    prints: np.ndarray  # (n,) √J, of the print at each place; empty where nothing has yielded
 
     @property
     def lateness_p50(self) -> float:

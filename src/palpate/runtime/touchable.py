@@ -3,32 +3,22 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from pathlib import Path
 from typing import TypeAlias
 
 from palpate.errors import FileFormatError
-from palpate.network import load_archive
 from palpate.runtime.pressed import PressedBody
 from palpate.runtime.remembering import RememberingBody
 from palpate.runtime.workspace import Workspace
-from palpate.surrogates import TouchedBody, TouchModel, TouchSurrogate
-from palpate.surrogates.field.touched_body import KIND as BODY
-from palpate.surrogates.grasp.file import KIND as HELD_BY_PAD
+from palpate.surrogates import FieldSurrogate, TouchedBody, TouchModel, TouchSurrogate
+from palpate.surrogates.grasp import GraspSurrogate
+from palpate.surrogates.loading import load
 from palpate.surrogates.plastic import HeldBody
-from palpate.surrogates.plastic.held_file import KIND as REMEMBERS
-from palpate.surrogates.touch_file import KIND as SURROGATE
 
 __all__ = ["Learnt", "Touchable", "load_touchable", "touchable", "workspace_for"]
 
 Touchable: TypeAlias = TouchModel | PressedBody | RememberingBody
 Learnt: TypeAlias = TouchModel | TouchedBody | TouchSurrogate | HeldBody
-
-_LOAD: dict[str, Callable[[Path], Learnt]] = {
-    BODY: TouchedBody.load,
-    SURROGATE: TouchSurrogate.load,
-    REMEMBERS: HeldBody.load,
-}
 
 
 def touchable(model: Learnt, name: str = "") -> Touchable:
@@ -47,14 +37,18 @@ def load_touchable(path: str | os.PathLike[str]) -> Touchable:
         If the file is missing, corrupt, foreign, or of something that no hand can be laid on.
     """
     path = Path(path)
-    kind = load_archive(path).kind
-    if kind == HELD_BY_PAD:
+    model = load(path)
+    if isinstance(model, GraspSurrogate):
         raise FileFormatError(
             f"{path} holds a body held by a pad, which has no page and no loop yet.",
             fix="Touch it from Python: GraspSurrogate.load(file).evaluator().",
         )
-    load = _LOAD.get(kind, TouchModel.load)
-    return touchable(load(path), path.stem)
+    if isinstance(model, FieldSurrogate):
+        raise FileFormatError(
+            f"{path} holds a field alone, which gives no force.",
+            fix="Save it with its energy: TouchedBody(touch, fields).save(file).",
+        )
+    return touchable(model, path.stem)
 
 
 def workspace_for(model: Touchable, radius: float) -> Workspace:

@@ -80,7 +80,7 @@ def validate(
     if not isinstance(test, Dataset | TouchSolves):
         raise UsageError(
             f"A model is judged by solves, not by {type(test).__name__} {test!r:.60}.",
-            fix="Give what `palpate.sweep` returned, `Dataset.load(path)`, or TouchSolves of arrays.",
+            fix="Give what `palpate.sweep` returned, `Dataset.open(path)`, or TouchSolves of arrays.",
         )
     if isinstance(model, TouchModel):
         if not isinstance(test, Dataset) or refined is not None or strokes:

@@ -123,7 +123,7 @@ class PressedExhibit:
         prints = np.zeros(0)
         if self._prints is not None:
             prints = self._prints.depths(state.prints)
-            coefficients *= self._elastic(place, state.prints)
+            coefficients *= 0.0 if place is None else self._prints.elastic(place, state.prints)
         deviation = self._judge.trust(state.position, parameters) if held else 0.0
         if held and place is not None:
             self._normal = place[5:8].copy()
@@ -138,13 +138,6 @@ class PressedExhibit:
             coefficients=coefficients,
             prints=prints,
         )
-
-    def _elastic(self, place: np.ndarray | None, amplitude: np.ndarray) -> float:
-        """Share of the elastic shape that is drawn on top of the print: none until the probe meets its bottom."""
-        if place is None or self._prints is None:
-            return 0.0
-        kept = self._prints.under(place[2:5], place[5:8], amplitude)
-        return max(0.0, 1.0 - kept / max(float(place[0]), 1e-12))
 
     def _pressed(self, state: State) -> np.ndarray:
         self._last, self._depth, self._released = state.position, state.depth, now()

@@ -86,6 +86,14 @@ class Prints:
         met = self._dents.shares(foot[None]) @ amplitude
         return float(self._depths.of(met, self._depths.table(foot[None], normal[None]))[0])
 
+    def elastic(self, place: np.ndarray, amplitude: np.ndarray) -> float:
+        """Share of the elastic shape that is drawn on top of the print: none until the probe meets its bottom.
+
+        `place` (8,) is a field's: depth in m, growth, foot in m, normal.
+        """
+        kept = self.under(place[2:5], place[5:8], amplitude)
+        return max(0.0, 1.0 - kept / max(float(place[0]), 1e-12))
+
 
 def yielding_in_words(body: PressedBody) -> str:
     """From which depth in its middle a body yields; empty for one that doesn't."""

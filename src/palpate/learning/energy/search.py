@@ -33,7 +33,7 @@ _TOLERANCE = 1e-5
 _RIDGE = 3e-6  # with 1e-10 some networks bend wildly between solves, with 1e-4 all miss more
 _MOST = 0.98  # leverage; what a solve decides alone is judged by fifty times its residual
 _PASSES = 3
-_COMBED, _AFTERWARDS = 2, 30  # times that needles are taken out, and iterations after that
+_COMBED = (30, 0)  # iterations after needles are taken out, once and again; with none there can't be new ones
 _STEP = 1.4  # growth of the number of units from one size to the next
 
 
@@ -76,7 +76,7 @@ class Problem:
     ridge : float
         A penalty on weights.
     finest : (n,), optional
-        Of scaled inputs, the shortest way over which a unit may change; 0 for any, which is the default.
+        Of scaled inputs, the shortest way over which a unit may change, 0 where that is any; None where all are.
     """
 
     X: np.ndarray
@@ -210,10 +210,8 @@ class Search:
         begun = time.monotonic()
         found = self._refined(theta, regressors, iterations)
         left_out = self.problem.missed(found)
-        usable = not self.problem.needles(found).any()
-        error = left_out.mean if usable else float("inf")
-        if usable or not self.found:
-            self.found.append(Found(found, left_out.errors, error))
+        error = left_out.mean
+        self.found.append(Found(found, left_out.errors, error))
         took = time.monotonic() - begun
         form, radial = regressors.form.name, regressors.radial
         self.trials.append(EnergyTrial(self.problem.law, form, radial, start, len(found.theta), error, took))
@@ -222,19 +220,17 @@ class Search:
         return found, error
 
     def _refined(self, theta: np.ndarray, regressors: Regressors, iterations: int) -> Refined:
-        """A refinement, and once more without the needles in it.
+        """A refinement without needles: what has some is refined once more without them.
 
         A unit that stands on one solve alone and misses all others costs nothing where solves are left out, and makes
         the force ripple between them.
         """
         found = self.problem.refined(theta, regressors, iterations=iterations, seconds=max(self.left, 0.1))
-        for _ in range(_COMBED):
+        for more in _COMBED:
             if not (narrow := self.problem.needles(found)).any():
                 break
-            seconds = max(self.left, 0.1)
-            found = self.problem.refined(
-                found.theta[~narrow], regressors, iterations=_AFTERWARDS, seconds=seconds
-            )
+            kept = found.theta[~narrow]
+            found = self.problem.refined(kept, regressors, iterations=more, seconds=max(self.left, 0.1))
         return found
 
     def random(self, regressors: Regressors, count: int) -> np.ndarray:

@@ -136,6 +136,7 @@ STUDIES: dict[str, TouchStudy] = {
     "block": _BLOCK,
     "block-10k": replace(_BLOCK, pad=STIFF_PAD),
     "layered": _LAYERED,
+    "layered-10k": replace(_LAYERED, pad=STIFF_PAD),
     "breast-dome": _BREAST,
     "breast-dome-10k": replace(_BREAST, pad=STIFF_PAD),
     "liver": TouchStudy(

@@ -13,6 +13,10 @@ from hypothesis import settings
 settings.register_profile("palpate", deadline=None, derandomize=True)
 settings.load_profile("palpate")
 
+# there are as many workers as cores: a second thread of each would only wait for the other's; programs inherit it
+for library in ("OMP", "OPENBLAS", "MKL"):
+    os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+
 # a run in the background of a shell ignores interrupts, and so would the programs that tests interrupt
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from palpate.learning.energy.average import average
+from palpate.learning.energy.judging import Judged, judged, left_out_again
 from palpate.learning.energy.search import Problem, Search
 
 
@@ -43,14 +44,19 @@ def search():
     return search
 
 
+@pytest.fixture(scope="module")
+def networks(search):
+    return judged(search, np.inf)
+
+
 def answers(found, X):
     """Of a mean's units and tail (N, 1)."""
     of = found.regressors
     return np.hstack([of.tail_rows(X), of.phi(X, found.theta)]) @ found.coefficients
 
 
-def test_a_mean_answers_what_its_networks_do_on_average(search):
-    found = average(search, 4)
+def test_a_mean_answers_what_its_networks_do_on_average(networks):
+    found = average(networks, 4)
     assert found.networks > 1
     X = np.random.default_rng(5).uniform(-1, 1, (30, 2))
     answer = answers(found, X)
@@ -58,44 +64,43 @@ def test_a_mean_answers_what_its_networks_do_on_average(search):
     np.testing.assert_allclose(answer, np.mean(members, axis=0), rtol=1e-10, atol=1e-12)
 
 
-def test_what_a_mean_misses_of_a_solve_left_out_is_the_mean_of_what_its_networks_miss(search):
-    found = average(search, 4)
-    missed = np.mean([search.problem.missed(one).errors for one in found.members], axis=0)
-    rows = search.problem.missed(found.members[0]).rows
+def test_what_a_mean_misses_of_a_solve_left_out_is_the_mean_of_what_its_networks_miss(search, networks):
+    found = average(networks, 4)
+    missed = np.mean([left_out_again(one, search.problem).errors for one in found.members], axis=0)
+    rows = found.left_out.rows
     by_solve = [np.linalg.norm(missed[rows.samples == i]) for i in range(25)]
     assert found.error == pytest.approx(np.mean(by_solve), rel=1e-9)
-    alone = [one.error for one in search.found if any(one.network is member for member in found.members)]
+    alone = [one.error for one in networks if any(one.network is member for member in found.members)]
     assert found.error < np.mean(alone)
-    assert found.error <= 1.1 * search.error  # of the best network alone
+    assert found.error <= 1.1 * min(one.error for one in networks)
 
 
-def test_unseen_answers_are_nearer_than_the_networks_on_average(search):
+def test_unseen_answers_are_nearer_than_the_networks_on_average(networks):
     """The error of a mean is below the mean of the squared errors, by what its networks differ (Krogh & Vedelsby)."""
-    found = average(search, 4)
+    found = average(networks, 4)
     X, rows = waves(200, 1)
     squares = [np.mean((one.predict(X) - rows["Y"]) ** 2) for one in found.members]
     answer = answers(found, X)
     assert np.mean((answer - rows["Y"]) ** 2) < np.mean(squares)
 
 
-def test_one_network_is_the_best(search):
-    found = average(search, 1)
-    assert (found.networks, found.error) == (1, search.error)
-    np.testing.assert_array_equal(found.theta, search.best.theta)
+def test_one_network_is_the_best(networks):
+    found, best = average(networks, 1), min(networks, key=lambda one: one.error)
+    assert (found.networks, found.error) == (1, best.error)
+    np.testing.assert_array_equal(found.theta, best.network.theta)
 
 
-def test_the_second_network_is_that_with_which_the_mean_misses_least(search):
-    found = average(search, 2)
-    best = found.members[0]
-    networks = [one.network for one in search.found]
-    same = [one for one in networks if one.regressors.radial == best.regressors.radial]
-    alone = search.problem.missed(best)
+def test_the_second_network_is_that_with_which_the_mean_misses_least(networks):
+    found = average(networks, 2)
+    best = next(one for one in networks if one.network is found.members[0])
+    same = [one for one in networks if one.network.regressors.radial == best.network.regressors.radial]
 
-    def missed(other):
-        return replace(alone, errors=(alone.errors + search.problem.missed(other).errors) / 2).mean
+    def together(other):
+        errors = (best.left_out.errors + other.left_out.errors) / 2
+        return Judged(best.network, replace(best.left_out, errors=errors)).error
 
-    assert found.error == pytest.approx(min(missed(one) for one in same if one is not best), rel=1e-12)
+    assert found.error == pytest.approx(min(together(one) for one in same if one is not best), rel=1e-12)
 
 
-def test_no_more_units_than_a_query_has_time_for(search):
-    assert len(average(search, 4, units=9).theta) <= 9
+def test_no_more_units_than_a_query_has_time_for(networks):
+    assert len(average(networks, 4, units=9).theta) <= 9

@@ -9,8 +9,11 @@ import pytest
 
 from palpate.errors import UsageError
 from palpate.learning.energy import EnergySamples, learn_surrogate
+from palpate.learning.energy.average import average
 from palpate.learning.energy.images import images_of
+from palpate.learning.energy.judging import Judged, left_out_again
 from palpate.learning.energy.search import Problem, Search
+from palpate.learning.energy.trust import trust_of
 from palpate.learning.refinement.rows import Rows
 from palpate.learning.units.regressors import pairs
 from palpate.surrogates import ContactLaw, TouchedSurface
@@ -120,6 +123,36 @@ def test_the_leave_one_solve_out_error_is_that_of_fits_without_each_solve(surfac
         C = np.linalg.lstsq(A[~out], b[~out], rcond=None)[0]
         total += rows.scale[i] * np.linalg.norm(b[out] - A[out] @ C)
     assert found == pytest.approx(total / rows.total, rel=1e-6)
+
+
+def test_the_posterior_covers_nine_tenths_of_what_is_missed_when_left_out(surface):
+    """With covariances of fits without each fold, and the share that so few solves ask for (Vovk et al. 2005)."""
+    X, U, F, K = touches(24)
+    samples = EnergySamples.of(X, U, F, K, surface=surface, radius=RADIUS, inputs=INPUTS)
+    problem = Problem(samples.scaled, samples.rows(LAW, resolved=1e-3), None, "")
+    of = problem.regressors("rotated", "gaussian")
+    theta = np.array([of.form.unit(samples.scaled[i], 0.8) for i in range(3)])
+    network = problem.refined(theta, of, iterations=2)
+    found = average([Judged(network, left_out_again(network, problem))], 1)
+    trust, left = trust_of(found, samples), found.left_out
+    rows, A = left.rows, left.rows.matrix(network.theta)
+    penalty = np.diag(np.r_[np.zeros(of.tail_size), np.full(3, problem.ridge * rows.total)])
+    fold, missed = left.together[rows.samples], left.errors @ rows.modes
+    by_force, half = np.linalg.norm(F, axis=1), np.array([SIDE / 2, SIDE / 2, 0.003])
+    scale = trust.root @ trust.root.T @ (A.T @ A + penalty)  # the variance, times the identity
+    np.testing.assert_allclose(scale, scale[0, 0] * np.eye(len(scale)), rtol=1e-5, atol=1e-5 * scale[0, 0])
+    held = 0
+    for i in range(24):
+        M = np.linalg.inv(A[fold != left.together[i]].T @ A[fold != left.together[i]] + penalty)
+        at = np.r_[i, 24 + 3 * i + np.arange(3)]
+        to_l = 1.0 / np.r_[rows.scale[i], rows.slope_scale[i]]  # unweighted, by scaled inputs
+        errors, spread = missed[at, 0] * to_l, A[at] * to_l[:, None]
+        to_force = np.column_stack([F[i], np.diag(-U[i] / half)]) / by_force[i]  # δF = F δℓ − U ∇δℓ
+        error = np.linalg.norm(to_force @ errors)
+        size = np.sqrt(scale[0, 0] * np.trace(to_force @ spread @ M @ spread.T @ to_force.T))
+        assert trust.errors[i] == pytest.approx(error, rel=1e-6)
+        held += error <= 1.645 * size * (1 + 1e-9)
+    assert held == np.ceil(0.9 * 25 / 24 * 23)  # the quantile lies between this one and the next
 
 
 def test_no_unit_is_narrower_than_what_a_probe_can_feel(surface):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -35,6 +36,7 @@ def sampled(N, noise, seed):
     return X, response(X) + noise * SCALE * rng.normal(size=(N, 4))
 
 
+@cache
 def learnt(noise, name="rotated", radial="gaussian", h=10):
     X, Y = sampled(250, noise, 1)
     scaling = Scaling.of(RANGES, Y)

@@ -7,19 +7,20 @@ are all of theirs, each weight divided by their number, and its tail is the mean
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from palpate.learning.energy.search import Found, LeftOut, Problem, Search
+from palpate.learning.energy.judging import Judged
+from palpate.learning.energy.search import LeftOut
 from palpate.learning.refinement.refine import Refined
 from palpate.learning.units.regressors import Regressors
 
 __all__ = ["Average", "average"]
 
 _AS_GOOD = 1.1  # the error of solves left out flatters the one network that it has chosen
-_POOL = 16  # of a kind: further ones miss too much
 _UNITS = 320  # of a mean, images counted: a query costs about 25 ns for each
 
 
@@ -66,37 +67,42 @@ class Average:
         return self.left_out.mean
 
 
-def average(search: Search, most: int, units: int = _UNITS) -> Average:
+def average(judged: Sequence[Judged], most: int, units: int = _UNITS) -> Average:
     """The mean of 1, 2, … or `most` networks of one kind that misses least of what is left out.
 
     To the best network of a kind is added, one after another, the one with which the mean misses least (Caruana,
     Niculescu-Mizil, Crew & Ksikes 2004): one that errs elsewhere, where the next best often only grew from the best.
     It is of as many as miss no more than a tenth more than the least, and have no more than `units`, images counted.
     """
-    kinds: dict[tuple[str, str], list[Found]] = defaultdict(list)
-    for found in search.found:
-        of = found.network.regressors
-        kinds[of.form.name, of.radial].append(found)
-    images = search.problem.images
-    copies = 1 if images is None else len(images.turns)
-    means = [_means(search.problem, same, most, units // copies) for same in kinds.values()]
+    kinds: dict[tuple[str, str], list[Judged]] = defaultdict(list)
+    for one in judged:
+        of = one.network.regressors
+        kinds[of.form.name, of.radial].append(one)
+    means = [_means(same, most, units) for same in kinds.values()]
     least, kind = min((min(one.error for one in kind), i) for i, kind in enumerate(means))
     return next(one for one in reversed(means[kind]) if one.error <= _AS_GOOD * least)
 
 
-def _means(problem: Problem, same: list[Found], most: int, units: int) -> list[Average]:
+def _means(same: list[Judged], most: int, units: int) -> list[Average]:
     """Means of 1, 2, … networks of a kind, while they have no more than so many units."""
-    pool = sorted(same, key=lambda one: one.error)[:_POOL]
-    best = problem.missed(pool[0].network)
-    chosen, means = [pool.pop(0)], [best]
+    pool = sorted(same, key=lambda one: one.error)
+    best = pool.pop(0)
+    chosen, means = [best], [best.left_out]
     while len(chosen) < most:
-        left, sums = units - sum(len(one.network.theta) for one in chosen), means[-1].errors * len(chosen)
-        fitting = [one for one in pool if len(one.network.theta) <= left]
+        left, sums = units - sum(_units(one) for one in chosen), means[-1].errors * len(chosen)
+        fitting = [one for one in pool if _units(one) <= left]
         if not fitting:
             break
-        tried = [replace(best, errors=(sums + one.errors) / (len(chosen) + 1)) for one in fitting]
+        tried = [
+            replace(best.left_out, errors=(sums + one.left_out.errors) / (len(chosen) + 1)) for one in fitting
+        ]
         least = int(np.argmin([one.mean for one in tried]))
         chosen.append(fitting[least])
         pool.remove(fitting[least])
         means.append(tried[least])
     return [Average(tuple(one.network for one in chosen[: i + 1]), mean) for i, mean in enumerate(means)]
+
+
+def _units(one: Judged) -> int:
+    """Of the network, images counted."""
+    return one.network.regressors.copies * len(one.network.theta)

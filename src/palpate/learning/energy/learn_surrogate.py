@@ -14,10 +14,11 @@ from threadpoolctl import threadpool_limits
 from palpate.errors import UsageError
 from palpate.learning.energy.average import average
 from palpate.learning.energy.images import images_of
+from palpate.learning.energy.judging import judged
 from palpate.learning.energy.laws import chosen_law
 from palpate.learning.energy.samples import EnergySamples
 from palpate.learning.energy.search import EnergyTrial, Problem
-from palpate.learning.energy.strategy import searched
+from palpate.learning.energy.strategy import SEARCH_SHARE, searched
 from palpate.learning.energy.trust import trust_of
 from palpate.learning.energy.written import trained_region, training_meta, written_out
 from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction
@@ -107,7 +108,7 @@ def learn_surrogate(
     target : float
         Leave-one-solve-out error at which no more units are added.
     seconds : float
-        For the search; a refinement under way is ended.
+        For the search, and for refining what it found again without some of the solves.
     resolved : float, optional
         Depth (m) at which a contact is as wide as an element; an eighth of the radius by default, for elements of
         half the radius.
@@ -146,8 +147,8 @@ def learn_surrogate(
             law, trials = chosen_law(samples, images, guess, resolved=resolved, seconds=share, seed=seed)
         rows = samples.rows(law, resolved=resolved)
         problem = Problem(samples.scaled, rows, images, str(law), finest=samples.finest(radius))
-        search = searched(problem, begun + seconds, form, radial, units_max, target, seed)
-        found = average(search, networks)
+        search = searched(problem, begun + SEARCH_SHARE * seconds, form, radial, units_max, target, seed)
+        found = average(judged(search, begun + seconds), networks)
         trust = trust_of(found, samples)
     trials = (*trials, *search.trials)
     meta = training_meta(samples, images, found, trust.errors)

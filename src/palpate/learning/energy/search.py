@@ -96,7 +96,7 @@ class Problem:
         )
 
     def refined(
-        self, theta: np.ndarray, regressors: Regressors, *, iterations: int, seconds: float
+        self, theta: np.ndarray, regressors: Regressors, *, iterations: int, seconds: float | None = None
     ) -> Refined:
         """The refinement from units θ."""
         known: dict[str, Any] = dict(self.rows)
@@ -126,9 +126,15 @@ class Problem:
         """What a network misses of each solve that is left out; anything where its unknowns could fit all."""
         rows, fit = self.fitted(refined)
         if refined.theta.size + len(fit.tau) >= len(rows.targets):
-            return LeftOut(rows, fit, np.full(rows.targets.shape, np.inf))
+            return LeftOut(rows, fit, np.full(rows.targets.shape, np.inf), rows.groups)
         span = span_of_units(rows, refined.theta, fit) if len(refined.theta) else None
-        return LeftOut(rows, fit, left_out_rows(rows, fit, basis=span, most=_MOST))
+        return LeftOut(rows, fit, left_out_rows(rows, fit, basis=span, most=_MOST), rows.groups)
+
+    def of(self, kept: np.ndarray) -> Problem:
+        """The problem of some samples, (N,) true, alone."""
+        count = len(self.X)
+        some = {k: v[kept] if np.shape(v)[:1] == (count,) else v for k, v in self.rows.items()}
+        return replace(self, X=self.X[kept], rows=some)
 
     def room(self, regressors: Regressors) -> int:
         """How many units so many solves can decide on: half as many unknowns as numbers known."""
@@ -142,11 +148,23 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class LeftOut:
-    """Errors (R, 1) of every weighted row when its solve is left out, with the fit that they are of."""
+    """What is missed of solves that are left out.
+
+    Attributes
+    ----------
+    rows : Rows
+    fit : Fit
+        Of all of them.
+    errors : (R, 1)
+        Of every weighted row, when its solve is left out.
+    together : (N,) int
+        Samples of one number were left out together.
+    """
 
     rows: Rows
     fit: Fit
     errors: np.ndarray
+    together: np.ndarray
 
     @property
     def mean(self) -> float:

@@ -11,7 +11,10 @@ from palpate.learning.energy.search import Problem, Search
 from palpate.learning.refinement.refine import Refined
 from palpate.network.radial import RadialFunction
 
-__all__ = ["searched"]
+__all__ = ["SEARCH_SHARE", "searched"]
+
+SEARCH_SHARE = 0.65
+"""Of the time for learning; the rest goes to `palpate.learning.energy.judging`."""
 
 _FORM_SHARE = 0.35  # of the time
 _FORMS = ("rotated", "axis-aligned", "rank-2")  # the last for more inputs than the position

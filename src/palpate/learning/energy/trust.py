@@ -1,10 +1,11 @@
 """The posterior of the linear weights of ℓ, and the factor that makes it cover the errors of solves left out.
 
 Given the units, the weights of a network have the covariance M = (ΦᵀΦ + λ)⁻¹ times a variance. A mean of networks has
-the shape of its best one's: they learnt from the same solves, and miss where there are none. Leaving a group i of
-solves out, such as a column of depths, its rows have the covariance H_ii (I − H_ii)⁻¹ (Cook & Weisberg 1982), and
-the force of each solve the relative error that its left-out residual has. The variance is chosen such that nine
-tenths of those errors are below 1.645 deviations.
+the shape of its best one's: they learnt from the same solves, and miss where there are none. Leaving a fold i of
+solves out, its rows have the covariance H_ii (I − H_ii)⁻¹ (Cook & Weisberg 1982), and the force of each solve the
+relative error of a mean that was refined again without that fold. The variance is chosen such that nine tenths of
+those errors are below 1.645 deviations, and as many more as so few groups ask for: of n exchangeable ones the share
+0.9 (n + 1)/n has to lie below what the next one exceeds once in ten times (Vovk, Gammerman & Shafer 2005, §2.2).
 """
 
 from __future__ import annotations
@@ -40,23 +41,25 @@ class Trust:
 
 
 def trust_of(found: Average, samples: Solves) -> Trust:
-    """From what a mean of networks misses of the solves that they were refined on."""
-    rows, fit = found.left_out.rows, found.left_out.fit
+    """From what a mean of networks misses of the solves that it was refined on, when they are left out."""
+    rows, fit, fold = found.left_out.rows, found.left_out.fit, found.left_out.together
     missed, Q = found.left_out.errors @ rows.modes, fit.Q
     to_force, at = _to_force(rows, samples), _slope_rows(rows)
     errors, sizes = np.empty(len(at)), np.empty(len(at))
-    together = rows.groups[rows.samples]
-    for group in np.unique(rows.groups[[i for i, _ in at]]):
-        members = np.flatnonzero(together == group)
+    of_row = fold[rows.samples]
+    for one in np.unique(fold[[i for i, _ in at]]):
+        members = np.flatnonzero(of_row == one)
         values, V = np.linalg.eigh(Q[members] @ Q[members].T)
         values = np.clip(values, 0.0, _MOST)
         spread = V * np.sqrt(values / (1.0 - values))
         for k, (i, first) in enumerate(at):
-            if rows.groups[i] == group:
+            if fold[i] == one:
                 block = np.r_[i, first + np.arange(3)]
                 errors[k] = np.linalg.norm(to_force[k] @ missed[block, 0])
                 sizes[k] = np.linalg.norm(to_force[k] @ spread[np.searchsorted(members, block)])
-    ratio = float(np.quantile(errors / np.maximum(sizes, 1e-300), 0.9)) / _NINE_TENTHS
+    groups = int(rows.groups.max()) + 1
+    share = min(0.9 * (groups + 1) / groups, 1.0)
+    ratio = float(np.quantile(errors / np.maximum(sizes, 1e-300), share)) / _NINE_TENTHS
     triangle = np.linalg.cholesky(fit.inverse + 1e-14 * np.trace(fit.inverse) * np.eye(len(fit.tau)))
     others = np.zeros((len(found.coefficients) - len(triangle), triangle.shape[1]))
     return Trust(ratio * np.vstack([triangle, others]), errors)

@@ -13,8 +13,9 @@ from threadpoolctl import threadpool_limits
 
 from palpate.errors import UsageError
 from palpate.learning.energy.average import average
+from palpate.learning.energy.judging import judged
 from palpate.learning.energy.search import EnergyTrial, Problem
-from palpate.learning.energy.strategy import searched
+from palpate.learning.energy.strategy import SEARCH_SHARE, searched
 from palpate.learning.energy.trust import trust_of
 from palpate.learning.energy.written import trained_region, training_meta, written_out
 from palpate.learning.grasp.images import hold_images
@@ -151,8 +152,9 @@ def learn_grasp(
         rows = samples.rows(found.rest, found.stiffening)
         law = f"degrees {found.rest.degree} and {found.stiffening.degree}"
         problem = Problem(samples.scaled, rows, images, law, _RIDGE)
-        search = searched(problem, time.monotonic() + seconds, form, radial, units_max, target, seed)
-        mean = average(search, networks)
+        begun = time.monotonic()
+        search = searched(problem, begun + SEARCH_SHARE * seconds, form, radial, units_max, target, seed)
+        mean = average(judged(search, begun + seconds), networks)
         trust = trust_of(mean, samples)
     meta = training_meta(samples, images, mean, trust.errors)
     network, root = written_out(mean, trust.root, samples, meta)

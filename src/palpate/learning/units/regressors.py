@@ -81,6 +81,11 @@ class Regressors:
                 )
 
     @property
+    def copies(self) -> int:
+        """Units that each one stands for."""
+        return 1
+
+    @property
     def tail_size(self) -> int:
         """Columns of the tail: 1 + n, 1 or 0."""
         return {"affine": 1 + self.form.inputs, "constant": 1, "none": 0}[self.tail]

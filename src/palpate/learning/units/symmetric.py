@@ -98,6 +98,11 @@ class SymmetricRegressors(Regressors):
         return self.images
 
     @property
+    def copies(self) -> int:
+        """Images of each unit."""
+        return len(self._images.turns)
+
+    @property
     def tail_size(self) -> int:
         """Affine functions that every map leaves as they are."""
         return 0 if self.tail == "none" else self._images.unchanged.shape[1]

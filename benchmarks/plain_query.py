@@ -115,10 +115,11 @@ def _microseconds(
     return 1e6 * best
 
 
-def example(units: int = 40, inputs: int = 3, rank: int | None = None) -> TouchSurrogate:
+def example(units: int = 40, inputs: int = 3, rank: int | None = None, networks: int = 1) -> TouchSurrogate:
     """A plane touched by a sphere of 10 mm, with random rotated units, 512 training inputs and a posterior.
 
-    Its `rank` is the number of weights by default; with a symmetry those of one orbit are one.
+    The units are of so many `networks`, of which the first has the posterior. Its `rank` is the number of weights by
+    default; with a symmetry those of one orbit are one.
     """
     from palpate.network import Network, Scaling, TrainedRegion
     from palpate.surrogates import ContactLaw, TouchedSurface
@@ -144,13 +145,15 @@ def example(units: int = 40, inputs: int = 3, rank: int | None = None) -> TouchS
             np.array([1.0]),
         ),
     )
+    root = 0.01 * rng.normal(size=(1 + inputs + units, rank or 1 + inputs + units))
+    root[1 + inputs + units // networks :] = 0.0
     return TouchSurrogate(
         network,
         ContactLaw("series", 1e-3),
         surface,
         radius=0.01,
         region=TrainedRegion.of(rng.uniform(-1, 1, (512, inputs))),
-        root=0.01 * rng.normal(size=(1 + inputs + units, rank or 1 + inputs + units)),
+        root=root,
     )
 
 

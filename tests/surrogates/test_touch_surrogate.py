@@ -227,9 +227,16 @@ def test_inside_means_in_all_ranges_no_deeper_and_near_the_data():
     np.testing.assert_array_equal(shallow.inside(X), S.depth(X) <= 0.004)
 
 
-def test_deviation_is_how_much_the_force_moves_with_the_weights():
-    """Each column of the root moves tail and weights; the force's own change is differenced."""
+@pytest.mark.parametrize("without", [0, 2, None])
+def test_deviation_is_how_much_the_force_moves_with_the_weights(without):
+    """Each column of the root moves tail and weights; the force's own change is differenced.
+
+    The last units, or all of them, may have no covariance, as those of a mean's further networks.
+    """
     S = surrogate(extra=(SOFT,))
+    root = S.root.copy()
+    root[len(root) - (S.network.units if without is None else without) :] = 0.0
+    S = dataclasses.replace(S, root=root)
     X = inside_points(60, (SOFT,))
     X = X[S.depth(X) > 1e-4]
     F, total, net, h = S.force(X), 0.0, S.network, 1e-3
@@ -243,6 +250,8 @@ def test_deviation_is_how_much_the_force_moves_with_the_weights():
         total = total + (((moved[0] - moved[1]) / (2 * h)) ** 2).sum(axis=1)
     expected = np.sqrt(total) / np.linalg.norm(F, axis=1)
     np.testing.assert_allclose(S.deviation(X), expected, rtol=1e-6)
+    evaluator = S.evaluator()
+    np.testing.assert_array_equal([evaluator.trust(x[:3], x[3:]) for x in X], S.deviation(X))
 
 
 @pytest.mark.parametrize("more", [{}, FAMILY], ids=["3", "5"])

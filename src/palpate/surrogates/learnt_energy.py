@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -95,16 +96,29 @@ class LearntEnergy(ABC):
                 fix="Learn it with one, or give `root`.",
             )
         X, answers, _ = self._answers(X)
-        out, columns = np.empty(len(X)), np.zeros((4, self._root.shape[1]))
-        trusts_into(X, answers, out, self._root, columns, self.network.compiled())
+        root, network = self._posterior
+        out, columns = np.empty(len(X)), np.zeros((4, root.shape[1]))
+        trusts_into(X, answers, out, root, columns, network.compiled())
         return out
 
     @cached_property
-    def _root(self) -> np.ndarray:
-        """The posterior's root in units of ℓ; (0, 0) without one."""
+    def _posterior(self) -> tuple[np.ndarray, Network]:
+        """The posterior's root in units of ℓ, (0, 0) without one, and the network of the units that it is of.
+
+        Of a mean of networks only the first one's units have a covariance.
+        """
         if self.root is None:
-            return np.zeros((0, 0))
-        return np.asarray(self.root * self.network.scaling.output_scale[0])
+            return np.zeros((0, 0)), self.network
+        tail = 1 + len(self.inputs)
+        units = np.flatnonzero(self.root[tail:].any(axis=1))
+        count = 1 + int(units.max()) if units.size else 0
+        some = replace(
+            self.network,
+            factors=self.network.factors[:count],
+            shifts=self.network.shifts[:count],
+            weights=self.network.weights[:, :count],
+        )
+        return self.root[: tail + count] * self.network.scaling.output_scale[0], some
 
 
 def history_in_words(meta: Mapping[str, Any]) -> str:

@@ -32,22 +32,26 @@ class SurrogateEvaluator:
     ----------
     compiled : tuple
         Of `TouchSurrogate.compiled`.
-    root : (1 + n + h, z)
-        Root of the covariance of ℓ's coefficients; (0, 0) without one.
+    posterior : tuple
+        Root (1 + n + h, z) of the covariance of ℓ's coefficients, (0, 0) without one, and the network of those units,
+        compiled.
     somewhere : n numbers
         An input of the surrogate.
     """
 
     _kernel: Callable[..., bool] = staticmethod(touch_into)
 
-    def __init__(self, compiled: tuple[Any, ...], root: np.ndarray, somewhere: Sequence[float]) -> None:
+    def __init__(
+        self, compiled: tuple[Any, ...], posterior: tuple[np.ndarray, Any], somewhere: Sequence[float]
+    ) -> None:
         self._answer = np.zeros(ANSWER)
         self.force, self.stiffness = self._answer[FORCE], self._answer[STIFFNESS].reshape(3, 3)
         self.inside = True
         self._arguments = (self._answer, *compiled)
         self._shape = (len(somewhere) - 3,)
         x: np.ndarray = compiled[0][0]  # the kernels keep the whole input there
-        self._posterior = (x, root, np.zeros((4, root.shape[1])), compiled[-1])
+        root, net = posterior
+        self._posterior = (x, root, np.zeros((4, root.shape[1])), net)
         # compile now, not in the loop
         self.trust(np.array(somewhere[:3], dtype=float), np.array(somewhere[3:], dtype=float))
 

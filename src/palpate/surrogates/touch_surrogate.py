@@ -173,7 +173,9 @@ class TouchSurrogate(LearntEnergy):
 
     def evaluator(self) -> SurrogateEvaluator:
         """The allocation-free evaluator of the 1 kHz path."""
-        return SurrogateEvaluator(self.compiled(), self._root, [r.low for r in self.inputs])
+        root, network = self._posterior
+        low = [r.low for r in self.inputs]
+        return SurrogateEvaluator(self.compiled(), (root, network.compiled()), low)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the surrogate to one file.

@@ -160,17 +160,18 @@ class SymmetricRegressors(Regressors):
     def expanded(
         self, theta: np.ndarray, coefficients: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The ordinary network: factors (c h, r, n), shifts (c h, r) and coefficients (1 + n + c h, k), tail first.
+        """The ordinary network: factors (h c, r, n), shifts (h c, r) and coefficients (1 + n + h c, k), tail first.
 
-        Coefficients (p_t + h, k) may be any linear function of the regressors, such as a root of their covariance.
+        The images of a unit stand together. Coefficients (p_t + h, k) may be any linear function of the regressors,
+        such as a root of their covariance.
         """
         A, b = self.form.factors(theta)
         turns, shifts = self._images.turns, self._images.shifts
-        factors = np.einsum("kri,cij->ckrj", A, turns).reshape(-1, *A.shape[1:])
-        places = (b - np.einsum("kri,ci->ckr", A, shifts)).reshape(-1, b.shape[1])
+        factors = np.einsum("kri,cij->kcrj", A, turns).reshape(-1, *A.shape[1:])
+        places = (b[:, None] - np.einsum("kri,ci->kcr", A, shifts)).reshape(-1, b.shape[1])
         p_t = self.tail_size
         tail = self._images.unchanged[:, :p_t] @ coefficients[:p_t]
-        return factors, places, np.vstack([tail, np.tile(coefficients[p_t:], (len(turns), 1))])
+        return factors, places, np.vstack([tail, np.repeat(coefficients[p_t:], len(turns), axis=0)])
 
     @cached_property
     def _turns_of_pairs(self) -> np.ndarray:

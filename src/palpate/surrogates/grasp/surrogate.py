@@ -147,7 +147,9 @@ class GraspSurrogate(LearntEnergy):
 
     def evaluator(self) -> GraspEvaluator:
         """The allocation-free evaluator of the 1 kHz path."""
-        return GraspEvaluator(self.compiled(), self._root, [r.low for r in self.inputs])
+        root, network = self._posterior
+        low = [r.low for r in self.inputs]
+        return GraspEvaluator(self.compiled(), (root, network.compiled()), low)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the surrogate to one file.

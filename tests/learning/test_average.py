@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from palpate.learning.energy.average import average
-from palpate.learning.energy.judging import Judged, judged, left_out_again
+from palpate.learning.energy.judging import judged, left_out_again
 from palpate.learning.energy.search import Problem, Search
 
 
@@ -66,11 +66,18 @@ def test_a_mean_answers_what_its_networks_do_on_average(networks):
 
 def test_what_a_mean_misses_of_a_solve_left_out_is_the_mean_of_what_its_networks_miss(search, networks):
     found = average(networks, 4)
-    missed = np.mean([left_out_again(one, search.problem).errors for one in found.members], axis=0)
-    rows = found.left_out.rows
-    by_solve = [np.linalg.norm(missed[rows.samples == i]) for i in range(25)]
-    assert found.error == pytest.approx(np.mean(by_solve), rel=1e-9)
-    alone = [one.error for one in networks if any(one.network is member for member in found.members)]
+    rows = search.problem.missed(found.members[0]).rows
+
+    def mean(miss):
+        missed = np.mean([miss(one).errors for one in found.members], axis=0)
+        return np.mean([np.linalg.norm(missed[rows.samples == i]) for i in range(25)])
+
+    again = mean(lambda one: left_out_again(one, search.problem))
+    assert found.left_out.mean == pytest.approx(again, rel=1e-9)
+    assert found.error == pytest.approx(np.sqrt(again * mean(search.problem.missed)), rel=1e-9)
+    members = {id(one) for one in found.members}
+    alone = [one.error for one in networks if id(one.networks[0]) in members]
+    assert len(alone) == found.networks > 1
     assert found.error < np.mean(alone)
     assert found.error <= 1.1 * min(one.error for one in networks)
 
@@ -87,19 +94,20 @@ def test_unseen_answers_are_nearer_than_the_networks_on_average(networks):
 def test_one_network_is_the_best(networks):
     found, best = average(networks, 1), min(networks, key=lambda one: one.error)
     assert (found.networks, found.error) == (1, best.error)
-    np.testing.assert_array_equal(found.theta, best.network.theta)
+    np.testing.assert_array_equal(found.theta, best.networks[0].theta)
 
 
 def test_the_second_network_is_that_with_which_the_mean_misses_least(networks):
     found = average(networks, 2)
-    best = next(one for one in networks if one.network is found.members[0])
-    same = [one for one in networks if one.network.regressors.radial == best.network.regressors.radial]
+    best = next(one for one in networks if one.networks[0] is found.members[0])
+    radial = best.networks[0].regressors.radial
+    others = [one for one in networks if one is not best and one.networks[0].regressors.radial == radial]
 
     def together(other):
-        errors = (best.left_out.errors + other.left_out.errors) / 2
-        return Judged(best.network, replace(best.left_out, errors=errors)).error
+        both = (getattr(best, kind).errors + getattr(other, kind).errors for kind in ("left_out", "closed"))
+        return np.prod([np.sqrt(replace(best.left_out, errors=errors / 2).mean) for errors in both])
 
-    assert found.error == pytest.approx(min(together(one) for one in same if one is not best), rel=1e-12)
+    assert found.error == pytest.approx(min(map(together, others)), rel=1e-12)
 
 
 def test_no_more_units_than_a_query_has_time_for(networks):

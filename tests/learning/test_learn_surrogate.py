@@ -133,7 +133,8 @@ def test_the_posterior_covers_nine_tenths_of_what_is_missed_when_left_out(surfac
     of = problem.regressors("rotated", "gaussian")
     theta = np.array([of.form.unit(samples.scaled[i], 0.8) for i in range(3)])
     network = problem.refined(theta, of, iterations=2)
-    found = average([Judged(network, left_out_again(network, problem))], 1)
+    judged = Judged((network,), left_out_again(network, problem), problem.missed(network))
+    found = average([judged], 1)
     trust, left = trust_of(found, samples), found.left_out
     rows, A = left.rows, left.rows.matrix(network.theta)
     penalty = np.diag(np.r_[np.zeros(of.tail_size), np.full(3, problem.ridge * rows.total)])
@@ -288,7 +289,7 @@ def sized(count, seed):
 
 
 def test_the_probes_radius_may_be_an_input(surface):
-    X, U, response, K = sized(40, 5)
+    X, U, response, K = sized(80, 5)
     inputs = (*INPUTS[:2], Range("z", 0.002, 0.010, "m"), Range("R", 0.008, 0.010, "m"))
     known = {"surface": surface, "radius": 0.009, "inputs": inputs, "radius_input": 3}
     samples = EnergySamples.of(X, U, response, None, **known)
@@ -297,7 +298,8 @@ def test_the_probes_radius_may_be_an_input(surface):
     slopes = samples.targets(LAW)[1][:, 0, 3]
     np.testing.assert_allclose(slopes, 0.5 / X[:, 3] * 1e-3, rtol=1e-6)
     given = np.where(np.arange(4) < 3, response, np.nan)  # as finite elements tell it
-    learnt = learn_surrogate(X, U, given, K, **known, law=LAW, units_max=8, seconds=8.0, form="axis-aligned")
+    kind = {"law": LAW, "form": "axis-aligned", "radial": "gaussian"}
+    learnt = learn_surrogate(X, U, given, K, **known, **kind, units_max=12, seconds=8.0)
     s = learnt.surrogate
     assert s.radius_input == 3
     X, U, response, _ = sized(100, 6)

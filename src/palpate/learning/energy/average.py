@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -30,14 +30,21 @@ class Average:
 
     Attributes
     ----------
-    members : tuple of Refined
-        The best one first.
-    left_out : LeftOut
-        Rows and fit of the best one, and what the mean misses of solves that are left out.
+    judged : Judged
+        The best one first; rows and fit are of it.
     """
 
-    members: tuple[Refined, ...]
-    left_out: LeftOut
+    judged: Judged
+
+    @property
+    def members(self) -> tuple[Refined, ...]:
+        """The networks."""
+        return self.judged.networks
+
+    @property
+    def left_out(self) -> LeftOut:
+        """What the mean misses of solves that it was refined again without."""
+        return self.judged.left_out
 
     @property
     def networks(self) -> int:
@@ -63,8 +70,8 @@ class Average:
 
     @property
     def error(self) -> float:
-        """Leave-one-solve-out error."""
-        return self.left_out.mean
+        """Of solves left out, as `Judged` has it."""
+        return self.judged.error
 
 
 def average(judged: Sequence[Judged], most: int, units: int = _UNITS) -> Average:
@@ -76,33 +83,23 @@ def average(judged: Sequence[Judged], most: int, units: int = _UNITS) -> Average
     """
     kinds: dict[tuple[str, str], list[Judged]] = defaultdict(list)
     for one in judged:
-        of = one.network.regressors
+        of = one.networks[0].regressors
         kinds[of.form.name, of.radial].append(one)
     means = [_means(same, most, units) for same in kinds.values()]
     least, kind = min((min(one.error for one in kind), i) for i, kind in enumerate(means))
-    return next(one for one in reversed(means[kind]) if one.error <= _AS_GOOD * least)
+    return Average(next(one for one in reversed(means[kind]) if one.error <= _AS_GOOD * least))
 
 
-def _means(same: list[Judged], most: int, units: int) -> list[Average]:
+def _means(same: list[Judged], most: int, units: int) -> list[Judged]:
     """Means of 1, 2, … networks of a kind, while they have no more than so many units."""
     pool = sorted(same, key=lambda one: one.error)
-    best = pool.pop(0)
-    chosen, means = [best], [best.left_out]
-    while len(chosen) < most:
-        left, sums = units - sum(_units(one) for one in chosen), means[-1].errors * len(chosen)
-        fitting = [one for one in pool if _units(one) <= left]
+    means = [pool.pop(0)]
+    while len(means) < most:
+        fitting = [one for one in pool if means[-1].units + one.units <= units]
         if not fitting:
             break
-        tried = [
-            replace(best.left_out, errors=(sums + one.left_out.errors) / (len(chosen) + 1)) for one in fitting
-        ]
-        least = int(np.argmin([one.mean for one in tried]))
-        chosen.append(fitting[least])
-        pool.remove(fitting[least])
+        tried = [means[-1].with_one(one) for one in fitting]
+        least = int(np.argmin([one.error for one in tried]))
         means.append(tried[least])
-    return [Average(tuple(one.network for one in chosen[: i + 1]), mean) for i, mean in enumerate(means)]
-
-
-def _units(one: Judged) -> int:
-    """Of the network, images counted."""
-    return one.network.regressors.copies * len(one.network.theta)
+        pool.remove(fitting[least])
+    return means

@@ -3,13 +3,16 @@
 The closed form by which a search goes (`palpate.learning.refinement.leave_one_out`) counts units as unknowns of a
 linearised problem. It costs next to nothing, but with few solves a unit that is left without its own could go
 anywhere in that problem: errors come out several times too large, and the order of networks is lost. Refining again
-from the units as they are is what cross-validation means (Stone 1974), and takes a few iterations for each fold.
+from the units as they are is what cross-validation means (Stone 1974), and takes a few iterations for each fold. Units
+that have seen a solve remember it, though, so that of very few solves this says too little: networks are chosen by
+the geometric mean of both.
 """
 
 from __future__ import annotations
 
+import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,15 +28,40 @@ _MOST = 24  # networks: what the closed form puts behind these is never the best
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """A network with what it misses of solves when it is refined again without them."""
+    """A network, or a mean of some, with what it misses of solves that are left out.
 
-    network: Refined
+    Attributes
+    ----------
+    networks : tuple of Refined
+    left_out : LeftOut
+        Refined again without them.
+    closed : LeftOut
+        By the closed form.
+    """
+
+    networks: tuple[Refined, ...]
     left_out: LeftOut
+    closed: LeftOut
 
     @property
     def error(self) -> float:
-        """Mean over solves."""
-        return self.left_out.mean
+        """Geometric mean of both means over solves."""
+        return math.sqrt(self.left_out.mean * self.closed.mean)
+
+    @property
+    def units(self) -> int:
+        """Of the networks, images counted."""
+        return sum(one.regressors.copies * len(one.theta) for one in self.networks)
+
+    def with_one(self, other: Judged) -> Judged:
+        """The mean of these networks and one more."""
+        count = len(self.networks)
+
+        def mean(own: LeftOut, new: LeftOut) -> LeftOut:
+            return replace(own, errors=(count * own.errors + new.errors) / (count + 1))
+
+        networks = (*self.networks, *other.networks)
+        return Judged(networks, mean(self.left_out, other.left_out), mean(self.closed, other.closed))
 
 
 def judged(search: Search, deadline: float, seed: int = 0) -> list[Judged]:
@@ -41,7 +69,8 @@ def judged(search: Search, deadline: float, seed: int = 0) -> list[Judged]:
     order = sorted(search.found, key=lambda one: one.error)[:_MOST]
     found: list[Judged] = []
     for one in order:
-        found.append(Judged(one.network, left_out_again(one.network, search.problem, seed)))
+        again = left_out_again(one.network, search.problem, seed)
+        found.append(Judged((one.network,), again, replace(again, errors=one.errors)))
         if time.monotonic() >= deadline:
             break
     return found

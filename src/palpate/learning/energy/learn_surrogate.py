@@ -43,7 +43,8 @@ class LearntSurrogate:
     errors : (N,)
         Relative force error of each solve in contact when it is left out.
     loo : float
-        Leave-one-solve-out error of the mean of networks chosen.
+        Of the mean of networks chosen: what it misses of solves left out, by closed form and refined again without
+        them, as a geometric mean.
     """
 
     surrogate: TouchSurrogate

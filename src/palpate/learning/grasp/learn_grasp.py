@@ -45,7 +45,8 @@ class LearntGrasp:
     errors : (N,)
         Relative force error of each solve with a displaced pad when it is left out.
     loo : float
-        Leave-one-solve-out error of the mean of networks chosen.
+        Of the mean of networks chosen: what it misses of solves left out, by closed form and refined again without
+        them, as a geometric mean.
     law_errors : dict
         What S and P alone miss of solves left out, by the degrees of both.
     """

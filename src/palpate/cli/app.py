@@ -236,6 +236,21 @@ def show(
 
 
 @app.command()
+def ask(
+    model: ModelFile,
+    at: Annotated[
+        list[str] | None,
+        typer.Option(help="Inputs with commas between, SI units: 0.05,0.05,0.055. May be given again."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Say what a learnt body's file holds, or the force, stiffness and trust at a place."""
+    from palpate.cli.ask import ask as ask_model
+
+    ask_model(model, at or [], Console(as_json))
+
+
+@app.command()
 def run(
     model: ModelFile,
     seconds: Annotated[float, typer.Option(min=0.1, help="How long.")] = 5.0,

@@ -1,0 +1,124 @@
+"""`palpate ask`: what a learnt body's file holds, and what the body answers at a place."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate.cli.console import Console
+from palpate.errors import UsageError
+from palpate.surrogates import TouchedBody
+from palpate.surrogates.learnt_energy import LearntEnergy
+from palpate.surrogates.loading import load
+from palpate.units import Range
+
+__all__ = ["ask"]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Of an energy at one input; force (3,) in N, stiffness (3, 3) in N/m."""
+
+    inputs: np.ndarray
+    energy: float
+    force: np.ndarray
+    stiffness: np.ndarray
+    deviation: float
+    inside: bool
+
+    def words(self, names: Sequence[Range]) -> str:
+        """For a person."""
+        at = ", ".join(f"{r.name} {x:g} {r.unit}".rstrip() for r, x in zip(names, self.inputs, strict=True))
+        size = float(np.linalg.norm(self.force))
+        if size == 0.0:
+            return f"at {at}\n  no contact: force, stiffness and energy are zero"
+        largest = float(np.abs(self.stiffness).max())
+        lines = [
+            f"at {at}",
+            f"  force      {_row(self.force, size)} N, in all {size:.4g} N",
+            f"  stiffness  {'; '.join(_row(row, largest) for row in self.stiffness)} N/m",
+            f"  energy     {self.energy:.4g} J",
+            f"  trust      {self._trust()}",
+        ]
+        return "\n".join(lines)
+
+    def _trust(self) -> str:
+        known = (
+            ""
+            if math.isnan(self.deviation)
+            else f"± {100 * self.deviation:.2g} % of the force, one deviation; "
+        )
+        return known + ("inside" if self.inside else "OUTSIDE") + " what it was trained on"
+
+    def as_dict(self) -> dict[str, Any]:
+        """For a program."""
+        return {
+            "inputs": self.inputs.tolist(),
+            "force": self.force.tolist(),
+            "stiffness": self.stiffness.tolist(),
+            "energy": self.energy,
+            "deviation": self.deviation,
+            "inside": self.inside,
+        }
+
+
+def ask(model: Path, at: Sequence[str], console: Console) -> None:
+    """Print what a file holds; with places, what it answers there instead.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is missing or damaged.
+    UsageError
+        If a place is not as many numbers as there are inputs, or the file's body has no energy to ask.
+    """
+    found = load(model)
+    energy = found.touch if isinstance(found, TouchedBody) else found
+    if not at:
+        ranges = [{"name": r.name, "low": r.low, "high": r.high, "unit": r.unit} for r in energy.inputs]
+        content = {"model": str(model), "kind": type(found).__name__, "inputs": ranges, "text": str(found)}
+        console.result(f"{type(found).__name__} in {model}\n{found}", content)
+        return
+    if not isinstance(energy, LearntEnergy):
+        raise UsageError(
+            f"{model} holds a {type(found).__name__}, which does not answer at a place.",
+            why="Bodies that are pressed or gripped have an energy of place; others answer to a hand that moves.",
+            fix="Try `palpate run` or `palpate view`, or the value that `pp.load` reads.",
+        )
+    X = np.array([_place(text, energy.inputs) for text in at])
+    known = energy.deviation(X) if energy.root is not None else np.full(len(X), math.nan)
+    columns = energy.energy(X), energy.force(X), energy.stiffness(X), known, energy.inside(X)
+    answers = [
+        Answer(x, float(U), F, K, float(d), bool(i)) for x, U, F, K, d, i in zip(X, *columns, strict=True)
+    ]
+    console.result(
+        "\n".join(one.words(energy.inputs) for one in answers),
+        {"model": str(model), "answers": [one.as_dict() for one in answers]},
+    )
+
+
+def _place(text: str, inputs: Sequence[Range]) -> list[float]:
+    """Numbers with commas or blanks between them, as many as there are inputs."""
+    try:
+        found = [float(word) for word in text.replace(",", " ").split()]
+    except ValueError:
+        found = []
+    if len(found) != len(inputs) or not all(map(math.isfinite, found)):
+        names = ", ".join(f"{r.name} ({r.unit})" if r.unit else r.name for r in inputs)
+        example = ",".join(f"{(r.low + r.high) / 2:.4g}" for r in inputs)
+        raise UsageError(
+            f"{text!r} is no place of this model.",
+            why=f"It has {len(inputs)} inputs: {names}.",
+            fix=f"Give as many numbers with commas between, for example --at {example}.",
+        )
+    return found
+
+
+def _row(values: np.ndarray, size: float) -> str:
+    """Numbers; what is round-off beside `size` as zero."""
+    return " ".join("0" if abs(value) < 1e-9 * size else f"{value:.4g}" for value in values)

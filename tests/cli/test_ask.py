@@ -1,0 +1,86 @@
+"""`palpate ask`: what a file holds, and what it answers at a place."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from models import spring_beam
+from palpate.surrogates import TouchedBody, TouchSurrogate
+
+sys.path.append(str(Path(__file__).parents[1] / "learning" / "correction"))
+from correction_made import model, touches
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("ask") / "model.palpate"
+    return model().save(path)
+
+
+def text_of(x):
+    return ",".join(map(repr, x.tolist()))
+
+
+def test_a_file_says_what_it_holds(palpate, file):
+    answer = palpate("ask", file)
+    assert answer.code == 0
+    for one in model().inputs:
+        assert one.name in answer.out
+    assert str(model()).splitlines()[0] in answer.out
+
+
+def test_answers_are_the_surrogates(palpate, file):
+    S = TouchSurrogate.load(file)
+    X = touches(3, 4, shallowest=0.001)
+    X[2, 2] = 1.0  # in the air
+    places = [word for x in X for word in ("--at", text_of(x))]
+    answers = json.loads(palpate("ask", file, *places, "--json").out)["answers"]
+    assert len(answers) == 3
+    for key, wanted in {
+        "inputs": X,
+        "energy": S.energy(X),
+        "force": S.force(X),
+        "stiffness": S.stiffness(X),
+        "inside": S.inside(X),
+    }.items():
+        np.testing.assert_array_equal([one[key] for one in answers], wanted)
+    if S.root is not None:
+        np.testing.assert_array_equal([one["deviation"] for one in answers], S.deviation(X))
+    words = palpate("ask", file, *places).out
+    assert f"{np.linalg.norm(S.force(X)[0]):.4g} N" in words
+    assert words.count("no contact") == 1
+
+
+def test_a_body_with_its_shape_answers_by_its_energy(palpate, file, tmp_path):
+    S = TouchSurrogate.load(file)
+    both = TouchedBody(S).save(tmp_path / "both.palpate")
+    x = touches(1, 5)
+    (answer,) = json.loads(palpate("ask", both, "--at", text_of(x[0]), "--json").out)["answers"]
+    np.testing.assert_array_equal(answer["force"], S.force(x)[0])
+
+
+@pytest.mark.parametrize("place", ["0.01,0.02", "1,2,3,4", "a,b,c", "0.01,nan,0.02", ""])
+def test_what_is_no_place_is_told_what_is(palpate, file, place):
+    answer = palpate("ask", file, "--at", place)
+    assert answer.code == 2
+    assert f"{len(model().inputs)} inputs" in answer.err
+    assert "--at" in answer.err
+
+
+def test_a_body_held_at_a_node_has_no_place_to_ask_at(palpate, tmp_path):
+    path = spring_beam().save(tmp_path / "beam.palpate")
+    assert "TouchModel" in palpate("ask", path).out
+    answer = palpate("ask", path, "--at", "0,0,0")
+    assert answer.code == 2
+    assert "palpate run" in answer.err
+
+
+def test_a_missing_file_is_named(palpate, tmp_path):
+    answer = palpate("ask", tmp_path / "none.palpate")
+    assert answer.code == 2
+    assert "none.palpate" in answer.err

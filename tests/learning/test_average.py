@@ -76,7 +76,7 @@ def test_what_a_mean_misses_of_a_solve_left_out_is_the_mean_of_what_its_networks
     assert found.left_out.mean == pytest.approx(again, rel=1e-9)
     assert found.error == pytest.approx(np.sqrt(again * mean(search.problem.missed)), rel=1e-9)
     members = {id(one) for one in found.members}
-    alone = [one.error for one in networks if id(one.networks[0]) in members]
+    alone = [one.error for one in networks if id(one.members[0]) in members]
     assert len(alone) == found.networks > 1
     assert found.error < np.mean(alone)
     assert found.error <= 1.1 * min(one.error for one in networks)
@@ -94,14 +94,14 @@ def test_unseen_answers_are_nearer_than_the_networks_on_average(networks):
 def test_one_network_is_the_best(networks):
     found, best = average(networks, 1), min(networks, key=lambda one: one.error)
     assert (found.networks, found.error) == (1, best.error)
-    np.testing.assert_array_equal(found.theta, best.networks[0].theta)
+    np.testing.assert_array_equal(found.theta, best.members[0].theta)
 
 
 def test_the_second_network_is_that_with_which_the_mean_misses_least(networks):
     found = average(networks, 2)
-    best = next(one for one in networks if one.networks[0] is found.members[0])
-    radial = best.networks[0].regressors.radial
-    others = [one for one in networks if one is not best and one.networks[0].regressors.radial == radial]
+    best = next(one for one in networks if one.members[0] is found.members[0])
+    radial = best.members[0].regressors.radial
+    others = [one for one in networks if one is not best and one.members[0].regressors.radial == radial]
 
     def together(other):
         both = (getattr(best, kind).errors + getattr(other, kind).errors for kind in ("left_out", "closed"))

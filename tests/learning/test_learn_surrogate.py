@@ -9,9 +9,9 @@ import pytest
 
 from palpate.errors import UsageError
 from palpate.learning.energy import EnergySamples, learn_surrogate
-from palpate.learning.energy.average import average
+from palpate.learning.energy.average import Average
 from palpate.learning.energy.images import images_of
-from palpate.learning.energy.judging import Judged, left_out_again
+from palpate.learning.energy.judging import left_out_again
 from palpate.learning.energy.search import Problem, Search
 from palpate.learning.energy.trust import trust_of
 from palpate.learning.refinement.rows import Rows
@@ -133,8 +133,7 @@ def test_the_posterior_covers_nine_tenths_of_what_is_missed_when_left_out(surfac
     of = problem.regressors("rotated", "gaussian")
     theta = np.array([of.form.unit(samples.scaled[i], 0.8) for i in range(3)])
     network = problem.refined(theta, of, iterations=2)
-    judged = Judged((network,), left_out_again(network, problem), problem.missed(network))
-    found = average([judged], 1)
+    found = Average((network,), left_out_again(network, problem), problem.missed(network))
     trust, left = trust_of(found, samples), found.left_out
     rows, A = left.rows, left.rows.matrix(network.theta)
     penalty = np.diag(np.r_[np.zeros(of.tail_size), np.full(3, problem.ridge * rows.total)])

@@ -113,11 +113,12 @@ def test_errors_are_as_large_as_at_places_never_seen():
     new = places(400, 1)
     answer = np.mean([one.predict(new)[:, 0] for one in found.members], axis=0)
     ratio = np.median(np.abs(values)) / np.median(np.abs(answer - wave(new)[0]))
+    # the median of 40 such errors is known to about a third, so three times that is allowed
     assert 0.4 < ratio < 2.5
 
 
 def test_one_network_is_judged_whatever_the_time_and_it_is_the_best_by_the_closed_form():
     search = searched(3)
     (only,) = judged(search, time.monotonic() - 1.0)
-    assert only.networks[0] is min(search.found, key=lambda one: one.error).network
+    assert only.members[0] is min(search.found, key=lambda one: one.error).network
     assert len(judged(search, np.inf)) == 3

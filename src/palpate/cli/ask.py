@@ -22,7 +22,23 @@ __all__ = ["ask"]
 
 @dataclass(frozen=True)
 class Answer:
-    """Of an energy at one input; force (3,) in N, stiffness (3, 3) in N/m."""
+    """What an energy answers at one place.
+
+    Attributes
+    ----------
+    inputs : (n,)
+        In the inputs' units.
+    energy : float
+        J.
+    force : (3,)
+        N.
+    stiffness : (3, 3)
+        ∂F/∂x by the first three inputs, N/m.
+    deviation : float
+        Of the force, relative to its size; not-a-number where it is not known.
+    inside : bool
+        Whether the place lies in what was trained.
+    """
 
     inputs: np.ndarray
     energy: float
@@ -48,12 +64,10 @@ class Answer:
         return "\n".join(lines)
 
     def _trust(self) -> str:
-        known = (
-            ""
-            if math.isnan(self.deviation)
-            else f"± {100 * self.deviation:.2g} % of the force, one deviation; "
-        )
-        return known + ("inside" if self.inside else "OUTSIDE") + " what it was trained on"
+        where = ("inside" if self.inside else "OUTSIDE") + " what it was trained on"
+        if math.isnan(self.deviation):
+            return where
+        return f"± {100 * self.deviation:.2g} % of the force, one deviation; {where}"
 
     def as_dict(self) -> dict[str, Any]:
         """For a program."""

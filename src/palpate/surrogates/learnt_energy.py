@@ -96,14 +96,19 @@ class LearntEnergy(ABC):
                 fix="Learn it with one, or give `root`.",
             )
         X, answers, _ = self._answers(X)
-        root, network = self._posterior
+        root, net = self._compiled_posterior()
         out, columns = np.empty(len(X)), np.zeros((4, root.shape[1]))
-        trusts_into(X, answers, out, root, columns, network.compiled())
+        trusts_into(X, answers, out, root, columns, net)
         return out
+
+    def _compiled_posterior(self) -> tuple[np.ndarray, tuple[Any, ...]]:
+        """Root and network that the kernels of trust take, with scratch for one thread."""
+        root, network = self._posterior
+        return root, network.compiled()
 
     @cached_property
     def _posterior(self) -> tuple[np.ndarray, Network]:
-        """The posterior's root in units of ℓ, (0, 0) without one, and the network of the units that it is of.
+        """The posterior's root (1 + n + k, z) in units of ℓ, (0, 0) without one, and the network of its k units.
 
         Of a mean of networks only the first one's units have a covariance.
         """

@@ -33,7 +33,7 @@ class SurrogateEvaluator:
     compiled : tuple
         Of `TouchSurrogate.compiled`.
     posterior : tuple
-        Root (1 + n + h, z) of the covariance of ℓ's coefficients, (0, 0) without one, and the network of those units,
+        Root (1 + n + k, z) of the covariance of ℓ's coefficients, (0, 0) without one, and the network of its k units,
         compiled.
     somewhere : n numbers
         An input of the surrogate.
@@ -42,7 +42,10 @@ class SurrogateEvaluator:
     _kernel: Callable[..., bool] = staticmethod(touch_into)
 
     def __init__(
-        self, compiled: tuple[Any, ...], posterior: tuple[np.ndarray, Any], somewhere: Sequence[float]
+        self,
+        compiled: tuple[Any, ...],
+        posterior: tuple[np.ndarray, tuple[Any, ...]],
+        somewhere: Sequence[float],
     ) -> None:
         self._answer = np.zeros(ANSWER)
         self.force, self.stiffness = self._answer[FORCE], self._answer[STIFFNESS].reshape(3, 3)

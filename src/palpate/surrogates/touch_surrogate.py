@@ -173,9 +173,8 @@ class TouchSurrogate(LearntEnergy):
 
     def evaluator(self) -> SurrogateEvaluator:
         """The allocation-free evaluator of the 1 kHz path."""
-        root, network = self._posterior
-        low = [r.low for r in self.inputs]
-        return SurrogateEvaluator(self.compiled(), (root, network.compiled()), low)
+        somewhere = [r.low for r in self.inputs]
+        return SurrogateEvaluator(self.compiled(), self._compiled_posterior(), somewhere)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the surrogate to one file.

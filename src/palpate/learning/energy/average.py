@@ -6,14 +6,14 @@ are all of theirs, each weight divided by their number, and its tail is the mean
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from palpate.learning.energy.judging import Judged
 from palpate.learning.energy.search import LeftOut
 from palpate.learning.refinement.refine import Refined
 from palpate.learning.units.regressors import Regressors
@@ -26,25 +26,26 @@ _UNITS = 320  # of a mean, images counted: a query costs about 25 ns for each
 
 @dataclass(frozen=True, eq=False)
 class Average:
-    """Networks of one kind as one, in scaled quantities.
+    """Networks of one kind, at least one, as one, in scaled quantities.
 
     Attributes
     ----------
-    judged : Judged
-        The best one first; rows and fit are of it.
+    members : tuple of Refined
+        The best one first; rows and fit of what follows are its.
+    left_out : LeftOut
+        What their mean misses of solves that each was refined again without.
+    closed : LeftOut
+        What it misses of solves left out by the closed form.
     """
 
-    judged: Judged
+    members: tuple[Refined, ...]
+    left_out: LeftOut
+    closed: LeftOut
 
     @property
-    def members(self) -> tuple[Refined, ...]:
-        """The networks."""
-        return self.judged.networks
-
-    @property
-    def left_out(self) -> LeftOut:
-        """What the mean misses of solves that it was refined again without."""
-        return self.judged.left_out
+    def error(self) -> float:
+        """Geometric mean of what is missed, over solves, by refining again and by the closed form."""
+        return math.sqrt(self.left_out.mean * self.closed.mean)
 
     @property
     def networks(self) -> int:
@@ -69,28 +70,36 @@ class Average:
         return np.vstack([tails, weights])
 
     @property
-    def error(self) -> float:
-        """Of solves left out, as `Judged` has it."""
-        return self.judged.error
+    def units(self) -> int:
+        """Of all of them, images counted."""
+        return self.regressors.copies * len(self.theta)
+
+    def with_one(self, other: Average) -> Average:
+        """The mean of these networks and one more."""
+
+        def mean(own: LeftOut, new: LeftOut) -> LeftOut:
+            return replace(own, errors=(self.networks * own.errors + new.errors) / (self.networks + 1))
+
+        left_out, closed = mean(self.left_out, other.left_out), mean(self.closed, other.closed)
+        return Average((*self.members, *other.members), left_out, closed)
 
 
-def average(judged: Sequence[Judged], most: int, units: int = _UNITS) -> Average:
+def average(judged: Sequence[Average], most: int, units: int = _UNITS) -> Average:
     """The mean of 1, 2, … or `most` networks of one kind that misses least of what is left out.
 
     To the best network of a kind is added, one after another, the one with which the mean misses least (Caruana,
     Niculescu-Mizil, Crew & Ksikes 2004): one that errs elsewhere, where the next best often only grew from the best.
     It is of as many as miss no more than a tenth more than the least, and have no more than `units`, images counted.
     """
-    kinds: dict[tuple[str, str], list[Judged]] = defaultdict(list)
+    kinds: dict[tuple[str, str], list[Average]] = defaultdict(list)
     for one in judged:
-        of = one.networks[0].regressors
-        kinds[of.form.name, of.radial].append(one)
+        kinds[one.regressors.form.name, one.regressors.radial].append(one)
     means = [_means(same, most, units) for same in kinds.values()]
     least, kind = min((min(one.error for one in kind), i) for i, kind in enumerate(means))
-    return Average(next(one for one in reversed(means[kind]) if one.error <= _AS_GOOD * least))
+    return next(one for one in reversed(means[kind]) if one.error <= _AS_GOOD * least)
 
 
-def _means(same: list[Judged], most: int, units: int) -> list[Judged]:
+def _means(same: list[Average], most: int, units: int) -> list[Average]:
     """Means of 1, 2, … networks of a kind, while they have no more than so many units."""
     pool = sorted(same, key=lambda one: one.error)
     means = [pool.pop(0)]

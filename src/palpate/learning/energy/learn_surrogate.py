@@ -152,7 +152,7 @@ def learn_surrogate(
         found = average(judged(search, begun + seconds), networks)
         trust = trust_of(found, samples)
     trials = (*trials, *search.trials)
-    meta = training_meta(samples, images, found, trust.errors)
+    meta = training_meta(samples, found, trust.errors)
     network, root = written_out(found, trust.root, samples, meta)
     surrogate = TouchSurrogate(
         *(network, law, surface),

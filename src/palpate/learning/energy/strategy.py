@@ -37,11 +37,11 @@ def searched(
 ) -> Search:
     """Every kind of unit at one size, then growth of the best two, and what time is left for starts of any size."""
     search = Search(problem, deadline, seed)
-    copies = 1 if problem.images is None else len(problem.images.turns)
-    most, n = units_max // copies, problem.X.shape[1]
+    kinds = _kinds(form, radial, problem.X.shape[1])
+    most = units_max // problem.regressors(*kinds[0]).copies
     found: list[tuple[Refined, float]] = []
     until = time.monotonic() + _FORM_SHARE * search.left
-    for kind in _kinds(form, radial, n):
+    for kind in kinds:
         of = problem.regressors(*kind)
         h = min(_FIRST, most, problem.room(of))
         if not found or time.monotonic() < until:

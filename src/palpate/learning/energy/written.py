@@ -81,15 +81,12 @@ def trained_region(samples: Solves, images: Images | None) -> TrainedRegion:
     return TrainedRegion.of(points, most=_COPIES)
 
 
-def training_meta(
-    samples: Solves, images: Images | None, found: Average, errors: np.ndarray
-) -> dict[str, Any]:
-    """What a surrogate's file tells of its training."""
-    copies = 1 if images is None else len(images.turns)
+def training_meta(samples: Solves, found: Average, errors: np.ndarray) -> dict[str, Any]:
+    """What a surrogate's file tells of its training; errors (N,) of solves left out, relative."""
     return {
         **training_record(samples.X, samples.energy[:, None], samples.inputs),
         "solves": len(samples),
-        "samples": copies * len(samples),
+        "samples": found.regressors.copies * len(samples),
         "form": found.regressors.form.name,
         "radial": found.regressors.radial,
         "networks": found.networks,

@@ -117,7 +117,7 @@ def learn_grasp(
     target : float
         Leave-one-solve-out error at which no more units are added.
     seconds : float
-        For the search; a refinement under way is ended.
+        For the search, and for refining what it found again without some of the solves.
     form : str
         Of a unit (see `palpate.learning.units.forms`), or "auto".
     radial : {"gaussian", "inverse-multiquadric", "matern-5/2", "auto"}
@@ -157,7 +157,7 @@ def learn_grasp(
         search = searched(problem, begun + SEARCH_SHARE * seconds, form, radial, units_max, target, seed)
         mean = average(judged(search, begun + seconds), networks)
         trust = trust_of(mean, samples)
-    meta = training_meta(samples, images, mean, trust.errors)
+    meta = training_meta(samples, mean, trust.errors)
     network, root = written_out(mean, trust.root, samples, meta)
     surrogate = GraspSurrogate(
         network, found.rest, found.stiffening, region=trained_region(samples, images), root=root, meta=meta

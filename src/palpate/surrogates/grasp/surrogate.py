@@ -147,9 +147,8 @@ class GraspSurrogate(LearntEnergy):
 
     def evaluator(self) -> GraspEvaluator:
         """The allocation-free evaluator of the 1 kHz path."""
-        root, network = self._posterior
-        low = [r.low for r in self.inputs]
-        return GraspEvaluator(self.compiled(), (root, network.compiled()), low)
+        somewhere = [r.low for r in self.inputs]
+        return GraspEvaluator(self.compiled(), self._compiled_posterior(), somewhere)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the surrogate to one file.

@@ -210,7 +210,7 @@ def _solve(solver: Any, column: Column, options: argparse.Namespace) -> list[dic
 def join(study: str, files: Sequence[Path], out: Path) -> None:
     """One file of all parts and roles, its displacements at no more than `NODES` nodes.
 
-    A joined file without displacements may be a part of a new one.
+    A joined file may be a part of a new one.
     """
     parts = [dict(np.load(file)) for file in files]
     wrong = [str(file) for file, part in zip(files, parts, strict=True) if _study_of(part) != study]
@@ -245,13 +245,19 @@ def _thinned(fields: Sequence[Any], parts: Sequence[Any], order: np.ndarray) -> 
     """Displacements (N, m, 3) of some nodes of the surface in mm, NaN where a part has none."""
     points, triangles = fields[0]["points"], fields[0]["triangles"]
     chosen = _spread(points, np.unique(triangles), NODES)
-    u = [
-        1e3 * p["displacement"][:, chosen]
-        if "displacement" in p
-        else np.full((len(p["energy"]), len(chosen), 3), np.nan)
-        for p in parts
-    ]
-    return {"displacement_mm": np.concatenate(u)[order].astype(np.float16), "nodes": points[chosen]}
+    u = np.concatenate([_of_nodes(part, chosen, points[chosen]) for part in parts])
+    return {"displacement_mm": u[order].astype(np.float16), "nodes": points[chosen]}
+
+
+def _of_nodes(part: Any, chosen: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Displacements (N, m, 3) in mm of a part, whole or joined before, at these nodes."""
+    if "displacement" in part:
+        return np.asarray(1e3 * part["displacement"][:, chosen])
+    if "displacement_mm" in part:
+        if not np.array_equal(part["nodes"], places):
+            raise SystemExit("a file joined before holds displacements of other nodes: join its parts anew")
+        return np.asarray(part["displacement_mm"])
+    return np.full((len(part["energy"]), len(chosen), 3), np.nan)
 
 
 def _spread(points: np.ndarray, among: np.ndarray, count: int) -> np.ndarray:

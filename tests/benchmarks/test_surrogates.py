@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -124,6 +125,29 @@ def test_a_run_goes_on_where_it_was_and_parts_join(tmp_path, monkeypatch):
         touch_data.main(["layered", "--join", str(whole), "--out", str(tmp_path / "wrong.npz")])
     with pytest.raises(SystemExit, match="name another file"):
         touch_data.main(["block", "--depths", "3", "--out", str(files[0])])
+
+
+def test_displacements_of_a_joined_file_stay_where_more_is_joined(tmp_path):
+    def part(name, role, seed):
+        rng = np.random.default_rng(seed)
+        points = np.random.default_rng(0).random((20, 3))
+        plan = {"study": "block", "depths": 2, "seed": 0, "role": role, "fields": True}
+        arrays = {key: rng.random((4, 3)) for key in ("inputs", "force")} | {"energy": rng.random(4)}
+        arrays |= {"column": np.array([0, 0, 1, 1]) + 2 * seed, "role": np.full(4, role)}
+        arrays |= {"displacement": rng.random((4, 20, 3)).astype(np.float32), "points": points}
+        triangles = np.array([[0, 1, 2], [3, 4, 5], [6, 7, 8]])
+        np.savez(tmp_path / name, **arrays, triangles=triangles, plan=json.dumps(plan), done=[0, 1])
+        return str(tmp_path / name)
+
+    first, second, test = part("a.npz", "train", 0), part("b.npz", "train", 1), part("c.npz", "test", 2)
+    once, before, after = (str(tmp_path / name) for name in ("once.npz", "before.npz", "after.npz"))
+    touch_data.main(["block", "--join", first, second, test, "--out", once])
+    touch_data.main(["block", "--join", first, test, "--out", before])
+    touch_data.main(["block", "--join", before, second, "--out", after])
+    with np.load(once) as one, np.load(after) as two:
+        assert one["displacement_mm"].shape == (12, 9, 3)
+        for key in ("displacement_mm", "nodes", "inputs", "column"):
+            assert np.array_equal(one[key], two[key]), key
 
 
 @pytest.mark.parametrize(("kind", "count"), [("square", 8), ("round", 16), ("none", 0)])

@@ -53,7 +53,7 @@ class TouchStudy:
     inputs : tuple of Varied
         Beyond the position: properties of the materials.
     element : float, optional
-        Size of the elements that are pressed, in m; half the sphere's radius by default.
+        Size of the elements that are pressed, in m; the sphere's own choice by default.
     wanted : int
         Number of training solves at which targets are set.
     target : tuple of float
@@ -130,7 +130,7 @@ _BLOCK = TouchStudy(
 )
 # a skin of 3 mm needs two elements through it: one alone makes it 2 to 5 % too stiff
 _LAYERED = TouchStudy(_layered, over=_MIDDLE, about=(0.05, 0.05), element=0.0025)
-_BREAST = TouchStudy(_dome, over=_MERIDIAN, symmetry="round", within=0.045)
+_BREAST = TouchStudy(_dome, over=_MERIDIAN, symmetry="round", within=0.045, element=0.004)
 
 STUDIES: dict[str, TouchStudy] = {
     "block": _BLOCK,
@@ -150,7 +150,7 @@ STUDIES: dict[str, TouchStudy] = {
     ),
     "family": replace(
         _LAYERED,
-        element=None,
+        element=0.005,
         inputs=(Varied("fat.young", 2e3, 8e3), Varied("muscle.young", 8e3, 30e3)),
         wanted=200,
         target=(np.nan, 0.03),

@@ -83,7 +83,7 @@ class TouchSweepRecord(Record):
     element: Metres | None = Field(
         None,
         gt=0,
-        description="size of elements under the ball; left out: half its radius, less on round bodies",
+        description="size of elements under the ball; left out: half its radius, less on round and layered bodies",
         examples=["4 mm"],
     )
     workers: int | None = Field(None, ge=1, description="processes; left out: one per core", examples=[2])

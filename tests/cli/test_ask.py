@@ -64,6 +64,22 @@ def test_a_body_with_its_shape_answers_by_its_energy(palpate, file, tmp_path):
     np.testing.assert_array_equal(answer["force"], S.force(x)[0])
 
 
+def test_beyond_the_ranges_the_trust_is_not_known(palpate, file):
+    S = TouchSurrogate.load(file)
+    deep = touches(1, 5)
+    deep[0, 2] = S.inputs[2].low - 0.001
+    assert S.force(deep).any()
+    assert not S.inside(deep).any()
+    words = palpate("ask", file, "--at", text_of(deep[0])).out
+    assert "not known, OUTSIDE" in words
+    assert f"c_z {deep[0, 2]:g} m is not in" in words
+    assert "%" not in words
+    # millimetres taken for metres
+    words = palpate("ask", file, "--at", "0,0,50").out
+    assert "no contact" in words
+    assert "c_z 50 m is not in" in words
+
+
 @pytest.mark.parametrize("place", ["0.01,0.02", "1,2,3,4", "a,b,c", "0.01,nan,0.02", ""])
 def test_what_is_no_place_is_told_what_is(palpate, file, place):
     answer = palpate("ask", file, "--at", place)

@@ -141,3 +141,13 @@ def test_small_study_is_the_one_of_the_fixture(tmp_path):
     path = tmp_path / "study.toml"
     path.write_text(SMALL, encoding="utf-8")
     assert read_study(path).sweep.samples == 33
+
+
+def test_ctrl_c_says_what_is_kept(palpate, carried_out, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("palpate.cli.app._with_workers", interrupted)
+    answer = palpate("sweep", carried_out / "study.toml")
+    assert answer.code == 130
+    assert "Interrupted. What is solved is kept: the same command goes on." in answer.err

@@ -110,7 +110,9 @@ def test_a_pipe_that_falls_silent_ends_and_what_came_is_kept(folder):
         process.stdin.flush()
         assert process.wait(timeout=60) == 0  # its input is still open
         assert "40 learnt" in process.stdout.read()
-        assert "Fatal" not in process.stderr.read()
+        said = process.stderr.read()
+        assert "Fatal" not in said
+        assert "the stream ended: nothing came for 1.5 s; what had come is learnt from" in said
     assert follows(folder / "new.touch")
 
 
@@ -175,3 +177,4 @@ def test_what_can_not_be_is_refused_with_its_reason(palpate, folder):
     assert palpate("correct", folder / "bad.csv", "--stdin", "--out", out).code == 2
     silent = palpate("correct", model_, "--port", "0", "--wait", "0.1", "--out", out)
     assert (silent.code, "Nobody connected" in silent.err) == (3, True)
+    assert "port 0" not in silent.err  # but the one that it took

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -49,6 +50,20 @@ def test_a_miss_is_exit_code_one_in_plain_words(palpate, folder):
     }
     assert "misses 3 of 8 limits" in answer.err
     assert not (folder / "wrong.html").exists()
+
+
+def test_what_was_corrected_to_a_specimen_is_said_to_differ_on_purpose(palpate, folder):
+    stiffer = surrogate(factor=1.1)
+    replace(stiffer, meta=stiffer.meta | {"correction": {"counts": {"learnt": 30}}}).save(
+        folder / "specimen.palpate"
+    )
+    answer = palpate(
+        "validate", folder / "specimen.palpate", "--test", folder / "slab-test.zarr", "--no-report"
+    )
+    assert answer.code == 1
+    assert "specimen on 200 unseen solves" in answer.out
+    assert "Corrected by 30 measured touches" in answer.err
+    assert "more solves" not in answer.err
 
 
 def test_refined_solves_tell_the_mesh_s_own_error(palpate, folder):

@@ -74,6 +74,13 @@ def test_units_are_allowed_and_kept_in_si(tmp_path):
     [
         ('[body]\nkind = "blok"', "no kind of body 'blok'"),
         ('[body]\nkind = "block"\nsiez = [1, 1, 1]', "did you mean 'size'"),
+        # of the keys of that table, though another has a nearer one
+        ('[body]\nkind = "block"\n[sweep]\ndepht = 3', "sweep.depht: there is no such key; did you mean 'depths'"),
+        ('[body]\nkind = "block"\n[probe]\ndepht = 3', "probe.depht: there is no such key; did you mean 'depth'"),
+        (
+            '[body]\nkind = "layered"\nlayers = [{name = "skin", thicknes = 0.01}]',
+            "thicknes: there is no such key; did you mean 'thickness'",
+        ),
         ('[body]\nkind = "block"\nfixed = "botom"', "no surface 'botom'"),
         ('[body]\nkind = "dome"\nmaterial = "ecoflex"', "There is no material called 'ecoflex'"),
         ('[body]\nkind = "block"\n[probe]\nradius = "1 kg"', "probe.radius: '1 kg' is not a quantity in m"),

@@ -94,7 +94,10 @@ def test_a_print_must_be_as_wide_as_places_are_apart(dents):
 def test_one_memory_takes_the_place_of_the_other(dents):
     body = touched_slab().relaxing(Branches(((0.3, 0.1),)), spacing=0.0025)
     assert PressedBody.of(body).branches == Branches(((0.3, 0.1),))
+    assert "relaxes: 30 % in 0.1 s" in str(body)
     printed = body.yielding(dents)
+    assert "relaxes" not in str(printed)
+    assert "yields and keeps prints" in str(printed)
     assert PressedBody.of(printed).branches is None
     assert PressedBody.of(printed).dents is not None
     assert PressedBody.of(printed.relaxing(Branches(((0.3, 0.1),)))).dents is None

@@ -35,6 +35,7 @@ Port = Annotated[
 Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")]
 
 STUDY = Path("study.toml")
+_INTERRUPTED = 130  # the shell's code of a program that Ctrl-C has ended
 
 
 @app.callback(invoke_without_command=True)
@@ -346,7 +347,8 @@ def main(arguments: list[str] | None = None) -> None:
     except PalpateError as error:
         Console(as_json="--json" in words).error(error)
         sys.exit(error.exit_code)
-    except KeyboardInterrupt:
-        kept = " What is solved is kept: the same command goes on." if {"sweep", "demo"} & set(words) else ""
-        Console().say(f"\nInterrupted.{kept}")
-        sys.exit(130)
+    except SystemExit as end:
+        if end.code == _INTERRUPTED:  # as which Typer ends by Ctrl-C, without a word
+            kept = " What is solved is kept: the same command goes on." if {"sweep", "demo"} & set(words) else ""
+            Console().say(f"\nInterrupted.{kept}")
+        raise

@@ -49,25 +49,39 @@ class Answer:
 
     def words(self, names: Sequence[Range]) -> str:
         """For a person."""
-        at = ", ".join(f"{r.name} {x:g} {r.unit}".rstrip() for r, x in zip(names, self.inputs, strict=True))
+        at = ", ".join(_quantity(r, x) for r, x in zip(names, self.inputs, strict=True))
+        beyond = self._beyond(names)
         size = float(np.linalg.norm(self.force))
         if size == 0.0:
-            return f"at {at}\n  no contact: force, stiffness and energy are zero"
+            told = "\n  " + beyond if beyond else ""
+            return f"at {at}\n  no contact: force, stiffness and energy are zero{told}"
         largest = float(np.abs(self.stiffness).max())
         lines = [
             f"at {at}",
             f"  force      {_row(self.force, size)} N, in all {size:.4g} N",
             f"  stiffness  {'; '.join(_row(row, largest) for row in self.stiffness)} N/m",
             f"  energy     {self.energy:.4g} J",
-            f"  trust      {self._trust()}",
+            f"  trust      {self._trust(beyond)}",
         ]
         return "\n".join(lines)
 
-    def _trust(self) -> str:
-        where = ("inside" if self.inside else "OUTSIDE") + " what it was trained on"
+    def _trust(self, beyond: str) -> str:
+        if beyond:  # a deviation is of what is like the training, and says nothing there
+            return f"not known, OUTSIDE what it was trained on: {beyond}"
+        where = "inside what it was trained on"
+        if not self.inside:
+            where = "OUTSIDE what it was trained on: within the ranges, but no training solve is near"
         if math.isnan(self.deviation):
             return where
         return f"± {100 * self.deviation:.2g} % of the force, one deviation; {where}"
+
+    def _beyond(self, names: Sequence[Range]) -> str:
+        """Inputs outside of their ranges, in words; "" if there are none."""
+        return ", ".join(
+            f"{_quantity(r, x)} is not in {r.low:.4g} … {r.high:.4g} {r.unit}".rstrip()
+            for r, x in zip(names, self.inputs, strict=True)
+            if not r.low <= x <= r.high
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """For a program."""
@@ -131,6 +145,10 @@ def _place(text: str, inputs: Sequence[Range]) -> list[float]:
             fix=f"Give as many numbers with commas between, for example --at {example}.",
         )
     return found
+
+
+def _quantity(of: Range, value: float) -> str:
+    return f"{of.name} {value:g} {of.unit}".rstrip()
 
 
 def _row(values: np.ndarray, size: float) -> str:

@@ -106,13 +106,16 @@ def _streamed(corrector: Corrector, source: Source, console: Console) -> Correct
     def answer(text: str) -> None:
         print(text, file=sys.stderr, flush=True)  # noqa: T201
 
+    def ended(why: str) -> None:
+        print(f"the stream ended: {why}; what had come is learnt from", file=sys.stderr, flush=True)  # noqa: T201
+
     if source.port is not None:
         with listening(source.port, source.wait, say) as other:
-            lines = measurements(other.lines(source.stall), other.answer)
+            lines = measurements(other.lines(source.stall, ended), other.answer)
             return _learnt(corrector, lines, console)
     # a descriptor of its own: at exit Python waits for a thread that still reads sys.stdin
     stream = open(os.dup(sys.stdin.fileno()), "rb")  # noqa: SIM115 - the thread goes on reading it
-    return _learnt(corrector, measurements(lines_of(stream, source.stall), answer), console)
+    return _learnt(corrector, measurements(lines_of(stream, source.stall, ended), answer), console)
 
 
 def _learnt(corrector: Corrector, lines: Iterable[Measured], console: Console) -> Corrected:
@@ -138,12 +141,23 @@ def _parameters(surrogate: TouchSurrogate, words: Sequence[str]) -> list[float]:
     said = dict(word.partition("=")[::2] for word in words)
     names = [r.name for r in surrogate.parameters]
     if set(said) != set(names) or len(said) != len(words):
+        unknown, missing = [n for n in said if n not in names], [n for n in names if n not in said]
+        wrong = [f"{n!r} is none of them" for n in unknown] + [f"{n!r} is missing" for n in missing]
         raise UsageError(
-            f"The model's further inputs are: {', '.join(names) or 'none'}.",
+            f"The model's further inputs are: {', '.join(names) or 'none'}"
+            f"; {', '.join(wrong) or 'one is given twice'}.",
             why="A specimen is one member of the family that the model is of.",
             fix="Give each of them once: --parameter NAME=VALUE." if names else "Leave --parameter out.",
         )
-    return [_value(said[r.name], r.unit) for r in surrogate.parameters]
+    values = [_value(said[r.name], r.unit) for r in surrogate.parameters]
+    for r, value in zip(surrogate.parameters, values, strict=True):
+        if not r.low <= value <= r.high:
+            raise UsageError(
+                f"{r.name} = {value:g} {r.unit} is outside of {r.low:g} … {r.high:g} {r.unit}.".replace(" .", "."),
+                why="The model was trained for members of the family within these ranges, and knows no others.",
+                fix="Give a value within them, in SI units or with a unit: fat.young=4kPa.",
+            )
+    return values
 
 
 def _value(text: str, unit: str) -> float:

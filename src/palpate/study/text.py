@@ -222,17 +222,40 @@ def _is_tag(part: str) -> bool:
 
 def _words(item: Any, record: type[BaseModel]) -> str:
     if item["type"] == "extra_forbidden":
-        close = difflib.get_close_matches(str(item["loc"][-1]), _known_keys(record), n=1)
+        close = difflib.get_close_matches(str(item["loc"][-1]), _known_keys(record, item["loc"][:-1]), n=1)
         return "there is no such key" + (f"; did you mean {close[0]!r}?" if close else "")
     if item["type"] == "string_pattern_mismatch":
         return f"{item['input']!r} can't name files: letters, digits, dots, dashes and underscores can"
     return str(item["msg"]).removeprefix("Value error, ")
 
 
-def _known_keys(record: type[BaseModel]) -> set[str]:
-    """Every key that appears anywhere in a study."""
-    keys: set[str] = set()
+def _known_keys(record: type[BaseModel], place: tuple[int | str, ...]) -> set[str]:
+    """Keys of a study's table at this place."""
     schema = record.model_json_schema()
-    for part in (schema, *schema.get("$defs", {}).values()):
-        keys |= set(part.get("properties", {}))
-    return keys
+    tables = list(_forms(schema, schema))
+    for key in place:
+        tables = [form for table in tables for part in _parts(table, key) for form in _forms(part, schema)]
+    return {key for table in tables for key in table.get("properties", {})}
+
+
+def _forms(part: dict[str, Any], schema: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """What a part of a schema stands for: of a union, each of its forms."""
+    if "$ref" in part:
+        yield from _forms(schema["$defs"][str(part["$ref"]).rpartition("/")[2]], schema)
+    elif forms := part.get("anyOf", part.get("oneOf")):
+        for form in forms:
+            yield from _forms(form, schema)
+    else:
+        yield part
+
+
+def _parts(table: dict[str, Any], key: int | str) -> Iterator[dict[str, Any]]:
+    """Below a table by a key; a union's tag leads to the table itself."""
+    if key in table.get("properties", {}):
+        yield table["properties"][key]
+    elif isinstance(key, int):
+        yield from (part for part in [table.get("items")] if isinstance(part, dict))
+    else:
+        yield from (part for part in [table.get("additionalProperties")] if isinstance(part, dict))
+        if "additionalProperties" not in table or table["additionalProperties"] is False:
+            yield table

@@ -138,6 +138,18 @@ def history_in_words(meta: Mapping[str, Any]) -> str:
         words += f"; force error {100 * error['median']:.2g} % median, {100 * error['p95']:.2g} % p95"
     if (touches := corrected_by(meta)) is not None:
         words += f"; corrected by {touches} measured touches"
+    return words + _memory_in_words(meta)
+
+
+def _memory_in_words(meta: Mapping[str, Any]) -> str:
+    """What the body does in the loop beyond its energy."""
+    words = ""
+    relaxation = meta.get("relaxation")
+    if isinstance(relaxation, Mapping) and relaxation.get("terms"):
+        shares = ", ".join(f"{100 * share:.3g} % in {seconds:.3g} s" for share, seconds in relaxation["terms"])
+        words += f"; relaxes: {shares}"
+    if isinstance(meta.get("yielding"), Mapping):
+        words += "; yields and keeps prints"
     return words
 
 

@@ -71,7 +71,13 @@ def test_units_that_are_wrong_by_a_thousand_are_suspicious():
     done = correct(S, record(X, 1e3 * S.force(X)))
     # the constant change alone would be ln 1000/0.5 deviations; at most the slow one's share of the variance less
     assert np.log(1e3) / np.hypot(0.5, 0.3) < done.surprise < np.log(1e3) / 0.5
-    assert f"{done.surprise:.0f} standard deviations" in done.warning
+    assert done.ratio == pytest.approx(1e3)
+    assert "1e+03 times the model's" in done.warning
+    # newtons said to be kilograms or pounds, and forces on the body instead of those on the probe
+    for factor, said in [(9.80665, "9.8 times the model's"), (4.44822, "4.4 times"), (-1.0, "Change their sign")]:
+        assert said in correct(S, record(X, factor * S.force(X))).warning
+    for factor in (1 / 3, 3.0):
+        assert "times the model's" not in correct(S, record(X, factor * S.force(X))).warning
     rng = np.random.default_rng(3)
     X = touches(80, 3)
     slipped = (rng.random((80, 1)) < 0.38) * rng.normal(0.0, 5.0, (80, 3))

@@ -26,31 +26,41 @@ _WAITING = 10_000  # lines read and not yet taken; the sender then waits
 _ANSWERS = 1.0  # s that an answer may take; who does not read them gets none any more
 
 
-def lines_of(stream: BinaryIO, stall: float) -> Iterator[str]:
-    """Lines of a stream of bytes until it ends, breaks, or says nothing for `stall` seconds."""
-    found: queue.Queue[bytes | None] = queue.Queue(_WAITING)
+def lines_of(stream: BinaryIO, stall: float, say: Callable[[str], None] = lambda why: None) -> Iterator[str]:
+    """Lines of a stream of bytes until it ends, breaks, or says nothing for `stall` seconds.
+
+    `say` is told why, where it did not end by itself.
+    """
+    found: queue.Queue[bytes | str] = queue.Queue(_WAITING)
     threading.Thread(target=_read, args=(stream, found), daemon=True, name="lines").start()
     while True:
         try:
             line = found.get(timeout=stall)
         except queue.Empty:
+            say(f"nothing came for {stall:g} s")
             return
-        if line is None:
+        if isinstance(line, str):
+            if line:
+                say(line)
             return
         yield line.decode("utf-8", errors="replace").rstrip("\r\n")
 
 
-def _read(stream: BinaryIO, found: queue.Queue[bytes | None]) -> None:
-    inside = False  # of a line that was too long
-    with contextlib.suppress(OSError, ValueError):  # closed from the other side, or from this one
+def _read(stream: BinaryIO, found: queue.Queue[bytes | str]) -> None:
+    """Put lines as bytes, and at last why there are no more, "" where all came."""
+    inside, why = False, ""  # inside a line that was too long
+    try:
         while line := stream.readline(LONGEST):
             ended = line.endswith(b"\n")
             if not ended and len(line) < LONGEST:
-                break  # cut off on its way: what stands there may be half a number
+                why = "the last line was cut off"  # what stands there may be half a number
+                break
             if not inside:
                 found.put(line)
             inside = not ended
-    found.put(None)
+    except (OSError, ValueError):  # closed from the other side, or from this one
+        why = "the connection broke"
+    found.put(why)
 
 
 class Connection:
@@ -60,9 +70,9 @@ class Connection:
         self._socket, self._file = other, other.makefile("rb")
         self._deaf = False
 
-    def lines(self, stall: float) -> Iterator[str]:
+    def lines(self, stall: float, say: Callable[[str], None] = lambda why: None) -> Iterator[str]:
         """As `lines_of`."""
-        return lines_of(self._file, stall)
+        return lines_of(self._file, stall, say)
 
     def answer(self, text: str) -> None:
         """Send one line; a sender that does not read is not waited for twice."""
@@ -116,7 +126,7 @@ def listening(port: int, wait: float, say: Callable[[int], None]) -> Iterator[Co
             other, _ = server.accept()
         except TimeoutError:
             raise DeviceError(
-                f"Nobody connected to port {port} within {wait:g} s.",
+                f"Nobody connected to port {server.getsockname()[1]} within {wait:g} s.",
                 fix="Start the sensor's script meanwhile, or wait longer.",
             ) from None
     other.settimeout(None)

@@ -22,6 +22,7 @@ _FEWEST = 10  # touches that are enough to leave some of them out
 _SURPRISE = 5.0  # one in 1.7 million of a Gaussian's numbers is as far
 _STRAINED = 3.0
 _STRANGE = 0.3  # of the touches: as many outliers are no outliers
+_RATIO = 4.0  # specimens are two or three times as stiff; pounds or kilograms for newtons make 4.4 and 9.8
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +44,8 @@ class Corrected:
         Largest change, in standard deviations of the discrepancy.
     strain : float
         How many times larger the noise is than was said.
+    ratio : float
+        How many times the model's forces the measured ones are, least squares; not-a-number without contact.
     """
 
     surrogate: TouchSurrogate
@@ -53,10 +56,21 @@ class Corrected:
     offset: tuple[float, float]
     surprise: float
     strain: float
+    ratio: float
 
     @property
     def warning(self) -> str:
         """What is suspicious, in words; "" if nothing is."""
+        if self.ratio < 0:
+            return (
+                "Measured forces point against the model's: they are to be those on the probe, which a body pushes "
+                "out. Change their sign."
+            )
+        if self.ratio > _RATIO or self.ratio < 1 / _RATIO:
+            return (
+                f"Measured forces are {self.ratio:.2g} times the model's: more than specimens mostly differ by, and as "
+                "much as between units (pounds 4.4, kilograms 9.8, millinewtons 1000 times newtons)."
+            )
         out, learnt = self.counts.get("outlier", 0), self.counts.get("learnt", 0)
         if out > _STRANGE * (out + learnt):
             return (
@@ -96,6 +110,7 @@ class Corrected:
             "left_out": None if self.left_out is None else self.left_out.as_dict(),
             "surprise": self.surprise,
             "strain": self.strain,
+            "ratio": self.ratio,
             "offset": {"value": self.offset[0], "deviation": self.offset[1]},
         }
 
@@ -159,7 +174,16 @@ def judged(corrector: Corrector, measured: Measured, left_out: ForceError | None
         corrector.offset,
         surprise,
         corrector.strain,
+        _ratio(corrector.model.force(X), force, along),
     )
+
+
+def _ratio(predicted: np.ndarray, measured: np.ndarray, along: np.ndarray) -> float:
+    """Factor that makes forces (N, 3) of the model the measured ones, least squares; `along` as in `observe`."""
+    one = along.any(axis=1, keepdims=True)
+    compared = np.where(one, (predicted * along).sum(axis=1)[:, None] * along, predicted)
+    size = float((compared**2).sum())
+    return float((compared * measured).sum()) / size if size > 0 else np.nan
 
 
 def _left_out(surrogate: TouchSurrogate, measured: Measured, options: Mapping[str, Any]) -> ForceError | None:

@@ -31,8 +31,8 @@ CASES = {
     ),
     "pad on its way": (
         GluedPad(radius=0.01, over=CORNERS, displacement=(RANGE, 0.0, RANGE), element=0.007),
-        (0.018, 0.022, 0.002, -0.003),
-        (2e-6, 2e-6, 1e-5, 1e-5),
+        (0.002, -0.003, 0.018, 0.022),
+        (1e-5, 1e-5, 2e-6, 2e-6),
     ),
     "prescribed, two directions": (
         PrescribedDisplacement("top", ("x", (0, 1, 1)), (RANGE, RANGE)),
@@ -135,3 +135,9 @@ def test_a_pressure_pushes_along_the_deformed_normal(surface):
     F = ngsolve.Id(3) + ngsolve.Grad(field.displacement)
     shrunk = ngsolve.Integrate((1 - ngsolve.Det(F)) * ngsolve.dx, field.mesh)
     assert solution.response.item() == pytest.approx(shrunk, rel=1e-9)
+
+
+def test_a_pad_s_displacement_comes_before_its_place():
+    """As in the surrogate that is learnt from its solves, whose force is that by the first three inputs."""
+    problem = BODY.problem(GluedPad(radius=0.01, over=CORNERS, displacement=(RANGE,) * 3, element=0.007))
+    assert [r.name for r in problem.ranges] == ["d_x", "d_y", "d_z", "p_x", "p_y"]

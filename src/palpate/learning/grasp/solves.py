@@ -1,4 +1,4 @@
-"""Solves of a held body from a dataset, the displacement's inputs first."""
+"""Solves of a held body from a dataset, the displacement's inputs first, wherever they stand there."""
 
 from __future__ import annotations
 

@@ -103,7 +103,7 @@ class GluedPad:
         )
 
     def ranges(self, geometry: Any) -> tuple[Range, ...]:
-        """Inputs: the place's two coordinates if it varies, then the components of d that vary.
+        """Inputs: the components of d that vary, then the place's two coordinates if it varies.
 
         Raises
         ------
@@ -112,12 +112,12 @@ class GluedPad:
         """
         chart = _placed(self, geometry.rest())[0]
         found = []
-        if self.over is not None and chart is not None:
-            for axis, low, high in zip(chart.names, *self.over, strict=True):
-                found.append(Range(tag(self.name, f"p_{axis}"), low, high, "m"))
         for axis, ends in zip(AXES, self.displacement, strict=True):
             if isinstance(ends, tuple):
                 found.append(Range(tag(self.name, f"d_{axis}"), *ends, "m"))
+        if self.over is not None and chart is not None:
+            for axis, low, high in zip(chart.names, *self.over, strict=True):
+                found.append(Range(tag(self.name, f"p_{axis}"), low, high, "m"))
         return tuple(found)
 
     def __str__(self) -> str:
@@ -167,11 +167,11 @@ class GluedPad:
         strain = ng.CF(tuple(moves)) - (field.trial - glued)
         surface = ng.ds(definedon=field.surface(self.touches), bonus_intorder=QUADRATURE)
         energy = Energy(self.pad / 2 * weight * ng.InnerProduct(strain, strain), surface)
-        inputs = (*place, *(m for m in moves if isinstance(m, ng.Parameter)))
-        fixed = len(place)
+        inputs = (*(m for m in moves if isinstance(m, ng.Parameter)), *place)
+        moved = len(inputs) - len(place)
 
         def approach(q: np.ndarray) -> np.ndarray | None:
-            return np.concatenate([q[:fixed], np.zeros(len(q) - fixed)])
+            return np.concatenate([np.zeros(moved), q[moved:]])
 
         return Attached(parameters=inputs, energies=(energy,), approach=approach)
 

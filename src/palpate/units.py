@@ -122,5 +122,7 @@ def to_si(value: str | float, unit: str) -> float:
         raise UsageError(
             f"{value!r} is not a quantity in {unit or 'pure numbers'}.",
             why=f"{error}.",
-            fix=f'Write a number in {unit or "no unit"}, or a quantity such as "1 {unit}".',
+            fix=f'Write a number in {unit}, or a quantity such as "1 {unit}".'
+            if unit
+            else "Write a number alone.",
         ) from error

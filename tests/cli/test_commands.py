@@ -6,12 +6,14 @@ import json
 import shutil
 import subprocess
 import sys
+import warnings
 
 import numpy as np
 import pytest
 
 from palpate import __version__
 from palpate.dataset import Dataset
+from palpate.physics.advice import advise
 from palpate.study import Study, preset_names, preset_study, read_study
 from palpate.surrogates import TouchModel
 
@@ -151,3 +153,20 @@ def test_ctrl_c_says_what_is_kept(palpate, carried_out, monkeypatch):
     answer = palpate("sweep", carried_out / "study.toml")
     assert answer.code == 130
     assert "Interrupted. What is solved is kept: the same command goes on." in answer.err
+
+
+def test_advice_is_told_once_and_without_the_line_of_code(palpate, carried_out, monkeypatch):
+    def advising(study, _):
+        for _ in range(3):
+            advise("The pad is soft.", why="It takes most of the depth.", fix="Take a stiffer one.")
+        return study
+
+    monkeypatch.setattr("palpate.cli.app._with_workers", advising)
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        answer = palpate("sweep", carried_out / "study.toml")
+    assert (
+        answer.err.count("warning: The pad is soft.\nIt takes most of the depth.\nTake a stiffer one.") == 1
+    )
+    assert "ModelWarning" not in answer.err
+    assert ".py" not in answer.err

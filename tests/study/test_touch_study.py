@@ -75,8 +75,14 @@ def test_units_are_allowed_and_kept_in_si(tmp_path):
         ('[body]\nkind = "blok"', "no kind of body 'blok'"),
         ('[body]\nkind = "block"\nsiez = [1, 1, 1]', "did you mean 'size'"),
         # of the keys of that table, though another has a nearer one
-        ('[body]\nkind = "block"\n[sweep]\ndepht = 3', "sweep.depht: there is no such key; did you mean 'depths'"),
-        ('[body]\nkind = "block"\n[probe]\ndepht = 3', "probe.depht: there is no such key; did you mean 'depth'"),
+        (
+            '[body]\nkind = "block"\n[sweep]\ndepht = 3',
+            "sweep.depht: there is no such key; did you mean 'depths'",
+        ),
+        (
+            '[body]\nkind = "block"\n[probe]\ndepht = 3',
+            "probe.depht: there is no such key; did you mean 'depth'",
+        ),
         (
             '[body]\nkind = "layered"\nlayers = [{name = "skin", thicknes = 0.01}]',
             "thicknes: there is no such key; did you mean 'thickness'",
@@ -90,6 +96,10 @@ def test_units_are_allowed_and_kept_in_si(tmp_path):
         ('[body]\nkind = "layered"', "body.layers"),
         ('[body]\nkind = "block"\n[[varied]]\npath = "young"\nlow = "2 mm"\nhigh = 1', "varied.0.low"),
         ('[body]\nkind = "block"\n[[varied]]\npath = "young"\nlow = 2\nhigh = 1', "is no range"),
+        (
+            '[body]\nkind = "block"\n[[varied]]\npath = "density"\nlow = "1 kPa"\nhigh = 2',
+            "a density can't vary",
+        ),
     ],
 )
 def test_mistakes_are_told_by_their_place(tmp_path, text, words):

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from palpate.cli.console import Console
+from palpate.cli.console import Console, advice_in_words
 from palpate.errors import AccuracyError, PalpateError, UsageError
 
 __all__ = ["app", "main"]
@@ -340,7 +340,8 @@ def main(arguments: list[str] | None = None) -> None:
     """Entry point: exit codes from the error tree, never a traceback for an error palpate foresaw."""
     words = sys.argv[1:] if arguments is None else arguments
     try:
-        app(words, standalone_mode=True)
+        with advice_in_words():
+            app(words, standalone_mode=True)
     except AccuracyError as error:
         Console().error(error)  # the figures have been printed already, as JSON where asked
         sys.exit(error.exit_code)
@@ -349,6 +350,8 @@ def main(arguments: list[str] | None = None) -> None:
         sys.exit(error.exit_code)
     except SystemExit as end:
         if end.code == _INTERRUPTED:  # as which Typer ends by Ctrl-C, without a word
-            kept = " What is solved is kept: the same command goes on." if {"sweep", "demo"} & set(words) else ""
+            kept = (
+                " What is solved is kept: the same command goes on." if {"sweep", "demo"} & set(words) else ""
+            )
             Console().say(f"\nInterrupted.{kept}")
         raise

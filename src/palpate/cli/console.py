@@ -2,16 +2,37 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import sys
-from collections.abc import Mapping
+import warnings
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from palpate.errors import PalpateError
 
-__all__ = ["Console"]
+__all__ = ["Console", "advice_in_words"]
+
+
+@contextlib.contextmanager
+def advice_in_words() -> Iterator[None]:
+    """Show warnings of palpate's own as what they say, each once, without the line of code that led to it."""
+    usual, told = warnings.showwarning, set[str]()
+
+    def show(message: Warning | str, category: type[Warning], *place: Any) -> None:
+        if category.__module__.partition(".")[0] != "palpate":
+            usual(message, category, *place)
+        elif str(message) not in told:
+            told.add(str(message))
+            print(f"warning: {message}", file=sys.stderr, flush=True)  # noqa: T201
+
+    warnings.showwarning = show  # type: ignore[assignment]
+    try:
+        yield
+    finally:
+        warnings.showwarning = usual
 
 
 @dataclass(frozen=True)

@@ -153,7 +153,9 @@ def _parameters(surrogate: TouchSurrogate, words: Sequence[str]) -> list[float]:
     for r, value in zip(surrogate.parameters, values, strict=True):
         if not r.low <= value <= r.high:
             raise UsageError(
-                f"{r.name} = {value:g} {r.unit} is outside of {r.low:g} … {r.high:g} {r.unit}.".replace(" .", "."),
+                f"{r.name} = {value:g} {r.unit} is outside of {r.low:g} … {r.high:g} {r.unit}.".replace(
+                    " .", "."
+                ),
                 why="The model was trained for members of the family within these ranges, and knows no others.",
                 fix="Give a value within them, in SI units or with a unit: fat.young=4kPa.",
             )

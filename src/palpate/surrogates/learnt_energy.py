@@ -146,7 +146,9 @@ def _memory_in_words(meta: Mapping[str, Any]) -> str:
     words = ""
     relaxation = meta.get("relaxation")
     if isinstance(relaxation, Mapping) and relaxation.get("terms"):
-        shares = ", ".join(f"{100 * share:.3g} % in {seconds:.3g} s" for share, seconds in relaxation["terms"])
+        shares = ", ".join(
+            f"{100 * share:.3g} % in {seconds:.3g} s" for share, seconds in relaxation["terms"]
+        )
         words += f"; relaxes: {shares}"
     if isinstance(meta.get("yielding"), Mapping):
         words += "; yields and keeps prints"

@@ -74,7 +74,11 @@ def test_units_that_are_wrong_by_a_thousand_are_suspicious():
     assert done.ratio == pytest.approx(1e3)
     assert "1e+03 times the model's" in done.warning
     # newtons said to be kilograms or pounds, and forces on the body instead of those on the probe
-    for factor, said in [(9.80665, "9.8 times the model's"), (4.44822, "4.4 times"), (-1.0, "Change their sign")]:
+    for factor, said in [
+        (9.80665, "9.8 times the model's"),
+        (4.44822, "4.4 times"),
+        (-1.0, "Change their sign"),
+    ]:
         assert said in correct(S, record(X, factor * S.force(X))).warning
     for factor in (1 / 3, 3.0):
         assert "times the model's" not in correct(S, record(X, factor * S.force(X))).warning

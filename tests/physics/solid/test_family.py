@@ -174,3 +174,8 @@ def test_stress_is_in_every_row_that_asks_for_it() -> None:
         seen = asked.solve(places[0])
         np.testing.assert_allclose(data["von_mises"][0], seen.von_mises, rtol=1e-6, atol=1e-3)
         assert data["von_mises"][0].max() > 100.0  # Pa, under a ball pressed 5 mm deep
+
+
+def test_a_range_of_words_is_refused():
+    with pytest.raises(UsageError, match="'5 kPa', of type str"):
+        Varied("young", "5 kPa", 15e3)

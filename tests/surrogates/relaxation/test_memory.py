@@ -211,3 +211,8 @@ def test_a_lifted_probe_feels_nothing():
     kept = memory.stored
     memory.step(away, 0.0, np.zeros(3), 5.0)
     assert 0 < memory.stored < 0.2 * kept
+
+
+def test_lists_are_refused_with_what_is_taken(memory):
+    with pytest.raises(UsageError, match=r"arrays of float64"):
+        memory.step([0, 0, 0.046], 0.0, [0.0, 0, 0], 1e-3)

@@ -33,7 +33,7 @@ __all__ = ["read_measured", "write_measured"]
 
 _HEAD = re.compile(r"^\s*(?P<name>[^\[\]]+?)\s*(?:\[(?P<unit>[^\[\]]*)\])?\s*$")
 _KEYS = {"units", "place", "direction"}
-_MAKE = "See `palpate.dataset.measured.table` for an example."
+_MAKE = "Write a header such as `t [s], x [mm], y [mm], z [mm], Fz [N]` and a row of numbers for each touch."
 
 
 def read_measured(path: str | os.PathLike[str]) -> Measured:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields, is_dataclass, replace
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 from palpate.errors import UsageError
@@ -42,6 +43,11 @@ class Varied:
         Of the input, by default the path.
     unit : str
         By default that of the property, where it is known.
+
+    Raises
+    ------
+    UsageError
+        If an end is no number.
     """
 
     path: str
@@ -49,6 +55,16 @@ class Varied:
     high: float
     name: str = ""
     unit: str = ""
+
+    def __post_init__(self) -> None:
+        ends: tuple[object, ...] = (self.low, self.high)
+        for end in ends:
+            if not isinstance(end, Real):
+                raise UsageError(
+                    f"An end of the range of {self.path!r} is {end!r}, of type {type(end).__name__}.",
+                    why="Ends are numbers in SI units.",
+                    fix='For example Varied("fat.young", 2e3, 8e3) for 2 to 8 kPa.',
+                )
 
     @property
     def range(self) -> Range:

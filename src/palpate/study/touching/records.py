@@ -8,7 +8,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from palpate.learning.bodies.touches import FEWEST
 from palpate.physics.geometry.groups import members
-from palpate.physics.solid.varied import UNITS
+from palpate.physics.solid.varied import BESIDE, UNITS
 from palpate.study.record import Metres, PadStiffness, Record, RuntimeRecord, in_si
 from palpate.study.touching.shapes import ShapeRecord, known_material
 
@@ -60,10 +60,21 @@ class VariedRecord(Record):
     low: float = Field(description='its least value, in SI units or such as "2 kPa"', examples=["2 kPa"])
     high: float = Field(description="its largest value, likewise", examples=["8 kPa"])
 
+    @field_validator("path")
+    @classmethod
+    def _can_vary(cls, path: str) -> str:
+        if path.rpartition(".")[2] in BESIDE:
+            raise ValueError(
+                "a density can't vary: it acts through the body's weight, not through its strain energy"
+            )
+        return path
+
     @field_validator("low", "high", mode="before")
     @classmethod
     def _in_si(cls, value: Any, info: ValidationInfo) -> Any:
         """A quantity in the unit of what varies."""
+        if "path" not in info.data:  # that has been told already
+            return 0.0
         return in_si(value, UNITS.get(str(info.data.get("path", "")).rpartition(".")[2], ""))
 
     @model_validator(mode="after")

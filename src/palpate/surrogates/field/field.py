@@ -218,7 +218,8 @@ class FieldSurrogate:
         if values.shape != (len(self._checked(X)), *self.rest.shape):
             raise UsageError(
                 f"Fields of shape {values.shape} can't be compared.",
-                fix=f"Pass an array of shape {(len(X), *self.rest.shape)}.",
+                why="A field is at the nodes of the body's surface, `rest`; a solve's is at all of the mesh's.",
+                fix=f"Pass an array of shape {(len(X), *self.rest.shape)}: of a dataset those at np.unique(triangles).",
             )
         missed = values - self.values(X)
         learning = np.tensordot(self._along(missed), self.modes, 1)

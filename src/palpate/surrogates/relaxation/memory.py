@@ -122,20 +122,20 @@ class Memory:
         -------
         bool
             False if a number is not finite or U is negative: the force is zero then and nothing has changed.
+
+        Raises
+        ------
+        UsageError
+            If position or slope is no array.
         """
-        return bool(
-            kernels.step_into(
-                position,
-                energy,
-                slope,
-                dt,
-                self.force,
-                self._ledger,
-                self._state,
-                self._work,
-                self._constants,
+        if not (isinstance(position, np.ndarray) and isinstance(slope, np.ndarray)):
+            raise UsageError(
+                "A step takes position and slope as arrays of float64.",
+                why="It runs a thousand times a second, and converts nothing.",
+                fix="Pass for example np.array([0.0, 0.0, 0.046]).",
             )
-        )
+        own = self.force, self._ledger, self._state, self._work, self._constants
+        return bool(kernels.step_into(position, energy, slope, dt, *own))
 
 
 @dataclass(frozen=True, eq=False)

@@ -59,7 +59,8 @@ TOUCHED: dict[str, dict[str, Any]] = {
             "material": "ecoflex 00-30",
             "inclusion": {"centre": (0.0, 0.0, 0.02), "radius": 0.008, "material": "dragon skin 30"},
         },
-        "probe": {"depth": (2e-4, 0.010), "over": ((-0.03, -0.03), (0.03, 0.03))},
+        # silicone is stiff: a pad of 2e6 would take more than half of what the hand presses
+        "probe": {"depth": (2e-4, 0.010), "over": ((-0.03, -0.03), (0.03, 0.03)), "pad": 2e7},
         "sweep": {"samples": 80, "depths": 3, "element": 0.004},  # nothing thin is near the surface
     },
 }
@@ -72,6 +73,12 @@ _COARSE: dict[str, tuple[float, float, float]] = {
     "breast-dome": (0.020, 0.010, 0.006),
     "liver": (0.030, 0.012, 0.008),
     "phantom": (0.020, 0.010, 0.005),
+}
+# of what is pressed a part, its box and the ball's radius in m, and solves to learn from and to judge by: where a solve
+# takes 5 s on one core. Elements of the liver are coarse even so, and a larger ball feels less of them
+_PART: dict[str, tuple[Any, float, int, int]] = {
+    "liver": (((-0.04, -0.02), (0.0, 0.02)), 0.020, 12, 8),
+    "phantom": (((-0.015, -0.015), (0.015, 0.015)), 0.010, 16, 8),
 }
 _QUICK: dict[str, Any] = {
     "test": {"samples": 24, "depths": 4},
@@ -105,4 +112,9 @@ def touched_preset(name: str, *, quick: bool = False) -> TouchStudy:
     if name != "block":  # thin layers and round bodies keep more elements, so that a solve takes longer
         content["sweep"] |= {"samples": 24}
         content["test"] = {"samples": 12, "depths": 4}
+    if name in _PART:
+        over, radius, samples, unseen = _PART[name]
+        content["probe"] |= {"over": over, "radius": radius}
+        content["sweep"] |= {"samples": samples}
+        content["test"] = {"samples": unseen, "depths": 4}
     return TouchStudy.model_validate(content)

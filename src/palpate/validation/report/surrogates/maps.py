@@ -41,7 +41,7 @@ def plot_errors(surrogate: TouchSurrogate, test: TouchSolves, samples: ForceSamp
         )
         for place, numbers in _marks(places, worst, some).items():
             axis.annotate(numbers, place, (5, 4), textcoords="offset points", fontsize=8.5, weight="bold")
-        axis.set_title(f"{name}, to {1e3 * ends[k + 1]:.1f} mm")
+        axis.set_title(f"{name}\nto {1e3 * ends[k + 1]:.1f} mm")  # panels may be narrow
         _framed(axis, view)
     axes[0, 1].set_ylabel("")
     axes[0, 2].set_ylabel("")

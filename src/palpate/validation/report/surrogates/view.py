@@ -12,7 +12,7 @@ __all__ = ["View", "at_depth", "deepest", "feet", "further"]
 
 AXES = ("x", "y", "z")
 ALONG = 0.9  # cosine from which a direction of the view is called by an axis
-TILT = 0.05  # a view so little off an axis is still drawn with x across
+TILT = 0.3  # a view so little off an axis is still drawn with x across: a few footprints on a dome lie on one side
 
 
 @dataclass(frozen=True, eq=False)

@@ -128,6 +128,16 @@ _BLOCK = TouchStudy(
     wanted=40,
     target=(0.003, 0.01),
 )
+# no edge near: the easiest to learn
+_CENTRE = replace(
+    _BLOCK,
+    over=((0.05, 0.05), (0.07, 0.07)),
+    depth=0.01,
+    to_edges=False,
+    element=0.006,
+    wanted=10,
+    target=(0.0019, 0.0074),
+)
 # a skin of 3 mm needs two elements through it: one alone makes it 2 to 5 % too stiff
 _LAYERED = TouchStudy(_layered, over=_MIDDLE, about=(0.05, 0.05), element=0.0025)
 _BREAST = TouchStudy(_dome, over=_MERIDIAN, symmetry="round", within=0.045, element=0.004)
@@ -135,6 +145,7 @@ _BREAST = TouchStudy(_dome, over=_MERIDIAN, symmetry="round", within=0.045, elem
 STUDIES: dict[str, TouchStudy] = {
     "block": _BLOCK,
     "block-10k": replace(_BLOCK, pad=STIFF_PAD),
+    "block-centre": _CENTRE,
     "layered": _LAYERED,
     "layered-10k": replace(_LAYERED, pad=STIFF_PAD),
     "breast-dome": _BREAST,

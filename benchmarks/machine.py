@@ -17,7 +17,7 @@ def machine_record() -> dict[str, str]:
     """Each as text, in the order in which they are printed."""
     return {
         "date": datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
-        "processor": f"{_processor()}, {_cores()} cores",
+        "processor": f"{_processor()}, {_cores()} core{'s' * (_cores() != 1)}",
         "load": _load(),
         "system": f"{platform.system()} {platform.release()}",
         "python": platform.python_version(),

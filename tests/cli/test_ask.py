@@ -11,6 +11,7 @@ import pytest
 
 from models import spring_beam
 from palpate.surrogates import TouchedBody, TouchSurrogate
+from palpate.surrogates.relaxation import Branches
 
 sys.path.append(str(Path(__file__).parents[1] / "learning" / "correction"))
 from correction_made import model, touches
@@ -78,6 +79,14 @@ def test_beyond_the_ranges_the_trust_is_not_known(palpate, file):
     words = palpate("ask", file, "--at", "0,0,50").out
     assert "no contact" in words
     assert "c_z 50 m is not in" in words
+
+
+def test_of_a_body_that_relaxes_the_answer_is_that_of_an_instant(palpate, file, tmp_path):
+    body = TouchedBody(TouchSurrogate.load(file)).relaxing(Branches(((0.3, 0.1),)), spacing=0.0025)
+    path = body.save(tmp_path / "relaxing.palpate")
+    assert "relaxes: 30 % in 0.1 s" in palpate("ask", path).out
+    assert "that of an instant" in palpate("ask", path, "--at", text_of(touches(1, 5)[0])).out
+    assert "instant" not in palpate("ask", file, "--at", text_of(touches(1, 5)[0])).out
 
 
 @pytest.mark.parametrize("place", ["0.01,0.02", "1,2,3,4", "a,b,c", "0.01,nan,0.02", ""])

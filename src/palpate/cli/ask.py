@@ -124,10 +124,12 @@ def ask(model: Path, at: Sequence[str], console: Console) -> None:
     answers = [
         Answer(x, float(U), F, K, float(d), bool(i)) for x, U, F, K, d, i in zip(X, *columns, strict=True)
     ]
-    console.result(
-        "\n".join(one.words(energy.inputs) for one in answers),
-        {"model": str(model), "answers": [one.as_dict() for one in answers]},
-    )
+    words = [one.words(energy.inputs) for one in answers]
+    if {"relaxation", "yielding"} & set(energy.meta):
+        words.append(
+            "This is the elastic answer, that of an instant: the body remembers, which `palpate run` shows."
+        )
+    console.result("\n".join(words), {"model": str(model), "answers": [one.as_dict() for one in answers]})
 
 
 def _place(text: str, inputs: Sequence[Range]) -> list[float]:

@@ -43,7 +43,7 @@ def test_quick_demos_keep_their_limits_and_leave_everything_behind(palpate, fold
         felt = np.linalg.norm(test.force, axis=1) > 0.05
         assert np.median(off[felt] / np.linalg.norm(test.force[felt], axis=1)) < 0.035
         assert body.touch.meta["validation"]["limits kept"] is True
-    page = (folder / "report.html").read_text(encoding="utf-8")
+    page = (folder / "block-quick.html").read_text(encoding="utf-8")
     for heading in (
         "Force against depth",
         "Error on the touched surface",
@@ -59,7 +59,8 @@ def test_the_commands_take_what_the_demo_left(palpate, folder, tmp_path):
 
     study = preset_study("block", quick=True)
     for path in folder.glob("block-quick*"):
-        (shutil.copytree if path.is_dir() else shutil.copy)(path, tmp_path / path.name)
+        if path.suffix != ".html":  # which `validate` is to write
+            (shutil.copytree if path.is_dir() else shutil.copy)(path, tmp_path / path.name)
     file = tmp_path / "study.toml"
     file.write_text(to_toml(study), encoding="utf-8")
     assert palpate("sweep", file).code == 0  # read, not solved again

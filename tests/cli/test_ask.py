@@ -75,6 +75,9 @@ def test_beyond_the_ranges_the_trust_is_not_known(palpate, file):
     assert "not known, OUTSIDE" in words
     assert f"c_z {deep[0, 2]:g} m is not in" in words
     assert "%" not in words
+    (answer,) = json.loads(palpate("ask", file, "--at", text_of(deep[0]), "--json").out)["answers"]
+    assert answer["deviation"] is None
+    assert answer["inside"] is False
     # millimetres taken for metres
     words = palpate("ask", file, "--at", "0,0,50").out
     assert "no contact" in words

@@ -15,7 +15,7 @@ from palpate.errors import UsageError
 from palpate.surrogates import TouchedBody
 from palpate.surrogates.learnt_energy import LearntEnergy
 from palpate.surrogates.loading import load
-from palpate.units import Range
+from palpate.units import Range, bounds
 
 __all__ = ["ask"]
 
@@ -35,7 +35,7 @@ class Answer:
     stiffness : (3, 3)
         ∂F/∂x by the first three inputs, N/m.
     deviation : float
-        Of the force, relative to its size; not-a-number where it is not known.
+        Of the force, relative to its size; not-a-number where it is not known, as beyond the ranges.
     inside : bool
         Whether the place lies in what was trained.
     """
@@ -66,7 +66,7 @@ class Answer:
         return "\n".join(lines)
 
     def _trust(self, beyond: str) -> str:
-        if beyond:  # a deviation is of what is like the training, and says nothing there
+        if beyond:
             return f"not known, OUTSIDE what it was trained on: {beyond}"
         where = "inside what it was trained on"
         if not self.inside:
@@ -79,8 +79,8 @@ class Answer:
         """Inputs outside of their ranges, in words; "" if there are none."""
         return ", ".join(
             f"{_quantity(r, x)} is not in {r.low:.4g} … {r.high:.4g} {r.unit}".rstrip()
-            for r, x in zip(names, self.inputs, strict=True)
-            if not r.low <= x <= r.high
+            for r, x, out in zip(names, self.inputs, _outside(self.inputs, names), strict=True)
+            if out
         )
 
     def as_dict(self) -> dict[str, Any]:
@@ -120,7 +120,10 @@ def ask(model: Path, at: Sequence[str], console: Console) -> None:
         )
     X = np.array([_place(text, energy.inputs) for text in at])
     known = energy.deviation(X) if energy.root is not None else np.full(len(X), math.nan)
-    columns = energy.energy(X), energy.force(X), energy.stiffness(X), known, energy.inside(X)
+    forces = energy.force(X)
+    # a deviation is of what is like the training, and says nothing beyond it; that nothing is touched is exact
+    known[_outside(X, energy.inputs).any(axis=1) & forces.any(axis=1)] = math.nan
+    columns = energy.energy(X), forces, energy.stiffness(X), known, energy.inside(X)
     answers = [
         Answer(x, float(U), F, K, float(d), bool(i)) for x, U, F, K, d, i in zip(X, *columns, strict=True)
     ]
@@ -147,6 +150,12 @@ def _place(text: str, inputs: Sequence[Range]) -> list[float]:
             fix=f"Give as many numbers with commas between, for example --at {example}.",
         )
     return found
+
+
+def _outside(values: np.ndarray, inputs: Sequence[Range]) -> np.ndarray:
+    """Which of the values (..., n) lie outside of their ranges."""
+    low, high = bounds(inputs)
+    return np.asarray((values < low) | (values > high))
 
 
 def _quantity(of: Range, value: float) -> str:

@@ -250,12 +250,10 @@ def _forms(part: dict[str, Any], schema: dict[str, Any]) -> Iterator[dict[str, A
 
 
 def _parts(table: dict[str, Any], key: int | str) -> Iterator[dict[str, Any]]:
-    """Below a table by a key; a union's tag leads to the table itself."""
+    """Below a table by a key, below a list by a number; a union's tag leads to the table itself."""
     if key in table.get("properties", {}):
         yield table["properties"][key]
-    elif isinstance(key, int):
-        yield from (part for part in [table.get("items")] if isinstance(part, dict))
-    else:
-        yield from (part for part in [table.get("additionalProperties")] if isinstance(part, dict))
-        if "additionalProperties" not in table or table["additionalProperties"] is False:
-            yield table
+    elif not isinstance(key, int):
+        yield table
+    elif "items" in table:
+        yield table["items"]

@@ -74,11 +74,21 @@ _COARSE: dict[str, tuple[float, float, float]] = {
     "liver": (0.030, 0.012, 0.008),
     "phantom": (0.020, 0.010, 0.005),
 }
-# of what is pressed a part, its box and the ball's radius in m, and solves to learn from and to judge by: where a solve
-# takes 5 s on one core. Elements of the liver are coarse even so, and a larger ball feels less of them
-_PART: dict[str, tuple[Any, float, int, int]] = {
-    "liver": (((-0.04, -0.02), (0.0, 0.02)), 0.020, 12, 8),
-    "phantom": (((-0.015, -0.015), (0.015, 0.015)), 0.010, 16, 8),
+# thin layers and round bodies keep more elements, so that a solve takes longer; of liver and phantom it takes 5 s, and
+# a part is pressed. The liver's elements are coarse even so: a larger ball feels less of them
+_LESS: dict[str, dict[str, dict[str, Any]]] = {
+    "layered": {"sweep": {"samples": 24}, "test": {"samples": 12}},
+    "breast-dome": {"sweep": {"samples": 24}, "test": {"samples": 12}},
+    "liver": {
+        "probe": {"over": ((-0.04, -0.02), (0.0, 0.02)), "radius": 0.020},
+        "sweep": {"samples": 12},
+        "test": {"samples": 8},
+    },
+    "phantom": {
+        "probe": {"over": ((-0.015, -0.015), (0.015, 0.015))},
+        "sweep": {"samples": 16},
+        "test": {"samples": 8},
+    },
 }
 _QUICK: dict[str, Any] = {
     "test": {"samples": 24, "depths": 4},
@@ -109,12 +119,6 @@ def touched_preset(name: str, *, quick: bool = False) -> TouchStudy:
     content["body"] = {**content["body"], "element": coarse}
     content["probe"] = {**content["probe"], "depth": (2e-4, depth)}
     content["sweep"] = {"samples": 32, "depths": 2, "element": element}
-    if name != "block":  # thin layers and round bodies keep more elements, so that a solve takes longer
-        content["sweep"] |= {"samples": 24}
-        content["test"] = {"samples": 12, "depths": 4}
-    if name in _PART:
-        over, radius, samples, unseen = _PART[name]
-        content["probe"] |= {"over": over, "radius": radius}
-        content["sweep"] |= {"samples": samples}
-        content["test"] = {"samples": unseen, "depths": 4}
+    for section, less in _LESS.get(name, {}).items():
+        content[section] = {**content[section], **less}
     return TouchStudy.model_validate(content)

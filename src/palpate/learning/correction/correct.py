@@ -11,7 +11,7 @@ import numpy as np
 from palpate.dataset.measured import Measured
 from palpate.errors import UsageError
 from palpate.learning.correction.corrector import Corrector
-from palpate.learning.correction.measures import ForceError, force_error
+from palpate.learning.correction.measures import ForceError, felt_along, force_error
 from palpate.learning.correction.placing import placed
 from palpate.surrogates import TouchSurrogate
 
@@ -180,8 +180,7 @@ def judged(corrector: Corrector, measured: Measured, left_out: ForceError | None
 
 def _ratio(predicted: np.ndarray, measured: np.ndarray, along: np.ndarray) -> float:
     """Factor that makes forces (N, 3) of the model the measured ones, least squares; `along` as in `observe`."""
-    one = along.any(axis=1, keepdims=True)
-    compared = np.where(one, (predicted * along).sum(axis=1)[:, None] * along, predicted)
+    compared = felt_along(predicted, along)
     size = float((compared**2).sum())
     return float((compared * measured).sum()) / size if size > 0 else np.nan
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.surrogates import TouchSurrogate
 
-__all__ = ["ForceError", "force_error"]
+__all__ = ["ForceError", "felt_along", "force_error"]
 
 FELT = 0.05  # of the largest force: relative errors are of touches above it
 
@@ -57,11 +57,9 @@ def force_error(
     `along` as in `Corrector.observe`.
     """
     predicted, depth = answer if isinstance(answer, tuple) else (answer.force(X), answer.depth(X))
-    measured = np.array(force)
+    measured = np.asarray(force)
     if along is not None:
-        one = along.any(axis=1)
-        for F in (predicted, measured):
-            F[one] = (F[one] * along[one]).sum(axis=1)[:, None] * along[one]
+        predicted, measured = felt_along(predicted, along), felt_along(measured, along)
     size, missed = np.linalg.norm(measured, axis=1), np.linalg.norm(predicted - measured, axis=1)
     largest = float(size.max(initial=0.0))
     felt = size > FELT * largest
@@ -74,6 +72,12 @@ def force_error(
     return ForceError(
         int(touched.sum()), rms, rms / _rms(size[touched]), float(quantiles[0]), float(quantiles[1])
     )
+
+
+def felt_along(force: np.ndarray, along: np.ndarray) -> np.ndarray:
+    """What of forces (N, 3) was measured: where `along` (N, 3) has a direction, the part along it, else all."""
+    one = along.any(axis=1, keepdims=True)
+    return np.asarray(np.where(one, (force * along).sum(axis=1, keepdims=True) * along, force))
 
 
 def _rms(sizes: np.ndarray) -> float:

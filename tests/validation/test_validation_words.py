@@ -6,10 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from palpate.units import Range
 from palpate.validation.words import (
     bound,
     count,
     duration,
+    interval,
     length,
     plain,
     power_of_ten,
@@ -53,6 +55,9 @@ def test_lengths_read_back_and_stay_short(metres: float) -> None:
 @pytest.mark.parametrize(
     ("text", "wanted"),
     [
+        (interval(Range("c_z", 0.0426531, 0.0498, "m")), "c_z 42.7 … 49.8 mm"),
+        (interval(Range("x", 0.5, 2.0, "m")), "x 0.5 … 2 m"),
+        (interval(Range("young", 4e3, 12e3, "Pa")), "young 4000 … 12000 Pa"),
         (length(0.0), "0 m"),
         (length(9.9999e-4), "1 mm"),
         (length(3.5e-4), "350 µm"),

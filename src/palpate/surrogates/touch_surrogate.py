@@ -126,7 +126,11 @@ class TouchSurrogate(LearntEnergy):
         return str(self)
 
     def __str__(self) -> str:
-        names = ", ".join(str(r) for r in self.inputs)
+        return f"TouchSurrogate: {', '.join(str(r) for r in self.inputs)}; {self.made_of}"
+
+    @property
+    def made_of(self) -> str:
+        """Probe, contact law, units and what it learnt from, in words."""
         probe = (
             f"of radius {1e3 * self.radius:g} mm"
             if self.radius_input is None
@@ -135,7 +139,7 @@ class TouchSurrogate(LearntEnergy):
         units = (
             f"{self.network.units} {self.network.form} units" if self.network.units else "an affine factor"
         )
-        return f"TouchSurrogate: {names}; sphere {probe}; {self.law}; {units}{history_in_words(self.meta)}"
+        return f"sphere {probe}; {self.law}; {units}{history_in_words(self.meta)}"
 
     @cached_property
     def _fixed(self) -> tuple[Any, ...]:

@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 import re
 
+from palpate.units import Range
+
 __all__ = [
     "bound",
     "count",
     "duration",
+    "interval",
     "length",
     "plain",
     "power_of_ten",
@@ -72,6 +75,13 @@ def length(metres: float) -> str:
         return f"{plain(metres)} m"
     factor, unit = next((u for u in _LENGTHS if size >= 0.9995 * u[0]), _LENGTHS[-1])
     return f"{plain(metres / factor, 3)} {unit}"
+
+
+def interval(of: Range) -> str:
+    """A range, lengths below 1 m in mm: c_z 42.7 … 49.8 mm."""
+    small = of.unit == "m" and max(abs(of.low), abs(of.high)) < 1.0
+    factor, unit = (1e-3, "mm") if small else (1.0, of.unit)
+    return f"{of.name} {plain(of.low / factor, 3)} … {plain(of.high / factor, 3)} {unit}".rstrip()
 
 
 def pressure(pascals: float) -> str:

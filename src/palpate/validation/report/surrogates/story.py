@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from palpate.validation.report.summary import Fact, Story, felt
 from palpate.validation.report.surrogates.chapter import SurrogateChapter
-from palpate.validation.words import count, plain, share
+from palpate.validation.words import count, interval, plain, share
 
 __all__ = ["surrogate_story"]
 
@@ -14,7 +14,12 @@ def surrogate_story(chapter: SurrogateChapter) -> Story:
     v = chapter.validation
     verdict = "Every limit kept" if v.passed else f"{len(v.failures)} of {len(v.checks)} limits missed"
     return Story(
-        verdict, v.passed, _facts(chapter), _solved(chapter), str(chapter.surrogate) + ".", _good(chapter)
+        verdict,
+        v.passed,
+        _facts(chapter),
+        _solved(chapter),
+        f"An energy network under a {chapter.surrogate.made_of}.",
+        _good(chapter),
     )
 
 
@@ -39,7 +44,7 @@ def _solved(chapter: SurrogateChapter) -> str:
     v = chapter.validation
     return (
         f"{count(v.samples, 'touch', 'touches')} by finite elements that the surrogate never saw, within "
-        f"{', '.join(str(r) for r in chapter.surrogate.inputs)}; {v.force.light_count} of them are light, up to "
+        f"{', '.join(interval(r) for r in chapter.surrogate.inputs)}; {v.force.light_count} of them are light, up to "
         f"f₀ = {plain(v.force.light)} N."
     )
 

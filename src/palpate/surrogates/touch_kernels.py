@@ -120,8 +120,10 @@ def _through_depth(x, excess, slope, curvature, small, step, surface) -> None:  
                 for b in range(3):
                     total += J[i, a] * H[a, b] * J[j, b]
             bend[i, j] = total
-    g[:] = new
-    H[:, :] = bend
+    for i in range(3):
+        g[i] = new[i]
+        for j in range(3):
+            H[i, j] = bend[i, j]
 
 
 @_jit
@@ -200,7 +202,8 @@ def touch_into(c, p, answer, lines, small, numbers, limits, points, grams, surfa
     if s <= 0.0:
         return True
     depth, slope, curvature = saturated(s, numbers[_DEEPEST], numbers[_DEPTH_WIDTH])
-    lines[1, :] = lines[0, :]
+    for i in range(lines.shape[1]):
+        lines[1, i] = lines[0, i]
     for i in range(3):
         lines[1, i] += (s - depth) * d[i]
     boxed(lines, limits)

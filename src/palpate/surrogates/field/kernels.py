@@ -68,7 +68,8 @@ def coefficients_into(c, p, z, place, b, lines, small, numbers, limits, surface,
         return False
     f = rise_at(s, numbers[4], numbers[5], numbers[6])
     place[1] = f
-    lines[1, :] = lines[0, :]
+    for i in range(lines.shape[1]):
+        lines[1, i] = lines[0, i]
     deep = saturated(s, numbers[2], numbers[3])[0]
     for i in range(3):
         lines[1, i] += (s - deep) * g[i]
@@ -134,7 +135,8 @@ def _add_dimple(y, place, profile, reach, nodes, points) -> None:  # type: ignor
 def field_into(y, z, place, numbers, rows, table, profile, reach, nodes, points) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """The field y (nodes · components,) from what `coefficients_into` has found; rows (1 + k, …): rest, modes."""
     if place[1] == 0.0 and z[0] == 1.0:
-        y[:] = rows[0]
+        for k in range(y.size):
+            y[k] = rows[0, k]
         return
     combine(z, rows, y)
     if nodes.size and place[1] > 0.0:

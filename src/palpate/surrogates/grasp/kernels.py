@@ -73,7 +73,8 @@ def grasp_into(d, y, answer, lines, small, radius, limits, points, laws, grams, 
     if not gathered(d, y, lines):
         answer[:] = math.nan
         return False
-    lines[1, :] = lines[0, :]
+    for i in range(lines.shape[1]):
+        lines[1, i] = lines[0, i]
     boxed(lines, limits)
     xi, scales = lines[_SCALED], net[3]
     for i in range(lines.shape[1]):

@@ -25,7 +25,7 @@ from benchmarks.table import Claim, Column, Table
 from benchmarks.touch_studies import STUDIES
 from palpate.validation import validate
 from palpate.validation.limits import Check
-from palpate.validation.words import shown
+from palpate.words import shown
 
 __all__ = ["tables"]
 

@@ -14,7 +14,7 @@ from palpate.units import Quantity, Range
 from palpate.validation import Chapter, SurrogateChapter, TouchSolves, validate, write_report
 from palpate.validation.report.surrogates.curves import curves, plot_curves
 from palpate.validation.report.surrogates.view import View, at_depth, feet
-from palpate.validation.words import bound, interval
+from palpate.words import bound, interval
 from pressed import DEEPEST, INPUTS, RADIUS, A, B, face, force, places, solves, steady, surrogate
 
 HOSTILE = '<script>window.hacked = 1</script> $\\frac{1}$ "&amp;'

@@ -16,6 +16,7 @@ from palpate.surrogates import TouchedBody
 from palpate.surrogates.learnt_energy import LearntEnergy
 from palpate.surrogates.loading import load
 from palpate.units import Range, bounds
+from palpate.words import share
 
 __all__ = ["ask"]
 
@@ -73,7 +74,7 @@ class Answer:
             where = "OUTSIDE what it was trained on: within the ranges, but no training solve is near"
         if math.isnan(self.deviation):
             return where
-        return f"± {100 * self.deviation:.2g} % of the force, one deviation; {where}"
+        return f"± {share(self.deviation)} of the force, one deviation; {where}"
 
     def _beyond(self, names: Sequence[Range]) -> str:
         """Inputs outside of their ranges, in words; "" if there are none."""

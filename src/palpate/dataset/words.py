@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.dataset.fields import BOOKKEEPING
+from palpate.words import share
 
 if TYPE_CHECKING:
     from palpate.dataset.dataset import Dataset
@@ -43,4 +44,4 @@ def _answers(dataset: Dataset) -> list[str]:
 def _strain_line(dataset: Dataset) -> list[str]:
     known = dataset.largest_strain[np.isfinite(dataset.largest_strain)]
     kind = "strain" if "triangles" in dataset else "fibre strain"
-    return [f"  largest {kind} {100 * known.max():.2g} %"] if known.size else []
+    return [f"  largest {kind} {share(float(known.max()))}"] if known.size else []

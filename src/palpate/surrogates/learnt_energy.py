@@ -20,6 +20,7 @@ from palpate.surrogates.arguments import rows_of
 from palpate.surrogates.touch_kernels import ANSWER, FORCE, STIFFNESS
 from palpate.surrogates.touch_trust import trusts_into
 from palpate.units import Range
+from palpate.words import share
 
 __all__ = ["LearntEnergy", "corrected_by", "history_in_words"]
 
@@ -135,7 +136,7 @@ def history_in_words(meta: Mapping[str, Any]) -> str:
             words += f" ({meta['samples']} samples by symmetry)"
     error = meta.get("force_error")
     if isinstance(error, Mapping) and {"median", "p95"} <= error.keys():
-        words += f"; force error {100 * error['median']:.2g} % median, {100 * error['p95']:.2g} % p95"
+        words += f"; force error {share(error['median'])} median, {share(error['p95'])} p95"
     if (touches := corrected_by(meta)) is not None:
         words += f"; corrected by {touches} measured touches"
     return words + _memory_in_words(meta)
@@ -146,9 +147,7 @@ def _memory_in_words(meta: Mapping[str, Any]) -> str:
     words = ""
     relaxation = meta.get("relaxation")
     if isinstance(relaxation, Mapping) and relaxation.get("terms"):
-        shares = ", ".join(
-            f"{100 * share:.3g} % in {seconds:.3g} s" for share, seconds in relaxation["terms"]
-        )
+        shares = ", ".join(f"{100 * part:.3g} % in {seconds:.3g} s" for part, seconds in relaxation["terms"])
         words += f"; relaxes: {shares}"
     if isinstance(meta.get("yielding"), Mapping):
         words += "; yields and keeps prints"

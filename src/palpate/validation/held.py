@@ -16,7 +16,7 @@ from palpate.learning.plastic import HeldPath, HeldPaths
 from palpate.surrogates.plastic import HeldBody
 from palpate.validation.judgement import Judgement
 from palpate.validation.limits import Check, Criterion
-from palpate.validation.words import length, plain, share
+from palpate.words import length, plain, share
 
 __all__ = ["Followed", "HeldLimits", "HeldValidation", "follow_unseen", "validate_held"]
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from palpate.errors import AccuracyError
 from palpate.validation.limits import Check
-from palpate.validation.words import shown
+from palpate.words import shown
 
 __all__ = ["Judgement"]
 

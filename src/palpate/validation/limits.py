@@ -189,7 +189,7 @@ class Check:
 
     def __str__(self) -> str:
         """What was measured, what was asked, where the worst case is, what to do."""
-        from palpate.validation.words import shown
+        from palpate.words import shown
 
         kind = self.criterion.kind
         text = (

@@ -23,7 +23,7 @@ from palpate.validation.limits import Limits
 from palpate.validation.loops import LoopWork, loop_work
 from palpate.validation.outputs import OutputErrors, output_errors
 from palpate.validation.stiffness import StiffnessErrors, stiffness_errors
-from palpate.validation.words import count, length, plain, scientific, share
+from palpate.words import count, length, plain, scientific, share
 
 __all__ = ["Validation", "node_truth", "validate_model", "worse_than_filter"]
 

@@ -25,7 +25,7 @@ from palpate.validation.shown import ShownErrors, shown_errors
 from palpate.validation.solves import TouchFunction, TouchSolves
 from palpate.validation.stiffness import StiffnessErrors, matrix_errors
 from palpate.validation.strokes import Smoothness, smoothness
-from palpate.validation.words import count, plain, share
+from palpate.words import count, plain, share
 
 __all__ = ["SurrogateValidation", "probe_samples", "validate_surrogate"]
 

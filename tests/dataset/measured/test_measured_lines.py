@@ -152,7 +152,7 @@ def test_a_connection_that_breaks_or_says_nothing_ends_cleanly():
 
 
 def test_a_sensor_that_never_reads_its_errors_does_not_stop_the_others():
-    port, found, _ = served(stall=2.0)
+    port, found, _ = served(stall=20.0)
     with socket.create_connection(("127.0.0.1", port), timeout=30) as sensor:
         sensor.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         sensor.sendall(f"{HELLO}\n".encode() + b"nonsense\n" * 60_000 + b"0 1 2 3 4 5 6\nend\n")

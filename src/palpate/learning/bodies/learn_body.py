@@ -14,6 +14,7 @@ from palpate.learning.bodies.touches import Touches
 from palpate.learning.energy import LearntSurrogate, learn_surrogate
 from palpate.learning.fields import LearntField, learn_field
 from palpate.surrogates import TouchedBody
+from palpate.words import share
 
 __all__ = ["TouchHistory", "learn_body"]
 
@@ -49,8 +50,8 @@ class TouchHistory:
         words = f"{self.solves} solves, {tried} networks of the energy tried in {self.seconds:.0f} s"
         if left:
             words += (
-                f"; a solve left out is missed by {100 * left['median']:.2g} % of its force (median), "
-                f"{100 * left['p95']:.2g} % (95th percentile)"
+                f"; a solve left out is missed by {share(left['median'])} of its force (median), "
+                f"{share(left['p95'])} (95th percentile)"
             )
         if self.shape is not None:
             modes = self.shape.field.meta["modes"]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.surrogates import TouchSurrogate
+from palpate.words import share
 
 __all__ = ["ForceError", "felt_along", "force_error"]
 
@@ -37,8 +38,8 @@ class ForceError:
 
     def __str__(self) -> str:
         return (
-            f"{1e3 * self.rms:.3g} mN rms ({100 * self.relative:.2g} %), of felt touches "
-            f"{100 * self.median:.2g} % median, {100 * self.p95:.2g} % p95"
+            f"{1e3 * self.rms:.3g} mN rms ({share(self.relative)}), of felt touches "
+            f"{share(self.median)} median, {share(self.p95)} p95"
         )
 
     def as_dict(self) -> dict[str, float]:

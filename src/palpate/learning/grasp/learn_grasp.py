@@ -24,6 +24,7 @@ from palpate.learning.grasp.samples import GraspSamples
 from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction
 from palpate.surrogates.grasp import GraspSurrogate
 from palpate.units import Range
+from palpate.words import share
 
 __all__ = ["LearntGrasp", "learn_grasp"]
 
@@ -58,10 +59,10 @@ class LearntGrasp:
     law_errors: dict[tuple[int, int], float]
 
     def __str__(self) -> str:
-        median, p95 = (100 * float(np.quantile(self.errors, q)) for q in (0.5, 0.95))
+        median, p95 = (share(float(np.quantile(self.errors, q))) for q in (0.5, 0.95))
         return (
             f"{self.surrogate.meta['solves']} solves, {len(self.trials)} networks of the energy tried; a solve left "
-            f"out is missed by {median:.2g} % of its force (median), {p95:.2g} % (95th percentile)"
+            f"out is missed by {median} of its force (median), {p95} (95th percentile)"
         )
 
     __repr__ = __str__

@@ -23,6 +23,7 @@ from palpate.learning.refinement.structure import refined_network
 from palpate.network import Network
 from palpate.surrogates.plastic import Elements, HeldBody
 from palpate.units import Quantity, Range
+from palpate.words import share
 
 __all__ = ["Fit", "learn_held"]
 
@@ -61,8 +62,8 @@ class Fit:
 
     def __str__(self) -> str:
         return (
-            f"force to {100 * self.error:.2g} % of the largest with {self.elements} of {self.candidates} elements, "
-            f"elastic twin to {100 * self.stretch_error:.2g} %, shape to {100 * self.shape_error:.2g} %"
+            f"force to {share(self.error)} of the largest with {self.elements} of {self.candidates} elements, "
+            f"elastic twin to {share(self.stretch_error)}, shape to {share(self.shape_error)}"
         )
 
 

@@ -31,6 +31,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.surrogates.plastic.dent_kernels import step_into
+from palpate.words import share
 
 __all__ = ["DentMemory", "Dents"]
 
@@ -98,7 +99,7 @@ class Dents:
     def __str__(self) -> str:
         return (
             f"yields from {self.reach[0]:.3g} √J on, dents to {self.dent[-1]:.3g} √J at {len(self.points)} places, "
-            f"stiffer by {100 * (self.stiffening[-1] - 1):.2g} %"
+            f"stiffer by {share(self.stiffening[-1] - 1)}"
         )
 
     @classmethod

@@ -19,6 +19,7 @@ from palpate.errors import UsageError
 from palpate.surrogates.relaxation.branches import Branches
 from palpate.surrogates.relaxation.descent import descend, slopes
 from palpate.surrogates.relaxation.record import Record
+from palpate.words import share
 
 __all__ = ["Identified", "identify", "identify_behind_pad"]
 
@@ -53,7 +54,7 @@ class Identified:
     def __str__(self) -> str:
         rows = zip(self.branches.terms, self.shares_error, self.times_error, strict=True)
         terms = ", ".join(f"{g:.3g} ± {dg:.1g} in {t:.3g} ± {dt:.1g} s" for (g, t), dg, dt in rows)
-        return f"relaxes by {terms}; scatter {100 * self.noise:.2g} %"
+        return f"relaxes by {terms}; scatter {share(self.noise)}"
 
 
 def identify(record: Record, *, most: int = MOST) -> Identified:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from palpate.surrogates import TouchModel
-from palpate.validation.words import count
+from palpate.words import count
 
 __all__ = ["ROLES", "network_rows", "units_of"]
 

@@ -15,7 +15,7 @@ from palpate.validation.report.networks import units_of
 from palpate.validation.report.shapes import colour_of_load, plot_shapes
 from palpate.validation.report.style import styled
 from palpate.validation.report.svg import Picture, inline_svg
-from palpate.validation.words import count, length, plain, scientific, share
+from palpate.words import count, length, plain, scientific, share
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

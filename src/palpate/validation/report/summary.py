@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from palpate.validation.report.body import body_words, strain_words
 from palpate.validation.report.chapter import Chapter
 from palpate.validation.result import Validation, worse_than_filter
-from palpate.validation.words import count, length, plain, scientific, share
+from palpate.words import count, length, plain, scientific, share
 
 __all__ = ["Fact", "Story", "felt", "story"]
 

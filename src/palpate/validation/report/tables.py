@@ -9,7 +9,7 @@ from typing import Any
 from palpate.validation.judgement import Judgement
 from palpate.validation.limits import CRITERIA
 from palpate.validation.result import Validation
-from palpate.validation.words import duration, length, scientific, shown
+from palpate.words import duration, length, scientific, shown
 
 __all__ = ["Judged", "flat", "judged_rows", "node_rows", "sources", "timing_rows"]
 

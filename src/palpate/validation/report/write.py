@@ -19,7 +19,7 @@ from palpate.validation.report.summary import story
 from palpate.validation.report.surrogates import SurrogateChapter
 from palpate.validation.report.surrogates.told import surrogate_told
 from palpate.validation.report.tables import flat, judged_rows, node_rows, sources, timing_rows
-from palpate.validation.words import bound
+from palpate.words import bound
 
 if TYPE_CHECKING:
     from markupsafe import Markup

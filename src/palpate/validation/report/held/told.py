@@ -11,7 +11,7 @@ from palpate.validation.report.pictures import picture
 from palpate.validation.report.summary import Fact, Story
 from palpate.validation.report.svg import Picture
 from palpate.validation.report.tables import flat, judged_rows, timing_rows
-from palpate.validation.words import length, plain, share
+from palpate.words import length, plain, share
 
 __all__ = ["held_told"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from palpate.validation.report.summary import Fact, Story, felt
 from palpate.validation.report.surrogates.chapter import SurrogateChapter
-from palpate.validation.words import count, interval, plain, share
+from palpate.words import count, interval, plain, share
 
 __all__ = ["surrogate_story"]
 

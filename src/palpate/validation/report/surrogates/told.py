@@ -17,7 +17,7 @@ from palpate.validation.report.svg import Picture
 from palpate.validation.report.tables import flat, judged_rows, timing_rows
 from palpate.validation.solves import TouchFunction
 from palpate.validation.surrogate import SurrogateValidation, probe_samples
-from palpate.validation.words import plain, share
+from palpate.words import plain, share
 
 __all__ = ["surrogate_told"]
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from palpate.units import Range
-from palpate.validation.words import (
+from palpate.words import (
     bound,
     count,
     duration,

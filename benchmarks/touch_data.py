@@ -222,12 +222,22 @@ def join(study: str, files: Sequence[Path], out: Path) -> None:
     rank = {"train": 0, "test": 1, "refined": 2}
     order = np.lexsort((arrays["column"], [rank[r] for r in arrays["role"].tolist()]))
     arrays = {key: value[order] for key, value in arrays.items()}
+    _require_distinct(arrays)
     fields = [p for p in parts if "displacement" in p]
     if fields:
         arrays |= _thinned(fields, parts, order)
     arrays["provenance"] = _provenance(study, parts)
     np.savez_compressed(out, **arrays)
     print(f"{out}: {len(order)} rows, {out.stat().st_size / 1e6:.2f} MB", flush=True)
+
+
+def _require_distinct(arrays: dict[str, Any]) -> None:
+    """A solve that stands there twice counts twice in all that is learnt and judged."""
+    rows = [
+        (role, *x, *y) for role, x, y in zip(arrays["role"], arrays["inputs"], arrays["beside"], strict=True)
+    ]
+    if twice := len(rows) - len(set(rows)):
+        raise SystemExit(f"{twice} solves are in two of these files: join each part once")
 
 
 def _plans(part: dict[str, Any]) -> list[str]:

@@ -53,7 +53,7 @@ def measured(
     case: Case,
     sizes: tuple[int, ...],
     *,
-    seconds: float,
+    seconds: float | None,
     detailed: int,
     loops: int,
     report: Callable[[str], None],
@@ -64,8 +64,8 @@ def measured(
     ----------
     case : Case
     sizes : tuple of int
-    seconds : float
-        That ours may search for.
+    seconds : float or None
+        That ours may search for; as long as it takes by itself where none.
     detailed, loops : int
     report : callable
         Takes a line for each result.
@@ -94,7 +94,7 @@ def measured(
     return Measured(case, rows, ours)
 
 
-def learnt(case: Case, size: int, seconds: float) -> TouchSurrogate:
+def learnt(case: Case, size: int, seconds: float | None) -> TouchSurrogate:
     """Our surrogate of so many solves."""
     training = case.training(size)
     return learn_surrogate(

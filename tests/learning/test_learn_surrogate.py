@@ -13,6 +13,7 @@ from palpate.learning.energy.average import Average
 from palpate.learning.energy.images import images_of
 from palpate.learning.energy.judging import left_out_again
 from palpate.learning.energy.search import Problem, Search
+from palpate.learning.energy.strategy import time_for
 from palpate.learning.energy.trust import trust_of
 from palpate.learning.refinement.rows import Rows
 from palpate.learning.units.regressors import pairs
@@ -221,6 +222,11 @@ def test_the_record_tells_what_was_tried(learnt):
     assert learnt.loo <= min(t.loo for t in learnt.trials)
     assert learnt.surrogate.meta["solves"] == 14
     assert learnt.surrogate.meta["samples"] == 8 * 14
+
+
+def test_more_solves_have_more_time_unless_one_is_given():
+    assert [time_for(n) for n in (4, 40, 60, 300)] == [60.0, 60.0, 60.0, 300.0]
+    assert time_for(300, 5.0) == 5.0
 
 
 def test_what_makes_no_sense_is_refused(surface):

@@ -12,6 +12,7 @@ from palpate.errors import UsageError
 from palpate.learning.bodies.images import shapes_of
 from palpate.learning.bodies.touches import Touches
 from palpate.learning.energy import LearntSurrogate, learn_surrogate
+from palpate.learning.energy.strategy import time_for
 from palpate.learning.fields import LearntField, learn_field
 from palpate.surrogates import TouchedBody
 from palpate.words import share
@@ -71,7 +72,7 @@ def learn_body(
     *,
     name: str = "body",
     layout: Layout | None = None,
-    seconds: float = 60.0,
+    seconds: float | None = None,
     units_max: int = 160,
     target: float = 1e-3,
     shape: bool = True,
@@ -88,8 +89,9 @@ def learn_body(
     name : str
     layout : Layout, optional
         Of a mesh that is fine wherever the body shall be touched, where the sweep's is fine in a part only.
-    seconds : float
-        To search the network of the energy; a quarter as long for the shape, and for the stress where the sweep has it.
+    seconds : float, optional
+        To search the network of the energy, one for each solve by default, a minute at least; a quarter as long for
+        the shape, and for the stress where the sweep has it.
     units_max : int
         Most units of the energy; mirror images count.
     target : float
@@ -111,10 +113,11 @@ def learn_body(
     UsageError
         If the data is of no body under one probe, lacks energies, has too few solves or none in contact.
     """
-    if not seconds > 0:
+    if seconds is not None and not seconds > 0:
         raise UsageError(f"{seconds} s allow no learning.", fix="Give a positive time.")
     began = time.monotonic()
     touches = Touches.of(train, layout)
+    seconds = time_for(len(touches.data), seconds)
     say(f"energy of {len(touches.data)} solves")
     energy = _energy(
         touches, {"seconds": seconds, "units_max": units_max, "target": target, "seed": seed} | options

@@ -18,7 +18,7 @@ from palpate.learning.energy.judging import judged
 from palpate.learning.energy.laws import chosen_law
 from palpate.learning.energy.samples import EnergySamples
 from palpate.learning.energy.search import EnergyTrial, Problem
-from palpate.learning.energy.strategy import SEARCH_SHARE, searched
+from palpate.learning.energy.strategy import SEARCH_SHARE, searched, time_for
 from palpate.learning.energy.trust import trust_of
 from palpate.learning.energy.written import trained_region, training_meta, written_out
 from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction
@@ -70,7 +70,7 @@ def learn_surrogate(
     units_max: int = 160,
     networks: int = 4,
     target: float = 1e-3,
-    seconds: float = 60.0,
+    seconds: float | None = None,
     resolved: float | None = None,
     form: str = "auto",
     radial: RadialFunction | Literal["auto"] = "auto",
@@ -108,8 +108,9 @@ def learn_surrogate(
         How many at most make one surrogate, as their mean; one answers faster, four miss less.
     target : float
         Leave-one-solve-out error at which no more units are added.
-    seconds : float
-        For the search, and for refining what it found again without some of the solves.
+    seconds : float, optional
+        For the search, and for refining what it found again without some of the solves; one for each solve by
+        default, a minute at least.
     resolved : float, optional
         Depth (m) at which a contact is as wide as an element; an eighth of the radius by default, for elements of
         half the radius.
@@ -129,7 +130,8 @@ def learn_surrogate(
         If samples, surface, symmetry or options do not fit.
     """
     begun, inputs = time.monotonic(), tuple(inputs)
-    if not (math.isfinite(seconds) and seconds > 0 and radius > 0 and units_max >= 0 and networks >= 1):
+    lasting = seconds is None or (math.isfinite(seconds) and seconds > 0)
+    if not (lasting and radius > 0 and units_max >= 0 and networks >= 1):
         raise UsageError(
             f"seconds={seconds}, radius={radius}, units_max={units_max} and networks={networks} allow no learning.",
             fix="Give positive numbers.",
@@ -138,7 +140,7 @@ def learn_surrogate(
         raise UsageError(f"There is no radial function {radial!r}.", fix=f"Choose from {RADIAL_FUNCTIONS}.")
     known = {"surface": surface, "radius": radius, "inputs": inputs, "radius_input": radius_input}
     samples = EnergySamples.of(X, energy, force, stiffness, **known)  # type: ignore[arg-type]
-    images = images_of(symmetry, about, inputs)
+    images, seconds = images_of(symmetry, about, inputs), time_for(len(samples.X), seconds)
     resolved = radius / 8.0 if resolved is None else resolved
     with threadpool_limits(1):  # small matrices: more BLAS threads cost time and the bits of the result
         trials: tuple[EnergyTrial, ...] = ()

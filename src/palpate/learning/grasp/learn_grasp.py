@@ -15,7 +15,7 @@ from palpate.errors import UsageError
 from palpate.learning.energy.average import average
 from palpate.learning.energy.judging import judged
 from palpate.learning.energy.search import EnergyTrial, Problem
-from palpate.learning.energy.strategy import SEARCH_SHARE, searched
+from palpate.learning.energy.strategy import SEARCH_SHARE, searched, time_for
 from palpate.learning.energy.trust import trust_of
 from palpate.learning.energy.written import trained_region, training_meta, written_out
 from palpate.learning.grasp.images import hold_images
@@ -83,7 +83,7 @@ def learn_grasp(
     units_max: int = 192,
     networks: int = 4,
     target: float = 1e-3,
-    seconds: float = 60.0,
+    seconds: float | None = None,
     form: str = "auto",
     radial: RadialFunction | Literal["auto"] = "auto",
     seed: int = 0,
@@ -117,8 +117,9 @@ def learn_grasp(
         How many at most make one surrogate, as their mean; one answers faster, four miss less.
     target : float
         Leave-one-solve-out error at which no more units are added.
-    seconds : float
-        For the search, and for refining what it found again without some of the solves.
+    seconds : float, optional
+        For the search, and for refining what it found again without some of the solves; one for each solve by
+        default, a minute at least.
     form : str
         Of a unit (see `palpate.learning.units.forms`), or "auto".
     radial : {"gaussian", "inverse-multiquadric", "matern-5/2", "auto"}
@@ -142,7 +143,7 @@ def learn_grasp(
             fix=f"Sweep at least {FEWEST}, better 20 or more.",
         )
     samples = GraspSamples.of(X, energy, force, stiffness, inputs=inputs)
-    images = hold_images(symmetry, about, inputs, axes)
+    images, seconds = hold_images(symmetry, about, inputs, axes), time_for(len(X), seconds)
     with threadpool_limits(1):  # small matrices: more BLAS threads cost time and the bits of the result
         found = found_law(
             samples,
@@ -167,9 +168,10 @@ def learn_grasp(
 
 
 def _require(
-    seconds: float, units_max: int, networks: int, radial: str, axes: Sequence[int], inputs: int
+    seconds: float | None, units_max: int, networks: int, radial: str, axes: Sequence[int], inputs: int
 ) -> None:
-    if not (math.isfinite(seconds) and seconds > 0 and units_max >= 0 and networks >= 1):
+    lasting = seconds is None or (math.isfinite(seconds) and seconds > 0)
+    if not (lasting and units_max >= 0 and networks >= 1):
         raise UsageError(
             f"seconds={seconds}, units_max={units_max} and networks={networks} allow no learning.",
             fix="Give positive numbers.",

@@ -49,7 +49,7 @@ TOUCHED: dict[str, dict[str, Any]] = {
         "body": {"kind": "organ", "length": 0.20, "material": {"young": 6e3, "name": "liver"}},
         "probe": {"touches": "front", "depth": (2e-4, 0.015)},
         "sweep": {"samples": 200, "depths": 3},
-        "learning": {"seconds": 120.0, "units_max": 120},
+        "learning": {"units_max": 120},
     },
     "phantom": {
         "body": {

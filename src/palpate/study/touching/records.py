@@ -114,7 +114,12 @@ class TouchTestRecord(Record):
 class TouchLearningRecord(Record):
     """The search for the energy's network, and for the shape's."""
 
-    seconds: float = Field(60.0, gt=0, description="for the energy; a quarter as long for the shape")
+    seconds: float | None = Field(
+        None,
+        gt=0,
+        description="for the energy, a quarter as long for the shape; left out: one for each solve, at least 60",
+        examples=[60.0],
+    )
     units_max: int = Field(160, ge=0, description="most units of the energy, mirror images among them")
     target: float = Field(1e-3, ge=0.0, description="leave-one-out error at which growth stops")
     shape: bool = Field(True, description="whether to learn the displacement for the eye")

@@ -233,9 +233,7 @@ def join(study: str, files: Sequence[Path], out: Path) -> None:
 
 def _require_distinct(arrays: dict[str, Any]) -> None:
     """A solve that stands there twice counts twice in all that is learnt and judged."""
-    rows = [
-        (role, *x, *y) for role, x, y in zip(arrays["role"], arrays["inputs"], arrays["beside"], strict=True)
-    ]
+    rows = [(role, *x) for role, x in zip(arrays["role"], arrays["inputs"], strict=True)]
     if twice := len(rows) - len(set(rows)):
         raise SystemExit(f"{twice} solves are in two of these files: join each part once")
 

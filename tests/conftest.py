@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 import signal
-import zlib
 
 import pytest
 from hypothesis import settings
@@ -21,12 +20,6 @@ for library in ("OMP", "OPENBLAS", "MKL"):
 # a run in the background of a shell ignores interrupts, and so would the programs that tests interrupt
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
-
-
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Files of one folder apart where several workers run: side by side they compile the same kernels, both of them."""
-    if hasattr(config, "workerinput"):
-        items.sort(key=lambda item: zlib.crc32(item.path.as_posix()[len(str(config.rootpath)) :].encode()))
 
 
 def require_program(*names: str) -> str:

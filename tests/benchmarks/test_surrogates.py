@@ -123,6 +123,8 @@ def test_a_run_goes_on_where_it_was_and_parts_join(tmp_path, monkeypatch):
         assert all(word in plans for word in ('"depths": 2', '"depths": 3', '"role": "test"'))
     with pytest.raises(SystemExit, match="not of layered"):
         touch_data.main(["layered", "--join", str(whole), "--out", str(tmp_path / "wrong.npz")])
+    with pytest.raises(SystemExit, match="4 solves are in two"):
+        touch_data.main(["block", "--join", str(whole), str(files[2]), "--out", str(tmp_path / "twice.npz")])
     with pytest.raises(SystemExit, match="name another file"):
         touch_data.main(["block", "--depths", "3", "--out", str(files[0])])
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import tracemalloc
 
 import numpy as np
 import pytest
 from touch_made import SOFT, differences, network
 
+from allocated import kept_by
 from held import INPUTS, drawn
 from palpate.errors import FileFormatError, UsageError
 from palpate.network import TrainedRegion
@@ -112,13 +112,7 @@ def test_the_evaluator_says_the_same_and_allocates_nothing():
         assert ev.depth == pytest.approx(np.linalg.norm(x[:3]), rel=1e-15)
         assert ev.trust(x[:3], x[3:]) == S.deviation(row)[0]
     d, p = X[0, :3].copy(), X[0, 3:].copy()
-    tracemalloc.start()
-    before = tracemalloc.take_snapshot()
-    for _ in range(2000):
-        ev(d, p)
-    grown = tracemalloc.take_snapshot().compare_to(before, "filename")
-    tracemalloc.stop()
-    assert sum(g.size_diff for g in grown if "palpate" in g.traceback[0].filename) < 2000
+    assert kept_by(lambda: ev(d, p)) < 500
     with pytest.raises(UsageError, match="can't be answered"):
         ev(d, np.zeros(3))
     ev(np.array([np.nan, 0.0, 0.0]), p)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import tracemalloc
 
 import numpy as np
 import pytest
@@ -24,6 +23,7 @@ from touch_made import (
     undisturbed,
 )
 
+from allocated import kept_by
 from palpate.errors import UsageError
 from palpate.network import TrainedRegion
 from palpate.surrogates import ContactLaw, Continuation, TouchSurrogate
@@ -270,15 +270,7 @@ def test_the_evaluator_gives_the_same_bits_as_the_batch(more):
 
 def test_nothing_is_allocated_by_a_call():
     evaluator, position, none = surrogate().evaluator(), np.array([0.001, 0.002, 0.003]), np.zeros(0)
-    evaluator.trust(position, none)
-    tracemalloc.start()
-    before = tracemalloc.get_traced_memory()[0]
-    for _ in range(1000):
-        evaluator(position, none)
-        evaluator.trust(position, none)
-    grown = tracemalloc.get_traced_memory()[0] - before
-    tracemalloc.stop()
-    assert grown < 500
+    assert kept_by(lambda: (evaluator(position, none), evaluator.trust(position, none))) < 500
 
 
 def test_plain_sequences_are_as_good_as_arrays():

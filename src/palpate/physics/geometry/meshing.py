@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.physics.geometry.mesh import body_mesh
-from palpate.physics.geometry.refinement import GRADING, FineMesh, require_budget
+from palpate.physics.geometry.refinement import GRADING, THREADS, FineMesh, require_budget
 from palpate.physics.geometry.sampling import points_on
 
 __all__ = ["mesh_solid"]
@@ -68,7 +68,9 @@ def _generate(geometry: Any, solid: Any, coarse: float, **options: Any) -> Any:
     low, high = solid.bounding_box
     longest = max(high[i] - low[i] for i in range(3))
     try:
-        return geometry.GenerateMesh(maxh=coarse, grading=GRADING, minedgelen=SHORTEST * longest, **options)
+        return geometry.GenerateMesh(
+            maxh=coarse, grading=GRADING, minedgelen=SHORTEST * longest, nthreads=THREADS, **options
+        )
     except NgException as error:
         raise UsageError(
             f"Netgen could not mesh the body: {str(error).strip()}.",

@@ -10,9 +10,10 @@ from palpate.physics.arguments import require_positive
 from palpate.physics.geometry.checks import require_triple
 from palpate.physics.geometry.groups import GROUPS
 
-__all__ = ["GRADING", "MOST_ELEMENTS", "FineMesh", "require_budget"]
+__all__ = ["GRADING", "MOST_ELEMENTS", "THREADS", "FineMesh", "require_budget"]
 
 GRADING = 0.4  # growth of the element size per distance from a fine surface
+THREADS = 1  # of Netgen; its own four gain nothing, and spin: ten times slower where another process works
 MOST_ELEMENTS = 400_000  # about half a million nodes of second order: beyond any direct solver on one machine
 Point = tuple[float, float, float]
 

@@ -13,7 +13,7 @@ from palpate.errors import FileFormatError, UsageError
 from palpate.physics.geometry.checks import require_size
 from palpate.physics.geometry.files import UNITS, read_with_meshio
 from palpate.physics.geometry.mesh import BodyMesh, body_mesh
-from palpate.physics.geometry.refinement import GRADING, FineMesh, require_budget
+from palpate.physics.geometry.refinement import GRADING, THREADS, FineMesh, require_budget
 from palpate.physics.geometry.sampling import points_on, scattered
 from palpate.physics.geometry.segments import SurfacePatch, patched, segments
 from palpate.physics.geometry.triangulation import Triangulation, merged, require_closed
@@ -118,7 +118,9 @@ def _filled(geometry: Any, coarse: float, fine: list[tuple[np.ndarray, float]]) 
             sizes = Path(folder) / "sizes.txt"
             lines = [str(len(rows)), *(" ".join(map(repr, row)) for row in rows), "0"]
             sizes.write_text("\n".join(lines) + "\n", encoding="ascii")
-            return geometry.GenerateMesh(maxh=coarse, grading=GRADING, meshsizefilename=str(sizes))
+            return geometry.GenerateMesh(
+                maxh=coarse, grading=GRADING, meshsizefilename=str(sizes), nthreads=THREADS
+            )
     except NgException as error:
         raise UsageError(
             f"Netgen could not mesh the surface: {str(error).strip()}.",

@@ -149,7 +149,7 @@ def test_ctrl_c_says_what_is_kept(palpate, carried_out, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("palpate.cli.app._with_workers", interrupted)
+    monkeypatch.setattr("palpate.study.workers.with_workers", interrupted)
     answer = palpate("sweep", carried_out / "study.toml")
     assert answer.code == 130
     assert "Interrupted. What is solved is kept: the same command goes on." in answer.err
@@ -161,7 +161,7 @@ def test_advice_is_told_once_and_without_the_line_of_code(palpate, carried_out, 
             advise("The pad is soft.", why="It takes most of the depth.", fix="Take a stiffer one.")
         return study
 
-    monkeypatch.setattr("palpate.cli.app._with_workers", advising)
+    monkeypatch.setattr("palpate.study.workers.with_workers", advising)
     with warnings.catch_warnings():
         warnings.simplefilter("always")
         answer = palpate("sweep", carried_out / "study.toml")

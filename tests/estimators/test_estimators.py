@@ -35,7 +35,7 @@ def wave():
     return X, np.sin(2 * X[:, 0]) * np.exp(-X[:, 1])
 
 
-# one pass, so that the many small fits of the checks stay quick; the default is checked below, more slowly
+# one pass, so that the many small fits of the checks stay quick
 @parametrize_with_checks([MRANRegressor(passes=1), RBFNetworkRegressor()])
 def test_conventions(estimator, check):
     check(estimator)
@@ -48,13 +48,12 @@ CHOOSING = RBFNetworkRegressor(form="auto", target=0.9, seconds=2.0, random_stat
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("model", [MRANRegressor(), CHOOSING], ids=["MRAN", "auto"])
 @pytest.mark.filterwarnings(
     "ignore::sklearn.exceptions.SkipTestWarning"
 )  # the array API is switched off in SciPy
-def test_conventions_as_it_comes(model):
+def test_conventions_of_a_form_that_is_chosen():
     done, skipped = 0, set()
-    for estimator, check in estimator_checks_generator(model):
+    for estimator, check in estimator_checks_generator(CHOOSING):
         if check.func.__name__ in SAME_FIT_AGAIN:
             continue
         try:

@@ -8,6 +8,7 @@ from palpate.errors import StudyError, UsageError
 from palpate.study import Study, TouchStudy, named, preset_study, read_study, to_toml
 from palpate.study.touching.build import limits_of, points_of, probe_of, problem_of, solid_of
 from palpate.study.touching.presets import TOUCHED
+from palpate.study.workers import with_workers
 
 ALL = [(name, quick) for name in TOUCHED for quick in (False, True)]
 
@@ -179,3 +180,12 @@ def test_what_can_vary_is_told_where_a_path_names_nothing(tmp_path):
 
 def test_a_touch_study_takes_another_name():
     assert named(preset_study("block"), "mine").name == "mine"
+
+
+def test_workers_solve_and_learn():
+    fewer = with_workers(preset_study("block"), 3)
+    assert (fewer.sweep.workers, fewer.learning.workers) == (3, 3)
+    beam = with_workers(preset_study("beam-copper"), 3)  # is learnt in one process
+    assert beam.sweep.workers == 3
+    assert beam.learning == preset_study("beam-copper").learning
+    assert with_workers(beam, None) == beam

@@ -125,9 +125,10 @@ def sweep(study: StudyFile = STUDY, workers: Workers = None, as_json: Json = Fal
     """Solve the study's model over its ranges; an interrupted sweep goes on where it stopped."""
     from palpate.study import read_study
     from palpate.study.pipeline import sweep_study
+    from palpate.study.workers import with_workers
 
     console = Console(as_json)
-    record = _with_workers(read_study(study), workers)
+    record = with_workers(read_study(study), workers)
     paths = _paths(study, record.name)
     if paths.data.with_name(paths.data.name + ".parts").exists():
         console.say(f"Going on with the interrupted sweep in {paths.data} …")
@@ -328,12 +329,6 @@ def _paths(study: Path, name: str) -> Any:
     from palpate.study.paths import Paths
 
     return Paths(study.parent, name)
-
-
-def _with_workers(study: Any, workers: int | None) -> Any:
-    if workers is None:
-        return study
-    return study.model_copy(update={"sweep": study.sweep.model_copy(update={"workers": workers})})
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -11,6 +11,7 @@ from palpate.errors import AccuracyError, UsageError
 from palpate.study import preset_study
 from palpate.study.pipeline import Outcome, Paths, carry_out, report_study
 from palpate.study.stages import AnyStudy
+from palpate.study.workers import with_workers
 from palpate.sweeps import LocalCluster, local_cluster
 
 __all__ = ["run_demo"]
@@ -31,7 +32,7 @@ def run_demo(
     AccuracyError
         After everything is written, if a study missed its target.
     """
-    studies = [preset_study(name, quick=quick) for name in names]
+    studies = [with_workers(preset_study(name, quick=quick), workers) for name in names]
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

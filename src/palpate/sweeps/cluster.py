@@ -8,7 +8,6 @@ and need none: a sweep works in a file without a guard, in a notebook and on sta
 from __future__ import annotations
 
 import logging
-import os
 import subprocess
 import sys
 import tempfile
@@ -17,14 +16,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from palpate.cores import available_cores, helper_environment
 from palpate.errors import SolverError, UsageError
 
 __all__ = ["LocalCluster", "local_cluster"]
 
-# Workers are as many as cores: threads of linear algebra within them would only fight
-_ONE_THREAD = dict.fromkeys(
-    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
-)
 _GRACE = 1.0  # s to end by themselves; a worker in the midst of a solve does not
 _SPARE_LIVES = 16  # workers started again after a crash, per cluster
 
@@ -113,7 +109,7 @@ class LocalCluster:
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
                 stderr=log,
-                env=_environment(),
+                env=helper_environment(),
                 # Ctrl-C in the terminal is for this process, which then ends its workers
                 start_new_session=True,
             )
@@ -162,13 +158,6 @@ def local_cluster(workers: int | None = None) -> LocalCluster:
     return LocalCluster(count)
 
 
-def available_cores() -> int:
-    """Number of cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
 def _start_scheduler() -> Any:
     import dask
     import distributed
@@ -191,12 +180,6 @@ def _start_scheduler() -> Any:
                 "dashboard_address": "127.0.0.1:0",
             },
         )
-
-
-def _environment() -> dict[str, str]:
-    """Environment of a worker: it finds the modules that this process finds."""
-    path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
-    return {**os.environ, **_ONE_THREAD, "PYTHONPATH": path}
 
 
 def _end(worker: subprocess.Popen[bytes], deadline: float) -> None:

@@ -139,10 +139,9 @@ def test_force_energy_and_reactions_belong_together(kind, tmp_path):
     assert np.linalg.norm(far.response) < 1e-9 * np.linalg.norm(found.response)
 
 
-@pytest.mark.parametrize("kind", [MARKED["dome"], MARKED["organ"]])
-def test_the_energy_of_a_round_body_does_not_depend_on_the_chain(kind, tmp_path):
+def test_the_energy_of_a_round_body_does_not_depend_on_the_chain(tmp_path):
     """The zero of U is the body without a probe, not the first place that a chain begins at."""
-    problem, touching, normal = BODIES[kind](tmp_path)
+    problem, touching, normal = dome(tmp_path)
     solver, place = problem.open(), touching - 0.0005 * normal
     found = []
     for before in ((), (touching - 0.001 * normal + [0.002, 0.003, 0.0],)):

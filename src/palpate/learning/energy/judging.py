@@ -19,7 +19,7 @@ from palpate.learning.energy.average import Average
 from palpate.learning.energy.search import LeftOut, Problem, Search
 from palpate.learning.refinement.refine import Refined
 
-__all__ = ["folds", "judged", "left_out_again"]
+__all__ = ["folds", "judged", "left_out_again", "restored"]
 
 _FOLDS = 8
 _ITERATIONS = 20  # with 60 of ten solves the errors are up to 1.8 times larger, and order networks no better
@@ -38,6 +38,14 @@ def judged(search: Search, deadline: float) -> list[Average]:
         if time.monotonic() >= deadline:
             break
     return found
+
+
+def restored(problem: Problem, network: Refined, again: np.ndarray, closed: np.ndarray) -> Average:
+    """A network that was judged elsewhere, of the errors (R, 1) of every row both ways."""
+    rows, fit = problem.fitted(network)
+    fold = folds(rows.groups)
+    together = rows.groups if fold.max() == 0 else fold
+    return Average((network,), LeftOut(rows, fit, again, together), LeftOut(rows, fit, closed, rows.groups))
 
 
 def left_out_again(network: Refined, problem: Problem) -> LeftOut:

@@ -12,13 +12,12 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from palpate.errors import UsageError
-from palpate.learning.energy.average import average
+from palpate.learning.energy.crew import Task, processes_for, sought
 from palpate.learning.energy.images import images_of
-from palpate.learning.energy.judging import judged
 from palpate.learning.energy.laws import chosen_law
 from palpate.learning.energy.samples import EnergySamples
 from palpate.learning.energy.search import EnergyTrial, Problem
-from palpate.learning.energy.strategy import SEARCH_SHARE, searched, time_for
+from palpate.learning.energy.strategy import time_for
 from palpate.learning.energy.trust import trust_of
 from palpate.learning.energy.written import trained_region, training_meta, written_out
 from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction
@@ -71,6 +70,7 @@ def learn_surrogate(
     networks: int = 4,
     target: float = 1e-3,
     seconds: float | None = None,
+    workers: int | None = None,
     resolved: float | None = None,
     form: str = "auto",
     radial: RadialFunction | Literal["auto"] = "auto",
@@ -111,6 +111,9 @@ def learn_surrogate(
     seconds : float, optional
         For the search, and for refining what it found again without some of the solves; one for each solve by
         default, a minute at least.
+    workers : int, optional
+        Processes that search at a time, each from starts of its own; one for each core by default, at most eight,
+        and one alone where there are less than 20 s.
     resolved : float, optional
         Depth (m) at which a contact is as wide as an element; an eighth of the radius by default, for elements of
         half the radius.
@@ -118,7 +121,7 @@ def learn_surrogate(
         Of a unit (see `palpate.learning.units.forms`), or "auto".
     radial : {"gaussian", "inverse-multiquadric", "matern-5/2", "auto"}
     seed : int
-        Decides the starts. With a limit on time the result also depends on the machine's speed.
+        Decides the starts. With a limit on time the result also depends on the machine's speed and cores.
 
     Returns
     -------
@@ -141,6 +144,7 @@ def learn_surrogate(
     known = {"surface": surface, "radius": radius, "inputs": inputs, "radius_input": radius_input}
     samples = EnergySamples.of(X, energy, force, stiffness, **known)  # type: ignore[arg-type]
     images, seconds = images_of(symmetry, about, inputs), time_for(len(samples.X), seconds)
+    processes = processes_for(seconds, workers)
     resolved = radius / 8.0 if resolved is None else resolved
     with threadpool_limits(1):  # small matrices: more BLAS threads cost time and the bits of the result
         trials: tuple[EnergyTrial, ...] = ()
@@ -150,10 +154,10 @@ def learn_surrogate(
             law, trials = chosen_law(samples, images, guess, resolved=resolved, seconds=share, seed=seed)
         rows = samples.rows(law, resolved=resolved)
         problem = Problem(samples.scaled, rows, images, str(law), finest=samples.finest(radius))
-        search = searched(problem, begun + SEARCH_SHARE * seconds, form, radial, units_max, target, seed)
-        found = average(judged(search, begun + seconds), networks)
+        task = Task(problem, begun, seconds, form, radial, units_max, target, seed)
+        found, tried = sought(task, networks, processes)
         trust = trust_of(found, samples)
-    trials = (*trials, *search.trials)
+    trials = (*trials, *tried)
     meta = training_meta(samples, found, trust.errors)
     network, root = written_out(found, trust.root, samples, meta)
     surrogate = TouchSurrogate(

@@ -12,10 +12,9 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from palpate.errors import UsageError
-from palpate.learning.energy.average import average
-from palpate.learning.energy.judging import judged
+from palpate.learning.energy.crew import Task, processes_for, sought
 from palpate.learning.energy.search import EnergyTrial, Problem
-from palpate.learning.energy.strategy import SEARCH_SHARE, searched, time_for
+from palpate.learning.energy.strategy import time_for
 from palpate.learning.energy.trust import trust_of
 from palpate.learning.energy.written import trained_region, training_meta, written_out
 from palpate.learning.grasp.images import hold_images
@@ -84,6 +83,7 @@ def learn_grasp(
     networks: int = 4,
     target: float = 1e-3,
     seconds: float | None = None,
+    workers: int | None = None,
     form: str = "auto",
     radial: RadialFunction | Literal["auto"] = "auto",
     seed: int = 0,
@@ -120,11 +120,14 @@ def learn_grasp(
     seconds : float, optional
         For the search, and for refining what it found again without some of the solves; one for each solve by
         default, a minute at least.
+    workers : int, optional
+        Processes that search at a time, each from starts of its own; one for each core by default, at most eight,
+        and one alone where there are less than 20 s.
     form : str
         Of a unit (see `palpate.learning.units.forms`), or "auto".
     radial : {"gaussian", "inverse-multiquadric", "matern-5/2", "auto"}
     seed : int
-        Decides the starts. With a limit on time the result also depends on the machine's speed.
+        Decides the starts. With a limit on time the result also depends on the machine's speed and cores.
 
     Returns
     -------
@@ -144,6 +147,7 @@ def learn_grasp(
         )
     samples = GraspSamples.of(X, energy, force, stiffness, inputs=inputs)
     images, seconds = hold_images(symmetry, about, inputs, axes), time_for(len(X), seconds)
+    processes = processes_for(seconds, workers)
     with threadpool_limits(1):  # small matrices: more BLAS threads cost time and the bits of the result
         found = found_law(
             samples,
@@ -155,16 +159,15 @@ def learn_grasp(
         rows = samples.rows(found.rest, found.stiffening)
         law = f"degrees {found.rest.degree} and {found.stiffening.degree}"
         problem = Problem(samples.scaled, rows, images, law, _RIDGE)
-        begun = time.monotonic()
-        search = searched(problem, begun + SEARCH_SHARE * seconds, form, radial, units_max, target, seed)
-        mean = average(judged(search, begun + seconds), networks)
+        task = Task(problem, time.monotonic(), seconds, form, radial, units_max, target, seed)
+        mean, trials = sought(task, networks, processes)
         trust = trust_of(mean, samples)
     meta = training_meta(samples, mean, trust.errors)
     network, root = written_out(mean, trust.root, samples, meta)
     surrogate = GraspSurrogate(
         network, found.rest, found.stiffening, region=trained_region(samples, images), root=root, meta=meta
     )
-    return LearntGrasp(surrogate, tuple(search.trials), trust.errors, mean.error, found.errors)
+    return LearntGrasp(surrogate, tuple(trials), trust.errors, mean.error, found.errors)
 
 
 def _require(

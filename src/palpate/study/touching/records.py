@@ -120,6 +120,12 @@ class TouchLearningRecord(Record):
         description="for the energy, a quarter as long for the shape; left out: one for each solve, at least 60",
         examples=[60.0],
     )
+    workers: int | None = Field(
+        None,
+        ge=1,
+        description="processes that search the energy; left out: one per core, eight at most",
+        examples=[2],
+    )
     units_max: int = Field(160, ge=0, description="most units of the energy, mirror images among them")
     target: float = Field(1e-3, ge=0.0, description="leave-one-out error at which growth stops")
     shape: bool = Field(True, description="whether to learn the displacement for the eye")

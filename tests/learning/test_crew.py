@@ -124,3 +124,13 @@ def test_how_many_processes_are_worth_it():
     assert processes_for(1.0, 2) == 2
     with pytest.raises(UsageError, match="workers=0"):
         processes_for(60.0, 0)
+
+
+def test_where_no_process_can_be_started_one_searches(monkeypatch, caplog):
+    def refused(*_, **__):
+        raise OSError("no more processes")
+
+    monkeypatch.setattr(crew.subprocess, "Popen", refused)
+    found, _ = sought(task(seconds=1.0), 1, 3)
+    assert np.isfinite(found.error)
+    assert caplog.text.count("no more processes") == 1

@@ -132,7 +132,13 @@ class _Crew:
     """Processes at work on tasks; leaving the block ends them."""
 
     def __init__(self, tasks: list[Task]) -> None:
-        self._members = [_Member(task) for task in tasks]
+        self._members: list[_Member] = []
+        for task in tasks:
+            try:
+                self._members.append(_Member(task))
+            except OSError as error:  # too many processes, or too little memory
+                logger.warning("Fewer processes search than there are cores: %s.", error)
+                break
 
     def __enter__(self) -> Self:
         return self
@@ -169,9 +175,11 @@ class _Member:
         try:
             self._process.stdin.write(task)
             self._process.stdin.flush()  # left open: the process ends with it
-            self._told = self._process.stdout.read()
+            told = self._process.stdout.read()
         except (OSError, ValueError):  # it has ended, or was ended
-            self._told = b""
+            return
+        if self._process.wait() == 0:  # else it may have told a part
+            self._told = told
 
     def answer(self, deadline: float) -> Answer | None:
         self._thread.join(max(0.0, deadline - time.monotonic()))

@@ -15,8 +15,10 @@ import pytest
 from palpate.cores import available_cores
 from palpate.errors import UsageError
 from palpate.learning.energy import crew
-from palpate.learning.energy.crew import Task, processes_for, sought
+from palpate.learning.energy.crew import processes_for, sought
+from palpate.learning.energy.judging import restored
 from palpate.learning.energy.search import Problem
+from palpate.learning.energy.task import Task
 
 pytestmark = pytest.mark.timeout(120)
 
@@ -60,9 +62,9 @@ def test_what_every_process_finds_is_chosen_from():
 
 def test_a_network_judged_elsewhere_is_the_same_network():
     done = task(seconds=1.0)
-    _, here, _ = done.averages()
+    _, here = done.done()
     best = min(here, key=lambda one: one.error)
-    again = crew.restored(done.problem, best.members[0], best.left_out.errors, best.closed.errors)
+    again = restored(done.problem, best.members[0], best.left_out.errors, best.closed.errors)
     assert again.error == best.error
     np.testing.assert_array_equal(again.left_out.fit.tau, best.left_out.fit.tau)
     np.testing.assert_array_equal(again.left_out.together, best.left_out.together)

@@ -6,6 +6,7 @@ import pytest
 
 from palpate.errors import StudyError, UsageError
 from palpate.study import Study, TouchStudy, named, preset_study, read_study, to_toml
+from palpate.study.presets import preset_names
 from palpate.study.touching.build import limits_of, points_of, probe_of, problem_of, solid_of
 from palpate.study.touching.presets import TOUCHED
 from palpate.study.workers import with_workers
@@ -189,3 +190,9 @@ def test_workers_solve_and_learn():
     assert beam.sweep.workers == 3
     assert beam.learning == preset_study("beam-copper").learning
     assert with_workers(beam, None) == beam
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_every_study_takes_a_number_of_workers(name):
+    study = preset_study(name)
+    assert with_workers(study, 2).name == study.name

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from types import TracebackType
 from typing import Any, Self
 
+from palpate.cores import helper_environment
 from palpate.errors import DeviceError, UsageError
 from palpate.runtime.devices import device_traits
 from palpate.runtime.report import LoopReport
@@ -113,7 +114,7 @@ class LoopProcess:
                 stdout=subprocess.PIPE,
                 stderr=self._stderr,
                 text=True,
-                env=_environment(),
+                env=helper_environment(),
             )
         except OSError as error:
             raise DeviceError(
@@ -244,8 +245,3 @@ class LoopProcess:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.stop()
-
-
-def _environment() -> dict[str, str]:
-    # idle BLAS threads would cost the process memory and its scheduler attention
-    return os.environ | dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")

@@ -11,10 +11,9 @@ def with_workers(study: AnyStudy, workers: int | None) -> AnyStudy:
     """The study with so many processes for its sweep, and for learning where several can share it; None: as it says."""
     if workers is None:
         return study
-    parts = {name: getattr(study, name) for name in ("sweep", "learning")}
-    fewer = {
-        name: part.model_copy(update={"workers": workers})
-        for name, part in parts.items()
-        if hasattr(part, "workers")
-    }
+    fewer = {}
+    for name in ("sweep", "learning"):
+        part = getattr(study, name, None)  # histories of a held body have neither
+        if part is not None and hasattr(part, "workers"):
+            fewer[name] = part.model_copy(update={"workers": workers})
     return study.model_copy(update=fewer)

@@ -6,9 +6,9 @@ So no worker outlives the process that started it, however that one died.
 
 from __future__ import annotations
 
-import os
 import sys
-import threading
+
+from palpate.cores import end_with_input
 
 __all__ = ["main"]
 
@@ -30,13 +30,6 @@ async def _work(address: str, folder: str, name: str) -> None:
         await worker.finished()
 
 
-def _end_with_input() -> None:
-    # the descriptor itself is read: a thread inside `sys.stdin` would stall the interpreter's end
-    while os.read(sys.stdin.fileno(), 1024):
-        pass
-    os._exit(0)
-
-
 def main(folder: str, name: str) -> None:
     """Work for the scheduler whose address comes on standard input, with scratch files in `folder`."""
     import asyncio
@@ -48,7 +41,7 @@ def main(folder: str, name: str) -> None:
     address = sys.stdin.buffer.readline().decode().strip()
     if not address:
         return
-    threading.Thread(target=_end_with_input, daemon=True).start()
+    end_with_input()
     asyncio.run(_work(address, folder, name))
 
 

@@ -15,91 +15,23 @@ import subprocess
 import sys
 import threading
 import time
-from dataclasses import dataclass, replace
 from types import TracebackType
-from typing import Literal, Self
-
-import numpy as np
+from typing import Self
 
 from palpate.cores import available_cores, helper_environment
 from palpate.errors import UsageError
 from palpate.learning.energy.average import Average, average
-from palpate.learning.energy.judging import judged, restored
-from palpate.learning.energy.search import EnergyTrial, Problem
-from palpate.learning.energy.strategy import SEARCH_SHARE, searched
-from palpate.learning.refinement.refine import Refined
-from palpate.network.radial import RadialFunction
+from palpate.learning.energy.judging import restored
+from palpate.learning.energy.search import EnergyTrial
+from palpate.learning.energy.task import Answer, Task
 
-__all__ = ["Answer", "Task", "processes_for", "sought"]
+__all__ = ["processes_for", "sought"]
 
 logger = logging.getLogger("palpate.learning")
 
 _WORTH = 20.0  # s of learning; a process takes two to start
 _MOST = 8  # processes: each holds a copy of the solves, and a mean is of four networks
-_KEPT = 8  # networks of each process
 _LATE = 30.0  # s; the last network may be judged after the time is over
-
-Judged = tuple[Refined, np.ndarray, np.ndarray]
-"""A network, and what it misses of solves: refined again without them, and by the closed form."""
-
-
-@dataclass(frozen=True, eq=False)
-class Answer:
-    """What one process found.
-
-    Attributes
-    ----------
-    trials : list of EnergyTrial
-    networks : list of `Judged`
-        The best ones.
-    reached : bool
-        Whether the search ended at its target, and not with its time.
-    """
-
-    trials: list[EnergyTrial]
-    networks: list[Judged]
-    reached: bool
-
-
-@dataclass(frozen=True, eq=False)
-class Task:
-    """A search, and the time that it may take.
-
-    Attributes
-    ----------
-    problem : Problem
-    begun, seconds : float
-        Of `time.monotonic`, and from then on.
-    form, radial, units_max, target, seed
-        As in `palpate.learning.energy.learn_surrogate`.
-    """
-
-    problem: Problem
-    begun: float
-    seconds: float
-    form: str
-    radial: RadialFunction | Literal["auto"]
-    units_max: int
-    target: float
-    seed: int
-
-    def averages(self) -> tuple[list[EnergyTrial], list[Average], bool]:
-        """Trials, networks judged, and whether the target was reached."""
-        until = self.begun + SEARCH_SHARE * self.seconds
-        search = searched(self.problem, until, self.form, self.radial, self.units_max, self.target, self.seed)
-        return search.trials, judged(search, self.begun + self.seconds), search.error <= self.target
-
-    def answer(self) -> Answer:
-        """What is told to another process, without the large matrices that it can make itself."""
-        trials, found, reached = self.averages()
-        best = sorted(found, key=lambda one: one.error)[:_KEPT]
-        return Answer(trials, [(o.members[0], o.left_out.errors, o.closed.errors) for o in best], reached)
-
-    def with_other_starts(self, number: int) -> Task:
-        """The same search by process `number`; 0 is this one."""
-        if number == 0:
-            return self
-        return replace(self, seed=int(np.random.SeedSequence([self.seed, number]).generate_state(1)[0]))
 
 
 def processes_for(seconds: float, wanted: int | None = None) -> int:
@@ -120,11 +52,11 @@ def processes_for(seconds: float, wanted: int | None = None) -> int:
 def sought(task: Task, networks: int, processes: int) -> tuple[Average, list[EnergyTrial]]:
     """The mean of at most so many networks, found by so many processes, and all that was tried."""
     with _Crew([task.with_other_starts(k) for k in range(1, processes)]) as others:
-        trials, found, reached = task.averages()
+        search, found = task.done()
+        reached = search.error <= task.target
         answers = [] if reached else others.answers(task.begun + task.seconds + _LATE)
-    for one in answers:
-        trials = trials + one.trials
-        found = found + [restored(task.problem, *network) for network in one.networks]
+    trials = [*search.trials, *(trial for one in answers for trial in one.trials)]
+    found += [restored(task.problem, *network) for one in answers for network in one.networks]
     return average(found, networks), trials
 
 
@@ -137,7 +69,7 @@ class _Crew:
             try:
                 self._members.append(_Member(task))
             except OSError as error:  # too many processes, or too little memory
-                logger.warning("Fewer processes search than there are cores: %s.", error)
+                logger.warning("A process of the search could not be started: %s.", error)
                 break
 
     def __enter__(self) -> Self:
@@ -164,6 +96,7 @@ class _Member:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=helper_environment(),
+            start_new_session=True,  # Ctrl-C in the terminal is for this process, which then ends it
         )
         self._told = b""
         self._thread = threading.Thread(target=self._talk, args=(pickle.dumps(task),), daemon=True)

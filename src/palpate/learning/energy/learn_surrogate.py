@@ -12,12 +12,13 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from palpate.errors import UsageError
-from palpate.learning.energy.crew import Task, processes_for, sought
+from palpate.learning.energy.crew import processes_for, sought
 from palpate.learning.energy.images import images_of
 from palpate.learning.energy.laws import chosen_law
 from palpate.learning.energy.samples import EnergySamples
 from palpate.learning.energy.search import EnergyTrial, Problem
 from palpate.learning.energy.strategy import time_for
+from palpate.learning.energy.task import Task
 from palpate.learning.energy.trust import trust_of
 from palpate.learning.energy.written import trained_region, training_meta, written_out
 from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction

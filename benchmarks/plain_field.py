@@ -11,11 +11,12 @@ import time
 from collections.abc import Callable
 
 import numpy as np
+from numpy.polynomial.chebyshev import chebvander
 
 from benchmarks.plain_query import PlainQuery
 from palpate.network import Network, Scaling, TrainedRegion
 from palpate.surrogates import ContactLaw, FieldSurrogate, TouchedSurface, TouchSurrogate
-from palpate.surrogates.field import Dimple, Rise
+from palpate.surrogates.field import Dimple, Rise, Variation
 from palpate.units import Quantity, Range, bounds
 
 __all__ = ["PlainField", "made"]
@@ -44,16 +45,34 @@ class PlainField:
         b = self.rows @ np.concatenate([[1.0], x, np.exp(-(v * v).sum(axis=1))])
         f = float(self.field.rise.at(np.array(s)))
         out = ((f * b) @ self.modes).reshape(-1, 3) + self.field.rest
-        offset = self.points - [c[0], c[1], 0.0]
+        foot, r = np.array([c[0], c[1], 0.0]), table.shape[1]
+        offset = (self.points - foot) / reach
         distance = np.sqrt((offset**2).sum(axis=1))
-        near = np.flatnonzero(distance < reach)
-        first, four = _splines(distance[near] / reach * (table.shape[1] - 3), table.shape[1])
+        near = np.flatnonzero(distance < 1.0)
         j, of_depth = _splines(np.array([s / self.field.rise.deepest]) * (table.shape[2] - 3), table.shape[2])
-        profile = f * (table[:, :, j[0] : j[0] + 4] @ of_depth[:, 0])
-        g = (profile[:, first + np.arange(4)[:, None]] * four).sum(axis=1)
-        out[self.nodes[near], :2] += (g[1] / reach)[:, None] * offset[near, :2]
-        out[self.nodes[near], 2] += g[0]
+        profile = self.varied(foot, s / self.field.rise.deepest)
+        along, across = table[:, :, j[0] : j[0] + 4] @ of_depth[:, 0]
+        profile[:, 0, 2] += along
+        profile[:, 1, 0] += across
+        profile[:, 2, 1] += across
+        first, four = _splines(distance[near] * (r - 3), r)
+        rows = profile[first + np.arange(4)[:, None]]  # (4, near, 4, 3)
+        around = np.column_stack([np.ones(len(near)), offset[near]])
+        out[self.nodes[near]] += f * np.einsum("nh,kn,knhc->nc", around, four, rows, optimize=True)
         return np.asarray(out)
+
+    def varied(self, foot: np.ndarray, share: float) -> np.ndarray:
+        """The variation's profile (r, 4, 3) at a foot (3,) and a share of the deepest depth."""
+        own = self.dimple.variation
+        assert own is not None
+        q, m = own.table.shape[:2]
+        j, of_depth = _splines(np.array([share]) * (q - 3), q)
+        place = np.clip((own.axes @ foot - own.scales[0]) / own.scales[1], -1.0, 1.0)
+        T = chebvander(place, own.powers.max())
+        of_place = T[np.arange(len(place)), own.powers].prod(axis=1)
+        weights = (of_depth[:, 0][:, None] * of_place).ravel()
+        table = own.table[j[0] : j[0] + 4].reshape(4 * m, -1)
+        return (weights @ table).reshape(own.table.shape[2:])
 
 
 def _splines(t: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -78,8 +97,12 @@ def made(nodes: int = NODES, modes: int = MODES) -> tuple[TouchSurrogate, FieldS
         corners, np.array([[0, 1, 2], [0, 2, 3]]), radius=0.006, reach=0.02, spacing=0.002
     )
     basis = np.linalg.qr(rng.normal(size=(3 * nodes, modes)))[0].T * np.sqrt(nodes)
-    table = np.zeros((2, 20, 5))
-    table[:, :-3] = rng.normal(0.0, 1e-3, (2, 17, 5))
+    table = np.zeros((2, 14, 5))
+    table[:, :-3] = rng.normal(0.0, 1e-3, (2, 11, 5))
+    powers = np.array([(i, j) for i in range(11) for j in range(11 - i)])
+    varied = np.zeros((4, len(powers), 14, 4, 3))
+    varied[:, :, :-3] = rng.normal(0.0, 1e-4, (4, len(powers), 11, 4, 3))
+    variation = Variation(varied, powers, np.eye(3)[:2], np.array([[0.0, 0.0], [0.02, 0.02]]))
     field = FieldSurrogate(
         "displacement",
         "m",
@@ -92,7 +115,7 @@ def made(nodes: int = NODES, modes: int = MODES) -> tuple[TouchSurrogate, FieldS
         rise=Rise("series", DEEPEST, 1e-3),
         surface=face,
         radius=RADIUS,
-        dimple=Dimple(table, 3 * RADIUS, np.ones(nodes, dtype=bool)),
+        dimple=Dimple(table, 3 * RADIUS, np.ones(nodes, dtype=bool), variation),
     )
     region = TrainedRegion.of(rng.uniform(-1.0, 1.0, (400, 3)))
     root = 1e-3 * rng.normal(size=(4 + UNITS, 20))

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 
 import numpy as np
 from touch_made import BOX, DEEPEST, RADIUS, ball, plane
 
 from palpate.network import Network, Scaling
 from palpate.surrogates import FieldSurrogate
-from palpate.surrogates.field import Dimple, Rise
-from palpate.units import Quantity, bounds
+from palpate.surrogates.field import Dimple, Rise, Variation
+from palpate.units import Quantity, Range, bounds
 
 
 @functools.cache
@@ -24,8 +25,20 @@ def grid(side: int = 15) -> tuple[np.ndarray, np.ndarray]:
     return points, np.vstack([lower, upper])
 
 
+def variation(components: int, parameters: Sequence[Range], rng: np.random.Generator) -> Variation:
+    """Random, of second degree in two directions of the face and all parameters; not all of the face in range."""
+    axes = np.array([[0.6, 0.8, 0.0], [-0.8, 0.6, 0.0]])
+    v = 2 + len(parameters)
+    powers = np.array([p for p in np.ndindex(*[3] * v) if sum(p) <= 2])
+    table = np.zeros((5, len(powers), 11, 4, components))
+    table[:, :, :-3] = rng.normal(0.0, 2e-4, (5, len(powers), 8, 4, components))
+    middles, halves = [(r.low + r.high) / 2 for r in parameters], [0.4 * (r.high - r.low) for r in parameters]
+    scales = np.array([[0.001, -0.002, *middles], [0.012, 0.03, *halves]])
+    return Variation(table, powers, axes, scales)
+
+
 def field(
-    *, components: int = 3, modes: int = 5, extra=(), dimple=True, curved=False, seed=0, **more
+    *, components: int = 3, modes: int = 5, extra=(), dimple=True, varied=True, curved=False, seed=0, **more
 ) -> FieldSurrogate:
     """A field of random modes, coefficients and dimple on the grid."""
     rng = np.random.default_rng(seed)
@@ -37,6 +50,7 @@ def field(
     basis = np.linalg.qr(rng.normal(size=(nodes * components, modes)))[0].T.reshape(modes, nodes, components)
     table = np.zeros((1 if components == 1 else 2, 11, 5))
     table[:, :-3] = rng.normal(0.0, 1e-3, (len(table), 8, 5))
+    own = variation(components, extra, rng) if varied else None
     net = Network.axis_aligned(
         inputs,
         [Quantity(f"b{k}", "") for k in range(modes)],
@@ -50,7 +64,7 @@ def field(
         "rise": Rise("series", DEEPEST, 1e-3),
         "surface": ball() if curved else plane(),
         "radius": RADIUS,
-        "dimple": Dimple(table, 0.02, points[:, 2] == 0.0) if dimple else None,
+        "dimple": Dimple(table, 0.02, points[:, 2] == 0.0, own) if dimple else None,
         "rest": rng.normal(0.0, 1e-3, (nodes, components)),
     } | more
     rest = parts.pop("rest")

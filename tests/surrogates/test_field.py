@@ -16,7 +16,7 @@ from palpate.network import Archive, load_archive, save_archive
 from palpate.runtime.pressed import PressedBody
 from palpate.runtime.touchable import load_touchable
 from palpate.surrogates import FieldSurrogate, TouchedBody
-from palpate.surrogates.field import Dimple, Rise
+from palpate.surrogates.field import Dimple, Rise, Variation
 from palpate.surrogates.field.dimple import products
 from palpate.surrogates.field.rise import RISES
 from palpate.surrogates.loading import load
@@ -44,7 +44,26 @@ def by_formula(F: FieldSurrogate, x: np.ndarray) -> np.ndarray:
         else:
             across = offset[near] - (offset[near] @ n)[:, None] * n
             shown[near] += g[:, :1] * n + g[:, 1:] * across / F.dimple.reach
+        if F.dimple.variation is not None:
+            shown[near] += varied(
+                F.dimple.variation, x, x[:3] - d * n, s / F.rise.deepest, offset[near] / F.dimple.reach
+            )
     return F.rest + f * shown
+
+
+def varied(own: Variation, x: np.ndarray, foot: np.ndarray, share: float, offset: np.ndarray) -> np.ndarray:
+    """What the variation adds (nodes, components) at offsets over L, with SciPy's splines and NumPy's Chebyshev."""
+    from numpy.polynomial.chebyshev import chebvander
+    from scipy.interpolate import BSpline
+
+    q, _, r, _, _ = own.table.shape
+    told = (np.r_[own.axes @ foot, x[3:]] - own.scales[0]) / own.scales[1]
+    T = chebvander(np.clip(told, -1.0, 1.0), own.powers.max())
+    P = np.array([np.prod([T[v, k] for v, k in enumerate(p)]) for p in own.powers])
+    profile = np.einsum("m,mihc->ihc", P, BSpline(np.arange(-3.0, q + 1), own.table, 3)(share * (q - 3)))
+    rho = np.linalg.norm(offset, axis=1)
+    at = BSpline(np.arange(-3.0, r + 1), profile, 3)(rho * (r - 3))  # (nodes, 4, components)
+    return np.einsum("nh,nhc->nc", np.column_stack([np.ones(len(rho)), offset]), at)
 
 
 @pytest.mark.parametrize("rise", RISES)
@@ -63,6 +82,16 @@ def test_on_a_curved_surface_the_dimple_follows_its_normal():
     assert (F.depth(X) > 0).all()
     expected = np.array([by_formula(F, x) for x in X])
     np.testing.assert_allclose(F.values(X), expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+
+
+def test_the_dimple_of_a_family_varies_with_its_parameters_and_the_place_as_far_as_they_were_trained():
+    F = field(extra=(SOFT,))
+    X = inside_points(20, (SOFT,))
+    expected = np.array([by_formula(F, x) for x in X])
+    np.testing.assert_allclose(F.values(X), expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+    told = F.dimple.variation.variables(X[:, :3], X[:, 3:])
+    assert (np.abs(told) == 1.0).any()
+    assert (np.abs(told[:, 2]) < 1.0).any()
 
 
 @pytest.mark.parametrize("components", [1, 3])
@@ -239,7 +268,9 @@ def test_a_file_with_a_valid_checksum_and_parts_that_do_not_fit_is_refused(tmp_p
         FieldSurrogate.load(tmp_path / "f.palpate")
 
 
-@pytest.mark.parametrize("name", ["modes", "mass", "triangles", "table", "touched"])
+@pytest.mark.parametrize(
+    "name", ["modes", "mass", "triangles", "table", "touched", "varied/table", "varied/powers"]
+)
 def test_a_file_with_an_array_of_another_kind_or_shape_is_refused(tmp_path, name):
     archive = load_archive(field().save(tmp_path / "f.palpate"))
     for array in (archive.arrays[name].astype(np.float32), archive.arrays[name][:-1].copy()):
@@ -249,6 +280,8 @@ def test_a_file_with_an_array_of_another_kind_or_shape_is_refused(tmp_path, name
         if name == "table" and array.dtype == np.float64:
             array = archive.arrays[name][:1].copy()  # a scalar's table for a vector
             arrays[name] = array
+        if name == "varied/table" and array.dtype == np.float64:
+            arrays[name] = archive.arrays[name][:, :-1].copy()  # a polynomial less
         save_archive(tmp_path / "g.palpate", Archive(archive.networks, arrays, archive.meta, archive.kind))
         with pytest.raises(FileFormatError, match="field"):
             FieldSurrogate.load(tmp_path / "g.palpate")
@@ -273,6 +306,15 @@ def test_parts_that_do_not_fit_are_refused():
         Rise("square", 0.01, 1e-3)
     with pytest.raises(UsageError, match="dimple"):
         Dimple(np.ones((2, 9, 5)), 0.02, F.dimple.touched)
+    own = F.dimple.variation
+    for more in ({"table": own.table[:, :-1]}, {"scales": -own.scales}, {"axes": own.axes[:, :2]}):
+        with pytest.raises(UsageError, match="how a dimple varies"):
+            dataclasses.replace(own, **more)
+    scalar = dataclasses.replace(own, table=own.table[..., :1])
+    with pytest.raises(UsageError, match="another dimple"):
+        dataclasses.replace(F.dimple, variation=scalar)
+    with pytest.raises(UsageError, match="other inputs"):
+        dataclasses.replace(field(extra=(SOFT,)), dimple=F.dimple)
     with pytest.raises(UsageError, match="shape"):
         F.values(np.zeros((3, 2)))
     with pytest.raises(UsageError, match="answered"):

@@ -7,7 +7,7 @@ import numpy as np
 import pressed
 from models import linear_network
 from palpate.surrogates import ContactLaw, Continuation, FieldSurrogate, TouchedBody, TouchSurrogate
-from palpate.surrogates.field import Dimple, Rise
+from palpate.surrogates.field import Dimple, Rise, Variation
 from palpate.surrogates.field.dimple import splines
 from palpate.surrogates.plastic import Dents
 from palpate.units import Quantity, Range
@@ -67,7 +67,7 @@ def _field(touch, components: int) -> FieldSurrogate:
         rise=Rise("linear", pressed.DEEPEST),
         surface=touch.surface,
         radius=pressed.RADIUS,
-        dimple=Dimple(_table(components), 0.03, top),
+        dimple=Dimple(_table(components), 0.03, top, _variation(components)),
     )
 
 
@@ -86,6 +86,14 @@ def _table(components: int) -> np.ndarray:
     if components == 3:
         table[1, :-3] = -0.1 * pressed.DEEPEST * table[0, :-3] / scale  # drawn in a little
     return table
+
+
+def _variation(components: int) -> Variation:
+    """Towards one side it leans a little, the more so the deeper."""
+    powers = np.array([(0, 0), (1, 0), (0, 1)])
+    table = np.zeros((4, 3, 14, 4, components))
+    table[1:, 1, :-3, 1, -1] = 0.02 * pressed.DEEPEST if components == 3 else 0.02
+    return Variation(table, powers, np.eye(3)[:2], np.array([[0.0, 0.0], [HALF, HALF]]))
 
 
 def dents(width: float) -> Dents:

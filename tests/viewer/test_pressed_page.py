@@ -198,25 +198,21 @@ def test_the_browser_sums_a_field_as_numpy_does(page: Page, slab: TouchedBody):
         for c in ([0.004, 0.006, 0.0061], [-0.018, 0.0199, 0.0095], [0.011, 0.0, 0.0041], [0.0, 0.0, 0.0035]):
             eye = one.evaluator(precision="double")
             eye(np.array(c))
-            place = eye.place
-            numbers = [place[1], *eye.coefficients]
+            numbers = [*eye.coefficients, *eye.profile().ravel()]
             got = page.evaluate(
-                """async ([index, numbers, place]) => {
+                """async ([index, numbers, foot, components, modes_count]) => {
                     const m = await import("/assets/messages.js");
                     const { Field } = await import("/assets/field.js");
                     const get = async path => (await fetch(path)).arrayBuffer();
                     const skin = m.decodeSkin(await get("/skin"));
                     const modes = m.decodeModes(await get(`/fields/${index}`));
-                    const look = { components: modes.rest.length / (skin.rest.length / 3), modes: numbers.length - 1 };
+                    const look = { components, modes: modes_count };
                     const field = new Field(look, modes, skin.rest);
-                    field.update(Float32Array.from(numbers), place);
+                    if (field.count !== numbers.length) throw new Error(`${field.count} numbers`);
+                    field.update(Float32Array.from(numbers), foot);
                     return JSON.stringify([...field.values]);
                 }""",
-                [
-                    index,
-                    [float(n) for n in numbers],
-                    {"depth": place[0], "foot": list(place[2:5]), "normal": list(place[5:8])},
-                ],
+                [index, [float(n) for n in numbers], list(eye.place[2:5]), one.rest.shape[1], len(one.modes)],
             )
             wanted = one.values(np.array([c]))[0]
             back = np.array(json.loads(got)).reshape(len(rest), -1)

@@ -108,14 +108,17 @@ def test_coefficients_are_the_fields_and_a_frame_is_small(pressed_viewer: Viewer
     x = np.array(frame.position)[None]
     at = 0
     for one in slab.fields.values():
-        growth, own = frame.coefficients[at], frame.coefficients[at + 1 : at + 1 + len(one.modes)]
-        at += 1 + len(one.modes)
+        eye = one.evaluator()
+        eye(x[0])
+        own = frame.coefficients[at : at + len(one.modes)]
         np.testing.assert_allclose(own, one.coefficients(x)[0], rtol=1e-5)
-        assert growth == pytest.approx(one.rise.at(np.array([frame.drawn]))[0], rel=1e-6)
+        profile = eye.profile().ravel()
+        at += len(one.modes) + profile.size
+        np.testing.assert_allclose(frame.coefficients[at - profile.size : at], profile, rtol=1e-5, atol=1e-9)
     assert at == frame.coefficients.size
     np.testing.assert_allclose(frame.foot, [*x[0, :2], 0.0], atol=1e-5)
     np.testing.assert_allclose(frame.normal, [0.0, 0.0, 1.0], atol=1e-5)
-    assert len(frame.pack()) < 256
+    assert len(frame.pack()) < 1200
 
 
 def test_released_the_force_is_zero_and_the_body_returns_to_rest(pressed_viewer: Viewer):
@@ -153,7 +156,7 @@ def test_the_page_gets_the_skin_and_the_modes_once(pressed_viewer: Viewer, slab:
     np.testing.assert_array_equal(skin.touchable > 0, top)
     modes = Modes.unpack(fetched(pressed_viewer, "fields/0"))
     assert modes.modes.size == 2 * skin.rest.size
-    assert (modes.parts, modes.rows, modes.columns) == slab.fields["displacement"].dimple.table.shape
+    assert modes.rows == slab.fields["displacement"].dimple.table.shape[1]
     with pytest.raises(HTTPError, match="404"):
         fetched(pressed_viewer, "fields/2")
 

@@ -25,10 +25,10 @@ class Press(Beat):
         float, Wire("f32", "standard deviation of the force relative to it, NaN where unknown")
     ]
     drawn: Annotated[float, Wire("f32", "m, depth of the shape drawn: after release it goes back to 0")]
-    foot: Annotated[Vec3, Wire("vec3", "m, of the dimple at rest")]
+    foot: Annotated[Vec3, Wire("vec3", "m, of the dimples at rest")]
     normal: Annotated[Vec3, Wire("vec3", "of the surface there")]
     coefficients: Annotated[
-        np.ndarray, Wire("floats", "for each field its growth with depth and its modes' coefficients")
+        np.ndarray, Wire("floats", "for each field its modes' coefficients and its dimple's profile")
     ]
     prints: Annotated[
         np.ndarray, Wire("floats", "m, how deep it stays pressed at each of Skin.printable; empty if nowhere")
@@ -50,18 +50,14 @@ class Skin(Faceted):
 
 @dataclass(frozen=True, eq=False)
 class Modes(Binary):
-    """A field on a Skin's points, server to page: rest + coefficients · modes + growth · dimple."""
+    """A field on a Skin's points, server to page: rest + coefficients · modes + the dimple of a profile."""
 
     KIND: ClassVar[int] = 8
 
-    deepest: Annotated[float, Wire("f32", "m, depth at which the dimple's table ends")]
     reach: Annotated[float, Wire("f32", "m, of the dimple from its foot; 0 for none")]
-    parts: Annotated[int, Wire("u16", "of the table: 2 of a vector, along and across the normal")]
-    rows: Annotated[int, Wire("u16", "splines of the distance from the foot")]
-    columns: Annotated[int, Wire("u16", "splines of the depth")]
+    rows: Annotated[int, Wire("u16", "splines of the distance from the foot; 0 for none")]
     rest: Annotated[np.ndarray, Wire("floats", "components of each point")]
     modes: Annotated[np.ndarray, Wire("floats", "the same of each mode")]
-    table: Annotated[np.ndarray, Wire("floats", "parts · rows · columns")]
     touched: Annotated[np.ndarray, Wire("floats", "points that the dimple may move")]
 
 

@@ -82,17 +82,12 @@ class PressedExhibit:
     def modes(self, index: int) -> Modes:
         """What the page needs to sum up field `index`."""
         one, nodes = self.fields[index], self._nodes
-        table = np.zeros((1, 4, 4)) if one.dimple is None else one.dimple.table
         touched = np.zeros(0) if one.dimple is None else np.flatnonzero(one.dimple.touched[nodes])
         return Modes(
-            deepest=one.rise.deepest,
             reach=0.0 if one.dimple is None else one.dimple.reach,
-            parts=table.shape[0],
-            rows=table.shape[1],
-            columns=table.shape[2],
+            rows=0 if one.dimple is None else one.dimple.table.shape[1],
             rest=one.rest[nodes].ravel(),
             modes=one.modes[:, nodes].ravel(),
-            table=table.ravel(),
             touched=touched,
         )
 
@@ -153,12 +148,14 @@ class PressedExhibit:
     def _coefficients(
         self, centre: np.ndarray, parameters: np.ndarray
     ) -> tuple[np.ndarray | None, np.ndarray]:
-        """Depth, growth, foot and normal (8,) where there is contact, and what the fields' modes are multiplied by."""
+        """Depth, growth, foot and normal where there is contact, and what the page sums each field up from."""
         place, parts = None, []
-        for eye in self._eyes:
+        for eye, one in zip(self._eyes, self.fields, strict=True):
             if eye(centre, parameters):
                 place = eye.place
-            parts.append(np.append(eye.place[1], eye.coefficients))
+            parts.append(eye.coefficients)
+            if one.dimple is not None:
+                parts.append(eye.profile().ravel())
         return place, np.concatenate(parts) if parts else np.zeros(0)
 
     def _look(self, one: FieldSurrogate) -> Look:

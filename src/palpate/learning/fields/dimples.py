@@ -16,7 +16,7 @@ from palpate.surrogates.surface import TouchedSurface
 __all__ = ["fitted_dimple", "touched_nodes", "travelling_values"]
 
 _REACH = 3.0  # times the radius
-_CELLS = 17  # to the reach: a sixth of the radius each
+_CELLS = 11  # to the reach: a quarter of the radius each
 _PENALTY = 1e-5  # of the mean diagonal
 # of the radius: the smooth distance rounds a border by 2 to 4 % of it
 _ON, _ON_BORDER = 0.01, 0.06

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,22 +13,19 @@ from threadpoolctl import threadpool_limits
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.learning.checks import numbers
-from palpate.learning.fields.dimples import fitted_dimple, touched_nodes, travelling_values
 from palpate.learning.fields.kernel import at_solves
-from palpate.learning.fields.modes import SurfaceModes, left_out, lumped_mass
-from palpate.learning.fields.search import Coefficients, FieldTrial, searched
+from palpate.learning.fields.modes import lumped_mass
+from palpate.learning.fields.parting import Parted, Solves, best_part
+from palpate.learning.fields.search import FieldTrial, searched
 from palpate.learning.freezing import freeze_refined, training_record
 from palpate.network import Network, Scaling
-from palpate.network.radial import RadialFunction
 from palpate.surrogates import FieldSurrogate, TouchedSurface
-from palpate.surrogates.field import Dimple, Rise
 from palpate.surrogates.field.rise import RISES
 from palpate.units import Quantity, Range, bounds
 
 __all__ = ["LearntField", "learn_displacement", "learn_field"]
 
 _TOLERANCE = 5e-3  # of the snapshots' root mean square
-_TO_COMPARE: tuple[RadialFunction, ...] = ("matern-5/2",)  # how fields rise
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,45 +50,6 @@ class LearntField:
     truncation: float
     truncation_left_out: float
     learning_left_out: float
-
-
-@dataclass(frozen=True, eq=False)
-class _Solves:
-    """Checked solves in contact, the field less its rest, and all that is known beside them."""
-
-    X: np.ndarray
-    values: np.ndarray
-    depth: np.ndarray
-    groups: np.ndarray
-    inputs: tuple[Range, ...]
-    surface: TouchedSurface
-    radius: float
-    points: np.ndarray
-    mass: np.ndarray
-    radius_input: int | None = None
-
-    @property
-    def scaled(self) -> np.ndarray:
-        low, high = bounds(self.inputs)
-        return np.asarray((2.0 * self.X - low - high) / (high - low))
-
-
-@dataclass(frozen=True, eq=False)
-class _Parted:
-    """A rise, and what follows from it: travelling part, modes, coefficients."""
-
-    rise: Rise
-    dimple: Dimple | None
-    modes: SurfaceModes
-    problem: Coefficients
-    truncation: float
-    truncation_left_out: float
-
-    @cached_property
-    def missed(self) -> float:
-        """Mean square of what modes, and coefficients by a unit at each solve, miss of solves left out."""
-        learnt = at_solves(self.problem, radials=_TO_COMPARE).error
-        return float(learnt**2 + np.nan_to_num(self.truncation_left_out) ** 2)
 
 
 def learn_displacement(data: Dataset, **options: Any) -> LearntField:
@@ -201,7 +158,7 @@ def learn_field(
     length = radius / 10.0 if length is None else length
     with threadpool_limits(1):  # small matrices: more BLAS threads cost time and the bits of the result
         names = RISES if rise == "auto" else (rise,)
-        best = _best_part(solves, names, length, tolerance, modes_max, travelling)
+        best = best_part(solves, names, length, tolerance, modes_max, travelling)
         network, error, trials = _learnt(best, solves.inputs, units_max, seconds, seed)
     meta = {
         **training_record(X, np.reshape(values, (len(X), -1)), solves.inputs),
@@ -238,7 +195,7 @@ def _checked(
     rest: np.ndarray | None,
     mass: np.ndarray | None,
     groups: np.ndarray | None,
-) -> tuple[_Solves, np.ndarray]:
+) -> tuple[Solves, np.ndarray]:
     """Solves in contact, and the field without any."""
     X = numbers("Inputs X", X, (None, len(inputs)))
     points = numbers("Points", points, (None, 3))
@@ -262,66 +219,11 @@ def _checked(
             fix="Press deeper, or check the surface and the probe's radius.",
         )
     parts = (X[touching], (values - rest)[touching], depth[touching], groups[touching])
-    return _Solves(*parts, inputs, surface, radius, points, mass / mass.sum(), radius_input), rest
-
-
-def _parted(
-    solves: _Solves, name: str, length: float, tolerance: float, most: int, travelling: bool, border: bool
-) -> _Parted:
-    """Travelling part, modes and coefficients of the fields, as they follow from a rise."""
-    deepest = float(solves.depth.max())
-    rise = Rise(name, deepest, length if name == "series" else math.inf)
-    C, remainder, dimple = np.ascontiguousarray(solves.X[:, :3]), solves.values, None
-    probe = {"surface": solves.surface, "points": solves.points}
-    if travelling:
-        known: dict[str, Any] = {**probe, "mass": solves.mass, "radius": solves.radius, "border": border}
-        dimple = fitted_dimple(remainder, C, solves.depth, rise=rise, **known)
-    if dimple is not None:
-        remainder = remainder - travelling_values(dimple, C, solves.depth, rise, **probe)  # type: ignore[arg-type]
-    modes = SurfaceModes.of(remainder, solves.mass)
-    count = min(modes.count(tolerance), most)
-    missed = modes.missed
-    truncation = float(missed[count]) if count < len(missed) else 0.0
-    modes = modes.take(count)
-    weighted = (modes.modes * solves.mass[:, None]).reshape(count, -1)
-    along = remainder.reshape(len(remainder), -1) @ weighted.T
-    problem = Coefficients(solves.scaled, along, rise.at(solves.depth), solves.groups)
-    beyond = left_out(remainder, solves.mass, count, solves.groups)
-    return _Parted(rise, dimple, modes, problem, truncation, beyond)
-
-
-def _best_part(
-    solves: _Solves,
-    names: Sequence[str],
-    length: float,
-    tolerance: float,
-    most: int,
-    travelling: bool,
-) -> _Parted:
-    """First whether the border travels too, then the rise: what misses least of solves left out."""
-
-    def of(name: str, border: bool) -> _Parted:
-        return _parted(solves, name, length, tolerance, most, travelling, border)
-
-    borders = (True, False) if travelling else (True,)
-    first = _chosen([of(names[-1], border) for border in borders])
-    border = first.dimple is None or bool(_same_touched(first, solves))
-    return _chosen([first, *(of(name, border) for name in names[:-1])])
-
-
-def _same_touched(part: _Parted, solves: _Solves) -> bool:
-    """Whether the border's nodes are in a travelling part."""
-    assert part.dimple is not None
-    return bool((part.dimple.touched == touched_nodes(solves.surface, solves.points, solves.radius)).all())
-
-
-def _chosen(parted: list[_Parted]) -> _Parted:
-    """The one that misses least of solves left out."""
-    return parted[0] if len(parted) == 1 else min(parted, key=lambda one: one.missed)
+    return Solves(*parts, inputs, surface, radius, points, mass / mass.sum(), radius_input), rest
 
 
 def _learnt(
-    best: _Parted, inputs: tuple[Range, ...], units_max: int, seconds: float, seed: int
+    best: Parted, inputs: tuple[Range, ...], units_max: int, seconds: float, seed: int
 ) -> tuple[Network, float, tuple[FieldTrial, ...]]:
     """The coefficients' network, its left-out error and what was tried: a unit at each solve, or a few that move."""
     whole = at_solves(best.problem)
@@ -336,7 +238,7 @@ def _learnt(
     return network, error, (*whole.trials, *trials)
 
 
-def _outputs(best: _Parted, inputs: tuple[Range, ...]) -> tuple[list[Quantity], Scaling]:
+def _outputs(best: Parted, inputs: tuple[Range, ...]) -> tuple[list[Quantity], Scaling]:
     low, high = bounds(inputs)
     k = best.problem.along.shape[1]
     scale = np.full(k, best.problem.scale)

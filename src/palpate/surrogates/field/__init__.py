@@ -4,6 +4,7 @@
 
     rise         how a field begins with depth
     dimple       the part that travels with the probe
+    variation    … and how it differs from place to place
     field        FieldSurrogate, the whole of it
     errors       what the modes miss, and what learning misses
     kernels      the loops behind it
@@ -18,5 +19,6 @@ from palpate.surrogates.field.evaluator import FieldEvaluator
 from palpate.surrogates.field.field import FieldSurrogate
 from palpate.surrogates.field.rise import Rise
 from palpate.surrogates.field.touched_body import TouchedBody
+from palpate.surrogates.field.variation import Variation
 
-__all__ = ["Dimple", "FieldErrors", "FieldEvaluator", "FieldSurrogate", "Rise", "TouchedBody"]
+__all__ = ["Dimple", "FieldErrors", "FieldEvaluator", "FieldSurrogate", "Rise", "TouchedBody", "Variation"]

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.surrogates.field.variation import Variation
 
 __all__ = ["Dimple", "products", "splines"]
 
@@ -57,16 +58,19 @@ class Dimple:
         L, m.
     touched : (nodes,) bool
         Where it is.
+    variation : Variation, optional
+        How it differs from place to place.
 
     Raises
     ------
     UsageError
-        If the table or the reach is none.
+        If the table or the reach is none, or the variation is of another kind of field or other splines in ρ.
     """
 
     table: np.ndarray
     reach: float
     touched: np.ndarray
+    variation: Variation | None = None
 
     def __post_init__(self) -> None:
         table, touched = np.array(self.table, float, order="C"), np.array(self.touched, bool)
@@ -80,4 +84,13 @@ class Dimple:
                 f"A table of shape {table.shape} that reaches {self.reach} m is no dimple.",
                 why="It holds finite coefficients of four splines or more each way, the last three in ρ zero.",
                 fix="Let `palpate.learning.fields` fit it.",
+            )
+        own, parts = self.variation, {1: 1, 3: 2}
+        if own is not None and (
+            own.table.shape[2] != table.shape[1] or parts[own.table.shape[4]] != len(table)
+        ):
+            raise UsageError(
+                f"A variation of shape {own.table.shape} is of another dimple than a table of shape {table.shape}.",
+                why="Both have the same splines in ρ and the same components.",
+                fix="Let `palpate.learning.fields` fit both.",
             )

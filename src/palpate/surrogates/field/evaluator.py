@@ -9,7 +9,7 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.network.compiled import PRECISIONS, Precision
 from palpate.surrogates.arguments import NONE, touch_at
-from palpate.surrogates.field.kernels import FRAME, coefficients_into, field_into
+from palpate.surrogates.field.kernels import FRAME, coefficients_into, field_into, profile_into
 
 if TYPE_CHECKING:
     from palpate.surrogates.field.field import FieldSurrogate
@@ -38,19 +38,16 @@ class FieldEvaluator:
         n, k = len(surrogate.inputs), len(surrogate.modes)
         self.values = np.zeros(surrogate.rest.shape, kind)
         self._flat = self.values.reshape(-1)
-        self._z, self._place = np.zeros(1 + k, kind), np.zeros(FRAME)
+        self._z, self._place = np.zeros(1 + k, kind), np.zeros(FRAME + n - 3)
         numbers, limits, surface, net = surrogate.compiled()
         scratch = (np.zeros(k), np.zeros((2, n)), np.zeros((2, 3, 3)))
         self._first: tuple[Any, ...] = (self._z, self._place, *scratch, numbers, limits, surface, net)
         rows = np.concatenate([surrogate.rest[None], surrogate.modes]).reshape(1 + k, -1).astype(kind)
-        self._second: tuple[Any, ...] = (
-            self._flat,
-            self._z,
-            self._place,
-            numbers,
-            np.ascontiguousarray(rows),
-            *surrogate.travelling(),
-        )
+        self._profile = surrogate.profile()
+        self._second: tuple[Any, ...] = (self._profile, self._place, *surrogate.profiling())
+        line = np.zeros(self._profile[0].size)
+        known = (self._flat, self._z, self._place, np.ascontiguousarray(rows), self._profile, line)
+        self._third: tuple[Any, ...] = (*known, *surrogate.travelling())
         self._shape = (n - 3,)
         low = np.array([r.low for r in surrogate.inputs])
         self(low[:3], low[3:])  # compile now, not in the loop
@@ -69,8 +66,14 @@ class FieldEvaluator:
 
     def field(self) -> np.ndarray:
         """The field (nodes, components) at the last call's touch; the same array each time."""
-        field_into(*self._second)
+        profile_into(*self._second)
+        field_into(*self._third)
         return self.values
+
+    def profile(self) -> np.ndarray:
+        """The dimple's profile (r, 4, components) at the last call's touch, see `kernels`; one array for all calls."""
+        profile_into(*self._second)
+        return self._profile
 
     @property
     def coefficients(self) -> np.ndarray:
@@ -79,7 +82,7 @@ class FieldEvaluator:
 
     @property
     def place(self) -> np.ndarray:
-        """Where the last call was (8,): depth s (m), f, foot (m) and normal; all zero but s without contact."""
+        """Where the last call was (8 + p,): depth s (m), f, foot (m), normal, parameters; but for s zero in the air."""
         return self._place
 
     @property

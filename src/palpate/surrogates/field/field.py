@@ -28,6 +28,7 @@ from palpate.surrogates.field.dimple import Dimple
 from palpate.surrogates.field.errors import FieldErrors, sizes_of
 from palpate.surrogates.field.evaluator import FieldEvaluator
 from palpate.surrogates.field.rise import Rise
+from palpate.surrogates.field.variation import OFFSETS
 from palpate.surrogates.surface import TouchedSurface
 from palpate.units import Range, bounds
 
@@ -128,22 +129,34 @@ class FieldSurrogate:
             return f"its probe has a radius of {self.radius} m"
         if self.continuation is not None and self.continuation.widths.shape != (n,):
             return f"its continuation has {self.continuation.widths.size} widths for {n} inputs"
+        return self._fault_of_dimple()
+
+    def _fault_of_dimple(self) -> str:
         wanted, dimple = {1: 1, 3: 2}.get(self.rest.shape[1]), self.dimple
-        strange = dimple is not None and (
-            dimple.touched.shape != (len(self.points),) or len(dimple.table) != wanted
-        )
-        return "its travelling part is of other nodes or components" if strange else ""
+        if dimple is None:
+            return ""
+        if dimple.touched.shape != (len(self.points),) or len(dimple.table) != wanted:
+            return "its travelling part is of other nodes or components"
+        own, further = dimple.variation, len(self.inputs) - 3
+        strange = own is not None and own.powers.shape[1] != len(own.axes) + further
+        return "its travelling part varies with other inputs" if strange else ""
 
     def __str__(self) -> str:
         nodes, components = self.rest.shape
         names = ", ".join(str(r) for r in self.inputs)
         return (
             f"FieldSurrogate: {self.name} ({self.unit or '1'}) on {nodes} nodes, {components} each; {names}; "
-            f"{len(self.modes)} modes{'' if self.dimple is None else ' and a dimple'}, rise {self.rise.name!r}, "
+            f"{len(self.modes)} modes{self._dimple_in_words}, rise {self.rise.name!r}, "
             f"{self.network.units} units"
         )
 
     __repr__ = __str__
+
+    @property
+    def _dimple_in_words(self) -> str:
+        if self.dimple is None:
+            return ""
+        return " and a dimple" if self.dimple.variation is None else " and a dimple that varies"
 
     @property
     def inputs(self) -> tuple[Range, ...]:
@@ -164,14 +177,29 @@ class FieldSurrogate:
         """(numbers, limits, surface, net): what `coefficients_into` takes last, with scratch for one thread."""
         return (*self._fixed, self.surface.compiled(), self.network.compiled())
 
+    def profiling(self) -> tuple[Any, ...]:
+        """(s*, table, varied, powers, axes, scales, chebyshev, weights): what `profile_into` takes last."""
+        table = np.zeros((1, 4, 4)) if self.dimple is None else self.dimple.table
+        own = None if self.dimple is None else self.dimple.variation
+        if own is None:
+            none = (np.zeros((0, 0)), np.zeros((0, 0), np.int64), np.zeros((0, 3)), np.zeros((2, 0)))
+            return self.rise.deepest, table, *none, np.zeros((0, 2)), np.zeros(4)
+        q, m = own.table.shape[:2]
+        degrees = np.zeros((own.powers.shape[1], max(int(own.powers.max(initial=0)), 1) + 1))
+        known = (own.table.reshape(q * m, -1), own.powers, own.axes, own.scales)
+        return self.rise.deepest, table, *known, degrees, np.zeros(4 + 5 * m)
+
+    def profile(self) -> np.ndarray:
+        """Room (r, 4, components) for a dimple's profile, zero."""
+        r = 4 if self.dimple is None else self.dimple.table.shape[1]
+        return np.zeros((r, OFFSETS, self.rest.shape[1]))
+
     def travelling(self) -> tuple[Any, ...]:
-        """(table, profile, reach, nodes, points): what `field_into` takes last."""
+        """(reach, nodes, points): what `field_into` takes last."""
         if self.dimple is None:
-            return np.zeros((1, 4, 4)), np.zeros((1, 4)), 1.0, np.zeros(0, np.int64), np.zeros((0, 3))
+            return 1.0, np.zeros(0, np.int64), np.zeros((0, 3))
         nodes = np.flatnonzero(self.dimple.touched)
-        table = self.dimple.table
-        points = np.ascontiguousarray(self.points[nodes])
-        return table, np.zeros(table.shape[:2]), float(self.dimple.reach), nodes, points
+        return float(self.dimple.reach), nodes, np.ascontiguousarray(self.points[nodes])
 
     def _checked(self, X: np.ndarray) -> np.ndarray:
         return rows_of(X, self.inputs, "field")

@@ -14,6 +14,7 @@ from palpate.network import Archive, Network, save_archive
 from palpate.surrogates.continuation import Continuation
 from palpate.surrogates.field.dimple import Dimple
 from palpate.surrogates.field.rise import Rise
+from palpate.surrogates.field.variation import Variation
 from palpate.surrogates.file_parts import finite, number, read
 from palpate.surrogates.surface import TouchedSurface
 
@@ -25,6 +26,7 @@ __all__ = ["KIND", "arrays_of", "described", "field_of", "load_field", "save_fie
 KIND = "field-surrogate"
 _NETWORK, _SURFACE = "coefficients", "surface/"
 _OWN = ("modes", "rest", "points", "triangles", "mass")
+_VARIED, _PARTS = "varied/", ("table", "powers", "axes", "scales")
 _KEYS = {"name", "unit", "rise", "deepest", "length", "radius", "radius_input", "reach", "widths", "trained"}
 _KEYS |= {"trained_width", "meta"}
 
@@ -65,6 +67,8 @@ def arrays_of(field: FieldSurrogate) -> dict[str, np.ndarray]:
     arrays = {name: getattr(field, name) for name in _OWN}
     if field.dimple is not None:
         arrays |= {"table": field.dimple.table, "touched": field.dimple.touched}
+        if (own := field.dimple.variation) is not None:
+            arrays |= {_VARIED + name: getattr(own, name) for name in _PARTS}
     return arrays
 
 
@@ -101,6 +105,8 @@ def field_of(
     from palpate.surrogates.field.field import FieldSurrogate
 
     expected = {*_OWN, *(("table", "touched") if meta.get("reach") is not None else ())}
+    varies = meta.get("reach") is not None and any(name.startswith(_VARIED) for name in arrays)
+    expected |= {_VARIED + name for name in _PARTS} if varies else set()
     if meta.keys() != _KEYS or arrays.keys() != expected or not isinstance(meta["meta"], dict):
         raise ValueError("it is not described as one")
     own = meta["radius_input"]
@@ -108,13 +114,14 @@ def field_of(
         raise TypeError(f"its radius is input {own!r}")
     if not (isinstance(meta["name"], str) and isinstance(meta["unit"], str)):
         raise TypeError("its name or unit is no text")
-    kinds = {"triangles": np.int64, "touched": np.bool_}
+    kinds = {"triangles": np.int64, "touched": np.bool_, _VARIED + "powers": np.int64}
     for name, array in arrays.items():
         if array.dtype != kinds.get(name, np.float64):
             raise TypeError(f"its {name} holds {array.dtype} numbers")
     dimple = None
     if meta["reach"] is not None:
-        dimple = Dimple(arrays["table"], number(meta, "reach"), arrays["touched"])
+        variation = Variation(**{name: arrays[_VARIED + name] for name in _PARTS}) if varies else None
+        dimple = Dimple(arrays["table"], number(meta, "reach"), arrays["touched"], variation)
     widths = np.array([number({"width": w}, "width") for w in meta["widths"]])
     return FieldSurrogate(
         name=meta["name"],

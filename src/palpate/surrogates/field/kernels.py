@@ -3,16 +3,22 @@
     y = rest + f(s) [Σ_k b_k(x̃) φ_k + dimple]            x = (c, further inputs)
 
 with the coefficients b a network's, taken at x̃ as the energy is (see `palpate.surrogates.continuation`). Two steps:
-the coefficients, within microseconds, and then the field on all nodes, in one pass over the modes.
+the coefficients, within microseconds, and then the dimple's profile and the field on all nodes, in one pass over the
+modes.
 
 What the kernels take:
 
     z         (1 + k,) answer of the first step: 1, then f b_k; in the precision of the modes
-    place     (FRAME,) answer of the first step: s, f, then foot (3) and normal (3)
+    place     (FRAME + p,) answer of the first step: s, f, foot (3), normal (3), then the further inputs
+    profile   (r, 4, components): the dimple is Σ_i B_i(ρ/L) Σ_h ξ_h/L profile[i, h] per component, ξ_h/L = 1 and the
+              coordinates of ξ/L = (X − foot)/L
     lines     (2, n) scratch: x and x̃;  small (2, 3, 3) scratch: ∇²d, then ∇d as a row;  b (k,) scratch
     numbers   R, the input that R is or −1, s* and its w, then (p, s*, a) of the rise
     limits    (3, n): low and high ends and w of every input
-    table     (parts, r, q), profile (parts, r) scratch, reach, touched nodes (T,) and their points (T, 3)
+    table     (parts, r, q), the dimple's own
+    varied    (q · m, r · 4 · components) of `Variation`, with its powers, axes and scales; (0, …) without one
+    chebyshev (v, degree + 1) and weights (4 + m + 4 m,) scratch
+    reach     L, then touched nodes (T,) and their points (T, 3)
 """
 
 from __future__ import annotations
@@ -27,7 +33,7 @@ from palpate.surrogates.continuation import saturated
 from palpate.surrogates.field.rise import rise_at
 from palpate.surrogates.surface import distance_into
 
-__all__ = ["FRAME", "coefficients_into", "field_into"]
+__all__ = ["FRAME", "coefficients_into", "field_into", "profile_into"]
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
 FRAME = 8
@@ -76,6 +82,8 @@ def coefficients_into(c, p, z, place, b, lines, small, numbers, limits, surface,
         place[2 + i] = c[i] - d * g[i]
         place[5 + i] = g[i]
     _taken(lines, limits)
+    for i in range(3, lines.shape[1]):
+        place[FRAME - 3 + i] = lines[1, i]
     value_into(lines[1], b, *net)
     for k in range(b.size):
         z[1 + k] = f * b[k]
@@ -83,62 +91,106 @@ def coefficients_into(c, p, z, place, b, lines, small, numbers, limits, surface,
 
 
 @_jit
-def _profile(s, f, deepest, table, profile) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
-    """The table's splines in ρ at one depth, times f."""
+def _splines(u, weights) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """The four uniform cubic B-splines at u in [0, 1] of a cell into weights (4,)."""
+    v = 1.0 - u
+    weights[0], weights[1] = v * v * v / 6.0, (3.0 * u * u * u - 6.0 * u * u + 4.0) / 6.0
+    weights[2], weights[3] = (3.0 * v * v * v - 6.0 * v * v + 4.0) / 6.0, u * u * u / 6.0
+
+
+@_jit
+def _products(place, powers, axes, scales, chebyshev, values) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """Polynomials of the place and the further inputs into the first of values."""
+    a = axes.shape[0]
+    for v in range(scales.shape[1]):
+        t = place[FRAME - a + v] if v >= a else 0.0
+        if v < a:
+            for i in range(3):
+                t += axes[v, i] * place[2 + i]
+        t = min(max((t - scales[0, v]) / scales[1, v], -1.0), 1.0)
+        chebyshev[v, 0], chebyshev[v, 1] = 1.0, t
+        for k in range(2, chebyshev.shape[1]):
+            chebyshev[v, k] = 2.0 * t * chebyshev[v, k - 1] - chebyshev[v, k - 2]
+    for m in range(powers.shape[0]):
+        value = 1.0
+        for v in range(powers.shape[1]):
+            value *= chebyshev[v, powers[m, v]]
+        values[m] = value
+
+
+@_jit
+def profile_into(profile, place, deepest, table, varied, powers, axes, scales, chebyshev, weights) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """The dimple at one touch, f included: splines in ρ times 1 and the offset's coordinates over L; see above."""
+    four, share, f = weights[:4], min(place[0] / deepest, 1.0), place[1]
+    r, many, components = profile.shape
+    flat = profile.reshape(r * many * components)
+    flat[:] = 0.0
+    if f == 0.0:
+        return
+    if varied.shape[0]:
+        m = powers.shape[0]
+        q = varied.shape[0] // m
+        in_place, both = weights[4 : 4 + m], weights[4 + m :]
+        j = min(int(share * (q - 3)), q - 4)
+        _splines(share * (q - 3) - j, four)
+        _products(place, powers, axes, scales, chebyshev, in_place)
+        for k in range(4):
+            for i in range(m):
+                both[k * m + i] = f * four[k] * in_place[i]
+        combine(both, varied[j * m : (j + 4) * m], flat)
     q = table.shape[2]
-    t = min(s / deepest * (q - 3), q - 3.0)
-    j = min(int(t), q - 4)
-    u = t - j
-    v = 1.0 - u
-    w0, w1 = f * v * v * v / 6.0, f * (3.0 * u * u * u - 6.0 * u * u + 4.0) / 6.0
-    w2, w3 = f * (3.0 * v * v * v - 6.0 * v * v + 4.0) / 6.0, f * u * u * u / 6.0
-    for a in range(table.shape[0]):
-        for i in range(table.shape[1]):
-            row = table[a, i]
-            profile[a, i] = w0 * row[j] + w1 * row[j + 1] + w2 * row[j + 2] + w3 * row[j + 3]
+    j = min(int(share * (q - 3)), q - 4)
+    _splines(share * (q - 3) - j, four)
+    for i in range(r):
+        along, across = 0.0, 0.0
+        for k in range(4):
+            along += f * four[k] * table[0, i, j + k]
+            if components > 1:
+                across += f * four[k] * table[1, i, j + k]
+        if components == 1:
+            profile[i, 0, 0] += along
+            continue
+        for c in range(3):
+            profile[i, 0, c] += along * place[5 + c]
+            profile[i, 1 + c, c] += across
+            for e in range(3):
+                profile[i, 1 + e, c] -= across * place[5 + e] * place[5 + c]
 
 
 @_jit
-def _spline(u, first, row) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
-    v = 1.0 - u
-    total = v * v * v * row[first] + (3.0 * u * u * u - 6.0 * u * u + 4.0) * row[first + 1]
-    total += (3.0 * v * v * v - 6.0 * v * v + 4.0) * row[first + 2] + u * u * u * row[first + 3]
-    return float(total / 6.0)
-
-
-@_jit
-def _add_dimple(y, place, profile, reach, nodes, points) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
-    """Add the travelling part to y (nodes · components,)."""
-    parts, r = profile.shape
-    per, square = (r - 3) / reach, reach * reach
-    ox, oy, oz, nx, ny, nz = place[2], place[3], place[4], place[5], place[6], place[7]
+def _add_dimple(y, place, profile, line, reach, nodes, points) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """Add the travelling part to y (nodes · components,); line (4 · components,) is scratch."""
+    r, components = profile.shape[0], profile.shape[2]
+    wide = line.size
+    flat = profile.reshape(r, wide)
+    ox, oy, oz, per = place[2], place[3], place[4], 1.0 / reach
     for i in range(nodes.size):
-        x, e, h = points[i, 0] - ox, points[i, 1] - oy, points[i, 2] - oz
+        x, e, h = (points[i, 0] - ox) * per, (points[i, 1] - oy) * per, (points[i, 2] - oz) * per
         q = x * x + e * e + h * h
-        if q >= square:
+        if q >= 1.0:
             continue
-        t = math.sqrt(q) * per
+        t = math.sqrt(q) * (r - 3)
         first = min(int(t), r - 4)
-        u, k = t - first, nodes[i]
-        along = _spline(u, first, profile[0])
-        if parts == 1:
-            y[k] += along
-            continue
-        across = _spline(u, first, profile[1]) / reach
-        along -= across * (x * nx + e * ny + h * nz)
-        y[3 * k] += along * nx + across * x
-        y[3 * k + 1] += along * ny + across * e
-        y[3 * k + 2] += along * nz + across * h
+        u = t - first
+        v = 1.0 - u
+        b0, b1 = v * v * v / 6.0, (3.0 * u * u * u - 6.0 * u * u + 4.0) / 6.0
+        b2, b3 = (3.0 * v * v * v - 6.0 * v * v + 4.0) / 6.0, u * u * u / 6.0
+        for k in range(wide):
+            two = b0 * flat[first, k] + b1 * flat[first + 1, k]
+            line[k] = two + b2 * flat[first + 2, k] + b3 * flat[first + 3, k]
+        at = components * nodes[i]
+        for c in range(components):
+            moved = line[c] + x * line[components + c]
+            y[at + c] += moved + e * line[2 * components + c] + h * line[3 * components + c]
 
 
 @_jit
-def field_into(y, z, place, numbers, rows, table, profile, reach, nodes, points) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
-    """The field y (nodes · components,) from what `coefficients_into` has found; rows (1 + k, …): rest, modes."""
+def field_into(y, z, place, rows, profile, line, reach, nodes, points) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """The field y (nodes · components,) from coefficients, place and profile; rows (1 + k, …): rest, modes."""
     if place[1] == 0.0 and z[0] == 1.0:
         for k in range(y.size):
             y[k] = rows[0, k]
         return
     combine(z, rows, y)
     if nodes.size and place[1] > 0.0:
-        _profile(place[0], place[1], numbers[5], table, profile)
-        _add_dimple(y, place, profile, reach, nodes, points)
+        _add_dimple(y, place, profile, line, reach, nodes, points)

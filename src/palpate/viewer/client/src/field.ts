@@ -1,21 +1,15 @@
-// A field on a body's surface under a touch, summed on the page: rest + coefficients · modes + growth · dimple.
-// The dimple is what travels with the probe, products of uniform cubic B-splines in the distance from its foot and in
-// depth (docs/method/touch-field.md).
+// A field on a body's surface under a touch, summed on the page: rest + coefficients · modes + dimple. The dimple is what
+// travels with the probe: cubic B-splines in the distance from its foot, times 1 and the coordinates of the offset from
+// it (docs/method/touch-field.md); the server sends its profile with each picture.
 
 import type { Look, Modes, Vec3 } from "./messages";
 
-/** Where the dimple of one picture is. */
-export interface Place {
-  depth: number; // m
-  foot: Vec3; // m
-  normal: Vec3;
-}
+const OFFSETS = 4; // 1 and three coordinates
 
 export class Field {
   /** components of each point */
   readonly values: Float32Array;
   readonly touched: Int32Array;
-  private readonly profile: Float64Array;
 
   constructor(
     readonly look: Look,
@@ -24,26 +18,25 @@ export class Field {
   ) {
     this.values = Float32Array.from(modes.rest);
     this.touched = Int32Array.from(modes.touched);
-    this.profile = new Float64Array(modes.parts * modes.rows);
   }
 
   /** Numbers of `Press.coefficients` that this field takes. */
   get count(): number {
-    return 1 + this.look.modes;
+    return this.look.modes + OFFSETS * this.modes.rows * this.look.components;
   }
 
-  /** Sum it up: `numbers` are its growth with depth and its modes' coefficients. */
-  update(numbers: Float32Array, place: Place): void {
+  /** Sum it up: `numbers` are its modes' coefficients and its dimple's profile. */
+  update(numbers: Float32Array, foot: Vec3): void {
     const { values, modes } = this;
     const n = values.length;
     values.set(modes.rest);
     for (let k = 0; k < this.look.modes; k++) {
-      const b = numbers[1 + k]!;
+      const b = numbers[k]!;
       if (b === 0) continue;
       const mode = modes.modes.subarray(k * n, (k + 1) * n);
       for (let i = 0; i < n; i++) values[i]! += b * mode[i]!;
     }
-    if (modes.reach > 0 && numbers[0]! > 0) this.dimple(numbers[0]!, place);
+    if (modes.rows > 0) this.dimple(numbers.subarray(this.look.modes), foot);
   }
 
   /** The size of the field at each point. */
@@ -57,48 +50,28 @@ export class Field {
     });
   }
 
-  private dimple(growth: number, { depth, foot, normal }: Place): void {
-    const { modes, values, points } = this;
-    this.profiles(growth, depth);
-    const [reach, per] = [modes.reach, (modes.rows - 3) / modes.reach];
-    const [nx, ny, nz] = normal;
+  private dimple(profile: Float32Array, foot: Vec3): void {
+    if (!profile.some((x) => x !== 0)) return;
+    const { values, points } = this;
+    const { reach, rows } = this.modes;
+    const per = this.look.components;
     for (const i of this.touched) {
-      const [x, y, z] = [points[3 * i]! - foot[0], points[3 * i + 1]! - foot[1], points[3 * i + 2]! - foot[2]];
-      const far = Math.sqrt(x * x + y * y + z * z);
-      if (far >= reach) continue;
-      const t = far * per;
-      const first = Math.min(Math.floor(t), modes.rows - 4);
-      let along = this.spline(t - first, first);
-      if (modes.parts === 1) {
-        values[i]! += along;
-        continue;
+      const offset = [1, ...foot.map((o, c) => (points[3 * i + c]! - o) / reach)];
+      const far = Math.hypot(offset[1]!, offset[2]!, offset[3]!);
+      if (far >= 1) continue;
+      const t = far * (rows - 3);
+      const first = Math.min(Math.floor(t), rows - 4);
+      const w = weights(t - first);
+      for (let c = 0; c < per; c++) {
+        let sum = 0;
+        for (let h = 0; h < OFFSETS; h++) {
+          let along = 0;
+          for (let j = 0; j < 4; j++) along += w[j]! * profile[((first + j) * OFFSETS + h) * per + c]!;
+          sum += offset[h]! * along;
+        }
+        values[per * i + c]! += sum;
       }
-      const across = this.spline(t - first, modes.rows + first) / reach;
-      along -= across * (x * nx + y * ny + z * nz);
-      values[3 * i]! += along * nx + across * x;
-      values[3 * i + 1]! += along * ny + across * y;
-      values[3 * i + 2]! += along * nz + across * z;
     }
-  }
-
-  /** The table's splines in the distance, at one depth. */
-  private profiles(growth: number, depth: number): void {
-    const { table, columns, deepest, parts, rows } = this.modes;
-    const t = Math.min((depth / deepest) * (columns - 3), columns - 3);
-    const j = Math.min(Math.floor(t), columns - 4);
-    const w = weights(t - j);
-    for (let row = 0; row < parts * rows; row++) {
-      let sum = 0;
-      for (let m = 0; m < 4; m++) sum += w[m]! * table[row * columns + j + m]!;
-      this.profile[row] = growth * sum;
-    }
-  }
-
-  private spline(u: number, first: number): number {
-    const w = weights(u);
-    let sum = 0;
-    for (let m = 0; m < 4; m++) sum += w[m]! * this.profile[first + m]!;
-    return sum;
   }
 }
 

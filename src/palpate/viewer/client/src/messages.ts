@@ -504,13 +504,13 @@ export interface Press {
   deviation: number;
   /** m, depth of the shape drawn: after release it goes back to 0 */
   drawn: number;
-  /** m, of the dimple at rest */
+  /** m, of the dimples at rest */
   foot: Vec3;
   /** of the surface there */
   normal: Vec3;
   /** current values of the parameters */
   parameters: Float32Array;
-  /** for each field its growth with depth and its modes' coefficients */
+  /** for each field its modes' coefficients and its dimple's profile */
   coefficients: Float32Array;
   /** m, how deep it stays pressed at each of Skin.printable; empty if nowhere */
   prints: Float32Array;
@@ -703,37 +703,26 @@ export function decodeSkin(buffer: ArrayBuffer): Skin {
 
 export const MODES = 8;
 
-/** A field on a Skin's points, server to page: rest + coefficients · modes + growth · dimple. */
+/** A field on a Skin's points, server to page: rest + coefficients · modes + the dimple of a profile. */
 export interface Modes {
-  /** m, depth at which the dimple's table ends */
-  deepest: number;
   /** m, of the dimple from its foot; 0 for none */
   reach: number;
-  /** of the table: 2 of a vector, along and across the normal */
-  parts: number;
-  /** splines of the distance from the foot */
+  /** splines of the distance from the foot; 0 for none */
   rows: number;
-  /** splines of the depth */
-  columns: number;
   /** components of each point */
   rest: Float32Array;
   /** the same of each mode */
   modes: Float32Array;
-  /** parts · rows · columns */
-  table: Float32Array;
   /** points that the dimple may move */
   touched: Float32Array;
 }
 
 export function encodeModes(m: Modes): ArrayBuffer {
-  const view = new DataView(new ArrayBuffer(15 + 4 + 4 * m.rest.length + 4 + 4 * m.modes.length + 4 + 4 * m.table.length + 4 + 4 * m.touched.length));
+  const view = new DataView(new ArrayBuffer(7 + 4 + 4 * m.rest.length + 4 + 4 * m.modes.length + 4 + 4 * m.touched.length));
   view.setUint8(0, 8);
-  view.setFloat32(1, m.deepest, true);
-  view.setFloat32(5, m.reach, true);
-  view.setUint16(9, m.parts, true);
-  view.setUint16(11, m.rows, true);
-  view.setUint16(13, m.columns, true);
-  let at = 15;
+  view.setFloat32(1, m.reach, true);
+  view.setUint16(5, m.rows, true);
+  let at = 7;
   view.setUint32(at, m.rest.length, true);
   at += 4;
   for (const value of m.rest) {
@@ -743,12 +732,6 @@ export function encodeModes(m: Modes): ArrayBuffer {
   view.setUint32(at, m.modes.length, true);
   at += 4;
   for (const value of m.modes) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  view.setUint32(at, m.table.length, true);
-  at += 4;
-  for (const value of m.table) {
     view.setFloat32(at, value, true);
     at += 4;
   }
@@ -763,23 +746,17 @@ export function encodeModes(m: Modes): ArrayBuffer {
 
 export function decodeModes(buffer: ArrayBuffer): Modes {
   const view = new DataView(buffer);
-  const restAt = 15;
+  const restAt = 7;
   const restEnd = restAt + 4 + 4 * view.getUint32(restAt, true);
   const modesAt = restEnd;
   const modesEnd = modesAt + 4 + 4 * view.getUint32(modesAt, true);
-  const tableAt = modesEnd;
-  const tableEnd = tableAt + 4 + 4 * view.getUint32(tableAt, true);
-  const touchedAt = tableEnd;
+  const touchedAt = modesEnd;
   const touchedEnd = touchedAt + 4 + 4 * view.getUint32(touchedAt, true);
   return {
-    deepest: view.getFloat32(1, true),
-    reach: view.getFloat32(5, true),
-    parts: view.getUint16(9, true),
-    rows: view.getUint16(11, true),
-    columns: view.getUint16(13, true),
+    reach: view.getFloat32(1, true),
+    rows: view.getUint16(5, true),
     rest: new Float32Array(buffer.slice(restAt + 4, restEnd)),
     modes: new Float32Array(buffer.slice(modesAt + 4, modesEnd)),
-    table: new Float32Array(buffer.slice(tableAt + 4, tableEnd)),
     touched: new Float32Array(buffer.slice(touchedAt + 4, touchedEnd)),
   };
 }

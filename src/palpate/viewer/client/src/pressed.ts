@@ -131,7 +131,7 @@ function show(): void {
   fields.forEach((field, i) => {
     const numbers = latest!.coefficients.subarray(at, (at += field.count));
     // the first moves the surface, the chosen one colours it
-    if (i === 0 || i === chosen) field.update(numbers, { depth: latest!.drawn, foot: latest!.foot, normal: latest!.normal });
+    if (i === 0 || i === chosen) field.update(numbers, latest!.foot);
   });
   const first = fields[0];
   if (first?.look.components !== 3) still.fill(0);

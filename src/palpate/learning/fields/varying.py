@@ -1,0 +1,257 @@
+"""How a dimple varies from place to place, by regularised least squares over all nodes of all solves.
+
+For one solve the regressors are a product: what depends on the node (splines in ρ times offsets) by what depends on
+the touch (splines in s times polynomials of the place). So the normal equations are a sum of Kronecker products, and
+conjugate gradients (Hestenes & Stiefel 1952) never form them. A priori a coefficient of total degree n is smaller by
+b^{−n/2} than a constant, and profiles are smooth in ρ; b is what misses least of columns left out.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.learning.fields.search import parts_of
+from palpate.surrogates.field.dimple import Dimple, splines
+from palpate.surrogates.field.rise import Rise
+from palpate.surrogates.field.variation import OFFSETS, Variation, polynomials
+from palpate.surrogates.surface import TouchedSurface
+
+__all__ = ["VaryingDimples", "by_conjugate_gradients", "degrees", "directions", "fitted_variation"]
+
+_IN_DEPTH = 4  # one cubic
+_MOST = 84  # polynomials
+_DEGREE = 10
+_BASES = (4.0, 8.0)
+_RIDGE = 1e-4  # of the mean diagonal
+_ROUGH, _LEAST = 0.1, 0.01  # of second differences in ρ, of the coefficients themselves
+_UPRIGHT = 0.2  # cosine: a surface whose normals stay this near to their mean is a graph over a plane
+_ITERATIONS, _TOLERANCE = 400, 1e-4
+_PARTS = 2  # of the solves, each left out once
+_GAIN = 0.8  # of the squares in reach that are missed of columns left out: more is not worth the numbers
+
+
+@dataclass(frozen=True, eq=False)
+class VaryingDimples:
+    """Regressors of N solves, parted into nodes' and touches'.
+
+    Attributes
+    ----------
+    nodes : list of N (n_i,) int arrays
+        In reach of each probe.
+    near : list of N (n_i, 4 (r − 3)) arrays
+        Products of splines in ρ and offsets at these.
+    touches : (N, q, m)
+        f times products of splines in s and polynomials.
+    shape : (r, components)
+    """
+
+    nodes: list[np.ndarray]
+    near: list[np.ndarray]
+    touches: np.ndarray
+    shape: tuple[int, int]
+
+    def images(self, table: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """What a variation's table is (rows, 4 (r − 3), components) at the touch of each solve, f included."""
+        r, components = self.shape
+        flat = table[:, :, : r - 3].reshape(self.touches[0].size, -1, components)
+        return np.asarray(np.tensordot(self.touches[rows].reshape(len(rows), -1), flat, 1))
+
+    def values(self, table: np.ndarray, count: int) -> np.ndarray:
+        """Fields (N, count, components) by a variation's table."""
+        images = self.images(table, np.arange(len(self.nodes)))
+        out = np.zeros((len(images), count, self.shape[1]))
+        for i, image in enumerate(images):
+            out[i, self.nodes[i]] = self.near[i] @ image
+        return out
+
+
+def fitted_variation(
+    values: np.ndarray,
+    X: np.ndarray,
+    depth: np.ndarray,
+    groups: np.ndarray,
+    *,
+    dimple: Dimple,
+    rise: Rise,
+    surface: TouchedSurface,
+    points: np.ndarray,
+    mass: np.ndarray,
+) -> tuple[Variation, np.ndarray] | None:
+    """How the dimple of fields varies, and what that gives of them (N, nodes, components).
+
+    Parameters
+    ----------
+    values : (N, nodes, components)
+        Fields less their rest and less what the dimple gives.
+    X : (N, n)
+        Centre of the probe (m), then further inputs.
+    depth : (N,)
+    groups : (N,) int
+        Solves that are left out together.
+    dimple, rise, surface, points, mass
+        As in `fitted_dimple`.
+
+    Returns
+    -------
+    None where it is of no use: with one group alone, or where it gains little of columns left out.
+    """
+    parts = parts_of(groups)
+    if len(parts) < 2:
+        return None
+    feet, normals = _feet(surface, np.ascontiguousarray(X[:, :3]))
+    axes = directions(normals)
+    told = np.hstack([feet @ axes.T, X[:, 3:]])
+    low, high = told.min(axis=0), told.max(axis=0)
+    scales = np.array([(low + high) / 2, np.maximum((high - low) / 2, 1e-9)])
+    powers = degrees(told.shape[1])
+    empty = np.zeros((_IN_DEPTH, len(powers), dimple.table.shape[1], OFFSETS, values.shape[2]))
+    blank = Variation(empty, powers, axes, scales)
+    regressors = _regressors(blank, dimple, rise, feet, X[:, 3:], depth, points)
+    fit = _Fit(regressors, values, mass, powers.sum(axis=1))
+    base, missed = _best_base(fit, parts)
+    if missed > _GAIN:
+        return None
+    found = Variation(fit.table(base, np.arange(len(X))), powers, axes, scales)
+    return found, regressors.values(found.table, len(points))
+
+
+def _feet(surface: TouchedSurface, C: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Feet and normals, each (N, 3)."""
+    d, normals, _ = surface.at(C)
+    return C - d[:, None] * normals, normals
+
+
+def directions(normals: np.ndarray) -> np.ndarray:
+    """Two directions across the mean normal where the surface is a graph over their plane, all three elsewhere."""
+    mean = normals.mean(axis=0)
+    size = float(np.linalg.norm(mean))
+    if size == 0 or (normals @ mean).min() < _UPRIGHT * size:
+        return np.eye(3)
+    mean /= size
+    first = np.cross(mean, np.eye(3)[np.argmin(np.abs(mean))])
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(mean, first)])
+
+
+def degrees(v: int) -> np.ndarray:
+    """Degrees (m, v) up to the largest total degree, ten at most, that has no more than `_MOST` of them."""
+    degree = max(d for d in range(_DEGREE + 1) if d == 0 or math.comb(d + v, v) <= _MOST)
+    every = [p for p in itertools.product(range(degree + 1), repeat=v) if sum(p) <= degree]
+    return np.array(sorted(every, key=lambda p: (sum(p), p)))
+
+
+def _regressors(
+    blank: Variation,
+    dimple: Dimple,
+    rise: Rise,
+    feet: np.ndarray,
+    parameters: np.ndarray,
+    depth: np.ndarray,
+    points: np.ndarray,
+) -> VaryingDimples:
+    r, components = blank.table.shape[2], blank.table.shape[4]
+    touched, nodes, near = np.flatnonzero(dimple.touched), [], []
+    for foot in feet:
+        offset = (points[touched] - foot) / dimple.reach
+        distance = np.linalg.norm(offset, axis=1)
+        some = np.flatnonzero(distance < 1.0)
+        first, four = splines(distance[some] * (r - 3), r)
+        B = np.zeros((len(some), r))
+        np.put_along_axis(B, first[:, None] + np.arange(4), four, axis=1)
+        around = np.column_stack([np.ones(len(some)), offset[some]])
+        nodes.append(touched[some])
+        near.append((B[:, : r - 3, None] * around[:, None, :]).reshape(len(some), -1))
+    first, four = splines(np.minimum(depth / rise.deepest, 1.0) * (_IN_DEPTH - 3), _IN_DEPTH)
+    in_depth = np.zeros((len(depth), _IN_DEPTH))
+    np.put_along_axis(in_depth, first[:, None] + np.arange(4), four, axis=1)
+    in_place = polynomials(blank.variables(feet, parameters), blank.powers)
+    touches = rise.at(depth)[:, None, None] * in_depth[:, :, None] * in_place[:, None, :]
+    return VaryingDimples(nodes, near, touches, (r, components))
+
+
+class _Fit:
+    """Normal equations of all solves, each as a product."""
+
+    def __init__(
+        self, regressors: VaryingDimples, values: np.ndarray, mass: np.ndarray, total: np.ndarray
+    ) -> None:
+        self._regressors, self._values, self._mass, self._total = regressors, values, mass, total
+        R = regressors.shape[0] - 3
+        rough = np.diff(np.eye(R + 3), n=2, axis=0)[:, :R]
+        smooth = np.linalg.cholesky(np.linalg.inv(_ROUGH * rough.T @ rough + _LEAST * np.eye(R)))
+        self._prior = np.kron(smooth, np.eye(OFFSETS))
+        weighted = [
+            A * mass[rows][:, None] for A, rows in zip(regressors.near, regressors.nodes, strict=True)
+        ]
+        G = [A.T @ W for A, W in zip(regressors.near, weighted, strict=True)]
+        self._grams = self._prior.T @ np.array(G) @ self._prior
+        sides = [W.T @ u[rows] for W, u, rows in zip(weighted, values, regressors.nodes, strict=True)]
+        self._sides = self._prior.T @ np.array(sides)
+
+    def missed(self, rows: np.ndarray, table: np.ndarray | None = None) -> float:
+        """Sum over nodes in reach of squares that a table, or none, leaves of solves (rows,)."""
+        total = 0.0
+        images = None if table is None else self._regressors.images(table, rows)
+        for i, row in enumerate(rows):
+            nodes = self._regressors.nodes[row]
+            left = self._values[row, nodes]
+            left = left if images is None else left - self._regressors.near[row] @ images[i]
+            total += float((left**2).sum(axis=1) @ self._mass[nodes])
+        return total
+
+    def missed_left_out(self, base: float, out: np.ndarray) -> float:
+        """The same of solves where `out` (N,), by what the others say."""
+        return self.missed(np.flatnonzero(out), self.table(base, np.flatnonzero(~out)))
+
+    def table(self, base: float, rows: np.ndarray) -> np.ndarray:
+        """Coefficients (q, m, r, 4, components) from solves (rows,)."""
+        size = base ** (-self._total / 2.0)
+        touches = (self._regressors.touches[rows] * size).reshape(len(rows), -1)
+        found = by_conjugate_gradients(self._grams[rows], touches, self._sides[rows])
+        (r, components), (q, m) = self._regressors.shape, self._regressors.touches.shape[1:]
+        out = np.zeros((q, m, r, OFFSETS, components))
+        free = np.einsum("kl,flc->fkc", self._prior, found).reshape(q, m, r - 3, OFFSETS, components)
+        out[:, :, : r - 3] = free * size[None, :, None, None, None]
+        return out
+
+
+def _best_base(fit: _Fit, parts: list[np.ndarray]) -> tuple[float, float]:
+    """b, and the share of the squares that is missed of solves left out."""
+    parts = parts[:_PARTS]
+    squares = {b: sum(fit.missed_left_out(b, out) for out in parts) for b in _BASES}
+    base = min(_BASES, key=lambda b: squares[b])
+    whole = sum(fit.missed(np.flatnonzero(out)) for out in parts)
+    return base, squares[base] / max(whole, 1e-300)
+
+
+def by_conjugate_gradients(grams: np.ndarray, touches: np.ndarray, sides: np.ndarray) -> np.ndarray:
+    """W (k, R, c) with Σ_i t_i (G_i Wᵀt_i) + μ W = Σ_i t_i s_i, preconditioned by the diagonal, each c by itself."""
+    size = touches.shape[1] * grams.shape[1]
+    trace = float((np.einsum("ill->i", grams) * (touches**2).sum(axis=1)).sum())
+    mu = max(_RIDGE * trace / size, 1e-300)
+    diagonal = ((touches**2).T @ np.einsum("ill->il", grams) + mu)[..., None]
+
+    def times(W: np.ndarray) -> np.ndarray:
+        images = grams @ np.tensordot(touches, W, 1)
+        return np.asarray(np.tensordot(touches.T, images, 1) + mu * W)
+
+    residual = np.tensordot(touches.T, sides, 1)
+    W, goal = np.zeros_like(residual), _TOLERANCE * np.sqrt((residual**2).sum(axis=(0, 1)))
+    scaled = residual / diagonal
+    direction, rz = scaled.copy(), (residual * scaled).sum(axis=(0, 1))
+    for _ in range(_ITERATIONS):
+        if (np.sqrt((residual**2).sum(axis=(0, 1))) <= goal).all():
+            break
+        image = times(direction)
+        step = np.divide(rz, (direction * image).sum(axis=(0, 1)), out=np.zeros_like(rz), where=rz > 0)
+        W += step * direction
+        residual -= step * image
+        scaled = residual / diagonal
+        new = (residual * scaled).sum(axis=(0, 1))
+        direction = scaled + np.divide(new, rz, out=np.zeros_like(rz), where=rz > 0) * direction
+        rz = new
+    return W

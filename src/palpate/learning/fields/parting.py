@@ -97,10 +97,10 @@ def _with_modes(
     return Parted(rise, dimple, modes, problem, truncation, beyond)
 
 
-def _varied(solves: Solves, part: Parted, tolerance: float, most: int) -> Parted:
-    """The same with a dimple that differs from place to place, where columns left out say that it does."""
+def _varied(solves: Solves, part: Parted, tolerance: float, most: int) -> list[Parted]:
+    """The same with a dimple that differs from place to place; none where columns left out say that it does not."""
     if part.dimple is None:
-        return part
+        return []
     C = np.ascontiguousarray(solves.X[:, :3])
     remainder = solves.values - travelling_values(
         part.dimple, C, solves.depth, part.rise, solves.surface, solves.points
@@ -114,10 +114,10 @@ def _varied(solves: Solves, part: Parted, tolerance: float, most: int) -> Parted
         mass=solves.mass,
     )
     if found is None:
-        return part
+        return []
     variation, shown = found
     dimple = replace(part.dimple, variation=variation)
-    return _with_modes(solves, part.rise, dimple, remainder - shown, tolerance, most)
+    return [_with_modes(solves, part.rise, dimple, remainder - shown, tolerance, most)]
 
 
 def best_part(
@@ -136,7 +136,8 @@ def best_part(
     borders = (True, False) if travelling else (True,)
     first = _chosen([of(names[-1], border) for border in borders])
     border = first.dimple is None or bool(_same_touched(first, solves))
-    return _varied(solves, _chosen([first, *(of(name, border) for name in names[:-1])]), tolerance, most)
+    even = _chosen([first, *(of(name, border) for name in names[:-1])])
+    return _chosen([even, *_varied(solves, even, tolerance, most)])
 
 
 def _same_touched(part: Parted, solves: Solves) -> bool:

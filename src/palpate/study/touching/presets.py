@@ -19,7 +19,8 @@ TOUCHED: dict[str, dict[str, Any]] = {
     "block": {
         "body": {"kind": "block", "size": (0.10, 0.10, 0.05), "material": {"young": 9e3, "name": "tissue"}},
         "probe": {"depth": (2e-4, 0.012), "over": ((0.0, 0.0), (0.10, 0.10))},
-        "sweep": {"samples": 40, "depths": 2},  # places tell more than depths
+        # places tell more than depths; elements of half the radius show in force and shape
+        "sweep": {"samples": 40, "depths": 2, "element": 0.0035},
     },
     "layered": {
         "body": {

@@ -8,7 +8,7 @@ import pressed
 from models import linear_network
 from palpate.surrogates import ContactLaw, Continuation, FieldSurrogate, TouchedBody, TouchSurrogate
 from palpate.surrogates.field import Dimple, Rise, Variation
-from palpate.surrogates.field.dimple import splines
+from palpate.surrogates.field.dimple import design
 from palpate.surrogates.plastic import Dents
 from palpate.units import Quantity, Range
 
@@ -74,10 +74,7 @@ def _field(touch, components: int) -> FieldSurrogate:
 def _table(components: int) -> np.ndarray:
     """Splines of a dent exp(−ρ²/w²), as deep as the probe, a little narrower when it is deep."""
     rho, r, q = np.linspace(0.0, 0.999, 200), 14, 6
-    first, four = splines(rho * (r - 3), r)
-    A = np.zeros((200, r))
-    for j in range(4):
-        A[np.arange(200), first + j] = four[:, j]
+    A = design(rho * (r - 3), r)
     table = np.zeros((2 if components == 3 else 1, r, q))
     for j in range(q):
         dent = np.exp(-((rho * 0.03 / (0.010 - 0.0003 * j)) ** 2))

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.frozen import own_arrays
 from palpate.network import evaluate
 from palpate.network.compiled import Precision, packed, pattern, workspace
 from palpate.network.evaluator import Evaluator, refused
@@ -104,9 +105,7 @@ class Network:
         )
 
     def __post_init__(self) -> None:
-        for name in ("factors", "shifts", "weights", "tail", "basis"):
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, _frozen(getattr(self, name)))
+        own_arrays(self, "factors", "shifts", "weights", "tail", "basis")
         object.__setattr__(self, "inputs", tuple(self.inputs))
         object.__setattr__(self, "outputs", tuple(self.outputs))
         check_shapes(self)
@@ -295,10 +294,3 @@ class Network:
         from palpate.network.file import load_alone
 
         return load_alone(path)
-
-
-def _frozen(array: np.ndarray) -> np.ndarray:
-    """A private double-precision copy that nobody can write to."""
-    copy = np.array(array, dtype=np.float64, order="C")
-    copy.flags.writeable = False
-    return copy

@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 
 from palpate.errors import UsageError
+from palpate.frozen import own_arrays
 
 __all__ = ["TrainedRegion"]
 
@@ -37,9 +38,8 @@ class TrainedRegion:
     radius: float
 
     def __post_init__(self) -> None:
-        points = np.array(self.points, dtype=np.float64, order="C")
-        points.flags.writeable = False
-        object.__setattr__(self, "points", points)
+        own_arrays(self, "points")
+        points = self.points
         if (
             points.ndim != 2
             or not points.size

@@ -35,6 +35,7 @@ import numpy as np
 from numba import njit
 
 from palpate.errors import UsageError
+from palpate.frozen import own_arrays
 from palpate.units import Range
 
 __all__ = ["Continuation", "saturated"]
@@ -67,9 +68,8 @@ class Continuation:
     depth_width: float = 1.0
 
     def __post_init__(self) -> None:
-        widths = np.array(self.widths, dtype=np.float64)
-        widths.flags.writeable = False
-        object.__setattr__(self, "widths", widths)
+        own_arrays(self, "widths")
+        widths = self.widths
         finite = np.isfinite(widths).all() and math.isfinite(self.depth_width)
         if not (
             widths.ndim == 1 and finite and (widths > 0).all() and self.deepest > 0 and self.depth_width > 0

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.learning.fields.search import parts_of
-from palpate.surrogates.field.dimple import Dimple, splines
+from palpate.surrogates.field.dimple import Dimple, design
 from palpate.surrogates.field.rise import Rise
 from palpate.surrogates.field.variation import OFFSETS, Variation, polynomials
 from palpate.surrogates.surface import TouchedSurface
@@ -29,8 +29,8 @@ _BASES = (4.0, 8.0)
 _RIDGE = 1e-4  # of the mean diagonal
 _ROUGH, _LEAST = 0.1, 0.01  # of second differences in ρ, of the coefficients themselves
 _UPRIGHT = 0.2  # cosine: a surface whose normals stay this near to their mean is a graph over a plane
-_ITERATIONS, _TOLERANCE = 400, 1e-4
-_PARTS = 2  # of the solves, each left out once
+_ITERATIONS, _TOLERANCE = 400, 1e-4  # of conjugate gradients: relative residual
+_PARTS = 2  # of six of the solves, each left out once
 _GAIN = 0.8  # of the squares in reach that are missed of columns left out: more is not worth the numbers
 
 
@@ -90,6 +90,7 @@ def fitted_variation(
     X : (N, n)
         Centre of the probe (m), then further inputs.
     depth : (N,)
+        Of the rigid probe, m.
     groups : (N,) int
         Solves that are left out together.
     dimple, rise, surface, points, mass
@@ -97,7 +98,8 @@ def fitted_variation(
 
     Returns
     -------
-    None where it is of no use: with one group alone, or where it gains little of columns left out.
+    (Variation, (N, nodes, components) array) or None
+        None where it is of no use: with one group alone, or where it gains little of columns left out.
     """
     parts = parts_of(groups)
     if len(parts) < 2:
@@ -159,15 +161,11 @@ def _regressors(
         offset = (points[touched] - foot) / dimple.reach
         distance = np.linalg.norm(offset, axis=1)
         some = np.flatnonzero(distance < 1.0)
-        first, four = splines(distance[some] * (r - 3), r)
-        B = np.zeros((len(some), r))
-        np.put_along_axis(B, first[:, None] + np.arange(4), four, axis=1)
+        B = design(distance[some] * (r - 3), r)[:, : r - 3]
         around = np.column_stack([np.ones(len(some)), offset[some]])
         nodes.append(touched[some])
-        near.append((B[:, : r - 3, None] * around[:, None, :]).reshape(len(some), -1))
-    first, four = splines(np.minimum(depth / rise.deepest, 1.0) * (_IN_DEPTH - 3), _IN_DEPTH)
-    in_depth = np.zeros((len(depth), _IN_DEPTH))
-    np.put_along_axis(in_depth, first[:, None] + np.arange(4), four, axis=1)
+        near.append((B[:, :, None] * around[:, None, :]).reshape(len(some), -1))
+    in_depth = design(np.minimum(depth / rise.deepest, 1.0) * (_IN_DEPTH - 3), _IN_DEPTH)
     in_place = polynomials(blank.variables(feet, parameters), blank.powers)
     touches = rise.at(depth)[:, None, None] * in_depth[:, :, None] * in_place[:, None, :]
     return VaryingDimples(nodes, near, touches, (r, components))
@@ -229,29 +227,35 @@ def _best_base(fit: _Fit, parts: list[np.ndarray]) -> tuple[float, float]:
 
 
 def by_conjugate_gradients(grams: np.ndarray, touches: np.ndarray, sides: np.ndarray) -> np.ndarray:
-    """W (k, R, c) with Σ_i t_i (G_i Wᵀt_i) + μ W = Σ_i t_i s_i, preconditioned by the diagonal, each c by itself."""
-    size = touches.shape[1] * grams.shape[1]
-    trace = float((np.einsum("ill->i", grams) * (touches**2).sum(axis=1)).sum())
-    mu = max(_RIDGE * trace / size, 1e-300)
-    diagonal = ((touches**2).T @ np.einsum("ill->il", grams) + mu)[..., None]
+    """W (k, R, c) with Σ_i t_i ⊗ (G_i (t_i · W)) + μ W = Σ_i t_i ⊗ s_i, of each component c by itself.
 
-    def times(W: np.ndarray) -> np.ndarray:
-        images = grams @ np.tensordot(touches, W, 1)
-        return np.asarray(np.tensordot(touches.T, images, 1) + mu * W)
+    Parameters
+    ----------
+    grams : (N, R, R)
+        G, symmetric and non-negative.
+    touches : (N, k)
+        t.
+    sides : (N, R, c)
+        s.
+    """
+    from scipy.sparse.linalg import LinearOperator, cg
 
-    residual = np.tensordot(touches.T, sides, 1)
-    W, goal = np.zeros_like(residual), _TOLERANCE * np.sqrt((residual**2).sum(axis=(0, 1)))
-    scaled = residual / diagonal
-    direction, rz = scaled.copy(), (residual * scaled).sum(axis=(0, 1))
-    for _ in range(_ITERATIONS):
-        if (np.sqrt((residual**2).sum(axis=(0, 1))) <= goal).all():
-            break
-        image = times(direction)
-        step = np.divide(rz, (direction * image).sum(axis=(0, 1)), out=np.zeros_like(rz), where=rz > 0)
-        W += step * direction
-        residual -= step * image
-        scaled = residual / diagonal
-        new = (residual * scaled).sum(axis=(0, 1))
-        direction = scaled + np.divide(new, rz, out=np.zeros_like(rz), where=rz > 0) * direction
-        rz = new
-    return W
+    shape = touches.shape[1], grams.shape[1]
+    diagonal = (touches**2).T @ np.einsum("ill->il", grams)
+    mu = max(_RIDGE * float(diagonal.mean()), 1e-300)
+
+    def times(w: np.ndarray) -> np.ndarray:
+        W = w.reshape(shape)
+        images = (grams @ (touches @ W)[:, :, None])[:, :, 0]
+        return np.asarray(touches.T @ images + mu * W).ravel()
+
+    size = (diagonal.size, diagonal.size)
+    whole = LinearOperator(size, matvec=times, dtype=np.float64)
+    scaled = LinearOperator(size, matvec=lambda w: w / (diagonal + mu).ravel(), dtype=np.float64)
+
+    def solved(side: np.ndarray) -> np.ndarray:
+        # a fit that has not wholly settled is a little smoother: no fault, and what is left out judges it
+        w, _ = cg(whole, (touches.T @ side).ravel(), rtol=_TOLERANCE, maxiter=_ITERATIONS, M=scaled)
+        return np.asarray(w).reshape(shape)
+
+    return np.stack([solved(side) for side in np.moveaxis(sides, 2, 0)], axis=2)

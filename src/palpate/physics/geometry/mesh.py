@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from palpate.frozen import own_arrays
 from palpate.physics.geometry.checks import require_known
 from palpate.physics.geometry.groups import members
 from palpate.physics.geometry.quality import MeshQuality, mesh_quality, tetrahedron_volumes
@@ -50,10 +51,8 @@ class BodyMesh:
     regions: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        for name in ("points", "tetrahedra", "triangles", "surface_of", "region_of"):
-            array = np.array(getattr(self, name), dtype=float if name == "points" else np.int64)
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
+        own_arrays(self, "points")
+        own_arrays(self, "tetrahedra", "triangles", "surface_of", "region_of", dtype=np.int64)
 
     def __repr__(self) -> str:
         return (

@@ -18,9 +18,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.frozen import own_arrays
 from palpate.surrogates.field.variation import Variation
 
-__all__ = ["Dimple", "products", "splines"]
+__all__ = ["Dimple", "design", "products", "splines"]
 
 
 def splines(t: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -33,17 +34,18 @@ def splines(t: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     return first, np.stack(four, axis=-1) / 6.0
 
 
+def design(t: np.ndarray, count: int) -> np.ndarray:
+    """All `count` uniform cubic B-splines (N, count) at t (N,) in [0, count − 3]."""
+    first, four = splines(t, count)
+    out = np.zeros((len(first), count))
+    np.put_along_axis(out, first[:, None] + np.arange(4), four, axis=1)
+    return out
+
+
 def products(offsets: np.ndarray, depths: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     """Products of the splines (N, r − 3, q) at ρ/L in [0, 1) and s/s* in [0, 1], both (N,), for a shape (r, q)."""
     r, q = shape
-    out = np.zeros((len(offsets), r, q))
-    row = np.arange(len(offsets))
-    i, of_rho = splines(offsets * (r - 3), r)
-    j, of_s = splines(depths * (q - 3), q)
-    for a in range(4):
-        for b in range(4):
-            out[row, i + a, j + b] = of_rho[:, a] * of_s[:, b]
-    return out[:, : r - 3]
+    return np.asarray(design(offsets * (r - 3), r)[:, : r - 3, None] * design(depths * (q - 3), q)[:, None])
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,11 +75,9 @@ class Dimple:
     variation: Variation | None = None
 
     def __post_init__(self) -> None:
-        table, touched = np.array(self.table, float, order="C"), np.array(self.touched, bool)
-        for array in (table, touched):
-            array.flags.writeable = False
-        object.__setattr__(self, "table", table)
-        object.__setattr__(self, "touched", touched)
+        own_arrays(self, "table")
+        own_arrays(self, "touched", dtype=np.bool_)
+        table = self.table
         fits = table.ndim == 3 and table.shape[0] in (1, 2) and min(table.shape[1:]) >= 4
         if not (fits and np.isfinite(table).all() and not table[:, -3:].any() and 0 < self.reach < np.inf):
             raise UsageError(

@@ -10,6 +10,7 @@ from palpate.errors import UsageError
 from palpate.network.compiled import PRECISIONS, Precision
 from palpate.surrogates.arguments import NONE, touch_at
 from palpate.surrogates.field.kernels import FRAME, coefficients_into, field_into, profile_into
+from palpate.surrogates.field.variation import OFFSETS
 
 if TYPE_CHECKING:
     from palpate.surrogates.field.field import FieldSurrogate
@@ -43,8 +44,9 @@ class FieldEvaluator:
         scratch = (np.zeros(k), np.zeros((2, n)), np.zeros((2, 3, 3)))
         self._first: tuple[Any, ...] = (self._z, self._place, *scratch, numbers, limits, surface, net)
         rows = np.concatenate([surrogate.rest[None], surrogate.modes]).reshape(1 + k, -1).astype(kind)
-        self._profile = surrogate.profile()
-        self._second: tuple[Any, ...] = (self._profile, self._place, *surrogate.profiling())
+        deepest, table, *others = surrogate.profiling()
+        self._profile = np.zeros((table.shape[1], OFFSETS, surrogate.rest.shape[1]))
+        self._second: tuple[Any, ...] = (self._profile, self._place, deepest, table, *others)
         line = np.zeros(self._profile[0].size)
         known = (self._flat, self._z, self._place, np.ascontiguousarray(rows), self._profile, line)
         self._third: tuple[Any, ...] = (*known, *surrogate.travelling())

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.frozen import own_arrays
 from palpate.network import Network
 from palpate.network.compiled import Precision
 from palpate.surrogates.arguments import rows_of
@@ -28,7 +29,6 @@ from palpate.surrogates.field.dimple import Dimple
 from palpate.surrogates.field.errors import FieldErrors, sizes_of
 from palpate.surrogates.field.evaluator import FieldEvaluator
 from palpate.surrogates.field.rise import Rise
-from palpate.surrogates.field.variation import OFFSETS
 from palpate.surrogates.surface import TouchedSurface
 from palpate.units import Range, bounds
 
@@ -90,10 +90,8 @@ class FieldSurrogate:
     meta: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name in (*_ARRAYS, "triangles"):
-            array = np.array(getattr(self, name), np.int64 if name == "triangles" else np.float64, order="C")
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
+        own_arrays(self, *_ARRAYS)
+        own_arrays(self, "triangles", dtype=np.int64)
         if self.continuation is None and len(self.network.inputs) >= 3:
             going = Continuation.of(self.network.inputs, deepest=self.rise.deepest)
             object.__setattr__(self, "continuation", going)
@@ -188,11 +186,6 @@ class FieldSurrogate:
         degrees = np.zeros((own.powers.shape[1], max(int(own.powers.max(initial=0)), 1) + 1))
         known = (own.table.reshape(q * m, -1), own.powers, own.axes, own.scales)
         return self.rise.deepest, table, *known, degrees, np.zeros(4 + 5 * m)
-
-    def profile(self) -> np.ndarray:
-        """Room (r, 4, components) for a dimple's profile, zero."""
-        r = 4 if self.dimple is None else self.dimple.table.shape[1]
-        return np.zeros((r, OFFSETS, self.rest.shape[1]))
 
     def travelling(self) -> tuple[Any, ...]:
         """(reach, nodes, points): what `field_into` takes last."""

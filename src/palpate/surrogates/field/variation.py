@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.frozen import own_arrays
 
 __all__ = ["OFFSETS", "Variation", "polynomials"]
 
@@ -49,10 +50,8 @@ class Variation:
     scales: np.ndarray
 
     def __post_init__(self) -> None:
-        for name in ("table", "powers", "axes", "scales"):
-            array = np.array(getattr(self, name), np.int64 if name == "powers" else np.float64, order="C")
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
+        own_arrays(self, "table", "axes", "scales")
+        own_arrays(self, "powers", dtype=np.int64)
         if not self._fits():
             raise UsageError(
                 f"A table of shape {self.table.shape} is not how a dimple varies.",

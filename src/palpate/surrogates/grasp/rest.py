@@ -18,6 +18,7 @@ import numpy as np
 from numba import njit
 
 from palpate.errors import UsageError
+from palpate.frozen import own_arrays
 
 __all__ = ["RestStiffness", "monomials", "root_at", "terms"]
 
@@ -70,9 +71,8 @@ class RestStiffness:
     count: int
 
     def __post_init__(self) -> None:
-        C = np.array(self.coefficients, dtype=np.float64, order="C")
-        C.flags.writeable = False
-        object.__setattr__(self, "coefficients", C)
+        own_arrays(self, "coefficients")
+        C = self.coefficients
         lengths = [len(terms(self.count, d)) for d in range(MOST + 1)]
         if C.ndim != 2 or C.shape[1] != 6 or len(C) not in lengths or not np.isfinite(C).all():
             raise UsageError(

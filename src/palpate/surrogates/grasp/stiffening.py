@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from palpate.errors import UsageError
+from palpate.frozen import own_arrays
 
 __all__ = ["HIGHEST", "Stiffening", "exponents", "powers", "stiffening_into"]
 
@@ -65,13 +66,9 @@ class Stiffening:
     exponents: np.ndarray
 
     def __post_init__(self) -> None:
-        c, E = (
-            np.array(self.coefficients, dtype=np.float64),
-            np.array(self.exponents, dtype=np.int64, order="C"),
-        )
-        c.flags.writeable = E.flags.writeable = False
-        object.__setattr__(self, "coefficients", c)
-        object.__setattr__(self, "exponents", E)
+        own_arrays(self, "coefficients")
+        own_arrays(self, "exponents", dtype=np.int64)
+        c, E = self.coefficients, self.exponents
         fits = E.ndim == 2 and c.shape == E.shape[:1] and np.isfinite(c).all()
         if not fits or (E < 0).any() or E.sum(axis=1).max(initial=0) > HIGHEST:
             raise UsageError(

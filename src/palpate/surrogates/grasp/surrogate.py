@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.frozen import own_arrays
 from palpate.network import Network, TrainedRegion
 from palpate.network.second_order import gram
 from palpate.surrogates.continuation import Continuation
@@ -81,10 +82,7 @@ class GraspSurrogate(LearntEnergy):
             object.__setattr__(self, "continuation", Continuation.of(self.network.inputs, share=_SHARE))
         if self.stiffening is None:
             object.__setattr__(self, "stiffening", Stiffening.none(len(self.network.inputs)))
-        if self.root is not None:
-            root = np.array(self.root, dtype=np.float64, order="C")
-            root.flags.writeable = False
-            object.__setattr__(self, "root", root)
+        own_arrays(self, "root")
         if fault := self._fault():
             raise UsageError(
                 f"A grasp surrogate can't be made: {fault}.",

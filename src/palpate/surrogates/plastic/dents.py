@@ -30,6 +30,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.frozen import own_arrays
 from palpate.surrogates.plastic.dent_kernels import step_into
 from palpate.words import share
 
@@ -67,10 +68,7 @@ class Dents:
     width: float
 
     def __post_init__(self) -> None:
-        for name in ("dent", "reach", "stiffening", "points"):
-            array = np.array(getattr(self, name), dtype=np.float64, order="C")
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
+        own_arrays(self, "dent", "reach", "stiffening", "points")
         p, Q, k = self.dent, self.reach, self.stiffening
         shaped = p.ndim == 1 and len(p) > 1 and Q.shape == k.shape == p.shape
         placed = (

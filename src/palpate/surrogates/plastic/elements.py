@@ -29,6 +29,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.frozen import own_arrays
 
 __all__ = ["Elements"]
 
@@ -60,10 +61,7 @@ class Elements:
     time: np.ndarray
 
     def __post_init__(self) -> None:
-        for name in ("stiffness", "limit", "rise", "time"):
-            array = np.array(getattr(self, name), dtype=np.float64)
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
+        own_arrays(self, "stiffness", "limit", "rise", "time")
         n = self.stiffness.shape
         shaped = len(n) == 1 and n[0] > 0 and self.limit.shape == self.rise.shape == self.time.shape == n
         sound = shaped and bool(

@@ -33,7 +33,7 @@ class PlainField:
         s = net.scaling
         self.rows = np.hstack([net.tail, net.weights]) * s.output_scale[:, None]
         self.modes = field.modes.reshape(len(field.modes), -1)
-        self.nodes = np.flatnonzero(field.dimple.touched)
+        self.nodes = np.flatnonzero(field.touched)
         self.points = field.points[self.nodes]
 
     def __call__(self, c: np.ndarray) -> np.ndarray:
@@ -115,7 +115,7 @@ def made(nodes: int = NODES, modes: int = MODES) -> tuple[TouchSurrogate, FieldS
         rise=Rise("series", DEEPEST, 1e-3),
         surface=face,
         radius=RADIUS,
-        dimple=Dimple(table, 3 * RADIUS, np.ones(nodes, dtype=bool), variation),
+        dimple=Dimple(table, 3 * RADIUS, 1e-4, variation),
     )
     region = TrainedRegion.of(rng.uniform(-1.0, 1.0, (400, 3)))
     root = 1e-3 * rng.normal(size=(4 + UNITS, 20))

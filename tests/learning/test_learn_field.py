@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
-import dataclasses
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from palpate.errors import UsageError
-from palpate.learning.fields import SurfaceModes, learn_displacement, learn_field, lumped_mass
-from palpate.learning.fields.dimples import fitted_dimple, travelling_values
+from palpate.learning.fields import (
+    Snapshots,
+    SurfaceModes,
+    learn_displacement,
+    learn_field,
+    learn_snapshots,
+    lumped_mass,
+)
+from palpate.learning.fields.dimples import faded, fitted_dimple
 from palpate.learning.fields.modes import left_out
+from palpate.learning.fields.solves import Solves
 from palpate.learning.fields.varying import by_conjugate_gradients, degrees, directions
 from palpate.surrogates import TouchedSurface
-from palpate.surrogates.field import Rise
+from palpate.surrogates.field import Dimple, Rise, Variation
+from palpate.surrogates.field.carrying import Carrier
+from palpate.surrogates.field.dimple import design
 from palpate.units import Range
 
 RADIUS, DEEPEST = 0.010, 0.006
@@ -159,9 +169,14 @@ def test_a_dimple_alone_needs_no_modes(face, components):
     X, column = columns(10)
     new, _ = columns(6, seed=1)
     known = {"surface": surface, "points": points}
-    dimple = fitted_dimple(dimples(X), X, RADIUS - X[:, 2], rise=rise, **known, mass=mass, radius=RADIUS)
-    shown = travelling_values(dimple, new, RADIUS - new[:, 2], rise, **known)
-    # splines of 2.7 mm, an eleventh of the reach, on a polynomial of degree 8: h⁴ |g''''|/384 of it
+
+    def solves(X):
+        one = Snapshots(X, dimples(X), np.arange(len(X)), points, mass, triangles)
+        return Solves((one,), tuple(BOX), surface, RADIUS, points, triangles, mass)
+
+    dimple = fitted_dimple(solves(X), rise)
+    (shown,) = solves(new).travelling(dimple, rise)
+    # splines of 2.8 mm on a polynomial of degree 8: h⁴ |g''''|/384 of it
     assert np.abs(shown - dimples(new)).max() < 0.01 * np.abs(dimples(new)).max()
 
     more = {**known, "triangles": triangles, "radius": RADIUS, "inputs": BOX, "groups": column}
@@ -192,7 +207,7 @@ def test_a_dimple_that_differs_from_place_to_place_is_learnt(face, components):
     learnt = learn_field(X, dimples(X), **known, groups=column, rise="square", seconds=1, units_max=2)
     assert learnt.field.dimple.variation is not None
     assert "a dimple that varies" in str(learnt.field)
-    fixed = dataclasses.replace(learnt.field, dimple=dataclasses.replace(learnt.field.dimple, variation=None))
+    fixed = replace(learnt.field, dimple=replace(learnt.field.dimple, variation=None))
     missed, without = (F.errors(new, dimples(new)) for F in (learnt.field, fixed))
     assert missed.max() < 0.2 * without.max()
     assert missed.mean() < 0.1 * without.mean()
@@ -211,6 +226,66 @@ def test_a_dimple_that_is_the_same_everywhere_does_not_vary(face):
     assert learnt.field.dimple.variation is None
     alone = learn_field(X, values, **known, groups=np.zeros(len(X)), rise="square", seconds=1, units_max=2)
     assert alone.field.dimple.variation is None, "nothing can be left out"
+
+
+def test_a_dimple_fades_to_nothing_at_its_reach():
+    """What is asked is the window times the profile, smooth to its end; in the middle nothing changes."""
+    r = 21
+    rng = np.random.default_rng(0)
+    t = np.linspace(0.0, 1.0 - 1e-9, 400)
+    greville = (np.arange(r) - 1.0) / (r - 3)
+    smooth = np.cos(3.0 * greville)[None, :, None] * rng.uniform(0.5, 1.0, (2, 1, 4))
+    varied = smooth[0, :, 0][None, None, :, None, None] * rng.normal(size=(4, 3, 1, 4, 3))
+    own = Variation(varied, np.array([[0], [1], [2]]), np.eye(3)[:1], np.array([[0.0], [1.0]]))
+    free = Dimple(smooth, 0.05, 1e-4, own)
+    found = faded(free)
+    u = np.clip((t - 0.3) / 0.7, 0.0, 1.0)
+    window = (1.0 - u) ** 3 * (1.0 + 3.0 * u + 6.0 * u**2)  # 1 and 0 at its ends, with two derivatives
+    before, after = (np.einsum("ti,pij->tpj", design(t * (r - 3), r), one.table) for one in (free, found))
+    # splines of h = 1/18 on a window whose third derivative steps by 60/0.7³: h³ 175 times less than a hundredth
+    assert np.abs(after - window[:, None, None] * before).max() < 3e-4
+    assert not found.table[:, -3:].any()
+    assert not found.variation.table[:, :, -3:].any()
+    before, after = (
+        np.einsum("ti,qmihc->tqmhc", design(t * (r - 3), r), one.variation.table) for one in (free, found)
+    )
+    assert np.abs(after - window[:, None, None, None, None] * before).max() < 3e-4 * np.abs(before).max()
+
+
+def test_what_travels_is_learnt_at_the_nodes_that_it_was_solved_on(face):
+    """A dimple as narrow as two elements, on three meshes: carried from node to node it loses its flank."""
+    points, triangles, surface = face
+    rng = np.random.default_rng(0)
+    inner = (np.abs(points[:, :2]) < 0.029).all(axis=1)
+
+    def mesh():
+        return points + np.where(
+            inner[:, None], rng.uniform(-0.001, 0.001, points.shape) * (1.0, 1.0, 0.0), 0.0
+        )
+
+    def dimples(X, points):
+        rho = np.linalg.norm(points[None, :, :2] - X[:, None, :2], axis=2)
+        return -(RADIUS - X[:, 2:]) * np.exp(-((rho / 0.006) ** 2))
+
+    solved, asked = mesh(), mesh()
+    X, column = columns(30)
+    new, _ = columns(12, seed=1)
+    mass = lumped_mass(points, triangles)
+    known = {"inputs": BOX, "points": points, "triangles": triangles, "surface": surface, "radius": RADIUS}
+    known |= {"rise": "linear", "seconds": 1, "units_max": 2, "mass": mass}
+    own = Snapshots(
+        X, dimples(X, solved)[..., None], column, solved, lumped_mass(solved, triangles), triangles
+    )
+    up = np.tile([0.0, 0.0, 1.0], (len(points), 1))
+    carried = replace(
+        own, values=Carrier.of(solved, triangles, points, up)(own.values), points=points, mass=mass
+    )
+    errors = []
+    for one in (own, carried):
+        shown = learn_snapshots([one], **known).field.values_at(new, asked, triangles)[..., 0]
+        errors.append(np.abs(shown - dimples(new, asked)).max())
+    assert errors[0] < 0.3 * errors[1]
+    assert errors[0] < 0.05 * DEEPEST
 
 
 def test_conjugate_gradients_solve_the_normal_equations():

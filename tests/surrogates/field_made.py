@@ -64,7 +64,7 @@ def field(
         "rise": Rise("series", DEEPEST, 1e-3),
         "surface": ball() if curved else plane(),
         "radius": RADIUS,
-        "dimple": Dimple(table, 0.02, points[:, 2] == 0.0, own) if dimple else None,
+        "dimple": Dimple(table, 0.02, 2e-3, own) if dimple else None,
         "rest": rng.normal(0.0, 1e-3, (nodes, components)),
     } | more
     rest = parts.pop("rest")

@@ -35,7 +35,7 @@ def by_formula(F: FieldSurrogate, x: np.ndarray) -> np.ndarray:
         _, r, q = F.dimple.table.shape
         offset = F.points - (x[:3] - d * n)
         rho = np.linalg.norm(offset, axis=1)
-        near = np.flatnonzero(F.dimple.touched & (rho < F.dimple.reach))
+        near = np.flatnonzero(F.touched & (rho < F.dimple.reach))
         in_depth = BSpline(np.arange(-3.0, q + 1), np.moveaxis(F.dimple.table, 2, 0), 3)
         profile = in_depth(s / F.rise.deepest * (q - 3))  # (parts, r)
         g = BSpline(np.arange(-3.0, r + 1), profile.T, 3)(rho[near] / F.dimple.reach * (r - 3))
@@ -72,7 +72,7 @@ def test_the_field_is_its_formula(rise, components):
     F = field(components=components, rise=Rise(rise, DEEPEST, 1e-3 if rise == "series" else math.inf))
     X = inside_points(20)
     expected = np.array([by_formula(F, x) for x in X])
-    assert F.dimple.touched.sum() == len(F.points) - 1
+    assert F.touched.sum() == len(F.points) - 1
     np.testing.assert_allclose(F.values(X), expected, rtol=0, atol=1e-13 * np.abs(expected).max())
 
 
@@ -92,6 +92,28 @@ def test_the_dimple_of_a_family_varies_with_its_parameters_and_the_place_as_far_
     told = F.dimple.variation.variables(X[:, :3], X[:, 3:])
     assert (np.abs(told) == 1.0).any()
     assert (np.abs(told[:, 2]) < 1.0).any()
+
+
+def linear(shapes: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Fields (k, nodes, components) that are linear over the face, of numbers (k, 3, components)."""
+    return np.einsum("nj,kjc->knc", np.column_stack([np.ones(len(points)), 10.0 * points[:, :2]]), shapes)
+
+
+def test_at_other_nodes_the_dimple_is_its_formula_and_the_rest_is_carried():
+    """Rest and modes that are linear over the face are carried as they are."""
+    (points, triangles), rng = grid(), np.random.default_rng(3)
+    shapes = rng.normal(0.0, 1e-3, (6, 3, 3))
+    rest, *modes = linear(shapes, points)
+    F = dataclasses.replace(field(), rest=rest, modes=np.array(modes))
+    X = inside_points(20)
+    np.testing.assert_array_equal(F.values_at(X, points, triangles), F.values(X))
+    inner = (np.abs(points) < 0.045).all(axis=1)
+    moved = points + inner[:, None] * rng.uniform(-0.003, 0.003, points.shape) * (1.0, 1.0, 0.0)
+    rest, *modes = linear(shapes, moved)
+    truth = dataclasses.replace(F, points=moved, rest=rest, modes=np.array(modes))
+    expected, found = np.array([by_formula(truth, x) for x in X]), F.values_at(X, moved, triangles)
+    face = moved[:, 2] == 0.0
+    np.testing.assert_allclose(found[:, face], expected[:, face], rtol=0, atol=1e-7 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("components", [1, 3])
@@ -176,7 +198,7 @@ def test_the_splines_are_the_textbook_ones():
 
     t = np.random.default_rng(0).uniform(0, 1, 50)
     P = products(t, 1 - t, (9, 5))
-    r = BSpline.design_matrix(6 * t, np.arange(-3.0, 10), 3).toarray()[:, :6]
+    r = BSpline.design_matrix(6 * t, np.arange(-3.0, 10), 3).toarray()
     q = BSpline.design_matrix(2 * (1 - t), np.arange(-3.0, 6), 3).toarray()
     np.testing.assert_allclose(P, r[:, :, None] * q[:, None], atol=1e-15)
 
@@ -268,9 +290,7 @@ def test_a_file_with_a_valid_checksum_and_parts_that_do_not_fit_is_refused(tmp_p
         FieldSurrogate.load(tmp_path / "f.palpate")
 
 
-@pytest.mark.parametrize(
-    "name", ["modes", "mass", "triangles", "table", "touched", "varied/table", "varied/powers"]
-)
+@pytest.mark.parametrize("name", ["modes", "mass", "triangles", "table", "varied/table", "varied/powers"])
 def test_a_file_with_an_array_of_another_kind_or_shape_is_refused(tmp_path, name):
     archive = load_archive(field().save(tmp_path / "f.palpate"))
     for array in (archive.arrays[name].astype(np.float32), archive.arrays[name][:-1].copy()):
@@ -296,7 +316,8 @@ def test_parts_that_do_not_fit_are_refused():
         {"triangles": np.array([[0, 1, 999]])},
         {"radius_input": 2},
         {"modes": F.modes[:-1]},
-        {"dimple": Dimple(F.dimple.table[:1], 0.02, F.dimple.touched)},
+        {"dimple": Dimple(F.dimple.table[:1], 0.02, 1e-4)},
+        {"dimple": Dimple(np.ones((2, 9, 5)), 0.02, 1e-4)},  # does not end at its reach
     ):
         with pytest.raises(UsageError, match="field surrogate"):
             dataclasses.replace(F, **more)
@@ -305,7 +326,9 @@ def test_parts_that_do_not_fit_are_refused():
     with pytest.raises(UsageError, match="length"):
         Rise("square", 0.01, 1e-3)
     with pytest.raises(UsageError, match="dimple"):
-        Dimple(np.ones((2, 9, 5)), 0.02, F.dimple.touched)
+        Dimple(np.full((2, 9, 5), np.nan), 0.02, 1e-4)
+    with pytest.raises(UsageError, match="within"):
+        Dimple(np.zeros((2, 9, 5)), 0.02, 0.0)
     own = F.dimple.variation
     for more in ({"table": own.table[:, :-1]}, {"scales": -own.scales}, {"axes": own.axes[:, :2]}):
         with pytest.raises(UsageError, match="how a dimple varies"):

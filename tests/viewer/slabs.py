@@ -42,7 +42,7 @@ def touched_slab(**more: object) -> TouchedBody:
 
 def _field(touch, components: int) -> FieldSurrogate:
     points, triangles = box()
-    nodes, top = len(points), points[:, 2] > -1e-9
+    nodes = len(points)
     mass = np.full(nodes, 1.0 / nodes)
     # the middle sinks, the sides bulge; nothing moves at the bottom
     deep = 1.0 + points[:, 2] / HIGH
@@ -67,7 +67,7 @@ def _field(touch, components: int) -> FieldSurrogate:
         rise=Rise("linear", pressed.DEEPEST),
         surface=touch.surface,
         radius=pressed.RADIUS,
-        dimple=Dimple(_table(components), 0.03, top, _variation(components)),
+        dimple=Dimple(_table(components), 0.03, 1e-4, _variation(components)),
     )
 
 

@@ -208,7 +208,7 @@ class PressedBody:
             return None
         corners = skin.triangles
         if skin.dimple is not None:
-            corners = corners[skin.dimple.touched[corners].all(axis=1)]
+            corners = corners[skin.touched[corners].all(axis=1)]
         return Patches.over(skin.points, corners, spacing, width=width, energy=energy)
 
     def evaluator(self) -> PressedEvaluator:

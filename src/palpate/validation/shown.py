@@ -8,7 +8,6 @@ import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.surrogates import FieldSurrogate
-from palpate.surrogates.field.carrying import Carrier, node_normals
 from palpate.validation.region import Worst
 
 __all__ = ["ShownErrors", "shown_errors"]
@@ -36,21 +35,18 @@ class ShownErrors:
 def shown_errors(field: FieldSurrogate, test: Dataset) -> ShownErrors:
     """Of a displacement field on the converged rows of unseen solves.
 
-    The field's mesh may be another than the solves': what it shows is then carried to their nodes.
+    The field's mesh may be another than the solves': it is asked at their nodes.
     """
     test = test.ok
     nodes, own = np.unique(test.triangles, return_inverse=True)
     points = test.rest[nodes]
-    truth, shown = test.displacement[:, nodes], field.values(test.X)
-    if field.points.shape != points.shape or not np.allclose(field.points, points):
-        facing = node_normals(points, own.reshape(-1, 3))
-        shown = Carrier.of(field.points, field.triangles, points, facing)(shown)
-    error = np.linalg.norm(shown - truth, axis=2)
+    shown = field.values_at(test.X, points, own.reshape(-1, 3))
+    error = np.linalg.norm(shown - test.displacement[:, nodes], axis=2)
     sample, node = (int(i) for i in np.unravel_index(np.argmax(error), error.shape))
     place = "the node at " + ", ".join(f"{1e3 * x:.3g}" for x in points[node]) + " mm"
     return ShownErrors(
         float(error.mean()),
         float(error.max()),
-        float(np.linalg.norm(truth, axis=2).max()),
+        float(np.linalg.norm(test.displacement[:, nodes], axis=2).max()),
         Worst.of(float(error.max()), test.X[sample], test.ranges, place),
     )

@@ -82,13 +82,12 @@ class PressedExhibit:
     def modes(self, index: int) -> Modes:
         """What the page needs to sum up field `index`."""
         one, nodes = self.fields[index], self._nodes
-        touched = np.zeros(0) if one.dimple is None else np.flatnonzero(one.dimple.touched[nodes])
         return Modes(
             reach=0.0 if one.dimple is None else one.dimple.reach,
             rows=0 if one.dimple is None else one.dimple.table.shape[1],
             rest=one.rest[nodes].ravel(),
             modes=one.modes[:, nodes].ravel(),
-            touched=touched,
+            touched=np.flatnonzero(one.touched[nodes]),
         )
 
     def hello(self, state: State, rate: float) -> Touched:

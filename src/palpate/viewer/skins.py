@@ -19,7 +19,7 @@ def touchable_triangles(body: PressedBody, field: FieldSurrogate) -> np.ndarray:
     """Whether each triangle (t,) of a field's surface belongs to the touched surface."""
     corners = field.points[field.triangles]
     if field.dimple is not None:
-        return np.asarray(field.dimple.touched[field.triangles].all(axis=1) & _near(body, corners))
+        return np.asarray(field.touched[field.triangles].all(axis=1) & _near(body, corners))
     return _near(body, corners)
 
 

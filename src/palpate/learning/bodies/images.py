@@ -2,57 +2,42 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from palpate.learning.bodies.touches import Touches
-from palpate.surrogates.field.carrying import Carrier, node_normals
+from palpate.learning.fields import Snapshots, lumped_mass
 
-__all__ = ["Shapes", "shapes_of"]
+__all__ = ["snapshots_of"]
 
 MOST = 400  # shapes to learn a field from; more images of one solve tell little that is new
 
 
-@dataclass(frozen=True, eq=False)
-class Shapes:
-    """A field at a surface's nodes, images among them.
+def snapshots_of(
+    touches: Touches, field: str = "displacement", *, seed: int = 0, most: int = MOST
+) -> list[Snapshots]:
+    """All solves as they are and their images, each on its own nodes; vectors turn with the body.
 
-    Attributes
-    ----------
-    X : (N, n) array
-    values : (N, P, 3) or (N, P, 1) array
-        Of vectors, which turn with the body, or of numbers.
-    groups : (N,) array of int
-        Column of the solve that each comes from.
+    Of too many images whole columns are drawn at random.
     """
-
-    X: np.ndarray
-    values: np.ndarray
-    groups: np.ndarray
-
-
-def shapes_of(touches: Touches, field: str = "displacement", *, seed: int = 0, most: int = MOST) -> Shapes:
-    """All solves as they are and their images, of which whole columns are drawn at random if they are too many."""
     data, columns = touches.data, touches.columns
     nodes, own = np.unique(data.triangles, return_inverse=True)
     points, triangles = data.rest[nodes], own.reshape(-1, 3)
+    mass = lumped_mass(points, triangles)
     solved = np.asarray(data[field])[:, nodes].reshape(len(data), len(nodes), -1)
-    facing = node_normals(touches.points, touches.triangles)
     chosen = _chosen(columns, len(touches.matrices), most, seed)
-    X, values, groups = [], [], []
+    images = []
     for matrix, some in zip(touches.matrices, chosen, strict=True):
         rows = np.flatnonzero(np.isin(columns, some))
         if not rows.size:
             continue
-        places = touches.about + (touches.points - touches.about) @ matrix  # the images under its inverse
-        carried = Carrier.of(points, triangles, places, facing @ matrix)(solved[rows])
-        image = data.X[rows].copy()
-        image[:, :3] = touches.about + (image[:, :3] - touches.about) @ matrix.T
-        X.append(image)
-        values.append(carried @ matrix.T if solved.shape[2] == 3 else carried)
-        groups.append(columns[rows])
-    return Shapes(np.concatenate(X), np.concatenate(values), np.concatenate(groups))
+        X, values = data.X[rows].copy(), solved[rows]
+        X[:, :3] = touches.about + (X[:, :3] - touches.about) @ matrix.T
+        values = values @ matrix.T if values.shape[2] == 3 else values
+        places = touches.about + (points - touches.about) @ matrix.T
+        # seen in a mirror, a triangle runs round the other way
+        around = triangles if np.linalg.det(matrix) > 0 else triangles[:, ::-1]
+        images.append(Snapshots(X, values, columns[rows], places, mass, around))
+    return images
 
 
 def _chosen(columns: np.ndarray, images: int, most: int, seed: int) -> list[np.ndarray]:

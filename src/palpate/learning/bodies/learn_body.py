@@ -9,11 +9,11 @@ from typing import Any
 
 from palpate.dataset import Dataset, Layout
 from palpate.errors import UsageError
-from palpate.learning.bodies.images import shapes_of
+from palpate.learning.bodies.images import snapshots_of
 from palpate.learning.bodies.touches import Touches
 from palpate.learning.energy import LearntSurrogate, learn_surrogate
 from palpate.learning.energy.strategy import time_for
-from palpate.learning.fields import LearntField, learn_field
+from palpate.learning.fields import LearntField, learn_snapshots, lumped_mass
 from palpate.surrogates import TouchedBody
 from palpate.words import share
 
@@ -153,17 +153,15 @@ def _energy(touches: Touches, options: dict[str, Any]) -> LearntSurrogate:
 
 
 def _field(touches: Touches, name: str, unit: str, seconds: float, seed: int) -> LearntField:
-    shapes = shapes_of(touches, name, seed=seed)
-    return learn_field(
-        shapes.X,
-        shapes.values,
+    return learn_snapshots(
+        snapshots_of(touches, name, seed=seed),
         inputs=touches.inputs,
         points=touches.points,
         triangles=touches.triangles,
+        mass=lumped_mass(touches.points, touches.triangles),
         surface=touches.surface,
         radius=touches.radius,
         radius_input=touches.radius_input,
-        groups=shapes.groups,
         name=name,
         unit=unit,
         seconds=seconds,

@@ -1,4 +1,4 @@
-"""Solves of a field, and how it is parted: how it begins, what travels with the probe, modes, coefficients."""
+"""How a field is parted: how it begins, what travels with the probe, modes, coefficients."""
 
 from __future__ import annotations
 
@@ -6,45 +6,21 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
-from palpate.learning.fields.dimples import fitted_dimple, touched_nodes, travelling_values
+from palpate.learning.fields.dimples import faded, fitted_dimple
 from palpate.learning.fields.kernel import at_solves
 from palpate.learning.fields.modes import SurfaceModes, left_out
 from palpate.learning.fields.search import Coefficients
+from palpate.learning.fields.solves import Solves
 from palpate.learning.fields.varying import fitted_variation
 from palpate.network.radial import RadialFunction
-from palpate.surrogates import TouchedSurface
 from palpate.surrogates.field import Dimple, Rise
-from palpate.units import Range, bounds
 
-__all__ = ["Parted", "Solves", "best_part"]
+__all__ = ["Parted", "best_part"]
 
 _TO_COMPARE: tuple[RadialFunction, ...] = ("matern-5/2",)  # how fields rise
-
-
-@dataclass(frozen=True, eq=False)
-class Solves:
-    """Checked solves in contact, the field less its rest, and all that is known beside them."""
-
-    X: np.ndarray
-    values: np.ndarray
-    depth: np.ndarray
-    groups: np.ndarray
-    inputs: tuple[Range, ...]
-    surface: TouchedSurface
-    radius: float
-    points: np.ndarray
-    mass: np.ndarray
-    radius_input: int | None = None
-
-    @property
-    def scaled(self) -> np.ndarray:
-        """Inputs (N, n) over the ranges, −1 to 1."""
-        low, high = bounds(self.inputs)
-        return np.asarray((2.0 * self.X - low - high) / (high - low))
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +28,7 @@ class Parted:
     """A rise, and what follows from it: travelling part, modes, coefficients."""
 
     rise: Rise
+    free: Dimple | None  # as fitted, before it fades
     dimple: Dimple | None
     modes: SurfaceModes
     problem: Coefficients
@@ -69,22 +46,15 @@ def _parted(
     solves: Solves, name: str, length: float, tolerance: float, most: int, travelling: bool, border: bool
 ) -> Parted:
     """Travelling part, modes and coefficients of the fields, as they follow from a rise."""
-    deepest = float(solves.depth.max())
-    rise = Rise(name, deepest, length if name == "series" else math.inf)
-    C, remainder, dimple = np.ascontiguousarray(solves.X[:, :3]), solves.values, None
-    probe = {"surface": solves.surface, "points": solves.points}
-    if travelling:
-        known: dict[str, Any] = {**probe, "mass": solves.mass, "radius": solves.radius, "border": border}
-        dimple = fitted_dimple(remainder, C, solves.depth, rise=rise, **known)
-    if dimple is not None:
-        remainder = remainder - travelling_values(dimple, C, solves.depth, rise, **probe)  # type: ignore[arg-type]
-    return _with_modes(solves, rise, dimple, remainder, tolerance, most)
+    rise = Rise(name, float(solves.depth.max()), length if name == "series" else math.inf)
+    dimple = fitted_dimple(solves, rise, border=border) if travelling else None
+    return _with_modes(solves, rise, dimple, tolerance, most)
 
 
-def _with_modes(
-    solves: Solves, rise: Rise, dimple: Dimple | None, remainder: np.ndarray, tolerance: float, most: int
-) -> Parted:
-    """Modes and coefficients of what the travelling part leaves."""
+def _with_modes(solves: Solves, rise: Rise, free: Dimple | None, tolerance: float, most: int) -> Parted:
+    """Modes and coefficients of what the travelling part, once it fades, leaves."""
+    dimple = None if free is None else faded(free)
+    remainder = solves.remainder(dimple, rise)
     modes = SurfaceModes.of(remainder, solves.mass)
     count = min(modes.count(tolerance), most)
     missed = modes.missed
@@ -94,30 +64,19 @@ def _with_modes(
     along = remainder.reshape(len(remainder), -1) @ weighted.T
     problem = Coefficients(solves.scaled, along, rise.at(solves.depth), solves.groups)
     beyond = left_out(remainder, solves.mass, count, solves.groups)
-    return Parted(rise, dimple, modes, problem, truncation, beyond)
+    return Parted(rise, free, dimple, modes, problem, truncation, beyond)
 
 
 def _varied(solves: Solves, part: Parted, tolerance: float, most: int) -> list[Parted]:
     """The same with a dimple that differs from place to place; none where columns left out say that it does not."""
-    if part.dimple is None:
+    if part.free is None:
         return []
-    C = np.ascontiguousarray(solves.X[:, :3])
-    remainder = solves.values - travelling_values(
-        part.dimple, C, solves.depth, part.rise, solves.surface, solves.points
-    )
-    found = fitted_variation(
-        *(remainder, solves.X, solves.depth, solves.groups),
-        dimple=part.dimple,
-        rise=part.rise,
-        surface=solves.surface,
-        points=solves.points,
-        mass=solves.mass,
-    )
-    if found is None:
+    even = solves.travelling(part.free, part.rise)
+    left = [u - one for u, one in zip(solves.values, even, strict=True)]
+    variation = fitted_variation(solves, left, part.free, part.rise)
+    if variation is None:
         return []
-    variation, shown = found
-    dimple = replace(part.dimple, variation=variation)
-    return [_with_modes(solves, part.rise, dimple, remainder - shown, tolerance, most)]
+    return [_with_modes(solves, part.rise, replace(part.free, variation=variation), tolerance, most)]
 
 
 def best_part(
@@ -134,16 +93,11 @@ def best_part(
         return _parted(solves, name, length, tolerance, most, travelling, border)
 
     borders = (True, False) if travelling else (True,)
-    first = _chosen([of(names[-1], border) for border in borders])
-    border = first.dimple is None or bool(_same_touched(first, solves))
+    both = [of(names[-1], border) for border in borders]
+    first = _chosen(both)
+    border = first is both[0]
     even = _chosen([first, *(of(name, border) for name in names[:-1])])
     return _chosen([even, *_varied(solves, even, tolerance, most)])
-
-
-def _same_touched(part: Parted, solves: Solves) -> bool:
-    """Whether the border's nodes are in a travelling part."""
-    assert part.dimple is not None
-    return bool((part.dimple.touched == touched_nodes(solves.surface, solves.points, solves.radius)).all())
 
 
 def _chosen(parted: list[Parted]) -> Parted:

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.learning.fields.search import parts_of
+from palpate.learning.fields.solves import Solves
 from palpate.surrogates.field.dimple import Dimple, design
 from palpate.surrogates.field.rise import Rise
 from palpate.surrogates.field.variation import OFFSETS, Variation, polynomials
-from palpate.surrogates.surface import TouchedSurface
 
 __all__ = ["VaryingDimples", "by_conjugate_gradients", "degrees", "directions", "fitted_variation"]
 
@@ -41,8 +41,8 @@ class VaryingDimples:
     Attributes
     ----------
     nodes : list of N (n_i,) int arrays
-        In reach of each probe.
-    near : list of N (n_i, 4 (r − 3)) arrays
+        In reach of each probe, of its own snapshots.
+    near : list of N (n_i, 4 r) arrays
         Products of splines in ρ and offsets at these.
     touches : (N, q, m)
         f times products of splines in s and polynomials.
@@ -55,76 +55,42 @@ class VaryingDimples:
     shape: tuple[int, int]
 
     def images(self, table: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """What a variation's table is (rows, 4 (r − 3), components) at the touch of each solve, f included."""
-        r, components = self.shape
-        flat = table[:, :, : r - 3].reshape(self.touches[0].size, -1, components)
+        """What a variation's table is (rows, 4 r, components) at the touch of each solve, f included."""
+        flat = table.reshape(self.touches[0].size, -1, self.shape[1])
         return np.asarray(np.tensordot(self.touches[rows].reshape(len(rows), -1), flat, 1))
-
-    def values(self, table: np.ndarray, count: int) -> np.ndarray:
-        """Fields (N, count, components) by a variation's table."""
-        images = self.images(table, np.arange(len(self.nodes)))
-        out = np.zeros((len(images), count, self.shape[1]))
-        for i, image in enumerate(images):
-            out[i, self.nodes[i]] = self.near[i] @ image
-        return out
 
 
 def fitted_variation(
-    values: np.ndarray,
-    X: np.ndarray,
-    depth: np.ndarray,
-    groups: np.ndarray,
-    *,
-    dimple: Dimple,
-    rise: Rise,
-    surface: TouchedSurface,
-    points: np.ndarray,
-    mass: np.ndarray,
-) -> tuple[Variation, np.ndarray] | None:
-    """How the dimple of fields varies, and what that gives of them (N, nodes, components).
+    solves: Solves, remainder: list[np.ndarray], dimple: Dimple, rise: Rise
+) -> Variation | None:
+    """How the dimple of fields varies, not yet faded.
+
+    None where it is of no use: with one group alone, or where it gains little of columns left out.
 
     Parameters
     ----------
-    values : (N, nodes, components)
-        Fields less their rest and less what the dimple gives.
-    X : (N, n)
-        Centre of the probe (m), then further inputs.
-    depth : (N,)
-        Of the rigid probe, m.
-    groups : (N,) int
-        Solves that are left out together.
-    dimple, rise, surface, points, mass
-        As in `fitted_dimple`.
-
-    Returns
-    -------
-    (Variation, (N, nodes, components) array) or None
-        None where it is of no use: with one group alone, or where it gains little of columns left out.
+    solves : Solves
+    remainder : list of (N, P, components) arrays
+        Fields of the snapshots, less what the dimple gives.
+    dimple : Dimple
+    rise : Rise
     """
-    parts = parts_of(groups)
+    parts = parts_of(solves.groups)
     if len(parts) < 2:
         return None
-    feet, normals = _feet(surface, np.ascontiguousarray(X[:, :3]))
+    feet, normals = solves.feet
     axes = directions(normals)
-    told = np.hstack([feet @ axes.T, X[:, 3:]])
+    told = np.hstack([feet @ axes.T, solves.X[:, 3:]])
     low, high = told.min(axis=0), told.max(axis=0)
     scales = np.array([(low + high) / 2, np.maximum((high - low) / 2, 1e-9)])
     powers = degrees(told.shape[1])
-    empty = np.zeros((_IN_DEPTH, len(powers), dimple.table.shape[1], OFFSETS, values.shape[2]))
-    blank = Variation(empty, powers, axes, scales)
-    regressors = _regressors(blank, dimple, rise, feet, X[:, 3:], depth, points)
-    fit = _Fit(regressors, values, mass, powers.sum(axis=1))
+    empty = np.zeros((_IN_DEPTH, len(powers), dimple.table.shape[1], OFFSETS, solves.components))
+    regressors = _regressors(Variation(empty, powers, axes, scales), dimple, rise, solves)
+    fit = _Fit(regressors, solves, remainder, powers.sum(axis=1))
     base, missed = _best_base(fit, parts)
     if missed > _GAIN:
         return None
-    found = Variation(fit.table(base, np.arange(len(X))), powers, axes, scales)
-    return found, regressors.values(found.table, len(points))
-
-
-def _feet(surface: TouchedSurface, C: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Feet and normals, each (N, 3)."""
-    d, normals, _ = surface.at(C)
-    return C - d[:, None] * normals, normals
+    return Variation(fit.table(base, np.arange(len(told))), powers, axes, scales)
 
 
 def directions(normals: np.ndarray) -> np.ndarray:
@@ -146,28 +112,21 @@ def degrees(v: int) -> np.ndarray:
     return np.array(sorted(every, key=lambda p: (sum(p), p)))
 
 
-def _regressors(
-    blank: Variation,
-    dimple: Dimple,
-    rise: Rise,
-    feet: np.ndarray,
-    parameters: np.ndarray,
-    depth: np.ndarray,
-    points: np.ndarray,
-) -> VaryingDimples:
+def _regressors(blank: Variation, dimple: Dimple, rise: Rise, solves: Solves) -> VaryingDimples:
     r, components = blank.table.shape[2], blank.table.shape[4]
-    touched, nodes, near = np.flatnonzero(dimple.touched), [], []
-    for foot in feet:
-        offset = (points[touched] - foot) / dimple.reach
+    touched = [np.flatnonzero(dimple.touches(solves.surface, one.points)) for one in solves.snapshots]
+    feet, nodes, near = solves.feet[0], [], []
+    for (k, _), foot in zip(solves.rows(), feet, strict=True):
+        offset = (solves.snapshots[k].points[touched[k]] - foot) / dimple.reach
         distance = np.linalg.norm(offset, axis=1)
         some = np.flatnonzero(distance < 1.0)
-        B = design(distance[some] * (r - 3), r)[:, : r - 3]
+        B = design(distance[some] * (r - 3), r)
         around = np.column_stack([np.ones(len(some)), offset[some]])
-        nodes.append(touched[some])
+        nodes.append(touched[k][some])
         near.append((B[:, :, None] * around[:, None, :]).reshape(len(some), -1))
-    in_depth = design(np.minimum(depth / rise.deepest, 1.0) * (_IN_DEPTH - 3), _IN_DEPTH)
-    in_place = polynomials(blank.variables(feet, parameters), blank.powers)
-    touches = rise.at(depth)[:, None, None] * in_depth[:, :, None] * in_place[:, None, :]
+    in_depth = design(np.minimum(solves.depth / rise.deepest, 1.0) * (_IN_DEPTH - 3), _IN_DEPTH)
+    in_place = polynomials(blank.variables(feet, solves.X[:, 3:]), blank.powers)
+    touches = rise.at(solves.depth)[:, None, None] * in_depth[:, :, None] * in_place[:, None, :]
     return VaryingDimples(nodes, near, touches, (r, components))
 
 
@@ -175,19 +134,20 @@ class _Fit:
     """Normal equations of all solves, each as a product."""
 
     def __init__(
-        self, regressors: VaryingDimples, values: np.ndarray, mass: np.ndarray, total: np.ndarray
+        self, regressors: VaryingDimples, solves: Solves, fields: list[np.ndarray], total: np.ndarray
     ) -> None:
-        self._regressors, self._values, self._mass, self._total = regressors, values, mass, total
-        R = regressors.shape[0] - 3
-        rough = np.diff(np.eye(R + 3), n=2, axis=0)[:, :R]
-        smooth = np.linalg.cholesky(np.linalg.inv(_ROUGH * rough.T @ rough + _LEAST * np.eye(R)))
+        self._regressors, self._total = regressors, total
+        rows = list(zip(solves.rows(), regressors.nodes, strict=True))
+        self._values = [fields[k][i, nodes] for (k, i), nodes in rows]
+        self._mass = [solves.snapshots[k].mass[nodes] for (k, _), nodes in rows]
+        r = regressors.shape[0]
+        rough = np.diff(np.eye(r), n=2, axis=0)
+        smooth = np.linalg.cholesky(np.linalg.inv(_ROUGH * rough.T @ rough + _LEAST * np.eye(r)))
         self._prior = np.kron(smooth, np.eye(OFFSETS))
-        weighted = [
-            A * mass[rows][:, None] for A, rows in zip(regressors.near, regressors.nodes, strict=True)
-        ]
+        weighted = [A * mass[:, None] for A, mass in zip(regressors.near, self._mass, strict=True)]
         G = [A.T @ W for A, W in zip(regressors.near, weighted, strict=True)]
         self._grams = self._prior.T @ np.array(G) @ self._prior
-        sides = [W.T @ u[rows] for W, u, rows in zip(weighted, values, regressors.nodes, strict=True)]
+        sides = [W.T @ u for W, u in zip(weighted, self._values, strict=True)]
         self._sides = self._prior.T @ np.array(sides)
 
     def missed(self, rows: np.ndarray, table: np.ndarray | None = None) -> float:
@@ -195,10 +155,9 @@ class _Fit:
         total = 0.0
         images = None if table is None else self._regressors.images(table, rows)
         for i, row in enumerate(rows):
-            nodes = self._regressors.nodes[row]
-            left = self._values[row, nodes]
+            left = self._values[row]
             left = left if images is None else left - self._regressors.near[row] @ images[i]
-            total += float((left**2).sum(axis=1) @ self._mass[nodes])
+            total += float((left**2).sum(axis=1) @ self._mass[row])
         return total
 
     def missed_left_out(self, base: float, out: np.ndarray) -> float:
@@ -211,10 +170,8 @@ class _Fit:
         touches = (self._regressors.touches[rows] * size).reshape(len(rows), -1)
         found = by_conjugate_gradients(self._grams[rows], touches, self._sides[rows])
         (r, components), (q, m) = self._regressors.shape, self._regressors.touches.shape[1:]
-        out = np.zeros((q, m, r, OFFSETS, components))
-        free = np.einsum("kl,flc->fkc", self._prior, found).reshape(q, m, r - 3, OFFSETS, components)
-        out[:, :, : r - 3] = free * size[None, :, None, None, None]
-        return out
+        free = np.einsum("kl,flc->fkc", self._prior, found).reshape(q, m, r, OFFSETS, components)
+        return np.asarray(free * size[None, :, None, None, None])
 
 
 def _best_base(fit: _Fit, parts: list[np.ndarray]) -> tuple[float, float]:

@@ -5,6 +5,8 @@
     rise         how a field begins with depth
     dimple       the part that travels with the probe
     variation    … and how it differs from place to place
+    travelling   … at any places, of many touches at once
+    carrying     what is known at the nodes of one mesh, at those of another
     field        FieldSurrogate, the whole of it
     errors       what the modes miss, and what learning misses
     kernels      the loops behind it

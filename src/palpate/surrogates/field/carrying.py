@@ -91,7 +91,8 @@ def _weights(offsets: np.ndarray, facing: np.ndarray) -> np.ndarray:
 
 
 def _tangents(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two unit vectors (Q, 3) across each normal (Q, 3)."""
+    """Two unit vectors (Q, 3) across each normal (Q, 3); where it is zero, as if it were that of the plane z = 0."""
+    normals = np.where(normals.any(axis=1, keepdims=True), normals, (0.0, 0.0, 1.0))
     least = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
     first = np.cross(normals, least)
     first /= np.linalg.norm(first, axis=1, keepdims=True)

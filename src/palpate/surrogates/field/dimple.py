@@ -8,7 +8,7 @@ same everywhere in the probe's own frame is taken out before:
     vector   f(s) [g₀(ρ, s) n + g₁(ρ, s) t/L]        scalar   f(s) g₀(ρ, s)
 
 on the nodes of the touched surface with ρ < L, else zero. g is a product of uniform cubic B-splines (de Boor 1978) in
-ρ and s; the last three in ρ are left out, so that it ends at L with two continuous derivatives.
+ρ and s; in a field's the last three in ρ are zero, so that it ends at L with two continuous derivatives.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.frozen import own_arrays
 from palpate.surrogates.field.variation import Variation
+from palpate.surrogates.surface import TouchedSurface
 
 __all__ = ["Dimple", "design", "products", "splines"]
 
@@ -43,9 +44,9 @@ def design(t: np.ndarray, count: int) -> np.ndarray:
 
 
 def products(offsets: np.ndarray, depths: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """Products of the splines (N, r − 3, q) at ρ/L in [0, 1) and s/s* in [0, 1], both (N,), for a shape (r, q)."""
+    """Products of the splines (N, r, q) at ρ/L in [0, 1) and s/s* in [0, 1], both (N,), for a shape (r, q)."""
     r, q = shape
-    return np.asarray(design(offsets * (r - 3), r)[:, : r - 3, None] * design(depths * (q - 3), q)[:, None])
+    return np.asarray(design(offsets * (r - 3), r)[:, :, None] * design(depths * (q - 3), q)[:, None])
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,34 +56,34 @@ class Dimple:
     Attributes
     ----------
     table : (parts, r, q)
-        Coefficients of the splines in ρ (r of them, the last three zero) and s (q), for g₀ and, of vectors, g₁.
+        Coefficients of the splines in ρ (r) and s (q), for g₀ and, of vectors, g₁.
     reach : float
         L, m.
-    touched : (nodes,) bool
-        Where it is.
+    within : float
+        Nodes as near as this (m) to the touched surface at rest belong to it.
     variation : Variation, optional
         How it differs from place to place.
 
     Raises
     ------
     UsageError
-        If the table or the reach is none, or the variation is of another kind of field or other splines in ρ.
+        If the table or a length is none, or the variation is of another kind of field or other splines in ρ.
     """
 
     table: np.ndarray
     reach: float
-    touched: np.ndarray
+    within: float
     variation: Variation | None = None
 
     def __post_init__(self) -> None:
         own_arrays(self, "table")
-        own_arrays(self, "touched", dtype=np.bool_)
         table = self.table
         fits = table.ndim == 3 and table.shape[0] in (1, 2) and min(table.shape[1:]) >= 4
-        if not (fits and np.isfinite(table).all() and not table[:, -3:].any() and 0 < self.reach < np.inf):
+        sized = 0 < self.reach < np.inf and 0 < self.within < np.inf
+        if not (fits and sized and np.isfinite(table).all()):
             raise UsageError(
-                f"A table of shape {table.shape} that reaches {self.reach} m is no dimple.",
-                why="It holds finite coefficients of four splines or more each way, the last three in ρ zero.",
+                f"A table of shape {table.shape} that reaches {self.reach} m, within {self.within} m, is no dimple.",
+                why="It holds finite coefficients of four splines or more each way.",
                 fix="Let `palpate.learning.fields` fit it.",
             )
         own, parts = self.variation, {1: 1, 3: 2}
@@ -94,3 +95,7 @@ class Dimple:
                 why="Both have the same splines in ρ and the same components.",
                 fix="Let `palpate.learning.fields` fit both.",
             )
+
+    def touches(self, surface: TouchedSurface, points: np.ndarray) -> np.ndarray:
+        """Which nodes (nodes, 3) move with it, (nodes,) bool."""
+        return np.asarray(np.abs(surface.at(np.ascontiguousarray(points))[0]) < self.within)

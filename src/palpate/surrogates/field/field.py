@@ -25,10 +25,12 @@ from palpate.network import Network
 from palpate.network.compiled import Precision
 from palpate.surrogates.arguments import rows_of
 from palpate.surrogates.continuation import Continuation
+from palpate.surrogates.field.carrying import Carrier, node_normals
 from palpate.surrogates.field.dimple import Dimple
 from palpate.surrogates.field.errors import FieldErrors, sizes_of
 from palpate.surrogates.field.evaluator import FieldEvaluator
 from palpate.surrogates.field.rise import Rise
+from palpate.surrogates.field.travelling import profiling, travelling_values
 from palpate.surrogates.surface import TouchedSurface
 from palpate.units import Range, bounds
 
@@ -133,9 +135,12 @@ class FieldSurrogate:
         wanted, dimple = {1: 1, 3: 2}.get(self.rest.shape[1]), self.dimple
         if dimple is None:
             return ""
-        if dimple.touched.shape != (len(self.points),) or len(dimple.table) != wanted:
-            return "its travelling part is of other nodes or components"
+        if len(dimple.table) != wanted:
+            return "its travelling part is of other components"
         own, further = dimple.variation, len(self.inputs) - 3
+        ends = [dimple.table[:, -3:], *([] if own is None else [own.table[:, :, -3:]])]
+        if any(end.any() for end in ends):
+            return "its travelling part does not end at its reach"
         strange = own is not None and own.powers.shape[1] != len(own.axes) + further
         return "its travelling part varies with other inputs" if strange else ""
 
@@ -162,6 +167,13 @@ class FieldSurrogate:
         return self.network.inputs
 
     @cached_property
+    def touched(self) -> np.ndarray:
+        """Nodes (nodes,) that the travelling part moves, bool."""
+        if self.dimple is None:
+            return np.zeros(len(self.points), dtype=np.bool_)
+        return self.dimple.touches(self.surface, self.points)
+
+    @cached_property
     def _fixed(self) -> tuple[np.ndarray, np.ndarray]:
         going = self.continuation
         assert going is not None
@@ -176,22 +188,14 @@ class FieldSurrogate:
         return (*self._fixed, self.surface.compiled(), self.network.compiled())
 
     def profiling(self) -> tuple[Any, ...]:
-        """(s*, table, varied, powers, axes, scales, chebyshev, weights): what `profile_into` takes last."""
-        table = np.zeros((1, 4, 4)) if self.dimple is None else self.dimple.table
-        own = None if self.dimple is None else self.dimple.variation
-        if own is None:
-            none = (np.zeros((0, 0)), np.zeros((0, 0), np.int64), np.zeros((0, 3)), np.zeros((2, 0)))
-            return self.rise.deepest, table, *none, np.zeros((0, 2)), np.zeros(4)
-        q, m = own.table.shape[:2]
-        degrees = np.zeros((own.powers.shape[1], max(int(own.powers.max(initial=0)), 1) + 1))
-        known = (own.table.reshape(q * m, -1), own.powers, own.axes, own.scales)
-        return self.rise.deepest, table, *known, degrees, np.zeros(4 + 5 * m)
+        """What `profile_into` takes last."""
+        return profiling(self.dimple, self.rise.deepest)
 
     def travelling(self) -> tuple[Any, ...]:
         """(reach, nodes, points): what `field_into` takes last."""
         if self.dimple is None:
             return 1.0, np.zeros(0, np.int64), np.zeros((0, 3))
-        nodes = np.flatnonzero(self.dimple.touched)
+        nodes = np.flatnonzero(self.touched)
         return float(self.dimple.reach), nodes, np.ascontiguousarray(self.points[nodes])
 
     def _checked(self, X: np.ndarray) -> np.ndarray:
@@ -226,6 +230,37 @@ class FieldSurrogate:
             ev(x[:3], x[3:])
             out[i] = ev.field()
         return out
+
+    def values_at(self, X: np.ndarray, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+        """The field (N, P, components) at the nodes of another mesh of the same surface.
+
+        The travelling part is known everywhere; the others are carried from node to node.
+
+        Parameters
+        ----------
+        X : (N, n)
+        points : (P, 3)
+            At rest, m.
+        triangles : (t, 3) int
+        """
+        if points.shape == self.points.shape and np.allclose(points, self.points, rtol=0, atol=1e-9):
+            return self.values(X)
+        carrier = Carrier.of(self.points, self.triangles, points, node_normals(points, triangles))
+        values = self.values(X)
+        out = carrier(values)
+        if self.dimple is None:
+            return out
+        here, touched = self._travelling_values(X, self.points), self.dimple.touches(self.surface, points)
+        out[:, touched] = (self._travelling_values(X, points) + carrier(values - here))[:, touched]
+        return out
+
+    def _travelling_values(self, X: np.ndarray, points: np.ndarray) -> np.ndarray:
+        assert self.dimple is not None
+        ev, touches = self.evaluator(precision="double"), []
+        for x in self._checked(X):
+            ev(x[:3], x[3:])
+            touches.append(ev.place.copy())
+        return travelling_values(self.dimple, self.rise.deepest, np.array(touches), points)
 
     def errors(self, X: np.ndarray, values: np.ndarray) -> FieldErrors:
         """Errors at solves X (N, n) with the fields (N, nodes, components), split into truncation and learning.

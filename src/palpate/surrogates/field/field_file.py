@@ -27,8 +27,8 @@ KIND = "field-surrogate"
 _NETWORK, _SURFACE = "coefficients", "surface/"
 _OWN = ("modes", "rest", "points", "triangles", "mass")
 _VARIED, _PARTS = "varied/", ("table", "powers", "axes", "scales")
-_KEYS = {"name", "unit", "rise", "deepest", "length", "radius", "radius_input", "reach", "widths", "trained"}
-_KEYS |= {"trained_width", "meta"}
+_KEYS = {"name", "unit", "rise", "deepest", "length", "radius", "radius_input", "reach", "within", "widths"}
+_KEYS |= {"trained", "trained_width", "meta"}
 
 
 def save_field(path: str | os.PathLike[str], field: FieldSurrogate) -> Path:
@@ -66,7 +66,7 @@ def arrays_of(field: FieldSurrogate) -> dict[str, np.ndarray]:
     """Its own arrays, network and surface apart."""
     arrays = {name: getattr(field, name) for name in _OWN}
     if field.dimple is not None:
-        arrays |= {"table": field.dimple.table, "touched": field.dimple.touched}
+        arrays |= {"table": field.dimple.table}
         if (own := field.dimple.variation) is not None:
             arrays |= {_VARIED + name: getattr(own, name) for name in _PARTS}
     return arrays
@@ -85,6 +85,7 @@ def described(field: FieldSurrogate) -> dict[str, Any]:
         "radius": finite(field.radius),
         "radius_input": field.radius_input,
         "reach": None if dimple is None else dimple.reach,
+        "within": None if dimple is None else dimple.within,
         "widths": going.widths.tolist(),
         "trained": finite(going.deepest),
         "trained_width": going.depth_width,
@@ -104,7 +105,7 @@ def field_of(
     """
     from palpate.surrogates.field.field import FieldSurrogate
 
-    expected = {*_OWN, *(("table", "touched") if meta.get("reach") is not None else ())}
+    expected = {*_OWN, *(("table",) if meta.get("reach") is not None else ())}
     varies = meta.get("reach") is not None and any(name.startswith(_VARIED) for name in arrays)
     expected |= {_VARIED + name for name in _PARTS} if varies else set()
     if meta.keys() != _KEYS or arrays.keys() != expected or not isinstance(meta["meta"], dict):
@@ -114,14 +115,14 @@ def field_of(
         raise TypeError(f"its radius is input {own!r}")
     if not (isinstance(meta["name"], str) and isinstance(meta["unit"], str)):
         raise TypeError("its name or unit is no text")
-    kinds = {"triangles": np.int64, "touched": np.bool_, _VARIED + "powers": np.int64}
+    kinds = {"triangles": np.int64, _VARIED + "powers": np.int64}
     for name, array in arrays.items():
         if array.dtype != kinds.get(name, np.float64):
             raise TypeError(f"its {name} holds {array.dtype} numbers")
     dimple = None
     if meta["reach"] is not None:
         variation = Variation(**{name: arrays[_VARIED + name] for name in _PARTS}) if varies else None
-        dimple = Dimple(arrays["table"], number(meta, "reach"), arrays["touched"], variation)
+        dimple = Dimple(arrays["table"], number(meta, "reach"), number(meta, "within"), variation)
     widths = np.array([number({"width": w}, "width") for w in meta["widths"]])
     return FieldSurrogate(
         name=meta["name"],

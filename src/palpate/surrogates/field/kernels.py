@@ -33,7 +33,7 @@ from palpate.surrogates.continuation import saturated
 from palpate.surrogates.field.rise import rise_at
 from palpate.surrogates.surface import distance_into
 
-__all__ = ["FRAME", "coefficients_into", "field_into", "profile_into"]
+__all__ = ["FRAME", "coefficients_into", "field_into", "profile_into", "travelling_into"]
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
 FRAME = 8
@@ -158,7 +158,7 @@ def profile_into(profile, place, deepest, table, varied, powers, axes, scales, c
 
 
 @_jit
-def _add_dimple(y, place, profile, line, reach, nodes, points) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def travelling_into(y, place, profile, line, reach, nodes, points) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Add the travelling part to y (nodes · components,); line (4 · components,) is scratch."""
     r, components = profile.shape[0], profile.shape[2]
     wide = line.size
@@ -193,4 +193,4 @@ def field_into(y, z, place, rows, profile, line, reach, nodes, points) -> None: 
         return
     combine(z, rows, y)
     if nodes.size and place[1] > 0.0:
-        _add_dimple(y, place, profile, line, reach, nodes, points)
+        travelling_into(y, place, profile, line, reach, nodes, points)

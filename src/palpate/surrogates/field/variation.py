@@ -30,7 +30,7 @@ class Variation:
     Attributes
     ----------
     table : (q, m, r, 4, components)
-        Coefficients of the splines in s (q), polynomials (m), splines in ρ (r, the last three zero) and offsets.
+        Coefficients of the splines in s (q), polynomials (m), splines in ρ (r) and offsets.
     powers : (m, v) int
         Degree of each polynomial in each of the v variables.
     axes : (a, 3)
@@ -67,7 +67,7 @@ class Variation:
         sizes = min(table.shape[0], table.shape[2]) >= 4 and table.shape[4] in (1, 3)
         known = np.isfinite(table).all() and np.isfinite(axes).all() and np.isfinite(scales).all()
         signs = (scales[1] > 0).all() and (powers >= 0).all() and len(axes) <= powers.shape[1]
-        return bool(shapes and sizes and known and signs and not table[:, :, -3:].any())
+        return bool(shapes and sizes and known and signs)
 
     def variables(self, feet: np.ndarray, parameters: np.ndarray) -> np.ndarray:
         """Scaled variables (N, v) of feet (N, 3) in m and further inputs (N, p)."""

@@ -1,0 +1,186 @@
+"""Fields of solves, each at the nodes of the mesh that it was solved on, and the mesh that they shall be shown on.
+
+What travels with the probe is learnt where it was solved: carried to other nodes first, the flank of a dimple would
+lose some tenths of a millimetre between elements of 5 mm. Only what that leaves, which is smooth, is carried.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.surrogates import TouchedSurface
+from palpate.surrogates.field import Dimple, Rise
+from palpate.surrogates.field.carrying import Carrier, node_normals
+from palpate.surrogates.field.travelling import travelling_values
+from palpate.units import Range, bounds
+
+__all__ = ["Snapshots", "Solves"]
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshots:
+    """Fields of some touches at the nodes of one mesh.
+
+    Attributes
+    ----------
+    X : (N, n)
+        Centre of the probe (m), then further inputs.
+    values : (N, P, components)
+        Less the field at rest.
+    groups : (N,) int
+        Solves of one group are left out together.
+    points : (P, 3)
+        At rest, m.
+    mass : (P,)
+        Share of the surface that each node stands for.
+    triangles : (t, 3) int
+    """
+
+    X: np.ndarray
+    values: np.ndarray
+    groups: np.ndarray
+    points: np.ndarray
+    mass: np.ndarray
+    triangles: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Solves:
+    """Snapshots in contact, and all that is known beside them.
+
+    Attributes
+    ----------
+    snapshots : tuple of Snapshots
+    inputs : n ranges
+    surface : TouchedSurface
+    radius : float
+        Of the probe, m; where it is an input, a usual one.
+    points, triangles, mass : (nodes, 3), (t, 3), (nodes,) arrays
+        Of the mesh that the field is shown on.
+    radius_input : int, optional
+        The input that is the radius.
+    """
+
+    snapshots: tuple[Snapshots, ...]
+    inputs: tuple[Range, ...]
+    surface: TouchedSurface
+    radius: float
+    points: np.ndarray
+    triangles: np.ndarray
+    mass: np.ndarray
+    radius_input: int | None = None
+
+    @property
+    def touching(self) -> Solves:
+        """Those in contact.
+
+        Raises
+        ------
+        UsageError
+            If none is.
+        """
+        deep, first, kept = self.depth > 0, 0, []
+        for one in self.snapshots:
+            own = deep[first : first + len(one.X)]
+            first += len(own)
+            kept.append(replace(one, X=one.X[own], values=one.values[own], groups=one.groups[own]))
+        if not deep.any():
+            raise UsageError(
+                f"None of {len(deep)} solves has contact.",
+                why="Without contact a field is what it is at rest.",
+                fix="Press deeper, or check the surface and the probe's radius.",
+            )
+        return replace(self, snapshots=tuple(one for one in kept if len(one.X)))
+
+    @cached_property
+    def X(self) -> np.ndarray:
+        """Inputs (N, n) of all."""
+        return np.concatenate([one.X for one in self.snapshots])
+
+    @cached_property
+    def groups(self) -> np.ndarray:
+        """Groups (N,) of all."""
+        return np.concatenate([one.groups for one in self.snapshots])
+
+    @cached_property
+    def depth(self) -> np.ndarray:
+        """Depth (N,) of the rigid probe, m."""
+        radius = self.radius if self.radius_input is None else self.X[:, self.radius_input]
+        return self.surface.depth(np.ascontiguousarray(self.X[:, :3]), radius)
+
+    @cached_property
+    def feet(self) -> tuple[np.ndarray, np.ndarray]:
+        """Touched places at rest and normals there, each (N, 3)."""
+        C = np.ascontiguousarray(self.X[:, :3])
+        d, normals, _ = self.surface.at(C)
+        return C - d[:, None] * normals, normals
+
+    @property
+    def values(self) -> list[np.ndarray]:
+        """Fields of the snapshots."""
+        return [one.values for one in self.snapshots]
+
+    @property
+    def components(self) -> int:
+        """Of the field."""
+        return int(self.snapshots[0].values.shape[2])
+
+    @property
+    def scaled(self) -> np.ndarray:
+        """Inputs (N, n) over the ranges, −1 to 1."""
+        low, high = bounds(self.inputs)
+        return np.asarray((2.0 * self.X - low - high) / (high - low))
+
+    @property
+    def size(self) -> float:
+        """Root mean square of the fields over surface and solves."""
+        squares = [(one.values**2).sum(axis=2) @ one.mass for one in self.snapshots]
+        return float(np.sqrt(np.concatenate(squares).mean()))
+
+    def rows(self) -> Iterator[tuple[int, int]]:
+        """Of every solve the number of its snapshots, and the row there."""
+        return ((k, i) for k, one in enumerate(self.snapshots) for i in range(len(one.X)))
+
+    @cached_property
+    def _carriers(self) -> list[Carrier | None]:
+        facing = node_normals(self.points, self.triangles)
+        return [
+            None
+            if one.points.shape == self.points.shape and (one.points == self.points).all()
+            else Carrier.of(one.points, one.triangles, self.points, facing)
+            for one in self.snapshots
+        ]
+
+    def travelling(self, dimple: Dimple, rise: Rise) -> list[np.ndarray]:
+        """What a dimple gives of the snapshots, each (N, P, components), as if all nodes were touched."""
+        return [
+            travelling_values(dimple, rise.deepest, touches, one.points)
+            for touches, one in zip(self._touches(rise), self.snapshots, strict=True)
+        ]
+
+    def _touches(self, rise: Rise) -> list[np.ndarray]:
+        """Of the snapshots s, f, foot, normal and further inputs, each (N, 8 + p)."""
+        known = (self.depth[:, None], rise.at(self.depth)[:, None], *self.feet, self.X[:, 3:])
+        ends = np.cumsum([len(one.X) for one in self.snapshots])[:-1]
+        return np.split(np.hstack(known), ends)
+
+    def remainder(self, dimple: Dimple | None, rise: Rise) -> np.ndarray:
+        """What a dimple leaves of the fields at the nodes that are shown, (N, nodes, components).
+
+        It is taken away where it is known, at the nodes of the snapshots; only the rest is carried.
+        """
+        whole = self._carried(self.values)
+        if dimple is None:
+            return whole
+        shown = self.travelling(dimple, rise)
+        rest = self._carried([u - one for u, one in zip(self.values, shown, strict=True)])
+        return np.where(dimple.touches(self.surface, self.points)[:, None], rest, whole)
+
+    def _carried(self, fields: Sequence[np.ndarray]) -> np.ndarray:
+        both = zip(self._carriers, fields, strict=True)
+        return np.concatenate([field if carrier is None else carrier(field) for carrier, field in both])

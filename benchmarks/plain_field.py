@@ -97,11 +97,11 @@ def made(nodes: int = NODES, modes: int = MODES) -> tuple[TouchSurrogate, FieldS
         corners, np.array([[0, 1, 2], [0, 2, 3]]), radius=0.006, reach=0.02, spacing=0.002
     )
     basis = np.linalg.qr(rng.normal(size=(3 * nodes, modes)))[0].T * np.sqrt(nodes)
-    table = np.zeros((2, 14, 5))
-    table[:, :-3] = rng.normal(0.0, 1e-3, (2, 11, 5))
+    table = np.zeros((2, 17, 5))
+    table[:, :-3] = rng.normal(0.0, 1e-3, (2, 14, 5))
     powers = np.array([(i, j) for i in range(11) for j in range(11 - i)])
-    varied = np.zeros((4, len(powers), 14, 4, 3))
-    varied[:, :, :-3] = rng.normal(0.0, 1e-4, (4, len(powers), 11, 4, 3))
+    varied = np.zeros((4, len(powers), 17, 4, 3))
+    varied[:, :, :-3] = rng.normal(0.0, 1e-4, (4, len(powers), 14, 4, 3))
     variation = Variation(varied, powers, np.eye(3)[:2], np.array([[0.0, 0.0], [0.02, 0.02]]))
     field = FieldSurrogate(
         "displacement",
@@ -115,7 +115,7 @@ def made(nodes: int = NODES, modes: int = MODES) -> tuple[TouchSurrogate, FieldS
         rise=Rise("series", DEEPEST, 1e-3),
         surface=face,
         radius=RADIUS,
-        dimple=Dimple(table, 3 * RADIUS, 1e-4, variation),
+        dimple=Dimple(table, 5 * RADIUS, 1e-4, variation),
     )
     region = TrainedRegion.of(rng.uniform(-1.0, 1.0, (400, 3)))
     root = 1e-3 * rng.normal(size=(4 + UNITS, 20))

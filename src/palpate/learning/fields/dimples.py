@@ -16,16 +16,24 @@ from palpate.learning.fields.solves import Solves
 from palpate.surrogates.field.dimple import Dimple, design, products
 from palpate.surrogates.field.rise import Rise
 
-__all__ = ["faded", "fitted_dimple"]
+__all__ = ["borders", "faded", "fitted_dimple"]
 
 _REACH = 5.0  # times the radius
 _FULL = 0.3  # of the reach: from there on it fades
-_CELLS = 18  # to the reach: a quarter of the radius each, or little more
+_CELLS = 14  # to the reach, a third of the radius each: smaller ones show the mesh
 _PENALTY = 1e-5  # of the mean diagonal
-# of the radius: the smooth distance rounds a border by 2 to 4 % of it
-_ON, _ON_BORDER = 0.01, 0.06
+# of the radius, with and without nodes on the border: the smooth distance rounds that by 2 to 4 % of the radius
+WITHIN = (0.06, 0.01)
 _EVEN = 1e3  # an even profile is known, not guessed
 _LEAST = 1e-6  # keeps the system regular
+
+
+def borders(solves: Solves) -> tuple[float, ...]:
+    """Which of `WITHIN` make a difference."""
+    distances = [np.abs(solves.surface.at(np.ascontiguousarray(one.points))[0]) for one in solves.snapshots]
+    wide, narrow = ([d < within * solves.radius for d in distances] for within in WITHIN)
+    same = all((a == b).all() for a, b in zip(wide, narrow, strict=True))
+    return WITHIN[:1] if same else WITHIN
 
 
 def faded(dimple: Dimple) -> Dimple:
@@ -50,18 +58,18 @@ def _fading(r: int) -> np.ndarray:
     return fade
 
 
-def fitted_dimple(solves: Solves, rise: Rise, *, border: bool = True) -> Dimple | None:
+def fitted_dimple(solves: Solves, rise: Rise, within: float = WITHIN[0]) -> Dimple | None:
     """The dimple of fields where they were solved, not yet faded; None where no node is in reach.
 
     Fields of one component are scalars, those of three vectors; others have no dimple. Nodes on the border of the
-    touched surface, which also belong to another one, may move otherwise: they can be left to the modes.
+    touched surface, which also belong to another one, may move otherwise: by `within`, a share of the radius, they
+    can be left to the modes.
     """
     if solves.components not in (1, 3):
         return None
     levels = int(np.clip(len(np.unique(np.round(solves.depth / rise.deepest, 6))), 1, 5))
     parts, r, q = 1 if solves.components == 1 else 2, _CELLS + 3, max(4, levels)
-    within = (_ON_BORDER if border else _ON) * solves.radius
-    blank = Dimple(np.zeros((parts, r, q)), _REACH * solves.radius, within)
+    blank = Dimple(np.zeros((parts, r, q)), _REACH * solves.radius, within * solves.radius)
     G, b = np.zeros((parts * r * q,) * 2), np.zeros(parts * r * q)
     for k, i, rows, A in _regressors(blank, solves, rise):
         w = np.repeat(solves.snapshots[k].mass[rows], solves.components)

@@ -84,18 +84,24 @@ class Solves:
         UsageError
             If none is.
         """
-        deep, first, kept = self.depth > 0, 0, []
-        for one in self.snapshots:
-            own = deep[first : first + len(one.X)]
-            first += len(own)
-            kept.append(replace(one, X=one.X[own], values=one.values[own], groups=one.groups[own]))
+        deep = self.depth > 0
         if not deep.any():
             raise UsageError(
                 f"None of {len(deep)} solves has contact.",
                 why="Without contact a field is what it is at rest.",
                 fix="Press deeper, or check the surface and the probe's radius.",
             )
-        return replace(self, snapshots=tuple(one for one in kept if len(one.X)))
+        return self.take(deep)
+
+    def take(self, some: np.ndarray) -> Solves:
+        """Those where `some` (N,) is true."""
+        ends = np.cumsum([len(one.X) for one in self.snapshots])[:-1]
+        kept = [
+            replace(one, X=one.X[own], values=one.values[own], groups=one.groups[own])
+            for one, own in zip(self.snapshots, np.split(some, ends), strict=True)
+            if own.any()
+        ]
+        return replace(self, snapshots=tuple(kept))
 
     @cached_property
     def X(self) -> np.ndarray:

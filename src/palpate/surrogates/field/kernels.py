@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from numba import njit, uint64
 
 from palpate.network.combine import combine
 from palpate.network.evaluate import value_into
@@ -36,7 +36,10 @@ from palpate.surrogates.surface import distance_into
 __all__ = ["FRAME", "coefficients_into", "field_into", "profile_into", "travelling_into"]
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
+# a product and a sum rounded once: faster, and no less exact
+_fused = njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 FRAME = 8
+SIXTH = 1.0 / 6.0
 
 
 @_jit
@@ -157,7 +160,7 @@ def profile_into(profile, place, deepest, table, varied, powers, axes, scales, c
                 profile[i, 1 + e, c] -= across * place[5 + e] * place[5 + c]
 
 
-@_jit
+@_fused
 def travelling_into(y, place, profile, line, reach, nodes, points) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Add the travelling part to y (nodes · components,); line (4 · components,) is scratch."""
     r, components = profile.shape[0], profile.shape[2]
@@ -170,14 +173,14 @@ def travelling_into(y, place, profile, line, reach, nodes, points) -> None:  # t
         if q >= 1.0:
             continue
         t = math.sqrt(q) * (r - 3)
-        first = min(int(t), r - 4)
+        first = uint64(min(int(t), r - 4))  # unsigned: no index counts from the end
         u = t - first
         v = 1.0 - u
-        b0, b1 = v * v * v / 6.0, (3.0 * u * u * u - 6.0 * u * u + 4.0) / 6.0
-        b2, b3 = (3.0 * v * v * v - 6.0 * v * v + 4.0) / 6.0, u * u * u / 6.0
+        b0, b3 = v * v * v * SIXTH, u * u * u * SIXTH
+        b1, b2 = (0.5 * u - 1.0) * u * u + 4.0 * SIXTH, (0.5 * v - 1.0) * v * v + 4.0 * SIXTH
         for k in range(wide):
-            two = b0 * flat[first, k] + b1 * flat[first + 1, k]
-            line[k] = two + b2 * flat[first + 2, k] + b3 * flat[first + 3, k]
+            two = b0 * flat[first, k] + b1 * flat[first + uint64(1), k]
+            line[k] = two + b2 * flat[first + uint64(2), k] + b3 * flat[first + uint64(3), k]
         at = components * nodes[i]
         for c in range(components):
             moved = line[c] + x * line[components + c]

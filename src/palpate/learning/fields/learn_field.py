@@ -18,8 +18,6 @@ from palpate.units import Range
 
 __all__ = ["learn_displacement", "learn_field"]
 
-__all__ = ["LearntField", "learn_displacement", "learn_field"]
-
 
 def learn_displacement(data: Dataset, **options: Any) -> LearntField:
     """Learn the displacement of a body's surface from a dataset of touches; options are those of `learn_field`.

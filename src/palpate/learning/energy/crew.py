@@ -30,7 +30,7 @@ __all__ = ["processes_for", "sought"]
 logger = logging.getLogger("palpate.learning")
 
 _WORTH = 20.0  # s of learning; a process takes two to start
-_MOST = 8  # processes: each holds a copy of the solves, and a mean is of four networks
+_MOST = 8  # processes: each holds a copy of the solves, and finds ten networks and more
 _LATE = 30.0  # s; the last network may be judged after the time is over
 
 

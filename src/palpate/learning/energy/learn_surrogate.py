@@ -68,7 +68,7 @@ def learn_surrogate(
     law: Law = "auto",
     length: float | None = None,
     units_max: int = 160,
-    networks: int = 4,
+    networks: int = 12,
     target: float = 1e-3,
     seconds: float | None = None,
     workers: int | None = None,
@@ -106,7 +106,8 @@ def learn_surrogate(
     units_max : int
         Most units of one network; images count.
     networks : int
-        How many at most make one surrogate, as their mean; one answers faster, four miss less.
+        How many at most make one surrogate, as their mean, and no more than 320 units do; one answers faster,
+        several miss less.
     target : float
         Leave-one-solve-out error at which no more units are added.
     seconds : float, optional

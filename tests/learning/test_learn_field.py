@@ -16,7 +16,7 @@ from palpate.learning.fields import (
     learn_snapshots,
     lumped_mass,
 )
-from palpate.learning.fields.dimples import faded, fitted_dimple
+from palpate.learning.fields.dimples import borders, faded, fitted_dimple
 from palpate.learning.fields.modes import left_out
 from palpate.learning.fields.solves import Solves
 from palpate.learning.fields.varying import by_conjugate_gradients, degrees, directions
@@ -172,7 +172,7 @@ def test_a_dimple_alone_needs_no_modes(face, components):
 
     def solves(X):
         one = Snapshots(X, dimples(X), np.arange(len(X)), points, mass, triangles)
-        return Solves((one,), tuple(BOX), surface, RADIUS, points, triangles, mass)
+        return Solves.of([one], BOX, surface, RADIUS, points, triangles, mass)
 
     dimple = fitted_dimple(solves(X), rise)
     (shown,) = solves(new).travelling(dimple, rise)
@@ -226,6 +226,19 @@ def test_a_dimple_that_is_the_same_everywhere_does_not_vary(face):
     assert learnt.field.dimple.variation is None
     alone = learn_field(X, values, **known, groups=np.zeros(len(X)), rise="square", seconds=1, units_max=2)
     assert alone.field.dimple.variation is None, "nothing can be left out"
+
+
+@pytest.mark.parametrize(("off", "count"), [(0.0, 1), (3e-4, 2), (1e-3, 1)])
+def test_nodes_that_lie_a_little_off_the_surface_are_tried_with_and_without(face, off, count):
+    """By 3 % of the radius, as a rounded border does; on it, or a tenth of the radius off, nothing is to decide."""
+    points, triangles = (
+        np.array([[0.0, 0.0, -off], [0.01, 0.0, 0.0], [0.0, 0.01, 0.0]]),
+        np.array([[0, 1, 2]]),
+    )
+    X, column = columns(2)
+    one = Snapshots(X, np.zeros((6, 3, 1)), column, points, np.full(3, 1 / 3), triangles)
+    solves = Solves.of([one], BOX, face[2], RADIUS, points, triangles, one.mass)
+    assert len(borders(solves)) == count
 
 
 def test_a_dimple_fades_to_nothing_at_its_reach():

@@ -17,8 +17,12 @@ from palpate.errors import UsageError
 from palpate.learning import TouchHistory, learn_body, learn_dataset
 from palpate.learning.bodies import Touches
 from palpate.learning.bodies.images import snapshots_of
+from palpate.learning.fields import Snapshots, lumped_mass
+from palpate.learning.fields.dimples import faded, fitted_dimple
+from palpate.learning.fields.solves import Solves
 from palpate.physics.solid.symmetry import fundamental_part
 from palpate.surrogates import ContactLaw, TouchedBody, TouchModel
+from palpate.surrogates.field import Rise
 from palpate.surrogates.field.carrying import Carrier
 from palpate.sweeps import sweep
 from palpate.sweeps.provenance import provenance
@@ -131,6 +135,34 @@ def test_images_of_a_field_are_fields_of_the_images(field):
         np.testing.assert_allclose(one.values, truth, rtol=0, atol=1e-9 * np.abs(truth).max())
         a, b, c = np.moveaxis(one.points[one.triangles], 1, 0)
         assert np.einsum("ij,ij->", a, np.cross(b - a, c - a)) / 6 == pytest.approx(0.06 * 0.06 * 0.03)
+
+
+def test_what_a_dimple_leaves_is_carried_beside_the_touched_surface_as_it_is():
+    """On another mesh: the whole field where nothing is touched, and the field less the dimple where it is."""
+    body, probe = block()
+    found = Touches.of(touches(), body.problem(probe, element=0.006).layout)
+    mass = lumped_mass(found.points, found.triangles)
+    known = (found.inputs, found.surface, found.radius, found.points, found.triangles, mass)
+    solves = Solves.of(snapshots_of(found), *known).touching
+    rise = Rise("linear", float(solves.depth.max()))
+    dimple = faded(fitted_dimple(solves, rise))
+    touched = dimple.touches(found.surface, found.points)
+    assert 0 < touched.sum() < len(touched)
+    truth = answers(solves.X, found.points)["displacement"]
+    there = Solves.of(
+        [Snapshots(solves.X, truth, solves.groups, found.points, mass, found.triangles)], *known
+    )
+    (shown,) = there.travelling(dimple, rise)
+    assert np.linalg.norm(shown[:, ~touched], axis=2).max() > 0.3 * np.linalg.norm(truth, axis=2).max()
+    miss = np.linalg.norm(
+        solves.remainder(dimple, rise) - np.where(touched[:, None], truth - shown, truth), axis=2
+    )
+    # cubic in h/w = ½ with a factor below one where the whole is carried; the dimple itself is one of this formula
+    assert miss[:, ~touched].max() < 0.1 * np.linalg.norm(truth, axis=2).max()
+    assert miss[:, touched].max() < 0.02 * np.linalg.norm(truth, axis=2).max()
+    half = solves.take(solves.groups < np.median(solves.groups))
+    rows = solves.groups < np.median(solves.groups)
+    np.testing.assert_array_equal(half.remainder(dimple, rise), solves.remainder(dimple, rise)[rows])
 
 
 def test_too_many_images_are_thinned_by_whole_columns():

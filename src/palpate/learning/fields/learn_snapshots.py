@@ -87,8 +87,8 @@ def learn_snapshots(
             f"seconds={seconds}, modes_max={modes_max}, units_max={units_max}, radius={radius} allow no learning.",
             fix="Give positive numbers.",
         )
-    known = (tuple(inputs), surface, radius, points, triangles, mass, radius_input)
-    solves = Solves(tuple(snapshots), *known).touching
+    known = (inputs, surface, radius, points, triangles, mass, radius_input)
+    solves = Solves.of(snapshots, *known).touching
     tolerance = _TOLERANCE * solves.size if tolerance is None else tolerance
     length = radius / 10.0 if length is None else length
     with threadpool_limits(1):  # small matrices: more BLAS threads cost time and the bits of the result

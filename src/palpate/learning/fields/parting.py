@@ -34,7 +34,13 @@ class Parted:
     modes: SurfaceModes
     problem: Coefficients
     truncation: float
-    truncation_left_out: float
+    remainder: np.ndarray  # (N, nodes, components), what the travelling part leaves
+    mass: np.ndarray
+
+    @cached_property
+    def truncation_left_out(self) -> float:
+        """What as many modes of other solves miss of some: root mean square over surface and solves."""
+        return left_out(self.remainder, self.mass, len(self.modes.modes), self.problem.groups)
 
     @cached_property
     def missed(self) -> float:
@@ -71,8 +77,7 @@ def _with_modes(solves: Solves, rise: Rise, free: Dimple | None, tolerance: floa
     weighted = (modes.modes * solves.mass[:, None]).reshape(count, -1)
     along = remainder.reshape(len(remainder), -1) @ weighted.T
     problem = Coefficients(solves.scaled, along, rise.at(solves.depth), solves.groups)
-    beyond = left_out(remainder, solves.mass, count, solves.groups)
-    return Parted(rise, free, dimple, modes, problem, truncation, beyond)
+    return Parted(rise, free, dimple, modes, problem, truncation, remainder, solves.mass)
 
 
 def _varied(solves: Solves, part: Parted, tolerance: float, most: int) -> Parted | None:

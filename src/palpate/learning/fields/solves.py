@@ -62,8 +62,10 @@ class Solves:
         Of the probe, m; where it is an input, a usual one.
     points, triangles, mass : (nodes, 3), (t, 3), (nodes,) arrays
         Of the mesh that the field is shown on.
-    radius_input : int, optional
+    radius_input : int or None
         The input that is the radius.
+    carriers : tuple of Carrier or None
+        From the nodes of each snapshots to those; None where they are the same.
     """
 
     snapshots: tuple[Snapshots, ...]
@@ -73,7 +75,31 @@ class Solves:
     points: np.ndarray
     triangles: np.ndarray
     mass: np.ndarray
-    radius_input: int | None = None
+    radius_input: int | None
+    carriers: tuple[Carrier | None, ...]
+
+    @classmethod
+    def of(
+        cls,
+        snapshots: Sequence[Snapshots],
+        inputs: Sequence[Range],
+        surface: TouchedSurface,
+        radius: float,
+        points: np.ndarray,
+        triangles: np.ndarray,
+        mass: np.ndarray,
+        radius_input: int | None = None,
+    ) -> Solves:
+        """All of them, as they are."""
+        facing = node_normals(points, triangles)
+        carriers = tuple(
+            None
+            if one.points.shape == points.shape and (one.points == points).all()
+            else Carrier.of(one.points, one.triangles, points, facing)
+            for one in snapshots
+        )
+        known = (surface, radius, points, triangles, mass, radius_input)
+        return cls(tuple(snapshots), tuple(inputs), *known, carriers)
 
     @property
     def touching(self) -> Solves:
@@ -95,13 +121,17 @@ class Solves:
 
     def take(self, some: np.ndarray) -> Solves:
         """Those where `some` (N,) is true."""
-        ends = np.cumsum([len(one.X) for one in self.snapshots])[:-1]
         kept = [
-            replace(one, X=one.X[own], values=one.values[own], groups=one.groups[own])
-            for one, own in zip(self.snapshots, np.split(some, ends), strict=True)
+            (replace(one, X=one.X[own], values=one.values[own], groups=one.groups[own]), carrier)
+            for one, carrier, own in zip(self.snapshots, self.carriers, self._split(some), strict=True)
             if own.any()
         ]
-        return replace(self, snapshots=tuple(kept))
+        snapshots, carriers = zip(*kept, strict=True)
+        return replace(self, snapshots=snapshots, carriers=carriers)
+
+    def _split(self, rows: np.ndarray) -> list[np.ndarray]:
+        """What belongs to each snapshots, of an array (N, …)."""
+        return np.split(rows, np.cumsum([len(one.X) for one in self.snapshots])[:-1])
 
     @cached_property
     def X(self) -> np.ndarray:
@@ -152,16 +182,6 @@ class Solves:
         """Of every solve the number of its snapshots, and the row there."""
         return ((k, i) for k, one in enumerate(self.snapshots) for i in range(len(one.X)))
 
-    @cached_property
-    def _carriers(self) -> list[Carrier | None]:
-        facing = node_normals(self.points, self.triangles)
-        return [
-            None
-            if one.points.shape == self.points.shape and (one.points == self.points).all()
-            else Carrier.of(one.points, one.triangles, self.points, facing)
-            for one in self.snapshots
-        ]
-
     def travelling(self, dimple: Dimple, rise: Rise) -> list[np.ndarray]:
         """What a dimple gives of the snapshots, each (N, P, components), as if all nodes were touched."""
         return [
@@ -172,8 +192,7 @@ class Solves:
     def _touches(self, rise: Rise) -> list[np.ndarray]:
         """Of the snapshots s, f, foot, normal and further inputs, each (N, 8 + p)."""
         known = (self.depth[:, None], rise.at(self.depth)[:, None], *self.feet, self.X[:, 3:])
-        ends = np.cumsum([len(one.X) for one in self.snapshots])[:-1]
-        return np.split(np.hstack(known), ends)
+        return self._split(np.hstack(known))
 
     def remainder(self, dimple: Dimple | None, rise: Rise) -> np.ndarray:
         """What a dimple leaves of the fields at the nodes that are shown, (N, nodes, components).
@@ -188,5 +207,5 @@ class Solves:
         return np.where(dimple.touches(self.surface, self.points)[:, None], rest, whole)
 
     def _carried(self, fields: Sequence[np.ndarray]) -> np.ndarray:
-        both = zip(self._carriers, fields, strict=True)
+        both = zip(self.carriers, fields, strict=True)
         return np.concatenate([field if carrier is None else carrier(field) for carrier, field in both])

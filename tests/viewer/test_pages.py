@@ -48,12 +48,16 @@ def test_a_finger_pulls(visit, keep, viewer: Viewer, rod: TouchModel):
 @contextlib.contextmanager
 def held_elsewhere(viewer: Viewer, y: float) -> Iterator[None]:
     """Another page holds the tip at y (m) meanwhile, however long a busy machine keeps it from saying so."""
-    over = threading.Event()
+    held, over = threading.Event(), threading.Event()
 
     def hold() -> None:
         with client_of(viewer) as client:
             while not over.wait(0.02):
                 client.hand(0.0, y)
+                if not held.is_set():
+                    client.grant(1)
+                    if client.frame().position[1] == pytest.approx(y, rel=2**-22):
+                        held.set()
             client.hand(grabbed=False)
 
     other = threading.Thread(target=hold)
@@ -61,6 +65,7 @@ def held_elsewhere(viewer: Viewer, y: float) -> Iterator[None]:
         patch.setattr(hands, "FORGOTTEN", 60.0)
         other.start()
         try:
+            assert held.wait(10.0)
             yield
         finally:  # the viewer is other tests' too
             over.set()

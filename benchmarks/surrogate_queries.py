@@ -61,6 +61,10 @@ def query_table(quick: bool) -> Table:
         rows.append({"what": what, "ours": a, "plain": b, "ratio": a / b, "about": about})
     for units, surrogate in surrogates.items():
         low, high = bounds(surrogate.inputs)
+        took = _least(partial(surrogate.force_covariance, ((low + high) / 2)[None]), repeats)
+        rows.append(
+            {"what": f"covariance of the force at a place, {units} units", "ours": took, "about": FRAME}
+        )
         places = np.random.default_rng(0).uniform(low, high, (NODES, len(low)))
         took = _least(partial(surrogate.deviation, places), 1)
         rows.append({"what": f"deviation at {NODES} places, {units} units", "ours": took, "about": FRAME})

@@ -76,14 +76,14 @@ def problem(seed: int, samples: int, passes: int = 1) -> Problem:
 
 def table(*, quick: bool) -> Table:
     """The filter after one and ten passes, refined, and a spline."""
-    draws, fewer = (1, 1) if quick else (30, 10)
-    one = [problem(s, 200) for s in range(draws)]
-    ten = [problem(s, 200, 10) for s in range(draws)]
-    fifty = [problem(s, 60 if quick else 200, 12 if quick else 50) for s in range(1 if quick else 5)]
-    large = [problem(s, 150 if quick else 1000) for s in range(fewer)]
+    draws, fewer, size, passes = (1, 1, 60, 3) if quick else (30, 10, 200, 10)
+    one = [problem(s, size) for s in range(draws)]
+    ten = [problem(s, size, passes) for s in range(draws)]
+    fifty = [problem(s, size, 5 * passes) for s in range(1 if quick else 5)]
+    large = [problem(s, 5 * size) for s in range(fewer)]
     mran_by, emran_by = (partial(filtered, settings=SETTINGS[name]) for name in ("MRAN", "EMRAN"))
     once = scores(one[:fewer], partial(ours, passes=1))
-    often = scores(one[:fewer], partial(ours, passes=10))
+    often = scores(one[:fewer], partial(ours, passes=passes))
     once_large = scores(large, partial(ours, passes=1))
     stream = scores(one[:fewer], partial(streamed, every=1))
     best = scores(one[:fewer], partial(refined, units=10 if quick else 40, target=1e-6))

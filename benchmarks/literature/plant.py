@@ -53,18 +53,20 @@ SETTINGS: dict[str, Settings] = {
 }
 
 
-def problem(seed: int) -> Problem:
-    """The series, and one permutation of the training samples."""
+def problem(seed: int, samples: int = 1000) -> Problem:
+    """The series, and the first `samples` of one permutation of the training samples."""
     t = np.arange(1000)
     train = np.concatenate([np.linspace(-2.0, 2.0, 500), 1.05 * np.sin(np.pi * t[500:] / 45)])
     sines = 0.3 * np.sin(np.pi * t / 25) + 0.1 * np.sin(np.pi * t / 32) + 0.6 * np.sin(np.pi * t / 10)
     test = np.select([t < 250, t < 500, t < 750], [np.sin(np.pi * t / 25), 1.0, -1.0], sines)
-    return Problem(*_answered(train), *_answered(test), np.random.default_rng(seed).permutation(1000), seed)
+    return Problem(
+        *_answered(train), *_answered(test), np.random.default_rng(seed).permutation(1000)[:samples], seed
+    )
 
 
 def table(*, quick: bool) -> Table:
     """Ours beside the published figures."""
-    problems = [problem(s) for s in range(1 if quick else 30)]
+    problems = [problem(0, 200)] if quick else [problem(s) for s in range(30)]
     p = problems[0]
     persistence = Score(0, p.error(p.X_test[:, :1]), 0.0)
     found = {name: scores(problems, partial(filtered, settings=s)) for name, s in SETTINGS.items()}

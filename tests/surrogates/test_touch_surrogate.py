@@ -49,6 +49,7 @@ def test_without_contact_everything_is_exactly_zero_everywhere(law):
     assert not S.force(X).any()
     assert not S.stiffness(X).any()
     assert not S.deviation(X).any()
+    assert not S.force_covariance(X).any()
     assert S.inside(X).all()
 
 
@@ -239,7 +240,7 @@ def test_deviation_is_how_much_the_force_moves_with_the_weights(without):
     S = dataclasses.replace(S, root=root)
     X = inside_points(60, (SOFT,))
     X = X[S.depth(X) > 1e-4]
-    F, total, net, h = S.force(X), 0.0, S.network, 1e-3
+    F, covariance, net, h = S.force(X), np.zeros((len(X), 3, 3)), S.network, 1e-3
     for column in S.root.T:
         moved = []
         for sign in (h, -h):
@@ -247,8 +248,10 @@ def test_deviation_is_how_much_the_force_moves_with_the_weights(without):
             weights = net.weights + sign * column[net.tail.size :]
             shifted = dataclasses.replace(net, tail=tail, weights=weights)
             moved.append(dataclasses.replace(S, network=shifted).force(X))
-        total = total + (((moved[0] - moved[1]) / (2 * h)) ** 2).sum(axis=1)
-    expected = np.sqrt(total) / np.linalg.norm(F, axis=1)
+        slope = (moved[0] - moved[1]) / (2 * h)
+        covariance += slope[:, :, None] * slope[:, None, :]
+    np.testing.assert_allclose(S.force_covariance(X), covariance, rtol=1e-6, atol=1e-6 * covariance.max())
+    expected = np.sqrt(np.trace(covariance, axis1=1, axis2=2)) / np.linalg.norm(F, axis=1)
     np.testing.assert_allclose(S.deviation(X), expected, rtol=1e-6)
     evaluator = S.evaluator()
     np.testing.assert_array_equal([evaluator.trust(x[:3], x[3:]) for x in X], S.deviation(X))
@@ -296,6 +299,8 @@ def test_without_a_posterior_the_trust_is_unknown():
     S = surrogate(root=None)
     with pytest.raises(UsageError, match="deviation"):
         S.deviation(inside_points(3))
+    with pytest.raises(UsageError, match="deviation"):
+        S.force_covariance(inside_points(3))
     evaluator = S.evaluator()
     assert np.isnan(evaluator.trust(np.array([0.0, 0.0, 0.004])))
     assert evaluator.trust(np.array([0.0, 0.0, 0.04])) == 0.0

@@ -7,7 +7,7 @@ kernels of both fill the same answer (`touch_kernels`).
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, ClassVar
@@ -18,7 +18,7 @@ from palpate.errors import UsageError
 from palpate.network import Network
 from palpate.surrogates.arguments import rows_of
 from palpate.surrogates.touch_kernels import ANSWER, FORCE, STIFFNESS
-from palpate.surrogates.touch_trust import trusts_into
+from palpate.surrogates.touch_trust import covariances_into, trusts_into
 from palpate.units import Range
 from palpate.words import share
 
@@ -90,6 +90,22 @@ class LearntEnergy(ABC):
         UsageError
             If the surrogate has no posterior.
         """
+        return self._by_posterior(X, trusts_into, ())
+
+    def force_covariance(self, X: np.ndarray) -> np.ndarray:
+        """Covariance (N, 3, 3) of the force, N²: how far it may be off in which direction; zero where there is none.
+
+        First order in the weights; its trace is (deviation · ‖F‖)².
+
+        Raises
+        ------
+        UsageError
+            If the surrogate has no posterior.
+        """
+        return self._by_posterior(X, covariances_into, (3, 3))
+
+    def _by_posterior(self, X: np.ndarray, kernel: Callable[..., None], shape: tuple[int, ...]) -> np.ndarray:
+        """What a kernel of `touch_trust` finds for each row, (N, *shape)."""
         if self.root is None:
             raise UsageError(
                 "This surrogate does not know its deviation.",
@@ -98,8 +114,8 @@ class LearntEnergy(ABC):
             )
         X, answers, _ = self._answers(X)
         root, net = self._compiled_posterior()
-        out, columns = np.empty(len(X)), np.zeros((4, root.shape[1]))
-        trusts_into(X, answers, out, root, columns, net)
+        out, columns = np.empty((len(X), *shape)), np.zeros((4, root.shape[1]))
+        kernel(X, answers, out, root, columns, net)
         return out
 
     def _compiled_posterior(self) -> tuple[np.ndarray, tuple[Any, ...]]:

@@ -19,7 +19,7 @@ TOUCHED: dict[str, dict[str, Any]] = {
     "block": {
         "body": {"kind": "block", "size": (0.10, 0.10, 0.05), "material": {"young": 9e3, "name": "tissue"}},
         "probe": {"depth": (2e-4, 0.012), "over": ((0.0, 0.0), (0.10, 0.10))},
-        # places tell more than depths; elements of 3.5 mm instead of 5 take twice as long for the same errors
+        # places tell more than depths; elements of 3.5 mm instead of 5 take twice as long for the same force
         "sweep": {"samples": 40, "depths": 2},
     },
     "layered": {

@@ -9,7 +9,9 @@ from palpate.learning.fields import Snapshots, lumped_mass
 
 __all__ = ["snapshots_of"]
 
-MOST = 400  # shapes to learn a field from; more images of one solve tell little that is new
+# shapes to learn a field from. A dome has 16 images of each solve: of 80, 400 shapes leave the largest error of unseen
+# ones at 0.35 mm, 800 at 0.20 and all at 0.17, learnt in 1, 1½ and 3 minutes
+MOST = 800
 
 
 def snapshots_of(

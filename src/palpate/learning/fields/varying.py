@@ -184,7 +184,7 @@ def _best_base(fit: _Fit, parts: list[np.ndarray]) -> tuple[float, float]:
 
 
 def by_conjugate_gradients(grams: np.ndarray, touches: np.ndarray, sides: np.ndarray) -> np.ndarray:
-    """W (k, R, c) with Σ_i t_i ⊗ (G_i (t_i · W)) + μ W = Σ_i t_i ⊗ s_i, of each component c by itself.
+    """W (k, R, c) with Σ_i t_i ⊗ (G_i (t_i · W)) + μ W = Σ_i t_i ⊗ s_i, for all c components.
 
     Parameters
     ----------
@@ -197,22 +197,26 @@ def by_conjugate_gradients(grams: np.ndarray, touches: np.ndarray, sides: np.nda
     """
     from scipy.sparse.linalg import LinearOperator, cg
 
-    shape = touches.shape[1], grams.shape[1]
+    (N, k), (R, c) = touches.shape, sides.shape[1:]
     diagonal = (touches**2).T @ np.einsum("ill->il", grams)
     mu = max(_RIDGE * float(diagonal.mean()), 1e-300)
 
     def times(w: np.ndarray) -> np.ndarray:
-        W = w.reshape(shape)
-        images = (grams @ (touches @ W)[:, :, None])[:, :, 0]
-        return np.asarray(touches.T @ images + mu * W).ravel()
+        # all components at once, since reading the matrices is what takes the time
+        W = w.reshape(k, R * c)
+        images = grams @ (touches @ W).reshape(N, R, c)
+        return np.asarray(touches.T @ images.reshape(N, R * c) + mu * W).ravel()
 
-    size = (diagonal.size, diagonal.size)
+    scales = np.repeat(diagonal + mu, c)
+    size = (scales.size, scales.size)
     whole = LinearOperator(size, matvec=times, dtype=np.float64)
-    scaled = LinearOperator(size, matvec=lambda w: w / (diagonal + mu).ravel(), dtype=np.float64)
-
-    def solved(side: np.ndarray) -> np.ndarray:
-        # a fit that has not wholly settled is a little smoother: no fault, and what is left out judges it
-        w, _ = cg(whole, (touches.T @ side).ravel(), rtol=_TOLERANCE, maxiter=_ITERATIONS, M=scaled)
-        return np.asarray(w).reshape(shape)
-
-    return np.stack([solved(side) for side in np.moveaxis(sides, 2, 0)], axis=2)
+    scaled = LinearOperator(size, matvec=lambda w: w / scales, dtype=np.float64)
+    # a fit that has not wholly settled is a little smoother: no fault, and what is left out judges it
+    w, _ = cg(
+        whole,
+        (touches.T @ sides.reshape(N, R * c)).ravel(),
+        rtol=_TOLERANCE,
+        maxiter=_ITERATIONS,
+        M=scaled,
+    )
+    return np.asarray(w).reshape(k, R, c)

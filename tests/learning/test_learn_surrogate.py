@@ -164,18 +164,20 @@ def test_no_unit_is_narrower_than_what_a_probe_can_feel(surface):
     np.testing.assert_allclose(finest * half, RADIUS / 40)
     problem = Problem(samples.scaled, samples.rows(LAW, resolved=1e-3), None, "", finest=finest)
     of = problem.regressors("rotated", "inverse-multiquadric")
-    # a Gaussian exp(−|Aξ|²) of width w falls over w: just wide enough along all axes, or not along the last
-    ways = finest[2] * np.array([1.02, 0.98])
-    theta = np.array([of.form.unit(samples.scaled[3], w) for w in (*ways, 1.0)])
+    # a Gaussian exp(−|Aξ|²) of width w falls over w: too sharp in one direction, or of less than R/5 in all
+    ways = np.array([[40, 40, 1.02], [40, 40, 0.98], [8.2, 8.2, 8.2], [7.8, 7.8, 7.8]]) * finest
+    theta = of.form.of(samples.scaled[[3, 3, 3, 3]], ways)
     start = problem.refined(theta, of, iterations=0, seconds=1.0)
-    assert problem.needles(start).tolist() == [False, True, False]
+    assert problem.needles(start).tolist() == [False, True, False, True]
     search = Search(problem, time.monotonic() + 60.0)
     for _ in range(4):
         search.tried(np.vstack([theta, search.random(of, 3)]), of, "test")
     assert search.found
     for one in search.found:
         factors = of.form.factors(one.network.theta)[0]
-        assert np.linalg.svd(factors * finest)[1].max() <= 1.0
+        sharpness = np.linalg.svd(factors * finest)[1]
+        assert sharpness[:, 0].max() <= 1.0
+        assert sharpness[:, -1].max() <= 1 / 8
 
 
 @pytest.fixture(scope="module")

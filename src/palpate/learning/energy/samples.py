@@ -129,7 +129,7 @@ class EnergySamples:
     def finest(self, radius: float) -> np.ndarray:
         """Of scaled inputs (n,), the shortest way over which touches by a probe of that radius (m) change.
 
-        The contact smooths over its own width √(2Rs), 2 mm of a probe of 10 mm at 0.2 mm; a tenth of that is allowed.
+        The contact smooths over its own width √(2Rs), 2 mm of a probe of 10 mm at 0.2 mm; an eighth of that is allowed.
         """
         found = np.zeros(len(self.inputs))
         found[:3] = _FINEST * radius / self.half[:3]

@@ -32,6 +32,7 @@ _WIDTHS = (0.2, 1.0)  # of first units, in scaled inputs: from an edge's reach t
 _TOLERANCE = 1e-5
 _RIDGE = 3e-6  # with 1e-10 some networks bend wildly between solves, with 1e-4 all miss more
 _MOST = 0.98  # leverage; what a solve decides alone is judged by fifty times its residual
+_ALL_OVER = 8.0  # times the finest: a unit that is nowhere wider stands on one solve
 _PASSES = 3
 _COMBED = (30, 0)  # iterations after needles are taken out, once and again; with none there can't be new ones
 _STEP = 1.4  # growth of the number of units from one size to the next
@@ -110,11 +111,14 @@ class Problem:
         )
 
     def needles(self, refined: Refined) -> np.ndarray:
-        """Units (h,) that are narrower in some direction than anything that a probe could feel."""
+        """Units (h,) that are narrower than anything that a probe could feel: far so in one direction, or in all."""
         if self.finest is None or not len(refined.theta):
             return np.zeros(len(refined.theta), dtype=bool)
-        factors = refined.regressors.form.factors(refined.theta)[0]
-        return np.asarray(np.linalg.norm(factors * self.finest, 2, axis=(1, 2)) > 1.0)
+        felt = self.finest > 0
+        factors = refined.regressors.form.factors(refined.theta)[0][:, :, felt] * self.finest[felt]
+        sharpness = np.linalg.svd(factors, compute_uv=False)
+        all_over = sharpness.shape[1] == felt.sum()
+        return np.asarray((sharpness[:, 0] > 1.0) | (all_over & (sharpness[:, -1] > 1.0 / _ALL_OVER)))
 
     def fitted(self, refined: Refined) -> tuple[Rows, Fit]:
         """The least-squares problem of a refinement's units, and its solution."""

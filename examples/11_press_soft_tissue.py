@@ -16,7 +16,7 @@ tissue = {
 }
 body = pp.Body(flesh, tissue, fixed="bottom")
 ball = pp.SphereProbe(radius=0.010, touches="top", depth=(0.0, 0.006), over=((0.025, 0.025), (0.035, 0.035)))
-problem = body.problem(ball)
+problem = body.problem(ball, element=0.0075)  # m beneath the ball; without, half its radius: finer and slower
 print(problem)
 
 solver = problem.open()  # keeps the finite elements; each solve starts from the nearest one before
@@ -38,7 +38,7 @@ print(f"force from differences of the energy: {-(above - below) / (2 * step):.4f
 pressed.plot("von_mises", cut="y").save("tissue.png")
 pressed.to_vtu("tissue.vtu")  # for ParaView
 
-data = pp.sweep(body, ball, samples=4, seed=0, path="tissue.zarr")
+data = pp.sweep(problem, samples=4, seed=0, path="tissue.zarr")
 print(data)
 deepest = np.argmax(np.linalg.norm(data.force, axis=1))
 print(f"largest force: {np.linalg.norm(data.force[deepest]):.4f} N at {1e3 * data.X[deepest]} mm")

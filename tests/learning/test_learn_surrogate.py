@@ -169,6 +169,12 @@ def test_no_unit_is_narrower_than_what_a_probe_can_feel(surface):
     theta = of.form.of(samples.scaled[[3, 3, 3, 3]], ways)
     start = problem.refined(theta, of, iterations=0, seconds=1.0)
     assert problem.needles(start).tolist() == [False, True, False, True]
+    # a ridge of a millimetre has no end along it
+    ridge = problem.regressors("rank-1", "inverse-multiquadric")
+    across = np.array([[0.0, 0.0, 1 / (w * finest[2])] for w in (4.0, 0.9)])
+    of_rank_1 = np.column_stack([across, across @ samples.scaled[3]])
+    start = problem.refined(of_rank_1, ridge, iterations=0, seconds=1.0)
+    assert problem.needles(start).tolist() == [False, True]
     search = Search(problem, time.monotonic() + 60.0)
     for _ in range(4):
         search.tried(np.vstack([theta, search.random(of, 3)]), of, "test")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_process import watch
+from test_process import wait_for, watch
 
 from bent import CREEPS, D, body
 from palpate.runtime import LoopProcess, now
@@ -144,12 +144,14 @@ def test_in_the_real_process_it_stays_bent(tmp_path):
         to_hand = workspace_for(load_touchable(path), loop.read().radius).to_hand
         for w in np.linspace(0.0, PAST_YIELD, 60):
             loop.shared.write_command(beat=now() + 60, grabbed=True, target=to_hand(w * D))
-            held = watch(loop, 0.02)[-1]
+            watch(loop, 0.02)
         loop.shared.write_command(beat=now() + 60, grabbed=True, target=to_hand(PAST_YIELD * D))
-        held = watch(loop, 0.2)[-1]
-        assert held.loads[0] == pytest.approx(PAST_YIELD, abs=1e-9)
+        # the hand is followed at a bounded speed, and a busy machine lets the loop sleep
+        wait_for(lambda: abs(loop.read().loads[0] - PAST_YIELD) < 1e-9)
+        held = loop.read()
         assert -held.force @ D == pytest.approx(held.loads[1], rel=1e-6)
         loop.shared.write_command(grabbed=False)
+        wait_for(lambda: not loop.read().force.any())
         free = watch(loop, 0.2)[-1]
         assert not free.force.any()
         assert 0.05 < free.loads[0] < 0.25

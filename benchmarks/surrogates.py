@@ -106,7 +106,7 @@ def _curve_table(result: Measured, sizes: tuple[int, ...], mark: str) -> Table:
             "of 0.5 N and 5 % of the largest; " + _symmetry(result.case),
             f"smallest 95th percentile by others: {'; '.join(lost)}"
             if lost
-            else "palpate's 95th percentile is the smallest at every number of solves",
+            else "of these, palpate's 95th percentile is the smallest at every number of solves",
             *(() if mark else ("palpate learns for a second a solve, a minute at least",)),
         ),
     )

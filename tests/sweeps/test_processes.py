@@ -50,14 +50,13 @@ def gone(processes, seconds=10.0):
     return not alive
 
 
-@pytest.mark.parametrize("way", ["file", "stdin", "command", "notebook"])
+@pytest.mark.parametrize("way", ["file", "stdin", "notebook"])
 def test_a_plain_script_needs_no_guard(tmp_path, way):
     file = tmp_path / "script.py"
     file.write_text(SCRIPT, encoding="utf-8")
     arguments = {
         "file": [str(file)],
         "stdin": ["-"],
-        "command": ["-c", SCRIPT],
         "notebook": ["-c", IN_A_RUNNING_LOOP],  # a notebook's cells run inside an event loop
     }[way]
     done = subprocess.run(

@@ -19,6 +19,7 @@ ARGUMENTS = [
     "--use-gl=angle",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
+    "--disable-gpu-compositing",  # without a GPU putting the page together takes most of a core, at rest too
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",

@@ -1,0 +1,64 @@
+"""Bodies with a name are carried out, from finite elements to file and report; how well is the demos' to tell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from palpate.study import TouchStudy, preset_study
+from palpate.study.pipeline import Paths, carry_out, report_study
+from palpate.surrogates import TouchedBody
+from palpate.sweeps import LocalCluster, local_cluster
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
+
+
+@pytest.fixture(scope="module")
+def workers() -> Iterator[LocalCluster]:
+    with local_cluster(2) as cluster:
+        yield cluster
+
+
+def small(name: str) -> TouchStudy:
+    """As few solves as can be learnt from, not deep and on coarse elements."""
+    study = preset_study(name, quick=True)
+    assert isinstance(study, TouchStudy)
+    assert study.body.element is not None
+    assert study.sweep.element is not None
+    changes: dict[str, dict[str, object]] = {
+        "body": {"element": 1.5 * study.body.element},
+        "probe": {"depth": (3e-4, 0.0015)},
+        "sweep": {"samples": 6, "element": 1.7 * study.sweep.element},
+        "test": {"samples": 1, "depths": 2},
+        "learning": {"seconds": 2.0},
+    }
+    return study.model_copy(
+        update={part: getattr(study, part).model_copy(update=new) for part, new in changes.items()}
+    )
+
+
+# the block runs as a whole on the command line; dome and phantom go the ways of these two, and cost as much again
+@pytest.mark.parametrize("name", ["layered", "liver"])
+def test_a_named_body_is_solved_learnt_judged_and_told(
+    name: str, workers: LocalCluster, tmp_path: Path
+) -> None:
+    study = small(name)
+    paths = Paths(tmp_path, study.name)
+    outcome = carry_out(study, paths, cluster=workers, progress=False)
+    assert (len(outcome.train), len(outcome.test)) == (6, 1), "every solve converged"
+    body = TouchedBody.load(paths.model)
+    felt = np.linalg.norm(outcome.train.force, axis=1)
+    off = np.linalg.norm(body.touch.force(outcome.train.X) - outcome.train.force, axis=1) / felt
+    assert np.median(off) < 0.05
+    away = outcome.train.X + np.array([0.0, 0.0, 0.2])
+    np.testing.assert_array_equal(body.touch.force(away), 0.0)
+    # the body is shown on other nodes than those of a part's solves: what moves most is compared
+    most = np.abs(body.fields["displacement"].values(outcome.train.X)).max(axis=(1, 2))
+    moved = np.abs(outcome.train.displacement).max(axis=(1, 2))
+    assert np.median(np.abs(most - moved) / moved) < 0.1
+    page = report_study(tmp_path / "report.html", [outcome]).read_text(encoding="utf-8")
+    assert study.name in page
+    assert "Where to trust it" in page

@@ -245,7 +245,7 @@ def test_a_bar_starts_where_an_earlier_run_stopped(monkeypatch):
 
 def test_a_log_gets_a_line_now_and_then(monkeypatch, capsys):
     clock = iter([0.0, 1.0, 11.0, 11.0, 12.0, 13.0, 13.0])
-    monkeypatch.setattr("palpate.sweeps.progress.time.monotonic", lambda: next(clock))
+    monkeypatch.setattr("palpate.sweeps.progress.monotonic", lambda: next(clock))
     with reporter(True) as report:
         for done in (0, 3, 5, 9):
             report(done, 9)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import sys
-import time
 from collections.abc import Callable, Iterator
+from time import monotonic
 
 __all__ = ["Report", "reporter"]
 
@@ -35,14 +35,14 @@ def _silent(done: int, total: int) -> None:
 
 def _lines() -> Report:
     """For a log: a line every so often, and at the end of what took that long."""
-    last, before = time.monotonic(), -1
+    last, before = monotonic(), -1
 
     def report(done: int, total: int) -> None:
         nonlocal last, before
-        late = time.monotonic() - last > SELDOM
+        late = monotonic() - last > SELDOM
         if late or (done == total and 0 <= before < total):
             print(f"solved {done} of {total}", file=sys.stderr, flush=True)  # noqa: T201
-            last, before = time.monotonic(), done
+            last, before = monotonic(), done
 
     return report
 

@@ -48,6 +48,30 @@ def test_radius_is_the_datas_own_spacing():
     assert not TrainedRegion.of(hole).inside(np.array([0.0]))
 
 
+@pytest.mark.parametrize("most", [512, 40])
+def test_what_was_left_out_together_is_no_neighbour_of_itself(most):
+    places = np.random.default_rng(2).uniform(-1, 1, (30, 2))
+    depths = np.array([-0.02, 0.0, 0.02])
+    columns = np.column_stack([np.repeat(places, 3, axis=0), np.tile(depths, 30)])
+    both = np.vstack([columns, columns * [-1, 1, 1]])  # and mirrored
+    groups = np.tile(np.repeat(np.arange(30), 3), 2)
+    alone, together = TrainedRegion.of(both, most=most), TrainedRegion.of(both, groups=groups, most=most)
+    apart = np.linalg.norm(both[:, None] - both, axis=2)
+    apart[groups[:, None] == groups] = np.inf
+    if most > len(both):
+        assert alone.radius == pytest.approx(0.02)
+        assert together.radius == pytest.approx(np.quantile(apart.min(axis=1), 0.99))
+    assert together.radius >= np.quantile(apart.min(axis=1), 0.99) * (1 - 1e-12)
+    new = np.column_stack([np.random.default_rng(3).uniform(-1, 1, (2000, 2)), np.zeros(2000)])
+    assert (together.distances(new) <= together.radius).mean() > 0.9
+    assert (alone.distances(new) <= alone.radius).mean() < 0.5 or most < len(both)
+
+
+def test_groups_are_one_number_for_each_row():
+    with pytest.raises(UsageError, match="which of 4 inputs"):
+        TrainedRegion.of(np.zeros((4, 2)), groups=np.zeros(3))
+
+
 def test_thinning_keeps_every_sample_near_a_kept_one():
     X = np.random.default_rng(1).normal(size=(2000, 3))
     region = TrainedRegion.of(X, most=64)

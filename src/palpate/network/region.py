@@ -53,24 +53,39 @@ class TrainedRegion:
             )
 
     @classmethod
-    def of(cls, X: np.ndarray, *, most: int = _MOST) -> TrainedRegion:
+    def of(cls, X: np.ndarray, *, groups: np.ndarray | None = None, most: int = _MOST) -> TrainedRegion:
         """Of scaled training inputs X (N, n).
 
         More than `most` are thinned by farthest-point selection (Gonzalez 1985). The radius is what 99 % of the
         data are from their nearest other kept point, as each was left out, and never less than what it takes to
         hold all data.
 
+        Parameters
+        ----------
+        X : (N, n)
+        groups : (N,) int, optional
+            What is one sample and is left out as a whole: depths pressed over one place, with their mirror images.
+            They are nearer to each other than any new input is to them. By default each row is one.
+        most : int
+            Points kept.
+
         Raises
         ------
         UsageError
-            If X is empty, not finite or no table, or no point may be kept.
+            If X is empty, not finite or no table, there is no group for each row, or no point may be kept.
         """
         if most < 1:
             raise UsageError(f"A region of {most} points is none.", fix="Keep one point at least.")
         everything = cls(X, 0.0).points  # checked
+        own = np.arange(len(everything)) if groups is None else np.asarray(groups)
+        if own.shape != (len(everything),):
+            raise UsageError(
+                f"Groups of shape {own.shape} do not say which of {len(everything)} inputs are one sample.",
+                fix="Give one number for each row of X.",
+            )
         kept, cover = _farthest(everything, min(most, len(everything)))
-        gaps = _gaps(everything, everything[kept], kept)
-        gaps = gaps[np.isfinite(gaps)]  # the only point kept of one place has no other
+        gaps = _gaps(everything, own, everything[kept], own[kept])
+        gaps = gaps[np.isfinite(gaps)]  # the only sample kept of one place has no other
         typical = float(np.quantile(gaps, _TYPICAL)) if gaps.size else 0.0
         return cls(everything[kept], max(typical, float(np.sqrt(cover))))
 
@@ -178,13 +193,13 @@ def _farthest(X: np.ndarray, count: int) -> tuple[np.ndarray, float]:
 
 
 @_jit
-def _gaps(X: np.ndarray, points: np.ndarray, own: np.ndarray) -> np.ndarray:
-    """Distance (N,) of each row of X to the nearest kept point that it is not itself."""
+def _gaps(X: np.ndarray, own: np.ndarray, points: np.ndarray, groups: np.ndarray) -> np.ndarray:
+    """Distance (N,) of each row of X, of its own group (N,), to the nearest kept point of another group."""
     out = np.empty(len(X))
     for i in range(len(X)):
         best = np.inf
         for k in range(len(points)):
-            if own[k] != i:
+            if groups[k] != own[i]:
                 q = ((X[i] - points[k]) ** 2).sum()
                 best = min(best, q)
         out[i] = np.sqrt(best)

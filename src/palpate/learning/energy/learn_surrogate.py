@@ -166,7 +166,7 @@ def learn_surrogate(
         *(network, law, surface),
         radius=radius if radius_input is None else math.nan,
         radius_input=radius_input,
-        region=trained_region(samples, images),
+        region=trained_region(samples, images, rows["groups"]),
         root=root,
         meta=meta,
     )

@@ -75,10 +75,14 @@ def written_out(
     return network, root
 
 
-def trained_region(samples: Solves, images: Images | None) -> TrainedRegion:
-    """Around the solves' scaled inputs and their images."""
-    points = samples.scaled if images is None else images.of(samples.scaled).reshape(-1, len(samples.inputs))
-    return TrainedRegion.of(points, most=_COPIES)
+def trained_region(samples: Solves, images: Images | None, groups: np.ndarray | None = None) -> TrainedRegion:
+    """Around the solves' scaled inputs and their images.
+
+    A solve is left out with its images, and with all of its number in `groups` (N,) where there are such.
+    """
+    points = samples.scaled[None] if images is None else images.of(samples.scaled)
+    together = np.tile(np.arange(len(samples.X)) if groups is None else groups, len(points))
+    return TrainedRegion.of(points.reshape(-1, len(samples.inputs)), groups=together, most=_COPIES)
 
 
 def training_meta(samples: Solves, found: Average, errors: np.ndarray) -> dict[str, Any]:

@@ -26,11 +26,16 @@ INPUTS = (
 )
 
 
+CORNERS = (
+    0.06 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]),
+    np.array([[0, 1, 2], [0, 2, 3]]),
+)
+
+
 @functools.cache
 def face() -> TouchedSurface:
     """The plane z = 0, far beyond where anything is tested."""
-    corners = 0.06 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
-    return TouchedSurface.of(corners, np.array([[0, 1, 2], [0, 2, 3]]), radius=RADIUS, spacing=0.003)
+    return TouchedSurface.of(*CORNERS, radius=RADIUS, spacing=0.003)
 
 
 def surrogate(*, factor: float = 1.0, root: np.ndarray | None = None, **more: Any) -> TouchSurrogate:

@@ -54,7 +54,7 @@ def test_answers_are_the_surrogates(palpate, file):
         np.testing.assert_array_equal([one["deviation"] for one in answers], S.deviation(X))
     words = palpate("ask", file, *places).out
     assert f"{np.linalg.norm(S.force(X)[0]):.4g} N" in words
-    assert words.count("no contact") == 1
+    assert words.count("no force: in the air") == 1
 
 
 def test_a_body_with_its_shape_answers_by_its_energy(palpate, file, tmp_path):
@@ -80,8 +80,37 @@ def test_beyond_the_ranges_the_trust_is_not_known(palpate, file):
     assert answer["inside"] is False
     # millimetres taken for metres
     words = palpate("ask", file, "--at", "0,0,50").out
-    assert "no contact" in words
+    assert "no force: in the air" in words
     assert "c_z 50 m is not in" in words
+
+
+def test_deeper_than_the_distance_goes_no_force_is_told(palpate, file):
+    S = TouchSurrogate.load(file)
+    end, middle = S.surface.inner, touches(1, 5)
+    line = np.repeat(middle, 3, axis=0)
+    line[:, 2] = -end + np.array(
+        [0.0005, -0.0005, -1.8 * S.radius]
+    )  # just before, just behind, where d turns back
+    assert S.force(line).any(axis=1).all()
+    assert S.force(line)[2] @ S.force(line)[0] < 0, "the energy has to end, and pulls the probe in"
+    texts = [word for x in line for word in ("--at", text_of(x))]
+    first, *rest = json.loads(palpate("ask", file, *texts, "--json").out)["answers"]
+    np.testing.assert_array_equal(first["force"], S.force(line)[0])
+    for one in rest:
+        assert one["force"] == [None] * 3
+        assert one["energy"] is None
+        assert one["inside"] is False
+    words = palpate("ask", file, *texts).out
+    assert words.count("no force is known here") == 2
+    assert f"{1e3 * end:.3g} mm beneath" in words
+
+
+def test_the_stiffness_along_the_force_is_positive_where_pressing_meets_more(palpate, file):
+    S, x = TouchSurrogate.load(file), touches(1, 5)
+    F, K = S.force(x)[0], -S.stiffness(x)[0]
+    words = palpate("ask", file, "--at", text_of(x[0])).out
+    assert f"stiffness  {F @ K @ F / (F @ F):.4g} N/m along the force" in words
+    assert "∂F/∂c" in words
 
 
 def test_of_a_body_that_relaxes_the_answer_is_that_of_an_instant(palpate, file, tmp_path):

@@ -237,6 +237,28 @@ def test_more_solves_have_more_time_unless_one_is_given():
     assert time_for(300, 5.0) == 5.0
 
 
+@pytest.mark.parametrize("deepest", [None, 0.004, 0.006, 0.012])
+def test_deeper_than_the_solves_is_not_trained_though_in_the_ranges(surface, deepest):
+    """On a curved body the ranges hold depths that nobody solved; here they simply go on."""
+    X, U, F, K = touches(40, seed=3)
+    inputs = (*INPUTS[:2], Range("z", -0.002, 0.010, "m"))
+    known = {
+        "surface": surface,
+        "radius": RADIUS,
+        "inputs": inputs,
+        "law": LAW,
+        "units_max": 0,
+        "seconds": 1.0,
+    }
+    s = learn_surrogate(X, U, F, K, **known, deepest=deepest).surrogate
+    own = RADIUS - X[:, 2].min()
+    assert 0.0054 < own < 0.006
+    ends = {None: np.inf, 0.006: 0.006}.get(deepest, own)  # the others were not reached, or gone beyond
+    assert s.continuation.deepest == pytest.approx(ends, rel=1e-9)
+    deeper = X[np.argmin(X[:, 2])] - [0.0, 0.0, 0.0006]
+    assert s.inside(deeper[None])[0] == (deepest is None)
+
+
 def test_what_makes_no_sense_is_refused(surface):
     given = {"surface": surface, "radius": RADIUS, "inputs": INPUTS}
     X, U, F, K = touches(6)

@@ -9,13 +9,15 @@ import pytest
 from test_process import watch
 
 import pressed as slab
+from models import linear_network
 from palpate.errors import FileFormatError, UsageError
 from palpate.runtime import LoopProcess, now
 from palpate.runtime.pressed import PressedBody
 from palpate.runtime.touchable import load_touchable, touchable, workspace_for
 from palpate.runtime.workspace import Workspace
-from palpate.surrogates import TouchedBody
+from palpate.surrogates import ContactLaw, TouchedBody, TouchedSurface, TouchSurrogate
 from palpate.surrogates.relaxation import Branches
+from palpate.units import Quantity, Range
 
 TERMS = ((0.3, 0.05), (0.2, 0.4))
 RELAXING = {"name": "slab", "relaxation": {"terms": [list(t) for t in TERMS]}}
@@ -90,6 +92,86 @@ def test_a_held_probe_relaxes_by_the_prony_series():
     answer.elapsed = 1e-3
     answer(answer.away, none)
     assert not answer.force.any(), "tissue doesn't stick"
+
+
+def test_a_probe_pushed_through_the_body_is_let_go_and_never_pulled_in(body):
+    """Down through the face, beyond where the distance ends and turns back, and up again the same way."""
+    answer, none, touch = body.evaluator(), np.zeros(0), body.touch
+    end = slab.RADIUS + touch.surface.inner  # depth at which the centre is `inner` beneath the face
+    down = np.arange(-0.002, end + 4 * slab.RADIUS, 2e-4)
+    there = np.column_stack([0 * down + 0.005, 0 * down, slab.RADIUS - down])
+    assert touch.force(there)[:, 2].min() < -1.0, "the energy alone would pull"
+    forces, depths, flags = [], [], []
+    for x in (*there, *there[::-1]):
+        answer(x, none)
+        forces.append(answer.force.copy())
+        depths.append(answer.depth)
+        flags.append(answer.inside)
+    forces, once = np.array(forces), len(there)
+    held, gone = (down > 0) & (down < end - 1e-4), down > end + 1e-4
+    np.testing.assert_allclose(forces[:once][held], touch.force(there[held]), atol=1e-12)
+    assert not forces[:once][gone].any()
+    assert depths[np.argmax(gone)] == 0.0
+    assert not flags[np.argmax(gone)]
+    back = forces[once:][::-1]  # by depth
+    assert not back[held].any(), "let go behind, and not held again before it was in the air"
+    assert back[:, 2].min() < -1.0, "who comes from behind is kept out"
+    moved = np.diff(np.vstack([there, there[::-1]]), axis=0)
+    assert ((forces[1:] * moved).sum(axis=1) <= 1e-12).all(), "the hand works on the body all the way"
+
+
+def test_a_probe_that_was_let_go_is_held_again_after_air(body):
+    answer, none = body.evaluator(), np.zeros(0)
+
+    def at(depth):
+        answer(np.array([0.0, 0.0, slab.RADIUS - depth]), none)
+        return float(answer.force[2])
+
+    deep, shallow = slab.RADIUS + body.touch.surface.inner + 1e-4, 0.003
+    pressed = at(shallow)
+    assert pressed > 0
+    assert at(deep) == 0.0
+    assert at(shallow) == 0.0
+    assert (answer.stiffness, answer.depth, answer.inside) == (0.0, 0.0, False)
+    assert answer.let_go
+    at(-1e-4)
+    assert at(shallow) == pressed
+    at(deep)
+    place = np.array([0.0, 0.0, slab.RADIUS - shallow])
+    answer.place(place, holding=False, believed=True)
+    answer(place, none)
+    assert at(shallow) == pressed, "nor is it after nobody held it"
+
+
+def test_a_memory_lets_go_too_and_recovers_meanwhile():
+    body, none = PressedBody.of(slab.surrogate(meta=RELAXING)), np.zeros(0)
+    answer, fresh = body.evaluator(), body.evaluator()
+    for depth in np.arange(0.0, 0.028, 1e-3):
+        answer.elapsed = 0.1
+        answer(np.array([0.0, 0.0, slab.RADIUS - depth]), none)
+    assert answer.let_go
+    assert not answer.force.any()
+    for _ in range(100):
+        answer(answer.contact, none)
+    answer.elapsed = fresh.elapsed = 1e-3
+    for place in (answer.away, np.array([0.0, 0.0, slab.RADIUS - 0.004])):
+        answer(place, none)
+        fresh(place, none)
+    np.testing.assert_allclose(answer.force, fresh.force, rtol=1e-6)
+
+
+def test_of_a_larger_probe_the_centre_goes_as_deep():
+    radius = Range("probe.radius", 0.008, 0.012, "m")
+    tail = np.array([[np.log(slab.A), 0.0, 0.0, 0.0, 0.0]])
+    network = linear_network([*slab.INPUTS, radius], [Quantity("ln U/U0")], tail)
+    surface = TouchedSurface.of(*slab.CORNERS, radius=0.012, spacing=0.003)
+    touch = TouchSurrogate(network, ContactLaw("pad"), surface, radius_input=3)
+    answer = PressedBody.of(touch).evaluator()
+    for own in (0.008, 0.012):
+        for beneath, gone in ((-1e-4, False), (1e-4, True)):
+            answer(np.array([0.0, 0.0, 0.03]), np.array([own]))
+            answer(np.array([0.0, 0.0, -surface.inner - beneath]), np.array([own]))
+            assert answer.let_go is gone
 
 
 @pytest.mark.parametrize("wrong", [{"terms": [[0.3]]}, {"terms": [[0.7, 1.0], [0.4, 2.0]]}, {}, "soon"])

@@ -122,6 +122,27 @@ def test_coefficients_are_the_fields_and_a_frame_is_small(pressed_viewer: Viewer
     assert len(frame.pack()) < 256 + 4 * (14 * 4 * 3 + 14 * 4 * 1)
 
 
+def test_pushed_too_deep_the_body_returns_to_rest_under_the_hand(pressed_viewer: Viewer, slab: TouchedBody):
+    x, end = np.zeros(3), slab.touch.surface.inner
+    with client_of(pressed_viewer) as client:
+        x[2] = -end + 5e-4
+        deep = client.held(x)
+        assert deep.coefficients.any()
+        assert deep.depth > 0
+        x[2] = -end - 5e-4
+        for _ in range(100):
+            frame = client.say(x)
+            if not frame.coefficients.any():
+                break
+            time.sleep(0.02)
+        assert frame.force == (0.0, 0.0, 0.0)
+        assert not frame.coefficients.any()
+        assert not frame.inside
+        assert (frame.depth, frame.deviation) == (0.0, 0.0)
+        client.held([0.0, 0.0, 1.2 * pressed.RADIUS])
+        assert client.held([0.0, 0.0, pressed.RADIUS - 0.004]).force[2] > 0
+
+
 def test_released_the_force_is_zero_and_the_body_returns_to_rest(pressed_viewer: Viewer):
     with client_of(pressed_viewer) as client:
         assert client.held([0.0, 0.0, pressed.RADIUS - 0.004]).force[2] > 0

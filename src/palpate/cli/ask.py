@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from palpate.cli.console import Console
 from palpate.errors import UsageError
-from palpate.surrogates import TouchedBody
+from palpate.surrogates import TouchedBody, TouchSurrogate
 from palpate.surrogates.learnt_energy import LearntEnergy
 from palpate.surrogates.loading import load
 from palpate.units import Range, bounds
@@ -34,11 +34,14 @@ class Answer:
     force : (3,)
         N.
     stiffness : (3, 3)
-        ∂F/∂x by the first three inputs, N/m.
+        ∂F/∂c by the first three inputs c, N/m.
     deviation : float
         Of the force, relative to its size; not-a-number where it is not known, as beyond the ranges.
     inside : bool
         Whether the place lies in what was trained.
+    deepest : float, optional
+        How far inside the touched surface (m) the probe's centre could go; given where it is farther, or elsewhere
+        where nothing is known of its depth. Energy, force and stiffness are not-a-number there.
     """
 
     inputs: np.ndarray
@@ -47,24 +50,33 @@ class Answer:
     stiffness: np.ndarray
     deviation: float
     inside: bool
+    deepest: float | None = None
 
     def words(self, names: Sequence[Range]) -> str:
         """For a person."""
         at = ", ".join(_quantity(r, x) for r, x in zip(names, self.inputs, strict=True))
         beyond = self._beyond(names)
+        if self.deepest is not None:
+            return f"at {at}\n  {_unknown(self.deepest)}" + (f"\n  {beyond}" if beyond else "")
         size = float(np.linalg.norm(self.force))
         if size == 0.0:
-            told = "\n  " + beyond if beyond else ""
-            return f"at {at}\n  no contact: force, stiffness and energy are zero{told}"
+            if beyond:
+                return f"at {at}\n  no force: in the air, or behind the body\n  {beyond}"
+            return f"at {at}\n  no contact: force, stiffness and energy are zero"
         largest = float(np.abs(self.stiffness).max())
         lines = [
             f"at {at}",
             f"  force      {_row(self.force, size)} N, in all {size:.4g} N",
-            f"  stiffness  {'; '.join(_row(row, largest) for row in self.stiffness)} N/m",
+            f"  stiffness  {self.along():.4g} N/m along the force",
+            f"  ∂F/∂c      {'; '.join(_row(row, largest) for row in self.stiffness)} N/m",
             f"  energy     {self.energy:.4g} J",
             f"  trust      {self._trust(beyond)}",
         ]
         return "\n".join(lines)
+
+    def along(self) -> float:
+        """−F·(∂F/∂c)F/‖F‖², N/m: what a hand feels that goes on pushing."""
+        return float(-self.force @ self.stiffness @ self.force / (self.force @ self.force))
 
     def _trust(self, beyond: str) -> str:
         if beyond:
@@ -82,6 +94,19 @@ class Answer:
             f"{_quantity(r, x)} is not in {r.low:.4g} … {r.high:.4g} {r.unit}".rstrip()
             for r, x, out in zip(names, self.inputs, _outside(self.inputs, names), strict=True)
             if out
+        )
+
+    def ended(self, deepest: float) -> Answer:
+        """The same place, where nothing is known of how deep the probe is."""
+        none = math.nan
+        return replace(
+            self,
+            energy=none,
+            force=np.full(3, none),
+            stiffness=np.full((3, 3), none),
+            deviation=none,
+            inside=False,
+            deepest=deepest,
         )
 
     def as_dict(self) -> dict[str, Any]:
@@ -128,6 +153,10 @@ def ask(model: Path, at: Sequence[str], console: Console) -> None:
     answers = [
         Answer(x, float(U), F, K, float(d), bool(i)) for x, U, F, K, d, i in zip(X, *columns, strict=True)
     ]
+    if isinstance(energy, TouchSurrogate):
+        measured = energy.surface.measured(X[:, :3]) | ~forces.any(axis=1)
+        end = energy.surface.inner
+        answers = [one if known else one.ended(end) for one, known in zip(answers, measured, strict=True)]
     words = [one.words(energy.inputs) for one in answers]
     if {"relaxation", "yielding"} & set(energy.meta):
         words.append(
@@ -157,6 +186,13 @@ def _outside(values: np.ndarray, inputs: Sequence[Range]) -> np.ndarray:
     """Which of the values (..., n) lie outside of their ranges."""
     low, high = bounds(inputs)
     return np.asarray((values < low) | (values > high))
+
+
+def _unknown(deepest: float) -> str:
+    return (
+        f"no force is known here: a probe is followed to where its centre is {1e3 * deepest:.3g} mm beneath the "
+        "touched\n  surface, not deeper, nor behind the body or beside it; the loop and the page let go of the hand"
+    )
 
 
 def _quantity(of: Range, value: float) -> str:

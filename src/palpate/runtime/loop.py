@@ -25,7 +25,7 @@ from palpate.errors import DeviceError, UsageError
 from palpate.runtime.clock import Metronome
 from palpate.runtime.devices import Device
 from palpate.runtime.faults import Fault
-from palpate.runtime.pressed import PressedEvaluator
+from palpate.runtime.pressed_evaluator import PressedEvaluator
 from palpate.runtime.publisher import Publisher
 from palpate.runtime.records import MAX_PLACES
 from palpate.runtime.remembering import RememberingEvaluator

@@ -14,23 +14,21 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from palpate.errors import FileFormatError, UsageError
+from palpate.runtime.pressed_evaluator import PressedEvaluator
 from palpate.runtime.recorded import branches_told, dents_told, spacing_told
-from palpate.surrogates import FieldSurrogate, SurrogateEvaluator, TouchedBody, TouchSurrogate
+from palpate.surrogates import FieldSurrogate, TouchedBody, TouchSurrogate
 from palpate.surrogates.learnt_energy import corrected_by
 from palpate.surrogates.plastic import DentMemory, Dents
 from palpate.surrogates.relaxation import Branches, Memory, Patches
 from palpate.units import Range, bounds
 
-__all__ = ["PressedBody", "PressedEvaluator"]
+__all__ = ["PressedBody"]
 
 _SAMPLES = 4096  # of the trained ranges, for what is largest there
 _SHARE = 0.75  # of the deepest trained depth: how deep a scripted stroke goes
 _SLIVER = 1e-3  # of the deepest depth: shallower is no press
-
-_jit = njit(cache=True, nogil=True, error_model="numpy")
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,7 +211,9 @@ class PressedBody:
 
     def evaluator(self) -> PressedEvaluator:
         """The allocation-free evaluator of the 1 kHz path."""
-        return PressedEvaluator(self.touch.evaluator(), self.memory(), self.away)
+        touch, own = self.touch, self.touch.radius_input
+        ends = touch.surface.inner, touch.radius, None if own is None else own - 3
+        return PressedEvaluator(touch.evaluator(), self.memory(), self.away, *ends)
 
     def stroke(self, scale: float) -> dict[str, float]:
         """Amplitude (m) and direction, in device coordinates, of a stroke that presses to three quarters of `deepest`.
@@ -225,78 +225,3 @@ class PressedBody:
         """
         x, y, z = (-self.normal).tolist()
         return {"amplitude": _SHARE * self.deepest / scale, "x": x, "y": z, "z": -y}
-
-
-class PressedEvaluator:
-    """Answers a probe's centre; nothing is allocated.
-
-    Attributes
-    ----------
-    force : (3,)
-        On the probe, N.
-    contact : (3,)
-        The probe's centre, m.
-    loads : (0,)
-        None: the body is held by nothing but the probe.
-    inside : bool
-        Within the trained region.
-    mirrored : bool
-        Never.
-    depth : float
-        Of the rigid probe in the surface at rest, m; negative without contact.
-    stiffness : float
-        Along the force, −F·(∂F/∂c)F/‖F‖², N/m, of the elastic answer; zero without contact.
-    elapsed : float
-        Since the call before, s, to be set ahead of each call where the body has a memory.
-    away : (3,)
-        Where a probe is that nobody holds, m.
-    prints : (n,)
-        Amplitude of the print at each place that keeps one, √J; empty for a body that keeps none.
-    """
-
-    def __init__(
-        self, elastic: SurrogateEvaluator, memory: Memory | DentMemory | None, away: np.ndarray
-    ) -> None:
-        self._elastic, self._memory = elastic, memory
-        self._yielding = memory if isinstance(memory, DentMemory) else None
-        self.prints = np.zeros(0) if self._yielding is None else self._yielding.now
-        self.force = elastic.force if memory is None else memory.force
-        self._slope = np.zeros(3)
-        self.contact, self.loads, self.away = np.zeros(3), np.zeros(0), away
-        self.inside, self.mirrored = True, False
-        self.depth, self.stiffness, self.elapsed = -math.inf, 0.0, 0.0
-        _along(elastic.force, elastic.stiffness)  # compile now, not in the loop
-
-    def place(self, position: np.ndarray, *, holding: bool, believed: bool) -> None:
-        """Keep a probe that nobody holds `away`: a way back to the centre could lead through the body."""
-        del believed  # what can't be believed isn't answered
-        if not holding:
-            position[:] = self.away
-
-    @property
-    def grew(self) -> bool:
-        """Whether the last call made a print grow."""
-        return self._yielding is not None and self._yielding.lost_in_step > 0.0
-
-    def __call__(self, position: np.ndarray, parameters: np.ndarray) -> None:
-        """Renew the attributes for a probe at `position` (3,), m, and the further inputs (p,)."""
-        elastic, memory = self._elastic, self._memory
-        elastic(position, parameters)
-        self.contact[:] = position
-        self.inside, self.depth = elastic.inside, elastic.depth
-        self.stiffness = _along(elastic.force, elastic.stiffness)
-        if memory is None:
-            return
-        np.negative(elastic.force, out=self._slope)
-        if not memory.step(position, elastic.energy, self._slope, self.elapsed):
-            self.force[:] = math.nan  # the loop makes a fault of it
-
-
-@_jit
-def _along(force, stiffness) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
-    size, total = 0.0, 0.0
-    for i in range(3):
-        size += force[i] * force[i]
-        for j in range(3):
-            total -= force[i] * stiffness[i, j] * force[j]
-    return total / size if size > 0.0 else 0.0

@@ -112,14 +112,15 @@ class PressedExhibit:
 
     def frame(self, beat: Mapping[str, Any], state: State, held: bool, parameters: np.ndarray) -> Press:
         """See `Exhibit`."""
-        centre = self._pressed(state) if held else self._withdrawn()
+        pressed = held and (state.inside or state.depth > 0.0)  # the body lets go of what is too deep in it
+        centre = self._pressed(state) if pressed else self._withdrawn()
         place, coefficients = self._coefficients(centre, parameters)
         prints = np.zeros(0)
         if self._prints is not None:
             prints = self._prints.depths(state.prints)
             coefficients *= 0.0 if place is None else self._prints.elastic(place, state.prints)
-        deviation = self._judge.trust(state.position, parameters) if held else 0.0
-        if held and place is not None:
+        deviation = self._judge.trust(state.position, parameters) if pressed else 0.0
+        if pressed and place is not None:
             self._normal = place[5:8].copy()
         return Press(
             **beat,

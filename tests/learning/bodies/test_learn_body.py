@@ -193,6 +193,7 @@ def test_a_body_is_learnt_judged_and_kept(tmp_path):
     assert stress.unit == "Pa"
     assert np.abs(stress.values(test.X)[..., 0] - truth).mean() < 0.05 * truth.max()
     assert "von Mises stress" in str(history)
+    assert touch.touch.continuation.deepest == 0.004, "what the probe was told to reach"
     # the trained touches among a whole sweep are no test, of the shape neither
     whole = validate(touch, touches())
     assert whole.samples == judged.samples

@@ -148,6 +148,7 @@ def _energy(touches: Touches, options: dict[str, Any]) -> LearntSurrogate:
         "symmetry": touches.matrices if len(touches.matrices) > 1 else (),
         "about": touches.about,
         "resolved": touches.resolved,
+        "deepest": touches.deepest or None,
     }
     return learn_surrogate(data.X, data.potential_energy, data.response, K, **(known | options))
 

@@ -59,6 +59,8 @@ class Touches:
         The body's symmetry, the identity among it.
     resolved : float or None
         Depth at which a contact is as wide as an element, m; None for elements of the usual size.
+    deepest : float
+        Depth that the solves were made to, m; 0 where the provenance does not tell.
     """
 
     data: Dataset
@@ -71,6 +73,7 @@ class Touches:
     matrices: np.ndarray
     about: np.ndarray
     resolved: float | None
+    deepest: float
 
     @classmethod
     def of(cls, data: Dataset, layout: Layout | None = None) -> Touches:
@@ -101,13 +104,18 @@ class Touches:
             which,
             (*widened(data.ranges[:3], matrices, about), *data.ranges[3:]),
             TouchedSurface.of(
-                rest, touched, radius=largest, inner=_inner(probe, largest), shoulder=SHOULDER * radius
+                rest,
+                touched,
+                radius=largest,
+                inner=_inner(_deepest(probe), largest),
+                shoulder=SHOULDER * radius,
             ),
             rest[nodes],
             own.reshape(-1, 3),
             matrices,
             about,
             None if element is None else float(element) ** 2 / (2 * radius),
+            _deepest(probe),
         )
 
     @property
@@ -116,9 +124,13 @@ class Touches:
         return columns_of(self.data.X[:, :3], self.surface, self.radius)
 
 
-def _inner(probe: Mapping[str, Any], radius: float) -> float:
+def _deepest(probe: Mapping[str, Any]) -> float:
+    return float(max(probe.get("depth") or (0.0,)))
+
+
+def _inner(deepest: float, radius: float) -> float:
     """How deep the probe's centre may go before the distance ends, m: the probe is twice as deep there as trained."""
-    return float(max(1.5 * radius, 2.0 * max(probe.get("depth") or (0.0,)) - radius))
+    return max(1.5 * radius, 2.0 * deepest - radius)
 
 
 def _radius_input(data: Dataset) -> int | None:

@@ -22,12 +22,13 @@ from palpate.learning.energy.task import Task
 from palpate.learning.energy.trust import trust_of
 from palpate.learning.energy.written import trained_region, training_meta, written_out
 from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction
-from palpate.surrogates import ContactLaw, TouchedSurface, TouchSurrogate
+from palpate.surrogates import ContactLaw, Continuation, TouchedSurface, TouchSurrogate
 from palpate.units import Range
 
 __all__ = ["LearntSurrogate", "learn_surrogate"]
 
 _LAW_SHARE = 0.15  # of the time
+_NEARLY = 0.9
 Law = ContactLaw | Literal["auto"]
 
 
@@ -73,6 +74,7 @@ def learn_surrogate(
     seconds: float | None = None,
     workers: int | None = None,
     resolved: float | None = None,
+    deepest: float | None = None,
     form: str = "auto",
     radial: RadialFunction | Literal["auto"] = "auto",
     seed: int = 0,
@@ -119,6 +121,9 @@ def learn_surrogate(
     resolved : float, optional
         Depth (m) at which a contact is as wide as an element; an eighth of the radius by default, for elements of
         half the radius.
+    deepest : float, optional
+        Depth (m) that the solves were to reach, or that they did reach where they came less far than nine tenths of
+        it: beyond it nothing counts as trained, whatever the ranges say. By default they alone decide.
     form : str
         Of a unit (see `palpate.learning.units.forms`), or "auto".
     radial : {"gaussian", "inverse-multiquadric", "matern-5/2", "auto"}
@@ -167,7 +172,16 @@ def learn_surrogate(
         radius=radius if radius_input is None else math.nan,
         radius_input=radius_input,
         region=trained_region(samples, images, rows["groups"]),
+        continuation=Continuation.of(inputs, deepest=_reached(samples.depth, deepest)),
         root=root,
         meta=meta,
     )
     return LearntSurrogate(surrogate, trials, trust.errors, found.error)
+
+
+def _reached(depths: np.ndarray, wanted: float | None) -> float:
+    """To which depth samples at `depths` (N,) teach; they are spread up to the wanted one, and end just before it."""
+    if wanted is None:
+        return math.inf
+    own = float(depths.max())
+    return wanted if _NEARLY * wanted <= own <= wanted else own

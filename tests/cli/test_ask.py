@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import palpate as pp
 from models import spring_beam
+from palpate.dataset.measured import read_measured, write_measured
+from palpate.learning.correction import correct
+from palpate.learning.plastic.paths import HeldPath, HeldPaths
+from palpate.runtime.pressed import PressedBody
 from palpate.surrogates import TouchedBody, TouchSurrogate
 from palpate.surrogates.relaxation import Branches
 
@@ -119,6 +125,62 @@ def test_of_a_body_that_relaxes_the_answer_is_that_of_an_instant(palpate, file, 
     assert "relaxes: 30 % in 0.1 s" in palpate("ask", path).out
     assert "that of an instant" in palpate("ask", path, "--at", text_of(touches(1, 5)[0])).out
     assert "instant" not in palpate("ask", file, "--at", text_of(touches(1, 5)[0])).out
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory):
+    X = np.random.default_rng(0).uniform(-1.0, 1.0, (60, 2))
+    found = pp.fit(X, np.column_stack([np.sin(X[:, 0]), X[:, 1] ** 2]), seconds=1.0)
+    return found, found.save(tmp_path_factory.mktemp("fitted") / "fit.palpate")
+
+
+def test_networks_of_arrays_answer_too(palpate, fitted):
+    found, path = fitted
+    words = palpate("ask", path).out
+    assert "Fitted: 2 inputs → 2 outputs" in words
+    X = np.array([[0.1, 0.2], [3.0, 0.1]])
+    places = [word for x in X for word in ("--at", text_of(x))]
+    first, beyond = json.loads(palpate("ask", path, *places, "--json").out)["answers"]
+    assert first["outputs"] == dict(zip(["y0", "y1"], found.predict(X)[0], strict=True))
+    assert first["deviations"] == found.deviation(X)[0].tolist()
+    assert (first["inside"], beyond["inside"]) == (True, False)
+    assert beyond["deviations"] == [None, None]
+    words = palpate("ask", path, *places).out
+    assert f"{found.predict(X)[0, 1]:.6g} ± {found.deviation(X)[0, 1]:.2g}" in words
+    assert "x0 3 is not in" in words
+    assert words.count("±") == 2
+    assert palpate("ask", path, "--at", "1,2,3").code == 2
+
+
+def test_a_network_alone_knows_its_ranges_and_no_deviation(palpate, fitted, tmp_path):
+    net = fitted[0].network
+    path = replace(net, extras={}, meta={}).save(tmp_path / "net.palpate")
+    assert "Network" in palpate("ask", path).out
+    (answer,) = json.loads(palpate("ask", path, "--at", "0.1,0.2", "--json").out)["answers"]
+    assert list(answer["outputs"].values()) == net.predict(np.array([[0.1, 0.2]]))[0].tolist()
+    assert answer["deviations"] is answer["inside"] is None
+    assert "within the ranges" in palpate("ask", path, "--at", "0.1,0.2").out
+
+
+def test_histories_of_a_held_body_say_what_they_are(palpate, tmp_path):
+    one = HeldPath(
+        *np.array([[0.0, 1.0], [0.0, 0.01], [0.0, 2.0], [0.0, 0.01], [0.0, 0.0]]), np.zeros((2, 3, 2))
+    )
+    path = HeldPaths(np.zeros((3, 2)), 2, np.array([0.0, 1.0]), (one,)).save(tmp_path / "paths.palpate")
+    assert "HeldPaths: 1 with 2 samples" in palpate("ask", path).out
+    answer = palpate("ask", path, "--at", "0,0,0")
+    assert (answer.code, "does not answer at a place" in answer.err) == (2, True)
+
+
+def test_what_was_suspicious_of_a_correction_is_told_again(palpate, tmp_path):
+    S, X, path = model(), touches(30, 3), tmp_path / "wrong.palpate"
+    measured = read_measured(write_measured(tmp_path / "pushed.csv", X, -S.force(X)))
+    correct(S, measured).surrogate.save(path)
+    for words in ((), ("--at", text_of(X[0]))):
+        assert "Change their sign" in palpate("ask", path, *words).out
+        assert "Change their sign" in json.loads(palpate("ask", path, *words, "--json").out)["warning"]
+    assert "with a warning" in str(TouchSurrogate.load(path))
+    assert "with a warning" in PressedBody.of(TouchSurrogate.load(path)).name
 
 
 @pytest.mark.parametrize("place", ["0.01,0.02", "1,2,3,4", "a,b,c", "0.01,nan,0.02", ""])

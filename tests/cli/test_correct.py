@@ -76,6 +76,40 @@ def test_a_file_corrects_a_model(palpate, folder):
     assert content["left_out"]["median"] < 0.03
 
 
+@pytest.mark.parametrize(("factor", "said"), [(-1.0 / FACTOR, "Change their sign"), (1e3 / FACTOR, "1e+03 times the model's")])
+def test_forces_that_can_hardly_be_this_bodys_are_a_failure_that_loses_nothing(palpate, folder, factor, said):
+    X, F = measured()
+    write_measured(folder / "specimen.csv", X, factor * F)
+    words = (
+        "correct",
+        folder / "model.touch",
+        "--file",
+        folder / "specimen.csv",
+        "--out",
+        folder / "new.touch",
+    )
+    answer = palpate(*words)
+    assert answer.code == 1
+    assert said in answer.err
+    assert "before" in answer.out
+    assert said in TouchSurrogate.load(folder / "new.touch").meta["correction"]["warning"]
+    assert said in json.loads(palpate(*words, "--json").out)["warning"]
+
+
+def test_a_short_record_says_that_none_of_it_was_left_out(palpate, folder):
+    X, F = measured(9)
+    write_measured(folder / "specimen.csv", X, F)
+    words = (
+        "correct",
+        folder / "model.touch",
+        "--file",
+        folder / "specimen.csv",
+        "--out",
+        folder / "new.touch",
+    )
+    assert "left out  not judged: that takes a record of 10" in palpate(*words).out
+
+
 def test_a_body_with_its_shape_stays_one(palpate, folder):
     X, F = measured()
     write_measured(folder / "specimen.csv", X, F)

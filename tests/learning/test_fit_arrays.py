@@ -188,6 +188,7 @@ BAD = {
     "ragged": (lambda X, Y: ([[1.0, 2.0], [3.0]] * 20, Y), "Samples are real numbers"),
     "complex": (lambda X, Y: (X + 1j, Y), "Samples are real numbers"),
     "constant": (lambda X, Y: (X, np.full(40, 3.0)), "same outputs"),
+    "nothing varied": (lambda X, Y: (np.ones((40, 2)), Y), "same inputs"),
     "huge": (lambda X, Y: (X * 1e200, Y), "other units"),
     "cube": (lambda X, Y: (X[:, None], Y), "not samples"),
 }

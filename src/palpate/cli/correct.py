@@ -12,7 +12,7 @@ import numpy as np
 
 from palpate.cli.console import Console
 from palpate.dataset.measured import Measured, lines_of, listening, measurements, read_measured
-from palpate.errors import UsageError
+from palpate.errors import AccuracyError, UsageError
 from palpate.learning.correction import Corrected, Corrector, Discrepancy, Noise, correct, judged
 from palpate.surrogates import TouchedBody, TouchSurrogate
 from palpate.surrogates.loading import load
@@ -66,6 +66,8 @@ def correct_model(
         If files or options do not fit, or nothing was learnt.
     DeviceError
         If nobody connects to the port.
+    AccuracyError
+        If the forces have another sign, or may have another unit, than the model's; everything has been written then.
     """
     body = load(model)
     if not isinstance(body, TouchedBody | TouchSurrogate):
@@ -93,9 +95,15 @@ def correct_model(
         done = _streamed(corrector, source, console)
     found = done.surrogate
     path = (body.felt_as(found) if isinstance(body, TouchedBody) else found).save(out)
-    if done.warning:
+    if done.warning and not done.doubtful:
         console.say(done.warning)
     console.result(f"{done}\n{path}", {**done.as_dict(), "warning": done.warning or None, "model": str(path)})
+    if done.doubtful:
+        raise AccuracyError(
+            done.warning,
+            why="A model that believes them pushes the hand as wrongly.",
+            fix=f"Mend the measurements and correct again; if they are right, {path} is the corrected model.",
+        )
 
 
 def _streamed(corrector: Corrector, source: Source, console: Console) -> Corrected:

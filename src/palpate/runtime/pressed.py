@@ -19,7 +19,7 @@ from palpate.errors import FileFormatError, UsageError
 from palpate.runtime.pressed_evaluator import PressedEvaluator
 from palpate.runtime.recorded import branches_told, dents_told, spacing_told
 from palpate.surrogates import FieldSurrogate, TouchedBody, TouchSurrogate
-from palpate.surrogates.learnt_energy import corrected_by
+from palpate.surrogates.learnt_energy import corrected_by, warning_of
 from palpate.surrogates.plastic import DentMemory, Dents
 from palpate.surrogates.relaxation import Branches, Memory, Patches
 from palpate.units import Range, bounds
@@ -54,7 +54,9 @@ class PressedBody:
         touch = body if isinstance(body, TouchSurrogate) else body.touch
         known = str(touch.meta.get("name", "")) or name or "body"
         if (touches := corrected_by(touch.meta)) is not None:
-            known += f", corrected by {touches} touches"
+            known += f", corrected by {touches} touches" + (
+                " with a warning" if warning_of(touch.meta) else ""
+            )
         return cls(touch, {} if alone else dict(body.fields), known)  # type: ignore[union-attr]
 
     def __str__(self) -> str:

@@ -22,7 +22,7 @@ from palpate.surrogates.touch_trust import covariances_into, trusts_into
 from palpate.units import Range
 from palpate.words import share
 
-__all__ = ["LearntEnergy", "corrected_by", "history_in_words"]
+__all__ = ["LearntEnergy", "corrected_by", "history_in_words", "warning_of"]
 
 
 class LearntEnergy(ABC):
@@ -155,6 +155,7 @@ def history_in_words(meta: Mapping[str, Any]) -> str:
         words += f"; force error {share(error['median'])} median, {share(error['p95'])} p95"
     if (touches := corrected_by(meta)) is not None:
         words += f"; corrected by {touches} measured touches"
+        words += ", with a warning" if warning_of(meta) else ""
     return words + _memory_in_words(meta)
 
 
@@ -175,3 +176,9 @@ def corrected_by(meta: Mapping[str, Any]) -> int | None:
     told = meta.get("correction")
     counts = told.get("counts") if isinstance(told, Mapping) else None
     return int(counts.get("learnt", 0)) if isinstance(counts, Mapping) else None
+
+
+def warning_of(meta: Mapping[str, Any]) -> str:
+    """What was suspicious of the measurements that have corrected it, in words; "" if nothing was."""
+    told = meta.get("correction")
+    return str(told.get("warning", "")) if isinstance(told, Mapping) else ""

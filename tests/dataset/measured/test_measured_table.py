@@ -74,7 +74,10 @@ def test_depths_at_a_place(tmp_path):
         ("x [m],y [m],z [N],Fz [N]\n1,2,3,4\n", "line 1: 'N' is no unit of length"),
         ("x [m],y [m],z,Fz [N]\n1,2,3,4\n", "line 1: Column 3, 'z', has no unit"),
         ("x,y,z,Fz\n1,2,3,4\n", "line 1: Column 1, 'x', has no unit"),
-        ("x,y,z,Fz\nm,m,m\n1,2,3,4\n", "line 1: The row of units has 3 cells"),
+        ("x,y,z,Fz\nm,m,m\n1,2,3,4\n", "line 2: The row of units has 3 cells"),
+        ("# a bench\nx,y,z,Fz\n\nm,m,m,lbf\n1,2,3,4\n", "line 4: 'lbf' is no unit of force"),
+        ("x,y,z,Fz\nm,m,,N\n1,2,3,4\n", "line 2: Column 3, 'z', has no unit"),
+        ("x,y,w,Fz\nm,m,m,N\n1,2,3,4\n", "line 1: Column 3 is called 'w'"),
         ("x [m],y [m],y [m],Fz [N]\n1,2,3,4\n", "line 1: Column 3 is called 'y', as another"),
         ("x [m],y [m],w [m],Fz [N]\n1,2,3,4\n", "line 1: Column 3 is called 'w'"),
         ("x [m],y [m],z [m],Fx [N],Fz [N]\n1,2,3,4,5\n", "make no measurement"),
@@ -89,6 +92,12 @@ def test_what_is_wrong_is_named_with_file_line_and_column(tmp_path, text, said):
     assert said in error.value.what + error.value.why
     assert "specimen.csv" in error.value.what
     assert error.value.fix
+
+
+def test_a_unit_of_the_sidecar_is_wrong_there(tmp_path):
+    path = table(tmp_path, "x,y,z,Fz\n1,2,3,4\n", {"units": {"x": "m", "y": "m", "z": "m", "Fz": "lbf"}})
+    with pytest.raises(FileFormatError, match=r"specimen\.json: 'lbf' is no unit of force"):
+        read_measured(path)
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from palpate.dataset.measured.units import FORCES, LENGTHS, TIMES, in_si
+from palpate.dataset.measured.units import FORCES, LENGTHS, TIMES, UnitError, in_si
 from palpate.errors import UsageError
 
 __all__ = ["NAMES", "Columns", "number"]
@@ -61,7 +61,7 @@ class Columns:
                     fix="Columns are t (optional), x, y, z and Fx, Fy, Fz or one of them; or depth and F at a place.",
                 )
             if not known.get(name):
-                raise UsageError(
+                raise UnitError(
                     f"Column {number_}, {written.strip()!r}, has no unit.",
                     why="Metres and millimetres differ by what a correction would take for another specimen.",
                     fix="Name it, for example: x [mm].",

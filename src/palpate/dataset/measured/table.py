@@ -27,6 +27,7 @@ import numpy as np
 
 from palpate.dataset.measured.columns import NAMES, Columns, number
 from palpate.dataset.measured.record import Measured
+from palpate.dataset.measured.units import UnitError
 from palpate.errors import FileFormatError, UsageError
 
 __all__ = ["read_measured", "write_measured"]
@@ -51,12 +52,20 @@ def read_measured(path: str | os.PathLike[str]) -> Measured:
         raise FileFormatError(f"{path} holds no table.", why="It has no header.", fix=_MAKE)
     first, header = lines.pop(0)
     split = next((mark for mark in ";\t" if mark in header), ",")
+    second, beside = lines[0][1].split(split) if lines else [], side.get("units", {})
+    told = f"{path}, line {first}"
     try:
-        columns, used = _columns(
-            header.split(split), lines[0][1].split(split) if lines else [], side.get("units", {}), side
-        )
+        names, units = _named(header.split(split), beside)
+        used = int(not units and _is_row_of_units(second))
+        if used:  # what is wrong with a unit is wrong there
+            told = f"{path}, line {lines[0][0]}"
+            units = _row_of_units(names, second)
+        elif beside:
+            told = str(path.with_suffix(".json"))
+        columns = Columns.of(names, units, placed="place" in side)
     except UsageError as error:
-        raise FileFormatError(f"{path}, line {first}: {error.what}", why=error.why, fix=error.fix) from error
+        where = told if isinstance(error, UnitError) else f"{path}, line {first}"
+        raise FileFormatError(f"{where}: {error.what}", why=error.why, fix=error.fix) from error
     rows = []
     for at, line in lines[used:]:
         try:
@@ -100,30 +109,32 @@ def _lines(path: Path) -> list[tuple[int, str]]:
     return [(at, line) for at, line in numbered if line.strip() and not line.lstrip().startswith("#")]
 
 
-def _columns(
-    header: list[str], second: list[str], beside: Mapping[str, str], side: Mapping[str, Any]
-) -> tuple[Columns, int]:
-    """The columns, and how many further lines (0 or 1) told of them."""
+def _named(header: list[str], beside: Mapping[str, str]) -> tuple[list[str], Mapping[str, str]]:
+    """Names of the columns, and the units that header or sidecar tell."""
     heads = [_HEAD.match(cell) for cell in header]
     for i, (head, cell) in enumerate(zip(heads, header, strict=True), 1):
         if head is None:
             raise UsageError(f"Column {i} is called {cell.strip()!r}.", fix="Write a name, or a name [unit].")
     found = [head for head in heads if head is not None]
-    names = [head["name"] for head in found]
     units = {head["name"]: head["unit"] for head in found if head["unit"]}
-    row = bool(second) and all(number(cell) is None for cell in second) and not units and not beside
-    if row:
-        if len(second) != len(names):
-            raise UsageError(
-                f"The row of units has {len(second)} cells for {len(names)} columns.", fix="One for each."
-            )
-        units = dict(zip(names, second, strict=True))
-    if not row and units and beside:
+    if units and beside:
         raise UsageError(
             "Units stand in the header and in the sidecar.",
             fix="Name them in one place, so that one is right.",
         )
-    return Columns.of(names, units or beside, placed="place" in side), int(row)
+    return [head["name"] for head in found], units or beside
+
+
+def _is_row_of_units(cells: list[str]) -> bool:
+    return bool(cells) and all(number(cell) is None for cell in cells)
+
+
+def _row_of_units(names: list[str], cells: list[str]) -> dict[str, str]:
+    if len(cells) != len(names):
+        raise UnitError(
+            f"The row of units has {len(cells)} cells for {len(names)} columns.", fix="One for each."
+        )
+    return dict(zip(names, cells, strict=True))
 
 
 def _sidecar(path: Path) -> dict[str, Any]:

@@ -82,7 +82,7 @@ def points(X: Any, inputs: Sequence[Range]) -> np.ndarray:
 
 
 def constant(Y: np.ndarray) -> bool:
-    """Whether no output of Y (N, m) changes by more than rounding."""
+    """Whether no column of Y (N, m) changes by more than rounding."""
     return not bool((np.ptp(Y, axis=0) > 1e-13 * np.abs(Y).max()).any())
 
 
@@ -149,6 +149,12 @@ def _check_rows(X: np.ndarray, Y: np.ndarray) -> None:
     if max(np.abs(X).max(), np.abs(Y).max()) > _LARGEST:
         raise UsageError(
             f"Numbers beyond {_LARGEST:.0e} can't be squared.", fix="Give the samples in other units."
+        )
+    if constant(X):
+        raise UsageError(
+            f"All {len(X)} samples have the same inputs.",
+            why="Outputs can't be told apart by inputs that do not change.",
+            fix="Check which columns of the data became X.",
         )
     if constant(Y):
         raise UsageError(

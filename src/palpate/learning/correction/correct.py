@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -32,6 +32,7 @@ class Corrected:
     Attributes
     ----------
     surrogate : TouchSurrogate
+        Its ``meta["correction"]`` holds counts, height and the warning, so a file goes on telling of it.
     before, after : ForceError
         Of the model and of the corrected surrogate on all measurements that were not outliers of both.
     left_out : ForceError, optional
@@ -59,6 +60,11 @@ class Corrected:
     ratio: float
 
     @property
+    def doubtful(self) -> bool:
+        """Whether the forces can hardly be this body's: they have another sign, or may have another unit."""
+        return self.ratio < 0 or self.ratio > _RATIO or self.ratio < 1 / _RATIO
+
+    @property
     def warning(self) -> str:
         """What is suspicious, in words; "" if nothing is."""
         if self.ratio < 0:
@@ -66,7 +72,7 @@ class Corrected:
                 "Measured forces point against the model's: they are to be those on the probe, which a body pushes "
                 "out. Change their sign."
             )
-        if self.ratio > _RATIO or self.ratio < 1 / _RATIO:
+        if self.doubtful:
             return (
                 f"Measured forces are {self.ratio:.2g} times the model's: more than specimens mostly differ by, and as "
                 "much as between units (pounds 4.4, kilograms 9.8, millinewtons 1000 times newtons)."
@@ -96,8 +102,12 @@ class Corrected:
             f"before    {self.before}",
             f"after     {self.after}",
         ]
-        if self.left_out is not None:
-            lines.append(f"left out  {self.left_out}")
+        whole = (
+            f"not judged: that takes a record of {_FEWEST} measurements"
+            if self.left_out is None
+            else self.left_out
+        )
+        lines.append(f"left out  {whole}")
         height, sure = self.offset
         return "\n".join([*lines, f"surface   {1e3 * height:+.3f} ± {1e3 * sure:.3f} mm over the model's"])
 
@@ -158,14 +168,14 @@ def judged(corrector: Corrector, measured: Measured, left_out: ForceError | None
         raise UsageError(
             f"No measurement taught anything: {said}.",
             why="Touches teach where the probe is in contact, in the trained ranges and no deeper than trained.",
-            fix="Check the frame, the units, the probe's radius and the surface's height.",
+            fix="Check the frame, the units, the forces' sign, the probe's radius and the surface's height.",
         )
     X = _inputs(corrector.model, measured, corrector.parameters)
     usable = np.isfinite(X).all(axis=1) & np.isfinite(measured.force).all(axis=1)
     X, force, along = X[usable], measured.force[usable], measured.along[usable]
     surprise = float(np.abs(corrector.belief.mean).max())
     before = force_error(corrector.model, X, force, along)
-    return Corrected(
+    done = Corrected(
         after,
         before,
         force_error(after, X, force, along),
@@ -176,6 +186,13 @@ def judged(corrector: Corrector, measured: Measured, left_out: ForceError | None
         corrector.strain,
         _ratio(corrector.model.force(X), force, along),
     )
+    return replace(done, surrogate=_warned(after, done.warning)) if done.warning else done
+
+
+def _warned(surrogate: TouchSurrogate, warning: str) -> TouchSurrogate:
+    """The surrogate, whose record repeats a warning."""
+    told = {**surrogate.meta["correction"], "warning": warning}
+    return replace(surrogate, meta={**surrogate.meta, "correction": told})
 
 
 def _ratio(predicted: np.ndarray, measured: np.ndarray, along: np.ndarray) -> float:

@@ -1,0 +1,151 @@
+"""What an energy of place answers at one place, for a person and for a program."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from palpate.units import Range, bounds
+from palpate.words import share
+
+__all__ = ["Answer", "beyond_in_words", "outside", "place_in_words", "within_in_words"]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What an energy answers at one place.
+
+    Attributes
+    ----------
+    inputs : (n,)
+        In the inputs' units.
+    energy : float
+        J.
+    force : (3,)
+        N.
+    stiffness : (3, 3)
+        ∂F/∂c by the first three inputs c, N/m.
+    deviation : float
+        Of the force, relative to its size; not-a-number where it is not known, as beyond the ranges.
+    inside : bool
+        Whether the place lies in what was trained.
+    deepest : float, optional
+        How far inside the touched surface (m) the probe's centre could go; given where it is farther, or elsewhere
+        where nothing is known of its depth. Energy, force and stiffness are not-a-number there.
+    """
+
+    inputs: np.ndarray
+    energy: float
+    force: np.ndarray
+    stiffness: np.ndarray
+    deviation: float
+    inside: bool
+    deepest: float | None = None
+
+    def words(self, names: Sequence[Range]) -> str:
+        """For a person."""
+        at, beyond = place_in_words(self.inputs, names), beyond_in_words(self.inputs, names)
+        if self.deepest is not None:
+            return f"{at}\n  {_unknown(self.deepest)}" + (f"\n  {beyond}" if beyond else "")
+        size = float(np.linalg.norm(self.force))
+        if size == 0.0:
+            if beyond:
+                return f"{at}\n  no force: in the air, or behind the body\n  {beyond}"
+            return f"{at}\n  no contact: force, stiffness and energy are zero"
+        largest = float(np.abs(self.stiffness).max())
+        lines = [
+            at,
+            f"  force      {_row(self.force, size)} N, in all {size:.4g} N",
+            f"  stiffness  {self.along():.4g} N/m along the force",
+            f"  ∂F/∂c      {'; '.join(_row(row, largest) for row in self.stiffness)} N/m",
+            f"  energy     {self.energy:.4g} J",
+            f"  trust      {self._trust(names)}",
+        ]
+        return "\n".join(lines)
+
+    def along(self) -> float:
+        """−F·(∂F/∂c)F/‖F‖², N/m: what a hand feels that goes on pushing."""
+        return float(-self.force @ self.stiffness @ self.force / (self.force @ self.force))
+
+    def _trust(self, names: Sequence[Range]) -> str:
+        where = within_in_words(self.inputs, names, inside=self.inside)
+        return (
+            where
+            if math.isnan(self.deviation)
+            else f"± {share(self.deviation)} of the force, one deviation; {where}"
+        )
+
+    def ended(self, deepest: float) -> Answer:
+        """The same place, where nothing is known of how deep the probe is."""
+        none = math.nan
+        return replace(
+            self,
+            energy=none,
+            force=np.full(3, none),
+            stiffness=np.full((3, 3), none),
+            deviation=none,
+            inside=False,
+            deepest=deepest,
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """For a program."""
+        return {
+            "inputs": self.inputs.tolist(),
+            "force": self.force.tolist(),
+            "stiffness": self.stiffness.tolist(),
+            "energy": self.energy,
+            "deviation": self.deviation,
+            "inside": self.inside,
+        }
+
+
+def outside(values: np.ndarray, inputs: Sequence[Range]) -> np.ndarray:
+    """Which of the values (..., n) lie outside of their ranges."""
+    low, high = bounds(inputs)
+    return np.asarray((values < low) | (values > high))
+
+
+def place_in_words(values: np.ndarray, inputs: Sequence[Range]) -> str:
+    """Names, values and units."""
+    return "at " + ", ".join(_quantity(r, x) for r, x in zip(inputs, values, strict=True))
+
+
+def beyond_in_words(values: np.ndarray, inputs: Sequence[Range]) -> str:
+    """Values outside of their ranges, in words; "" if there are none."""
+    return ", ".join(
+        f"{_quantity(r, x)} is not in {r.low:.4g} … {r.high:.4g} {r.unit}".rstrip()
+        for r, x, out in zip(inputs, values, outside(values, inputs), strict=True)
+        if out
+    )
+
+
+def within_in_words(values: np.ndarray, inputs: Sequence[Range], *, inside: bool | None) -> str:
+    """Whether values lie in what was trained; `inside` says whether a training sample is near, where that is known."""
+    if beyond := beyond_in_words(values, inputs):
+        return f"not known, OUTSIDE what it was trained on: {beyond}"
+    if inside is None:
+        return "within the ranges it was trained on"
+    if not inside:
+        return "OUTSIDE what it was trained on: within the ranges, but no training sample is near"
+    return "inside what it was trained on"
+
+
+def _unknown(deepest: float) -> str:
+    return (
+        f"no force is known here: a probe is followed to where its centre is {1e3 * deepest:.3g} mm beneath the "
+        "touched\n  surface, not deeper, nor behind the body or beside it; the loop and the page let go of the hand"
+    )
+
+
+def _quantity(of: Range, value: float) -> str:
+    return f"{of.name} {value:g} {of.unit}".rstrip()
+
+
+def _row(values: np.ndarray, size: float) -> str:
+    """Numbers; what is round-off beside `size` as zero."""
+    return " ".join("0" if abs(value) < 1e-9 * size else f"{value:.4g}" for value in values)

@@ -6,6 +6,7 @@ import dataclasses
 from pathlib import Path
 
 import numpy as np
+import pytest
 from linear_bodies import history, tip_data, tip_model
 
 from models import linear_network
@@ -14,7 +15,7 @@ from palpate.units import Quantity, Range
 from palpate.validation import Chapter, SurrogateChapter, TouchSolves, validate, write_report
 from palpate.validation.report.surrogates.curves import curves, plot_curves
 from palpate.validation.report.surrogates.view import View, at_depth, feet
-from palpate.words import bound, interval
+from palpate.words import bound, interval, plain
 from pressed import DEEPEST, INPUTS, RADIUS, A, B, face, force, places, solves, steady, surrogate
 
 HOSTILE = '<script>window.hacked = 1</script> $\\frac{1}$ "&amp;'
@@ -67,6 +68,16 @@ def test_of_a_family_it_is_told_which_body_is_shown(tmp_path: Path) -> None:
         "utf-8"
     )
     assert "The surrogate states no deviation. Shown for young = 6000 Pa." in text
+
+
+@pytest.mark.parametrize("images", [1, 8])
+def test_a_picture_of_a_part_says_that_it_is_one(tmp_path: Path, images: int) -> None:
+    S, test = surrogate(meta={"solves": 12, "samples": 12 * images}), solves()
+    v = validate(S, test)
+    assert v.smoothness is not None
+    text = write_report(tmp_path / "part.html", [SurrogateChapter("part", S, test, v)]).read_text("utf-8")
+    assert text.count("a part of the body of which the rest is mirror images") == (0 if images == 1 else 2)
+    assert f"{plain(v.smoothness.p95)} times as much as its reference (the model" in " ".join(text.split())
 
 
 def test_both_kinds_of_bodies_stand_in_one_report(tmp_path: Path) -> None:

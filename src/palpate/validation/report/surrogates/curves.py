@@ -86,5 +86,9 @@ def plot_curves(surrogate: TouchSurrogate, test: TouchSolves) -> Figure:
     axis.set_ylabel("‖F‖ / N")
     axis.set_xlim(left=0)
     axis.set_ylim(bottom=0)
-    axis.legend(loc="best", title="line: surrogate, dots: finite elements; down to", title_fontsize=8.5)
+    axis.legend(
+        loc="best",
+        title="line: surrogate, dots: finite elements; the deepest probe's centre at",
+        title_fontsize=8.5,
+    )
     return fig

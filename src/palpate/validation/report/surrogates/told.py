@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from palpate.surrogates import TouchSurrogate
 from palpate.validation.report.forces import plot_force_errors
 from palpate.validation.report.pictures import picture
 from palpate.validation.report.surrogates.chapter import SurrogateChapter
@@ -16,6 +17,7 @@ from palpate.validation.report.surrogates.view import deepest, further
 from palpate.validation.report.svg import Picture
 from palpate.validation.report.tables import flat, judged_rows, timing_rows
 from palpate.validation.solves import TouchFunction
+from palpate.validation.strokes import Smoothness
 from palpate.validation.surrogate import SurrogateValidation, probe_samples
 from palpate.words import plain, share
 
@@ -47,9 +49,8 @@ def _pictures(chapter: SurrogateChapter, key: str) -> list[Picture]:
     off = "No touch was strong enough to judge in relative terms."
     if v.force.p95 is not None and v.force.max is not None:
         off = f"95 of 100 forces are within {share(v.force.p95)}, all within {share(v.force.max)}."
-    smooth = (
-        "" if v.smoothness is None else f" Along strokes the force is smooth to {plain(v.smoothness.p95)} ×."
-    )
+    smooth = "" if v.smoothness is None else _smooth(v.smoothness)
+    part = _part(surrogate)
     trust = "Colour: standard deviation of the force that the surrogate states."
     if surrogate.root is None:
         trust = "The surrogate states no deviation."
@@ -68,7 +69,7 @@ def _pictures(chapter: SurrogateChapter, key: str) -> list[Picture]:
             "Error on the touched surface",
             f"Force error of {chapter.name} at each unseen solve, on the surface seen from outside. {off}",
             "One dot per unseen solve, where the probe touches; forces up to f₀ are judged against f₀. Numbers mark "
-            f"the worst cases of the table. {off}",
+            f"the worst cases of the table. {off}{part}",
             lambda: plot_errors(surrogate, test, samples),
         ),
         picture(
@@ -82,10 +83,28 @@ def _pictures(chapter: SurrogateChapter, key: str) -> list[Picture]:
             f"{key}-trust",
             "Where to trust it",
             f"Stated deviation of the force of {chapter.name} on the surface seen from outside, at two depths. {trust}",
-            f"{trust} Hatched: outside what was trained. Dots: unseen solves.",
+            f"{trust} Hatched: outside what was trained. Dots: unseen solves.{part}",
             lambda: plot_trust(surrogate, test),
         ),
     ]
+
+
+def _smooth(found: Smoothness) -> str:
+    return (
+        f" Along strokes at 0.1 m/s the force changes its rate from one millisecond to the next at most "
+        f"{plain(found.p95)} times as much as its reference ({found.reference}), in 95 of 100 strokes."
+    )
+
+
+def _part(surrogate: TouchSurrogate) -> str:
+    """That symmetry was used, where it was: the picture shows less than the body."""
+    solves, samples = surrogate.meta.get("solves", 0), surrogate.meta.get("samples", 0)
+    if not samples > solves:
+        return ""
+    return (
+        " Solved, tested and drawn is a part of the body of which the rest is mirror images or turned copies; the "
+        "surrogate answers there alike."
+    )
 
 
 def _part_rows(v: SurrogateValidation) -> tuple[list[str], list[list[str]]]:

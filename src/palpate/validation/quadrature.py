@@ -16,7 +16,7 @@ import numpy as np
 __all__ = ["Work", "work_of_polygons"]
 
 ORDER = 8
-FIRST = 64  # intervals of an edge to begin with: a touch shorter than that may be passed over
+FIRST = 32  # intervals of an edge to begin with: a touch shorter than that may be passed over
 LEVELS = 24  # halvings at most: an interval of an edge of 10 mm is then 10 picometres
 TOLERANCE = 1e-13  # disagreement that an interval may keep, over the energy of its loop
 

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from statistics import NormalDist
 
 import numpy as np
+from scipy.special import stdtrit
 
 from palpate.learning.choosing.kernel_layer import KernelLayer
 from palpate.learning.refinement.refine import Refined
@@ -146,9 +147,7 @@ def _quantiles(scores: np.ndarray, level: float) -> np.ndarray:
     rank = math.ceil((count + 1) * level - 1e-9)
     if rank <= count:
         return np.asarray(np.maximum(np.sort(scores, axis=0)[rank - 1], 1e-12))
-    from scipy.stats import t
-
-    return np.full(scores.shape[1], float(t.ppf((1.0 + level) / 2.0, count)))
+    return np.full(scores.shape[1], float(stdtrit(count, (1.0 + level) / 2.0)))  # quantile of Student's t
 
 
 def _rows(found: Refined, X: np.ndarray) -> np.ndarray:

@@ -26,7 +26,7 @@ from touch_made import (
 from allocated import kept_by
 from palpate.errors import UsageError
 from palpate.network import TrainedRegion
-from palpate.surrogates import ContactLaw, Continuation, TouchSurrogate
+from palpate.surrogates import ContactLaw, Continuation, TouchSurrogate, learnt_energy
 
 FAMILY = {"extra": (SOFT, PROBE), "radius_input": 4}
 LAWS = [ContactLaw("square"), ContactLaw("hertz"), ContactLaw("pad"), ContactLaw("series", 1e-3)]
@@ -269,6 +269,24 @@ def test_the_evaluator_gives_the_same_bits_as_the_batch(more):
         np.testing.assert_array_equal(evaluator.force, F[i])
         np.testing.assert_array_equal(evaluator.stiffness, K[i])
         assert evaluator.trust(x[:3], x[3:]) == trust[i]
+
+
+def test_many_answers_are_shared_by_threads_and_the_same_bits(monkeypatch):
+    S = surrogate()
+    X = around_points(501)
+    alone = S.energy(X), S.force(X), S.stiffness(X), S.inside(X)
+    monkeypatch.setattr(learnt_energy, "available_cores", lambda: 3)
+    monkeypatch.setattr(learnt_energy, "_PART", 10)
+    parts, one = [], TouchSurrogate._fill
+
+    def fill(self, X, answers, inside):
+        parts.append(len(X))
+        one(self, X, answers, inside)
+
+    monkeypatch.setattr(TouchSurrogate, "_fill", fill)
+    for found, before in zip((S.energy(X), S.force(X), S.stiffness(X), S.inside(X)), alone, strict=True):
+        np.testing.assert_array_equal(found, before)
+    assert parts == 12 * [167]
 
 
 def test_nothing_is_allocated_by_a_call():

@@ -6,14 +6,17 @@ kernels of both fill the same answer (`touch_kernels`).
 
 from __future__ import annotations
 
+import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 
+from palpate.cores import available_cores
 from palpate.errors import UsageError
 from palpate.network import Network
 from palpate.surrogates.arguments import rows_of
@@ -23,6 +26,8 @@ from palpate.units import Range
 from palpate.words import share
 
 __all__ = ["LearntEnergy", "corrected_by", "history_in_words", "warning_of"]
+
+_PART = 2000  # answers that are worth a thread: about 10 ms
 
 
 class LearntEnergy(ABC):
@@ -54,7 +59,14 @@ class LearntEnergy(ABC):
         """Checked inputs (N, n), answers (N, 14) and inside (N,)."""
         X = rows_of(X, self.inputs, self.WORDS)
         answers, inside = np.empty((len(X), ANSWER)), np.empty(len(X), dtype=np.bool_)
-        self._fill(X, answers, inside)
+        parts = max(1, min(available_cores(), len(X) // _PART))
+        if parts == 1:
+            self._fill(X, answers, inside)
+            return X, answers, inside
+        ends = np.linspace(0, len(X), parts + 1).astype(int)
+        some = [slice(a, b) for a, b in itertools.pairwise(ends)]
+        with ThreadPoolExecutor(parts) as threads:  # the kernels need no lock of the interpreter
+            list(threads.map(lambda one: self._fill(X[one], answers[one], inside[one]), some))
         return X, answers, inside
 
     def energy(self, X: np.ndarray) -> np.ndarray:

@@ -60,7 +60,7 @@ def test_answers_are_the_surrogates(palpate, file):
         np.testing.assert_array_equal([one["deviation"] for one in answers], S.deviation(X))
     words = palpate("ask", file, *places).out
     assert f"{np.linalg.norm(S.force(X)[0]):.4g} N" in words
-    assert words.count("no force: in the air") == 1
+    assert words.count("no contact") == 1
 
 
 def test_a_body_with_its_shape_answers_by_its_energy(palpate, file, tmp_path):
@@ -86,7 +86,7 @@ def test_beyond_the_ranges_the_trust_is_not_known(palpate, file):
     assert answer["inside"] is False
     # millimetres taken for metres
     words = palpate("ask", file, "--at", "0,0,50").out
-    assert "no force: in the air" in words
+    assert "no contact" in words
     assert "c_z 50 m is not in" in words
 
 
@@ -97,6 +97,7 @@ def test_deeper_than_the_distance_goes_no_force_is_told(palpate, file):
     line[:, 2] = -end + np.array(
         [0.0005, -0.0005, -1.8 * S.radius]
     )  # just before, just behind, where d turns back
+    behind, air = middle[0] - [0, 0, 10 * S.radius], middle[0] + [0.2, 0, 2 * S.radius]
     assert S.force(line).any(axis=1).all()
     assert S.force(line)[2] @ S.force(line)[0] < 0, "the energy has to end, and pulls the probe in"
     texts = [word for x in line for word in ("--at", text_of(x))]
@@ -106,8 +107,15 @@ def test_deeper_than_the_distance_goes_no_force_is_told(palpate, file):
         assert one["force"] == [None] * 3
         assert one["energy"] is None
         assert one["inside"] is False
+        assert one["contact"] is None
     words = palpate("ask", file, *texts).out
     assert words.count("no force is known here") == 2
+    assert not S.force(np.array([behind, air])).any()
+    places = ("--at", text_of(behind), "--at", text_of(air), "--at", text_of(middle[0]))
+    unknown, free, pressed = json.loads(palpate("ask", file, *places, "--json").out)["answers"]
+    assert (unknown["force"], unknown["inside"], unknown["contact"]) == ([None] * 3, False, None)
+    assert (free["force"], free["contact"], free["beyond"]) == ([0.0] * 3, False, ["c_x", "c_z"])
+    assert (pressed["contact"], pressed["beyond"]) == (True, [])
     assert f"{1e3 * end:.3g} mm beneath" in words
 
 

@@ -96,6 +96,29 @@ def test_forces_that_can_hardly_be_this_bodys_are_a_failure_that_loses_nothing(p
     assert said in json.loads(palpate(*words, "--json").out)["warning"]
 
 
+@pytest.mark.parametrize(
+    ("factor", "more", "said"),
+    [(1e3 * FACTOR, ("--offset", "0.005"), "units (pounds"), (-1e3, (), "Change their sign")],
+)
+def test_where_such_forces_teach_nothing_they_are_the_reason(palpate, folder, factor, more, said):
+    X = touches(60, 3)
+    F = factor * model().force(X) + np.random.default_rng(1).normal(0.0, 3.0, (60, 3))
+    write_measured(folder / "specimen.csv", X, F)
+    words = (
+        "correct",
+        folder / "model.touch",
+        "--file",
+        folder / "specimen.csv",
+        "--out",
+        folder / "new.touch",
+    )
+    answer = palpate(*words, *more)
+    assert answer.code == 2
+    assert said in answer.err
+    assert "Nothing could be learnt from them" in answer.err
+    assert not (folder / "new.touch").exists()
+
+
 def test_a_short_record_says_that_none_of_it_was_left_out(palpate, folder):
     X, F = measured(9)
     write_measured(folder / "specimen.csv", X, F)
@@ -107,7 +130,7 @@ def test_a_short_record_says_that_none_of_it_was_left_out(palpate, folder):
         "--out",
         folder / "new.touch",
     )
-    assert "left out  not judged: that takes a record of 10" in palpate(*words).out
+    assert "left out  not judged: only files of 10" in palpate(*words).out
 
 
 def test_a_body_with_its_shape_stays_one(palpate, folder):

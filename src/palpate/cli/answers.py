@@ -14,6 +14,8 @@ from palpate.words import share
 
 __all__ = ["Answer", "beyond_in_words", "outside", "place_in_words", "within_in_words"]
 
+_NOTHING = 1e-9  # N: first touch, but for round-off
+
 
 @dataclass(frozen=True)
 class Answer:
@@ -52,10 +54,9 @@ class Answer:
         if self.deepest is not None:
             return f"{at}\n  {_unknown(self.deepest)}" + (f"\n  {beyond}" if beyond else "")
         size = float(np.linalg.norm(self.force))
-        if size == 0.0:
-            if beyond:
-                return f"{at}\n  no force: in the air, or behind the body\n  {beyond}"
-            return f"{at}\n  no contact: force, stiffness and energy are zero"
+        if size < _NOTHING:
+            told = f"\n  {beyond}" if beyond else ""
+            return f"{at}\n  no contact: force, stiffness and energy are zero{told}"
         largest = float(np.abs(self.stiffness).max())
         lines = [
             at,
@@ -92,8 +93,8 @@ class Answer:
             deepest=deepest,
         )
 
-    def as_dict(self) -> dict[str, Any]:
-        """For a program."""
+    def as_dict(self, names: Sequence[Range]) -> dict[str, Any]:
+        """For a program; `contact` is None where the probe's depth is not known, `beyond` the inputs out of range."""
         return {
             "inputs": self.inputs.tolist(),
             "force": self.force.tolist(),
@@ -101,6 +102,8 @@ class Answer:
             "energy": self.energy,
             "deviation": self.deviation,
             "inside": self.inside,
+            "contact": None if self.deepest is not None else float(np.linalg.norm(self.force)) >= _NOTHING,
+            "beyond": [r.name for r, out in zip(names, outside(self.inputs, names), strict=True) if out],
         }
 
 

@@ -14,6 +14,7 @@ from palpate.cli.console import Console
 from palpate.cli.predictions import predicted
 from palpate.errors import FileFormatError, UsageError
 from palpate.network import Archive, Network, load_archive
+from palpate.runtime.pressed import PressedBody
 from palpate.surrogates import TouchedBody, TouchSurrogate
 from palpate.surrogates.learnt_energy import LearntEnergy, warning_of
 from palpate.surrogates.loading import load
@@ -55,7 +56,7 @@ def ask(model: Path, at: Sequence[str], console: Console) -> None:
             "answer to a hand that moves.",
             fix="Try `palpate run` or `palpate view`, or the value that `pp.load` reads.",
         )
-    content = {"model": str(model), "answers": [one.as_dict() for one in answers]}
+    content = {"model": str(model), "answers": [one.as_dict(inputs) for one in answers]}
     console.result("\n".join(words), content | _as_field(_warning(asked)))
 
 
@@ -89,10 +90,30 @@ def _answered(energy: LearntEnergy, X: np.ndarray) -> list[Answer]:
         Answer(x, float(U), F, K, float(d), bool(i)) for x, U, F, K, d, i in zip(X, *columns, strict=True)
     ]
     if isinstance(energy, TouchSurrogate):
-        measured = energy.surface.measured(X[:, :3]) | ~forces.any(axis=1)
+        ended = _ended(energy, X, np.asarray(forces.any(axis=1)))
         end = energy.surface.inner
-        return [one if known else one.ended(end) for one, known in zip(answers, measured, strict=True)]
+        return [one.ended(end) if gone else one for one, gone in zip(answers, ended, strict=True)]
     return answers
+
+
+def _ended(touch: TouchSurrogate, X: np.ndarray, felt: np.ndarray) -> np.ndarray:
+    """Whether nothing is known of the depth (N,) at inputs X (N, n): too deep, beside the body, or behind it.
+
+    Where nothing is `felt` a probe is in the air, unless the touched surface lies above it, along its normal.
+    """
+    out: np.ndarray = felt & ~touch.surface.measured(X[:, :3])
+    still = np.flatnonzero(~felt & outside(X, touch.inputs).any(axis=1))
+    if not len(still):
+        return out
+    low, high = touch.surface.box
+    far = float(np.linalg.norm(high - low))
+    ways = np.linspace(0.0, far, max(2, int(far / (touch.surface.radius / 4.0))))
+    normal = PressedBody.of(touch).normal
+    for i in still:
+        line = np.repeat(X[i][None], len(ways), axis=0)
+        line[:, :3] += ways[:, None] * normal
+        out[i] = bool((touch.depth(line) > 0).any())
+    return out
 
 
 def _reservations(energy: LearntEnergy) -> list[str]:

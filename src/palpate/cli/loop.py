@@ -16,6 +16,8 @@ from palpate.runtime.pressed import PressedBody
 from palpate.runtime.shared import State
 from palpate.runtime.stability import stiffness_warning
 from palpate.runtime.touchable import Touchable, load_touchable, workspace_for
+from palpate.surrogates.learnt_energy import warning_of
+from palpate.words import share
 
 __all__ = ["run_loop"]
 
@@ -24,27 +26,46 @@ LOOK = 0.02  # s between two looks at the loop
 
 @dataclass
 class Peak:
-    """The largest force (N) and depth (m) that were seen."""
+    """The largest force (N) and depth (m) that were seen, and how often the hand was where nothing was trained."""
 
     force: float = 0.0
     depth: float = -math.inf
+    looks: int = 0
+    outside: int = 0
+    let_go: int = 0
 
     def see(self, state: State) -> None:
         """One look at the loop."""
         self.force = max(self.force, math.hypot(*state.force))
         self.depth = max(self.depth, state.depth)
+        self.looks += 1
+        self.outside += not state.inside
+        self.let_go += state.depth == 0.0 and not state.inside  # only where the body has let go both are so
 
     def words(self, pressed: bool) -> str:
         """For a person."""
         if self.force == 0.0:
             return "  felt       nothing: the device did not reach the body"
-        return f"  felt       up to {self.force:.3g} N" + (
+        words = f"  felt       up to {self.force:.3g} N" + (
             f", {1e3 * self.depth:.3g} mm deep" if pressed else ""
         )
+        if self.outside:
+            words += (
+                f"\n  trust      outside what was trained for {share(self.outside / self.looks)} of the time"
+            )
+        if pressed and self.let_go:
+            words += f", so deep that the body let go for {share(self.let_go / self.looks)}"
+        return words
 
     def as_dict(self) -> dict[str, float]:
         """For a program."""
-        return {"largest_force": self.force, "largest_depth": max(self.depth, 0.0)}
+        looks = max(self.looks, 1)
+        return {
+            "largest_force": self.force,
+            "largest_depth": max(self.depth, 0.0),
+            "outside": self.outside / looks,
+            "let_go": self.let_go / looks,
+        }
 
 
 def run_loop(model: Path, seconds: float, device: str, rate: float | None, console: Console) -> None:
@@ -57,6 +78,8 @@ def run_loop(model: Path, seconds: float, device: str, rate: float | None, conso
     device = _aimed(device, touch, workspace.scale)
     if warning := stiffness_warning(felt, traits.damping, rate):
         console.say(warning)
+    if warning := warning_of(touch.meta):
+        console.say(f"its correction was warned of: {warning}")
     limit = settings.get("max_force")
     peak = Peak()
     # whoever stops it early still wants to know

@@ -50,13 +50,14 @@ class Prediction:
             lines.append(f"  {one.name:{width}}  {value:.6g}{spread} {one.unit}".rstrip())
         return "\n".join([*lines, f"  trust: {within_in_words(self.inputs, names, inside=self.inside)}"])
 
-    def as_dict(self) -> dict[str, Any]:
-        """For a program."""
+    def as_dict(self, names: Sequence[Range]) -> dict[str, Any]:
+        """For a program; `beyond` are the inputs out of range."""
         return {
             "inputs": self.inputs.tolist(),
             "outputs": {one.name: float(v) for one, v in zip(self.outputs, self.values, strict=True)},
             "deviations": None if self.deviations is None else self.deviations.tolist(),
             "inside": self.inside,
+            "beyond": [r.name for r, out in zip(names, outside(self.inputs, names), strict=True) if out],
         }
 
 

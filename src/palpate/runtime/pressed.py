@@ -215,7 +215,7 @@ class PressedBody:
         """The allocation-free evaluator of the 1 kHz path."""
         touch, own = self.touch, self.touch.radius_input
         ends = touch.surface.inner, touch.radius, None if own is None else own - 3
-        return PressedEvaluator(touch.evaluator(), self.memory(), self.away, *ends)
+        return PressedEvaluator(touch.evaluator(), self.memory(), self.away, self.normal, *ends)
 
     def stroke(self, scale: float) -> dict[str, float]:
         """Amplitude (m) and direction, in device coordinates, of a stroke that presses to three quarters of `deepest`.

@@ -10,6 +10,7 @@ from numba import njit
 from palpate.surrogates import SurrogateEvaluator
 from palpate.surrogates.plastic import DentMemory
 from palpate.surrogates.relaxation import Memory
+from palpate.surrogates.surface.touched import STEEP
 
 __all__ = ["PressedEvaluator"]
 
@@ -19,8 +20,9 @@ _jit = njit(cache=True, nogil=True, error_model="numpy")
 class PressedEvaluator:
     """Answers a probe's centre; nothing is allocated.
 
-    Farther inside than the distance to the touched surface is known the body lets go: no force, until the probe has
-    been in the air. An energy can't end there without pulling the hand in; ending so loses energy and makes none.
+    Farther inside than the distance to the touched surface is known, and where it turns back behind the body, the body
+    lets go: no force, until the probe has been in the air. An energy can't end there without pulling the hand in;
+    ending so loses energy and makes none. A probe that comes from behind meets nothing until it was in front.
 
     Attributes
     ----------
@@ -53,6 +55,8 @@ class PressedEvaluator:
     memory : Memory or DentMemory, optional
     away : (3,)
         See above.
+    normal : (3,)
+        Outer normal of the surface where it is usually touched.
     inner : float
         How far inside the surface the probe's centre may go, m.
     radius : float
@@ -66,6 +70,7 @@ class PressedEvaluator:
         elastic: SurrogateEvaluator,
         memory: Memory | DentMemory | None,
         away: np.ndarray,
+        normal: np.ndarray,
         inner: float,
         radius: float,
         radius_input: int | None = None,
@@ -76,10 +81,12 @@ class PressedEvaluator:
         self.force = elastic.force if memory is None else memory.force
         self._slope = np.zeros(3)
         self.contact, self.loads, self.away = np.zeros(3), np.zeros(0), away
+        self._normal = normal
         self._inner, self._radius, self._radius_input = inner, radius, radius_input
         self.inside, self.mirrored, self.let_go = True, False, False
         self.depth, self.stiffness, self.elapsed = -math.inf, 0.0, 0.0
         _along(elastic.force, elastic.stiffness)  # compile now, not in the loop
+        _behind(elastic.outward, normal)
 
     def place(self, position: np.ndarray, *, holding: bool, believed: bool) -> None:
         """Keep a probe that nobody holds `away`: a way back to the centre could lead through the body."""
@@ -114,9 +121,10 @@ class PressedEvaluator:
     def _judge(self, depth: float, parameters: np.ndarray) -> None:
         """Let go, or hold again."""
         own = self._radius_input
+        radius = self._radius if own is None else parameters[own]
         if depth <= 0.0:
             self.let_go = False
-        elif depth > self._inner + (self._radius if own is None else parameters[own]):
+        elif depth > self._inner + radius or _behind(self._elastic.outward, self._normal):
             self.let_go = True
 
 
@@ -128,3 +136,13 @@ def _along(force, stiffness) -> float:  # type: ignore[no-untyped-def]  # noqa: 
         for j in range(3):
             total -= force[i] * stiffness[i, j] * force[j]
     return total / size if size > 0.0 else 0.0
+
+
+@_jit
+def _behind(slope, normal) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """Whether d climbs towards the back, and faster than a distance does."""
+    square, out = 0.0, 0.0
+    for i in range(3):
+        square += slope[i] * slope[i]
+        out += slope[i] * normal[i]
+    return out < 0.0 and square > STEEP * STEEP

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from palpate.surrogates.arguments import NONE, touch_at
-from palpate.surrogates.touch_kernels import ANSWER, FORCE, STIFFNESS, touch_into
+from palpate.surrogates.touch_kernels import ANSWER, FORCE, STIFFNESS, VECTORS, touch_into
 from palpate.surrogates.touch_trust import trust_at
 
 __all__ = ["SurrogateEvaluator"]
@@ -25,6 +25,8 @@ class SurrogateEvaluator:
         F on the probe, N, where the last call evaluated.
     stiffness : (3, 3)
         ∂F/∂c, N/m.
+    outward : (3,)
+        ∇d there, of length 1 where the distance d to the touched surface is one.
     inside : bool
         Whether that was inside the trained region; without contact the answer is exact and counts as inside.
 
@@ -50,6 +52,7 @@ class SurrogateEvaluator:
         self._answer = np.zeros(ANSWER)
         self.force, self.stiffness = self._answer[FORCE], self._answer[STIFFNESS].reshape(3, 3)
         self.inside = True
+        self.outward: np.ndarray = compiled[1][VECTORS, 0]
         self._arguments = (self._answer, *compiled)
         self._shape = (len(somewhere) - 3,)
         x: np.ndarray = compiled[0][0]  # the kernels keep the whole input there

@@ -35,6 +35,7 @@ __all__ = [
     "FORCE",
     "SMALL",
     "STIFFNESS",
+    "VECTORS",
     "boxed",
     "gathered",
     "near",
@@ -50,7 +51,7 @@ ANSWER, FORCE, STIFFNESS = 14, slice(2, 5), slice(5, 14)
 _TWICE, _FACTOR, _LENGTH, _RADIUS, _RADIUS_INPUT, _DEEPEST, _DEPTH_WIDTH, _REGION, _STEP = range(9)
 _SLACK = 1e-9  # of a range: round-off at its edge is still inside
 # places in `small`: ∇²d, ∇²ℓ and two more of their like; then ∇d, ∇ℓ and others as rows
-_SURFACE, _LOG, _BEND, _OTHER, _VECTORS, _MORE = range(6)
+_SURFACE, _LOG, _BEND, _OTHER, VECTORS, _MORE = range(6)
 _LAST = 2  # row of small[MORE]
 SMALL = 6
 
@@ -85,7 +86,7 @@ def _bend(x, g, small, step, surface) -> None:  # type: ignore[no-untyped-def]  
     small[_BEND, :, :] = 0.0
     if size == 0.0:
         return
-    moved, unused, other = small[_VECTORS, 2], small[_MORE, 0], small[_OTHER]
+    moved, unused, other = small[VECTORS, 2], small[_MORE, 0], small[_OTHER]
     for many, weight in ((1.0, 8.0), (-1.0, -8.0), (2.0, -1.0), (-2.0, 1.0)):
         for i in range(3):
             moved[i] = x[i] + many * step * g[i] / size
@@ -103,7 +104,7 @@ def _through_depth(x, excess, slope, curvature, small, step, surface) -> None:  
     −(1 − σ')(∇d hᵀ + h ∇dᵀ + (∇d·g) ∇²d) − σ'' (∇d·g) ∇d ∇dᵀ + m ∂∇²d/∂g.
     """
     D, H, bend, J = small[_SURFACE], small[_LOG], small[_BEND], small[_OTHER]
-    d, g, new, h = small[_VECTORS, 0], small[_VECTORS, 1], small[_MORE, 0], small[_MORE, 1]
+    d, g, new, h = small[VECTORS, 0], small[VECTORS, 1], small[_MORE, 0], small[_MORE, 1]
     _bend(x, g, small, step, surface)
     along, rest = d[0] * g[0] + d[1] * g[1] + d[2] * g[2], 1.0 - slope
     for i in range(3):
@@ -129,7 +130,7 @@ def _through_depth(x, excess, slope, curvature, small, step, surface) -> None:  
 @_jit
 def _assemble(answer, kappa, law, small) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """U, F and ∂F/∂c from the law's and the factor's derivatives; symmetric to the last bit."""
-    D, H, d, g = small[_SURFACE], small[_LOG], small[_VECTORS, 0], small[_VECTORS, 1]
+    D, H, d, g = small[_SURFACE], small[_LOG], small[VECTORS, 0], small[VECTORS, 1]
     value, slope, curvature = kappa * law[0], kappa * law[1], kappa * law[2]
     answer[0] = value
     for i in range(3):
@@ -194,7 +195,7 @@ def touch_into(c, p, answer, lines, small, numbers, limits, points, grams, surfa
     if not gathered(c, p, lines):
         answer[:] = math.nan
         return False
-    d, g = small[_VECTORS, 0], small[_VECTORS, 1]
+    d, g = small[VECTORS, 0], small[VECTORS, 1]
     own = int(numbers[_RADIUS_INPUT])
     radius = numbers[_RADIUS] if own < 0 else lines[0, own]
     s = radius - distance_into(c, d, small[_SURFACE], *surface)

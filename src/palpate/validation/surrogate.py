@@ -82,7 +82,8 @@ class SurrogateValidation(Judgement):
             )
         if self.smoothness:
             lines.append(
-                f"smoothness over {count(self.smoothness.strokes, 'stroke')} at 0.1 m/s and 1 kHz; reference: "
+                f"second differences of the force at 0.1 m/s and 1 kHz: at most {self.smoothness.p95:.2f} times the "
+                f"reference's on 95 of 100 of {count(self.smoothness.strokes, 'stroke')}; reference: "
                 f"{self.smoothness.reference}"
             )
         if self.mesh:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import contextlib
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -62,21 +63,13 @@ class Corrected:
     @property
     def doubtful(self) -> bool:
         """Whether the forces can hardly be this body's: they have another sign, or may have another unit."""
-        return self.ratio < 0 or self.ratio > _RATIO or self.ratio < 1 / _RATIO
+        return bool(_doubt(self.ratio))
 
     @property
     def warning(self) -> str:
         """What is suspicious, in words; "" if nothing is."""
-        if self.ratio < 0:
-            return (
-                "Measured forces point against the model's: they are to be those on the probe, which a body pushes "
-                "out. Change their sign."
-            )
         if self.doubtful:
-            return (
-                f"Measured forces are {self.ratio:.2g} times the model's: more than specimens mostly differ by, and as "
-                "much as between units (pounds 4.4, kilograms 9.8, millinewtons 1000 times newtons)."
-            )
+            return _doubt(self.ratio)
         out, learnt = self.counts.get("outlier", 0), self.counts.get("learnt", 0)
         if out > _STRANGE * (out + learnt):
             return (
@@ -103,7 +96,7 @@ class Corrected:
             f"after     {self.after}",
         ]
         whole = (
-            f"not judged: that takes a record of {_FEWEST} measurements"
+            f"not judged: only files of {_FEWEST} measurements or more are"
             if self.left_out is None
             else self.left_out
         )
@@ -149,8 +142,10 @@ def correct(
     radius = surrogate.radius if own is None else float(parameters[own - 3])
     measured = placed(measured, surrogate.surface, radius)
     corrector = Corrector(surrogate, **options)
-    _observed(corrector, measured, np.arange(len(measured)))
-    return judged(corrector, measured, left_out=_left_out(surrogate, measured, options))
+    with _doubted(corrector, measured):
+        _observed(corrector, measured, np.arange(len(measured)))
+        left_out = _left_out(surrogate, measured, options)
+    return judged(corrector, measured, left_out=left_out)
 
 
 def judged(corrector: Corrector, measured: Measured, left_out: ForceError | None = None) -> Corrected:
@@ -161,6 +156,11 @@ def judged(corrector: Corrector, measured: Measured, left_out: ForceError | None
     UsageError
         If it has learnt nothing.
     """
+    with _doubted(corrector, measured):
+        return _judged(corrector, measured, left_out)
+
+
+def _judged(corrector: Corrector, measured: Measured, left_out: ForceError | None) -> Corrected:
     after = corrector.surrogate
     counts = {verdict: n for verdict, n in corrector.counts.items() if n}
     if not counts.get("learnt"):
@@ -170,9 +170,7 @@ def judged(corrector: Corrector, measured: Measured, left_out: ForceError | None
             why="Touches teach where the probe is in contact, in the trained ranges and no deeper than trained.",
             fix="Check the frame, the units, the forces' sign, the probe's radius and the surface's height.",
         )
-    X = _inputs(corrector.model, measured, corrector.parameters)
-    usable = np.isfinite(X).all(axis=1) & np.isfinite(measured.force).all(axis=1)
-    X, force, along = X[usable], measured.force[usable], measured.along[usable]
+    X, force, along = _usable(corrector, measured)
     surprise = float(np.abs(corrector.belief.mean).max())
     before = force_error(corrector.model, X, force, along)
     done = Corrected(
@@ -187,6 +185,43 @@ def judged(corrector: Corrector, measured: Measured, left_out: ForceError | None
         _ratio(corrector.model.force(X), force, along),
     )
     return replace(done, surrogate=_warned(after, done.warning)) if done.warning else done
+
+
+def _usable(corrector: Corrector, measured: Measured) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Inputs (N, n), forces and directions (N, 3) of measurements that are finite."""
+    X = _inputs(corrector.model, measured, corrector.parameters)
+    usable = np.isfinite(X).all(axis=1) & np.isfinite(measured.force).all(axis=1)
+    return X[usable], measured.force[usable], measured.along[usable]
+
+
+@contextlib.contextmanager
+def _doubted(corrector: Corrector, measured: Measured) -> Iterator[None]:
+    """Where nothing can be learnt, and sign or unit of the forces look wrong, say that first."""
+    try:
+        yield
+    except UsageError as error:
+        X, force, along = _usable(corrector, measured)
+        doubt = _doubt(_ratio(corrector.model.force(X), force, along))
+        if not doubt:
+            raise
+        raise UsageError(
+            doubt, why=f"Nothing could be learnt from them: {error.what}", fix="Mend the measurements."
+        ) from error
+
+
+def _doubt(ratio: float) -> str:
+    """What is wrong with forces that are so many times the model's, in words; "" where they may be a specimen's."""
+    if ratio < 0:
+        return (
+            "Measured forces point against the model's: they are to be those on the probe, which a body pushes "
+            "out. Change their sign."
+        )
+    if ratio > _RATIO or ratio < 1 / _RATIO:
+        return (
+            f"Measured forces are {ratio:.2g} times the model's: more than specimens mostly differ by, and as "
+            "much as between units (pounds 4.4, kilograms 9.8, millinewtons 1000 times newtons)."
+        )
+    return ""
 
 
 def _warned(surrogate: TouchSurrogate, warning: str) -> TouchSurrogate:

@@ -45,7 +45,8 @@ def plot_errors(surrogate: TouchSurrogate, test: TouchSolves, samples: ForceSamp
         _framed(axis, view)
     axes[0, 1].set_ylabel("")
     axes[0, 2].set_ylabel("")
-    fig.colorbar(drawn, ax=axes, label="force error / %", shrink=0.85, aspect=30, pad=0.02)
+    over = "max" if 100 * float(against.max()) > top else "neither"  # the colours end below the worst
+    fig.colorbar(drawn, ax=axes, label="force error / %", extend=over, shrink=0.85, aspect=30, pad=0.02)
     return fig
 
 

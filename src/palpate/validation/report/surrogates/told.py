@@ -92,7 +92,7 @@ def _pictures(chapter: SurrogateChapter, key: str) -> list[Picture]:
 def _smooth(found: Smoothness) -> str:
     return (
         f" Along strokes at 0.1 m/s the force changes its rate from one millisecond to the next at most "
-        f"{plain(found.p95)} times as much as its reference ({found.reference}), in 95 of 100 strokes."
+        f"{found.p95:.2f} times as much as its reference ({found.reference}), in 95 of 100 strokes."
     )
 
 

@@ -1,0 +1,51 @@
+"""`palpate run` on a body that is pressed: what it says of a stroke within the training, and far beyond it."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+import pressed as slab
+from palpate.runtime.pressed import PressedBody
+from palpate.runtime.touchable import workspace_for
+
+pytestmark = pytest.mark.timeout(60)
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    return slab.surrogate(meta={"name": "slab"}).save(tmp_path_factory.mktemp("run") / "slab.palpate")
+
+
+def stroke(metres: float) -> str:
+    """So far into the body and out again, twice in a second."""
+    scale = workspace_for(PressedBody.of(slab.surrogate()), 0.075).scale
+    return f"stroke:frequency=2,amplitude={metres / scale:.6f}"
+
+
+def test_a_stroke_within_the_training_is_told_as_such(palpate, file):
+    answer = palpate("run", file, "--seconds", "1", "--device", stroke(0.004), "--json")
+    assert answer.code == 0, answer.err
+    told = json.loads(answer.out)
+    assert told["largest_depth"] == pytest.approx(0.004, rel=0.05)  # a look may miss the deepest millisecond
+    assert told["outside"] == told["let_go"] == 0.0
+
+
+def test_a_stroke_through_the_body_tells_how_long_it_was_let_go(palpate, file):
+    deep = slab.RADIUS + slab.face().inner
+    answer = palpate("run", file, "--seconds", "1", "--device", stroke(1.5 * deep), "--json")
+    told = json.loads(answer.out)
+    assert told["largest_depth"] <= deep + 1e-4
+    assert 0.0 < told["let_go"] < told["outside"] < 1.0
+    words = palpate("run", file, "--seconds", "1", "--device", stroke(1.5 * deep)).out
+    assert "outside what was trained for" in words
+    assert "so deep that the body let go for" in words
+
+
+def test_the_warning_of_a_correction_is_told_again(palpate, tmp_path):
+    meta = {"name": "slab", "correction": {"counts": {"learnt": 3}, "warning": "Change their sign."}}
+    wrong = slab.surrogate(meta=meta).save(tmp_path / "wrong.palpate")
+    answer = palpate("run", wrong, "--seconds", "0.2", "--device", stroke(0.002))
+    assert answer.code == 0
+    assert "its correction was warned of: Change their sign." in answer.err

@@ -41,6 +41,12 @@ def test_curves_lie_on_the_closed_form_with_the_solves_of_their_column() -> None
         assert (np.diff(RADIUS - test.X[curve.rows, 2]) < 0).all()
 
 
+def test_depths_of_one_place_are_told_from_places() -> None:
+    test = columns()
+    assert "The 20 solves lie over 4 places, at several depths of each." in str(validate(surrogate(), test))
+    assert "at several depths" not in str(validate(surrogate(), solves()))
+
+
 def test_a_flat_face_is_seen_from_above() -> None:
     S, X = surrogate(), places(50)
     view = View.of(S, X)

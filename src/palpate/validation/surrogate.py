@@ -10,6 +10,7 @@ import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
+from palpate.learning.energy.columns import columns_of
 from palpate.surrogates import TouchedBody, TouchSurrogate
 from palpate.surrogates.grasp import GraspSurrogate
 from palpate.units import bounds
@@ -130,7 +131,7 @@ def validate_surrogate(
     solves, seen = unseen_solves(model, test)
     samples = probe_samples(function, solves)
     force = force_errors(samples, solves.X, function.inputs, units=function.units)
-    notes: list[str] = []
+    notes: list[str] = _over(model, solves)
     stiffness = _told(_stiffness(function, solves), notes)
     smooth = _told(smoothness(function, solves, strokes, seed=seed), notes)
     held = _told(coverage(function, solves, samples), notes)
@@ -255,6 +256,20 @@ def _energy(model: TouchFunction, solves: TouchSolves) -> np.ndarray | None:
     rows = solves.energy > 0
     error = np.abs(model.energy(solves.X[rows]) - solves.energy[rows]) / solves.energy[rows]
     return np.asarray(error) if error.size else None
+
+
+def _over(model: object, solves: TouchSolves) -> list[str]:
+    """That several depths over one place were solved, where they were: these are less than as many places."""
+    if not isinstance(model, TouchSurrogate):
+        return []
+    own = model.radius_input
+    radius = model.radius if own is None else float(solves.X[:, own].mean())
+    places = int(columns_of(solves.X, model.surface, radius).max()) + 1
+    if places == len(solves):
+        return []
+    return [
+        f"The {count(len(solves), 'solve')} lie over {count(places, 'place')}, at several depths of each."
+    ]
 
 
 def _notes(

@@ -273,7 +273,7 @@ def test_the_evaluator_gives_the_same_bits_as_the_batch(more):
 
 def test_many_answers_are_shared_by_threads_and_the_same_bits(monkeypatch):
     S = surrogate()
-    X = around_points(501)
+    X = around_points(20_001)  # so many that threads meet
     alone = S.energy(X), S.force(X), S.stiffness(X), S.inside(X)
     monkeypatch.setattr(learnt_energy, "available_cores", lambda: 3)
     monkeypatch.setattr(learnt_energy, "_PART", 10)
@@ -286,7 +286,7 @@ def test_many_answers_are_shared_by_threads_and_the_same_bits(monkeypatch):
     monkeypatch.setattr(TouchSurrogate, "_fill", fill)
     for found, before in zip((S.energy(X), S.force(X), S.stiffness(X), S.inside(X)), alone, strict=True):
         np.testing.assert_array_equal(found, before)
-    assert parts == 12 * [167]
+    assert parts == 12 * [6667]
 
 
 def test_nothing_is_allocated_by_a_call():

@@ -125,20 +125,22 @@ class GraspSurrogate(LearntEnergy):
 
     @cached_property
     def _fixed(self) -> tuple[Any, ...]:
-        """What never changes of the kernels' arguments: radius, limits, points, both laws, grams."""
-        going, region, stiffening = self.continuation, self.region, self.stiffening
+        """What never changes of the kernels' arguments: radius, limits, points, grams."""
+        going, region = self.continuation, self.region
         assert going is not None
-        assert stiffening is not None
         low, high = bounds(self.inputs)
         radius = math.inf if region is None else region.radius
         points = np.zeros((0, len(self.inputs))) if region is None else region.points
         limits = np.array([low, high, going.widths])
-        return radius, limits, points, (self.rest.compiled(), stiffening.compiled()), gram(self.network, 3)
+        return radius, limits, points, gram(self.network, 3)
 
     def compiled(self) -> tuple[Any, ...]:
         """What `grasp_into` takes after its answer, with scratch for one thread."""
         scratch = (np.zeros((5, len(self.inputs))), np.zeros((SMALL, 3, 3)))
-        return (*scratch, *self._fixed, self.network.compiled())
+        assert self.stiffening is not None
+        laws = self.rest.compiled(), self.stiffening.compiled()
+        *fixed, grams = self._fixed
+        return (*scratch, *fixed, laws, grams, self.network.compiled())
 
     def _fill(self, X: np.ndarray, answers: np.ndarray, inside: np.ndarray) -> None:
         grasps_into(X, answers, inside, *self.compiled())

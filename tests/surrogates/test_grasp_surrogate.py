@@ -12,6 +12,7 @@ from allocated import kept_by
 from held import INPUTS, drawn
 from palpate.errors import FileFormatError, UsageError
 from palpate.network import TrainedRegion
+from palpate.surrogates import learnt_energy
 from palpate.surrogates.grasp import GraspSurrogate, RestStiffness
 from palpate.surrogates.grasp.rest import terms
 
@@ -98,6 +99,15 @@ def test_far_outside_the_energy_goes_on_as_that_of_a_linear_spring():
     near_axes = np.abs(direction).min(axis=1) < 0.01  # such a component has not left its range
     np.testing.assert_allclose(S.energy(farther)[~near_axes], 4 * S.energy(far)[~near_axes], rtol=1e-9)
     assert not S.inside(far).any()
+
+
+def test_many_answers_are_shared_by_threads_and_the_same_bits(monkeypatch):
+    """Each thread has its own scratch, that of the stiffening polynomial too."""
+    S, X = made(), wide(INPUTS, 20_001)
+    monkeypatch.setattr(learnt_energy, "available_cores", lambda: 1)
+    alone = S.force(X)
+    monkeypatch.setattr(learnt_energy, "available_cores", lambda: 3)
+    np.testing.assert_array_equal(S.force(X), alone)
 
 
 def test_the_evaluator_says_the_same_and_allocates_nothing():

@@ -13,8 +13,9 @@ from held import INPUTS, drawn
 from palpate.errors import FileFormatError, UsageError
 from palpate.network import TrainedRegion
 from palpate.surrogates import learnt_energy
-from palpate.surrogates.grasp import GraspSurrogate, RestStiffness
+from palpate.surrogates.grasp import GraspSurrogate, RestStiffness, Stiffening
 from palpate.surrogates.grasp.rest import terms
+from palpate.surrogates.grasp.stiffening import exponents
 
 CURVED = (*INPUTS, dataclasses.replace(INPUTS[4], name="p_z"), SOFT)
 
@@ -103,7 +104,9 @@ def test_far_outside_the_energy_goes_on_as_that_of_a_linear_spring():
 
 def test_many_answers_are_shared_by_threads_and_the_same_bits(monkeypatch):
     """Each thread has its own scratch, that of the stiffening polynomial too."""
-    S, X = made(), wide(INPUTS, 20_001)
+    E = exponents(len(INPUTS), 3)
+    law = Stiffening(np.random.default_rng(3).normal(0.0, 0.1, len(E)), E)
+    S, X = made(stiffening=law), wide(INPUTS, 20_001)
     monkeypatch.setattr(learnt_energy, "available_cores", lambda: 1)
     alone = S.force(X)
     monkeypatch.setattr(learnt_energy, "available_cores", lambda: 3)

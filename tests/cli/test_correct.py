@@ -39,6 +39,12 @@ def lines(X, F):
     return "".join(" ".join(map(repr, row)) + "\n" for row in rows)
 
 
+def ordered(folder):
+    """The command that corrects the model by a table, in words."""
+    made = ("--file", folder / "specimen.csv", "--out", folder / "new.touch")
+    return ("correct", folder / "model.touch", *made)
+
+
 def follows(path):
     X, F = measured(100, 9)
     return force_error(TouchSurrogate.load(path), X, F).median < 0.02
@@ -53,24 +59,14 @@ def started(folder, *words):
 def test_a_file_corrects_a_model(palpate, folder):
     X, F = measured()
     write_measured(folder / "specimen.csv", X, F)
-    answer = palpate(
-        "correct", folder / "model.touch", "--file", folder / "specimen.csv", "--out", folder / "new.touch"
-    )
+    answer = palpate(*ordered(folder))
     assert answer.code == 0
     assert follows(folder / "new.touch")
     before = re.search(r"before .* ([\d.]+) % median", answer.out)[1]
     after = re.search(r"after .* ([\d.]+) % median", answer.out)[1]
     assert float(before) == pytest.approx(100 * (1 - 1 / FACTOR), abs=1.0)
     assert float(after) < 2
-    said = palpate(
-        "correct",
-        folder / "model.touch",
-        "--file",
-        folder / "specimen.csv",
-        "--out",
-        folder / "new.touch",
-        "--json",
-    )
+    said = palpate(*ordered(folder), "--json")
     content = json.loads(said.out)
     assert content["counts"]["learnt"] == 40
     assert content["left_out"]["median"] < 0.03
@@ -80,14 +76,7 @@ def test_a_file_corrects_a_model(palpate, folder):
 def test_forces_that_can_hardly_be_this_bodys_are_a_failure_that_loses_nothing(palpate, folder, factor, said):
     X = touches(30, 3)
     write_measured(folder / "specimen.csv", X, factor * model().force(X))
-    words = (
-        "correct",
-        folder / "model.touch",
-        "--file",
-        folder / "specimen.csv",
-        "--out",
-        folder / "new.touch",
-    )
+    words = ordered(folder)
     answer = palpate(*words)
     assert answer.code == 1
     assert said in answer.err
@@ -104,14 +93,7 @@ def test_where_such_forces_teach_nothing_they_are_the_reason(palpate, folder, fa
     X = touches(60, 3)
     F = factor * model().force(X) + np.random.default_rng(1).normal(0.0, 3.0, (60, 3))
     write_measured(folder / "specimen.csv", X, F)
-    words = (
-        "correct",
-        folder / "model.touch",
-        "--file",
-        folder / "specimen.csv",
-        "--out",
-        folder / "new.touch",
-    )
+    words = ordered(folder)
     answer = palpate(*words, *more)
     assert answer.code == 2
     assert said in answer.err
@@ -122,14 +104,7 @@ def test_where_such_forces_teach_nothing_they_are_the_reason(palpate, folder, fa
 def test_a_short_record_says_that_none_of_it_was_left_out(palpate, folder):
     X, F = measured(9)
     write_measured(folder / "specimen.csv", X, F)
-    words = (
-        "correct",
-        folder / "model.touch",
-        "--file",
-        folder / "specimen.csv",
-        "--out",
-        folder / "new.touch",
-    )
+    words = ordered(folder)
     assert "left out  not judged: only files of 10" in palpate(*words).out
 
 

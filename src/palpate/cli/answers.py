@@ -12,7 +12,7 @@ import numpy as np
 from palpate.units import Range, bounds
 from palpate.words import share
 
-__all__ = ["Answer", "beyond_in_words", "outside", "place_in_words", "within_in_words"]
+__all__ = ["Answer", "beyond", "beyond_in_words", "outside", "place_in_words", "within_in_words"]
 
 _NOTHING = 1e-9  # N: first touch, but for round-off
 
@@ -36,8 +36,8 @@ class Answer:
     inside : bool
         Whether the place lies in what was trained.
     deepest : float, optional
-        How far inside the touched surface (m) the probe's centre could go; given where it is farther, or elsewhere
-        where nothing is known of its depth. Energy, force and stiffness are not-a-number there.
+        How far inside the touched surface (m) the probe's centre could go; given where the loop lets go of it. Energy,
+        force and stiffness are not-a-number there.
     """
 
     inputs: np.ndarray
@@ -50,12 +50,12 @@ class Answer:
 
     def words(self, names: Sequence[Range]) -> str:
         """For a person."""
-        at, beyond = place_in_words(self.inputs, names), beyond_in_words(self.inputs, names)
+        at, told = place_in_words(self.inputs, names), beyond_in_words(self.inputs, names)
+        told = f"\n  {told}" if told else ""
         if self.deepest is not None:
-            return f"{at}\n  {_unknown(self.deepest)}" + (f"\n  {beyond}" if beyond else "")
+            return f"{at}\n  {_unknown(self.deepest)}{told}"
         size = float(np.linalg.norm(self.force))
         if size < _NOTHING:
-            told = f"\n  {beyond}" if beyond else ""
             return f"{at}\n  no contact: force, stiffness and energy are zero{told}"
         largest = float(np.abs(self.stiffness).max())
         lines = [
@@ -74,14 +74,13 @@ class Answer:
 
     def _trust(self, names: Sequence[Range]) -> str:
         where = within_in_words(self.inputs, names, inside=self.inside)
-        return (
-            where
-            if math.isnan(self.deviation)
-            else f"± {share(self.deviation)} of the force, one deviation; {where}"
+        sure = (
+            "" if math.isnan(self.deviation) else f"± {share(self.deviation)} of the force, one deviation; "
         )
+        return sure + where
 
     def ended(self, deepest: float) -> Answer:
-        """The same place, where nothing is known of how deep the probe is."""
+        """The same place, where the body has let go of the probe."""
         none = math.nan
         return replace(
             self,
@@ -94,7 +93,7 @@ class Answer:
         )
 
     def as_dict(self, names: Sequence[Range]) -> dict[str, Any]:
-        """For a program; `contact` is None where the probe's depth is not known, `beyond` the inputs out of range."""
+        """For a program; `contact` is None where the body lets go, `beyond` the inputs out of range."""
         return {
             "inputs": self.inputs.tolist(),
             "force": self.force.tolist(),
@@ -103,7 +102,7 @@ class Answer:
             "deviation": self.deviation,
             "inside": self.inside,
             "contact": None if self.deepest is not None else float(np.linalg.norm(self.force)) >= _NOTHING,
-            "beyond": [r.name for r, out in zip(names, outside(self.inputs, names), strict=True) if out],
+            "beyond": beyond(self.inputs, names),
         }
 
 
@@ -111,6 +110,11 @@ def outside(values: np.ndarray, inputs: Sequence[Range]) -> np.ndarray:
     """Which of the values (..., n) lie outside of their ranges."""
     low, high = bounds(inputs)
     return np.asarray((values < low) | (values > high))
+
+
+def beyond(values: np.ndarray, inputs: Sequence[Range]) -> list[str]:
+    """Names of the inputs whose values (n,) lie outside of their ranges."""
+    return [r.name for r, out in zip(inputs, outside(values, inputs), strict=True) if out]
 
 
 def place_in_words(values: np.ndarray, inputs: Sequence[Range]) -> str:
@@ -129,8 +133,8 @@ def beyond_in_words(values: np.ndarray, inputs: Sequence[Range]) -> str:
 
 def within_in_words(values: np.ndarray, inputs: Sequence[Range], *, inside: bool | None) -> str:
     """Whether values lie in what was trained; `inside` says whether a training sample is near, where that is known."""
-    if beyond := beyond_in_words(values, inputs):
-        return f"not known, OUTSIDE what it was trained on: {beyond}"
+    if told := beyond_in_words(values, inputs):
+        return f"not known, OUTSIDE what it was trained on: {told}"
     if inside is None:
         return "within the ranges it was trained on"
     if not inside:
@@ -141,7 +145,7 @@ def within_in_words(values: np.ndarray, inputs: Sequence[Range], *, inside: bool
 def _unknown(deepest: float) -> str:
     return (
         f"no force is known here: a probe is followed to where its centre is {1e3 * deepest:.3g} mm beneath the "
-        "touched\n  surface, not deeper, nor behind the body or beside it; the loop and the page let go of the hand"
+        "touched\n  surface, not deeper and not behind the body: there the loop and the page let go of the hand"
     )
 
 

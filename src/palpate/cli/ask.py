@@ -13,6 +13,8 @@ from palpate.cli.answers import Answer, outside
 from palpate.cli.console import Console
 from palpate.cli.predictions import predicted
 from palpate.errors import FileFormatError, UsageError
+from palpate.learning import Fitted
+from palpate.learning.plastic.paths import KIND, HeldPaths
 from palpate.network import Archive, Network, load_archive
 from palpate.runtime.pressed import PressedBody
 from palpate.surrogates import TouchedBody, TouchSurrogate
@@ -21,6 +23,8 @@ from palpate.surrogates.loading import load
 from palpate.units import Range
 
 __all__ = ["ask"]
+
+_STEPS = 16  # in a radius
 
 
 def ask(model: Path, at: Sequence[str], console: Console) -> None:
@@ -46,7 +50,7 @@ def ask(model: Path, at: Sequence[str], console: Console) -> None:
         X = _places(at, inputs)
         answers: Sequence[Any] = _answered(asked, X)
         words = [one.words(inputs) for one in answers] + _reservations(asked)
-    elif what in {"Fitted", "Network"}:
+    elif isinstance(asked, Fitted | Network):
         answers = predicted(asked, _places(at, inputs))
         words = [one.words(inputs) for one in answers]
     else:
@@ -62,9 +66,6 @@ def ask(model: Path, at: Sequence[str], console: Console) -> None:
 
 def _read(path: Path) -> Any:
     """What a file of any kind holds."""
-    from palpate.learning import Fitted
-    from palpate.learning.plastic.paths import KIND, HeldPaths
-
     kind = load_archive(path).kind
     if kind == KIND:
         return HeldPaths.load(path)
@@ -77,7 +78,10 @@ def _read(path: Path) -> Any:
 
 
 def _inputs(asked: Any) -> tuple[Range, ...]:
-    return tuple(getattr(asked, "inputs", getattr(getattr(asked, "network", None), "inputs", ())))
+    """Ranges of the n inputs; none of histories."""
+    if isinstance(asked, HeldPaths):
+        return ()
+    return tuple(asked.network.inputs if isinstance(asked, Fitted) else asked.inputs)
 
 
 def _answered(energy: LearntEnergy, X: np.ndarray) -> list[Answer]:
@@ -89,41 +93,41 @@ def _answered(energy: LearntEnergy, X: np.ndarray) -> list[Answer]:
     answers = [
         Answer(x, float(U), F, K, float(d), bool(i)) for x, U, F, K, d, i in zip(X, *columns, strict=True)
     ]
-    if isinstance(energy, TouchSurrogate):
-        ended = _ended(energy, X, np.asarray(forces.any(axis=1)))
-        end = energy.surface.inner
-        return [one.ended(end) if gone else one for one, gone in zip(answers, ended, strict=True)]
-    return answers
+    if not isinstance(energy, TouchSurrogate):
+        return answers
+    let_go, end = _let_go(energy, X), energy.surface.inner
+    return [one.ended(end) if gone else one for one, gone in zip(answers, let_go, strict=True)]
 
 
-def _ended(touch: TouchSurrogate, X: np.ndarray, felt: np.ndarray) -> np.ndarray:
-    """Whether nothing is known of the depth (N,) at inputs X (N, n): too deep, beside the body, or behind it.
+def _let_go(touch: TouchSurrogate, X: np.ndarray) -> list[bool]:
+    """Whether the loop would let go of a probe (N,) at inputs X (N, n), so that no force is known there.
 
-    Where nothing is `felt` a probe is in the air, unless the touched surface lies above it, along its normal.
+    One that feels nothing is led out along the body's normal: from beneath the touched surface it meets that from
+    behind, and the body lets go of it; from the air it meets nothing, or a front.
     """
-    out: np.ndarray = felt & ~touch.surface.measured(X[:, :3])
-    still = np.flatnonzero(~felt & outside(X, touch.inputs).any(axis=1))
-    if not len(still):
-        return out
-    low, high = touch.surface.box
+    body = PressedBody.of(touch)
+    loop, (low, high) = body.evaluator(), touch.surface.box
     far = float(np.linalg.norm(high - low))
-    ways = np.linspace(0.0, far, max(2, int(far / (touch.surface.radius / 4.0))))
-    normal = PressedBody.of(touch).normal
-    for i in still:
-        line = np.repeat(X[i][None], len(ways), axis=0)
-        line[:, :3] += ways[:, None] * normal
-        out[i] = bool((touch.depth(line) > 0).any())
-    return out
+    ways = np.linspace(0.0, far, max(2, int(_STEPS * far / touch.surface.radius)))
+    found = []
+    for x in X:
+        loop(body.away, x[3:])  # every probe begins in the air
+        for way in ways:
+            loop(x[:3] + way * body.normal, x[3:])
+            if loop.depth > 0.0 or loop.let_go:
+                break
+        found.append(loop.let_go)
+    return found
 
 
 def _reservations(energy: LearntEnergy) -> list[str]:
-    memory = {"relaxation", "yielding"} & set(getattr(energy, "meta", ()))
+    memory = {"relaxation", "yielding"} & set(energy.meta)
     instant = "This is the elastic answer, that of an instant: the body remembers, which `palpate run` shows."
     return [instant] * bool(memory) + _warning(energy)
 
 
 def _warning(asked: Any) -> list[str]:
-    told = warning_of(getattr(asked, "meta", {}))
+    told = warning_of(asked.meta) if isinstance(asked, LearntEnergy) else ""
     return [f"Its correction was warned of: {told}"] if told else []
 
 

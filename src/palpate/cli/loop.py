@@ -40,7 +40,7 @@ class Peak:
         self.depth = max(self.depth, state.depth)
         self.looks += 1
         self.outside += not state.inside
-        self.let_go += state.depth == 0.0 and not state.inside  # only where the body has let go both are so
+        self.let_go += state.let_go
 
     def words(self, pressed: bool) -> str:
         """For a person."""
@@ -53,7 +53,7 @@ class Peak:
             words += (
                 f"\n  trust      outside what was trained for {share(self.outside / self.looks)} of the time"
             )
-        if pressed and self.let_go:
+        if self.let_go:
             words += f", so deep that the body let go for {share(self.let_go / self.looks)}"
         return words
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.cli.answers import outside, place_in_words, within_in_words
+from palpate.cli.answers import beyond, outside, place_in_words, within_in_words
 from palpate.learning import Fitted
 from palpate.network import Network
 from palpate.units import Quantity, Range
@@ -57,7 +57,7 @@ class Prediction:
             "outputs": {one.name: float(v) for one, v in zip(self.outputs, self.values, strict=True)},
             "deviations": None if self.deviations is None else self.deviations.tolist(),
             "inside": self.inside,
-            "beyond": [r.name for r, out in zip(names, outside(self.inputs, names), strict=True) if out],
+            "beyond": beyond(self.inputs, names),
         }
 
 

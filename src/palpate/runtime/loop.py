@@ -249,7 +249,7 @@ class Loop:
         ):
             self.out.answer(answer.contact, answer.loads, inside=answer.inside, mirrored=answer.mirrored)
             if pressed is not None:
-                self.out.pressed(pressed.depth, pressed.stiffness)
+                self.out.pressed(pressed.depth, pressed.stiffness, let_go=pressed.let_go)
                 if pressed.grew:
                     self.out.printed(pressed.prints)
         else:

@@ -28,6 +28,7 @@ class Publisher:
         self.hand, self.position, self.force = record["hand"], record["position"], record["force"]
         self._contact, self._loads = record["contact"], record["loads"][:inputs]
         self._depth, self._stiffness = record["depth"], record["stiffness"]
+        self._let_go = record["let_go"]
         self._tick, self._time = record["tick"], record["time"]
         self._inside, self._mirrored = record["inside"], record["mirrored"]
         self._grabbed, self._stalled, self._clamped = record["grabbed"], record["stalled"], record["clamped"]
@@ -53,9 +54,9 @@ class Publisher:
         self._loads[:] = loads
         self._inside[()], self._mirrored[()] = inside, mirrored
 
-    def pressed(self, depth: float, stiffness: float) -> None:
-        """How deep a probe is (m), and how stiff the body is under it (N/m)."""
-        self._depth[()], self._stiffness[()] = depth, stiffness
+    def pressed(self, depth: float, stiffness: float, *, let_go: bool) -> None:
+        """How deep a probe is (m), how stiff the body is under it (N/m), and whether it has let go."""
+        self._depth[()], self._stiffness[()], self._let_go[()] = depth, stiffness, let_go
 
     def printed(self, amplitude: np.ndarray) -> None:
         """Publish the prints, amplitudes (n,) in √J; asked for only when one has grown."""

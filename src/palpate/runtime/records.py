@@ -28,6 +28,7 @@ STATE = np.dtype(
         ("loads", "f8", MAX_INPUTS),  # N, the loads that hold the body there
         ("mirrored", "u1"),
         ("inside", "u1"),  # within the trained range
+        ("let_go", "u1"),  # the body has let go of a probe that is too deep in it
         ("clamped", "u1"),  # the force limit acted
         ("grabbed", "u1"),  # a hand holds the body
         ("stalled", "u1"),  # the input is older than its device allows
@@ -90,6 +91,7 @@ class State:
     loads: np.ndarray
     mirrored: bool
     inside: bool
+    let_go: bool
     clamped: bool
     grabbed: bool
     stalled: bool
@@ -140,7 +142,7 @@ class State:
     @classmethod
     def of(cls, record: np.ndarray, prints: np.ndarray) -> State:
         """Copy records of dtype `STATE` and `PRINTS`, shape ()."""
-        flags = {"mirrored", "inside", "clamped", "grabbed", "stalled"}
+        flags = {"mirrored", "inside", "let_go", "clamped", "grabbed", "stalled"}
         values: dict[str, Any] = {}
         for name in STATE.names or ():
             value = record[name]

@@ -36,6 +36,7 @@ class LearntEnergy(ABC):
     WORDS: ClassVar[str]
     network: Network
     root: np.ndarray | None
+    meta: Mapping[str, Any]
 
     @property
     def inputs(self) -> tuple[Range, ...]:

@@ -112,7 +112,7 @@ class PressedExhibit:
 
     def frame(self, beat: Mapping[str, Any], state: State, held: bool, parameters: np.ndarray) -> Press:
         """See `Exhibit`."""
-        pressed = held and (state.inside or state.depth > 0.0)  # the body lets go of what is too deep in it
+        pressed = held and not state.let_go
         centre = self._pressed(state) if pressed else self._withdrawn()
         place, coefficients = self._coefficients(centre, parameters)
         prints = np.zeros(0)

@@ -28,7 +28,7 @@ from palpate.units import Range
 __all__ = ["LearntSurrogate", "learn_surrogate"]
 
 _LAW_SHARE = 0.15  # of the time
-_NEARLY = 0.9
+_NEARLY = 0.9  # of the wanted depth: columns of depths are shifted at random and end just before it
 Law = ContactLaw | Literal["auto"]
 
 

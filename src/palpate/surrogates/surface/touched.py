@@ -25,7 +25,6 @@ CHECKS = 20_000  # places at which the error is measured
 AFTER = 1.0  # of that radius: how much farther inside than `inner` the distance turns back, some cells
 COARSEST = 3  # cells to the radius, below which nothing is known of edges
 TRIALS = 3
-STEEP = 1.2  # a distance has slope 1, a spline of it hardly more
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,15 +139,6 @@ class TouchedSurface:
     def depth(self, C: np.ndarray, radius: float | np.ndarray) -> np.ndarray:
         """Depth R − d (N,) in m of probes of radius R (m; one or N) at places (N, 3); not positive without contact."""
         return np.asarray(radius - self.at(C)[0])
-
-    def measured(self, C: np.ndarray) -> np.ndarray:
-        """Whether d is a distance (N,) at places (N, 3) in m, and not how it ends.
-
-        It is none deeper than `inner`, and none behind the body and beside it beneath the border, where d climbs
-        faster than a distance does.
-        """
-        d, g, _ = self.at(C)
-        return np.asarray((d >= -self.inner) & (np.linalg.norm(g, axis=1) < STEEP))
 
     def compiled(self) -> tuple[np.ndarray, np.ndarray]:
         """What the kernel `distance_into` takes after its own arguments."""

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.massspring import MassSpringBody
 from benchmarks.surrogate_cases import Case, Training
-from palpate.physics.massspring import MassSpringBody
 from palpate.physics.solid import FamilyProblem
 from palpate.validation import TouchSolves
 

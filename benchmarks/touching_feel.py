@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.massspring import MassSpringBody, MassSpringMotion
 from benchmarks.runner import main
 from benchmarks.table import Column, Table
 from benchmarks.touching import HEIGHT, RADIUS, block, probe
 from palpate.physics.interactions import pad_share
-from palpate.physics.massspring import MassSpringBody, MassSpringMotion
 
 __all__ = ["tables"]
 

@@ -68,7 +68,6 @@ if TYPE_CHECKING:
         named_material,
         roller,
     )
-    from palpate.physics.massspring import MassSpringBody
     from palpate.study import Study, TouchStudy, preset_study, read_study
     from palpate.surrogates import TouchedBody, TouchedSurface, TouchModel, TouchSurrogate
     from palpate.surrogates.grasp import GraspSurrogate
@@ -109,7 +108,6 @@ _HOMES = {
     "LinearElastic": "physics",
     "LinearHardening": "physics",
     "LoadAndUnload": "physics",
-    "MassSpringBody": "physics.massspring",
     "MooneyRivlin": "physics",
     "NeoHookean": "physics",
     "Network": "network",
@@ -191,7 +189,6 @@ __all__ = [
     "LinearElastic",
     "LinearHardening",
     "LoadAndUnload",
-    "MassSpringBody",
     "MooneyRivlin",
     "NeoHookean",
     "Network",

@@ -6,7 +6,6 @@
     solid         solid bodies in three dimensions
     beam          plane cantilevers
     equilibrium   finding a minimum of an energy, whatever body it belongs to
-    massspring    points and springs on the same mesh, to compare with
     pictures      drawing what was solved
     advice        warnings of models that are hardly meant
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from lattice import Elastic, Sphere, kuhn_block
 
-from palpate.physics.massspring import MassSpringBody, MassSpringMotion, MassSpringSolver
+from benchmarks.massspring import MassSpringBody, MassSpringMotion, MassSpringSolver
 
 AT = np.array([0.031, 0.029, 0.046])  # 4 mm deep
 SHALLOW = np.array([0.031, 0.029, 0.048])  # points at rest lie within the pad

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.massspring import MassSpringBody
 from palpate.physics.geometry import Block
 from palpate.physics.interactions import SphereProbe
-from palpate.physics.massspring import MassSpringBody
 from palpate.physics.materials import NeoHookean
 from palpate.physics.solid import Body
 

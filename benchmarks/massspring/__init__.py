@@ -4,17 +4,18 @@
     kernels   energy, gradient and Hessian times a vector of springs and volumes, compiled
     pad       the sphere's pad, felt by the points of the touched surface
     body      `MassSpringBody`: the value a user writes
-    solver    quasi-static answers to a probe: Newton's method with conjugate gradients
+    state     energy, gradient and Hessian of the network with a probe in it; SciPy's conjugate gradients
+    solver    quasi-static answers to a probe by Newton's method
     marching  steps in time, explicit and implicit, and what they cost
 
 Spring networks are fast and simple, and no approximation of a given elastic law that a finer mesh would improve:
 docs/method/mass-spring.md says how far off they are.
 """
 
-from palpate.physics.massspring.body import MassSpringBody
-from palpate.physics.massspring.marching import MassSpringMotion, StepCosts
-from palpate.physics.massspring.solver import MassSpringSolution, MassSpringSolver
-from palpate.physics.massspring.springs import SpringNetwork, spring_network
+from benchmarks.massspring.body import MassSpringBody
+from benchmarks.massspring.marching import MassSpringMotion, StepCosts
+from benchmarks.massspring.solver import MassSpringSolution, MassSpringSolver
+from benchmarks.massspring.springs import SpringNetwork, spring_network
 
 __all__ = [
     "MassSpringBody",

@@ -7,12 +7,12 @@ import itertools
 
 import numpy as np
 import pytest
+from benchmarks.massspring.kernels import springs_gradient, volumes_gradient
+from benchmarks.massspring.springs import LLOYD
 from lattice import Elastic, Sphere, kuhn_block, kuhn_points
 
+from benchmarks.massspring import MassSpringBody, MassSpringMotion, spring_network
 from palpate.errors import UsageError
-from palpate.physics.massspring import MassSpringBody, MassSpringMotion, spring_network
-from palpate.physics.massspring.kernels import springs_gradient, volumes_gradient
-from palpate.physics.massspring.springs import LLOYD
 
 REGULAR = np.array([[1, 1, 1], [-1, 1, -1], [1, -1, -1], [-1, -1, 1.0]]) * 0.01
 YOUNG = 9e3

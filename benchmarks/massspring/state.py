@@ -1,18 +1,19 @@
-"""Energy, gradient and Hessian of the whole network with a probe in it."""
+"""Energy, gradient and Hessian of the whole network with a probe in it, and linear solves with the Hessian."""
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse.linalg import LinearOperator, cg
 
-from palpate.physics.massspring.kernels import (
+from benchmarks.massspring.kernels import (
     diagonal_blocks,
     springs_apply,
     springs_gradient,
     volumes_apply,
     volumes_gradient,
 )
-from palpate.physics.massspring.pad import PointPad
-from palpate.physics.massspring.springs import SpringNetwork
+from benchmarks.massspring.pad import PointPad
+from benchmarks.massspring.springs import SpringNetwork
 
 __all__ = ["Energy", "Tangent"]
 
@@ -54,6 +55,10 @@ class Energy:
         return Tangent(self, x, self.pad.blocks(x, centre))
 
 
+class _NegativeCurvature(Exception):
+    """The Hessian is not positive definite along a direction of the conjugate gradients."""
+
+
 class Tangent:
     """The Hessian at a state, and a preconditioner made of its diagonal blocks.
 
@@ -89,6 +94,53 @@ class Tangent:
     def precondition(self, r: np.ndarray) -> np.ndarray:
         """Inverse diagonal blocks times (node, 3)."""
         return np.asarray(np.einsum("nij,nj->ni", self._inverse, r))
+
+    def solve(self, b: np.ndarray, tolerance: float, limit: int = 2000) -> tuple[np.ndarray, bool]:
+        """Solve H d = b by conjugate gradients that stop where the curvature turns negative.
+
+        Newton's method with this inner solver is Algorithm 7.1 of Nocedal & Wright (2006): along a direction of
+        negative curvature the solution so far is kept, which still leads downhill.
+
+        Parameters
+        ----------
+        b : (node, 3) array
+            Right-hand side, N.
+        tolerance : float
+            Largest norm of the residual, relative to the norm of `b`.
+        limit : int
+            Largest number of products.
+
+        Returns
+        -------
+        d : (node, 3) array
+            Solution, m.
+        solved : bool
+            False where the curvature was negative or the limit was met.
+        """
+        iterates: list[np.ndarray] = []
+
+        def product(p: np.ndarray) -> np.ndarray:
+            image = self.apply(p.reshape(b.shape)).ravel()
+            if float(p @ image) <= 0.0:
+                raise _NegativeCurvature
+            return image
+
+        def preconditioned(r: np.ndarray) -> np.ndarray:
+            return self.precondition(r.reshape(b.shape)).ravel()
+
+        shape = (b.size, b.size)
+        try:
+            d, unsolved = cg(
+                LinearOperator(shape, matvec=product, dtype=float),
+                b.ravel(),
+                rtol=tolerance,
+                maxiter=limit,
+                M=LinearOperator(shape, matvec=preconditioned, dtype=float),
+                callback=lambda iterate: iterates.__setitem__(slice(None), [iterate]),
+            )
+        except _NegativeCurvature:
+            return (iterates[0].reshape(b.shape) if iterates else self.precondition(b)), False
+        return d.reshape(b.shape), not unsolved
 
     def _diagonal(self) -> np.ndarray:
         """Positive definite stand-ins of the diagonal blocks, shape (node, 3, 3).

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from benchmarks.massspring.pad import PointPad, point_areas
+from benchmarks.massspring.springs import SpringNetwork, spring_network
 from palpate.errors import UsageError
-from palpate.physics.massspring.pad import PointPad, point_areas
-from palpate.physics.massspring.springs import SpringNetwork, spring_network
 from palpate.physics.solid.parts import by_region, surfaces_of
 
 if TYPE_CHECKING:
-    from palpate.physics.massspring.solver import MassSpringSolver
+    from benchmarks.massspring.solver import MassSpringSolver
 
 __all__ = ["MassSpringBody"]
 
@@ -88,7 +88,7 @@ class MassSpringBody:
 
     def open(self, probe: Any) -> MassSpringSolver:
         """A solver for a `SphereProbe`, at rest and out of contact."""
-        from palpate.physics.massspring.solver import MassSpringSolver
+        from benchmarks.massspring.solver import MassSpringSolver
 
         return MassSpringSolver(self, probe)
 

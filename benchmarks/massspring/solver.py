@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.physics.massspring.conjugate import conjugate_gradients
-from palpate.physics.massspring.state import Energy
+from benchmarks.massspring.state import Energy
 
 if TYPE_CHECKING:
-    from palpate.physics.massspring.body import MassSpringBody
+    from benchmarks.massspring.body import MassSpringBody
 
 __all__ = ["MassSpringSolution", "MassSpringSolver"]
 
@@ -134,9 +133,7 @@ class MassSpringSolver:
                 return True, iteration, products
             tangent = self.energy.tangent(self.x, centre)
             # as exact as the rest of the way to the target deserves
-            d, _ = conjugate_gradients(
-                tangent, -g, max(min(0.1, np.sqrt(target / size)), 0.1 * target / size)
-            )
+            d, _ = tangent.solve(-g, max(min(0.1, np.sqrt(target / size)), 0.1 * target / size))
             products += tangent.products
             alpha = self._along(d, centre, value, float(np.vdot(g, d)))
             if alpha is None:
@@ -188,7 +185,7 @@ class MassSpringSolver:
         for j in range(3):
             load = np.zeros_like(self.x)
             load[nodes] = blocks[:, :, j]
-            moved[j] = conjugate_gradients(tangent, load, 1e-10)[0]
+            moved[j] = tangent.solve(load, 1e-10)[0]
         answer = np.einsum("mij,kmj->ik", blocks, moved[:, nodes])
         return np.asarray(answer - blocks.sum(axis=0))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -30,12 +31,17 @@ def test_every_public_name_exists(name):
         assert getattr(module, public) is not None
 
 
-def test_top_level_names_are_those_promised():
-    assert set(palpate.__all__) == set(palpate._HOMES)
-    for name in palpate.__all__:
-        assert getattr(palpate, name) is not None
+@pytest.mark.parametrize("stub", sorted(PACKAGE.rglob("__init__.pyi")), ids=lambda p: p.parent.name)
+def test_a_stub_lists_what_its_package_offers(stub):
+    """The `.pyi` file is the one list of a package whose names load late; a moved module is renamed there too."""
+    package = importlib.import_module(".".join(["palpate", *stub.parent.relative_to(PACKAGE).parts]))
+    listed = re.findall(r"^from \.\S* import (\w+) as (\w+)$", stub.read_text(encoding="utf-8"), re.MULTILINE)
+    assert all(name == alias for name, alias in listed)
+    assert sorted(name for name, _ in listed) == package.__all__ == sorted(set(package.__all__))
+    for name in package.__all__:
+        assert getattr(package, name) is not None
     with pytest.raises(AttributeError, match="no_such_name"):
-        _ = palpate.no_such_name
+        _ = package.no_such_name
 
 
 @pytest.mark.parametrize(

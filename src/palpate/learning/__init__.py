@@ -24,7 +24,6 @@ dispatch     `palpate.learn`: whichever fits the dataset
 from palpate.learning.bodies import TouchHistory, learn_body
 from palpate.learning.choosing.automatic import automatic
 from palpate.learning.choosing.choice import Fitted, fit
-from palpate.learning.dispatch import learn_dataset
 from palpate.learning.filter.observation import Observation
 from palpate.learning.filter.presets import PRESETS, default, founding, recommended
 from palpate.learning.filter.settings import Settings
@@ -69,7 +68,6 @@ __all__ = [
     "initial",
     "learn",
     "learn_body",
-    "learn_dataset",
     "learn_touch",
     "node_outputs",
     "observe",

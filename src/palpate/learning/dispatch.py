@@ -12,13 +12,13 @@ from palpate.learning.touch import learn_touch
 from palpate.surrogates import TouchedBody, TouchModel
 from palpate.surrogates.grasp import GraspSurrogate
 
-__all__ = ["learn_dataset"]
+__all__ = ["learn"]
 
 
 Learnt = tuple[TouchModel, History] | tuple[TouchedBody, TouchHistory] | tuple[GraspSurrogate, LearntGrasp]
 
 
-def learn_dataset(train: Dataset, **options: Any) -> Learnt:
+def learn(train: Dataset, **options: Any) -> Learnt:
     """Learn a dataset of solves by the kind of its body.
 
     Parameters

@@ -12,32 +12,6 @@
 Names are loaded when asked for, so that the loop's process imports nothing it doesn't need.
 """
 
-from __future__ import annotations
+import lazy_loader
 
-import importlib
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from palpate.runtime.faults import Fault
-    from palpate.runtime.process import LoopProcess
-    from palpate.runtime.report import LoopReport
-    from palpate.runtime.shared import Shared, State, now
-    from palpate.runtime.workspace import Workspace
-
-__all__ = ["Fault", "LoopProcess", "LoopReport", "Shared", "State", "Workspace", "now"]
-
-_HOMES = {
-    "Fault": "faults",
-    "LoopProcess": "process",
-    "LoopReport": "report",
-    "Shared": "shared",
-    "State": "shared",
-    "Workspace": "workspace",
-    "now": "shared",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -15,56 +15,6 @@
 Names are loaded when they are first used: Matplotlib and Jinja2 cost time that only a report needs.
 """
 
-from __future__ import annotations
+import lazy_loader
 
-import importlib
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from palpate.validation.dispatch import validate
-    from palpate.validation.held import HeldLimits, HeldValidation, validate_held
-    from palpate.validation.limits import Check, Limits
-    from palpate.validation.report import Chapter, HeldChapter, SurrogateChapter, write_report
-    from palpate.validation.result import Validation
-    from palpate.validation.solves import TouchFunction, TouchSolves
-    from palpate.validation.surrogate import SurrogateValidation
-
-__all__ = [
-    "Chapter",
-    "Check",
-    "HeldChapter",
-    "HeldLimits",
-    "HeldValidation",
-    "Limits",
-    "SurrogateChapter",
-    "SurrogateValidation",
-    "TouchFunction",
-    "TouchSolves",
-    "Validation",
-    "validate",
-    "validate_held",
-    "write_report",
-]
-
-_HOMES = {
-    "Check": "limits",
-    "Limits": "limits",
-    "Chapter": "report",
-    "HeldChapter": "report",
-    "HeldLimits": "held",
-    "HeldValidation": "held",
-    "SurrogateChapter": "report",
-    "SurrogateValidation": "surrogate",
-    "TouchFunction": "solves",
-    "TouchSolves": "solves",
-    "write_report": "report",
-    "Validation": "result",
-    "validate": "dispatch",
-    "validate_held": "held",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name in _HOMES:
-        return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

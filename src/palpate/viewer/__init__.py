@@ -21,30 +21,6 @@ The built page is under version control, so that installing needs no node. After
     npm ci && npm run build        # in src/palpate/viewer/client
 """
 
-from __future__ import annotations
+import lazy_loader
 
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from palpate.viewer.ports import free_port
-    from palpate.viewer.server import Viewer, serve
-    from palpate.viewer.showing import BodyViewer, show
-
-__all__ = ["BodyViewer", "Viewer", "free_port", "serve", "show"]
-
-
-def __getattr__(name: str) -> Any:
-    # lazy: the command line imports this package to show its help
-    if name in {"Viewer", "serve"}:
-        from palpate.viewer import server
-
-        return getattr(server, name)
-    if name in {"BodyViewer", "show"}:
-        from palpate.viewer import showing
-
-        return getattr(showing, name)
-    if name == "free_port":
-        from palpate.viewer.ports import free_port
-
-        return free_port
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -14,7 +14,7 @@ import pressed
 from palpate.dataset import Dataset, assemble
 from palpate.dataset.fields import complete
 from palpate.errors import UsageError
-from palpate.learning import TouchHistory, learn_body, learn_dataset
+from palpate.learning import TouchHistory, learn_body
 from palpate.learning.bodies import Touches
 from palpate.learning.bodies.images import snapshots_of
 from palpate.learning.fields import Snapshots, lumped_mass
@@ -180,7 +180,7 @@ def test_a_body_is_learnt_judged_and_kept(tmp_path):
     body, probe = block()
     train, test = touches().take(np.arange(20)), touches().take(np.arange(20, 24))
     layout = body.problem(probe, element=0.006).layout
-    touch, history = learn_dataset(train, layout=layout, seconds=4.0, law=ContactLaw("pad"))
+    touch, history = pp.learn(train, layout=layout, seconds=4.0, law=ContactLaw("pad"))
     assert isinstance(touch, TouchedBody)
     assert isinstance(history, TouchHistory)
     judged = validate(touch, test)

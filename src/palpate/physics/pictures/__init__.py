@@ -15,24 +15,6 @@ The renderer is this package's own and draws with the processor: it needs neithe
 so a picture comes out on any machine, a server in a container included. docs/guide/pictures.md says why.
 """
 
-from __future__ import annotations
+import lazy_loader
 
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from palpate.physics.pictures.picture import Picture
-    from palpate.physics.pictures.plot import plot_solution
-    from palpate.physics.pictures.vtu import write_pvd, write_vtu
-
-__all__ = ["Picture", "plot_solution", "write_pvd", "write_vtu"]
-
-_HOMES = {"Picture": "picture", "plot_solution": "plot", "write_pvd": "vtu", "write_vtu": "vtu"}
-
-
-def __getattr__(name: str) -> Any:
-    # lazy: the renderer's kernels load only for those who draw
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    import importlib
-
-    return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

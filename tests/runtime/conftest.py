@@ -6,7 +6,7 @@ import pytest
 from standins import STIFFNESS, PlainModel
 
 from models import spring_beam
-from palpate.runtime.shared import Shared
+from palpate.runtime.shared_state import Shared
 
 
 @pytest.fixture(scope="session")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from palpate.runtime.clock import Metronome
+from palpate.runtime.realtime import Metronome
 
 PERIOD = 1e-3
 

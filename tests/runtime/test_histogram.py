@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.runtime.histogram import BINS, EDGES, Histogram, percentile
+from palpate.runtime.loop_report import BINS, EDGES, Histogram, percentile
 
 
 @pytest.mark.parametrize("scale", [3e-6, 2e-4, 5e-3])

@@ -11,10 +11,9 @@ from standins import STIFFNESS, PlainModel
 from palpate.errors import DeviceError, UsageError
 from palpate.runtime.devices.device import Sample, Traits
 from palpate.runtime.devices.page import PageDevice
-from palpate.runtime.faults import Fault
 from palpate.runtime.loop import Loop
-from palpate.runtime.safety import Limits
-from palpate.runtime.shared import MAX_INPUTS
+from palpate.runtime.safety import Fault, Limits
+from palpate.runtime.shared_state import MAX_INPUTS
 from palpate.runtime.workspace import Workspace
 from palpate.units import Range
 

@@ -12,7 +12,7 @@ from palpate.runtime.devices.device import Sample, Traits
 from palpate.runtime.loop import Loop
 from palpate.runtime.remembering import RememberingBody
 from palpate.runtime.safety import Limits
-from palpate.runtime.shared import Shared
+from palpate.runtime.shared_state import Shared
 from palpate.runtime.touchable import load_touchable, touchable, workspace_for
 
 TICK, STRONG = 1e-3, Limits(1e3, 1e9)

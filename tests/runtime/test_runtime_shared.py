@@ -11,14 +11,13 @@ import numpy as np
 import pytest
 
 from palpate.errors import DeviceError, UsageError
-from palpate.runtime import shared as module
-from palpate.runtime.records import MAX_PLACES, size_of
-from palpate.runtime.shared import STATE, Shared, State, now
+from palpate.runtime import shared_state as module
+from palpate.runtime.shared_state import MAX_PLACES, STATE, Shared, State, now, size_of
 
 WRITER = """
 import sys
-from palpate.runtime.records import MAX_PLACES, size_of
-from palpate.runtime.shared import Shared, now
+from palpate.runtime.shared_state import MAX_PLACES, size_of
+from palpate.runtime.shared_state import Shared, now
 shared = Shared.attach(sys.argv[1])
 record, k, until = shared.state.record, 0, now() + 60.0
 while now() < until and not (shared.command.fetch() and shared.command.record["quit"]):

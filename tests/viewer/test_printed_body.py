@@ -15,9 +15,8 @@ from palpate.errors import FileFormatError, UsageError
 from palpate.runtime import LoopProcess, now
 from palpate.runtime.loop import Loop
 from palpate.runtime.pressed import PressedBody
-from palpate.runtime.records import MAX_PLACES
 from palpate.runtime.safety import Limits
-from palpate.runtime.shared import Shared
+from palpate.runtime.shared_state import MAX_PLACES, Shared
 from palpate.runtime.touchable import load_touchable, workspace_for
 from palpate.surrogates import TouchedBody
 from palpate.surrogates.plastic import Dents

@@ -13,7 +13,7 @@ from palpate.cli.console import Console
 from palpate.runtime import LoopProcess
 from palpate.runtime.devices import device_traits
 from palpate.runtime.pressed import PressedBody
-from palpate.runtime.shared import State
+from palpate.runtime.shared_state import State
 from palpate.runtime.stability import stiffness_warning
 from palpate.runtime.touchable import Touchable, load_touchable, workspace_for
 from palpate.surrogates.learnt_energy import warning_of

@@ -1,13 +1,12 @@
 """In the hand: a real-time process that reads a device, evaluates the learnt body and sends a force back.
 
-    shared, records                   state out and commands in, through shared memory
-    process, child, report            LoopProcess: the parent's handle, and the process behind it
-    loop, publisher, rehearsal        one tick, as a list of stages
-    clock, priority, histogram        being on time, and knowing how much so
-    safety, faults, stability         what may reach a hand
+    shared_state, publisher           state and prints out, commands in, through shared memory
+    process, child                    LoopProcess: the parent's handle, and the process behind it
+    loop                              one tick, as a list of stages
+    realtime, loop_report             punctuality, and how well it was kept
+    safety, stability                 what may reach a hand
     workspace, devices                where the hand is
     touchable, pressed                what it is laid on
-    realtime                          what this machine permits
 
 Names are loaded when asked for, so that the loop's process imports nothing it doesn't need.
 """

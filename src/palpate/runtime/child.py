@@ -17,11 +17,10 @@ from collections.abc import Callable, Sequence
 
 from palpate.errors import PalpateError
 from palpate.runtime.devices import device_named
-from palpate.runtime.loop import Loop
-from palpate.runtime.priority import obtain
-from palpate.runtime.rehearsal import rehearsal
+from palpate.runtime.loop import Loop, rehearsal
+from palpate.runtime.realtime import obtain
 from palpate.runtime.safety import Limits
-from palpate.runtime.shared import Shared
+from palpate.runtime.shared_state import Shared
 from palpate.runtime.touchable import load_touchable, workspace_for
 
 __all__ = ["FOREIGN", "main"]

@@ -19,8 +19,8 @@ from typing import Any, Self
 from palpate.cores import helper_environment
 from palpate.errors import DeviceError, UsageError
 from palpate.runtime.devices import device_traits
-from palpate.runtime.report import LoopReport
-from palpate.runtime.shared import Shared, State, now
+from palpate.runtime.loop_report import LoopReport
+from palpate.runtime.shared_state import Shared, State, now
 
 __all__ = ["LoopProcess"]
 

@@ -6,11 +6,9 @@ import math
 
 import numpy as np
 
-from palpate.runtime.faults import Fault
-from palpate.runtime.histogram import Histogram
-from palpate.runtime.records import size_of
-from palpate.runtime.safety import Limits
-from palpate.runtime.shared import Shared
+from palpate.runtime.loop_report import Histogram
+from palpate.runtime.safety import Fault, Limits
+from palpate.runtime.shared_state import Shared, size_of
 from palpate.runtime.workspace import Workspace
 
 __all__ = ["Publisher"]

@@ -1,6 +1,7 @@
 """The last word on every force: how large, how sudden, and whether at all.
 
-Three laws hold on every tick, whatever the model says:
+Inside the loop nothing raises: a fault is a value (`Fault`), and the force is zero. Three laws hold on every tick,
+whatever the model says:
 
 - *limit*: ‖F‖ ≤ F_max; a larger force is shortened, never turned;
 - *slew*: while the gate is open, ‖F_k − F_{k−1}‖ ≤ s T, T being the tick;
@@ -14,12 +15,47 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from enum import IntEnum
 
 import numpy as np
 
 from palpate.errors import UsageError
 
-__all__ = ["HARDWARE_PATIENCE", "Limits", "Safety", "stalled"]
+__all__ = ["HARDWARE_PATIENCE", "Fault", "Limits", "Safety", "stalled"]
+
+
+class Fault(IntEnum):
+    """Why the force is zero on this tick, or `NONE`.
+
+    The numbers travel through the shared memory and the viewer's messages: append, never renumber.
+    """
+
+    NONE = 0
+    INPUT_NOT_FINITE = 1
+    OUTPUT_NOT_FINITE = 2
+    INPUT_STALLED = 3
+    CLOCK_JUMP = 4
+    DEVICE_ERROR = 5
+    EVALUATOR_ERROR = 6
+    PARENT_GONE = 7
+
+    @property
+    def meaning(self) -> str:
+        """One line for people."""
+        return _MEANINGS[self]
+
+
+_MEANINGS = {
+    Fault.NONE: "no fault",
+    Fault.INPUT_NOT_FINITE: "the device reported a position that is not a finite number",
+    Fault.OUTPUT_NOT_FINITE: "the model answered with a number that is not finite",
+    Fault.INPUT_STALLED: "the input is older than its device allows, or the page is hidden",
+    Fault.CLOCK_JUMP: "the clock jumped, or the process was suspended",
+    Fault.DEVICE_ERROR: "the device driver reported an error",
+    Fault.EVALUATOR_ERROR: "the model could not be evaluated",
+    Fault.PARENT_GONE: "the process that started the loop has ended",
+}
+
 
 HARDWARE_PATIENCE = 0.020  # s without a fresh sample after which a motorised device gets zero force
 _SHORTEST_RAMP = 0.050  # s

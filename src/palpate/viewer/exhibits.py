@@ -7,10 +7,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from palpate.runtime.faults import Fault
 from palpate.runtime.pressed import PressedBody
 from palpate.runtime.remembering import RememberingBody
-from palpate.runtime.shared import State, now
+from palpate.runtime.safety import Fault
+from palpate.runtime.shared_state import State, now
 from palpate.runtime.touchable import Touchable
 from palpate.surrogates import TouchModel
 from palpate.surrogates.plastic import HeldBody

@@ -21,7 +21,7 @@ SHORTEST_PERIOD = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Command:
-    """What the loop is told: `palpate.runtime.shared.COMMAND` in Python values."""
+    """What the loop is told: `palpate.runtime.shared_state.COMMAND` in Python values."""
 
     beat: float
     target: tuple[float, float, float]

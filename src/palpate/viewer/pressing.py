@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from palpate.runtime.pressed import PressedBody
-from palpate.runtime.shared import State, now
+from palpate.runtime.shared_state import State, now
 from palpate.surrogates import FieldSurrogate
 from palpate.viewer.exhibits import loop_facts, ranges, vector
 from palpate.viewer.messages import PROTOCOL

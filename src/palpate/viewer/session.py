@@ -18,9 +18,9 @@ import numpy as np
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from palpate.errors import DeviceError, UsageError
-from palpate.runtime.faults import Fault
-from palpate.runtime.histogram import EDGES
-from palpate.runtime.shared import Shared, State, now
+from palpate.runtime.loop_report import EDGES
+from palpate.runtime.safety import Fault
+from palpate.runtime.shared_state import Shared, State, now
 from palpate.runtime.touchable import Touchable
 from palpate.viewer.exhibits import exhibit_of, vector
 from palpate.viewer.hands import Command, Hands

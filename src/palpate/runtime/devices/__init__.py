@@ -9,7 +9,7 @@ from palpate.errors import UsageError
 from palpate.runtime.devices.device import Device, Sample, Traits
 from palpate.runtime.devices.page import PageDevice
 from palpate.runtime.devices.stroke import StrokeDevice
-from palpate.runtime.shared import Block
+from palpate.runtime.shared_state import Block
 
 __all__ = ["Device", "Sample", "Traits", "device_named", "device_names", "device_traits"]
 

@@ -20,7 +20,7 @@ from typing import ClassVar
 import numpy as np
 
 from palpate.runtime.devices.device import Sample, Traits, settings_from
-from palpate.runtime.shared import Block
+from palpate.runtime.shared_state import Block
 
 __all__ = ["FrameInterpolator", "PageDevice", "page_patience"]
 

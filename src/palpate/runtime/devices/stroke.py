@@ -15,7 +15,7 @@ import numpy as np
 
 from palpate.errors import DeviceError, UsageError
 from palpate.runtime.devices.device import Sample, Traits, settings_from
-from palpate.runtime.shared import Block
+from palpate.runtime.shared_state import Block
 
 __all__ = ["StrokeDevice", "StrokeSettings"]
 

@@ -1,0 +1,247 @@
+"""Checks of arguments: each returns the value in its plain form, or raises a `UsageError` with what, why and fix.
+
+    finite    a real number that is neither infinite nor not-a-number
+    positive  a finite number above zero
+    fits      a number, or a whole number, between bounds
+    one_of    a word among a few; the error offers the nearest
+    shape     an array of real numbers of a given shape
+
+Import the module and name it in the call, ``checks.positive("The radius", radius, "m")``: the verbs alone are too
+common as names. `what` is the quantity's name as a sentence begins with it, with its article.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Sequence
+from numbers import Integral, Real
+from typing import TYPE_CHECKING, Any
+
+from palpate.errors import UsageError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+__all__ = ["finite", "fits", "one_of", "positive", "shape"]
+
+
+def finite(what: str, value: Any, unit: str = "") -> float:
+    """Return a finite real number as a float.
+
+    Parameters
+    ----------
+    what : str
+        Name of the quantity, which begins the message.
+    value : number
+        Value to check; text such as ``"5 N"`` is refused.
+    unit : str
+        SI unit that the message names; empty for a pure number.
+
+    Raises
+    ------
+    UsageError
+        If the value is no real number, infinite or not-a-number.
+    """
+    number = _real(what, value, unit)
+    if math.isfinite(number):
+        return number
+    raise UsageError(
+        f"{what} is {_with_unit(number, unit)}.",
+        why="It must be finite.",
+        fix=f"Pass a finite number{_in(unit)}.",
+    )
+
+
+def positive(what: str, value: Any, unit: str = "", *, infinite: bool = False) -> float:
+    """Return a positive real number as a float.
+
+    Parameters
+    ----------
+    what : str
+        Name of the quantity, which begins the message.
+    value : number
+        Value to check; text such as ``"5 N"`` is refused.
+    unit : str
+        SI unit that the message names; empty for a pure number.
+    infinite : bool
+        True where infinity is a sensible value.
+
+    Raises
+    ------
+    UsageError
+        If the value is no real number, not above zero or, unless `infinite`, not finite.
+    """
+    number = _real(what, value, unit)
+    if number > 0 and (infinite or math.isfinite(number)):
+        return number
+    raise UsageError(
+        f"{what} is {_with_unit(number, unit)}.",
+        why=f"It must be positive{'' if infinite else ' and finite'}.",
+        fix=f"Pass a positive number{_in(unit)}.",
+    )
+
+
+def fits(
+    what: str,
+    value: Any,
+    unit: str = "",
+    *,
+    least: float | None = None,
+    most: float | None = None,
+    above: float | None = None,
+    below: float | None = None,
+    whole: bool = False,
+) -> Any:
+    """Return a finite number that lies between bounds, as a float or, where `whole`, as an int.
+
+    Parameters
+    ----------
+    what : str
+        Name of the quantity, which begins the message.
+    value : number
+        Value to check; text, and True and False where `whole`, are refused.
+    unit : str
+        SI unit that the message names; empty for a pure number.
+    least, most : float, optional
+        Bounds that the value may meet.
+    above, below : float, optional
+        Bounds that the value may not meet.
+    whole : bool
+        True for a count, an index or a seed.
+
+    Raises
+    ------
+    UsageError
+        If the value is no number, beyond a bound or, where `whole`, no whole number.
+    """
+    if whole and (isinstance(value, bool) or not isinstance(value, Integral)):
+        inside = False
+    else:
+        value = int(value) if whole else finite(what, value, unit)
+        inside = (
+            (least is None or value >= least)
+            and (most is None or value <= most)
+            and (above is None or value > above)
+            and (below is None or value < below)
+        )
+    if inside:
+        return value
+    bounds = [
+        f"{word} {bound:g}"
+        for word, bound in (("at least", least), ("above", above), ("at most", most), ("below", below))
+        if bound is not None
+    ]
+    rule = ", ".join([*(["a whole number"] if whole else []), " and ".join(bounds)]).strip(", ")
+    shown = repr(value) if whole else _with_unit(value, unit)
+    raise UsageError(
+        f"{what} is {shown}.", why=f"It must be {rule}{_in(unit)}.", fix=f"Pass {rule}{_in(unit)}."
+    )
+
+
+def one_of(what: str, value: Any, choices: Sequence[str]) -> str:
+    """Return a word that is among the choices.
+
+    Parameters
+    ----------
+    what : str
+        Name of the option, which begins the message.
+    value : str
+        Word to check.
+    choices : sequence of str
+        Words that are taken, spelt as they must be.
+
+    Raises
+    ------
+    UsageError
+        If the value is none of them; the message offers the nearest.
+    """
+    if isinstance(value, str) and value in choices:
+        return value
+    near = difflib.get_close_matches(str(value).lower(), choices, n=1, cutoff=0.5)
+    raise UsageError(
+        f"{what} is {value!r}.",
+        why=f"It is one of {', '.join(map(repr, choices))}.",
+        fix=f"Did you mean {near[0]!r}?" if near else "Choose one of these.",
+    )
+
+
+def shape(
+    what: str,
+    value: Any,
+    wanted: tuple[int | None, ...],
+    unit: str = "",
+    *,
+    why: str = "",
+    infinite: bool = False,
+) -> np.ndarray:
+    """Return an array of real numbers of a given shape, in double precision.
+
+    Parameters
+    ----------
+    what : str
+        Name of the array in the singular, which begins the message.
+    value : array-like
+        Array, list or tuple to check; arrays in double precision are returned as they are, not copied.
+    wanted : tuple of int or None
+        Length along each axis; None stands for any length above zero.
+    unit : str
+        SI unit that the message names; empty for pure numbers.
+    why : str
+        What rows and columns mean, one sentence for the message.
+    infinite : bool
+        True where infinities and not-a-number are let through.
+
+    Raises
+    ------
+    UsageError
+        If it holds anything but real numbers, has another shape or, unless `infinite`, is not finite.
+    """
+    import numpy as np  # the command line checks its options without arrays
+
+    form = f"({', '.join('any' if n is None else str(n) for n in wanted)}{',' if len(wanted) == 1 else ''})"
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind not in "fiu" and array.size:
+            raise TypeError(f"they are of type {array.dtype}")  # noqa: TRY301 - one message for both causes
+        array = array.astype(np.float64, copy=False)
+    except (TypeError, ValueError) as error:
+        raise UsageError(
+            f"{what} does not consist of real numbers: {value!r:.80}.",
+            why=why or f"Its numbers can't be read: {error}.",
+            fix=f"Pass an array of shape {form}{_in(unit)}.",
+        ) from error
+    if array.ndim != len(wanted) or any(
+        n == 0 if m is None else n != m for n, m in zip(array.shape, wanted, strict=True)
+    ):
+        raise UsageError(
+            f"{what} has shape {array.shape}; {form} is needed.",
+            why=why,
+            fix=f"Pass an array of that shape{_in(unit)}.",
+        )
+    if not infinite and not np.isfinite(array).all():
+        place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        raise UsageError(
+            f"{what} holds {array[place]:g} at index {place[0] if len(place) == 1 else place}.",
+            why="It must be finite: often a division by zero, or a gap in a table.",
+            fix=f"Pass finite numbers{_in(unit)}.",
+        )
+    return array
+
+
+def _real(what: str, value: Any, unit: str) -> float:
+    if isinstance(value, Real):
+        return float(value)
+    raise UsageError(
+        f"{what} is {value!r}, of type {type(value).__name__}.",
+        why=f"In Python it is a number{_in(unit)}; units in words are for study files.",
+        fix="Pass numbers in SI units, for example 0.3 for 300 mm, 5 for 5 N or 70e9 for 70 GPa.",
+    )
+
+
+def _with_unit(number: float, unit: str) -> str:
+    return f"{number:g} {unit}".rstrip()
+
+
+def _in(unit: str) -> str:
+    return f" in {unit}" if unit else ""

@@ -23,9 +23,9 @@ from benchmarks.surrogate_queries import query_table
 from benchmarks.surrogate_relaxation import relaxation_table
 from benchmarks.table import Claim, Column, Table
 from benchmarks.touch_studies import STUDIES
+from palpate.format import criterion_figure
 from palpate.validation import validate
 from palpate.validation.limits import Check
-from palpate.words import shown
 
 __all__ = ["tables"]
 
@@ -192,9 +192,9 @@ def _check_row(check: Check) -> dict[str, Any]:
     kind, good = check.criterion.kind, check.criterion.good
     return {
         "what": check.criterion.label,
-        "measured": shown(check.measured, kind),
-        "good": None if good is None else shown(good, kind),
-        "limit": shown(check.limit, kind),
+        "measured": criterion_figure(check.measured, kind),
+        "good": None if good is None else criterion_figure(good, kind),
+        "limit": criterion_figure(check.limit, kind),
         "grade": check.grade,
         "value": check.measured,
     }

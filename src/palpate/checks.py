@@ -6,6 +6,8 @@
     one_of    a word among a few; the error offers the nearest
     shape     an array of real numbers of a given shape
 
+and `own_arrays`, which makes the arrays of a frozen dataclass read-only.
+
 Import the module and name it in the call, ``checks.positive("The radius", radius, "m")``: the verbs alone are too
 common as names. `what` is the quantity's name as a sentence begins with it, with its article.
 """
@@ -23,7 +25,7 @@ from palpate.errors import UsageError
 if TYPE_CHECKING:
     import numpy as np
 
-__all__ = ["finite", "fits", "one_of", "positive", "shape"]
+__all__ = ["finite", "fits", "one_of", "own_arrays", "positive", "shape"]
 
 
 def finite(what: str, value: Any, unit: str = "") -> float:
@@ -227,6 +229,30 @@ def shape(
             fix=f"Pass finite numbers{_in(unit)}.",
         )
     return array
+
+
+def own_arrays(value: object, *names: str, dtype: Any = "float64") -> None:
+    """Replace arrays of a frozen dataclass by read-only, C-ordered copies.
+
+    A ``__post_init__`` calls it, so that nobody can change the value from outside.
+
+    Parameters
+    ----------
+    value : object
+        The frozen dataclass, changed in place.
+    *names : str
+        Attributes to replace; one that is None stays None.
+    dtype : data type
+        Type of the numbers in the copies.
+    """
+    import numpy as np
+
+    for name in names:
+        if getattr(value, name) is None:
+            continue
+        array = np.array(getattr(value, name), dtype=dtype, order="C")
+        array.flags.writeable = False
+        object.__setattr__(value, name, array)
 
 
 def _real(what: str, value: Any, unit: str) -> float:

@@ -1,4 +1,4 @@
-"""Every error palpate raises on purpose, and the exit code the command line gives it.
+"""The errors that palpate raises on purpose, and the exit codes that the command line gives them.
 
 ::
 

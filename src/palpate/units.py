@@ -42,10 +42,11 @@ class Range:
     Attributes
     ----------
     name : str
+        What varies, for example ``"tip load"``; messages, reports and the page show it.
     low, high : float
         Ends of the interval in `unit`, ``low < high``.
     unit : str
-        SI unit.
+        SI unit of both ends, for example ``"N"``; ``""`` for a pure number.
 
     Raises
     ------
@@ -75,7 +76,7 @@ class Range:
 
 
 def bounds(ranges: Sequence[Range]) -> tuple[np.ndarray, np.ndarray]:
-    """Lower and upper ends of n ranges, each of shape (n,)."""
+    """Return the lower and the upper ends of n ranges, each of shape (n,)."""
     return np.array([r.low for r in ranges]), np.array([r.high for r in ranges])
 
 
@@ -87,18 +88,19 @@ def _registry() -> Any:
 
 
 def to_si(value: str | float, unit: str) -> float:
-    """Turn a quantity such as ``"110 GPa"`` into a number in `unit`.
+    """Convert a quantity such as ``"110 GPa"`` to a number in `unit`.
 
     Parameters
     ----------
     value : str or float
-        A number is taken to be in `unit` already.
+        Text with a number and a unit; a number alone is taken to be in `unit` already.
     unit : str
         The SI unit wanted, for example ``"Pa"``.
 
     Returns
     -------
     float
+        The value in `unit`.
 
     Raises
     ------

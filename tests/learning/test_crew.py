@@ -12,13 +12,13 @@ import numpy as np
 import psutil
 import pytest
 
-from palpate.cores import available_cores
 from palpate.errors import UsageError
 from palpate.learning.energy import crew
 from palpate.learning.energy.crew import processes_for, sought
 from palpate.learning.energy.judging import restored
 from palpate.learning.energy.search import Problem
 from palpate.learning.energy.task import Task
+from palpate.processes import available_cores
 
 pytestmark = pytest.mark.timeout(120)
 

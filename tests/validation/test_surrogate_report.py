@@ -10,12 +10,12 @@ import pytest
 from linear_bodies import history, tip_data, tip_model
 
 from models import linear_network
+from palpate.format import bind_units, interval
 from palpate.surrogates import ContactLaw, Continuation, TouchSurrogate
 from palpate.units import Quantity, Range
 from palpate.validation import Chapter, SurrogateChapter, TouchSolves, validate, write_report
 from palpate.validation.report.surrogates.curves import curves, plot_curves
 from palpate.validation.report.surrogates.view import View, at_depth, feet
-from palpate.words import bound, interval
 from pressed import DEEPEST, INPUTS, RADIUS, A, B, face, force, places, solves, steady, surrogate
 
 HOSTILE = '<script>window.hacked = 1</script> $\\frac{1}$ "&amp;'
@@ -98,4 +98,4 @@ def test_both_kinds_of_bodies_stand_in_one_report(tmp_path: Path) -> None:
     assert "The surrogate states no deviation." in text
     # overconfident or too careful: here no error at all, which no 90 % interval should hold all of
     assert "Share of errors within the 90" in text.split("What was missed")[1]
-    assert bound(interval(INPUTS[0])) in text
+    assert bind_units(interval(INPUTS[0])) in text

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from palpate.format import share
 from palpate.units import Range, bounds
-from palpate.words import share
 
 __all__ = ["Answer", "beyond", "beyond_in_words", "outside", "place_in_words", "within_in_words"]
 

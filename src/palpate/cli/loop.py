@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from palpate.cli.console import Console
+from palpate.format import share
 from palpate.runtime import LoopProcess
 from palpate.runtime.devices import device_traits
 from palpate.runtime.pressed import PressedBody
@@ -17,7 +18,6 @@ from palpate.runtime.shared_state import State
 from palpate.runtime.stability import stiffness_warning
 from palpate.runtime.touchable import Touchable, load_touchable, workspace_for
 from palpate.surrogates.learnt_energy import warning_of
-from palpate.words import share
 
 __all__ = ["run_loop"]
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.dataset.fields import BOOKKEEPING
-from palpate.words import share
+from palpate.format import share
 
 if TYPE_CHECKING:
     from palpate.dataset.dataset import Dataset

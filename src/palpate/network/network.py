@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from palpate.checks import own_arrays
 from palpate.errors import UsageError
-from palpate.frozen import own_arrays
 from palpate.network import evaluate
 from palpate.network.compiled import Precision, packed, pattern, workspace
 from palpate.network.evaluator import Evaluator, refused

@@ -16,8 +16,8 @@ from collections.abc import Sequence
 from types import TracebackType
 from typing import Any, Self
 
-from palpate.cores import helper_environment
 from palpate.errors import DeviceError, UsageError
+from palpate.processes import helper_environment
 from palpate.runtime.devices import device_traits
 from palpate.runtime.loop_report import LoopReport
 from palpate.runtime.shared_state import Shared, State, now

@@ -34,8 +34,8 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from palpate.checks import own_arrays
 from palpate.errors import UsageError
-from palpate.frozen import own_arrays
 from palpate.units import Range
 
 __all__ = ["Continuation", "saturated"]

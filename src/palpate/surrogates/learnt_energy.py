@@ -16,14 +16,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from palpate.cores import available_cores
 from palpate.errors import UsageError
+from palpate.format import share
 from palpate.network import Network
+from palpate.processes import available_cores
 from palpate.surrogates.arguments import rows_of
 from palpate.surrogates.touch_kernels import ANSWER, FORCE, STIFFNESS
 from palpate.surrogates.touch_trust import covariances_into, trusts_into
 from palpate.units import Range
-from palpate.words import share
 
 __all__ = ["LearntEnergy", "corrected_by", "history_in_words", "warning_of"]
 

@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from palpate.checks import own_arrays
 from palpate.errors import UsageError
-from palpate.frozen import own_arrays
 from palpate.network import Network, TrainedRegion
 from palpate.network.second_order import gram
 from palpate.surrogates.continuation import Continuation

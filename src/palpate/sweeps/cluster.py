@@ -16,8 +16,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from palpate.cores import available_cores, helper_environment
 from palpate.errors import SolverError, UsageError
+from palpate.processes import available_cores, helper_environment
 
 __all__ = ["LocalCluster", "local_cluster"]
 

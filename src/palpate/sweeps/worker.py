@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 
-from palpate.cores import end_with_input
+from palpate.processes import end_with_input
 
 __all__ = ["main"]
 

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.format import length, plain, share
 from palpate.learning.plastic import HeldPath, HeldPaths
 from palpate.surrogates.plastic import HeldBody
 from palpate.validation.judgement import Judgement
 from palpate.validation.limits import Check, Criterion
-from palpate.words import length, plain, share
 
 __all__ = ["Followed", "HeldLimits", "HeldValidation", "follow_unseen", "validate_held"]
 

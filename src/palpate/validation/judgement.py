@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import AccuracyError
+from palpate.format import criterion_figure
 from palpate.validation.limits import Check
-from palpate.words import shown
 
 __all__ = ["Judgement"]
 
@@ -94,9 +94,9 @@ class Judgement:
             rows.append(
                 (
                     c.criterion.label,
-                    shown(c.measured, kind),
-                    shown(c.limit, kind),
-                    "" if good is None else shown(good, kind),
+                    criterion_figure(c.measured, kind),
+                    criterion_figure(c.limit, kind),
+                    "" if good is None else criterion_figure(good, kind),
                     c.grade.upper() if c.grade == "fail" else c.grade,
                 )
             )

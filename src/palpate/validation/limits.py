@@ -189,12 +189,11 @@ class Check:
 
     def __str__(self) -> str:
         """What was measured, what was asked, where the worst case is, what to do."""
-        from palpate.words import shown
+        from palpate.format import criterion_figure
 
         kind = self.criterion.kind
-        text = (
-            f"{self.criterion.label}: {shown(self.measured, kind)} measured, {shown(self.limit, kind)} asked."
-        )
+        measured, limit = criterion_figure(self.measured, kind), criterion_figure(self.limit, kind)
+        text = f"{self.criterion.label}: {measured} measured, {limit} asked."
         if self.where:
             text += f" The worst case is {self.where}."
         return text if self.passed else f"{text} {self.criterion.fix}"

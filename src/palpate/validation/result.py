@@ -10,6 +10,7 @@ import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
+from palpate.format import count, length, plain, scientific, share
 from palpate.learning import History
 from palpate.learning.touch import node_outputs
 from palpate.surrogates import TouchModel
@@ -23,7 +24,6 @@ from palpate.validation.limits import Limits
 from palpate.validation.loops import LoopWork, loop_work
 from palpate.validation.outputs import OutputErrors, output_errors
 from palpate.validation.stiffness import StiffnessErrors, stiffness_errors
-from palpate.words import count, length, plain, scientific, share
 
 __all__ = ["Validation", "node_truth", "validate_model", "worse_than_filter"]
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
+from palpate.format import count, plain, share
 from palpate.learning.energy.columns import columns_of
 from palpate.surrogates import TouchedBody, TouchSurrogate
 from palpate.surrogates.grasp import GraspSurrogate
@@ -26,7 +27,6 @@ from palpate.validation.shown import ShownErrors, shown_errors
 from palpate.validation.solves import TouchFunction, TouchSolves
 from palpate.validation.stiffness import StiffnessErrors, matrix_errors
 from palpate.validation.strokes import Smoothness, smoothness
-from palpate.words import count, plain, share
 
 __all__ = ["SurrogateValidation", "probe_samples", "validate_surrogate"]
 

@@ -9,13 +9,13 @@ from typing import Any
 
 from palpate.dataset import Dataset, Layout
 from palpate.errors import UsageError
+from palpate.format import share
 from palpate.learning.bodies.images import snapshots_of
 from palpate.learning.bodies.touches import Touches
 from palpate.learning.energy import LearntSurrogate, learn_surrogate
 from palpate.learning.energy.strategy import time_for
 from palpate.learning.fields import LearntField, learn_snapshots, lumped_mass
 from palpate.surrogates import TouchedBody
-from palpate.words import share
 
 __all__ = ["TouchHistory", "learn_body"]
 

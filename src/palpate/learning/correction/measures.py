@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from palpate.format import share
 from palpate.surrogates import TouchSurrogate
-from palpate.words import share
 
 __all__ = ["ForceError", "felt_along", "force_error"]
 

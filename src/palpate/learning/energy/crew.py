@@ -18,12 +18,12 @@ import time
 from types import TracebackType
 from typing import Self
 
-from palpate.cores import available_cores, helper_environment
 from palpate.errors import UsageError
 from palpate.learning.energy.average import Average, average
 from palpate.learning.energy.judging import restored
 from palpate.learning.energy.search import EnergyTrial
 from palpate.learning.energy.task import Answer, Task
+from palpate.processes import available_cores, helper_environment
 
 __all__ = ["processes_for", "sought"]
 

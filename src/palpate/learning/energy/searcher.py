@@ -10,7 +10,7 @@ import os
 import pickle
 import sys
 
-from palpate.cores import end_with_input
+from palpate.processes import end_with_input
 
 __all__ = ["main"]
 

@@ -12,6 +12,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from palpate.errors import UsageError
+from palpate.format import share
 from palpate.learning.energy.crew import processes_for, sought
 from palpate.learning.energy.search import EnergyTrial, Problem
 from palpate.learning.energy.strategy import time_for
@@ -24,7 +25,6 @@ from palpate.learning.grasp.samples import GraspSamples
 from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction
 from palpate.surrogates.grasp import GraspSurrogate
 from palpate.units import Range
-from palpate.words import share
 
 __all__ = ["LearntGrasp", "learn_grasp"]
 

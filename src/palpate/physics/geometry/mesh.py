@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.frozen import own_arrays
+from palpate.checks import own_arrays
 from palpate.physics.geometry.checks import require_known
 from palpate.physics.geometry.groups import members
 from palpate.physics.geometry.quality import MeshQuality, mesh_quality, tetrahedron_volumes

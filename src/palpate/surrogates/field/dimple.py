@@ -17,8 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from palpate.checks import own_arrays
 from palpate.errors import UsageError
-from palpate.frozen import own_arrays
 from palpate.surrogates.field.variation import Variation
 from palpate.surrogates.surface import TouchedSurface
 

@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
+from palpate.checks import own_arrays
 from palpate.errors import UsageError
-from palpate.frozen import own_arrays
 from palpate.network import Network
 from palpate.network.compiled import Precision
 from palpate.surrogates.arguments import rows_of

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from palpate.checks import own_arrays
 from palpate.errors import UsageError
-from palpate.frozen import own_arrays
 
 __all__ = ["OFFSETS", "Variation", "polynomials"]
 

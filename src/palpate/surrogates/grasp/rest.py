@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from palpate.checks import own_arrays
 from palpate.errors import UsageError
-from palpate.frozen import own_arrays
 
 __all__ = ["RestStiffness", "monomials", "root_at", "terms"]
 

@@ -12,8 +12,8 @@ from itertools import combinations_with_replacement
 import numpy as np
 from numba import njit
 
+from palpate.checks import own_arrays
 from palpate.errors import UsageError
-from palpate.frozen import own_arrays
 
 __all__ = ["HIGHEST", "Stiffening", "exponents", "powers", "stiffening_into"]
 

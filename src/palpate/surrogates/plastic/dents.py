@@ -29,10 +29,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from palpate.checks import own_arrays
 from palpate.errors import UsageError
-from palpate.frozen import own_arrays
+from palpate.format import share
 from palpate.surrogates.plastic.dent_kernels import step_into
-from palpate.words import share
 
 __all__ = ["DentMemory", "Dents"]
 

@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.format import share
 from palpate.surrogates.relaxation.branches import Branches
 from palpate.surrogates.relaxation.descent import descend, slopes
 from palpate.surrogates.relaxation.record import Record
-from palpate.words import share
 
 __all__ = ["Identified", "identify", "identify_behind_pad"]
 

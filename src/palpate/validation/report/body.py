@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from palpate.dataset import Dataset
-from palpate.words import length, plain, pressure, share
+from palpate.format import length, plain, pressure, share
 
 __all__ = ["LINEAR", "body_words", "strain_words"]
 

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.dataset import Dataset
+from palpate.format import share
 from palpate.surrogates import TouchModel
 from palpate.validation.force import ForceSamples, hand_positions
 from palpate.validation.limits import FAINT, FAINT_JND, FORCE_JND
 from palpate.validation.report.style import BLUE, INK, ORANGE, SERIES, figure, logarithmic
-from palpate.words import share
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

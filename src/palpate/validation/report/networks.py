@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from palpate.format import count
 from palpate.surrogates import TouchModel
-from palpate.words import count
 
 __all__ = ["ROLES", "network_rows", "units_of"]
 

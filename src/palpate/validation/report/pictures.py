@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
+from palpate.format import count, length, plain, scientific, share
 from palpate.learning import History
 from palpate.validation.force import force_samples
 from palpate.validation.report.chapter import Chapter
@@ -15,7 +16,6 @@ from palpate.validation.report.networks import units_of
 from palpate.validation.report.shapes import colour_of_load, plot_shapes
 from palpate.validation.report.style import styled
 from palpate.validation.report.svg import Picture, inline_svg
-from palpate.words import count, length, plain, scientific, share
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

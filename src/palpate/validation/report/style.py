@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from palpate.words import power_of_ten
+from palpate.format import power_of_ten
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

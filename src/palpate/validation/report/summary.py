@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from palpate.format import count, length, plain, scientific, share
 from palpate.validation.report.body import body_words, strain_words
 from palpate.validation.report.chapter import Chapter
 from palpate.validation.result import Validation, worse_than_filter
-from palpate.words import count, length, plain, scientific, share
 
 __all__ = ["Fact", "Story", "felt", "story"]
 

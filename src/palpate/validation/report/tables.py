@@ -6,10 +6,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from palpate.format import criterion_figure, duration, length, scientific
 from palpate.validation.judgement import Judgement
 from palpate.validation.limits import CRITERIA
 from palpate.validation.result import Validation
-from palpate.words import duration, length, scientific, shown
 
 __all__ = ["Judged", "flat", "judged_rows", "node_rows", "sources", "timing_rows"]
 
@@ -33,9 +33,9 @@ def judged_rows(validation: Judgement) -> list[Judged]:
     return [
         Judged(
             c.criterion.label,
-            shown(c.measured, c.criterion.kind),
-            shown(c.limit, c.criterion.kind),
-            "–" if c.criterion.good is None else shown(c.criterion.good, c.criterion.kind),
+            criterion_figure(c.measured, c.criterion.kind),
+            criterion_figure(c.limit, c.criterion.kind),
+            "–" if c.criterion.good is None else criterion_figure(c.criterion.good, c.criterion.kind),
             c.grade,
             c.where,
         )

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from palpate.errors import UsageError
+from palpate.format import bind_units
 from palpate.validation.report.chapter import Chapter
 from palpate.validation.report.held import HeldChapter
 from palpate.validation.report.held.told import held_told
@@ -19,7 +20,6 @@ from palpate.validation.report.summary import story
 from palpate.validation.report.surrogates import SurrogateChapter
 from palpate.validation.report.surrogates.told import surrogate_told
 from palpate.validation.report.tables import flat, judged_rows, node_rows, sources, timing_rows
-from palpate.words import bound
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -102,7 +102,7 @@ def render(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"bound": bound, "prose": _prose}
+    environment.filters |= {"bound": bind_units, "prose": _prose}
     # figures are made here, with every name in them escaped by Matplotlib; the style sheet is palpate's own
     style = Markup(environment.get_template("report.css").render())
     told = [_told(chapter, f"c{i}") for i, chapter in enumerate(chapters, 1)]
@@ -120,7 +120,7 @@ def _prose(text: str) -> Markup:
     """Text as HTML: escaped, numbers bound to their units, what stands between backticks as code."""
     from markupsafe import Markup, escape
 
-    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(bound(text)))))
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(bind_units(text)))))
 
 
 def _told(chapter: AnyChapter, key: str) -> dict[str, Any]:

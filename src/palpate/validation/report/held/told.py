@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from palpate.format import length, plain, share
 from palpate.validation.held import Followed, HeldValidation, follow_unseen
 from palpate.validation.report.held.chapter import HeldChapter
 from palpate.validation.report.held.loops import plot_energies, plot_loops
@@ -11,7 +12,6 @@ from palpate.validation.report.pictures import picture
 from palpate.validation.report.summary import Fact, Story
 from palpate.validation.report.svg import Picture
 from palpate.validation.report.tables import flat, judged_rows, timing_rows
-from palpate.words import length, plain, share
 
 __all__ = ["held_told"]
 

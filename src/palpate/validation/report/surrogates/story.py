@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from palpate.format import count, interval, plain, share
 from palpate.validation.report.summary import Fact, Story, felt
 from palpate.validation.report.surrogates.chapter import SurrogateChapter
-from palpate.words import count, interval, plain, share
 
 __all__ = ["surrogate_story"]
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from palpate.format import plain, share
 from palpate.surrogates import TouchSurrogate
 from palpate.validation.report.forces import plot_force_errors
 from palpate.validation.report.pictures import picture
@@ -19,7 +20,6 @@ from palpate.validation.report.tables import flat, judged_rows, timing_rows
 from palpate.validation.solves import TouchFunction
 from palpate.validation.strokes import Smoothness
 from palpate.validation.surrogate import SurrogateValidation, probe_samples
-from palpate.words import plain, share
 
 __all__ = ["surrogate_told"]
 

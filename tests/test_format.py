@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palpate.units import Range
-from palpate.words import (
-    bound,
+from palpate.format import (
+    bind_units,
     count,
+    criterion_figure,
     duration,
     interval,
     length,
@@ -18,8 +18,8 @@ from palpate.words import (
     pressure,
     scientific,
     share,
-    shown,
 )
+from palpate.units import Range
 
 LOWERED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 UNITS = {"m": 1.0, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9}
@@ -71,9 +71,9 @@ def test_lengths_read_back_and_stay_short(metres: float) -> None:
         (count(1, "unit"), "1 unit"),
         (count(1255, "unit"), "1,255 units"),
         (count(2, "pass", "passes"), "2 passes"),
-        (shown(2e-7, "scale"), "2.0 × 10⁻⁷"),
-        (shown(4.5e-3, "degrees"), "0.0045°"),
-        (shown(2.0, "times"), "2 ×"),
+        (criterion_figure(2e-7, "scale"), "2.0 × 10⁻⁷"),
+        (criterion_figure(4.5e-3, "degrees"), "0.0045°"),
+        (criterion_figure(2.0, "times"), "2 ×"),
     ],
 )
 def test_examples(text: str, wanted: str) -> None:
@@ -86,6 +86,6 @@ def test_powers_of_ten_on_an_axis() -> None:
 
 def test_numbers_stay_with_their_units() -> None:
     space = "\N{NO-BREAK SPACE}"
-    assert bound("P = -1.5 N at 0.4 m") == f"P{space}={space}−1.5{space}N at 0.4{space}m"
-    assert bound("3.4 × 10⁻⁷ %") == f"3.4{space}×{space}10⁻⁷{space}%"
-    assert bound("beam-3 and 5 men") == "beam-3 and 5 men"
+    assert bind_units("P = -1.5 N at 0.4 m") == f"P{space}={space}−1.5{space}N at 0.4{space}m"
+    assert bind_units("3.4 × 10⁻⁷ %") == f"3.4{space}×{space}10⁻⁷{space}%"
+    assert bind_units("beam-3 and 5 men") == "beam-3 and 5 men"

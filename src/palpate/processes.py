@@ -1,4 +1,4 @@
-"""Processes that help this one: how many are worth it, what they find around them, and how they end with it."""
+"""Helper processes: their number, their environment, and their end when this process ends."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ _ONE_THREAD = dict.fromkeys(
 
 
 def available_cores() -> int:
-    """Number of cores that this process may use."""
+    """Return the number of processor cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def helper_environment() -> dict[str, str]:
-    """Environment of a process that helps this one: it finds the modules that this one finds, and has one thread."""
+    """Return environment variables for a helper: it imports what this process can import, and uses one thread."""
     path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
     return {**os.environ, **_ONE_THREAD, "PYTHONPATH": path}
 
 
 def end_with_input() -> None:
-    """In a helper: from now on end the process when its standard input closes, however the one that started it died."""
-    threading.Thread(target=_wait_for_end, daemon=True).start()
+    """End this process when its standard input closes, however the process that started it died; for helpers."""
+    threading.Thread(target=_exit_at_end_of_input, daemon=True).start()
 
 
-def _wait_for_end() -> None:
+def _exit_at_end_of_input() -> None:
     # the descriptor itself is read: a thread inside `sys.stdin` would stall the interpreter's end
     while os.read(sys.stdin.fileno(), 1024):
         pass

@@ -1,4 +1,4 @@
-"""Figures as a person reads them."""
+"""Numbers as text for people: few digits, a fitting unit, a proper minus sign."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import re
 from palpate.units import Range
 
 __all__ = [
-    "bound",
+    "bind_units",
     "count",
+    "criterion_figure",
     "duration",
     "interval",
     "length",
@@ -18,7 +19,6 @@ __all__ = [
     "pressure",
     "scientific",
     "share",
-    "shown",
 ]
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -27,7 +27,7 @@ _LENGTHS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
 
 
 def plain(value: float, digits: int = 2) -> str:
-    """A number with significant digits, without trailing zeros: 1234, 0.012, 3.4 × 10⁻⁷."""
+    """Write a number with `digits` significant digits and no trailing zeros: 1234, 0.012, 3.4 × 10⁻⁷."""
     if not math.isfinite(value):
         return "not a number" if math.isnan(value) else "infinite"
     if value == 0:
@@ -40,7 +40,7 @@ def plain(value: float, digits: int = 2) -> str:
 
 
 def scientific(value: float, digits: int = 2) -> str:
-    """A number as 3.4 × 10⁻⁷."""
+    """Write a number as 3.4 × 10⁻⁷."""
     if not math.isfinite(value) or value == 0:
         return plain(value)
     mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
@@ -48,13 +48,13 @@ def scientific(value: float, digits: int = 2) -> str:
 
 
 def power_of_ten(value: float) -> str:
-    """A power of ten as 10⁻³, and 1 and 10 as they are."""
+    """Write a power of ten as 10⁻³, but 1 and 10 as they are."""
     exponent = round(math.log10(value)) if value > 0 else 0
     return {0: "1", 1: "10"}.get(exponent, f"10{str(exponent).translate(_RAISED)}")
 
 
-def bound(text: str) -> str:
-    """A text whose numbers no line break parts from their unit, with proper minus signs."""
+def bind_units(text: str) -> str:
+    """Join each number in a text to its unit by a no-break space, and set proper minus signs."""
     text = re.sub(r"(?<![\w-])-(?=\d)", "−", text)
     text = text.replace(" × 10", "\N{NO-BREAK SPACE}×\N{NO-BREAK SPACE}10")
     text = text.replace(" = ", "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}")
@@ -63,13 +63,13 @@ def bound(text: str) -> str:
     )
 
 
-def count(number: int, one: str, many: str = "") -> str:
-    """So many things: 1 unit, 1,255 observations."""
-    return f"{number:,} {one if number == 1 else many or one + 's'}"
+def count(number: int, singular: str, plural: str = "") -> str:
+    """Write a number of things: 1 unit, 1,255 observations."""
+    return f"{number:,} {singular if number == 1 else plural or singular + 's'}"
 
 
 def length(metres: float) -> str:
-    """A length in the unit that gives the shortest number."""
+    """Write a length in the unit that gives the shortest number."""
     size = abs(metres)
     if not math.isfinite(size) or size == 0:
         return f"{plain(metres)} m"
@@ -77,35 +77,36 @@ def length(metres: float) -> str:
     return f"{plain(metres / factor, 3)} {unit}"
 
 
-def interval(of: Range) -> str:
-    """A range, lengths below 1 m in mm: c_z 42.7 … 49.8 mm."""
-    small = of.unit == "m" and max(abs(of.low), abs(of.high)) < 1.0
-    factor, unit = (1e-3, "mm") if small else (1.0, of.unit)
-    return f"{of.name} {plain(of.low / factor, 3)} … {plain(of.high / factor, 3)} {unit}".rstrip()
+def interval(extent: Range) -> str:
+    """Write a range, with lengths below 1 m in mm: c_z 42.7 … 49.8 mm."""
+    low, high, unit = extent.low, extent.high, extent.unit
+    if unit == "m" and max(abs(low), abs(high)) < 1.0:
+        low, high, unit = low / 1e-3, high / 1e-3, "mm"
+    return f"{extent.name} {plain(low, 3)} … {plain(high, 3)} {unit}".rstrip()
 
 
 def pressure(pascals: float) -> str:
-    """A modulus in GPa, MPa, kPa or Pa."""
+    """Write a modulus in GPa, MPa, kPa or Pa."""
     factor, unit = next((u for u in _PRESSURES if pascals >= 0.9995 * u[0]), _PRESSURES[-1])
     return f"{plain(pascals / factor, 3)} {unit}"
 
 
 def share(value: float) -> str:
-    """A ratio in per cent."""
+    """Write a ratio in per cent."""
     return f"{plain(100 * value)} %"
 
 
 def duration(seconds: float) -> str:
-    """A time in s or ms, minutes above two."""
+    """Write a time in s or ms, or in minutes above two of them."""
     if seconds >= 120:
         return f"{plain(seconds / 60)} min"
     return f"{plain(seconds)} s" if seconds >= 1 else f"{plain(1e3 * seconds)} ms"
 
 
-def shown(value: float | tuple[float, float], kind: str) -> str:
-    """A figure, or the two ends of a band, of one of the kinds of `palpate.validation.limits.Criterion`."""
+def criterion_figure(value: float | tuple[float, float], kind: str) -> str:
+    """Write a figure, or the two ends of a band, by the kind of its `palpate.validation.limits.Criterion`."""
     if isinstance(value, tuple):
-        return " … ".join(shown(end, kind) for end in value)
+        return " … ".join(criterion_figure(end, kind) for end in value)
     if kind == "scale":
         return scientific(value)
     if kind == "metres":

@@ -7,23 +7,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from safetensors.numpy import save_file
 
 from palpate.network import Network
-from palpate.network.description import describe
-from palpate.network.file import _digest
+from palpate.network.archive import network_to_json
+from palpate.network.container import Container, write_container
 
 
 def parts_of(network: Network) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """Content and arrays of a file with this network alone."""
-    description, arrays = describe(network)
+    description, arrays = network_to_json(network)
     content = {"networks": {"network": description}, "meta": {}}
     return content, {f"net/network/{k}": np.array(v) for k, v in arrays.items()}
 
 
-def forge(path: Path, content: object, tensors: dict[str, np.ndarray], **header: str) -> Path:
+def forge(path: Path, content: object, tensors: dict[str, np.ndarray], version: str = "2") -> Path:
     """Write a file whose checksum fits whatever it holds; content may be JSON text of its own."""
     text = content if isinstance(content, str) else json.dumps(content)
-    full = {"palpate": "networks", "version": "2", "content": text} | header
-    save_file(tensors, path, full | {"sha256": _digest(tensors, full)})
-    return path
+    return write_container(path, Container("networks", text, tensors, version))

@@ -278,7 +278,7 @@ class Network:
         UsageError
             If the folder does not exist or can't be written, or the network's numbers can't be evaluated.
         """
-        from palpate.network.file import Archive, save_archive
+        from palpate.network.archive import Archive, save_archive
 
         return save_archive(path, Archive({"network": self}))
 
@@ -291,6 +291,6 @@ class Network:
         FileFormatError
             If the file is missing, truncated, corrupt, foreign or from a later version, or holds something else.
         """
-        from palpate.network.file import load_alone
+        from palpate.network.archive import load_single_network
 
-        return load_alone(path)
+        return load_single_network(path)

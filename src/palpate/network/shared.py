@@ -24,8 +24,8 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.network import mapped
+from palpate.network.archive import quantity_from_json, range_from_json
 from palpate.network.compiled import Precision
-from palpate.network.description import quantity_of, range_of
 from palpate.network.evaluator import Evaluator
 from palpate.network.network import Network
 from palpate.network.publication import HEAD, Memory, create, parts_of, shapes_of
@@ -166,8 +166,8 @@ class Subscriber:
     def __init__(self, name: str, *, precision: Precision = "double", jacobian: bool = False) -> None:
         self._memory = Memory(name)
         self._options: dict[str, Any] = {"precision": precision, "jacobian": jacobian}
-        self._inputs = tuple(range_of(r) for r in self._memory.text["inputs"])
-        self._outputs = tuple(quantity_of(q) for q in self._memory.text["outputs"])
+        self._inputs = tuple(range_from_json(r) for r in self._memory.text["inputs"])
+        self._outputs = tuple(quantity_from_json(q) for q in self._memory.text["outputs"])
         self._network: Network | None = None
         self._evaluator: Evaluator | None = None
         self.serial = 0

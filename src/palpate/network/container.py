@@ -1,0 +1,139 @@
+"""The container under every ``.palpate`` file: arrays and one JSON text in a safetensors archive.
+
+safetensors holds plain numbers and a size-checked header, so opening a file can't run code.
+The header carries
+
+    palpate   the kind of the archive: "networks" or a richer one
+    version   of this layout; a reader refuses later ones
+    sha256    over the other entries and names, types, shapes and bytes of all arrays
+    content   JSON text, which `palpate.network.archive` writes and reads
+
+A checksum only tells accidents; a file made with bad intent is for the reader of the content to refuse.
+Version 1 knew Gaussian units only.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import FileFormatError, UsageError
+
+__all__ = ["MAKE_ANEW", "Container", "read_container", "write_container"]
+
+VERSION = 2
+MAKE_ANEW = "Copy the file again, or make it anew with `palpate learn`."
+_KINDS = {"BOOL", "U8", "I8", "U16", "I16", "U32", "I32", "U64", "I64", "F16", "F32", "F64"}
+
+
+@dataclass(frozen=True, eq=False)
+class Container:
+    """The raw parts of one file.
+
+    Attributes
+    ----------
+    kind : str
+        The sort of thing that the file holds.
+    content : str
+        JSON text.
+    tensors : mapping of name to array
+    version : str
+        Of the layout, "1" to the latest.
+    """
+
+    kind: str
+    content: str
+    tensors: Mapping[str, np.ndarray]
+    version: str = str(VERSION)
+
+    @property
+    def header(self) -> dict[str, str]:
+        """The safetensors metadata: kind, version, content, and the checksum over these and the arrays."""
+        digest = hashlib.sha256("|".join((self.kind, self.version, self.content)).encode())
+        for name in sorted(self.tensors):
+            a = self.tensors[name]
+            digest.update(f"{name}|{a.dtype.str}|{a.shape}".encode())
+            digest.update(a.tobytes())
+        return {
+            "palpate": self.kind,
+            "version": self.version,
+            "content": self.content,
+            "sha256": digest.hexdigest(),
+        }
+
+
+def write_container(path: str | os.PathLike[str], container: Container) -> Path:
+    """Write a container; the file appears whole or not at all.
+
+    Raises
+    ------
+    UsageError
+        If the folder does not exist or can't be written.
+    """
+    from safetensors.numpy import save
+
+    path = Path(path)
+    temporary = path.with_name(path.name + ".part")
+    try:
+        temporary.write_bytes(save(dict(container.tensors), container.header))
+        os.replace(temporary, path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise UsageError(
+            f"Could not write {path}.", why=str(error), fix="Choose a folder that exists."
+        ) from error
+    return path
+
+
+def read_container(path: str | os.PathLike[str]) -> Container:
+    """Read a container back, bit for bit.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is missing, truncated, corrupt, foreign or from a later version.
+    """
+    path = Path(path)
+    header, tensors = _read(path)
+    if not {"palpate", "version", "content"} <= header.keys():
+        raise FileFormatError(f"{path} is a safetensors file, but not one of palpate's.")
+    if header["version"] not in {str(v) for v in range(1, VERSION + 1)}:
+        raise FileFormatError(
+            f"{path} has file version {header['version']}; this palpate reads up to {VERSION}.",
+            fix="Upgrade palpate.",
+        )
+    container = Container(header["palpate"], header["content"], tensors, header["version"])
+    if header.get("sha256") != container.header["sha256"]:
+        raise FileFormatError(f"{path} is damaged: its contents do not match its checksum.", fix=MAKE_ANEW)
+    return container
+
+
+def _read(path: Path) -> tuple[dict[str, str], dict[str, np.ndarray]]:
+    from safetensors import SafetensorError, safe_open
+
+    if not path.is_file():
+        state = "is a folder, not a network file" if path.is_dir() else "does not exist"
+        raise FileFormatError(
+            f"{path} {state}.", fix="`palpate learn` writes such a file; or give the path of another."
+        )
+    try:
+        with safe_open(path, framework="numpy") as file:
+            header = dict(file.metadata() or {})
+            return header, {name: _tensor(file, name) for name in file.keys()}  # noqa: SIM118 - not a mapping
+    except (SafetensorError, OSError, ValueError, TypeError, KeyError) as error:
+        raise FileFormatError(
+            f"{path} is not a network file, or it is truncated.", why=str(error), fix=MAKE_ANEW
+        ) from error
+
+
+def _tensor(file: Any, name: str) -> np.ndarray:
+    kind = file.get_slice(name).get_dtype()
+    if kind not in _KINDS:  # asked for these, NumPy refuses in ways that differ
+        raise TypeError(f"{name!r} holds numbers of kind {kind}")
+    return np.asarray(file.get_tensor(name))

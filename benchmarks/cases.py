@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.physics.beam.presets import preset
+from palpate.physics.beam.beam_presets import preset
 from palpate.surrogates import TouchModel
 from palpate.units import Quantity, Range
 

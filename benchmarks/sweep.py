@@ -15,7 +15,7 @@ import numpy as np
 import palpate
 from benchmarks.runner import main
 from benchmarks.table import Column, Table
-from palpate.physics.beam.presets import Preset, preset
+from palpate.physics.beam.beam_presets import Preset, preset
 
 __all__ = ["tables"]
 

@@ -18,7 +18,7 @@ import numpy as np
 from palpate.learning import default
 from palpate.learning.stream.learner import Learner
 from palpate.network import Publisher, Subscriber
-from palpate.physics.beam.presets import preset
+from palpate.physics.beam.beam_presets import preset
 from palpate.units import Range
 
 BEGIN, END, STOP = 250, 600, 700  # observations: drift begins, drift ends, stream ends

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from palpate.learning import Settings, default, founding, learn, refined_network
-from palpate.physics.beam.presets import preset
+from palpate.physics.beam.beam_presets import preset
 from palpate.units import Quantity
 
 pytestmark = pytest.mark.slow

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from palpate.dataset import Layout, beam_fields
-from palpate.physics.beam.solution import Solution
-from palpate.physics.equilibrium.stop import Stop
+from palpate.physics.beam.beam_problem import Solution
+from palpate.physics.stop import Stop
 from palpate.units import Range
 
 

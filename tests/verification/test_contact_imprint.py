@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.physics.equilibrium.stop import Stop
 from palpate.physics.geometry import Block
 from palpate.physics.interactions import SphereProbe
 from palpate.physics.materials import NeoHookean
 from palpate.physics.solid import Body
+from palpate.physics.stop import Stop
 
 SIZE, RADIUS = (0.10, 0.10, 0.05), 0.010
 GEL = NeoHookean(9e3, 0.45)

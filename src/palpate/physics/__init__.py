@@ -5,8 +5,8 @@
     interactions  what acts on it, as energies with inputs
     solid         solid bodies in three dimensions
     beam          plane cantilevers
-    equilibrium   finding a minimum of an energy, whatever body it belongs to
     pictures      drawing what was solved
+    stop          why a search for an equilibrium ended
     advice        warnings of models that are hardly meant
 
 A body and what acts on it make a problem, a plain value. The problem's `open` builds the finite elements and gives a
@@ -29,9 +29,6 @@ from palpate.physics.beam import (
     StepAndHold,
     TipLoad,
     preset,
-)
-from palpate.physics.equilibrium import (
-    Stop,
 )
 from palpate.physics.geometry import (
     Block,
@@ -89,6 +86,7 @@ from palpate.physics.solid import (
     SolidSolution,
     Varied,
 )
+from palpate.physics.stop import Stop
 
 __all__ = [
     "HISTORY_PRESETS",

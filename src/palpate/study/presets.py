@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from palpate.errors import UsageError
 from palpate.physics import Cantilever, Circle, PointLoad
-from palpate.physics.beam.presets import PRESETS, preset
+from palpate.physics.beam.beam_presets import PRESETS, preset
 from palpate.study.held.presets import HELD, held_preset
 from palpate.study.models import Study
 from palpate.study.stages import AnyStudy

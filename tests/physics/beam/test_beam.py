@@ -18,7 +18,7 @@ from palpate.physics import (
     TipLoad,
     preset,
 )
-from palpate.physics.beam.solver import STANDARD_GRAVITY
+from palpate.physics.beam.beam_solver import STANDARD_GRAVITY
 
 SECTION, MATERIAL = Circle(0.005), LinearElastic(2e9, 0.43, 1150.0)
 BENDING = MATERIAL.young * SECTION.second_moment

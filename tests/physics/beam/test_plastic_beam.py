@@ -19,12 +19,12 @@ from palpate.physics.beam import (
     TipLoad,
     preset,
 )
-from palpate.physics.beam.plastic_section import PlasticSection
-from palpate.physics.equilibrium import Stop
+from palpate.physics.beam.section_laws import PlasticSection
 from palpate.physics.materials.hardening import LinearHardening, VoceHardening
 from palpate.physics.materials.linear import LinearElastic
 from palpate.physics.materials.plastic import Plastic
 from palpate.physics.materials.uniaxial import UniaxialPlastic
+from palpate.physics.stop import Stop
 
 ELASTIC = LinearElastic(110e9, 0.35, 8700.0)
 YIELD = 100e6

@@ -9,7 +9,7 @@ from palpate.physics.beam import (
     Circle,
     Rectangle,
 )
-from palpate.physics.beam.plastic_section import PlasticSection
+from palpate.physics.beam.section_laws import PlasticSection
 from palpate.physics.materials.hardening import LinearHardening, VoceHardening
 from palpate.physics.materials.linear import LinearElastic
 from palpate.physics.materials.uniaxial import UniaxialPlastic

@@ -5,9 +5,8 @@ import pytest
 
 from palpate.errors import UsageError
 from palpate.physics.beam import Cantilever, Circle, LoadAndUnload, StepAndHold, TipLoad, preset
-from palpate.physics.beam.history_beam import HistoryBeam
-from palpate.physics.beam.reissner import Stiffness
-from palpate.physics.beam.viscous_section import ViscousSection
+from palpate.physics.beam.beam_energy import BeamEnergy
+from palpate.physics.beam.section_laws import ViscousSection
 from palpate.physics.materials.linear import LinearElastic
 from palpate.physics.materials.prony import PronySeries
 from palpate.physics.materials.viscous import Viscoelastic
@@ -55,7 +54,7 @@ def creep(terms, time):
 
 
 def section(terms=TWO):
-    return ViscousSection(Stiffness(3.0, 5.0, 7.0), PronySeries(terms))
+    return ViscousSection(np.array([3.0, 5.0, 7.0]), PronySeries(terms))
 
 
 @pytest.mark.parametrize("steps", [1, 2, 7])
@@ -103,7 +102,7 @@ def test_forever_is_the_limit_of_long():
 @pytest.mark.parametrize("large", [True, False])
 def test_forces_and_tangents_of_a_step_are_derivatives(large):
     law = section()
-    model = HistoryBeam(np.array([0.0, 0.3, 0.5, 1.0]), 3, law, large=large)
+    model = BeamEnergy(np.array([0.0, 0.3, 0.5, 1.0]), 3, law, large=large)
     rng = np.random.default_rng(5)
     internal = model.step(model.rest(), None).outcome(0.3 * rng.normal(size=model.size))
     step, z, d, h = model.step(internal, 0.2), *(0.3 * rng.normal(size=(2, model.size))), 1e-5

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from solids import FOOT, PROBE, RADIUS, SIZE, above, pressed
 
-from palpate.physics.equilibrium.stop import Stop
 from palpate.physics.interactions import SphereProbe
 from palpate.physics.interactions.contact import Contact
 from palpate.physics.interactions.patch import winding_number
+from palpate.physics.stop import Stop
 
 
 def test_a_corner_turned_over_between_the_quadrature_points_is_seen():

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from solids import above, pressed
 
-from palpate.physics.equilibrium.stop import Stop, Verdict
 from palpate.physics.geometry import Block
 from palpate.physics.interactions import Held, PrescribedDisplacement, SphereProbe
 from palpate.physics.materials import NeoHookean
 from palpate.physics.solid import Body, newton, path
+from palpate.physics.stop import Stop, Verdict
 
 TOP = PrescribedDisplacement("top", "z", (-0.03, 0.03))
 

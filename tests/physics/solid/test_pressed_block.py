@@ -8,8 +8,8 @@ import pytest
 from solids import PROBE, RADIUS, above, gel, pressed
 
 from palpate.errors import UsageError
-from palpate.physics.equilibrium.stop import Stop
 from palpate.physics.interactions import SphereProbe
+from palpate.physics.stop import Stop
 
 STEP = 1e-6  # m; so short that hardly a quadrature point comes into contact, where stiffness jumps
 

@@ -10,12 +10,12 @@ import pytest
 from solids import SIZE, Stretched, above, gel
 
 from palpate.errors import UsageError
-from palpate.physics.equilibrium.stop import Stop
 from palpate.physics.geometry import Block
 from palpate.physics.interactions import SphereProbe
 from palpate.physics.materials import LinearElastic, LinearHardening, Plastic
 from palpate.physics.solid import Body
 from palpate.physics.solid.system import sparse_solver
+from palpate.physics.stop import Stop
 
 METAL = Plastic(LinearElastic(1e6, 0.35), LinearHardening(1e4, 2e4))
 HARD = SphereProbe(radius=0.01, pad=1e8, stop=0.001, depth=(0.0, 0.0015))

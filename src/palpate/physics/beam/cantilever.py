@@ -12,11 +12,10 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_number
-from palpate.physics.beam.histories import LoadAndUnload, StepAndHold
-from palpate.physics.beam.loads import Load, as_loads
-from palpate.physics.beam.problem import BeamProblem
-from palpate.physics.beam.section import CrossSection
-from palpate.physics.beam.sections import BeamMaterial, Kind, kind_of
+from palpate.physics.beam.beam_loads import Load, LoadAndUnload, StepAndHold, as_loads
+from palpate.physics.beam.beam_problem import BeamProblem
+from palpate.physics.beam.cross_section import CrossSection
+from palpate.physics.beam.section_laws import BeamMaterial, Kind, material_kind
 
 __all__ = ["Cantilever"]
 
@@ -90,7 +89,7 @@ class Cantilever:
     @property
     def kind(self) -> Kind:
         """Whether the beam is elastic, yields ("plastic") or creeps ("viscous"), by its material."""
-        kind = kind_of(self.material)
+        kind = material_kind(self.material)
         assert kind is not None  # checked when the beam was made
         return kind
 
@@ -178,7 +177,7 @@ _FIBRED = "a Circle or a Rectangle: one that yields is cut into fibres, and bare
 
 
 def _check_material(material: object) -> None:
-    if kind_of(material) is not None:
+    if material_kind(material) is not None:
         return
     by_name = f"named_material({material!r})" if isinstance(material, str) else 'named_material("nylon")'
     raise UsageError(

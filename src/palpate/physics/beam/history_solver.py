@@ -1,4 +1,4 @@
-"""Solving a beam that remembers: single questions from the virgin beam, and whole histories of loads."""
+"""Solving a beam with memory: single questions from the virgin beam, and whole histories of loads."""
 
 from __future__ import annotations
 
@@ -8,43 +8,38 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.physics.beam.history_beam import HistoryBeam
-from palpate.physics.beam.marching import Failure, Moment, march
-from palpate.physics.beam.marching_beam import MarchingBeam
-from palpate.physics.beam.problem import BeamProblem
-from palpate.physics.beam.sections import law_of
-from palpate.physics.beam.solution import Solution
-from palpate.physics.beam.solver import STANDARD_GRAVITY
-from palpate.physics.equilibrium.stop import Stop
+from palpate.physics.beam.beam_newton import lower_state, minimise
+from palpate.physics.beam.beam_problem import BeamProblem, Solution
+from palpate.physics.beam.beam_solver import LoadedBeam
+from palpate.physics.beam.history_march import Failure, Moment, march
+from palpate.physics.beam.section_laws import PlasticSection
+from palpate.physics.stop import Stop
 
 __all__ = ["HistorySolver"]
+
+NEWTON_LIMIT = 40  # a step that needs more iterations is cheaper in two halves
 
 
 class HistorySolver:
     """Finite elements of one problem of a beam that yields or creeps, kept open between solves.
 
-    It remembers nothing between calls: each answer belongs to a history that is told in full, so it is the same
+    It remembers nothing between calls: each answer belongs to a history that is given in full, so it is the same
     whatever was asked before.
 
     Parameters
     ----------
     problem : BeamProblem
+        A beam with memory and its loads.
     """
 
     def __init__(self, problem: BeamProblem) -> None:
-        body = problem.body
         self._problem = problem
-        self._timed = body.kind == "viscous"
-        self._beam = HistoryBeam(
-            body.vertices(problem.loads), body.order, law_of(body), large=body.kinematics == "large"
-        )
-        self._marching = MarchingBeam(body, self._beam)
-        self._directions = self._load_vectors()
-        weight = STANDARD_GRAVITY * body.material.density * body.section.area if body.self_weight else 0.0
-        self._weight, self._clamp_weight = self._beam.distributed((0.0, -weight))
+        self._timed = problem.body.kind == "viscous"
+        self._beam = LoadedBeam(problem)
+        self._steps = _BeamSteps(self._beam)
 
     def reset(self) -> None:
-        """Nothing to forget: it is here because every solver has it."""
+        """Do nothing: there is nothing to forget. Every solver has this method."""
 
     def solve(self, x: Any) -> Solution:
         """Run through the history that the inputs mean, from the virgin beam.
@@ -66,10 +61,10 @@ class HistorySolver:
         """
         values = self._problem.sizes(x)
         if not np.isfinite(values).all():
-            return self._failed(self._bad_input())
+            return self._beam.failure(Stop.BAD_INPUT, 0, "")
         times, sizes = self._problem.program(values)
         solutions = self._run(times, sizes, self._virgin())
-        return replace(solutions[-1], iterations=sum(one.iterations for one in solutions))
+        return replace(solutions[-1], iterations=sum(solution.iterations for solution in solutions))
 
     def march(self, loads: Any, times: Any = None, *, start: Solution | None = None) -> list[Solution]:
         """Follow a history of loads.
@@ -94,7 +89,7 @@ class HistorySolver:
         UsageError
             If the arrays do not fit, the times fall or are missing, or the start has no history.
         """
-        begun = self._virgin() if start is None else self._begun(start)
+        begun = self._virgin() if start is None else self._moment_of(start)
         sizes = self._rows(loads)
         return self._run(self._clock(times, len(sizes), begun.time), sizes, begun)
 
@@ -103,47 +98,38 @@ class HistorySolver:
         for time, row in zip(times, sizes, strict=True):
             reached = self._next(moment, float(time), row)
             if isinstance(reached, Failure):
-                first, later = self._failed(reached), self._failed(reached, later=True)
-                return [*solutions, first, *[later] * (len(sizes) - len(solutions) - 1)]
+                later = self._beam.failure(reached.stop, 0, "an earlier load of the history failed")
+                return [*solutions, self._failed(reached), *[later] * (len(sizes) - len(solutions) - 1)]
             solutions.append(self._answer(reached))
             moment = reached
         return solutions
 
     def _next(self, moment: Moment, time: float, sizes: np.ndarray) -> Moment | Failure:
         if not np.isfinite(sizes).all():
-            return self._bad_input()
-        return march(self._marching, moment, time, sizes @ self._directions + self._weight)
+            return Failure(Stop.BAD_INPUT, moment, moment.z, 0)
+        return march(self._steps, moment, time, self._beam.load(sizes))
 
     def _virgin(self) -> Moment:
-        """The beam as it was made, under its weight if it has one."""
-        rest = np.zeros(self._beam.size)
-        moment = Moment(0.0, rest, rest, self._beam.rest())
-        if not self._weight.any():
+        """Return the beam as it was made, under its weight if it has one."""
+        rest = np.zeros(self._beam.energy.size)
+        moment = Moment(0.0, rest, rest, self._beam.energy.rest())
+        if not self._beam.weight.any():
             return moment
-        reached = march(self._marching, moment, 0.0, self._weight)
+        reached = march(self._steps, moment, 0.0, self._beam.weight)
         if isinstance(reached, Moment):
             return reached
         # a beam that its own weight breaks: whatever is asked of it starts from that weight and fails, too
         return moment
 
-    def _begun(self, start: Solution) -> Moment:
-        """What to march on from."""
-        if isinstance(start.history, Moment) and start.history.z.size == self._beam.size:
+    def _moment_of(self, start: Solution) -> Moment:
+        """Return the moment to march on from."""
+        if isinstance(start.history, Moment) and start.history.z.size == self._beam.energy.size:
             return start.history
         raise UsageError(
             "The solution to start from carries no history of this problem.",
             why=f"It is of another beam or one that remembers nothing, or it failed: {start.message}.",
             fix="Start from a converged solution of this problem, or leave `start` out for the virgin beam.",
         )
-
-    def _load_vectors(self) -> np.ndarray:
-        """Load vector of 1 N of each load, shape (n, dof)."""
-        problem = self._problem
-        vectors = np.zeros((len(problem.loads), self._beam.size))
-        for row, load, node in zip(vectors, problem.loads, problem.nodes_of_loads, strict=True):
-            # node 0 is clamped and has no unknowns
-            row[self._beam.vertex_dofs[node - 1, :2]] = load.direction
-        return vectors
 
     def _rows(self, loads: Any) -> np.ndarray:
         rows = np.asarray(loads, dtype=float)
@@ -177,36 +163,94 @@ class HistorySolver:
         return clock
 
     def _answer(self, moment: Moment) -> Solution:
-        stored = self._beam.stored(moment.z, moment.internal)
-        forces = self._beam.step(moment.internal, None)  # after an instant: the forces of this very moment
+        beam = self._beam
+        stored = beam.energy.stored(moment.z, moment.internal)
+        at_once = beam.energy.step(moment.internal, None)  # after an instant: the forces of this very moment
         return Solution(
             stop=Stop.CONVERGED,
             iterations=moment.iterations,
             residual=moment.residual,
-            displacement=np.vstack([np.zeros(3), moment.z[self._beam.vertex_dofs]]),
-            root_reaction=forces.clamp_force(moment.z) - self._clamp_weight,
+            displacement=beam.displacement(moment.z),
+            root_reaction=beam.root_reaction(at_once, moment.z),
             strain_energy=stored,
             potential_energy=stored - float(moment.load @ moment.z),
-            largest_strain=self._marching.fibre_strain(moment.z),
+            largest_strain=beam.fibre_strain(moment.z),
             state=moment.z,
             time=moment.time,
             dissipated=moment.dissipated,
             history=moment,
         )
 
-    def _bad_input(self) -> Failure:
-        rest = np.zeros(self._beam.size)
-        return Failure(Stop.BAD_INPUT, Moment(0.0, rest, rest, None), rest, 0)
+    def _failed(self, failure: Failure) -> Solution:
+        return self._beam.failure(failure.stop, failure.iterations, self._steps.detail(failure))
 
-    def _failed(self, failure: Failure, *, later: bool = False) -> Solution:
-        return Solution(
-            stop=failure.stop,
-            iterations=0 if later else failure.iterations,
-            residual=np.inf,
-            displacement=np.full((len(self._beam.vertex_dofs) + 1, 3), np.nan),
-            root_reaction=np.full(3, np.nan),
-            strain_energy=np.nan,
-            potential_energy=np.nan,
-            dissipated=np.nan,
-            detail="an earlier load of the history failed" if later else self._marching.detail(failure),
+
+class _BeamSteps:
+    """The steps of one beam on its march (a `history_march.SteppedBody`)."""
+
+    def __init__(self, beam: LoadedBeam) -> None:
+        self._beam = beam
+        # time steps are of second order: two halves err by a third of their difference from the whole (Richardson 1911)
+        self._share = 1 / 3 if beam.body.kind == "viscous" else 1.0
+
+    def take(self, start: Moment, time: float, load: np.ndarray, guess: np.ndarray) -> Moment | Failure:
+        """Take one step to a time and load, from a guess of the unknowns."""
+        step = self._beam.energy.step(start.internal, time - start.time if time > start.time else None)
+        end = minimise(step, load, lower_state(step, load, start.z, guess), limit=NEWTON_LIMIT)
+        stop = end.stop if end.stop is not Stop.CONVERGED else self._verdict(start.z, end.z)
+        if self._is_mechanism(stop, step.energy(end.z)):
+            stop = Stop.STEP_TOO_SMALL
+        if stop is not Stop.CONVERGED:
+            return Failure(stop, start, end.z, end.iterations)
+        return Moment(
+            time=time,
+            load=load,
+            z=end.z,
+            internal=step.outcome(end.z),
+            dissipated=start.dissipated + step.dissipated(end.z),
+            reach=max(start.reach, float(np.abs(end.z[self._beam.energy.is_translation]).max())),
+            iterations=end.iterations,
+            residual=end.residual,
         )
+
+    def error(self, whole: Moment, halves: Moment) -> float:
+        """Return the larger of the errors in displacement and dissipation, both relative, over the tolerance."""
+        energy, body = self._beam.energy, self._beam.body
+        offset = float(np.abs((whole.z - halves.z)[energy.is_translation]).max())
+        reach = max(halves.reach, 1e-9 * body.length)
+        lost = abs(whole.dissipated - halves.dissipated)
+        total = energy.stored(halves.z, halves.internal) + halves.dissipated
+        relative = max(offset / reach, lost / max(total, energy.energy_floor))
+        return float(self._share * relative / body.step_tolerance)
+
+    def detail(self, failure: Failure) -> str:
+        """Return the figures that belong to a failure's reason."""
+        if failure.stop is Stop.BAD_INPUT:
+            return ""
+        figures = [f"{100 * failure.share:.3g} % of the way to this load was found"]
+        energy, law = self._beam.energy, self._beam.energy.law
+        if isinstance(law, PlasticSection):
+            forces = energy.step(failure.moment.internal, None).resultants(failure.moment.z)
+            share = float(np.abs(forces[..., 2]).max()) / law.plastic_moment
+            figures.append(f"there the largest moment is {share:.3g} of the first plastic one")
+        if failure.stop is Stop.STRAIN_LIMIT:
+            strain = self._beam.fibre_strain(failure.z)
+            figures.append(f"a strain of {strain:.2g} against {self._beam.body.strain_limit:g}")
+        return "; ".join(figures)
+
+    def _is_mechanism(self, stop: Stop, energy: float) -> bool:
+        """Return whether a search failed for want of stiffness alone.
+
+        A beam that has yielded through may have a tangent that is singular to the last digit; at small displacements
+        nothing can buckle.
+        """
+        if stop is Stop.UNSTABLE:
+            return self._beam.body.kinematics == "small"
+        return stop is Stop.NOT_FINITE and bool(np.isfinite(energy))
+
+    def _verdict(self, before: np.ndarray, after: np.ndarray) -> Stop:
+        """Return `Stop.CONVERGED`, or why the model does not hold at a state or the step to it was too long."""
+        verdict = self._beam.admit(after)
+        if verdict is not Stop.CONVERGED:
+            return verdict
+        return Stop.CONVERGED if self._beam.is_near(before, after) else Stop.STEP_TOO_SMALL

@@ -19,7 +19,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_number
-from palpate.physics.equilibrium.stop import Verdict
+from palpate.physics.stop import Verdict
 from palpate.physics.words import number
 
 if TYPE_CHECKING:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.physics.equilibrium.stop import Stop
 from palpate.physics.solid.path import Followed, Known
 from palpate.physics.solid.solution import SolidSolution
+from palpate.physics.stop import Stop
 
 if TYPE_CHECKING:
     from palpate.physics.solid.model import SolidModel

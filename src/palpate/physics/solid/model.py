@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.physics.equilibrium.stop import Stop, Verdict
 from palpate.physics.interactions.interaction import Attached, Energy
 from palpate.physics.solid.field import SolidField
 from palpate.physics.solid.measures import Measures
 from palpate.physics.solid.newton import Found, Scale, equilibrate, error_at
 from palpate.physics.solid.response import Inputs
 from palpate.physics.solid.system import System
+from palpate.physics.stop import Stop, Verdict
 
 if TYPE_CHECKING:
     from palpate.physics.solid.history import History

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.physics.equilibrium.stop import Stop
 from palpate.physics.solid.system import System
+from palpate.physics.stop import Stop
 
 __all__ = ["Found", "Scale", "equilibrate", "error_at"]
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.physics.equilibrium.stop import Stop
 from palpate.physics.interactions.interaction import Attached
 from palpate.physics.interactions.rigid import require_held
 from palpate.physics.materials.pre_stretched import PreStretched
@@ -18,6 +17,7 @@ from palpate.physics.solid.history import History
 from palpate.physics.solid.measures import Measures
 from palpate.physics.solid.model import Constant, SolidModel
 from palpate.physics.solid.path import Followed, Known, follow
+from palpate.physics.stop import Stop
 
 if TYPE_CHECKING:
     from palpate.physics.solid.body import Body

@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.physics.equilibrium.stop import Stop, Verdict
 from palpate.physics.solid.model import SolidModel
 from palpate.physics.solid.predicting import Known
 from palpate.physics.solid.stepping import Tried, take
+from palpate.physics.stop import Stop, Verdict
 
 __all__ = ["Followed", "Known", "LoadStep", "follow"]
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from palpate.dataset import conjugate_unit
 from palpate.errors import UsageError
-from palpate.physics.equilibrium.stop import Stop
 from palpate.physics.geometry.mesh import BodyMesh
+from palpate.physics.stop import Stop
 from palpate.physics.words import number, span
 from palpate.units import Range
 

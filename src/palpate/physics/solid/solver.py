@@ -9,7 +9,6 @@ import numpy as np
 
 from palpate.errors import SolverError, UsageError
 from palpate.physics.arguments import require_positive
-from palpate.physics.equilibrium.stop import Stop, Verdict
 from palpate.physics.solid.answers import Answers
 from palpate.physics.solid.newton import ROUND_OFF
 from palpate.physics.solid.opening import open_problem
@@ -17,6 +16,7 @@ from palpate.physics.solid.path import Followed, Known, follow
 from palpate.physics.solid.stability import is_accurate, is_stable
 from palpate.physics.solid.system import sparse_solver
 from palpate.physics.solid.times import durations
+from palpate.physics.stop import Stop, Verdict
 
 if TYPE_CHECKING:
     from palpate.physics.solid.model import SolidModel

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from palpate.physics.equilibrium.stop import Stop, Verdict
 from palpate.physics.solid.predicting import Known, predict, turns_back
+from palpate.physics.stop import Stop, Verdict
 
 if TYPE_CHECKING:
     from palpate.physics.solid.model import SolidModel

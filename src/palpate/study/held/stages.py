@@ -10,7 +10,7 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.learning.plastic import Fit, HeldPaths, lead_held, lead_twin, learn_held
 from palpate.physics import Cantilever, TipLoad
-from palpate.physics.beam.presets import preset
+from palpate.physics.beam.beam_presets import preset
 from palpate.physics.materials.plastic import Plastic
 from palpate.physics.materials.viscous import Viscoelastic
 from palpate.study.held.record import HeldStudy

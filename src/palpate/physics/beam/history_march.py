@@ -13,9 +13,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from palpate.physics.equilibrium.stop import Stop
+from palpate.physics.stop import Stop
 
-__all__ = ["Failure", "Marching", "Moment", "march"]
+__all__ = ["Failure", "Moment", "SteppedBody", "march"]
 
 # Shares of the way between two loads: a body that finds no equilibrium in so short a step has none, while the first
 # moments of a long creep may need a very short one
@@ -26,7 +26,7 @@ WASTE_LIMIT = 600  # iterations of steps that found nothing: bounds the time tha
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """All that the future of a body depends on, and what it cost.
+    """A moment of a history: all that the body's future depends on, and the cost of finding it.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Moment:
     load, z : (dof,) arrays
         Loads and unknowns.
     internal : value
-        Internal variables.
+        Internal variables of the sections.
     dissipated : float
         Energy in J lost for good so far.
     reach : float
@@ -58,16 +58,18 @@ class Moment:
 
 @dataclass(frozen=True, eq=False)
 class Failure:
-    """Why a march ended.
+    """The reason for which a march ended without reaching its load.
 
     Attributes
     ----------
     stop : Stop
+        Why it ended.
     moment : Moment
         The last good one.
     z : (dof,) array
         Unknowns at which the search gave up.
     iterations : int
+        Newton iterations spent.
     share : float
         How far the load had come on its way.
     """
@@ -79,42 +81,45 @@ class Failure:
     share: float = 0.0
 
 
-class Marching(Protocol):
-    """What a march asks of a body."""
+class SteppedBody(Protocol):
+    """The methods that a march needs of a body."""
 
     def take(self, start: Moment, time: float, load: np.ndarray, guess: np.ndarray) -> Moment | Failure:
-        """One step to a time and load, sought from a guess of the unknowns (dof,)."""
+        """Take one step to a time and load, from a guess of the unknowns (dof,)."""
 
     def error(self, whole: Moment, halves: Moment) -> float:
-        """Difference of the two outcomes of a step, in units of what is tolerated."""
+        """Return the difference of the two outcomes of a step, in units of what is tolerated."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Way:
-    """From a moment to a time and load, evenly."""
+    """An even way from a moment to a time and a load."""
 
     start: Moment
     time: float
     load: np.ndarray
 
     def at(self, share: float) -> tuple[float, np.ndarray]:
-        """Time and load at a share between 0 and 1; the end is met to the last digit."""
+        """Return time and load at a share between 0 and 1; the end is met to the last digit."""
         if share == 1.0:
             return self.time, self.load
         begun = self.start
         return begun.time + share * (self.time - begun.time), begun.load + share * (self.load - begun.load)
 
 
-def march(body: Marching, start: Moment, time: float, load: np.ndarray) -> Moment | Failure:
+def march(body: SteppedBody, start: Moment, time: float, load: np.ndarray) -> Moment | Failure:
     """March from a moment to a time and a load.
 
     Parameters
     ----------
-    body : Marching
+    body : SteppedBody
+        Takes the steps.
     start : Moment
+        Where the march begins.
     time : float
-        In s; that of the start means a load put on at once.
+        Time of its end in s; that of the start means a load put on at once.
     load : (dof,) array
+        Load at its end.
 
     Returns
     -------
@@ -141,9 +146,9 @@ def march(body: Marching, start: Moment, time: float, load: np.ndarray) -> Momen
 
 
 def _try(
-    body: Marching, way: _Way, moment: Moment, shares: tuple[float, float], guess: np.ndarray
+    body: SteppedBody, way: _Way, moment: Moment, shares: tuple[float, float], guess: np.ndarray
 ) -> tuple[Moment | Failure, float, int]:
-    """A step whole and in halves: the halves' outcome or the failure, its error and its iterations."""
+    """Take a step whole and in halves; return the halves' outcome or the failure, its error and its iterations."""
     done, end = shares
     whole = body.take(moment, *way.at(end), guess)
     if isinstance(whole, Failure):
@@ -157,14 +162,14 @@ def _try(
 
 
 def _factor(error: float) -> float:
-    """By how much the next step is longer: the error of a smooth step goes with its third power."""
+    """Return the factor by which the next step is longer: the error of a smooth step goes with its third power."""
     if not np.isfinite(error):
         return 0.5
     return float(np.clip(SAFETY * max(error, 1e-9) ** (-1 / 3), SHRINKAGE, GROWTH))
 
 
 def _given_up(tried: Moment | Failure, moment: Moment, spent: int, done: float) -> Failure:
-    """The failure of a whole march; what a step was cut back for is not the reason for its end."""
+    """Return the failure of a whole march; what a step was cut back for is not the reason for its end."""
     if isinstance(tried, Moment) or tried.stop is Stop.ITERATION_LIMIT:
         return Failure(Stop.STEP_TOO_SMALL, moment, tried.z, spent, done)
     return Failure(tried.stop, moment, tried.z, spent, done)

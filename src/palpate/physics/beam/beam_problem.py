@@ -1,26 +1,32 @@
-"""A beam and its loads: the question that a sweep asks many times."""
+"""A beam and its loads, the question that a sweep asks many times; and its solution.
+
+A solve always returns a solution, also where it failed: a plain value that says why.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from palpate.dataset import Field, Layout, beam_fields
 from palpate.errors import UsageError
-from palpate.physics.beam.loads import Load, PointLoad
+from palpate.physics.beam.beam_loads import Load, PointLoad
+from palpate.physics.stop import Stop
 from palpate.units import Range
 
 if TYPE_CHECKING:
+    from palpate.physics.beam.beam_solver import BeamSolver
     from palpate.physics.beam.cantilever import Cantilever
     from palpate.physics.beam.history_solver import HistorySolver
-    from palpate.physics.beam.solution import Solution
-    from palpate.physics.beam.solver import BeamSolver
 
-__all__ = ["BeamProblem"]
+__all__ = [
+    "BeamProblem",
+    "Solution",
+]
 
 _DISSIPATED = Field("dissipated", unit="J", meaning="energy lost for good since the virgin beam")
 
@@ -43,7 +49,7 @@ class BeamProblem:
     @property
     def ranges(self) -> tuple[Range, ...]:
         """Name, range and unit of each input."""
-        return tuple(one for load in self.loads for one in load.inputs)
+        return tuple(entry for load in self.loads for entry in load.inputs)
 
     @property
     def rest(self) -> np.ndarray:
@@ -106,7 +112,7 @@ class BeamProblem:
     def open(self) -> BeamSolver | HistorySolver:
         """Build the finite elements; the solver that comes back is good for many solves."""
         if self.body.kind == "elastic":
-            from palpate.physics.beam.solver import BeamSolver
+            from palpate.physics.beam.beam_solver import BeamSolver
 
             return BeamSolver(self)
         from palpate.physics.beam.history_solver import HistorySolver
@@ -165,7 +171,7 @@ class BeamProblem:
             If `x` has not one number per input.
         """
         sizes = np.atleast_1d(np.asarray(x, dtype=float))
-        names = [one.name for one in self.ranges]
+        names = [entry.name for entry in self.ranges]
         if sizes.shape != (len(names),):
             raise UsageError(
                 f"The loads given have the shape {sizes.shape}.",
@@ -182,3 +188,64 @@ class BeamProblem:
 def _described(load: Load) -> dict[str, Any]:
     plain = asdict(load)  # type: ignore[call-overload]
     return plain if isinstance(load, PointLoad) else {"type": type(load).__name__, **plain}
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Equilibrium of a beam, or the reason why there is none.
+
+    Attributes
+    ----------
+    stop : Stop
+        Why the solver stopped.
+    iterations : int
+        Newton iterations spent, over all load steps.
+    residual : float
+        √(Newton decrement / energy): about the relative error left, in the energy norm.
+    displacement : (node, 3) array
+        u_x and u_y in m and the rotation in rad, counter-clockwise, at the mesh's vertices. NaN unless
+        converged, as are all the fields below.
+    root_reaction : (3,) array
+        Force (x, y) in N and moment in N·m that the clamp exerts on the beam.
+    strain_energy, potential_energy : float
+        In J; the potential energy is the strain energy, that is what can be had back, less the work potential of loads
+        and weight.
+    largest_strain : float
+        Largest strain of a fibre along the beam, |ε| + |κ| times the section's half height: what tells whether a
+        linear elastic material could bear the load.
+    detail : str
+        Figures that belong to the reason.
+    state : (dof,) array
+        All unknowns, for a warm start.
+    time : float
+        In s, of a beam that follows a history; else NaN.
+    dissipated : float
+        Energy in J lost for good since the virgin beam: plastic work, or what dashpots took. The work of loads and
+        weight is strain energy plus this.
+    history : value
+        All that the future of a beam that remembers depends on, to march on from; else None.
+    """
+
+    stop: Stop
+    iterations: int
+    residual: float
+    displacement: np.ndarray
+    root_reaction: np.ndarray
+    strain_energy: float
+    potential_energy: float
+    largest_strain: float = np.nan
+    detail: str = ""
+    state: np.ndarray = field(default_factory=lambda: np.empty(0), repr=False)
+    time: float = np.nan
+    dissipated: float = 0.0
+    history: Any = field(default=None, repr=False)
+
+    @property
+    def converged(self) -> bool:
+        """Whether this is a stable equilibrium within the model's reach."""
+        return self.stop is Stop.CONVERGED
+
+    @property
+    def message(self) -> str:
+        """The reason in words, with its figures."""
+        return f"{self.stop} ({self.detail})" if self.detail else str(self.stop)

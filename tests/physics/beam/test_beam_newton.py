@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from palpate.physics.equilibrium.newton import minimise
-from palpate.physics.equilibrium.path import LoadPath, follow
-from palpate.physics.equilibrium.stop import Stop
+from palpate.physics.beam.beam_newton import LoadPath, follow, minimise
+from palpate.physics.stop import Stop
 
 
 class Dense:

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 from palpate.errors import UsageError
+from palpate.physics.beam.beam_loads import Load, LoadAndUnload, PointLoad, StepAndHold, TipLoad
+from palpate.physics.beam.beam_problem import BeamProblem
 from palpate.physics.beam.cantilever import Cantilever
-from palpate.physics.beam.histories import LoadAndUnload, StepAndHold
-from palpate.physics.beam.loads import Load, PointLoad, TipLoad
-from palpate.physics.beam.problem import BeamProblem
-from palpate.physics.beam.section import Circle
+from palpate.physics.beam.cross_section import Circle
 from palpate.physics.materials.library import named_material
 from palpate.physics.materials.linear import LinearElastic
 

@@ -1,8 +1,20 @@
-"""The incremental energy of a beam whose sections remember.
+"""The energy of a plane beam on finite elements, elastic or with memory.
 
-Over one step, from given internal variables and for a given time, the beam is a `newton.Model` like the elastic one:
-its energy is that of the sections, condensed over their internal variables, and its minimum the equilibrium at the
-end of the step. Nothing is remembered until the step's outcome is asked for.
+Geometrically exact (Reissner 1972, J. Appl. Math. Phys. 23, 795-804; Simo 1985, Comput. Methods Appl. Mech.
+Eng. 49, 55-70): with the centre line's displacement (u, v) and the section's rotation t over the arc length x
+of the undeformed beam,
+
+    axial strain  ε = (1 + u') cos t + v' sin t - 1
+    shear strain  γ = v' cos t - (1 + u') sin t
+    curvature     κ = t'
+    W = ∫ w(ε, γ, κ) dx
+
+where the section law gives w, for an elastic beam ½ (EA ε² + kGA γ² + EI κ²). The small-displacement beam
+(Timoshenko 1921) has ε = u', γ = v' - t and κ = t' instead.
+
+Over one step, from given internal variables and for a given time, W is the incremental energy, condensed over the
+internal variables; its minimum is the equilibrium at the end of the step. Nothing is remembered until the step's
+outcome is asked for. A beam without memory has the same energy in all steps.
 """
 
 from __future__ import annotations
@@ -12,21 +24,19 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 
-from palpate.physics.beam.line_elements import LineElements
-from palpate.physics.beam.reissner import BandedTangent
-from palpate.physics.beam.resultants import SectionAnswer, SectionLaw
-from palpate.physics.beam.strains import Strains
+from palpate.physics.beam.beam_element import LineElements, Strains
+from palpate.physics.beam.section_laws import SectionAnswer, SectionLaw
 
-__all__ = ["HistoryBeam", "Step"]
+__all__ = ["BandedTangent", "BeamEnergy", "BeamStep"]
 
-RELAXATIONS = (
-    12  # linear solves that put axial and shear forces in balance; two or three do where few fibres yield
-)
+# linear solves that put axial and shear forces in balance; two or three do where few fibres yield
+RELAXATIONS = 12
 BALANCED = 1e-14  # share of the energy below which what is left to be gained counts as nothing
 
 
-class HistoryBeam:
+class BeamEnergy:
     """Finite elements of a clamped plane beam over a section law.
 
     Parameters
@@ -34,8 +44,9 @@ class HistoryBeam:
     vertices : (node,) array
         Positions of the mesh's vertices in m, ascending; the first one is clamped.
     order : int
-        Polynomial order of the elements.
+        Polynomial order of the elements, 2 or more.
     law : SectionLaw
+        Section forces of strains.
     large : bool
         Geometrically exact, or small displacements.
     """
@@ -43,7 +54,7 @@ class HistoryBeam:
     def __init__(self, vertices: np.ndarray, order: int, law: SectionLaw, *, large: bool) -> None:
         self.elements = LineElements(vertices, order)
         self.law, self.large = law, large
-        self.energy_floor = 1e-24 * law.elastic[2] / float(vertices[-1] - vertices[0])
+        self.energy_floor = 1e-24 * float(law.elastic[2]) / float(vertices[-1] - vertices[0])
         self.is_translation = self.elements.translations()
         rows, columns = self.elements.band_columns()
         # entries between displacements; above the matrix' first row the band holds nothing
@@ -56,32 +67,32 @@ class HistoryBeam:
 
     @property
     def vertex_dofs(self) -> np.ndarray:
-        """Which unknowns are those of the vertices but the first, shape (node - 1, 3)."""
+        """Indices of the unknowns of the vertices but the first, shape (node - 1, 3)."""
         return self.elements.vertex_values
 
     def rest(self) -> Any:
-        """Internal variables of the virgin beam."""
+        """Return the internal variables of the virgin beam."""
         return self.law.rest(self.elements.weights.shape)
 
-    def step(self, internal: Any, dt: float | None) -> Step:
+    def step(self, internal: Any, dt: float | None) -> BeamStep:
         """Open a step of dt seconds from the given internal variables; None is an instant."""
-        return Step(self, internal, dt)
+        return BeamStep(self, internal, dt)
 
     def strains(self, z: np.ndarray) -> np.ndarray:
-        """Axial strain, shear strain and curvature at the Gauss points, shape (element, point, 3)."""
+        """Return axial strain, shear strain and curvature at the Gauss points, shape (element, point, 3)."""
         return Strains(self.elements.at_points(z), large=self.large).values
 
+    def strains_end_to_end(self, z: np.ndarray) -> np.ndarray:
+        """Return the strains at five points from end to end of each element, shape (element, 5, 3)."""
+        return Strains(self.elements.end_to_end(z), large=self.large).values
+
     def stored(self, z: np.ndarray, internal: Any) -> float:
-        """Energy in J that can be had back."""
+        """Return the energy in J that can be had back."""
         return self._integral(self.law.stored(self.strains(z), internal))
 
     def dissipated(self, before: Any, after: Any, dt: float | None) -> float:
-        """Energy in J that a step took for good."""
+        """Return the energy in J that a step took for good."""
         return self._integral(self.law.dissipated(before, after, dt))
-
-    def distributed(self, force: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-        """Load vector of a constant force per length (x, y) in N/m: (dof,) and the clamped three."""
-        return self.elements.uniform(force)
 
     def _integral(self, density: np.ndarray) -> float:
         return float((density * self.elements.weights).sum())
@@ -96,41 +107,42 @@ class _State:
     answer: SectionAnswer
 
 
-class Step:
-    """One step of a beam that remembers (a `newton.Model`).
+class BeamStep:
+    """One step of a beam (an `EnergyModel`).
 
     Parameters
     ----------
-    beam : HistoryBeam
+    beam : BeamEnergy
+        Its finite elements.
     internal : value
         Internal variables at the beginning of the step.
     dt : float or None
-        Its length in s; None is an instant.
+        Length of the step in s; None is an instant.
     """
 
-    def __init__(self, beam: HistoryBeam, internal: Any, dt: float | None) -> None:
+    def __init__(self, beam: BeamEnergy, internal: Any, dt: float | None) -> None:
         self._beam, self._internal, self._dt = beam, internal, dt
         self.energy_floor = beam.energy_floor
         self._state: _State | None = None
 
     def energy(self, z: np.ndarray) -> float:
-        """Incremental energy in J."""
+        """Return the incremental energy in J."""
         return float((self._at(z).answer.energy * self._beam.elements.weights).sum())
 
     def force(self, z: np.ndarray) -> np.ndarray:
-        """Its derivative, shape (dof,)."""
+        """Return the derivative of the energy, shape (dof,)."""
         return self._forces(z)[0]
 
     def clamp_force(self, z: np.ndarray) -> np.ndarray:
-        """Its derivative by (u, v, t) at the clamp, shape (3,)."""
+        """Return the derivative of the energy by (u, v, t) at the clamp, shape (3,)."""
         return self._forces(z)[1]
 
-    def tangent(self, z: np.ndarray) -> _ShiftedTangent:
-        """Its second derivative."""
-        return _ShiftedTangent(self._banded(z), lambda: self._elastic(z))
+    def tangent(self, z: np.ndarray) -> BandedTangent:
+        """Return the second derivative of the energy."""
+        return BandedTangent(self._banded(z), lambda: self._shifter(z))
 
     def relax(self, z: np.ndarray, load: np.ndarray) -> np.ndarray:
-        """Minimise energy - load·z over the displacements, the rotations held.
+        """Minimise energy - load·z over the displacements, the rotations fixed.
 
         Given the rotations the strains are linear in the displacements and the energy is convex in the strains, so
         Newton's method needs no safeguard but that each step gains. Where the energy is quadratic, one step does.
@@ -147,23 +159,23 @@ class Step:
         return z
 
     def outcome(self, z: np.ndarray) -> Any:
-        """Internal variables at the end of the step."""
+        """Return the internal variables at the end of the step."""
         return self._at(z).answer.internal
 
     def dissipated(self, z: np.ndarray) -> float:
-        """Energy in J that the step took for good."""
+        """Return the energy in J that the step took for good."""
         return self._beam.dissipated(self._internal, self.outcome(z), self._dt)
 
     def resultants(self, z: np.ndarray) -> np.ndarray:
-        """N, Q in N and M in N·m at the Gauss points, shape (element, point, 3)."""
+        """Return N, Q in N and M in N·m at the Gauss points, shape (element, point, 3)."""
         return self._at(z).answer.force
 
     def _relaxation(self, z: np.ndarray, load: np.ndarray) -> tuple[np.ndarray, float]:
-        """A Newton step in the displacements alone, and its decrement."""
+        """Return z after a Newton step in the displacements alone, and its decrement."""
         banded = np.where(self._beam.between_translations, self._banded(z), 0.0)
         banded[-1] += ~self._beam.is_translation
         residual = (self.force(z) - load) * self._beam.is_translation
-        step = BandedTangent(banded, banded).solve(residual, 0.0)
+        step = BandedTangent(banded).solve(residual)
         return (z, 0.0) if step is None else (z - step, float(residual @ step))
 
     def _at(self, z: np.ndarray) -> _State:
@@ -178,9 +190,9 @@ class Step:
         state = self._at(z)
         return self._beam.elements.forces(state.strains.forces(state.answer.force))
 
-    def _elastic(self, z: np.ndarray) -> np.ndarray:
-        """The stiffness that the sections had if they did not yield, without what the turning of forces adds."""
-        stiffness = np.diag(self._beam.law.elastic)
+    def _shifter(self, z: np.ndarray) -> np.ndarray:
+        """Return the stiffness that an indefinite tangent is shifted by, without what the turning of forces adds."""
+        stiffness = np.diag(self._beam.law.shift)
         return self._beam.elements.banded(self._at(z).strains.stiffness(np.zeros(3), stiffness))
 
     def _banded(self, z: np.ndarray) -> np.ndarray:
@@ -188,20 +200,30 @@ class Step:
         return self._beam.elements.banded(state.strains.stiffness(state.answer.force, state.answer.tangent))
 
 
-class _ShiftedTangent:
-    """A tangent in banded storage (a `newton.Tangent`).
+class BandedTangent:
+    """A symmetric matrix K in upper banded storage (band + 1, dof), and M to shift it by (a `Tangent`).
 
-    An indefinite one is shifted by the elastic stiffness: what has buckled is short of bending stiffness, what has
-    yielded of that and of axial stiffness.
+    Parameters
+    ----------
+    banded : (band + 1, dof) array
+        K, with the diagonal in the last row.
+    shifter : callable, optional
+        Returns M in the same storage; asked for once, and only where K is indefinite. By default there is none.
     """
 
-    def __init__(self, banded: np.ndarray, shifter: Callable[[], np.ndarray]) -> None:
+    def __init__(self, banded: np.ndarray, shifter: Callable[[], np.ndarray] | None = None) -> None:
         self._banded, self._make = banded, shifter
         self._shifter: np.ndarray | None = None
 
-    def solve(self, rhs: np.ndarray, shift: float) -> np.ndarray | None:
-        """(K + shift·M)⁻¹ rhs, or None if K + shift·M is not positive definite."""
-        if shift and self._shifter is None:
-            self._shifter = self._make()  # seldom asked for
-        other = self._banded if self._shifter is None else self._shifter
-        return BandedTangent(self._banded, other).solve(rhs, shift)
+    def solve(self, rhs: np.ndarray, shift: float = 0.0) -> np.ndarray | None:
+        """Return (K + shift·M)⁻¹ rhs by Cholesky's method, or None if K + shift·M is not positive definite."""
+        banded = self._banded
+        if shift and self._make is not None:
+            self._shifter = self._make() if self._shifter is None else self._shifter
+            banded = banded + shift * self._shifter
+        try:
+            factor = cholesky_banded(banded, check_finite=False)
+        except LinAlgError:
+            return None
+        solution: np.ndarray = cho_solve_banded((factor, False), rhs, check_finite=False)
+        return solution

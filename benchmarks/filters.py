@@ -21,8 +21,8 @@ from scipy.linalg.blas import dsymm, dsyr2k
 from benchmarks.runner import main
 from benchmarks.table import Claim, Column, Table
 from palpate.learning import Settings, State, default, initial, step
-from palpate.learning.filter.growth import grown
-from palpate.learning.filter.presets import ran_ekf
+from palpate.rbf.filter.growth import grown
+from palpate.rbf.filter.presets import ran_ekf
 
 __all__ = ["picture", "tables"]
 

@@ -19,11 +19,11 @@ from benchmarks.cases import BEAMS, case
 from benchmarks.runner import main
 from benchmarks.table import Claim, Column, Table
 from palpate.learning import Settings, default, refine
-from palpate.learning.filter.presets import shared
-from palpate.learning.modes import output_modes
 from palpate.learning.stream.learner import Learner
 from palpate.learning.stream.refining import Refining
 from palpate.network import Scaling
+from palpate.rbf.filter.presets import shared
+from palpate.rbf.output_modes import output_modes
 from palpate.units import Quantity, Range
 
 __all__ = ["Stream", "at_once", "streamed", "streams", "tables"]

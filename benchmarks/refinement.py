@@ -18,10 +18,10 @@ from benchmarks import peer_data
 from benchmarks.runner import main
 from benchmarks.table import Claim, Column, Table
 from palpate.learning import refine
-from palpate.learning.units.forms import form
-from palpate.learning.units.regressors import Regressors
 from palpate.network import TrainedRegion
 from palpate.network.radial import RadialFunction
+from palpate.rbf.units.forms import form
+from palpate.rbf.units.regressors import Regressors
 
 __all__ = ["tables"]
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from laws.beams import exact
 from palpate.learning import PRESETS, Settings, State, initial
-from palpate.learning.filter.covariance import Blocks, Full, Shared
-from palpate.learning.filter.growth import grown
 from palpate.network.radial import RADIAL_FUNCTIONS
+from palpate.rbf.filter.covariance import Blocks, Full, Shared
+from palpate.rbf.filter.growth import grown
 
 FORMS = ("isotropic", "axis-aligned", "rotated", "rank-1", "rank-2")
 RADIAL = RADIAL_FUNCTIONS

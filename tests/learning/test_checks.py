@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.errors import UsageError
-from palpate.learning.checks import numbers, samples
+from palpate.rbf.sample_checks import numbers, samples
 
 X, Y = np.zeros((4, 2)), np.ones((4, 3))
 

@@ -10,9 +10,9 @@ from palpate.learning.choosing.choice import fit
 from palpate.learning.choosing.committee import Member, averaged, expected_error, refitted
 from palpate.learning.choosing.kernel_layer import KernelLayer, Metric, _unlikelihood, likely_metric
 from palpate.learning.choosing.race import Race, Runner, Split, carried, start
-from palpate.learning.units.forms import form
-from palpate.learning.units.regressors import Regressors
 from palpate.network.radial import RADIAL_FUNCTIONS
+from palpate.rbf.units.forms import form
+from palpate.rbf.units.regressors import Regressors
 from palpate.units import Quantity, Range
 
 INPUTS = tuple(Range(f"x{i}", 2.0, 6.0, "N") for i in range(3))

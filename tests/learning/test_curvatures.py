@@ -7,13 +7,13 @@ from itertools import product
 import numpy as np
 import pytest
 
-from palpate.learning.refinement.leave_one_out import left_out_rows
-from palpate.learning.refinement.projection import project, span_of_units
-from palpate.learning.refinement.refine import refine
-from palpate.learning.refinement.rows import Rows
-from palpate.learning.units.forms import form
-from palpate.learning.units.regressors import Regressors, pairs
 from palpate.network.radial import radial, third
+from palpate.rbf.refinement.leave_one_out import left_out_rows
+from palpate.rbf.refinement.projection import project, span_of_units
+from palpate.rbf.refinement.refine import refine
+from palpate.rbf.refinement.rows import Rows
+from palpate.rbf.units.forms import form
+from palpate.rbf.units.regressors import Regressors, pairs
 
 FORMS = ("isotropic", "axis-aligned", "rotated", "rank-1", "rank-2")
 RADIALS = ("gaussian", "inverse-multiquadric", "matern-5/2")

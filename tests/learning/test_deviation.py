@@ -10,9 +10,9 @@ import pytest
 from laws.filters import COVARIANT, populated
 from palpate.errors import UsageError
 from palpate.learning import Settings, initial, observe
-from palpate.learning.filter.deviation import predictive_deviation, predictive_variance
-from palpate.learning.filter.model import value
-from palpate.learning.filter.observation import Observation
+from palpate.rbf.filter.deviation import predictive_deviation, predictive_variance
+from palpate.rbf.filter.model import value
+from palpate.rbf.filter.observation import Observation
 
 N, M, H = 70, 3, 5  # more points than are taken at a time
 

@@ -10,12 +10,12 @@ import pytest
 from laws.filters import FORMS, RADIAL, exact, frozen_shapes, populated
 from palpate.errors import UsageError
 from palpate.learning import Observation, freeze, observe, step
-from palpate.learning.filter.growth import grown
-from palpate.learning.filter.model import jacobian, measured, regressors_at, value
-from palpate.learning.filter.pruning import without
-from palpate.learning.refinement.rows import Rows
-from palpate.learning.units.forms import Centred, form
 from palpate.network import Scaling
+from palpate.rbf.filter.growth import grown
+from palpate.rbf.filter.model import jacobian, measured, regressors_at, value
+from palpate.rbf.filter.pruning import without
+from palpate.rbf.refinement.rows import Rows
+from palpate.rbf.units.forms import Centred, form
 from palpate.units import Quantity, Range
 
 n, m = 3, 2

@@ -10,11 +10,11 @@ import pytest
 from laws.beams import INPUT, OUTPUTS, stiffening
 from laws.filters import COVARIANT, FORMS, RULES, exact, frozen_shapes, populated
 from palpate.learning import PRESETS, Observation, initial, learn, observe, step
-from palpate.learning.filter.covariance import Full, Shared
-from palpate.learning.filter.growth import grown
-from palpate.learning.filter.model import value
-from palpate.learning.filter.pruning import without
-from palpate.learning.filter.updates import predicted, updated
+from palpate.rbf.filter.covariance import Full, Shared
+from palpate.rbf.filter.growth import grown
+from palpate.rbf.filter.model import value
+from palpate.rbf.filter.pruning import without
+from palpate.rbf.filter.updates import predicted, updated
 
 # priors far above the noise, and thresholds at which units come and go
 RECKLESS = {

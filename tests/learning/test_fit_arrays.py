@@ -12,10 +12,10 @@ from palpate.learning.choosing import calibration
 from palpate.learning.choosing.calibration import Evidence
 from palpate.learning.choosing.fitted import Fitted
 from palpate.learning.choosing.kernel_layer import KernelLayer, Metric
-from palpate.learning.refinement.refine import refine
-from palpate.learning.units.forms import form
-from palpate.learning.units.regressors import Regressors
 from palpate.network import Network, Uncertainty
+from palpate.rbf.refinement.refine import refine
+from palpate.rbf.units.forms import form
+from palpate.rbf.units.regressors import Regressors
 
 NOISE = 0.05
 

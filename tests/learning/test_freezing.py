@@ -8,10 +8,10 @@ import pytest
 from laws.beams import INPUT, OUTPUTS, stiffening
 from palpate.learning import Learner, freeze, initial, learn, refined_network
 from palpate.learning.choosing.problem import Problem
-from palpate.learning.filter.model import value
-from palpate.learning.freezing import training_record
 from palpate.learning.stream.gauge import Gauge
 from palpate.network import Network, Scaling
+from palpate.rbf.filter.model import value
+from palpate.rbf.freezing import training_record
 from palpate.units import Range
 
 

@@ -10,7 +10,7 @@ import pytest
 from laws.beams import exact
 from palpate.errors import UsageError
 from palpate.learning import PRESETS, default, initial, learn, step
-from palpate.learning.modes import output_modes
+from palpate.rbf.output_modes import output_modes
 from palpate.units import Quantity, Range
 
 PLANE = (Range("a", -2.0, 2.0, "m"), Range("b", 0.0, 1.0, "m"))

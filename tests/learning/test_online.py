@@ -12,12 +12,12 @@ import pytest
 from laws.beams import INPUT, OUTPUTS, stiffening
 from palpate.errors import UsageError
 from palpate.learning import Observation, default, initial, refine, step
-from palpate.learning.filter.presets import shared
-from palpate.learning.refinement.rows import Rows
 from palpate.learning.stream.learner import Learner
 from palpate.learning.stream.refining import Refining
 from palpate.learning.stream.reservoir import Reservoir
 from palpate.network import Publisher, Scaling
+from palpate.rbf.filter.presets import shared
+from palpate.rbf.refinement.rows import Rows
 from palpate.units import Quantity, Range
 
 SQUARE = (Range("a", -1.0, 1.0), Range("b", 0.0, 4.0, "N"))

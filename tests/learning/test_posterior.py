@@ -10,12 +10,12 @@ import pytest
 from laws.beams import INPUT, exact, stiffening
 from palpate.errors import UsageError
 from palpate.learning import Observation, Settings, initial, observe, posterior, refine, step
-from palpate.learning.filter.model import value
-from palpate.learning.freezing import freeze_refined
-from palpate.learning.refinement.laplace import Posterior
-from palpate.learning.units.forms import form
-from palpate.learning.units.regressors import Regressors
 from palpate.network import Scaling
+from palpate.rbf.filter.model import value
+from palpate.rbf.freezing import freeze_refined
+from palpate.rbf.refinement.laplace import Posterior
+from palpate.rbf.units.forms import form
+from palpate.rbf.units.regressors import Regressors
 from palpate.units import Quantity, Range
 
 LINE = Regressors(form("axis-aligned", 1))

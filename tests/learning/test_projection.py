@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from palpate.errors import UsageError
-from palpate.learning.modes import every_mode
-from palpate.learning.refinement.leave_one_out import left_out, without_each
-from palpate.learning.refinement.projection import gauss_newton, leverage_of_units, project
-from palpate.learning.refinement.rows import Rows
-from palpate.learning.units.forms import form
-from palpate.learning.units.regressors import Regressors
+from palpate.rbf.output_modes import every_mode
+from palpate.rbf.refinement.leave_one_out import left_out, without_each
+from palpate.rbf.refinement.projection import gauss_newton, leverage_of_units, project
+from palpate.rbf.refinement.rows import Rows
+from palpate.rbf.units.forms import form
+from palpate.rbf.units.regressors import Regressors
 
 FORMS = ("isotropic", "axis-aligned", "rotated", "rank-1")
 RADIALS = ("gaussian", "inverse-multiquadric", "matern-5/2")

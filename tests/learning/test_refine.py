@@ -12,9 +12,9 @@ import pytest
 from laws.beams import INPUT, stiffening
 from palpate.errors import UsageError
 from palpate.learning import refine
-from palpate.learning.units.forms import form
-from palpate.learning.units.regressors import Regressors
 from palpate.network import Scaling
+from palpate.rbf.units.forms import form
+from palpate.rbf.units.regressors import Regressors
 
 LINE = Regressors(form("axis-aligned", 1))
 NONE = np.zeros((0, 2))

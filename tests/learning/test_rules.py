@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from laws.beams import INPUT, OUTPUTS, exact, stiffening
 from palpate.errors import FileFormatError, UsageError
 from palpate.learning import History, Observation, Settings, default, founding, initial, learn, step
-from palpate.learning.filter.growth import grown, nearest, wants_growth
-from palpate.learning.filter.model import value
-from palpate.learning.filter.noise import edge_factor, variance
-from palpate.learning.filter.pruning import contributions, pruned
-from palpate.learning.filter.updates import predicted, updated
+from palpate.rbf.filter.growth import grown, nearest, wants_growth
+from palpate.rbf.filter.model import value
+from palpate.rbf.filter.noise import edge_factor, variance
+from palpate.rbf.filter.pruning import contributions, pruned
+from palpate.rbf.filter.updates import predicted, updated
 
 
 def shown(state, x, y, settings):

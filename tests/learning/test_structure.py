@@ -10,8 +10,8 @@ import pytest
 from laws.beams import INPUT, OUTPUTS, stiffening
 from palpate.learning import refine, refined_network
 from palpate.learning.refinement.structure import grow, placed, prune
-from palpate.learning.units.forms import form
-from palpate.learning.units.regressors import Regressors
+from palpate.rbf.units.forms import form
+from palpate.rbf.units.regressors import Regressors
 
 RADIALS = ("gaussian", "inverse-multiquadric", "matern-5/2")
 

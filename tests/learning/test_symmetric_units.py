@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from palpate.errors import UsageError
-from palpate.learning.refinement.rows import Rows
-from palpate.learning.units.forms import form
-from palpate.learning.units.regressors import Regressors, pairs
-from palpate.learning.units.symmetric import Images, SymmetricRegressors
+from palpate.rbf.refinement.rows import Rows
+from palpate.rbf.units.forms import form
+from palpate.rbf.units.regressors import Regressors, pairs
+from palpate.rbf.units.symmetric import Images, SymmetricRegressors
 
 FORMS = ("isotropic", "axis-aligned", "rotated", "rank-1", "rank-2")
 every_form = pytest.mark.parametrize("kind", FORMS)

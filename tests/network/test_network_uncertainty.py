@@ -10,12 +10,12 @@ import pytest
 
 from palpate.errors import UsageError
 from palpate.learning import refine
-from palpate.learning.freezing import freeze_refined
-from palpate.learning.refinement.laplace import Posterior
-from palpate.learning.units.forms import form
-from palpate.learning.units.regressors import Regressors
 from palpate.network import Network, Scaling
 from palpate.network.uncertainty import Uncertainty
+from palpate.rbf.freezing import freeze_refined
+from palpate.rbf.refinement.laplace import Posterior
+from palpate.rbf.units.forms import form
+from palpate.rbf.units.regressors import Regressors
 from palpate.units import Quantity, Range
 
 RANGES = (Range("Fx", -2.0, 2.0, "N"), Range("Fy", 0.0, 5.0, "N"))

@@ -13,10 +13,10 @@ from palpate.estimators.base import RadialRegressor
 from palpate.estimators.data import BadValue, Units, check_count, refused_as_bad_value, weights_of
 from palpate.learning import PRESETS, Observation, Settings, freeze, initial, learn, observe
 from palpate.learning.choosing.automatic import UNITS_MAX, automatic
-from palpate.learning.filter.deviation import predictive_deviation
-from palpate.learning.filter.state import State
-from palpate.learning.modes import output_modes
 from palpate.network import Scaling
+from palpate.rbf.filter.deviation import predictive_deviation
+from palpate.rbf.filter.state import State
+from palpate.rbf.output_modes import output_modes
 
 __all__ = ["MRANRegressor"]
 

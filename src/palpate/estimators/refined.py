@@ -17,12 +17,12 @@ from palpate.learning.choosing import choice
 from palpate.learning.choosing.arrays import check_search, constant
 from palpate.learning.choosing.calibration import Evidence, calibrated, regressor_root, spread_of
 from palpate.learning.choosing.fitted import Choice
-from palpate.learning.refinement.refine import Refined, refine
 from palpate.learning.refinement.structure import Trial, freeze_refined, placed
-from palpate.learning.units.forms import form as form_of
-from palpate.learning.units.regressors import Regressors, Tail
 from palpate.network import Scaling, Uncertainty
 from palpate.network.radial import RADIAL_FUNCTIONS
+from palpate.rbf.refinement.refine import Refined, refine
+from palpate.rbf.units.forms import form as form_of
+from palpate.rbf.units.regressors import Regressors, Tail
 
 __all__ = ["RBFNetworkRegressor"]
 
@@ -46,7 +46,7 @@ class RBFNetworkRegressor(RadialRegressor):
         Error wanted on samples kept apart, relative to the outputs' spread: root mean square error over root mean
         square deviation from the mean.
     form : str, optional
-        Of a unit (see `palpate.learning.units.forms`); if left out rotated up to three inputs, ridges above.
+        Of a unit (see `palpate.rbf.units.forms`); if left out rotated up to three inputs, ridges above.
         "auto" tries forms, radial functions and sizes against each other (`palpate.learning.fit`) and takes up to
         `seconds`; `radial`, `tail` and `units_max` then have no effect. Where weights differ, or below 20
         samples, it is as if left out.

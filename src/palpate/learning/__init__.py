@@ -1,15 +1,11 @@
-"""How a network is learnt: one sample at a time (MRAN with an extended Kalman filter), then refined.
+"""Learning from datasets: networks of arrays, energies of solved bodies, streams. `palpate.rbf` has the rules.
 
-units        what a network is made of: forms of unit, regressors and all their derivatives
-filter       the sequential filter and its family: `step`, and the rules that it is made of
-learn        a fold of the step over a data set
-refinement   variable projection, growth and pruning, the posterior
+learn        a fold of the filter's step over a data set
+refinement   growth and pruning around the refinement
 choosing     form, size and thresholds from the data alone
 stream       learning while it runs: a learner, samples retained, bounded refinement
 history      what happened meanwhile, and its picture (drawing)
-modes        the few directions in which many outputs move
-checks       samples as arrays that fit together         measures     errors relative to the outputs' spread
-freezing     a network value of what was learnt, and the hash of its samples
+measures     errors relative to the outputs' spread
 touch        a dataset of beam loads made into a body that can be touched
 energy       an energy of touch from solved energies, forces and stiffnesses
 bodies       a dataset of touches made into a body that can be pressed anywhere
@@ -24,21 +20,21 @@ dispatch     `palpate.learn`: whichever fits the dataset
 from palpate.learning.bodies import TouchHistory, learn_body
 from palpate.learning.choosing.automatic import automatic
 from palpate.learning.choosing.choice import Fitted, fit
-from palpate.learning.filter.observation import Observation
-from palpate.learning.filter.presets import PRESETS, default, founding, recommended
-from palpate.learning.filter.settings import Settings
-from palpate.learning.filter.state import State, initial
-from palpate.learning.filter.step import Event, observe, step
 from palpate.learning.history import History
 from palpate.learning.learn import Learned, freeze, learn
-from palpate.learning.refinement.laplace import Posterior
-from palpate.learning.refinement.posterior import posterior
-from palpate.learning.refinement.refine import Refined, refine
 from palpate.learning.refinement.structure import Trial, grow, prune, refined_network
 from palpate.learning.stream.learner import Learner
 from palpate.learning.stream.refining import Refining
 from palpate.learning.stream.reservoir import Reservoir
 from palpate.learning.touch import FEWEST, Refinement, hand_coordinates, learn_touch, node_outputs
+from palpate.rbf.filter.observation import Observation
+from palpate.rbf.filter.presets import PRESETS, default, founding, recommended
+from palpate.rbf.filter.settings import Settings
+from palpate.rbf.filter.state import State, initial
+from palpate.rbf.filter.step import Event, observe, step
+from palpate.rbf.refinement.laplace import Posterior
+from palpate.rbf.refinement.posterior import posterior
+from palpate.rbf.refinement.refine import Refined, refine
 
 __all__ = [
     "FEWEST",

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.errors import FileFormatError, UsageError
-from palpate.learning.filter.step import Event
+from palpate.rbf.filter.step import Event
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,19 +9,19 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from palpate.errors import UsageError
-from palpate.learning.checks import samples
 from palpate.learning.choosing.automatic import automatic, check_target
-from palpate.learning.filter.model import value
-from palpate.learning.filter.observation import Observation
-from palpate.learning.filter.presets import default
-from palpate.learning.filter.settings import Settings
-from palpate.learning.filter.state import State, initial
-from palpate.learning.filter.step import Event, observe
-from palpate.learning.freezing import freeze, training_record
 from palpate.learning.history import History
 from palpate.learning.measures import relative_error, spread_of
-from palpate.learning.modes import output_modes
 from palpate.network import Network, Scaling
+from palpate.rbf.filter.model import value
+from palpate.rbf.filter.observation import Observation
+from palpate.rbf.filter.presets import default
+from palpate.rbf.filter.settings import Settings
+from palpate.rbf.filter.state import State, initial
+from palpate.rbf.filter.step import Event, observe
+from palpate.rbf.freezing import freeze, training_record
+from palpate.rbf.output_modes import output_modes
+from palpate.rbf.sample_checks import samples
 from palpate.units import Quantity, Range
 
 __all__ = ["Learned", "freeze", "learn"]

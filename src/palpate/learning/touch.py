@@ -12,13 +12,13 @@ from threadpoolctl import threadpool_limits
 
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
-from palpate.learning.filter.presets import recommended
-from palpate.learning.filter.settings import Settings
 from palpate.learning.history import History
 from palpate.learning.learn import Learned, learn
 from palpate.learning.refinement.structure import refined_network
-from palpate.learning.units.forms import Centred
 from palpate.network import Network
+from palpate.rbf.filter.presets import recommended
+from palpate.rbf.filter.settings import Settings
+from palpate.rbf.units.forms import Centred
 from palpate.surrogates import TouchModel
 from palpate.units import Quantity, Range, bounds
 

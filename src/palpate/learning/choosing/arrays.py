@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.learning.checks import real
 from palpate.learning.choosing.automatic import check_target, ranges_of
+from palpate.rbf.sample_checks import real
 from palpate.units import Quantity, Range
 
 __all__ = ["FEWEST", "Samples", "check_search", "constant", "points"]

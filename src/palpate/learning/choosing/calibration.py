@@ -25,9 +25,9 @@ import numpy as np
 from scipy.special import stdtrit
 
 from palpate.learning.choosing.kernel_layer import KernelLayer
-from palpate.learning.refinement.refine import Refined
 from palpate.network import Network
 from palpate.network.uncertainty import Uncertainty
+from palpate.rbf.refinement.refine import Refined
 
 __all__ = [
     "LARGEST",

@@ -23,10 +23,10 @@ from palpate.learning.choosing.fitted import Choice, Fitted
 from palpate.learning.choosing.kernel_layer import KernelLayer, Metric, likely_metric
 from palpate.learning.choosing.problem import Problem
 from palpate.learning.choosing.race import RIDGE, Race, Runner, Split, best_of, carried, forms_for
-from palpate.learning.refinement.refine import refine
-from palpate.learning.units.forms import form as form_of
-from palpate.learning.units.regressors import Regressors
 from palpate.network.radial import RADIAL_FUNCTIONS
+from palpate.rbf.refinement.refine import refine
+from palpate.rbf.units.forms import form as form_of
+from palpate.rbf.units.regressors import Regressors
 from palpate.units import Quantity, Range
 
 __all__ = ["Choice", "Fitted", "fit"]

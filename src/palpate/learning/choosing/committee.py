@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.learning.choosing.race import Split
-from palpate.learning.refinement.refine import Refined, refine
+from palpate.rbf.refinement.refine import Refined, refine
 
 __all__ = ["Member", "averaged", "expected_error", "refitted"]
 

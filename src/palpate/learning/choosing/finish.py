@@ -16,9 +16,9 @@ from palpate.learning.choosing.fitted import Choice, Fitted
 from palpate.learning.choosing.kernel_layer import KernelLayer, Metric
 from palpate.learning.choosing.problem import Problem
 from palpate.learning.choosing.race import Split
-from palpate.learning.refinement.refine import Refined
 from palpate.network import TrainedRegion
 from palpate.network.radial import RadialFunction
+from palpate.rbf.refinement.refine import Refined
 
 __all__ = ["Finish"]
 

@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.learning.refinement.refine import Refined, refine
-from palpate.learning.units.forms import Centred, Form
-from palpate.learning.units.forms import form as form_of
-from palpate.learning.units.regressors import Regressors
 from palpate.network.radial import RadialFunction
+from palpate.rbf.refinement.refine import Refined, refine
+from palpate.rbf.units.forms import Centred, Form
+from palpate.rbf.units.forms import form as form_of
+from palpate.rbf.units.regressors import Regressors
 
 __all__ = ["Race", "Runner", "Split", "carried", "forms_for", "start"]
 

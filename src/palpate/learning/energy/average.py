@@ -15,8 +15,8 @@ from functools import cached_property
 import numpy as np
 
 from palpate.learning.energy.search import LeftOut
-from palpate.learning.refinement.refine import Refined
-from palpate.learning.units.regressors import Regressors
+from palpate.rbf.refinement.refine import Refined
+from palpate.rbf.units.regressors import Regressors
 
 __all__ = ["Average", "average"]
 

@@ -1,6 +1,6 @@
 """What networks miss of solves that were really left out: refined again without them, fold by fold.
 
-The closed form by which a search goes (`palpate.learning.refinement.leave_one_out`) counts units as unknowns of a
+The closed form by which a search goes (`palpate.rbf.refinement.leave_one_out`) counts units as unknowns of a
 linearised problem. It costs next to nothing, but with few solves a unit that is left without its own could go
 anywhere in that problem: errors come out several times too large, and the order of networks is lost. Refining again
 from the units as they are is what cross-validation means (Stone 1974), and takes a few iterations for each fold. Units
@@ -17,7 +17,7 @@ import numpy as np
 
 from palpate.learning.energy.average import Average
 from palpate.learning.energy.search import LeftOut, Problem, Search
-from palpate.learning.refinement.refine import Refined
+from palpate.rbf.refinement.refine import Refined
 
 __all__ = ["folds", "judged", "left_out_again", "restored"]
 

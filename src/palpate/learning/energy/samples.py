@@ -24,9 +24,9 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.learning.checks import numbers
 from palpate.learning.energy.columns import columns_of
-from palpate.learning.units.regressors import pairs
+from palpate.rbf.sample_checks import numbers
+from palpate.rbf.units.regressors import pairs
 from palpate.surrogates import ContactLaw, TouchedSurface
 from palpate.units import Range, bounds
 

@@ -13,18 +13,18 @@ from typing import Any
 
 import numpy as np
 
-from palpate.learning.filter.observation import Observation
-from palpate.learning.filter.presets import default
-from palpate.learning.filter.state import initial
-from palpate.learning.filter.step import observe
-from palpate.learning.refinement.leave_one_out import left_out_rows
-from palpate.learning.refinement.projection import Fit, project, span_of_units
-from palpate.learning.refinement.refine import Refined, refine
-from palpate.learning.refinement.rows import Rows
-from palpate.learning.units.forms import form as form_of
-from palpate.learning.units.regressors import Regressors
-from palpate.learning.units.symmetric import Images, SymmetricRegressors
 from palpate.network.radial import RadialFunction
+from palpate.rbf.filter.observation import Observation
+from palpate.rbf.filter.presets import default
+from palpate.rbf.filter.state import initial
+from palpate.rbf.filter.step import observe
+from palpate.rbf.refinement.leave_one_out import left_out_rows
+from palpate.rbf.refinement.projection import Fit, project, span_of_units
+from palpate.rbf.refinement.refine import Refined, refine
+from palpate.rbf.refinement.rows import Rows
+from palpate.rbf.units.forms import form as form_of
+from palpate.rbf.units.regressors import Regressors
+from palpate.rbf.units.symmetric import Images, SymmetricRegressors
 
 __all__ = ["EnergyTrial", "Found", "LeftOut", "Problem", "Search"]
 

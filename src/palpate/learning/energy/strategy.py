@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 
 from palpate.learning.energy.search import Problem, Search
-from palpate.learning.refinement.refine import Refined
 from palpate.network.radial import RadialFunction
+from palpate.rbf.refinement.refine import Refined
 
 __all__ = ["SEARCH_SHARE", "searched", "time_for"]
 

@@ -11,8 +11,8 @@ from palpate.learning.energy.average import Average
 from palpate.learning.energy.judging import judged
 from palpate.learning.energy.search import EnergyTrial, Problem, Search
 from palpate.learning.energy.strategy import SEARCH_SHARE, searched
-from palpate.learning.refinement.refine import Refined
 from palpate.network.radial import RadialFunction
+from palpate.rbf.refinement.refine import Refined
 
 __all__ = ["Answer", "Task"]
 

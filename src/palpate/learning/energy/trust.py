@@ -16,7 +16,7 @@ import numpy as np
 
 from palpate.learning.energy.average import Average
 from palpate.learning.energy.written import Solves
-from palpate.learning.refinement.rows import Rows
+from palpate.rbf.refinement.rows import Rows
 
 __all__ = ["Trust", "trust_of"]
 

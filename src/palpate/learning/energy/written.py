@@ -8,9 +8,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from palpate.learning.energy.average import Average
-from palpate.learning.freezing import training_record
-from palpate.learning.units.symmetric import Images, SymmetricRegressors
 from palpate.network import Network, Scaling, TrainedRegion
+from palpate.rbf.freezing import training_record
+from palpate.rbf.units.symmetric import Images, SymmetricRegressors
 from palpate.units import Quantity, Range, bounds
 
 __all__ = ["Solves", "trained_region", "training_meta", "written_out"]

@@ -9,10 +9,10 @@ import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
-from palpate.learning.checks import numbers
 from palpate.learning.fields.learn_snapshots import LearntField, learn_snapshots
 from palpate.learning.fields.modes import lumped_mass
 from palpate.learning.fields.solves import Snapshots
+from palpate.rbf.sample_checks import numbers
 from palpate.surrogates import TouchedSurface
 from palpate.units import Range
 

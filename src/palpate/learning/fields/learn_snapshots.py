@@ -14,8 +14,8 @@ from palpate.learning.fields.kernel import at_solves
 from palpate.learning.fields.parting import Parted, best_part
 from palpate.learning.fields.search import FieldTrial, searched
 from palpate.learning.fields.solves import Snapshots, Solves
-from palpate.learning.freezing import freeze_refined, training_record
 from palpate.network import Network, Scaling
+from palpate.rbf.freezing import freeze_refined, training_record
 from palpate.surrogates import FieldSurrogate, TouchedSurface
 from palpate.surrogates.field.rise import RISES
 from palpate.units import Quantity, Range, bounds

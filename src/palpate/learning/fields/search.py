@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.learning.refinement.refine import Refined, refine
-from palpate.learning.units.forms import form as form_of
-from palpate.learning.units.regressors import Regressors
 from palpate.network.radial import RadialFunction
+from palpate.rbf.refinement.refine import Refined, refine
+from palpate.rbf.units.forms import form as form_of
+from palpate.rbf.units.regressors import Regressors
 
 __all__ = ["Coefficients", "FieldTrial", "parts_of", "searched"]
 

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.learning.checks import samples
-from palpate.learning.freezing import freeze_refined, training_record
-from palpate.learning.refinement.refine import Refined, refine
-from palpate.learning.units.forms import form as form_of
-from palpate.learning.units.regressors import Regressors, Tail
 from palpate.network import Network, Scaling
 from palpate.network.radial import RadialFunction
+from palpate.rbf.freezing import freeze_refined, training_record
+from palpate.rbf.refinement.refine import Refined, refine
+from palpate.rbf.sample_checks import samples
+from palpate.rbf.units.forms import form as form_of
+from palpate.rbf.units.regressors import Regressors, Tail
 from palpate.units import Quantity, Range
 
 __all__ = ["Trial", "freeze_refined", "grow", "placed", "prune", "refined_network", "spread"]
@@ -70,7 +70,7 @@ def refined_network(
     known : (h, p), optional
         Scaled units of this form that the sequential filter found; they are one of the starts.
     form : str
-        Of a unit: isotropic, axis-aligned, rotated, rank-1, … (see `palpate.learning.units.forms`).
+        Of a unit: isotropic, axis-aligned, rotated, rank-1, … (see `palpate.rbf.units.forms`).
     radial : {"gaussian", "inverse-multiquadric", "matern-5/2"}
     tail : {"affine", "constant", "none"}
 

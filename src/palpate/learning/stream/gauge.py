@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.learning.filter.observation import Observation
-from palpate.learning.filter.settings import Settings
-from palpate.learning.filter.state import State, initial
-from palpate.learning.freezing import freeze
-from palpate.learning.modes import output_modes
-from palpate.learning.units.regressors import pairs
 from palpate.network import Network, Scaling
+from palpate.rbf.filter.observation import Observation
+from palpate.rbf.filter.settings import Settings
+from palpate.rbf.filter.state import State, initial
+from palpate.rbf.freezing import freeze
+from palpate.rbf.output_modes import output_modes
+from palpate.rbf.units.regressors import pairs
 from palpate.units import Quantity, Range, bounds
 
 __all__ = ["Gauge", "declared"]

@@ -15,18 +15,18 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from palpate.errors import UsageError
-from palpate.learning.filter.observation import Observation
-from palpate.learning.filter.presets import default
-from palpate.learning.filter.settings import Settings
-from palpate.learning.filter.state import State, initial
-from palpate.learning.filter.step import Event, observe
-from palpate.learning.freezing import freeze
 from palpate.learning.history import History
-from palpate.learning.modes import output_modes
 from palpate.learning.stream.gauge import Gauge, declared
 from palpate.learning.stream.refining import Progress, Refining, refined_state
 from palpate.learning.stream.reservoir import Reservoir
 from palpate.network import Network, Publisher, Scaling
+from palpate.rbf.filter.observation import Observation
+from palpate.rbf.filter.presets import default
+from palpate.rbf.filter.settings import Settings
+from palpate.rbf.filter.state import State, initial
+from palpate.rbf.filter.step import Event, observe
+from palpate.rbf.freezing import freeze
+from palpate.rbf.output_modes import output_modes
 from palpate.units import Quantity, Range, bounds
 
 __all__ = ["Learner"]

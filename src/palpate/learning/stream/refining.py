@@ -8,14 +8,14 @@ from typing import Any, get_args
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.learning.filter.settings import Settings
-from palpate.learning.filter.state import State
-from palpate.learning.refinement.nudge import nudged
-from palpate.learning.refinement.posterior import posterior
-from palpate.learning.refinement.projection import Fit, project
-from palpate.learning.refinement.refine import Refined
-from palpate.learning.refinement.rows import Rows
 from palpate.learning.stream.reservoir import Keeping, Reservoir
+from palpate.rbf.filter.settings import Settings
+from palpate.rbf.filter.state import State
+from palpate.rbf.refinement.nudge import nudged
+from palpate.rbf.refinement.posterior import posterior
+from palpate.rbf.refinement.projection import Fit, project
+from palpate.rbf.refinement.refine import Refined
+from palpate.rbf.refinement.rows import Rows
 
 __all__ = ["Progress", "Refining", "refined_state"]
 

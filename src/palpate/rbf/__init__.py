@@ -1,0 +1,11 @@
+"""Radial-basis-function networks, learnt one sample at a time (MRAN with an extended Kalman filter) and then refined.
+
+units          the forms of a unit, the regressors and all their derivatives
+filter         the sequential filter and its family: `step`, and the rules that it is made of
+refinement     variable projection, the posterior and the way back to the filter
+output_modes   the few directions in which many outputs move
+sample_checks  samples as arrays that fit together
+freezing       the network value of what was learnt, and the hash of its samples
+
+Knows nothing of where samples come from.
+"""

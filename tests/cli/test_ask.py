@@ -15,7 +15,7 @@ from models import spring_beam
 from palpate.dataset.measured import read_measured, write_measured
 from palpate.learning.correction import correct
 from palpate.learning.plastic.paths import HeldPath, HeldPaths
-from palpate.runtime.pressed import PressedBody
+from palpate.runtime.touchable import touchable
 from palpate.surrogates import TouchedBody, TouchSurrogate
 from palpate.surrogates.relaxation import Branches
 
@@ -188,7 +188,7 @@ def test_what_was_suspicious_of_a_correction_is_told_again(palpate, tmp_path):
         assert "Change their sign" in palpate("ask", path, *words).out
         assert "Change their sign" in json.loads(palpate("ask", path, *words, "--json").out)["warning"]
     assert "with a warning" in str(TouchSurrogate.load(path))
-    assert "with a warning" in PressedBody.of(TouchSurrogate.load(path)).name
+    assert "with a warning" in touchable(TouchSurrogate.load(path)).name
 
 
 @pytest.mark.parametrize("place", ["0.01,0.02", "1,2,3,4", "a,b,c", "0.01,nan,0.02", ""])

@@ -7,8 +7,7 @@ import json
 import pytest
 
 import pressed as slab
-from palpate.runtime.pressed import PressedBody
-from palpate.runtime.touchable import workspace_for
+from palpate.runtime.touchable import touchable
 
 pytestmark = pytest.mark.timeout(60)
 
@@ -20,7 +19,7 @@ def file(tmp_path_factory):
 
 def stroke(metres: float) -> str:
     """So far into the body and out again, twice in a second."""
-    scale = workspace_for(PressedBody.of(slab.surrogate()), 0.075).scale
+    scale = touchable(slab.surrogate()).workspace(0.075).scale
     return f"stroke:frequency=2,amplitude={metres / scale:.6f}"
 
 

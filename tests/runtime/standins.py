@@ -4,22 +4,26 @@ from __future__ import annotations
 
 import numpy as np
 
+from palpate.runtime.hand_evaluator import HandEvaluator
+
 STIFFNESS = 20.0  # N/m
 
 
-class PlainEvaluator:
+class PlainAnswer:
     """F = −k x in every direction, with switches to misbehave."""
+
+    energy, depth, inside, mirrored = 0.0, 0.0, True, False
 
     def __init__(self, parameters):
         self.force, self.contact, self.loads = np.zeros(3), np.zeros(3), np.zeros(1)
-        self.inside, self.mirrored = True, False
-        self.stiffness, self.poison, self.error = STIFFNESS, 0.0, None
+        self.stiffness = np.zeros((3, 3))
+        self.spring, self.poison, self.error = STIFFNESS, 0.0, None
         self.seen = np.full(parameters, np.nan)
 
     def __call__(self, position, parameters):
         if self.error is not None:
             raise self.error
-        np.multiply(position, -self.stiffness, out=self.force)
+        np.multiply(position, -self.spring, out=self.force)
         self.contact[:] = position
         self.force[0] += self.poison
         self.seen[:] = parameters
@@ -28,11 +32,9 @@ class PlainEvaluator:
 class PlainModel:
     """An isotropic spring behind the loop's `Model` protocol."""
 
-    reach = 0.25
-
     def __init__(self, parameters=()):
         self.parameters = tuple(parameters)
-        self.answer = PlainEvaluator(len(self.parameters))
+        self.answer = PlainAnswer(len(self.parameters))
 
     def evaluator(self):
-        return self.answer
+        return HandEvaluator(self.answer, holds=True)

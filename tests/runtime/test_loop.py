@@ -121,7 +121,7 @@ def test_a_grab_ramps_in(bench):
 
 
 def test_a_strong_body_is_clamped_and_counted(bench, plain):
-    plain.answer.stiffness = 1000.0
+    plain.answer.spring = 1000.0
     states = bench.ticks(200)
     np.testing.assert_allclose(states[-1].force, [0.0, LIMITS.max_force, 0.0])
     assert states[-1].clamped

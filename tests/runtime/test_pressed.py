@@ -12,8 +12,7 @@ import pressed as slab
 from models import linear_network
 from palpate.errors import FileFormatError, UsageError
 from palpate.runtime import LoopProcess, now
-from palpate.runtime.pressed import PressedBody
-from palpate.runtime.touchable import load_touchable, touchable, workspace_for
+from palpate.runtime.touchable import Touchable, load_touchable, touchable
 from palpate.runtime.workspace import Workspace
 from palpate.surrogates import ContactLaw, TouchedBody, TouchedSurface, TouchSurrogate
 from palpate.surrogates.relaxation import Branches
@@ -24,8 +23,8 @@ RELAXING = {"name": "slab", "relaxation": {"terms": [list(t) for t in TERMS]}}
 
 
 @pytest.fixture(scope="module")
-def body() -> PressedBody:
-    return PressedBody.of(slab.surrogate())
+def body() -> Touchable:
+    return touchable(slab.surrogate())
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +53,9 @@ def test_the_stiffness_that_stability_asks_for(body):
 def test_home_is_first_contact_and_away_is_none(body):
     np.testing.assert_allclose(body.home, [0.0, 0.0, slab.RADIUS], atol=1e-6)
     np.testing.assert_allclose(body.normal, [0.0, 0.0, 1.0], atol=1e-6)
-    assert body.touch.depth(body.away[None])[0] < -0.9 * slab.RADIUS  # the distance is true to 1.1 radii only
+    assert (
+        body.energy.depth(body.away[None])[0] < -0.9 * slab.RADIUS
+    )  # the distance is true to 1.1 radii only
     assert body.deepest == slab.DEEPEST
 
 
@@ -72,15 +73,15 @@ def test_an_upright_body_turns_places_and_forces_alike():
 
 
 def test_the_scripted_stroke_presses_to_three_quarters(body):
-    space = workspace_for(body, 0.075)
+    space = body.workspace(0.075)
     told = body.stroke(space.scale)
     place = np.empty(3)
     space.to_body(told["amplitude"] * np.array([told[k] for k in "xyz"]), place)
-    assert body.touch.depth(place[None])[0] == pytest.approx(0.75 * slab.DEEPEST, rel=1e-6)
+    assert body.energy.depth(place[None])[0] == pytest.approx(0.75 * slab.DEEPEST, rel=1e-6)
 
 
 def test_a_held_probe_relaxes_by_the_prony_series():
-    answer = PressedBody.of(slab.surrogate(meta=RELAXING)).evaluator()
+    answer = touchable(slab.surrogate(meta=RELAXING)).evaluator()
     place, none = np.array([0.005, 0.0, slab.RADIUS - 0.004]), np.zeros(0)
     answer(place, none)
     first = answer.force.copy()
@@ -96,7 +97,7 @@ def test_a_held_probe_relaxes_by_the_prony_series():
 
 def test_a_probe_pushed_through_the_body_is_let_go_and_never_pulled_in(body):
     """Down through the face, beyond where the distance ends and turns back, and up again the same way."""
-    answer, none, touch = body.evaluator(), np.zeros(0), body.touch
+    answer, none, touch = body.evaluator(), np.zeros(0), body.energy
     end = slab.RADIUS + touch.surface.inner  # depth at which the centre is `inner` beneath the face
     down = np.arange(-0.002, end + 4 * slab.RADIUS, 2e-4)
     there = np.column_stack([0 * down + 0.005, 0 * down, slab.RADIUS - down])
@@ -133,7 +134,7 @@ def test_beside_the_body_beneath_its_rim_the_energy_goes_on(body):
     """There too d climbs faster than a distance, but outwards: a hand that slips off and back goes on feeling it."""
     steps = np.linspace(0.0, 0.01, 21)
     beside = np.array([[slab.CORNERS[0].max() + a, 0.0, -b] for a in steps for b in steps])
-    d, slope, _ = body.touch.surface.at(beside)
+    d, slope, _ = body.energy.surface.at(beside)
     steep = (np.linalg.norm(slope, axis=1) > 1.3) & (slope[:, 2] > 0) & (np.abs(d) < slab.RADIUS / 2)
     assert steep.any()
     answer = body.evaluator()
@@ -150,7 +151,7 @@ def test_a_probe_that_was_let_go_is_held_again_after_air(body):
         answer(np.array([0.0, 0.0, slab.RADIUS - depth]), none)
         return float(answer.force[2])
 
-    deep, shallow = slab.RADIUS + body.touch.surface.inner + 1e-4, 0.003
+    deep, shallow = slab.RADIUS + body.energy.surface.inner + 1e-4, 0.003
     pressed = at(shallow)
     assert pressed > 0
     assert at(deep) == 0.0
@@ -167,7 +168,7 @@ def test_a_probe_that_was_let_go_is_held_again_after_air(body):
 
 
 def test_a_memory_lets_go_too_and_recovers_meanwhile():
-    body, none = PressedBody.of(slab.surrogate(meta=RELAXING)), np.zeros(0)
+    body, none = touchable(slab.surrogate(meta=RELAXING)), np.zeros(0)
     answer, fresh = body.evaluator(), body.evaluator()
     for depth in np.arange(0.0, 0.028, 1e-3):
         answer.elapsed = 0.1
@@ -189,7 +190,7 @@ def test_of_a_larger_probe_the_centre_goes_as_deep():
     network = linear_network([*slab.INPUTS, radius], [Quantity("ln U/U0")], tail)
     surface = TouchedSurface.of(*slab.CORNERS, radius=0.012, spacing=0.003)
     touch = TouchSurrogate(network, ContactLaw("pad"), surface, radius_input=3)
-    answer = PressedBody.of(touch).evaluator()
+    answer = touchable(touch).evaluator()
     for own in (0.008, 0.012):
         for beneath, gone in ((-1e-4, False), (1e-4, True)):
             answer(np.array([0.0, 0.0, 0.03]), np.array([own]))
@@ -200,13 +201,13 @@ def test_of_a_larger_probe_the_centre_goes_as_deep():
 @pytest.mark.parametrize("wrong", [{"terms": [[0.3]]}, {"terms": [[0.7, 1.0], [0.4, 2.0]]}, {}, "soon"])
 def test_a_relaxation_that_is_none_is_refused(wrong):
     with pytest.raises(FileFormatError, match="how the body relaxes"):
-        PressedBody.of(slab.surrogate(meta={"relaxation": wrong})).evaluator()
+        touchable(slab.surrogate(meta={"relaxation": wrong})).evaluator()
 
 
 def test_kinds_of_files_are_told_apart(files, spring_file, tmp_path):
-    assert isinstance(load_touchable(files["alone"]), PressedBody)
+    assert not load_touchable(files["alone"]).holds
     assert load_touchable(files["body"]).name == "slab"
-    assert not isinstance(load_touchable(spring_file), PressedBody)
+    assert load_touchable(spring_file).holds
     assert touchable(slab.surrogate(meta={}), "plate").name == "plate"
     with pytest.raises(FileFormatError):
         load_touchable(tmp_path / "nothing.palpate")
@@ -215,8 +216,8 @@ def test_kinds_of_files_are_told_apart(files, spring_file, tmp_path):
 def test_a_body_that_nothing_touches_is_refused():
     beside = slab.surrogate(continuation=None, region=None)
     object.__setattr__(beside, "radius", 1e-9)
-    with pytest.raises(UsageError, match="can't be pressed"):
-        PressedBody.of(beside).presses  # noqa: B018 a property that may fail
+    with pytest.raises(UsageError, match="can't be touched"):
+        touchable(beside).trained_inputs  # noqa: B018 a property that may fail
 
 
 @pytest.mark.parametrize("kind", ["alone", "body"])
@@ -241,7 +242,7 @@ def test_a_stroke_in_the_real_process_feels_the_closed_form(files, kind):
 def test_the_flag_tells_inside_from_outside(files):
     with LoopProcess(files["alone"]) as loop:
         shared, home = loop.shared, slab.RADIUS
-        space = workspace_for(load_touchable(files["alone"]), loop.read().radius)
+        space = load_touchable(files["alone"]).workspace(loop.read().radius)
         for depth, inside in ((0.004, True), (0.009, False)):
             target = space.to_hand(np.array([0.0, 0.0, home - depth]))
             shared.write_command(beat=now() + 60, grabbed=True, target=target)
@@ -257,11 +258,11 @@ def test_the_flag_tells_inside_from_outside(files):
 def test_memory_runs_in_the_real_process(files):
     with LoopProcess(files["relaxing"]) as loop:
         model = load_touchable(files["relaxing"])
-        target = workspace_for(model, loop.read().radius).to_hand(np.array([0.0, 0.0, slab.RADIUS - 0.004]))
+        target = model.workspace(loop.read().radius).to_hand(np.array([0.0, 0.0, slab.RADIUS - 0.004]))
         loop.shared.write_command(beat=now() + 60, grabbed=True, target=target)
         states = watch(loop, 1.5)
     last = states[-1]
-    elastic = np.linalg.norm(model.touch.force(last.position[None])[0])
+    elastic = np.linalg.norm(model.energy.force(last.position[None])[0])
     # all but exp(-1.4/0.4) of the slower branch has gone, whatever the ticks in between
     assert 0.5 < np.linalg.norm(last.force) / elastic < 0.5 + 0.2 * math.exp(-1.3 / 0.4)
     assert loop.report().foreign == ()

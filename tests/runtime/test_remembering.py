@@ -10,10 +10,9 @@ from bent import CREEPS, D, body
 from palpate.runtime import LoopProcess, now
 from palpate.runtime.devices.device import Sample, Traits
 from palpate.runtime.loop import Loop
-from palpate.runtime.remembering import RememberingBody
 from palpate.runtime.safety import Limits
 from palpate.runtime.shared_state import Shared
-from palpate.runtime.touchable import load_touchable, touchable, workspace_for
+from palpate.runtime.touchable import Touchable, load_touchable, touchable
 
 TICK, STRONG = 1e-3, Limits(1e3, 1e9)
 PAST_YIELD = 0.3  # m
@@ -41,9 +40,9 @@ class Plain:
 class Hand:
     """A loop without a process, whose hand is led tick by tick."""
 
-    def __init__(self, model: RememberingBody) -> None:
+    def __init__(self, model: Touchable) -> None:
         self.shared, self.device, self.time = Shared.private(), Plain(), 0.0
-        space = workspace_for(model, 0.075)
+        space = model.workspace(0.075)
         self.loop = Loop(model, self.device, self.shared, space, STRONG)
         self.to_hand = space.to_hand
 
@@ -73,7 +72,7 @@ class Hand:
 @pytest.fixture
 def bent() -> Hand:
     """Bent past yield and let go."""
-    hand = Hand(RememberingBody(body()))
+    hand = Hand(touchable(body()))
     hand.lead(0.0, PAST_YIELD)
     hand.tick(None)
     return hand
@@ -117,7 +116,7 @@ def test_a_hand_that_cannot_be_believed_takes_hold_anew(bent: Hand):
 
 
 def test_a_rod_that_creeps_comes_back_in_time():
-    hand = Hand(RememberingBody(body(CREEPS)))
+    hand = Hand(touchable(body(CREEPS)))
     hand.lead(0.0, 0.2, 500)
     hand.tick(None)
     first, path = hand.where, []
@@ -132,8 +131,8 @@ def test_a_rod_that_creeps_comes_back_in_time():
 def test_a_body_and_its_file_are_told_from_others(tmp_path):
     made = body()
     again = load_touchable(made.save(tmp_path / "rod.palpate"))
-    assert isinstance(again, RememberingBody)
-    assert isinstance(touchable(made), RememberingBody)
+    assert again.holds
+    assert str(again.energy) == str(made)
     assert (again.name, again.reach, again.parameters) == (made.name, made.reach, ())
     assert again.stiffness_max == made.stiffness_max
 
@@ -141,7 +140,7 @@ def test_a_body_and_its_file_are_told_from_others(tmp_path):
 def test_in_the_real_process_it_stays_bent(tmp_path):
     path = body().save(tmp_path / "rod.palpate")
     with LoopProcess(path, max_force=1e3) as loop:
-        to_hand = workspace_for(load_touchable(path), loop.read().radius).to_hand
+        to_hand = load_touchable(path).workspace(loop.read().radius).to_hand
         for w in np.linspace(0.0, PAST_YIELD, 60):
             loop.shared.write_command(beat=now() + 60, grabbed=True, target=to_hand(w * D))
             watch(loop, 0.02)

@@ -13,8 +13,7 @@ from touch_made import DEEPEST, PROBE, RADIUS, SOFT, around_points, ball, inside
 from palpate.errors import FileFormatError, UsageError
 from palpate.learning.correction.written import raised
 from palpate.network import Archive, load_archive, save_archive
-from palpate.runtime.pressed import PressedBody
-from palpate.runtime.touchable import load_touchable
+from palpate.runtime.touchable import load_touchable, touchable
 from palpate.surrogates import FieldSurrogate, TouchedBody
 from palpate.surrogates.field import Dimple, Rise, Variation
 from palpate.surrogates.field.dimple import products
@@ -240,7 +239,7 @@ def test_a_body_is_felt_as_a_corrected_energy_says(tmp_path):
     X = around_points(50)
     np.testing.assert_allclose(body.fields["displacement"].depth(X), S.depth(X) + 1e-4, atol=1e-12)
     assert "corrected by 40 measured touches" in str(body)
-    assert PressedBody.of(body, "block").name.endswith("corrected by 40 touches")
+    assert touchable(body, "block").name.endswith("corrected by 40 touches")
     again = load(body.save(tmp_path / "b.palpate"))
     assert isinstance(again, TouchedBody)
     np.testing.assert_array_equal(again.touch.force(X), body.touch.force(X))

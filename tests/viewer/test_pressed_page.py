@@ -190,9 +190,9 @@ def test_colours_are_chosen_with_their_own_scale(page: Page, keep, slab: Touched
 
 
 def test_the_browser_sums_a_field_as_numpy_does(page: Page, slab: TouchedBody):
-    from palpate.runtime.pressed import PressedBody
+    from palpate.runtime.touchable import touchable
 
-    exhibit = PressedExhibit(PressedBody.of(slab))
+    exhibit = PressedExhibit(touchable(slab))
     rest = exhibit.skin.rest.reshape(-1, 3)
     for index, one in enumerate(slab.fields.values()):
         for c in ([0.004, 0.006, 0.0061], [-0.018, 0.0199, 0.0095], [0.011, 0.0, 0.0041], [0.0, 0.0, 0.0035]):

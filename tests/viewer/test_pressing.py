@@ -14,7 +14,7 @@ from slabs import DEVIATION, HALF, family, touched_slab
 from websockets.sync.client import ClientConnection, connect
 
 import pressed
-from palpate.runtime.pressed import PressedBody
+from palpate.runtime.touchable import touchable
 from palpate.runtime.workspace import Workspace
 from palpate.surrogates import TouchedBody
 from palpate.viewer import Viewer
@@ -167,7 +167,7 @@ def test_the_hello_says_what_there_is(pressed_viewer: Viewer, slab: TouchedBody)
     ]
     assert hello.fields[0].low == 0.0
     assert 0.5 * pressed.DEEPEST < hello.fields[0].high < pressed.DEEPEST
-    assert hello.force_max == pytest.approx(PressedBody.of(slab).force_max)
+    assert hello.force_max == pytest.approx(touchable(slab).force_max)
 
 
 def test_the_page_gets_the_skin_and_the_modes_once(pressed_viewer: Viewer, slab: TouchedBody):
@@ -184,7 +184,7 @@ def test_the_page_gets_the_skin_and_the_modes_once(pressed_viewer: Viewer, slab:
 
 
 def test_a_surrogate_alone_is_drawn_from_its_distance():
-    body = PressedBody.of(pressed.surrogate())
+    body = touchable(pressed.surrogate())
     points, triangles = relief(body)
     used = points[np.unique(triangles)]
     np.testing.assert_allclose(used[:, 2], 0.0, atol=1e-3 * pressed.RADIUS)

@@ -14,10 +14,9 @@ import pressed
 from palpate.errors import FileFormatError, UsageError
 from palpate.runtime import LoopProcess, now
 from palpate.runtime.loop import Loop
-from palpate.runtime.pressed import PressedBody
 from palpate.runtime.safety import Limits
 from palpate.runtime.shared_state import MAX_PLACES, Shared
-from palpate.runtime.touchable import load_touchable, workspace_for
+from palpate.runtime.touchable import Touchable, load_touchable, touchable
 from palpate.surrogates import TouchedBody
 from palpate.surrogates.plastic import Dents
 from palpate.surrogates.relaxation import Branches
@@ -45,7 +44,7 @@ def file(dents, tmp_path):
 
 def test_the_file_tells_of_prints_and_where_they_can_stay(file, dents):
     body = load_touchable(file)
-    assert isinstance(body, PressedBody)
+    assert isinstance(body, Touchable)
     found = body.dents
     for name in ("dent", "reach", "stiffening"):
         np.testing.assert_array_equal(getattr(found, name), getattr(dents, name))
@@ -76,7 +75,7 @@ def test_a_print_is_felt_where_it_is_and_nowhere_else(file):
 
 def test_without_spacing_the_print_travels(dents, tmp_path):
     kept = TouchedBody.load(touched_slab().yielding(dents).save(tmp_path / "one.palpate"))
-    answer = PressedBody.of(kept).evaluator()
+    answer = touchable(kept).evaluator()
     answer(above(0.004), NONE)
     answer(above(0.002, x=0.015), NONE)
     assert answer.force[2] < 0.7 * touched_slab().touch.force(above(0.002, x=0.015)[None])[0, 2]
@@ -87,19 +86,19 @@ def test_a_print_must_be_as_wide_as_places_are_apart(dents):
     with pytest.raises(UsageError, match="do not fit places"):
         touched_slab().yielding(single, spacing=SPACING)
     told = touched_slab().yielding(single, spacing=SPACING, width=0.003)
-    assert PressedBody.of(told).dents.width == 0.003
+    assert touchable(told).dents.width == 0.003
 
 
 def test_one_memory_takes_the_place_of_the_other(dents):
     body = touched_slab().relaxing(Branches(((0.3, 0.1),)), spacing=0.0025)
-    assert PressedBody.of(body).branches == Branches(((0.3, 0.1),))
+    assert touchable(body).branches == Branches(((0.3, 0.1),))
     assert "relaxes: 30 % in 0.1 s" in str(body)
     printed = body.yielding(dents)
     assert "relaxes" not in str(printed)
     assert "yields and keeps prints" in str(printed)
-    assert PressedBody.of(printed).branches is None
-    assert PressedBody.of(printed).dents is not None
-    assert PressedBody.of(printed.relaxing(Branches(((0.3, 0.1),)))).dents is None
+    assert touchable(printed).branches is None
+    assert touchable(printed).dents is not None
+    assert touchable(printed.relaxing(Branches(((0.3, 0.1),)))).dents is None
 
 
 @pytest.mark.parametrize(
@@ -107,10 +106,10 @@ def test_one_memory_takes_the_place_of_the_other(dents):
 )
 def test_yielding_that_is_none_is_refused(wrong):
     with pytest.raises(FileFormatError, match="how the body yields"):
-        PressedBody.of(pressed.surrogate(meta={"yielding": wrong})).evaluator()
+        touchable(pressed.surrogate(meta={"yielding": wrong})).evaluator()
     both = {"yielding": wrong, "relaxation": {"terms": [[0.3, 0.1]]}}
     with pytest.raises(FileFormatError, match="that it relaxes"):
-        PressedBody.of(pressed.surrogate(meta=both)).evaluator()
+        touchable(pressed.surrogate(meta=both)).evaluator()
 
 
 @pytest.fixture
@@ -170,9 +169,9 @@ def test_all_points_of_the_top_may_keep_a_print_and_no_others(file, dents, tmp_p
 
 def test_print_and_elastic_shape_together_touch_the_ball(file):
     body = load_touchable(file)
-    exhibit, elastic = PressedExhibit(body), PressedExhibit(PressedBody.of(touched_slab()))
+    exhibit, elastic = PressedExhibit(body), PressedExhibit(touchable(touched_slab()))
     with LoopProcess(file) as loop:
-        space = workspace_for(body, loop.read().radius)
+        space = body.workspace(loop.read().radius)
 
         def picture(depth, held=True):
             target = space.to_hand(above(depth))
@@ -206,15 +205,15 @@ def _printable(exhibit):
 
 
 def test_more_places_than_the_shared_memory_carries_are_refused(dents):
-    body = PressedBody.of(touched_slab().yielding(dents, spacing=0.0007, width=0.002))
+    body = touchable(touched_slab().yielding(dents, spacing=0.0007, width=0.002))
     assert len(body.dents.points) > MAX_PLACES
     with pytest.raises(UsageError, match=f"carries {MAX_PLACES}"):
-        Loop(body, object(), Shared.private(), workspace_for(body, 0.06), Limits(8.0))
+        Loop(body, object(), Shared.private(), body.workspace(0.06), Limits(8.0))
 
 
 def test_prints_run_in_the_real_process(file):
     with LoopProcess(file) as loop:
-        space = workspace_for(load_touchable(file), loop.read().radius)
+        space = load_touchable(file).workspace(loop.read().radius)
         forces = []
         for depth in (0.002, 0.004, 0.002):
             loop.shared.write_command(beat=now() + 60, grabbed=True, target=space.to_hand(above(depth)))

@@ -7,9 +7,9 @@ import dataclasses
 import numpy as np
 
 from models import linear_network, spring_beam
+from palpate.runtime.touchable import touchable
 from palpate.surrogates import TouchModel
 from palpate.units import Quantity, Range
-from palpate.viewer.travel import travel
 
 
 def reached(model: TouchModel) -> np.ndarray:
@@ -20,7 +20,7 @@ def reached(model: TouchModel) -> np.ndarray:
 
 
 def test_a_body_that_mirrors_goes_as_far_to_the_other_side(rod: TouchModel):
-    low, high = travel(rod)
+    low, high = touchable(rod).travel
     ends = reached(rod)
     assert np.allclose(low, ends.min(axis=0), rtol=0, atol=1e-4)  # the network's rest is not quite 0
     assert high[1] == -low[1]
@@ -28,7 +28,7 @@ def test_a_body_that_mirrors_goes_as_far_to_the_other_side(rod: TouchModel):
 
 
 def test_a_body_that_does_not_mirror_stays_on_its_side(rod: TouchModel):
-    low, high = travel(dataclasses.replace(rod, mirrors=False))
+    low, high = touchable(dataclasses.replace(rod, mirrors=False)).travel
     assert low[1] < -0.5
     assert 0.0 <= high[1] < 1e-4
 
@@ -41,5 +41,5 @@ def test_loads_of_both_signs_and_several_loads_add_up():
     tail[2 * beam.touch_node] = [0.0, 0.0, 0.02]
     tail[2 * beam.touch_node + 1] = [-0.03, -0.07, 0.01]
     networks = dict(beam.networks) | {"field": linear_network(inputs, names, tail)}
-    box = travel(dataclasses.replace(beam, networks=networks, mirrors=False))
+    box = touchable(dataclasses.replace(beam, networks=networks, mirrors=False)).travel
     assert np.allclose(box, [[-0.02, -0.11, 0.0], [0.02, 0.05, 0.0]])

@@ -16,7 +16,7 @@ from palpate.errors import FileFormatError, UsageError
 from palpate.learning import Fitted
 from palpate.learning.plastic.paths import KIND, HeldPaths
 from palpate.network import Archive, Network, load_archive
-from palpate.runtime.pressed import PressedBody
+from palpate.runtime.touchable import touchable
 from palpate.surrogates import TouchedBody, TouchSurrogate
 from palpate.surrogates.learnt_energy import LearntEnergy, warning_of
 from palpate.surrogates.loading import load
@@ -105,7 +105,7 @@ def _let_go(touch: TouchSurrogate, X: np.ndarray) -> list[bool]:
     One that feels nothing is led out along the body's normal: from beneath the touched surface it meets that from
     behind, and the body lets go of it; from the air it meets nothing, or a front.
     """
-    body = PressedBody.of(touch)
+    body = touchable(touch)
     loop, (low, high) = body.evaluator(), touch.surface.box
     far = float(np.linalg.norm(high - low))
     ways = np.linspace(0.0, far, max(2, int(_STEPS * far / touch.surface.radius)))

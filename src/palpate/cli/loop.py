@@ -13,10 +13,9 @@ from palpate.cli.console import Console
 from palpate.format import share
 from palpate.runtime import LoopProcess
 from palpate.runtime.devices import device_traits
-from palpate.runtime.pressed import PressedBody
 from palpate.runtime.shared_state import State
 from palpate.runtime.stability import stiffness_warning
-from palpate.runtime.touchable import Touchable, load_touchable, workspace_for
+from palpate.runtime.touchable import Touchable, load_touchable
 from palpate.surrogates.learnt_energy import warning_of
 
 __all__ = ["run_loop"]
@@ -42,13 +41,13 @@ class Peak:
         self.outside += not state.inside
         self.let_go += state.let_go
 
-    def words(self, pressed: bool) -> str:
-        """For a person."""
+    def words(self, *, holds: bool) -> str:
+        """Return the figures as lines for a person; `holds` says whether the device held the body."""
         if self.force == 0.0:
             return "  felt       nothing: the device did not reach the body"
-        words = f"  felt       up to {self.force:.3g} N" + (
-            f", {1e3 * self.depth:.3g} mm deep" if pressed else ""
-        )
+        words = f"  felt       up to {self.force:.3g} N"
+        if self.depth > 0.0:
+            words += f", {1e3 * self.depth:.3g} mm {'from rest' if holds else 'deep'}"
         if self.outside:
             words += (
                 f"\n  trust      outside what was trained for {share(self.outside / self.looks)} of the time"
@@ -73,7 +72,7 @@ def run_loop(model: Path, seconds: float, device: str, rate: float | None, conso
     touch, traits = load_touchable(model), device_traits(device)
     settings = touch.meta.get("runtime", {})
     rate = rate or settings.get("rate", 1000.0)
-    workspace = workspace_for(touch, traits.radius)
+    workspace = touch.workspace(traits.radius)
     felt = workspace.felt(touch.stiffness_max)
     device = _aimed(device, touch, workspace.scale)
     if warning := stiffness_warning(felt, traits.damping, rate):
@@ -89,15 +88,13 @@ def run_loop(model: Path, seconds: float, device: str, rate: float | None, conso
     ):
         _wait(loop, seconds, console, peak)
     report = loop.report()  # after the end: only then is it known what the system granted
-    console.result(
-        f"{report}\n{peak.words(isinstance(touch, PressedBody))}", report.as_dict() | peak.as_dict()
-    )
+    console.result(f"{report}\n{peak.words(holds=touch.holds)}", report.as_dict() | peak.as_dict())
 
 
 def _aimed(device: str, touch: Touchable, scale: float) -> str:
     """The scripted stroke, unless it is told where to go, presses where a body was trained to be pressed."""
     name, _, text = device.partition(":")
-    if name != "stroke" or not isinstance(touch, PressedBody):
+    if name != "stroke" or touch.holds:
         return device
     given = {part.partition("=")[0].strip() for part in text.split(",") if part}
     axes = {"x", "y", "z"}

@@ -6,7 +6,7 @@
     realtime, loop_report             punctuality, and how well it was kept
     safety, stability                 what may reach a hand
     workspace, devices                where the hand is
-    touchable, pressed                what it is laid on
+    touchable, hand_evaluator         what it is laid on, and what answers it
 
 Names are loaded when asked for, so that the loop's process imports nothing it doesn't need.
 """

@@ -21,7 +21,7 @@ from palpate.runtime.loop import Loop, rehearsal
 from palpate.runtime.realtime import obtain
 from palpate.runtime.safety import Limits
 from palpate.runtime.shared_state import Shared
-from palpate.runtime.touchable import load_touchable, workspace_for
+from palpate.runtime.touchable import load_touchable
 
 __all__ = ["FOREIGN", "main"]
 
@@ -59,7 +59,7 @@ def _run(options: argparse.Namespace) -> int:
     orphaned = _watch_parent()
     model = load_touchable(options.model)
     device = device_named(options.device, shared.command)
-    workspace = workspace_for(model, options.radius)
+    workspace = model.workspace(options.radius)
     limits = Limits(options.max_force, options.slew)
     loop = Loop(model, device, shared, workspace, limits, rate=options.rate, orphaned=orphaned)
     _say({"obtained": obtain()})

@@ -24,64 +24,27 @@ import numpy as np
 from palpate.errors import DeviceError, UsageError
 from palpate.runtime.devices import Device
 from palpate.runtime.devices.page import PageDevice
-from palpate.runtime.pressed_evaluator import PressedEvaluator
+from palpate.runtime.hand_evaluator import HandEvaluator
 from palpate.runtime.publisher import Publisher
 from palpate.runtime.realtime import Metronome
-from palpate.runtime.remembering import RememberingEvaluator
 from palpate.runtime.safety import Fault, Limits, Safety, stalled
 from palpate.runtime.shared_state import MAX_INPUTS, MAX_PLACES, Shared, now
 from palpate.runtime.workspace import Workspace
 from palpate.units import Range
 
-__all__ = ["Evaluator", "Loop", "Model", "rehearsal"]
-
-
-class Evaluator(Protocol):
-    """What answers the hand; `palpate.surrogates.TouchEvaluator`, `PressedEvaluator` and `RememberingEvaluator` do.
-
-    The latter two also ask how long it was since the last call (`elapsed`), and `place` what the hand's place means to
-    them, above all that of a hand that holds nothing.
-
-    Attributes
-    ----------
-    force : (3,)
-        On the hand, N.
-    contact : (3,)
-        Where the touched node is, offset from its rest position, m.
-    loads : (n,)
-        The loads that hold the body there, N.
-    inside : bool
-        Within the trained range.
-    mirrored : bool
-        Answered by symmetry.
-    """
-
-    force: np.ndarray
-    contact: np.ndarray
-    loads: np.ndarray
-    inside: bool
-    mirrored: bool
-
-    def __call__(self, position: np.ndarray, parameters: np.ndarray) -> None:
-        """Renew the attributes for a hand at `position` (3,), m, and the untouched inputs (p,)."""
-        ...
+__all__ = ["Loop", "Model", "rehearsal"]
 
 
 class Model(Protocol):
-    """What the loop asks of a learnt body."""
-
-    @property
-    def reach(self) -> float:
-        """Largest trained displacement of the touched node, m."""
-        ...
+    """A learnt body as the loop asks for it; `palpate.runtime.touchable.Touchable` is one."""
 
     @property
     def parameters(self) -> tuple[Range, ...]:
         """The inputs that the hand doesn't supply."""
         ...
 
-    def evaluator(self) -> Evaluator:
-        """The allocation-free evaluator."""
+    def evaluator(self) -> HandEvaluator:
+        """Return the allocation-free evaluator."""
         ...
 
 
@@ -124,18 +87,15 @@ class Loop:
                 f"The loop can't run at {rate:g} Hz.", fix="Choose 10 … 10000 Hz; 1000 is usual."
             )
         self.evaluator, self.device, self.workspace = model.evaluator(), device, workspace
-        answer = self.evaluator
-        self.placing = answer if isinstance(answer, PressedEvaluator | RememberingEvaluator) else None
-        self.pressed = answer if isinstance(answer, PressedEvaluator) else None
         if max(len(self.evaluator.loads), len(model.parameters)) > MAX_INPUTS:
             raise UsageError(
                 f"The model has {len(self.evaluator.loads)} inputs; the runtime carries {MAX_INPUTS}.",
                 fix="Learn it with fewer inputs.",
             )
         self.period = 1.0 / rate
-        if self.pressed is not None and len(self.pressed.prints) > MAX_PLACES:
+        if len(self.evaluator.prints) > MAX_PLACES:
             raise UsageError(
-                f"The body keeps prints at {len(self.pressed.prints)} places; the runtime carries {MAX_PLACES}.",
+                f"The body keeps prints at {len(self.evaluator.prints)} places; the runtime carries {MAX_PLACES}.",
                 fix="Save it with a larger spacing.",
             )
         self.out = Publisher(shared, len(self.evaluator.loads))
@@ -222,9 +182,8 @@ class Loop:
     def map(self) -> None:
         """Hand metres to body metres; parameters that were set to those the model takes."""
         self.workspace.to_body(self.out.hand, self.out.position)
-        if self.placing is not None:
-            believed = self.fault is Fault.NONE
-            self.placing.place(self.out.position, holding=self.holding, believed=believed)
+        believed = self.fault is Fault.NONE
+        self.evaluator.place(self.out.position, holding=self.holding, believed=believed)
         for i in range(len(self.parameters)):
             wish = float(self._wished[i])
             if math.isfinite(wish):
@@ -234,9 +193,8 @@ class Loop:
         """Ask the learnt body."""
         if self.fault is not Fault.NONE:
             return
-        answer, pressed = self.evaluator, self.pressed
-        if self.placing is not None:
-            self.placing.elapsed = max(0.0, self.now - self._answered)
+        answer = self.evaluator
+        answer.elapsed = max(0.0, self.now - self._answered)
         self._answered = self.now
         try:
             answer(self.out.position, self.parameters)
@@ -246,11 +204,7 @@ class Loop:
         if math.isfinite(
             sum(answer.force.tolist()) + sum(answer.contact.tolist()) + sum(answer.loads.tolist())
         ):
-            self.out.answer(answer.contact, answer.loads, inside=answer.inside, mirrored=answer.mirrored)
-            if pressed is not None:
-                self.out.pressed(pressed.depth, pressed.stiffness, let_go=pressed.let_go)
-                if pressed.grew:
-                    self.out.printed(pressed.prints)
+            self.out.answer(answer)
         else:
             self.fail(Fault.OUTPUT_NOT_FINITE)
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
+from palpate.runtime.hand_evaluator import HandEvaluator
 from palpate.runtime.loop_report import Histogram
 from palpate.runtime.safety import Fault, Limits
 from palpate.runtime.shared_state import Shared, size_of
@@ -46,22 +45,17 @@ class Publisher:
         """Whether a hand holds the body, and whether its input is too old."""
         self._grabbed[()], self._stalled[()] = holding, late
 
-    def answer(self, contact: np.ndarray, loads: np.ndarray, *, inside: bool, mirrored: bool) -> None:
-        """The learnt body's answer: contact (3,) m and loads (n,) N."""
-        self._contact[:] = contact
-        self._loads[:] = loads
-        self._inside[()], self._mirrored[()] = inside, mirrored
-
-    def pressed(self, depth: float, stiffness: float, *, let_go: bool) -> None:
-        """How deep a probe is (m), how stiff the body is under it (N/m), and whether it has let go."""
-        self._depth[()], self._stiffness[()], self._let_go[()] = depth, stiffness, let_go
-
-    def printed(self, amplitude: np.ndarray) -> None:
-        """Publish the prints, amplitudes (n,) in √J; asked for only when one has grown."""
-        count = len(amplitude)
-        self._prints.record["count"] = count
-        self._amplitude[:count] = amplitude
-        self._prints.publish(size_of(self._prints.record))
+    def answer(self, answer: HandEvaluator) -> None:
+        """Take over the learnt body's answer, and publish its prints where one has grown."""
+        self._contact[:] = answer.contact
+        self._loads[:] = answer.loads
+        self._inside[()], self._mirrored[()] = answer.inside, answer.mirrored
+        self._depth[()], self._stiffness[()], self._let_go[()] = answer.depth, answer.stiffness, answer.let_go
+        if answer.grew:
+            count = len(answer.prints)
+            self._prints.record["count"] = count
+            self._amplitude[:count] = answer.prints
+            self._prints.publish(size_of(self._prints.record))
 
     def clamped(self, acted: bool) -> None:
         """Whether the force limit acted."""

@@ -1,35 +1,322 @@
-"""What a hand can be laid on, told apart by its file's kind: held at one node, with or without memory, or pressed."""
+"""A learnt body as a hand finds it: where the hand rests, how deep and stiff the body is, who answers in the loop.
+
+Nothing of the answer is made here: energy, force and stiffness are the learnt body's own, and so is its memory. All
+that follows from them for a hand is worked out once, when it is asked for.
+
+A free probe's centre is the hand's place itself, in the body's coordinates, z up; the device's centre is a place of
+first contact. What a hand holds is displaced by the hand from its rest position, which is the device's centre.
+"""
 
 from __future__ import annotations
 
+import math
 import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
-from palpate.errors import FileFormatError
-from palpate.runtime.pressed import PressedBody
-from palpate.runtime.remembering import RememberingBody
+import numpy as np
+
+from palpate.errors import FileFormatError, UsageError
+from palpate.runtime.hand_evaluator import HandEvaluator
+from palpate.runtime.recorded import branches_told, dents_told, spacing_told
 from palpate.runtime.workspace import Workspace
 from palpate.surrogates import FieldSurrogate, TouchedBody, TouchModel, TouchSurrogate
 from palpate.surrogates.grasp import GraspSurrogate
+from palpate.surrogates.learnt_energy import corrected_by, warning_of
 from palpate.surrogates.loading import load
-from palpate.surrogates.plastic import HeldBody
+from palpate.surrogates.plastic import DentMemory, Dents, HeldBody
+from palpate.surrogates.relaxation import Branches, Memory, Patches
+from palpate.units import Range, bounds
 
-__all__ = ["Learnt", "Touchable", "load_touchable", "touchable", "workspace_for"]
+__all__ = ["Learnt", "Touchable", "load_touchable", "touchable"]
 
-Touchable: TypeAlias = TouchModel | PressedBody | RememberingBody
-Learnt: TypeAlias = TouchModel | TouchedBody | TouchSurrogate | HeldBody
+Learnt: TypeAlias = TouchModel | TouchedBody | TouchSurrogate | HeldBody | GraspSurrogate
+
+_SAMPLES = 4096  # of the trained ranges, for what is largest there
+_SHARE = 0.75  # of the deepest trained depth: how deep a scripted stroke goes
+_SLIVER = 1e-3  # of the deepest depth: shallower is no press
+
+
+@dataclass(frozen=True, eq=False)
+class Touchable:
+    """An energy that a hand can feel, with all that follows from it for that hand.
+
+    Attributes
+    ----------
+    energy : TouchSurrogate or GraspSurrogate
+    fields : mapping of name to FieldSurrogate
+        What the eye sees; may be empty.
+    name : str
+    """
+
+    energy: Any
+    fields: Mapping[str, FieldSurrogate] = field(default_factory=dict)
+    name: str = "body"
+
+    def __str__(self) -> str:
+        return f"Touchable {self.name}: {self.energy}"
+
+    __repr__ = __str__
+
+    @property
+    def inputs(self) -> tuple[Range, ...]:
+        """Names and trained ranges of all inputs: the hand's three coordinates (m), then the further ones."""
+        return tuple(self.energy.inputs)
+
+    @property
+    def parameters(self) -> tuple[Range, ...]:
+        """The inputs that the hand doesn't supply."""
+        return tuple(self.energy.parameters)
+
+    @property
+    def meta(self) -> Mapping[str, Any]:
+        """What the file says of its making."""
+        return self.energy.meta  # type: ignore[no-any-return]
+
+    @property
+    def surface(self) -> Any:
+        """The touched surface at rest, where a free probe touches one; otherwise None."""
+        return getattr(self.energy, "surface", None)
+
+    @property
+    def holds(self) -> bool:
+        """Whether the hand holds a patch or a node of the body, and doesn't move a free probe."""
+        return self.surface is None
+
+    @property
+    def upright(self) -> bool:
+        """Whether the body has z up, as solids have; a beam lies in the x–y plane, y up."""
+        return True
+
+    @property
+    def radius_parameter(self) -> int | None:
+        """Which of the further inputs is the probe's radius; None where that is fixed."""
+        own = getattr(self.energy, "radius_input", None)
+        return None if own is None else own - 3
+
+    @property
+    def radius(self) -> float:
+        """Radius of the probe, m; the middle of its range where it is an input. Of what is held, a size to draw."""
+        if self.radius_parameter is not None:
+            own = self.parameters[self.radius_parameter]
+            return (own.low + own.high) / 2.0
+        return self.reach / 2.0 if self.holds else float(self.energy.radius)
+
+    @cached_property
+    def trained_inputs(self) -> np.ndarray:
+        """Inputs (N, n) where the hand feels something, inside the trained region: random ones, and those learnt from.
+
+        Raises
+        ------
+        UsageError
+            If there is none.
+        """
+        low, high = bounds(self.inputs)
+        X = np.random.default_rng(0).uniform(low, high, (_SAMPLES, len(low)))
+        X[0] = (low + high) / 2.0
+        region = self.energy.region
+        if region is not None:
+            scaling = self.energy.network.scaling
+            X = np.vstack([X, scaling.input_centre + scaling.input_half * region.points])
+        depth = self.depth(X)
+        felt = X[self.energy.inside(X) & (depth > _SLIVER * max(depth.max(), 0.0)) & (depth > 0.0)]
+        if not len(felt):
+            raise UsageError(
+                "This body can't be touched.",
+                why="No hand within the ranges it was trained on touches it.",
+                fix="Learn it from solves in contact.",
+            )
+        return np.asarray(felt)
+
+    def depth(self, X: np.ndarray) -> np.ndarray:
+        """Depth (N,) of the probe in the surface at rest, or displacement of what is held, at inputs (N, n), m."""
+        if self.holds:
+            return np.linalg.norm(X[:, :3], axis=1)
+        return np.asarray(self.energy.depth(X))
+
+    @cached_property
+    def stiffness_max(self) -> float:
+        """Largest eigenvalue of −∂F/∂x over the trained region, N/m: what the loop's stability depends on."""
+        return float(np.linalg.eigvalsh(-self.energy.stiffness(self.trained_inputs)).max())
+
+    @cached_property
+    def force_max(self) -> float:
+        """Largest ‖F‖ of the trained region, N."""
+        return float(np.linalg.norm(self.energy.force(self.trained_inputs), axis=1).max())
+
+    @cached_property
+    def deepest(self) -> float:
+        """Deepest trained depth, or largest trained displacement of what is held, m."""
+        known = math.inf if self.holds else self.energy.continuation.deepest
+        return known if math.isfinite(known) else float(self.depth(self.trained_inputs).max())
+
+    @cached_property
+    def _first_contact(self) -> tuple[np.ndarray, np.ndarray]:
+        """Centre of a probe at first contact in the middle of the touched place, and the outer normal there."""
+        if self.holds:
+            return np.zeros(3), np.array([0.0, 0.0, 1.0])
+        X = self.trained_inputs
+        low, high = bounds(self.inputs)
+        # the middle of the ranges where that is a press; on a curved body it may lie too deep
+        x = X[np.argmin((((X - (low + high) / 2.0) / (high - low)) ** 2).sum(axis=1))]
+        distance, slope, _ = self.surface.at(x[None, :3])
+        normal = slope[0] / np.linalg.norm(slope[0])
+        return x[:3] + (self.radius - distance[0]) * normal, normal
+
+    @property
+    def home(self) -> np.ndarray:
+        """The device's centre (3,), m: the probe's centre at first contact in the middle, or rest."""
+        return self._first_contact[0]
+
+    @property
+    def normal(self) -> np.ndarray:
+        """Outer normal (3,) of the surface there."""
+        return self._first_contact[1]
+
+    @property
+    def away(self) -> np.ndarray:
+        """Where a probe (3,) is that nobody holds, m: a radius above `home`, in the air. What is held is at rest."""
+        return self.home if self.holds else self.home + self.radius * self.normal
+
+    @cached_property
+    def reach(self) -> float:
+        """How far from `home` the hand was in training, m."""
+        return float(np.linalg.norm(self.trained_inputs[:, :3] - self.home, axis=1).max())
+
+    @cached_property
+    def branches(self) -> Branches | None:
+        """The branches of its force that relax, where its file says so.
+
+        Raises
+        ------
+        FileFormatError
+            If it says so in other words than `recorded` knows.
+        """
+        return branches_told(self.meta)
+
+    @cached_property
+    def dents(self) -> Dents | None:
+        """The law by which it yields, where its file says so.
+
+        Raises
+        ------
+        FileFormatError
+            If it says so in other words than `recorded` knows, or that it relaxes too.
+        """
+        if "yielding" in self.meta and "relaxation" in self.meta:
+            raise FileFormatError(
+                "The file says that the body yields and that it relaxes.",
+                why="A print and branches on one energy are not made to go together.",
+                fix="Save it with one of them.",
+            )
+        places = None if "yielding" not in self.meta else self._places(width=1.0, energy=0.0)
+        return dents_told(self.meta, None if places is None else places.points)
+
+    def memory(self) -> Memory | DentMemory | None:
+        """Return the body's memory at rest, or None for one that forgets nothing."""
+        if self.dents is not None:
+            return self.dents.memory()
+        if self.branches is None or not self.branches.terms:
+            return None
+        if spacing_told(self.meta) is None:
+            return Memory(self.branches)
+        depth = self.deepest / 2.0  # typical
+        X = self.trained_inputs
+        near = np.argmin(np.abs(self.depth(X) - depth))
+        energy = float(self.energy.energy(X[near : near + 1])[0])
+        return Memory(self.branches, self._places(Patches.width_at(self.radius, depth), energy))
+
+    def _places(self, width: float, energy: float) -> Patches | None:
+        """Places of the memory on the touched surface; None where it travels with the probe."""
+        spacing, skin = spacing_told(self.meta), next(iter(self.fields.values()), None)
+        if spacing is None or skin is None:
+            return None
+        corners = skin.triangles
+        if skin.dimple is not None:
+            corners = corners[skin.touched[corners].all(axis=1)]
+        return Patches.over(skin.points, corners, spacing, width=width, energy=energy)
+
+    def evaluator(self) -> HandEvaluator:
+        """Return the allocation-free evaluator of the 1 kHz path."""
+        elastic, memory = self.energy.evaluator(), self.memory()
+        if self.holds:
+            # lengths among the further inputs of what is held say where it is held
+            places = tuple(i for i, r in enumerate(self.parameters) if r.unit == "m")
+            return HandEvaluator(elastic, memory, holds=True, places=places)
+        return HandEvaluator(
+            elastic,
+            memory,
+            holds=False,
+            away=self.away,
+            normal=self.normal,
+            inner=self.surface.inner,
+            radius=self.energy.radius,
+            radius_input=self.radius_parameter,
+        )
+
+    def workspace(self, radius: float) -> Workspace:
+        """Return how a hand's workspace of `radius` (m) lies about the body.
+
+        Parameters
+        ----------
+        radius : float
+            Of the sphere that the device reaches, m.
+        """
+        x, y, z = self.home.tolist()
+        return Workspace.for_reach(radius, self.reach, centre=(x, y, z), upright=self.upright)
+
+    def stroke(self, scale: float) -> dict[str, float]:
+        """Return amplitude (m) and direction, in device coordinates, of a stroke to three quarters of `deepest`.
+
+        Parameters
+        ----------
+        scale : float
+            Metres of body per metre of hand.
+
+        Returns
+        -------
+        dict of float
+            ``amplitude``, ``x``, ``y``, ``z``; empty where a hand holds, which the device's own stroke displaces.
+        """
+        if self.holds:
+            return {}
+        x, y, z = (-self.normal).tolist()
+        return {"amplitude": _SHARE * self.deepest / scale, "x": x, "y": z, "z": -y}
 
 
 def touchable(model: Learnt, name: str = "") -> Touchable:
-    """A model as the loop takes it; `name` where a body's own record has none."""
+    """Return a learnt body as a hand finds it.
+
+    Parameters
+    ----------
+    model : learnt body
+        Anything that `palpate.load` reads and that gives a force.
+    name : str
+        Its name where its own record has none.
+    """
+    from palpate.runtime.held_node import BeamTouchable, RodTouchable
+
     if isinstance(model, HeldBody):
-        return RememberingBody(model)
-    return PressedBody.of(model, name) if isinstance(model, TouchedBody | TouchSurrogate) else model
+        return RodTouchable(model, {}, model.name)
+    if isinstance(model, TouchModel):
+        return BeamTouchable(model, {}, model.name)
+    energy = model.touch if isinstance(model, TouchedBody) else model
+    known = str(energy.meta.get("name", "")) or name or "body"
+    if (touches := corrected_by(energy.meta)) is not None:
+        known += f", corrected by {touches} touches" + (" with a warning" if warning_of(energy.meta) else "")
+    return Touchable(energy, dict(model.fields) if isinstance(model, TouchedBody) else {}, known)
 
 
 def load_touchable(path: str | os.PathLike[str]) -> Touchable:
-    """Read what can be touched from a file of any kind that can.
+    """Read a learnt body that can be touched from its file.
+
+    Parameters
+    ----------
+    path : path
+        A file that a learnt body was saved to; its stem names a body whose own record has no name.
 
     Raises
     ------
@@ -38,22 +325,9 @@ def load_touchable(path: str | os.PathLike[str]) -> Touchable:
     """
     path = Path(path)
     model = load(path)
-    if isinstance(model, GraspSurrogate):
-        raise FileFormatError(
-            f"{path} holds a body held by a pad, which has no page and no loop yet.",
-            fix="Touch it from Python: GraspSurrogate.load(file).evaluator().",
-        )
     if isinstance(model, FieldSurrogate):
         raise FileFormatError(
             f"{path} holds a field alone, which gives no force.",
             fix="Save it with its energy: TouchedBody(touch, fields).save(file).",
         )
     return touchable(model, path.stem)
-
-
-def workspace_for(model: Touchable, radius: float) -> Workspace:
-    """How a hand's workspace of `radius` (m) lies about a model."""
-    if isinstance(model, PressedBody):
-        x, y, z = model.home.tolist()
-        return Workspace.for_reach(radius, model.reach, centre=(x, y, z), upright=True)
-    return Workspace.for_reach(radius, model.reach)

@@ -1,6 +1,6 @@
 """From the hand's few centimetres to the body's travel and back.
 
-Of a body held at one node the device's centre is that node's rest position and the axes are parallel. Of a body
+Of a body held at a node or a patch the device's centre is the rest position of what is held. Of a body
 pressed anywhere it is a place of first contact, and the body stands upright: devices have y up and z towards the
 user, solids z up. Positions are scaled, forces are not: the hand feels the body's own newtons, at a stiffness that
 is `scale` times the body's.

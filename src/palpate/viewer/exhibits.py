@@ -7,17 +7,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from palpate.runtime.pressed import PressedBody
-from palpate.runtime.remembering import RememberingBody
+from palpate.runtime.held_node import BeamTouchable, RodTouchable
 from palpate.runtime.safety import Fault
 from palpate.runtime.shared_state import State, now
 from palpate.runtime.touchable import Touchable
-from palpate.surrogates import TouchModel
-from palpate.surrogates.plastic import HeldBody
 from palpate.units import Range
 from palpate.viewer.messages import PROTOCOL, Beat, Frame, Hello, RangeInfo, Vec3
 from palpate.viewer.picture import Picture
-from palpate.viewer.travel import travel, travel_of_memory
 from palpate.viewer.wire import Json
 
 __all__ = ["Exhibit", "HeldExhibit", "exhibit_of", "loop_facts", "ranges", "vector"]
@@ -49,14 +45,13 @@ class Exhibit(Protocol):
 class HeldExhibit:
     """A body held at one node."""
 
-    def __init__(self, model: TouchModel) -> None:
-        self.model = model
-        self._picture = Picture(model)
-        self._travel = travel(model)
+    def __init__(self, body: BeamTouchable) -> None:
+        self.body, self.model = body, body.energy
+        self._picture = Picture(body.energy)
 
     def hello(self, state: State, rate: float) -> Hello:
         """See `Exhibit`."""
-        return _greeting(self.model, self._travel, state, rate)
+        return _greeting(self.body, state, rate)
 
     def frame(self, beat: Mapping[str, Any], state: State, held: bool, parameters: np.ndarray) -> Frame:
         """See `Exhibit`."""
@@ -71,13 +66,12 @@ class HeldExhibit:
 class RememberingExhibit:
     """A body held at one node that remembers: drawn as it lies, held or not."""
 
-    def __init__(self, model: HeldBody) -> None:
-        self.model = model
-        self._travel = travel_of_memory(model)
+    def __init__(self, body: BeamTouchable) -> None:
+        self.body, self.model = body, body.energy
 
     def hello(self, state: State, rate: float) -> Hello:
         """See `Exhibit`."""
-        return _greeting(self.model, self._travel, state, rate)
+        return _greeting(self.body, state, rate)
 
     def frame(self, beat: Mapping[str, Any], state: State, held: bool, parameters: np.ndarray) -> Frame:
         """See `Exhibit`."""
@@ -90,13 +84,14 @@ def exhibit_of(model: Touchable) -> Exhibit:
     """The exhibit of a model."""
     from palpate.viewer.pressing import PressedExhibit
 
-    if isinstance(model, RememberingBody):
-        return RememberingExhibit(model.body)
-    return PressedExhibit(model) if isinstance(model, PressedBody) else HeldExhibit(model)
+    if isinstance(model, RodTouchable):
+        return RememberingExhibit(model)
+    return HeldExhibit(model) if isinstance(model, BeamTouchable) else PressedExhibit(model)
 
 
-def _greeting(model: TouchModel | HeldBody, corners: np.ndarray, state: State, rate: float) -> Hello:
-    """What the page of a body held at one node is told first; `corners` (2, 3) of the held node's way, m."""
+def _greeting(body: BeamTouchable, state: State, rate: float) -> Hello:
+    """What the page of a body held at one node is told first."""
+    model = body.energy
     return Hello(
         protocol=PROTOCOL,
         name=model.name,
@@ -107,7 +102,7 @@ def _greeting(model: TouchModel | HeldBody, corners: np.ndarray, state: State, r
         inputs=ranges(model.inputs),
         parameters=ranges(model.parameters),
         reach=model.reach,
-        travel=tuple(vector(corner) for corner in corners),
+        travel=tuple(vector(corner) for corner in body.travel),
         meta=model.meta,
         **loop_facts(state, rate),
     )

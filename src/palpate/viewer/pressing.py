@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from palpate.runtime.pressed import PressedBody
 from palpate.runtime.shared_state import State, now
+from palpate.runtime.touchable import Touchable
 from palpate.surrogates import FieldSurrogate
 from palpate.viewer.exhibits import loop_facts, ranges, vector
 from palpate.viewer.messages import PROTOCOL
@@ -41,12 +41,12 @@ class PressedExhibit:
         Those shown: all on the nodes of the first, which is the displacement where there is one.
     """
 
-    def __init__(self, body: PressedBody) -> None:
+    def __init__(self, body: Touchable) -> None:
         self.body = body
         self.fields = _shown(body.fields)
         self.skin, self._nodes, self._prints = self._made()
         self._eyes = [one.evaluator() for one in self.fields]
-        self._judge = body.touch.evaluator()
+        self._judge = body.energy.evaluator()
         self._looks = tuple(self._look(one) for one in self.fields)
         self._last, self._depth, self._released = body.home, 0.0, -math.inf
         self._normal = body.normal
@@ -92,14 +92,14 @@ class PressedExhibit:
 
     def hello(self, state: State, rate: float) -> Touched:
         """See `Exhibit`."""
-        body, own = self.body, self.body.touch.radius_input
+        body, own = self.body, self.body.radius_parameter
         return Touched(
             protocol=PROTOCOL,
             name=body.name,
             inputs=ranges(body.inputs),
             parameters=ranges(body.parameters),
             radius=body.radius,
-            radius_parameter=-1 if own is None else own - 3,
+            radius_parameter=-1 if own is None else own,
             deepest=body.deepest,
             force_max=body.force_max,
             stiffness_max=body.stiffness_max,
@@ -160,8 +160,8 @@ class PressedExhibit:
 
     def _look(self, one: FieldSurrogate) -> Look:
         """Its range over the deepest trained presses, from zero where the values allow."""
-        X = self.body.presses
-        deep = X[np.argsort(self.body.touch.depth(X))[-DEEPEST:]]
+        X = self.body.trained_inputs
+        deep = X[np.argsort(self.body.energy.depth(X))[-DEEPEST:]]
         values = one.values(deep)
         components = values.shape[2]
         sizes = np.linalg.norm(values, axis=2) if components > 1 else values[..., 0]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from palpate.runtime.pressed import PressedBody
+from palpate.runtime.touchable import Touchable
 
 __all__ = ["Prints", "yielding_in_words"]
 
@@ -22,8 +22,8 @@ AT_ONCE = 256  # points whose shares are worked out together
 class _Depths:
     """Depths at which an elastic body has given amplitudes; its further inputs stand in the middle of their ranges."""
 
-    def __init__(self, body: PressedBody) -> None:
-        self._touch, self._radius = body.touch, body.radius
+    def __init__(self, body: Touchable) -> None:
+        self._touch, self._radius = body.energy, body.radius
         self._further = np.array([(r.low + r.high) / 2.0 for r in body.parameters])
         # denser towards the surface, where the amplitude rises as a power of the depth
         self._levels = BEYOND * body.deepest * np.linspace(0.0, 1.0, LEVELS) ** 2
@@ -51,7 +51,7 @@ class Prints:
 
     Parameters
     ----------
-    body : PressedBody
+    body : Touchable
         One with dents that stand at places.
     points : (m, 3)
         Of the touched surface at rest, m.
@@ -62,10 +62,10 @@ class Prints:
         Outward unit normals there.
     """
 
-    def __init__(self, body: PressedBody, points: np.ndarray) -> None:
+    def __init__(self, body: Touchable, points: np.ndarray) -> None:
         assert body.dents is not None
         self._dents, self._depths = body.dents, _Depths(body)
-        slope = body.touch.surface.at(points)[1]
+        slope = body.energy.surface.at(points)[1]
         self.normals = slope / np.linalg.norm(slope, axis=1, keepdims=True)
         parts = np.array_split(points, max(1, -(-len(points) // AT_ONCE)))
         self._shares = np.concatenate([self._dents.shares(part).astype(np.float32) for part in parts])
@@ -95,7 +95,7 @@ class Prints:
         return max(0.0, 1.0 - kept / max(float(place[0]), 1e-12))
 
 
-def yielding_in_words(body: PressedBody) -> str:
+def yielding_in_words(body: Touchable) -> str:
     """From which depth in its middle a body yields; empty for one that doesn't."""
     if body.dents is None:
         return ""

@@ -26,7 +26,6 @@ from starlette.routing import BaseRoute, Mount, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 
 from palpate.runtime import LoopProcess
-from palpate.runtime.pressed import PressedBody
 from palpate.runtime.touchable import Learnt, load_touchable, touchable
 from palpate.viewer.guard import Guard
 from palpate.viewer.ports import listen
@@ -67,7 +66,7 @@ class Viewer:
 
     Parameters
     ----------
-    model : TouchModel, TouchedBody, TouchSurrogate, HeldBody or path
+    model : learnt body or path
     port : int
         The port wanted; 0 takes any free one.
     host : str
@@ -83,7 +82,7 @@ class Viewer:
 
     Attributes
     ----------
-    model : TouchModel, PressedBody or RememberingBody
+    model : Touchable
     loop : LoopProcess
         The real-time process, once started.
     port : int
@@ -205,6 +204,6 @@ def serve(
 
 
 def _announce(viewer: Viewer) -> None:
-    how = "Press it" if isinstance(viewer.model, PressedBody) else "Pull the tip"
+    how = "Press it" if not viewer.model.holds else "Pull the tip"
     sys.stderr.write(f"{viewer.url} shows {viewer.model.name}. {how}; Ctrl-C ends it.\n")
     sys.stderr.flush()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from palpate.runtime.pressed import PressedBody
+from palpate.runtime.touchable import Touchable
 from palpate.surrogates import FieldSurrogate
 
 __all__ = ["relief", "touchable_triangles"]
@@ -15,7 +15,7 @@ TRUE = 1e-3  # of the probe's radius: how near the surface a point of it must li
 NEAR = 0.1  # of the probe's radius: a triangle as near as this to the touched surface is part of it
 
 
-def touchable_triangles(body: PressedBody, field: FieldSurrogate) -> np.ndarray:
+def touchable_triangles(body: Touchable, field: FieldSurrogate) -> np.ndarray:
     """Whether each triangle (t,) of a field's surface belongs to the touched surface."""
     corners = field.points[field.triangles]
     if field.dimple is not None:
@@ -23,22 +23,22 @@ def touchable_triangles(body: PressedBody, field: FieldSurrogate) -> np.ndarray:
     return _near(body, corners)
 
 
-def _near(body: PressedBody, corners: np.ndarray) -> np.ndarray:
+def _near(body: Touchable, corners: np.ndarray) -> np.ndarray:
     """Whether triangles (t, 3, 3) lie on the touched surface and look the way it does."""
-    distance, slope, _ = body.touch.surface.at(corners.mean(axis=1))
+    distance, slope, _ = body.energy.surface.at(corners.mean(axis=1))
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     along = np.einsum("ti,ti->t", normal, slope) > 0.5 * np.linalg.norm(normal, axis=1)
     return np.asarray((np.abs(distance) < NEAR * body.radius) & along)
 
 
-def relief(body: PressedBody) -> tuple[np.ndarray, np.ndarray]:
+def relief(body: Touchable) -> tuple[np.ndarray, np.ndarray]:
     """The touched surface at rest where the body was trained, points (n, 3) in m and triangles (t, 3).
 
     A grid across the normal in the middle is lowered on the zero of the surface's distance; where it does not
     arrive, there is a hole.
     """
     across = _across(body.normal)
-    feet = (body.presses[:, :3] - body.home) @ across.T
+    feet = (body.trained_inputs[:, :3] - body.home) @ across.T
     low, high = feet.min(axis=0), feet.max(axis=0)
     u, v = (np.linspace(low[k], high[k], ALONG + 1) for k in (0, 1))
     flat = np.stack(np.meshgrid(u, v, indexing="ij"), axis=2).reshape(-1, 2)
@@ -58,12 +58,12 @@ def _across(normal: np.ndarray) -> np.ndarray:
     return np.stack([first, np.cross(normal, first)])
 
 
-def _lowered(body: PressedBody, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _lowered(body: Touchable, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 3) moved along the middle's normal to distance zero, and which of them got there."""
     normal, most = body.normal, body.radius
     for _ in range(STEPS):
-        distance, slope, _ = body.touch.surface.at(points)
+        distance, slope, _ = body.energy.surface.at(points)
         along = np.maximum(slope @ normal, 0.2)
         points = points - np.clip(distance / along, -most, most)[:, None] * normal
-    left = np.abs(body.touch.surface.at(points)[0])
+    left = np.abs(body.energy.surface.at(points)[0])
     return points, left < TRUE * body.radius

@@ -1,0 +1,248 @@
+"""The answer of a learnt body to a hand, tick by tick and without allocation: what the loop calls.
+
+One evaluator serves every body and asks what it can do. A hand either moves a free probe, whose centre is the hand's
+own place, or holds a patch or a node of the body, whose displacement from rest it gives.
+
+- *A free probe* that nobody holds is kept in the air. Farther inside than the distance to the touched surface is
+  known, and where it turns back behind the body, the body lets go: no force, until the probe has been in the air. An
+  energy can't end there without pulling the hand in; ending so loses energy and makes none. A probe that comes from
+  behind meets nothing until it was in front.
+- *A held body* without memory returns to rest when nobody holds it. One whose memory lets it lie elsewhere is taken
+  hold of where it is and follows the hand's motion from there on: led to the hand's own place, a rod that stays bent
+  would be bent back within a tick. A hand that can't be believed for a tick takes hold anew.
+- *A memory* walks the elastic energy; what it answers is the force. It never gives back more than it was given.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Protocol
+
+import numpy as np
+from numba import njit
+
+__all__ = ["Elastic", "HandEvaluator"]
+
+# slope of d: 1 for a distance, measured 1.0004 at most where five bodies are pressed; behind flat ones it is 6 at s = 0
+_STEEP = 1.2
+
+_jit = njit(cache=True, nogil=True, error_model="numpy")
+
+
+class Elastic(Protocol):
+    """The elastic answer that `HandEvaluator` asks for, such as `palpate.surrogates.SurrogateEvaluator`.
+
+    Attributes
+    ----------
+    force : (3,)
+        On the hand, N.
+    stiffness : (3, 3)
+        ∂F/∂x, N/m; zero where it isn't known.
+    inside : bool
+        Whether the answer is of the trained region.
+    """
+
+    force: np.ndarray
+    stiffness: np.ndarray
+    inside: bool
+
+    @property
+    def energy(self) -> float:
+        """U, J."""
+        ...
+
+    @property
+    def depth(self) -> float:
+        """Depth of a probe in the surface at rest, or displacement of what is held, m."""
+        ...
+
+    def __call__(self, position: np.ndarray, parameters: np.ndarray) -> None:
+        """Renew the attributes at `position` (3,), m, and the further inputs (p,)."""
+        ...
+
+
+class HandEvaluator:
+    """Answers a hand on any body; nothing is allocated.
+
+    Attributes
+    ----------
+    force : (3,)
+        On the hand, N.
+    contact : (3,)
+        The probe's centre, or the offset of the held place from its rest position, m.
+    loads : (n,)
+        The loads that hold the body there, N, where it is learnt by loads; otherwise none.
+    inside : bool
+        Within the trained region.
+    mirrored : bool
+        Answered by symmetry.
+    let_go : bool
+        Whether the body has let go of a probe that is still in it.
+    depth : float
+        Of the rigid probe in the surface at rest, m; negative without contact, zero for a probe that was let go. Of a
+        held body, how far the hand has displaced it.
+    stiffness : float
+        Along the force, −F·(∂F/∂x)F/‖F‖², N/m, of the elastic answer; zero without force, or where it isn't known.
+    elapsed : float
+        Since the call before, s, to be set ahead of each call where the body has a memory.
+    away : (3,)
+        Where a probe or a patch is that nobody holds, m.
+    prints : (n,)
+        Amplitude of the print at each place that keeps one, √J; empty for a body that keeps none.
+
+    Parameters
+    ----------
+    elastic : Elastic
+    memory : optional
+        With ``force`` and ``step(position, energy, slope, dt)`` as `palpate.surrogates.relaxation.Memory` has them.
+        One with ``release(dt)`` and ``lies`` (3,) says where the body lies that nobody holds; one with ``now`` keeps
+        prints.
+    holds : bool
+        Whether the hand holds a patch or a node, and doesn't move a free probe.
+    directions : (k, 3)
+        The felt directions, unit vectors; used by a memory that lets a body lie elsewhere.
+    away, normal : (3,)
+        See above; outer normal of the surface where a probe usually touches.
+    inner : float
+        How far inside the surface the probe's centre may go, m; infinite for a body that never lets go.
+    radius : float
+        Of the probe, m, unless it is among the further inputs.
+    radius_input : int, optional
+        Which of the further inputs is the probe's radius.
+    places : tuple of int
+        Further inputs that a hand which holds can't change: those that say where it has taken hold.
+    """
+
+    def __init__(
+        self,
+        elastic: Any,
+        memory: Any = None,
+        *,
+        holds: bool,
+        directions: np.ndarray | None = None,
+        away: np.ndarray | None = None,
+        normal: np.ndarray | None = None,
+        inner: float = math.inf,
+        radius: float = 0.0,
+        radius_input: int | None = None,
+        places: tuple[int, ...] = (),
+    ) -> None:
+        self._elastic, self._memory, self._holds = elastic, memory, holds
+        self.away = np.zeros(3) if away is None else away
+        self._normal = np.array([0.0, 0.0, 1.0]) if normal is None else normal
+        self._inner, self._radius, self._radius_input = inner, radius, radius_input
+        self._places, self._taken = places, np.zeros(0)
+        self._stays = memory if hasattr(memory, "release") else None
+        self._prints = memory if hasattr(memory, "now") else None
+        self.prints = np.zeros(0) if self._prints is None else self._prints.now
+        self.force: np.ndarray = elastic.force if memory is None else memory.force
+        self._follows = not hasattr(elastic, "contact")
+        self.contact: np.ndarray = getattr(elastic, "contact", np.zeros(3))
+        self.loads: np.ndarray = getattr(elastic, "loads", np.zeros(0))
+        self._slope, self._grip, self._held = np.zeros(3), np.zeros(3), False
+        felt = np.eye(3) if directions is None else directions
+        self._felt: list[list[float]] = (felt.T @ felt).tolist()
+        self.inside, self.mirrored, self.let_go = True, False, False
+        self.depth, self.stiffness, self.elapsed = -math.inf, 0.0, 0.0
+        _along(elastic.force, elastic.stiffness)  # compile now, not in the loop
+        _behind(self._normal, self._normal)
+
+    def place(self, position: np.ndarray, *, holding: bool, believed: bool) -> None:
+        """Turn the hand's place (3,), m, into that of the probe or of what it holds.
+
+        Parameters
+        ----------
+        position : (3,)
+            Overwritten.
+        holding : bool
+            Whether there is a hand. A probe that nobody holds is kept `away`: a way back to the centre could lead
+            through the body.
+        believed : bool
+            Whether the hand's place is good; one that isn't is answered by no force.
+        """
+        stays, took = self._stays, self._held
+        self._held = holding and believed
+        if stays is None:
+            if not holding:
+                position[:] = self.away
+            return
+        if not self._held:
+            position[:] = self.contact
+            return
+        x, y, z = position.tolist()
+        for i in range(3):
+            if not took:
+                row = self._felt[i]
+                self._grip[i] = stays.lies[i] - (row[0] * x + row[1] * y + row[2] * z)
+            position[i] += self._grip[i]
+
+    @property
+    def grew(self) -> bool:
+        """Whether the last call made a print grow."""
+        return self._prints is not None and self._prints.lost_in_step > 0.0
+
+    def __call__(self, position: np.ndarray, parameters: np.ndarray) -> None:
+        """Renew the attributes for a probe or a held place at `position` (3,), m, and the further inputs (p,)."""
+        elastic, memory = self._elastic, self._memory
+        if self._places:
+            parameters = self._where_taken(parameters)
+        if self._stays is not None and not self._held:
+            good = self._stays.release(self.elapsed)
+        else:
+            elastic(position, parameters)
+            energy = elastic.energy
+            if not self._holds:
+                self._hold_or_let_go(elastic.depth, parameters)
+                if self.let_go:
+                    energy = 0.0
+                    elastic.force[:] = 0.0
+            np.negative(elastic.force, out=self._slope)
+            good = memory is None or memory.step(position, energy, self._slope, self.elapsed)
+        if self._follows:
+            self.contact[:] = position
+        self.mirrored = elastic.mirrored if not self._follows else False
+        self.inside = elastic.inside and not self.let_go
+        self.depth = 0.0 if self.let_go else elastic.depth
+        self.stiffness = _along(elastic.force, elastic.stiffness)
+        if not good:
+            self.force[:] = math.nan  # the loop makes a fault of it
+
+    def _where_taken(self, parameters: np.ndarray) -> np.ndarray:
+        """The further inputs (p,), those of the place as they were when the hand took hold.
+
+        To move the place of a body that is held would change its energy by no work of the hand.
+        """
+        if len(self._taken) != len(parameters):
+            self._taken = parameters.copy()  # at the first call
+        for i in range(len(parameters)):
+            if not (self._held and i in self._places):
+                self._taken[i] = parameters[i]
+        return self._taken
+
+    def _hold_or_let_go(self, depth: float, parameters: np.ndarray) -> None:
+        own = self._radius_input
+        radius = self._radius if own is None else parameters[own]
+        if depth <= 0.0:
+            self.let_go = False
+        elif depth > self._inner + radius or _behind(self._elastic.outward, self._normal):
+            self.let_go = True
+
+
+@_jit
+def _along(force, stiffness) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    size, total = 0.0, 0.0
+    for i in range(3):
+        size += force[i] * force[i]
+        for j in range(3):
+            total -= force[i] * stiffness[i, j] * force[j]
+    return total / size if size > 0.0 else 0.0
+
+
+@_jit
+def _behind(slope, normal) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """Whether d climbs towards the back, and faster than a distance does."""
+    square, out = 0.0, 0.0
+    for i in range(3):
+        square += slope[i] * slope[i]
+        out += slope[i] * normal[i]
+    return out < 0.0 and square > _STEEP * _STEEP

@@ -1,0 +1,117 @@
+"""One evaluator for every body: nothing is allocated, and what is held by a pad is felt, let go and held in place."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_process import wait_for, watch
+
+import pressed
+from allocated import kept_by
+from bent import CREEPS, body
+from held import INPUTS
+from models import linear_network, spring_beam
+from palpate.runtime import LoopProcess, now
+from palpate.runtime.touchable import load_touchable, touchable
+from palpate.surrogates.grasp import GraspSurrogate, RestStiffness
+from palpate.units import Quantity
+
+SPRING = np.diag([80.0, 90.0, 110.0])  # N/m
+PLACE = np.array([0.005, -0.01])  # m
+
+
+def pad() -> GraspSurrogate:
+    """U = ½ d·K d, softer the farther the pad is along x: κ = exp(−10 p_x)."""
+    network = linear_network(list(INPUTS), [Quantity("ln U/U0")], np.array([[0.0, 0.0, 0.0, 0.0, -0.2, 0.0]]))
+    return GraspSurrogate(network, RestStiffness.even(SPRING, 2), meta={"name": "pad"})
+
+
+def expected(d: np.ndarray, p_x: float) -> np.ndarray:
+    """F of the pad, N."""
+    return -np.exp(-10.0 * p_x) * SPRING @ d
+
+
+BODIES = {
+    "beam": spring_beam,
+    "rod": body,
+    "creeping rod": lambda: body(CREEPS),
+    "probe": pressed.surrogate,
+    "relaxing": lambda: pressed.surrogate(meta={"relaxation": {"terms": [[0.3, 0.05]]}}),
+    "pad": pad,
+}
+
+
+@pytest.mark.parametrize("make", BODIES.values(), ids=BODIES)
+def test_a_tick_allocates_nothing(make):
+    model = touchable(make())
+    answer, parameters = model.evaluator(), np.array([(r.low + r.high) / 2 for r in model.parameters])
+    place, start = np.zeros(3), model.home - 0.1 * model.deepest * model.normal
+    answer.elapsed = 1e-3
+
+    def tick() -> None:
+        place[:] = start
+        answer.place(place, holding=True, believed=True)
+        answer(place, parameters)
+        answer.place(place, holding=False, believed=True)
+        answer(place, parameters)
+
+    tick()
+    assert kept_by(tick, 200) < 200
+
+
+def test_a_pad_is_felt_as_its_energy_says():
+    model = touchable(pad())
+    assert model.holds
+    assert not model.home.any()
+    answer, d = model.evaluator(), np.array([0.004, -0.002, 0.006])
+    position = d.copy()
+    answer.place(position, holding=True, believed=True)
+    answer(position, PLACE)
+    np.testing.assert_allclose(answer.force, expected(d, PLACE[0]), rtol=1e-12)
+    assert answer.depth == pytest.approx(np.linalg.norm(d))
+    assert answer.inside
+    n = answer.force / np.linalg.norm(answer.force)
+    assert answer.stiffness == pytest.approx(np.exp(-10 * PLACE[0]) * n @ SPRING @ n)
+    assert np.exp(0.2) * 110 > model.stiffness_max > 0.9 * np.exp(0.2) * 110
+
+
+def test_a_pad_that_nobody_holds_is_at_rest():
+    answer, position = touchable(pad()).evaluator(), np.full(3, 0.005)
+    answer.place(position, holding=False, believed=True)
+    answer(position, PLACE)
+    assert not answer.force.any()
+    assert not answer.contact.any()
+
+
+def test_a_held_pad_stays_where_it_has_taken_hold():
+    """To move its place would change the energy by no work of the hand."""
+    answer, d = touchable(pad()).evaluator(), np.array([0.004, 0.0, 0.0])
+
+    def felt(holding: bool, p_x: float) -> np.ndarray:
+        position = d.copy()
+        answer.place(position, holding=holding, believed=True)
+        answer(position, np.array([p_x, 0.0]))
+        return answer.force.copy()
+
+    first = felt(True, 0.005)
+    np.testing.assert_array_equal(felt(True, -0.015), first)
+    assert not felt(False, -0.015).any()
+    np.testing.assert_allclose(felt(True, -0.015), expected(d, -0.015), rtol=1e-12)
+
+
+def test_a_pad_in_the_real_process(tmp_path):
+    path = pad().save(tmp_path / "pad.palpate")
+    model, d = load_touchable(path), np.array([0.003, -0.004, 0.002])
+    assert (model.name, model.parameters) == ("pad", INPUTS[3:])
+    with LoopProcess(path, parameters=PLACE) as loop:
+        target = model.workspace(loop.read().radius).to_hand(d)
+        loop.shared.write_command(beat=now() + 60, grabbed=True, target=target)
+        wait_for(lambda: np.linalg.norm(loop.read().position - d) < 1e-9)
+        watch(loop, 0.2)  # the force ramps in
+        state = loop.read()
+        np.testing.assert_allclose(state.force, expected(d, PLACE[0]), rtol=1e-9)
+        assert state.inside
+        loop.shared.write_command(grabbed=False)
+        wait_for(lambda: not loop.read().force.any())
+    assert loop.report().foreign == ()
+    assert set(loop.report().faults) == set()

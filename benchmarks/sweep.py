@@ -95,7 +95,7 @@ def _round(p: Preset, points: np.ndarray) -> dict[str, float]:
 def _points(p: Preset, solves: int) -> np.ndarray:
     """The preset's kind of design, of another size."""
     from palpate.sweeps import Space
-    from palpate.sweeps.designs import design_points
+    from palpate.sweeps.space import design_points
 
     return design_points(p.design, Space(p.problem().ranges), solves, 0)
 

@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from palpate.dataset import Dataset, Field, Layout, assemble, beam_fields, solid_fields
-from palpate.dataset.fields import complete
+from palpate.dataset import Dataset, Field, Layout, assemble, beam_fields, solid_fields, with_bookkeeping
 from palpate.dataset.store import CHUNK_BYTES
 from palpate.errors import UsageError
 from palpate.units import Range
@@ -148,7 +147,7 @@ def test_stores_of_version_1_open(version_1, tmp_path):
 def test_rows_of_both_versions_are_joined(version_1):
     old = version_1.ok
     schema = beam_fields(len(old.rest))
-    names = [field.name for field in complete(schema)]
+    names = [field.name for field in with_bookkeeping(schema)]
     plan = Layout(old.rest, old["of_interest"], old.load_nodes, old.load_directions)
     new = assemble(old.ranges, plan, old.X, {n: old[n] for n in names}, old.provenance)
     assert new.data.attrs["format_version"] == 2
@@ -168,7 +167,7 @@ def test_rows_of_both_versions_are_joined(version_1):
 )
 def test_names_are_given_once(schema):
     with pytest.raises(UsageError, match="more than one"):
-        complete(schema)
+        with_bookkeeping(schema)
 
 
 def test_each_dimension_has_a_size():

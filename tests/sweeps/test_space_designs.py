@@ -10,8 +10,8 @@ from scipy.stats import qmc
 
 from palpate.errors import UsageError
 from palpate.sweeps import DESIGNS, Space, grid, random, sobol
-from palpate.sweeps.chunks import LARGEST, chunks
-from palpate.sweeps.designs import design_points
+from palpate.sweeps.plan import neighbour_chains
+from palpate.sweeps.space import design_points
 from palpate.units import Range
 
 LINE = Space([Range("P", 0.0, 5.0, "N")])
@@ -119,23 +119,23 @@ def test_a_design_of_ones_own():
 
 @settings(deadline=None, max_examples=60)
 @given(st.integers(1, 300), st.integers(1, 4), st.integers(0, 5))
-def test_chunks_part_all_rows_once(count, inputs, seed):
+def test_chains_hold_every_row_once(count, inputs, seed):
     unit = np.random.default_rng(seed).random((count, inputs))
-    parts = chunks(unit, np.zeros(inputs))
-    np.testing.assert_array_equal(np.sort(np.concatenate(parts)), np.arange(count))
-    assert max(map(len, parts)) <= LARGEST
+    chains = neighbour_chains(unit, np.zeros(inputs))
+    np.testing.assert_array_equal(np.sort(np.concatenate(chains)), np.arange(count))
+    assert max(map(len, chains)) <= 32
 
 
-def test_chunks_of_one_input_are_ascending_intervals():
+def test_chains_of_one_input_are_ascending_intervals():
     unit = np.random.default_rng(0).permutation(501)[:, None] / 500
-    parts = chunks(unit, np.zeros(1))
-    np.testing.assert_array_equal(unit[np.concatenate(parts), 0], np.arange(501) / 500)
+    chains = neighbour_chains(unit, np.zeros(1))
+    np.testing.assert_array_equal(unit[np.concatenate(chains), 0], np.arange(501) / 500)
 
 
-def test_chunks_shorten_the_way_between_samples():
+def test_chains_shorten_the_way_between_samples():
     unit = np.random.default_rng(0).random((512, 2))
 
     def way(rows):
         return np.linalg.norm(np.diff(unit[rows], axis=0), axis=1).mean()
 
-    assert np.mean([way(rows) for rows in chunks(unit, np.zeros(2))]) < way(np.arange(512)) / 5
+    assert np.mean([way(rows) for rows in neighbour_chains(unit, np.zeros(2))]) < way(np.arange(512)) / 5

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from models import linear_network
-from palpate.dataset import Dataset
-from palpate.dataset.assemble import Layout, assemble
+from palpate.dataset import Dataset, Layout, assemble
 from palpate.learning import History
 from palpate.network import Network
 from palpate.surrogates import TouchModel

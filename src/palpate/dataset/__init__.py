@@ -1,20 +1,36 @@
-"""Keeping the answers of a sweep: labelled arrays with units and provenance, in a Zarr store.
+"""Answers of many solves: labelled arrays with units and provenance, kept in a Zarr store.
 
 ::
 
-    fields.py     Field: one quantity that each solve answers; schemas of beams and solids
-    layout.py     Layout: nodes at rest, axes, surface
-    assemble.py   inputs and answers → a labelled dataset
-    dataset.py    Dataset: the frozen value
-    named.py      its arrays by name
-    words.py      a dataset in words
-    join.py       the rows of several datasets as one
-    store.py      on disk, with a checksum
+    dataset.py   Dataset: the frozen value, its arrays by name, its rows taken, split and joined
+    schema.py    Field, Layout: the quantities that a solver answers, and the nodes that they belong to
+    assemble.py  inputs and answers, labelled and joined into a dataset
+    store.py     a dataset on disk, with a checksum
+    measured/    forces measured on a specimen: text tables, and lines from a sensor
 """
 
 from palpate.dataset.assemble import assemble
 from palpate.dataset.dataset import Dataset
-from palpate.dataset.fields import Field, beam_fields, conjugate_unit, solid_fields
-from palpate.dataset.layout import Layout
+from palpate.dataset.schema import (
+    BOOKKEEPING,
+    Field,
+    Layout,
+    beam_fields,
+    check_schema,
+    conjugate_unit,
+    solid_fields,
+    with_bookkeeping,
+)
 
-__all__ = ["Dataset", "Field", "Layout", "assemble", "beam_fields", "conjugate_unit", "solid_fields"]
+__all__ = [
+    "BOOKKEEPING",
+    "Dataset",
+    "Field",
+    "Layout",
+    "assemble",
+    "beam_fields",
+    "check_schema",
+    "conjugate_unit",
+    "solid_fields",
+    "with_bookkeeping",
+]

@@ -1,4 +1,4 @@
-"""Putting the answers of a solver together as a labelled dataset."""
+"""Inputs and answers of a solver, labelled and joined into a dataset."""
 
 from __future__ import annotations
 
@@ -8,13 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from palpate.dataset.dataset import FORMAT, FORMAT_VERSION, Dataset
-from palpate.dataset.fields import Field, beam_fields, complete
-from palpate.dataset.layout import Layout
+from palpate.dataset.dataset import Dataset
+from palpate.dataset.schema import (
+    FORMAT,
+    FORMAT_VERSION,
+    Field,
+    Layout,
+    beam_fields,
+    check_schema,
+    with_bookkeeping,
+)
 from palpate.errors import UsageError
 from palpate.units import Range
 
-__all__ = ["assemble", "check_schema"]
+__all__ = ["assemble"]
 
 
 def assemble(
@@ -26,27 +33,25 @@ def assemble(
     samples: np.ndarray | None = None,
     schema: Iterable[Field] | None = None,
 ) -> Dataset:
-    """Label inputs and answers.
+    """Label inputs and answers as a dataset.
 
     Parameters
     ----------
-    ranges : n ranges
+    ranges : sequence of n ranges
+        Name, unit and interval of each input.
     layout : Layout
+        Nodes, axes and surface of the body.
     inputs : (sample, n) array
-        In the units of `ranges`.
+        Inputs of each solve, in the units of `ranges`.
     answers : mapping
         An array for each field of the schema and of the bookkeeping, samples first; optional fields may be
         missing.
     provenance : mapping
         Plain data for a JSON file: where the answers come from.
     samples : (sample,) array of int, optional
-        Number of each sample; by default they count from 0.
+        Number of each sample in its design; by default they count from 0.
     schema : fields, optional
-        What the solver answers; by default what a plane beam does.
-
-    Returns
-    -------
-    Dataset
+        Fields that the solver answers; by default those of a plane beam.
 
     Raises
     ------
@@ -61,7 +66,7 @@ def assemble(
     variables: dict[str, Any] = {
         "inputs": (("sample", "input"), np.asarray(inputs, dtype=float), _attrs(units, "inputs")),
     }
-    for field in complete(schema):
+    for field in with_bookkeeping(schema):
         if field.name in answers:
             values = np.asarray(answers[field.name], dtype=_text_type(field))
             variables[field.name] = (("sample", *field.dims), values, _attrs(field.unit, field.meaning))
@@ -79,32 +84,6 @@ def assemble(
         "provenance": json.dumps(dict(provenance), sort_keys=True),
     }
     return Dataset(xarray.Dataset(variables, coords, attrs))
-
-
-def check_schema(schema: Iterable[Field], layout: Layout, inputs: int) -> None:
-    """Make sure that every field's dimensions have the sizes that the layout and the inputs give them.
-
-    Raises
-    ------
-    UsageError
-        If one has not.
-    """
-    sizes = {
-        "node": len(layout.rest),
-        "axis": len(layout.axes),
-        "component": len(layout.components),
-        "input": inputs,
-        "along": inputs,
-        **{dim: len(names) for dim, names in (layout.labels or {}).items()},
-    }
-    for field in complete(schema):
-        for dim, size in zip(field.dims, field.shape, strict=True):
-            if sizes.setdefault(dim, size) != size:
-                raise UsageError(
-                    f"The field {field.name!r} has {size} values along {dim!r}.",
-                    why=f"The layout, or a field before it, has {sizes[dim]}.",
-                    fix="Give equal sizes, or call the dimension otherwise.",
-                )
 
 
 def _coords(ranges: Sequence[Range], layout: Layout, schema: Iterable[Field]) -> dict[str, Any]:
@@ -152,9 +131,9 @@ def _text_type(field: Field) -> Any:
     return np.dtypes.StringDType() if isinstance(field.fill, str) else None
 
 
-def _text(words: Any) -> np.ndarray:
+def _text(strings: Iterable[str]) -> np.ndarray:
     # variable-length text: Zarr has no stable format for NumPy's fixed-length one
-    return np.array(list(words), dtype=np.dtypes.StringDType())
+    return np.array(list(strings), dtype=np.dtypes.StringDType())
 
 
 def _attrs(unit: str, meaning: str) -> dict[str, str]:

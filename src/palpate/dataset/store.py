@@ -1,4 +1,4 @@
-"""Datasets on disk: one Zarr store (format 3) each, checked by a sum over everything in it."""
+"""Datasets on disk: each is a Zarr store (format 3) with a checksum over everything in it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from palpate.dataset.dataset import FORMAT, FORMAT_VERSION, Dataset
+from palpate.dataset.dataset import Dataset
+from palpate.dataset.schema import FORMAT, FORMAT_VERSION
 from palpate.errors import FileFormatError, UsageError
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ def write(dataset: Dataset, path: Path, *, overwrite: bool) -> Path:
     return path
 
 
-def read(path: Path) -> xarray.Dataset:
+def read(path: Path) -> Dataset:
     """Read and check the store at `path`."""
     attrs = _attributes(path)
     if attrs.get("format") != FORMAT:
@@ -66,7 +67,7 @@ def read(path: Path) -> xarray.Dataset:
 
 
 def _chunks(data: xarray.Dataset) -> dict[str, dict[str, Any]]:
-    """Chunks of whole samples for large fields, so that a reader of a few samples decodes no others."""
+    """Return chunks of whole samples for large fields, so that a reader of a few samples decodes no others."""
     encoding = {}
     for name, variable in data.data_vars.items():
         if variable.nbytes > CHUNK_BYTES and variable.dims[0] == "sample":
@@ -76,7 +77,7 @@ def _chunks(data: xarray.Dataset) -> dict[str, dict[str, Any]]:
 
 
 def _attributes(path: Path) -> dict[str, Any]:
-    """Attributes of the store's root, from its metadata file."""
+    """Read the attributes of the store's root from its metadata file."""
     if not path.exists():
         raise FileFormatError(
             f"There is no dataset at {path}.",
@@ -99,11 +100,11 @@ def _attributes(path: Path) -> dict[str, Any]:
     return attrs
 
 
-def _load(path: Path) -> xarray.Dataset:
+def _load(path: Path) -> Dataset:
     import xarray
 
-    if torn := _without_metadata(path):
-        raise _corrupt(path, f"its part {torn} has no zarr.json.")
+    if part := _part_without_metadata(path):
+        raise _corrupt(path, f"its part {part} has no zarr.json.")
     try:
         with warnings.catch_warnings():
             # what a file manager leaves in a folder is no part of it
@@ -111,24 +112,27 @@ def _load(path: Path) -> xarray.Dataset:
                 "ignore", message=".*is not recognized as a component of a Zarr hierarchy"
             )
             data: xarray.Dataset = xarray.open_zarr(path, consolidated=False, chunks=None).load()
-        wanted = data.attrs.pop("checksum", "none")
-        found = _checksum(Dataset(data))
+        written = data.attrs.pop("checksum", "none")
+        dataset = Dataset(data)
+        computed = _checksum(dataset)
     # the kinds of errors that Zarr, its codecs and xarray raise on broken bytes
     except (OSError, ValueError, KeyError, TypeError, RuntimeError, AttributeError) as error:
         raise _corrupt(path, f"it can't be decoded: {error!r}.") from error
-    if found != wanted:
-        raise _corrupt(path, f"its contents don't match its checksum ({found[:12]} against {wanted[:12]}).")
-    return data
+    if computed != written:
+        raise _corrupt(
+            path, f"its contents don't match its checksum ({computed[:12]} against {written[:12]})."
+        )
+    return dataset
 
 
-def _without_metadata(path: Path) -> str:
-    """A variable that can't be known any more, of which Zarr only warns; "" if there is none."""
+def _part_without_metadata(path: Path) -> str:
+    """Find a variable whose metadata are lost, of which Zarr only warns; "" if there is none."""
     parts = sorted(p for p in path.iterdir() if p.is_dir() and not p.name.startswith((".", "_")))
     return next((p.name for p in parts if not (p / "zarr.json").is_file()), "")
 
 
 def _checksum(dataset: Dataset) -> str:
-    """SHA-256 over all variables and the provenance, as hexadecimal digits."""
+    """Return the SHA-256 of all variables and the provenance, as hexadecimal digits."""
     origin = json.dumps(dataset.provenance, sort_keys=True)
     return hashlib.sha256((dataset.fingerprint() + origin).encode()).hexdigest()
 
@@ -143,10 +147,10 @@ def _corrupt(path: Path, why: str) -> FileFormatError:
 
 def _holds(path: Path, dataset: Dataset) -> bool:
     try:
-        there = Dataset(read(path))
+        stored = read(path)
     except FileFormatError:
         return False
-    return bool(there.hash == dataset.hash and there.provenance == dataset.provenance)
+    return bool(stored.hash == dataset.hash and stored.provenance == dataset.provenance)
 
 
 def _remove(path: Path) -> None:

@@ -33,7 +33,7 @@ class LocalCluster:
     Parameters
     ----------
     workers : int
-        How many.
+        Number of worker processes.
     """
 
     def __init__(self, workers: int) -> None:
@@ -133,7 +133,7 @@ def local_cluster(workers: int | None = None) -> LocalCluster:
     Parameters
     ----------
     workers : int, optional
-        By default one for each core.
+        Number of worker processes; by default one for each core.
 
     Returns
     -------

@@ -1,6 +1,6 @@
-"""What an interrupted sweep has done so far, on disk.
+"""The ledger of a sweep: its finished parts, on disk, through interruptions.
 
-While a sweep to ``NAME.zarr`` runs, what has been finished is written every few seconds as a small dataset of
+While a sweep to ``NAME.zarr`` runs, finished rows are written every few seconds as a small dataset of
 its own in ``NAME.zarr.parts``, whole or not at all. A sweep of the same configuration takes the parts up; the
 last step joins them into ``NAME.zarr``.
 """
@@ -26,7 +26,7 @@ class Ledger:
     Attributes
     ----------
     path : Path
-        Where the dataset goes.
+        Path of the dataset when it is complete.
     config : str
         Hash of the sweep's configuration.
     """
@@ -40,7 +40,7 @@ class Ledger:
         return self.path.with_name(self.path.name + ".parts")
 
     def complete(self) -> Dataset | None:
-        """The finished dataset, if there is one.
+        """Read the finished dataset, if there is one.
 
         Raises
         ------
@@ -52,15 +52,15 @@ class Ledger:
         if not self.path.exists():
             return None
         try:
-            there = Dataset.open(self.path)
+            dataset = Dataset.open(self.path)
         except FileFormatError as error:
             raise FileFormatError(
                 error.what,
                 why=error.why,
                 fix=f"Delete {self.path} and sweep again, or write to another path.",
             ) from error
-        self._check(self.path, there.provenance.get("config_hash"))
-        return there
+        self._check(self.path, dataset.provenance.get("config_hash"))
+        return dataset
 
     def begin(self) -> None:
         """Open the ledger.
@@ -78,7 +78,7 @@ class Ledger:
         plan.write_text(json.dumps({"config_hash": self.config}), encoding="utf-8")
 
     def read(self) -> Iterator[Dataset]:
-        """Parts that earlier runs finished."""
+        """Yield the parts that earlier runs finished."""
         for part in sorted(self.parts.glob("part-*.zarr")):
             try:
                 yield Dataset.open(part)
@@ -97,26 +97,26 @@ class Ledger:
         Returns
         -------
         Dataset
-            What is at the path now: where another run of the same sweep was faster, that run's.
+            The dataset at the path now: where another run of the same sweep was faster, that run's.
 
         Raises
         ------
         UsageError
             If something else has appeared at the path meanwhile.
         """
-        there = self.complete()
-        if there is None:
+        other = self.complete()
+        if other is None:
             try:
                 dataset.save(self.path)
             except (UsageError, OSError):  # the other run may have come in between
-                there = self.complete()
-                if there is None:
+                other = self.complete()
+                if other is None:
                     raise
         shutil.rmtree(self.parts, ignore_errors=True)  # the other run may be at it too
-        return dataset if there is None else there
+        return dataset if other is None else other
 
-    def _check(self, place: Path, found: object) -> None:
-        if found != self.config:
+    def _check(self, place: Path, config: object) -> None:
+        if config != self.config:
             raise UsageError(
                 f"{place} belongs to another sweep.",
                 why="Its body, loads or samples are not those asked for now.",

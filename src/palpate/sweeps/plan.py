@@ -1,40 +1,54 @@
-"""What a sweep will solve, in which order, and how the answers are labelled: all settled before it begins."""
+"""The plan of a sweep: points, order and labels, all settled before the first solve.
+
+Points are solved in chains of neighbours, which share a solver and its warm start. A problem may arrange them itself.
+"""
 
 from __future__ import annotations
 
+import datetime
 import functools
+import hashlib
+import importlib.metadata
+import json
+import os
+import platform
 from dataclasses import dataclass
 from numbers import Integral
 from typing import Any
 
 import numpy as np
 
-from palpate.dataset import Dataset, Field, Layout, assemble
-from palpate.dataset.assemble import check_schema
-from palpate.dataset.fields import complete
+from palpate.dataset import Dataset, Field, Layout, assemble, check_schema, with_bookkeeping
 from palpate.errors import UsageError
-from palpate.sweeps.answers import Columns
-from palpate.sweeps.chunks import chunks
-from palpate.sweeps.designs import Design, design_points
 from palpate.sweeps.problem import Checking, Designed, Problem, has_chains, missing_members, own_design
-from palpate.sweeps.provenance import config_hash, provenance
-from palpate.sweeps.space import Space
+from palpate.sweeps.runner import Columns
+from palpate.sweeps.space import Design, Space, design_points
 
-__all__ = ["Plan", "make_plan"]
+__all__ = [
+    "Plan",
+    "config_hash",
+    "make_plan",
+    "neighbour_chains",
+    "provenance",
+]
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What is to be solved, and the labels of the answers.
+    """Points to solve at, and the labels of the answers.
 
     Attributes
     ----------
     problem : Problem
+        The question that is asked at each point.
     space : Space
+        Ranges of its inputs.
     points : (N, n) array
+        Inputs of each sample.
     design : str
-        Name of what placed the points.
+        Name of the design that placed the points.
     seed : int
+        Seed of the design.
     """
 
     problem: Problem
@@ -50,7 +64,7 @@ class Plan:
 
     @functools.cached_property
     def layout(self) -> Layout:
-        """The problem's; a solid is meshed for it."""
+        """Layout of the problem; a solid is meshed for it."""
         return self.problem.layout
 
     @functools.cached_property
@@ -62,8 +76,8 @@ class Plan:
 
     @property
     def schema(self) -> tuple[Field, ...]:
-        """Every column, the bookkeeping among them."""
-        return complete(self.fields)
+        """Fields of all columns, with the bookkeeping."""
+        return with_bookkeeping(self.fields)
 
     @functools.cached_property
     def origin(self) -> dict[str, Any]:
@@ -71,23 +85,23 @@ class Plan:
         return provenance(self.problem, self.points, self.design, self.seed)
 
     def chains(self) -> list[np.ndarray]:
-        """Rows in the order in which one solver solves them."""
+        """Return the rows in chains, each of which one solver solves in order."""
         if has_chains(self.problem):
-            return _checked([np.asarray(rows) for rows in self.problem.chains(self.points)], len(self.points))
+            return _check_chains(self.problem.chains(self.points), len(self.points))
         rest = self.space.to_unit(np.clip(0.0, self.space.low, self.space.high))
-        return chunks(self.space.to_unit(self.points), rest)
+        return neighbour_chains(self.space.to_unit(self.points), rest)
 
     def label(self, columns: Columns, rows: np.ndarray) -> Dataset:
-        """Dataset of some rows."""
+        """Make a dataset of some rows."""
         return assemble(
             self.space.ranges, self.layout, self.points[rows], columns, self.origin, rows, self.fields
         )
 
 
 def make_plan(
-    body: Any, interactions: Any, samples: int | None, seed: int, design: str | Design | None, points: Any
+    body: Any, interactions: Any, samples: Any, seed: int, design: str | Design | None, points: Any
 ) -> Plan:
-    """Settle what a sweep solves; the arguments are those of `sweep`.
+    """Make the plan of a sweep; the arguments are those of `sweep`.
 
     Raises
     ------
@@ -102,19 +116,27 @@ def make_plan(
             why=f"Given were samples={samples} and points={'None' if points is None else 'an array'}.",
             fix="For example sweep(body, loads, samples=256).",
         )
-    if samples is not None:
-        _require_samples(samples)
+    if samples is not None and not (isinstance(samples, Integral) and samples >= 1):
+        raise UsageError(
+            f"A sweep was asked for {samples!r} samples.",
+            why="It needs a whole number of them, at least one.",
+            fix="For example samples=256.",
+        )
     if points is not None:
-        given = _some(space.points(points))
+        given = _check_not_empty(space.points(points))
         if isinstance(problem, Checking):
             problem.check_points(given)
         return Plan(problem, space, given, "points", seed)
     own = own_design(problem)
     if isinstance(problem, Designed) and own is not None and (design is None or design == own):
-        return Plan(problem, space, _some(space.points(problem.design(samples or 0, seed))), own, seed)
+        return Plan(
+            problem, space, _check_not_empty(space.points(problem.design(samples or 0, seed))), own, seed
+        )
     design = "sobol" if design is None else design
     name = design if isinstance(design, str) else getattr(design, "__name__", type(design).__name__)
-    return Plan(problem, space, _some(design_points(design, space, samples or 0, seed)), name, seed)
+    return Plan(
+        problem, space, _check_not_empty(design_points(design, space, samples or 0, seed)), name, seed
+    )
 
 
 def _problem(body: Any, interactions: Any) -> Problem:
@@ -135,29 +157,101 @@ def _problem(body: Any, interactions: Any) -> Problem:
     )
 
 
-def _checked(chains: list[np.ndarray], count: int) -> list[np.ndarray]:
-    """The chains, if each row is in just one."""
+def _check_chains(given: list[np.ndarray], count: int) -> list[np.ndarray]:
+    """Return the chains that hold a row; raise unless each row is in just one."""
+    chains = [np.asarray(rows) for rows in given]
     rows = np.sort(np.concatenate([np.empty(0, dtype=np.int64), *(rows.ravel() for rows in chains)]))
     if not np.array_equal(rows, np.arange(count)):
         raise UsageError(
             "The problem's chains don't hold each sample once.",
             why=f"They hold {rows.size} rows of {count} samples, {np.unique(rows).size} different ones.",
-            fix="Let chains(points) part the rows 0 … N − 1.",
+            fix="Let chains(points) put each of the rows 0 … N − 1 in one chain.",
         )
     return [rows for rows in chains if rows.size]
 
 
-def _require_samples(samples: Any) -> None:
-    if isinstance(samples, Integral) and int(samples) >= 1:
-        return
-    raise UsageError(
-        f"A sweep was asked for {samples!r} samples.",
-        why="It needs a whole number of them, at least one.",
-        fix="For example samples=256.",
-    )
-
-
-def _some(points: np.ndarray) -> np.ndarray:
+def _check_not_empty(points: np.ndarray) -> np.ndarray:
     if not len(points):
         raise UsageError("A sweep needs at least one point.", why="There is none.", fix="Give some.")
     return points
+
+
+_LONGEST, _SHORTEST = 32, 4  # samples of a chain
+
+
+def neighbour_chains(unit: np.ndarray, rest: np.ndarray) -> list[np.ndarray]:
+    """Arrange samples in chains of neighbours, each in an order that makes warm starts pay.
+
+    The points are halved across their widest side until a chain is short (a k-d tree); within a chain the
+    order goes from the point next to `rest` to its nearest neighbour and so on. The chains depend on the
+    points alone, not on the number of workers: the same sweep gives the same bits with any number of them.
+
+    Parameters
+    ----------
+    unit : (N, n) array
+        Points, scaled to [0, 1].
+    rest : (n,) array
+        The point without load, on the same scale.
+
+    Returns
+    -------
+    list of int arrays
+        Row indices of each chain.
+    """
+    # some eight chains at least, to keep the workers busy to the end
+    largest = int(np.clip(len(unit) // 8, _SHORTEST, _LONGEST))
+    pending, done = [np.arange(len(unit))], []
+    while pending:
+        rows = pending.pop()
+        if rows.size > largest:
+            axis = int(np.argmax(np.ptp(unit[rows], axis=0)))
+            ranked = rows[np.argsort(unit[rows, axis], kind="stable")]
+            # pushed in reverse, so that the list comes out in ascending order
+            pending += [ranked[rows.size // 2 :], ranked[: rows.size // 2]]
+        elif rows.size:
+            done.append(_nearest_first(unit, rows, rest))
+    return done
+
+
+def _nearest_first(unit: np.ndarray, rows: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """Order rows by going to the nearest row left, beginning next to `rest`."""
+    left, here, order = list(rows), rest, []
+    while left:
+        nearest = int(np.argmin(((unit[left] - here) ** 2).sum(axis=1)))
+        order.append(left.pop(nearest))
+        here = unit[order[-1]]
+    return np.array(order)
+
+
+_PACKAGES = ("palpate", "ngsolve", "numpy", "scipy", "distributed", "xarray", "zarr")
+
+
+def config_hash(problem: Problem, points: np.ndarray) -> str:
+    """Return the SHA-256 of everything that decides a sweep's answers, as hexadecimal digits."""
+    digest = hashlib.sha256(json.dumps(problem.describe(), sort_keys=True).encode())
+    digest.update(repr(points.shape).encode())
+    digest.update(np.ascontiguousarray(points).tobytes())
+    return digest.hexdigest()
+
+
+def provenance(problem: Problem, points: np.ndarray, design: str, seed: int) -> dict[str, Any]:
+    """Return the origin of a sweep's answers as plain data: configuration, versions, machine."""
+    return {
+        "problem": problem.describe(),
+        "words": getattr(problem, "words", ""),
+        "symmetry": getattr(problem, "symmetry", None),
+        "design": design,
+        "seed": seed,
+        "samples": len(points),
+        "config_hash": config_hash(problem, points),
+        "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "versions": {"python": platform.python_version(), **{name: _version(name) for name in _PACKAGES}},
+        "machine": {"system": platform.system(), "processor": platform.machine(), "cpus": os.cpu_count()},
+    }
+
+
+def _version(package: str) -> str:
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return "not installed"

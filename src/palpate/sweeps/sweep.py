@@ -1,28 +1,31 @@
-"""The sweep: solve at many points in parallel, and keep every answer."""
+"""The sweep: many solves in parallel, every answer kept, progress reported."""
 
 from __future__ import annotations
 
 import contextlib
 import os
-import time
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.errors import SolverError
-from palpate.sweeps.answers import Columns, empty, put
-from palpate.sweeps.designs import Design
 from palpate.sweeps.ledger import Ledger
 from palpate.sweeps.plan import Plan, make_plan
-from palpate.sweeps.progress import Report, reporter
-from palpate.sweeps.runner import connect, run
+from palpate.sweeps.runner import Columns, connect, empty, put, run
+from palpate.sweeps.space import Design
 
-__all__ = ["sweep"]
+__all__ = [
+    "Report",
+    "reporter",
+    "sweep",
+]
 
-FLUSH_SECONDS = 3.0  # most work that a killed sweep loses; a store of many small files is slow to write
+_FLUSH_SECONDS = 3.0  # most work that a killed sweep loses; a store of many small files is slow to write
 
 
 def sweep(
@@ -99,29 +102,29 @@ def _solve(
 ) -> Dataset:
     columns = empty(len(plan.points), plan.schema)
     chains = plan.chains()
-    done = _take_up(plan, ledger, columns, chains)
-    with reporter(progress) as report, _keeping(plan, ledger, columns) as keep:
+    done = _read_finished(plan, ledger, columns, chains)
+    with reporter(progress) as report, _saving(plan, ledger, columns) as save_rows:
         report(int(done.sum()), done.size)
 
         def accept(rows: np.ndarray, answers: Columns) -> None:
             put(columns, rows, answers)
             done[rows] = True
-            keep(rows)
+            save_rows(rows)
             report(int(done.sum()), done.size)
 
-        left = [rows for rows in chains if not done[rows].all()]
-        if left:
+        unsolved = [rows for rows in chains if not done[rows].all()]
+        if unsolved:
             with connect(cluster, workers) as (client, revive):
-                run(client, revive, plan.problem, plan.schema, plan.points, left, accept)
+                run(client, revive, plan.problem, plan.schema, plan.points, unsolved, accept)
     data = plan.label(columns, np.arange(len(plan.points)))
     return ledger.finish(data) if ledger else data
 
 
 @contextlib.contextmanager
-def _keeping(plan: Plan, ledger: Ledger | None, columns: Columns) -> Iterator[Callable[[np.ndarray], None]]:
-    """Yield what to call with rows as they are finished; on an interruption all of them are in the ledger."""
+def _saving(plan: Plan, ledger: Ledger | None, columns: Columns) -> Iterator[Callable[[np.ndarray], None]]:
+    """Yield a function that takes finished rows; after an interruption all of them are in the ledger."""
     fresh: list[np.ndarray] = []
-    begun = time.monotonic()
+    begun = monotonic()
 
     def flush() -> None:
         nonlocal begun
@@ -129,22 +132,24 @@ def _keeping(plan: Plan, ledger: Ledger | None, columns: Columns) -> Iterator[Ca
             rows = np.concatenate(fresh)
             ledger.add(plan.label({name: values[rows] for name, values in columns.items()}, rows))
         fresh.clear()
-        begun = time.monotonic()
+        begun = monotonic()
 
-    def keep(rows: np.ndarray) -> None:
+    def save_rows(rows: np.ndarray) -> None:
         fresh.append(rows)
-        if time.monotonic() - begun > FLUSH_SECONDS:
+        if monotonic() - begun > _FLUSH_SECONDS:
             flush()
 
     try:
-        yield keep
+        yield save_rows
     except BaseException:
         flush()
         raise
 
 
-def _take_up(plan: Plan, ledger: Ledger | None, columns: Columns, chains: list[np.ndarray]) -> np.ndarray:
-    """Fill in what an earlier run finished; which rows these are, bool of shape (N,).
+def _read_finished(
+    plan: Plan, ledger: Ledger | None, columns: Columns, chains: list[np.ndarray]
+) -> np.ndarray:
+    """Fill in the rows that an earlier run finished; return True for them, bool of shape (N,).
 
     A chain counts only as a whole: a solver that entered one in its midst would have another past, and answer
     with other last bits.
@@ -157,8 +162,8 @@ def _take_up(plan: Plan, ledger: Ledger | None, columns: Columns, chains: list[n
                 continue  # of another mesh: a mesher of another version made it
             rows = part["sample"]
             # parts of an earlier version lack what is recorded since
-            known = {name: part[name] for name in columns if name in part}
-            put(columns, rows, {name: values[rows] for name, values in columns.items()} | known)
+            answers = {name: part[name] if name in part else columns[name][rows] for name in columns}
+            put(columns, rows, answers)
             done[rows] = True
         for rows in chains:
             done[rows] = done[rows].all()
@@ -191,3 +196,60 @@ def _inputs(data: Dataset, row: int) -> str:
     return ", ".join(
         f"{r.name} = {value:g} {r.unit}" for r, value in zip(data.ranges, data.X[row], strict=True)
     )
+
+
+_LOG_INTERVAL = 10.0  # s between two lines in a log
+
+Report = Callable[[int, int], None]
+"""Called with the number of samples done and of all."""
+
+
+@contextlib.contextmanager
+def reporter(progress: bool | Report) -> Iterator[Report]:
+    """Yield a report: the caller's function, a bar in a terminal, else a line on standard error now and then."""
+    if callable(progress):
+        yield progress
+    elif progress and sys.stderr.isatty():
+        with _bar() as report:
+            yield report
+    elif progress:
+        yield _lines()
+    else:
+        yield _silent
+
+
+def _silent(done: int, total: int) -> None:
+    """Report to nobody."""
+
+
+def _lines() -> Report:
+    """Return a report for a log: a line every so often, and one at the end of what took that long."""
+    last, before = monotonic(), -1
+
+    def report(done: int, total: int) -> None:
+        nonlocal last, before
+        late = monotonic() - last > _LOG_INTERVAL
+        if late or (done == total and 0 <= before < total):
+            print(f"solved {done} of {total}", file=sys.stderr, flush=True)  # noqa: T201
+            last, before = monotonic(), done
+
+    return report
+
+
+@contextlib.contextmanager
+def _bar() -> Iterator[Report]:
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("solving"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task: TaskID | None = None
+
+        def report(done: int, total: int) -> None:
+            nonlocal task
+            if task is None:  # rows that an earlier run finished are no part of the speed
+                task = bar.add_task("solving", total=total, completed=done)
+            else:
+                bar.update(task, completed=done, total=total)
+
+        yield report

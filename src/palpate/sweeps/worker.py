@@ -1,4 +1,4 @@
-"""The process that solves: ``python -m palpate.sweeps.worker``, started by `palpate.sweeps.cluster`.
+"""The worker process of a sweep: ``python -m palpate.sweeps.worker``, started by `palpate.sweeps.cluster`.
 
 It reads the scheduler's address from the first line of its standard input, and ends when that input closes.
 So no worker outlives the process that started it, however that one died.

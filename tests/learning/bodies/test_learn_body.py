@@ -11,8 +11,7 @@ import pytest
 
 import palpate as pp
 import pressed
-from palpate.dataset import Dataset, assemble
-from palpate.dataset.fields import complete
+from palpate.dataset import Dataset, assemble, with_bookkeeping
 from palpate.errors import UsageError
 from palpate.learning import TouchHistory, learn_body
 from palpate.learning.bodies import Touches
@@ -25,7 +24,7 @@ from palpate.surrogates import ContactLaw, TouchedBody, TouchModel
 from palpate.surrogates.field import Rise
 from palpate.surrogates.field.carrying import Carrier
 from palpate.sweeps import sweep
-from palpate.sweeps.provenance import provenance
+from palpate.sweeps.plan import provenance
 from palpate.validation import validate
 
 RADIUS = 0.010
@@ -107,7 +106,7 @@ def touches() -> Dataset:
     body, probe = block()
     problem = body.problem(fundamental_part(body, probe), element=0.006, stress=True)
     X = problem.interactions[0].design(body.geometry, 24, 0, 4)
-    columns = {field.name: field.empty(len(X)) for field in complete(problem.schema)}
+    columns = {field.name: field.empty(len(X)) for field in with_bookkeeping(problem.schema)}
     columns |= answers(X, problem.mesh.points) | {"converged": np.ones(len(X), dtype=bool)}
     origin = provenance(problem, X, "points", 0)
     return assemble(problem.ranges, problem.layout, X, columns, origin, schema=problem.schema)

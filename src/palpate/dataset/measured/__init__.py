@@ -1,13 +1,12 @@
-"""Measured indentation: from tables and from a live sensor.
+"""Forces measured on a specimen: from text tables and from a live sensor.
 
-units     what its numbers may come in        columns   what makes a measurement
-record    arrays in SI units                  table     text tables with units
-lines     a line protocol                     live      lines from a pipe or from a TCP connection
+columns     Measured: N measurements in SI units; the columns and units that make one
+table       text tables with units, read and written
+live        lines of text from a pipe or a TCP connection, and the line protocol
 """
 
-from palpate.dataset.measured.lines import measurements
-from palpate.dataset.measured.live import Connection, lines_of, listening
-from palpate.dataset.measured.record import Measured
+from palpate.dataset.measured.columns import Measured
+from palpate.dataset.measured.live import Connection, lines_of, listening, measurements
 from palpate.dataset.measured.table import read_measured, write_measured
 
 __all__ = [

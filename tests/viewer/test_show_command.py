@@ -12,7 +12,7 @@ import httpx
 import pytest
 from blocks import dents
 
-from palpate.physics.pictures import write_pvd
+from palpate.physics.vtu import write_pvd
 from palpate.viewer.messages import Shown
 
 

@@ -5,7 +5,8 @@
     interactions  what acts on it, as energies with inputs
     solid         solid bodies in three dimensions
     beam          plane cantilevers
-    pictures      drawing what was solved
+    deformed      a solved body as it is shown: nodes, cells, fields, probe
+    renderer      drawing it        vtu  files of it for ParaView
     stop          why a search for an equilibrium ended
     advice        warnings of models that are hardly meant
 

@@ -193,7 +193,7 @@ def _body_of_solutions(solutions: list[Any], name: str) -> ShownBody:
 
 
 def _step_of(solution: Any) -> ShownStep:
-    from palpate.physics.pictures.tool import ball_of  # a page of a study needs no bodies
+    from palpate.physics.deformed import ball_of  # a page of a study needs no bodies
 
     fields = {VON_MISES: "von_mises", STRETCH: "largest_stretch"}
     known = {name: getattr(solution, attribute, None) for name, attribute in fields.items()}

@@ -10,7 +10,7 @@ import pytest
 from drawn import Made, dented
 
 from palpate.errors import UsageError
-from palpate.physics.pictures import write_pvd, write_vtu
+from palpate.physics.vtu import write_pvd, write_vtu
 
 
 def check_meshio(made: Made, path: Path) -> None:

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from solids import SIZE, Stretched, gel
 
+from palpate.physics.deformed import nodal_strain
 from palpate.physics.geometry import Block, Dome, LayeredBlock
 from palpate.physics.materials import LinearElastic
 from palpate.physics.materials.tensors import gradient
-from palpate.physics.pictures.fields import nodal_strain
 from palpate.physics.solid import Body, path
 from palpate.physics.solid.field import SolidField
 

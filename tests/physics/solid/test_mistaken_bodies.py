@@ -26,8 +26,8 @@ from palpate.physics import (
     roller,
 )
 from palpate.physics.interactions.estimate import pad_depth
-from palpate.physics.pictures import write_vtu
 from palpate.physics.solid.times import durations
+from palpate.physics.vtu import write_vtu
 from palpate.sweeps import sweep
 from palpate.units import Range
 

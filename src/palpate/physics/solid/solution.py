@@ -193,17 +193,17 @@ class SolidSolution:
         return ", ".join(f"{number(x, 6)} {conjugate_unit(r.unit)}" for r, x in pairs)
 
     def plot(self, *args: Any, last: bool = False, **kwargs: Any) -> Any:
-        """Draw the deformed body; see `palpate.physics.pictures.plot_solution`.
+        """Draw the deformed body; see `palpate.physics.renderer.plot_solution`.
 
         With `last` a failed solve's last equilibrium is drawn.
         """
-        from palpate.physics.pictures import plot_solution
+        from palpate.physics.renderer import plot_solution
 
         return plot_solution(self._shown(last), *args, **kwargs)
 
     def to_vtu(self, path: Any, *, last: bool = False, **kwargs: Any) -> Any:
-        """Write the deformed body as a VTU file, as `plot` draws it; see `palpate.physics.pictures.write_vtu`."""
-        from palpate.physics.pictures import write_vtu
+        """Write the deformed body as a VTU file, as `plot` draws it; see `palpate.physics.vtu.write_vtu`."""
+        from palpate.physics.vtu import write_vtu
 
         return write_vtu(self._shown(last), path, **kwargs)
 

@@ -18,8 +18,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.physics.pictures.fields import nodal_strain
-from palpate.physics.pictures.tool import ball_of, require_state
+from palpate.physics.deformed import ball_of, nodal_strain, require_state
 
 __all__ = ["write_pvd", "write_vtu"]
 

@@ -13,11 +13,11 @@ import json
 import os
 import platform
 from dataclasses import dataclass
-from numbers import Integral
 from typing import Any
 
 import numpy as np
 
+from palpate import checks
 from palpate.dataset import Dataset, Field, Layout, assemble, check_schema, with_bookkeeping
 from palpate.errors import UsageError
 from palpate.sweeps.problem import Checking, Designed, Problem, has_chains, missing_members, own_design
@@ -99,7 +99,7 @@ class Plan:
 
 
 def make_plan(
-    body: Any, interactions: Any, samples: Any, seed: int, design: str | Design | None, points: Any
+    body: Any, interactions: Any, samples: int | None, seed: int, design: str | Design | None, points: Any
 ) -> Plan:
     """Make the plan of a sweep; the arguments are those of `sweep`.
 
@@ -116,27 +116,20 @@ def make_plan(
             why=f"Given were samples={samples} and points={'None' if points is None else 'an array'}.",
             fix="For example sweep(body, loads, samples=256).",
         )
-    if samples is not None and not (isinstance(samples, Integral) and samples >= 1):
-        raise UsageError(
-            f"A sweep was asked for {samples!r} samples.",
-            why="It needs a whole number of them, at least one.",
-            fix="For example samples=256.",
-        )
     if points is not None:
         given = _check_not_empty(space.points(points))
         if isinstance(problem, Checking):
             problem.check_points(given)
         return Plan(problem, space, given, "points", seed)
+    count: int = checks.fits("The number of samples", samples, least=1, whole=True)
     own = own_design(problem)
     if isinstance(problem, Designed) and own is not None and (design is None or design == own):
-        return Plan(
-            problem, space, _check_not_empty(space.points(problem.design(samples or 0, seed))), own, seed
-        )
-    design = "sobol" if design is None else design
-    name = design if isinstance(design, str) else getattr(design, "__name__", type(design).__name__)
-    return Plan(
-        problem, space, _check_not_empty(design_points(design, space, samples or 0, seed)), name, seed
-    )
+        name, placed = own, space.points(problem.design(count, seed))
+    else:
+        design = "sobol" if design is None else design
+        name = design if isinstance(design, str) else getattr(design, "__name__", type(design).__name__)
+        placed = design_points(design, space, count, seed)
+    return Plan(problem, space, _check_not_empty(placed), name, seed)
 
 
 def _problem(body: Any, interactions: Any) -> Problem:

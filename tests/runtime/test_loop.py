@@ -184,6 +184,7 @@ def test_silent_hardware_gets_zero_force_within_20_ms(bench):
     bench.device.silent = True
     heard = bench.now
     states = bench.ticks(40)
+    assert states[0].time - heard < 0.020 < states[-1].time - heard
     for state in states:
         age = state.time - heard
         if age > 0.020 + 1e-9:
@@ -199,7 +200,9 @@ def test_a_page_that_falls_silent(page, period, limit):
     page.settle()
     heard = page.now
     page.shared.write_command(beat=heard, period=period)
-    for state in page.ticks(200):
+    states = page.ticks(200)
+    assert states[0].time - heard < limit < states[-1].time - heard
+    for state in states:
         age = state.time - heard
         if age > limit + 1e-9:
             assert not state.force.any()

@@ -23,8 +23,9 @@ def test_each_is_sourced_plain_data_and_a_value(name):
     assert material.source
     assert material.density > 0
     assert material.name == name
-    assert pickle.loads(pickle.dumps(material)) == material
-    assert hash(material) is not None
+    copy = pickle.loads(pickle.dumps(material))
+    assert copy == material
+    assert hash(copy) == hash(material)
     told = material.describe()
     assert json.loads(json.dumps(told)) == told
     assert name in str(material)

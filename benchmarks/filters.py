@@ -21,8 +21,8 @@ from scipy.linalg.blas import dsymm, dsyr2k
 from benchmarks.runner import main
 from benchmarks.table import Claim, Column, Table
 from palpate.learning import Settings, State, default, initial, step
-from palpate.rbf.filter.growth import grown
-from palpate.rbf.filter.presets import ran_ekf
+from palpate.rbf.filter.growth import add_unit
+from palpate.rbf.filter.settings import ran_ekf
 
 __all__ = ["picture", "tables"]
 
@@ -135,7 +135,7 @@ def filled(
     rng = np.random.default_rng(0)
     state = initial(inputs, outputs, settings, modes)
     for _ in range(units):
-        state = grown(state, rng.uniform(-1, 1, inputs), rng.normal(size=outputs), settings)
+        state = add_unit(state, rng.uniform(-1, 1, inputs), rng.normal(size=outputs), settings)
     return state
 
 

@@ -22,7 +22,7 @@ from palpate.learning import Settings, default, refine
 from palpate.learning.stream.learner import Learner
 from palpate.learning.stream.refining import Refining
 from palpate.network import Scaling
-from palpate.rbf.filter.presets import shared
+from palpate.rbf.filter.settings import shared
 from palpate.rbf.output_modes import output_modes
 from palpate.units import Quantity, Range
 

@@ -7,7 +7,7 @@ had another size; a star is a unit.
 import numpy as np
 
 from palpate.learning import Settings, initial, step
-from palpate.rbf.filter.model import value
+from palpate.rbf.filter.prediction import value
 
 settings = Settings(
     error_min=0.05,

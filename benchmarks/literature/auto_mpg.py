@@ -28,7 +28,7 @@ from benchmarks.literature.protocol import (
 )
 from benchmarks.table import Claim, Table
 from palpate.learning import Settings
-from palpate.rbf.filter.presets import gap, ggap, mran
+from palpate.rbf.filter.settings import gap, ggap, mran
 
 __all__ = ["SETTINGS", "problem", "table"]
 

@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.literature.protocol import Problem, Score, filtered, refined
 from benchmarks.table import Claim, Column, Table
 from palpate.learning import Settings
-from palpate.rbf.filter.presets import rotated_mran
+from palpate.rbf.filter.settings import rotated_mran
 
 __all__ = ["FORMS", "SETTINGS", "problem", "tables"]
 

@@ -28,7 +28,7 @@ from benchmarks.literature.protocol import (
 )
 from benchmarks.table import Table
 from palpate.learning import Settings
-from palpate.rbf.filter.presets import emran, mran
+from palpate.rbf.filter.settings import emran, mran
 
 __all__ = ["SETTINGS", "franke", "problem", "table"]
 

@@ -27,7 +27,7 @@ from benchmarks.literature.protocol import (
 )
 from benchmarks.table import Table
 from palpate.learning import Settings
-from palpate.rbf.filter.presets import mran, ran, ran_ekf
+from palpate.rbf.filter.settings import mran, ran, ran_ekf
 
 __all__ = ["SETTINGS", "problem", "table"]
 

@@ -28,7 +28,7 @@ from benchmarks.literature.protocol import (
 )
 from benchmarks.table import Claim, Column, Table
 from palpate.learning import Settings
-from palpate.rbf.filter.presets import emran, ggap, mran, ran, ran_ekf
+from palpate.rbf.filter.settings import emran, ggap, mran, ran, ran_ekf
 
 __all__ = ["SETTINGS", "problem", "tables"]
 

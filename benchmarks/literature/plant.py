@@ -29,7 +29,7 @@ from benchmarks.literature.protocol import (
 )
 from benchmarks.table import Table
 from palpate.learning import Settings
-from palpate.rbf.filter.presets import gap, mran
+from palpate.rbf.filter.settings import gap, mran
 
 __all__ = ["SETTINGS", "problem", "table"]
 

@@ -19,7 +19,7 @@ from benchmarks.table import Claim, Column
 from palpate.learning import Learner, Refining, Settings, State, default, initial, learn, refine, step
 from palpate.learning.refinement.structure import grow
 from palpate.network import Scaling
-from palpate.rbf.filter.model import value
+from palpate.rbf.filter.prediction import value
 from palpate.rbf.units.forms import form
 from palpate.rbf.units.regressors import Regressors
 from palpate.units import Quantity, Range

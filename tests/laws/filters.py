@@ -10,7 +10,7 @@ from laws.beams import exact
 from palpate.learning import PRESETS, Settings, State, initial
 from palpate.network.radial import RADIAL_FUNCTIONS
 from palpate.rbf.filter.covariance import Blocks, Full, Shared
-from palpate.rbf.filter.growth import grown
+from palpate.rbf.filter.growth import add_unit
 
 FORMS = ("isotropic", "axis-aligned", "rotated", "rank-1", "rank-2")
 RADIAL = RADIAL_FUNCTIONS
@@ -23,7 +23,7 @@ def populated(n: int, m: int, h: int, settings: Settings, seed: int = 0, modes=N
     rng = np.random.default_rng(seed)
     state = initial(n, m, settings, modes)
     for _ in range(h):
-        state = grown(state, rng.uniform(-1, 1, n), rng.normal(size=m), settings)
+        state = add_unit(state, rng.uniform(-1, 1, n), rng.normal(size=m), settings)
     form = settings.regressors(n).form
     theta = np.array([form.unit(rng.uniform(-1, 1, n), rng.uniform(0.5, 1.5), seed=i) for i in range(h)])
     theta = theta.reshape(h, form.size) + 0.05 * rng.normal(size=(h, form.size))
@@ -33,7 +33,7 @@ def populated(n: int, m: int, h: int, settings: Settings, seed: int = 0, modes=N
         coefficients=coefficients,
         theta=theta,
         covariance=randomised(state.covariance, rng),
-        in_modes=None if modes is None else coefficients @ modes,
+        mode_coefficients=None if modes is None else coefficients @ modes,
     )
 
 

@@ -10,9 +10,8 @@ import pytest
 from laws.filters import COVARIANT, populated
 from palpate.errors import UsageError
 from palpate.learning import Settings, initial, observe
-from palpate.rbf.filter.deviation import predictive_deviation, predictive_variance
-from palpate.rbf.filter.model import value
 from palpate.rbf.filter.observation import Observation
+from palpate.rbf.filter.prediction import predictive_deviation, predictive_variance, value
 
 N, M, H = 70, 3, 5  # more points than are taken at a time
 
@@ -23,7 +22,7 @@ def by_parameters(state, x, settings):
     for i in range(z.size):
         step = np.zeros_like(z)
         step[i] = 1e-6
-        high, low = (value(state.moved(z + s), x, settings) for s in (step, -step))
+        high, low = (value(state.with_parameters(z + s), x, settings) for s in (step, -step))
         columns.append((high - low) / 2e-6)
     return np.array(columns).T
 

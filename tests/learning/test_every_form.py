@@ -11,9 +11,8 @@ from laws.filters import FORMS, RADIAL, exact, frozen_shapes, populated
 from palpate.errors import UsageError
 from palpate.learning import Observation, freeze, observe, step
 from palpate.network import Scaling
-from palpate.rbf.filter.growth import grown
-from palpate.rbf.filter.model import jacobian, measured, regressors_at, value
-from palpate.rbf.filter.pruning import without
+from palpate.rbf.filter.growth import add_unit, remove_unit
+from palpate.rbf.filter.prediction import linearise, measurement, regressors_at, value
 from palpate.rbf.refinement.rows import Rows
 from palpate.rbf.units.forms import Centred, form
 from palpate.units import Quantity, Range
@@ -75,7 +74,7 @@ def test_jacobian_equals_complex_step(name, radial, widths, tail):
     settings = exact(form=name, radial=radial, widths=widths, tail=tail)
     state = populated(n, m, 4, settings)
     x = np.array([0.3, -0.2, 0.7])
-    f, H = jacobian(state, Observation(x, np.zeros(m)), settings)
+    f, H = linearise(state, Observation(x, np.zeros(m)), settings)
     np.testing.assert_allclose(f, written_out(state, state.vector(), x, settings), rtol=1e-12)
     numeric = by_complex_step(lambda z: written_out(state, z, x, settings), state.vector())
     np.testing.assert_allclose(H, numeric, rtol=1e-10, atol=1e-12)
@@ -87,7 +86,9 @@ def test_slopes_are_the_derivatives_of_the_value(name, radial):
     settings = exact(form=name, radial=radial)
     state = populated(n, m, 4, settings)
     x = np.array([0.3, -0.2, 0.7])
-    found = measured(state, Observation(x, np.zeros(m), slopes=np.zeros((m, n))), settings)[m:].reshape(m, n)
+    found = measurement(state, Observation(x, np.zeros(m), slopes=np.zeros((m, n))), settings)[m:].reshape(
+        m, n
+    )
     numeric = by_complex_step(lambda p: written_out(state, state.vector(), p, settings), x)
     np.testing.assert_allclose(found, numeric, rtol=1e-10, atol=1e-12)
 
@@ -99,13 +100,13 @@ def test_derivatives_of_the_slopes_by_every_parameter(name, radial):
     settings = exact(form=name, radial=radial)
     state = populated(n, m, 3, settings)
     seen = Observation(np.array([0.3, -0.2, 0.7]), np.zeros(m), slopes=np.zeros((m, n)))
-    f, H = jacobian(state, seen, settings)
-    np.testing.assert_allclose(f, measured(state, seen, settings), rtol=1e-13, atol=1e-15)
+    f, H = linearise(state, seen, settings)
+    np.testing.assert_allclose(f, measurement(state, seen, settings), rtol=1e-13, atol=1e-15)
     z, e = state.vector(), 1e-5
     for j in range(z.size):
         d = np.zeros_like(z)
         d[j] = e
-        sides = [measured(state.moved(z + s * d), seen, settings) for s in (1, -1)]
+        sides = [measurement(state.with_parameters(z + s * d), seen, settings) for s in (1, -1)]
         np.testing.assert_allclose(H[:, j], (sides[0] - sides[1]) / (2 * e), atol=2e-8)
 
 
@@ -172,8 +173,8 @@ def test_a_unit_of_zero_weight_changes_no_prediction_when_added_or_removed(name,
     def predictions(s):
         return freeze(s, settings, inputs, outputs, scaling).predict(X)
 
-    more = grown(state, np.array([0.1, 0.2, 0.3]), np.zeros(m), settings)
-    fewer = without(more, 4)
+    more = add_unit(state, np.array([0.1, 0.2, 0.3]), np.zeros(m), settings)
+    fewer = remove_unit(more, 4)
     np.testing.assert_array_equal(predictions(more), predictions(state))
     np.testing.assert_array_equal(predictions(fewer), predictions(state))
     np.testing.assert_allclose(value(more, X, settings), predictions(state), rtol=1e-12, atol=1e-14)
@@ -255,21 +256,21 @@ def test_jacobian_of_slopes_and_curvatures_equals_central_differences(name, radi
     settings = exact(form=name, radial=radial)
     state = populated(n, m, 4, settings)
     one = next(known_of(state, 1))
-    f, H = jacobian(state, one, settings)
-    np.testing.assert_allclose(f, measured(state, one, settings), rtol=1e-12, atol=1e-13)
+    f, H = linearise(state, one, settings)
+    np.testing.assert_allclose(f, measurement(state, one, settings), rtol=1e-12, atol=1e-13)
     assert f.shape == one.targets().shape == one.variances(1.0).shape == (m * (1 + n - 1 + 6 - 1),)
     z, step = state.vector(), 1e-5
     for j in range(z.size):
         away = step * np.eye(z.size)[j]
-        up, down = (measured(state.moved(z + a), one, settings) for a in (away, -away))
+        up, down = (measurement(state.with_parameters(z + a), one, settings) for a in (away, -away))
         numeric = (up - down) / (2 * step)
         np.testing.assert_allclose(H[:, j], numeric, atol=1e-8 * max(1.0, np.abs(numeric).max()))
 
 
 def test_an_observation_less_nothing_is_itself_and_less_itself_is_zero():
     one = next(known_of(None, 1))
-    np.testing.assert_array_equal(one.less(np.zeros(one.targets().size)).targets(), one.targets())
-    np.testing.assert_array_equal(one.less(one.targets()).targets(), 0.0)
+    np.testing.assert_array_equal(one.minus(np.zeros(one.targets().size)).targets(), one.targets())
+    np.testing.assert_array_equal(one.minus(one.targets()).targets(), 0.0)
 
 
 def test_a_curvature_that_counts_must_be_finite():

@@ -11,10 +11,9 @@ from laws.beams import INPUT, OUTPUTS, stiffening
 from laws.filters import COVARIANT, FORMS, RULES, exact, frozen_shapes, populated
 from palpate.learning import PRESETS, Observation, initial, learn, observe, step
 from palpate.rbf.filter.covariance import Full, Shared
-from palpate.rbf.filter.growth import grown
-from palpate.rbf.filter.model import value
-from palpate.rbf.filter.pruning import without
-from palpate.rbf.filter.updates import predicted, updated
+from palpate.rbf.filter.growth import add_unit, remove_unit
+from palpate.rbf.filter.prediction import value
+from palpate.rbf.filter.updates import predict_observation, update_state
 
 # priors far above the noise, and thresholds at which units come and go
 RECKLESS = {
@@ -35,7 +34,7 @@ every_rule = pytest.mark.parametrize("rule", RULES)
 def shown(state, x, y, settings):
     """The state after an update alone: no growth, no pruning, no memory."""
     seen = Observation(x, y)
-    return updated(state, seen, predicted(state, seen, settings), settings)
+    return update_state(state, seen, predict_observation(state, seen, settings), settings)
 
 
 def eager(rule):
@@ -109,7 +108,7 @@ def test_a_new_unit_meets_its_observation(rule):
     settings = PRESETS[rule]()
     state = populated(2, 3, 2, settings)
     x, y = np.array([0.9, -0.9]), np.array([1.0, 2.0, 3.0])
-    after = grown(state, x, y - value(state, x, settings), settings)
+    after = add_unit(state, x, y - value(state, x, settings), settings)
     np.testing.assert_allclose(value(after, x, settings), y, rtol=1e-12)
 
 
@@ -157,7 +156,9 @@ def test_a_refused_step_makes_nothing_surer():
         state = populated(1, 1, 2, settings, seed=3)
         # remembered observations that the network meets exactly: any step spoils them
         X = np.linspace(-1, 1, 9)[:, None]
-        state = replace(state, seen=np.hstack([X, value(state, X, settings)]), when=np.arange(1, 10), count=9)
+        state = replace(
+            state, memory=np.hstack([X, value(state, X, settings)]), memory_times=np.arange(1, 10), count=9
+        )
         after = shown(state, np.array([0.3]), np.array([5.0]), settings)
         np.testing.assert_array_equal(after.vector(), state.vector())
         np.testing.assert_array_equal(after.covariance.matrix, state.covariance.matrix)
@@ -186,7 +187,7 @@ def test_with_units_that_do_not_meet_block_filters_are_the_full_one(update):
     for s in (settings, replace(settings, update=update)):
         state = initial(1, 2, s)
         for place in (-0.9, 0.0, 0.9):
-            state = grown(state, np.array([place]), np.array([1.0, -0.5]), s)
+            state = add_unit(state, np.array([place]), np.array([1.0, -0.5]), s)
         states.append((state, s))
     rng = np.random.default_rng(6)
     for _ in range(30):
@@ -212,7 +213,7 @@ def test_with_resting_shapes_the_shared_filter_is_the_full_one(name, modes):
     np.testing.assert_allclose(shared.coefficients, full.coefficients, rtol=1e-10, atol=1e-11)
     np.testing.assert_array_equal(shared.theta, full.theta)
     if V is not None:
-        np.testing.assert_allclose(shared.in_modes, shared.coefficients @ V, atol=1e-12)
+        np.testing.assert_allclose(shared.mode_coefficients, shared.coefficients @ V, atol=1e-12)
     one = Shared(shared.covariance.regressors, np.zeros((0, 0))).matrix
     p_t = full.tail.shape[1]
     np.testing.assert_allclose(
@@ -253,7 +254,7 @@ def test_more_linearisations_come_closer_to_the_posterior_mode():
     y = value(state, x, settings) + np.array([0.3, -0.2])
 
     def cost(z):
-        d, e = z - state.vector(), y - value(state.moved(z), x, settings)
+        d, e = z - state.vector(), y - value(state.with_parameters(z), x, settings)
         return d @ np.linalg.solve(state.covariance.matrix, d) + e @ e / settings.noise
 
     costs = [cost(shown(state, x, y, replace(settings, iterations=k)).vector()) for k in (1, 10)]
@@ -301,7 +302,7 @@ def test_process_noise_widens_every_variance(update):
 def test_pruning_takes_the_units_own_rows_of_the_covariance(update):
     settings = exact(update=update)
     state = populated(2, 3, 4, settings)
-    fewer = without(state, 1)
+    fewer = remove_unit(state, 1)
     P, kept = state.covariance.matrix, np.delete(np.arange(4), 1)
     if update == "shared":
         p_t, p = 3, state.theta.shape[1]

@@ -10,7 +10,7 @@ from palpate.learning import Learner, freeze, initial, learn, refined_network
 from palpate.learning.choosing.problem import Problem
 from palpate.learning.stream.gauge import Gauge
 from palpate.network import Network, Scaling
-from palpate.rbf.filter.model import value
+from palpate.rbf.filter.prediction import value
 from palpate.rbf.freezing import training_record
 from palpate.units import Range
 

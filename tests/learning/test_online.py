@@ -16,7 +16,7 @@ from palpate.learning.stream.learner import Learner
 from palpate.learning.stream.refining import Refining
 from palpate.learning.stream.reservoir import Reservoir
 from palpate.network import Publisher, Scaling
-from palpate.rbf.filter.presets import shared
+from palpate.rbf.filter.settings import shared
 from palpate.rbf.refinement.rows import Rows
 from palpate.units import Quantity, Range
 
@@ -295,7 +295,7 @@ def test_memory_does_not_grow_with_the_stream():
     assert learner.count == 360
     assert learner.history.units.size == 50
     assert learner.history.error.size == 50
-    assert len(learner.state.seen) <= max(learner.settings.window, learner.settings.memory)
+    assert len(learner.state.memory) <= max(learner.settings.window, learner.settings.memory)
     assert len(learner.state.errors) == learner.settings.window
     h, d = learner.state.units, learner.state.vector().size
     assert d == 3 * 2 + h * (3 + 2)

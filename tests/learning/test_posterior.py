@@ -11,7 +11,7 @@ from laws.beams import INPUT, exact, stiffening
 from palpate.errors import UsageError
 from palpate.learning import Observation, Settings, initial, observe, posterior, refine, step
 from palpate.network import Scaling
-from palpate.rbf.filter.model import value
+from palpate.rbf.filter.prediction import value
 from palpate.rbf.freezing import freeze_refined
 from palpate.rbf.refinement.laplace import Posterior
 from palpate.rbf.units.forms import form

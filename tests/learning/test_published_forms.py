@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from palpate.learning import initial, step
-from palpate.rbf.filter.presets import gap, ggap, mran, ran, ran_ekf
-from palpate.rbf.filter.significance import significance
+from palpate.rbf.filter.growth import significance
+from palpate.rbf.filter.settings import gap, ggap, mran, ran, ran_ekf
 
 
 def shown(settings, *samples):

@@ -12,17 +12,16 @@ from hypothesis import strategies as st
 from laws.beams import INPUT, OUTPUTS, exact, stiffening
 from palpate.errors import FileFormatError, UsageError
 from palpate.learning import History, Observation, Settings, default, founding, initial, learn, step
-from palpate.rbf.filter.growth import grown, nearest, wants_growth
-from palpate.rbf.filter.model import value
-from palpate.rbf.filter.noise import edge_factor, variance
-from palpate.rbf.filter.pruning import contributions, pruned
-from palpate.rbf.filter.updates import predicted, updated
+from palpate.rbf.filter.growth import add_unit, contributions, nearest_unit, prune_units, wants_growth
+from palpate.rbf.filter.kalman import edge_factor, measurement_variance
+from palpate.rbf.filter.prediction import value
+from palpate.rbf.filter.updates import predict_observation, update_state
 
 
 def shown(state, x, y, settings):
     """The state after an update alone: no growth, no pruning, no memory."""
     seen = Observation(x, y)
-    return updated(state, seen, predicted(state, seen, settings), settings)
+    return update_state(state, seen, predict_observation(state, seen, settings), settings)
 
 
 def with_errors(settings: Settings, *errors: float, count: int = 1000):
@@ -43,13 +42,13 @@ def test_all_three_criteria_must_hold(errors, error, centre, expected):
     settings = exact(error_min=0.1, error_rms_min=0.1, distance_min=0.3)
     state = with_errors(settings, *errors)
     if centre is not None:
-        state = grown(state, np.array([centre]), np.array([1.0]), settings)
+        state = add_unit(state, np.array([centre]), np.array([1.0]), settings)
     assert wants_growth(state, np.array([0.6]), np.array([error]), settings) is expected
 
 
 def test_distance_threshold_shrinks_with_the_observations_of_all_passes():
     settings = exact(error_min=0.0, error_rms_min=0.0, distance_max=1.0, distance_decay=0.9, distance_min=0.1)
-    late = grown(with_errors(settings, 1.0, count=100), np.array([0.0]), np.array([1.0]), settings)
+    late = add_unit(with_errors(settings, 1.0, count=100), np.array([0.0]), np.array([1.0]), settings)
     early = replace(late, count=1)
     x, e = np.array([0.5]), np.array([1.0])
     assert not wants_growth(early, x, e, settings)
@@ -66,38 +65,38 @@ def test_founding_form_waits_for_its_window():
 
 def test_new_width_is_the_overlap_times_the_nearest_distance():
     settings = exact(overlap=0.7)
-    first = grown(initial(1, 1, settings), np.array([-0.5]), np.array([1.0]), settings)
+    first = add_unit(initial(1, 1, settings), np.array([-0.5]), np.array([1.0]), settings)
     assert first.widths(settings)[0, 0] == pytest.approx(0.7 * settings.distance_max)
-    second = grown(first, np.array([0.1]), np.array([1.0]), settings)
+    second = add_unit(first, np.array([0.1]), np.array([1.0]), settings)
     assert second.widths(settings)[1, 0] == pytest.approx(0.7 * 0.6)
-    assert nearest(second, np.array([0.2]), settings) == (1, pytest.approx(0.1))
+    assert nearest_unit(second, np.array([0.2]), settings) == (1, pytest.approx(0.1))
 
 
 def test_silent_units_are_removed_after_the_window_and_not_before():
     settings = exact(prune_below=0.1, prune_after=3)
-    state = grown(initial(1, 1, settings), np.array([0.0]), np.array([1.0]), settings)
-    state = grown(state, np.array([0.9]), np.array([1e-3]), settings)
+    state = add_unit(initial(1, 1, settings), np.array([0.0]), np.array([1.0]), settings)
+    state = add_unit(state, np.array([0.9]), np.array([1e-3]), settings)
     x = np.array([0.0])
     for expected in (2, 2, 1):
-        state = pruned(state, x, settings)
+        state = prune_units(state, x, settings)
         assert state.units == expected
     assert state.centres(settings)[0, 0] == 0.0
 
 
 def test_one_loud_observation_restarts_the_count():
     settings = exact(prune_below=0.1, prune_after=2)
-    state = grown(initial(1, 1, settings), np.array([-0.9]), np.array([1.0]), settings)
-    state = grown(state, np.array([0.9]), np.array([1.0]), settings)
+    state = add_unit(initial(1, 1, settings), np.array([-0.9]), np.array([1.0]), settings)
+    state = add_unit(state, np.array([0.9]), np.array([1.0]), settings)
     assert contributions(state, np.array([0.9]), settings)[1] == 1.0
     for x in (-0.9, 0.9, -0.9, 0.9):
-        state = pruned(state, np.array([x]), settings)
+        state = prune_units(state, np.array([x]), settings)
     assert state.units == 2
 
 
 def test_contribution_is_judged_output_by_output():
     settings = exact()
-    state = grown(initial(1, 2, settings), np.array([0.0]), np.array([1.0, 0.0]), settings)
-    state = grown(state, np.array([0.0]), np.array([0.0, 1e-6]), settings)
+    state = add_unit(initial(1, 2, settings), np.array([0.0]), np.array([1.0, 0.0]), settings)
+    state = add_unit(state, np.array([0.0]), np.array([0.0, 1e-6]), settings)
     np.testing.assert_array_equal(contributions(state, np.array([0.0]), settings), [1.0, 1.0])
 
 
@@ -111,17 +110,19 @@ def test_edge_factor_is_one_in_the_middle_and_never_below_its_floor(x):
 def test_noise_is_never_far_below_the_innovation():
     settings = default()
     error = np.array([0.3, -0.4])
-    assert variance(np.zeros(1), error, 0.0, settings) == pytest.approx(settings.gate * 0.125)
-    assert variance(np.zeros(1), 0 * error, 0.02, settings) == pytest.approx(settings.noise_share * 0.02)
-    assert variance(np.zeros(1), 0 * error, 0.0, settings) == settings.noise
+    assert measurement_variance(np.zeros(1), error, 0.0, settings) == pytest.approx(settings.gate * 0.125)
+    assert measurement_variance(np.zeros(1), 0 * error, 0.02, settings) == pytest.approx(
+        settings.noise_share * 0.02
+    )
+    assert measurement_variance(np.zeros(1), 0 * error, 0.0, settings) == settings.noise
 
 
 @given(st.integers(0, 10_000))
 def test_no_step_moves_a_unit_beyond_the_bound(seed):
     settings = exact(step_bound=0.1, noise=1e-8, tail="none")
     rng = np.random.default_rng(seed)
-    state = grown(initial(1, 2, settings), rng.uniform(-1, 1, 1), rng.normal(size=2), settings)
-    state = grown(state, rng.uniform(-1, 1, 1), rng.normal(size=2), settings)
+    state = add_unit(initial(1, 2, settings), rng.uniform(-1, 1, 1), rng.normal(size=2), settings)
+    state = add_unit(state, rng.uniform(-1, 1, 1), rng.normal(size=2), settings)
     after = shown(state, rng.uniform(-1, 1, 1), rng.normal(size=2), settings)
     moved = np.abs(after.centres(settings) - state.centres(settings)) / state.widths(settings)
     assert moved.max() <= 0.1 * (1 + 1e-9)
@@ -132,9 +133,9 @@ def test_no_step_moves_a_unit_beyond_the_bound(seed):
 def test_no_update_raises_the_windows_error_beyond_what_is_allowed(seed):
     settings = exact(relapse_limit=1.0, noise=1e-6)
     rng = np.random.default_rng(seed)
-    state = grown(initial(1, 1, settings), rng.uniform(-1, 1, 1), rng.normal(size=1), settings)
+    state = add_unit(initial(1, 1, settings), rng.uniform(-1, 1, 1), rng.normal(size=1), settings)
     seen = rng.normal(size=(6, 2))
-    state = replace(state, seen=seen, when=np.arange(1, 7), count=6)
+    state = replace(state, memory=seen, memory_times=np.arange(1, 7), count=6)
     after = shown(state, rng.uniform(-1, 1, 1), 3 * rng.normal(size=1), settings)
 
     def error(s):
@@ -175,7 +176,7 @@ def test_history_file_round_trips_and_a_damaged_one_is_named(tmp_path):
 
 def test_the_old_state_is_untouched_by_a_step():
     settings = default()
-    state = grown(initial(1, 2, settings), np.zeros(1), np.ones(2), settings)
+    state = add_unit(initial(1, 2, settings), np.zeros(1), np.ones(2), settings)
     before = state.vector().copy(), state.covariance.matrix.copy()
     step(state, np.array([0.3]), np.array([2.0, -1.0]), settings)
     np.testing.assert_array_equal(state.vector(), before[0])

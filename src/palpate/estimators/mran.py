@@ -14,7 +14,7 @@ from palpate.estimators.data import BadValue, Units, check_count, refused_as_bad
 from palpate.learning import PRESETS, Observation, Settings, freeze, initial, learn, observe
 from palpate.learning.choosing.automatic import UNITS_MAX, automatic
 from palpate.network import Scaling
-from palpate.rbf.filter.deviation import predictive_deviation
+from palpate.rbf.filter.prediction import predictive_deviation
 from palpate.rbf.filter.state import State
 from palpate.rbf.output_modes import output_modes
 

@@ -28,8 +28,7 @@ from palpate.learning.stream.refining import Refining
 from palpate.learning.stream.reservoir import Reservoir
 from palpate.learning.touch import FEWEST, Refinement, hand_coordinates, learn_touch, node_outputs
 from palpate.rbf.filter.observation import Observation
-from palpate.rbf.filter.presets import PRESETS, default, founding, recommended
-from palpate.rbf.filter.settings import Settings
+from palpate.rbf.filter.settings import PRESETS, Settings, default, founding, recommended
 from palpate.rbf.filter.state import State, initial
 from palpate.rbf.filter.step import Event, observe, step
 from palpate.rbf.refinement.laplace import Posterior

@@ -13,10 +13,9 @@ from palpate.learning.choosing.automatic import automatic, check_target
 from palpate.learning.history import History
 from palpate.learning.measures import relative_error, spread_of
 from palpate.network import Network, Scaling
-from palpate.rbf.filter.model import value
 from palpate.rbf.filter.observation import Observation
-from palpate.rbf.filter.presets import default
-from palpate.rbf.filter.settings import Settings
+from palpate.rbf.filter.prediction import value
+from palpate.rbf.filter.settings import Settings, default
 from palpate.rbf.filter.state import State, initial
 from palpate.rbf.filter.step import Event, observe
 from palpate.rbf.freezing import freeze, training_record

@@ -16,8 +16,7 @@ from palpate.learning.history import History
 from palpate.learning.learn import Learned, learn
 from palpate.learning.refinement.structure import refined_network
 from palpate.network import Network
-from palpate.rbf.filter.presets import recommended
-from palpate.rbf.filter.settings import Settings
+from palpate.rbf.filter.settings import Settings, recommended
 from palpate.rbf.units.forms import Centred
 from palpate.surrogates import TouchModel
 from palpate.units import Quantity, Range, bounds

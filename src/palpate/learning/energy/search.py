@@ -15,7 +15,7 @@ import numpy as np
 
 from palpate.network.radial import RadialFunction
 from palpate.rbf.filter.observation import Observation
-from palpate.rbf.filter.presets import default
+from palpate.rbf.filter.settings import default
 from palpate.rbf.filter.state import initial
 from palpate.rbf.filter.step import observe
 from palpate.rbf.refinement.leave_one_out import left_out_rows

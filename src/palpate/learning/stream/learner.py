@@ -21,8 +21,7 @@ from palpate.learning.stream.refining import Progress, Refining, refined_state
 from palpate.learning.stream.reservoir import Reservoir
 from palpate.network import Network, Publisher, Scaling
 from palpate.rbf.filter.observation import Observation
-from palpate.rbf.filter.presets import default
-from palpate.rbf.filter.settings import Settings
+from palpate.rbf.filter.settings import Settings, default
 from palpate.rbf.filter.state import State, initial
 from palpate.rbf.filter.step import Event, observe
 from palpate.rbf.freezing import freeze
@@ -244,7 +243,7 @@ class Learner:
     def numbers(self) -> int:
         """How many numbers are kept, but for events: parameters, covariance, memory and retained samples."""
         s = self.state
-        own = s.coefficients.size + s.theta.size + s.covariance.numbers + s.seen.size + s.errors.size
+        own = s.coefficients.size + s.theta.size + s.covariance.numbers + s.memory.size + s.errors.size
         return own + (0 if self._kept is None else self._kept.numbers)
 
     @property

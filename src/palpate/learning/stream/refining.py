@@ -170,7 +170,7 @@ def _continued(
         places=found.places,
         silent=np.append(state.silent, np.zeros(new, np.int64)),
         innovation=min(state.innovation, progress.expected**2),
-        in_modes=found.in_modes,
+        mode_coefficients=found.mode_coefficients,
     )
     return replace(state, errors=_window_errors(state, settings))
 
@@ -209,10 +209,10 @@ def _error(
 
 def _window_errors(state: State, settings: Settings) -> np.ndarray:
     """Squared errors (≤ M,) over the window: growth must not be asked for by errors that are gone."""
-    seen = state.seen[-settings.window :]
+    seen = state.memory[-settings.window :]
     X, Y = seen[:, : state.inputs], seen[:, state.inputs :]
     of = settings.regressors(state.inputs)
-    error = np.hstack([of.tail_rows(X), of.phi(X, state.theta)]) @ state.led - Y
+    error = np.hstack([of.tail_rows(X), of.phi(X, state.theta)]) @ state.latent_coefficients - Y
     return np.asarray((error**2).sum(axis=1))
 
 

@@ -74,7 +74,7 @@ class Observation:
         shares = self._shares()
         return np.asarray(r / (self.weight * shares[shares > 0]))
 
-    def less(self, others: np.ndarray) -> Observation:
+    def minus(self, others: np.ndarray) -> Observation:
         """The observation less what something else explains of its targets, (q,)."""
         if self.plain:
             return replace(self, y=self.y - others)

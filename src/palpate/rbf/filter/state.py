@@ -1,4 +1,4 @@
-"""The filter's state as a value: parameters, their covariance, and what the growth and pruning rules remember."""
+"""State of the filter as a value: parameters, their covariance, and the memory of the growth and pruning rules."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.rbf.filter.covariance import Blocks, Covariance, Full, Nothing, Shared
+from palpate.rbf.filter.covariance import Blocks, Covariance, Full, NoCovariance, Shared
 from palpate.rbf.filter.settings import Settings
 
 __all__ = ["State", "initial"]
@@ -28,9 +28,9 @@ class State:
         Where each unit was added.
     errors : (≤ M,)
         The last squared error norms ‖e‖², newest last.
-    seen : (≤ S, n + m) or (≤ S, n + r)
-        Remembered observations [x, y], newest last (see `memory`); y by the output modes where there are some.
-    when : (≤ S,) int
+    memory : (≤ S, n + m) or (≤ S, n + r)
+        Remembered observations [x, y], newest last (see `relapse`); y by the output modes where there are some.
+    memory_times : (≤ S,) int
         Which observation each of those was, counting from one.
     silent : (h,) int
         Observations in a row in which each unit was silent.
@@ -40,9 +40,9 @@ class State:
         Running mean square of the innovation, per output.
     modes : (m, r), optional
         Orthonormal output directions that drive the shapes under the shared-weight rule; None for all outputs.
-    in_modes : (p_t + h, r), optional
+    mode_coefficients : (p_t + h, r), optional
         The coefficients by those modes, kept up to date so that no step has to form them.
-    least : float
+    least_error : float
         Least mean squared error over the memory so far, ‖e‖² per observation; slowly fading.
     """
 
@@ -51,14 +51,14 @@ class State:
     covariance: Covariance
     places: np.ndarray
     errors: np.ndarray
-    seen: np.ndarray
-    when: np.ndarray
+    memory: np.ndarray
+    memory_times: np.ndarray
     silent: np.ndarray
     count: int
     innovation: float
     modes: np.ndarray | None = None
-    in_modes: np.ndarray | None = None
-    least: float = float("inf")
+    mode_coefficients: np.ndarray | None = None
+    least_error: float = float("inf")
 
     def __repr__(self) -> str:
         return str(self)
@@ -95,14 +95,14 @@ class State:
         return self.coefficients[len(self.coefficients) - self.units :]
 
     @property
-    def led(self) -> np.ndarray:
+    def latent_coefficients(self) -> np.ndarray:
         """The coefficients (p_t + h, r) by the modes, or (p_t + h, m) where there are none."""
-        return self.coefficients if self.in_modes is None else self.in_modes
+        return self.coefficients if self.mode_coefficients is None else self.mode_coefficients
 
     @property
-    def led_weights(self) -> np.ndarray:
-        """The weights' part of `led`, (h, r) or (h, m)."""
-        return self.led[len(self.coefficients) - self.units :]
+    def latent_weights(self) -> np.ndarray:
+        """The weights' part of `latent_coefficients`, (h, r) or (h, m)."""
+        return self.latent_coefficients[len(self.coefficients) - self.units :]
 
     @property
     def unit_size(self) -> int:
@@ -138,7 +138,7 @@ class State:
         coefficients[len(coefficients) - h :] = units[:, :m]
         return coefficients, units[:, m:]
 
-    def moved(self, z: np.ndarray) -> State:
+    def with_parameters(self, z: np.ndarray) -> State:
         """The state with its parameters replaced by a vector z (d,)."""
         coefficients, theta = self.split(z)
         return replace(self, coefficients=coefficients, theta=theta)
@@ -163,13 +163,13 @@ def initial(inputs: int, outputs: int, settings: Settings, modes: np.ndarray | N
         covariance=_prior(p_t, outputs, p, settings),
         places=np.zeros((0, inputs)),
         errors=np.zeros(0),
-        seen=np.zeros((0, columns)),
-        when=np.zeros(0, dtype=np.int64),
+        memory=np.zeros((0, columns)),
+        memory_times=np.zeros(0, dtype=np.int64),
         silent=np.zeros(0, dtype=np.int64),
         count=0,
         innovation=0.0,
         modes=modes,
-        in_modes=None if modes is None else np.zeros((p_t, modes.shape[1])),
+        mode_coefficients=None if modes is None else np.zeros((p_t, modes.shape[1])),
     )
 
 
@@ -181,4 +181,4 @@ def _prior(p_t: int, m: int, p: int, settings: Settings) -> Covariance:
             return Blocks.prior(m * p_t, settings.tail_prior, m + p)
         case "shared":
             return Shared.prior(p_t, settings.tail_prior)
-    return Nothing()
+    return NoCovariance()

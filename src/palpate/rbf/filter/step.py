@@ -9,14 +9,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.rbf.filter.growth import grown, wants_growth
-from palpate.rbf.filter.memory import kept, spoils, with_least
-from palpate.rbf.filter.noise import running_mean_square
+from palpate.rbf.filter.growth import add_unit, prune_units, wants_growth
+from palpate.rbf.filter.kalman import running_mean_square
 from palpate.rbf.filter.observation import Observation
-from palpate.rbf.filter.pruning import pruned
+from palpate.rbf.filter.relapse import exceeds_relapse_limit, remember, track_least_error
 from palpate.rbf.filter.settings import Settings
 from palpate.rbf.filter.state import State
-from palpate.rbf.filter.updates import predicted, updated
+from palpate.rbf.filter.updates import predict_observation, update_state
 
 __all__ = ["Event", "observe", "step"]
 
@@ -79,48 +78,52 @@ def step(
 
 
 def observe(
-    state: State, seen: Observation, settings: Settings, *, donate: bool = False
+    state: State, observation: Observation, settings: Settings, *, donate: bool = False
 ) -> tuple[State, Event]:
-    """Learn one observation that may have a weight and slopes; else as `step`."""
-    if seen.flaw:
-        return state, Event(np.nan, np.nan, False, False, 0, state.units, seen.flaw)
-    old, found = state, predicted(state, seen, settings)
-    missed = seen.y - found[0][: seen.y.size]
-    size = float(np.sqrt(missed @ missed))
-    state = _remembered(state, seen, missed, settings)
-    grew = wants_growth(state, seen.x, missed, settings)
-    if grew:
+    """Learn one observation that may have a weight, slopes and curvatures; else as `step`."""
+    if observation.flaw:
+        return state, Event(np.nan, np.nan, False, False, 0, state.units, observation.flaw)
+    old, prediction = state, predict_observation(state, observation, settings)
+    error = observation.y - prediction[0][: observation.y.size]
+    size = float(np.sqrt(error @ error))
+    state = _count(state, observation, error, settings)
+    grows = wants_growth(state, observation.x, error, settings)
+    if grows:
         # the new unit meets the observation, so the update below starts from a zero error, not twice the old one
-        state = _with_unit(state, seen.x, missed, settings)
-        found = predicted(state, seen, settings)
-    use = settings.update_on_growth or not grew
-    if use:
+        state = _grow(state, observation.x, error, settings)
+        prediction = predict_observation(state, observation, settings)
+    updates = settings.update_on_growth or not grows
+    if updates:
         try:
-            state = updated(state, seen, found, settings, donate=donate)
-        except FloatingPointError as error:  # raised before anything of the old state is overwritten
-            return old, Event(np.nan, np.nan, False, False, 0, old.units, str(error))
+            state = update_state(state, observation, prediction, settings, donate=donate)
+        except FloatingPointError as reason:  # raised before anything of the old state is overwritten
+            return old, Event(np.nan, np.nan, False, False, 0, old.units, str(reason))
     before = state.units
     # by significance: the nearest unit, once it was updated
-    if settings.pruning == "contribution" or not grew:
-        state = pruned(state, seen.x, settings)
-    state = with_least(state, settings)
-    event = Event(size, float(np.sqrt(state.errors.mean())), grew, use, before - state.units, state.units)
+    if settings.pruning == "contribution" or not grows:
+        state = prune_units(state, observation.x, settings)
+    state = track_least_error(state, settings)
+    event = Event(
+        size, float(np.sqrt(state.errors.mean())), grows, updates, before - state.units, state.units
+    )
     return state, event
 
 
-def _with_unit(state: State, x: np.ndarray, error: np.ndarray, settings: Settings) -> State:
+def _grow(state: State, x: np.ndarray, error: np.ndarray, settings: Settings) -> State:
     """The state with a unit at x; without weight, for the update to decide, where it would spoil what was learnt."""
-    more = grown(state, x, error, settings)
-    if spoils(state, more.led, more.theta, settings):
-        return grown(state, x, np.zeros_like(error), settings)
+    more = add_unit(state, x, error, settings)
+    if exceeds_relapse_limit(state, more.latent_coefficients, more.theta, settings):
+        return add_unit(state, x, np.zeros_like(error), settings)
     return more
 
 
-def _remembered(state: State, seen: Observation, error: np.ndarray, settings: Settings) -> State:
+def _count(state: State, observation: Observation, error: np.ndarray, settings: Settings) -> State:
     """The state with one more observation counted, and it and its error in the window."""
     errors = np.append(state.errors, float(error @ error))[-settings.window :]
-    y = seen.y if state.modes is None else seen.y @ state.modes
+    y = observation.y if state.modes is None else observation.y @ state.modes
     count = state.count + 1
     innovation = running_mean_square(state.innovation, error, count)
-    remembered, when = kept(state, seen.x, y, settings)
-    return replace(state, errors=errors, seen=remembered, when=when, count=count, innovation=innovation)
+    memory, times = remember(state, observation.x, y, settings)
+    return replace(
+        state, errors=errors, memory=memory, memory_times=times, count=count, innovation=innovation
+    )

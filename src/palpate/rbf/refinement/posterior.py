@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.rbf.filter.covariance import Blocks, Covariance, Full, Nothing, Shared
+from palpate.rbf.filter.covariance import Blocks, Covariance, Full, NoCovariance, Shared
 from palpate.rbf.filter.settings import Settings
 from palpate.rbf.filter.state import State, initial
 from palpate.rbf.refinement.inverse import inverse
@@ -84,7 +84,7 @@ def posterior(
         silent=np.zeros(len(theta), dtype=np.int64),
         count=len(X),
         innovation=refined.rms**2,
-        in_modes=None if modes is None else refined.coefficients @ modes,
+        mode_coefficients=None if modes is None else refined.coefficients @ modes,
     )
     given = {"weights": weights, "slope_weight": slope_weight, "curvature_weight": curvature_weight}
     return replace(mean, covariance=_COVARIANCES[settings.update](mean, refined, X, given, settings))
@@ -155,7 +155,7 @@ def _shared(mean: State, refined: Refined, X: np.ndarray, given: Given, settings
 
 
 def _nothing(mean: State, refined: Refined, X: np.ndarray, given: Given, settings: Settings) -> Covariance:
-    return Nothing()
+    return NoCovariance()
 
 
 _COVARIANCES: dict[str, Callable[[State, Refined, np.ndarray, Given, Settings], Covariance]] = {

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from palpate.physics.geometry import Block, Dome, LayeredBlock, Organ
 from palpate.physics.interactions import SphereProbe
 from palpate.physics.materials import NeoHookean
+from palpate.physics.shapes import Block, Dome, LayeredBlock, Organ
 from palpate.physics.solid import Body, BodyFamily, FamilyProblem, SolidProblem, Varied
 
 __all__ = ["STUDIES", "TouchStudy"]

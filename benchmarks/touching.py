@@ -20,9 +20,9 @@ from benchmarks.plain_touch import PlainAnswer, PlainTouch, Setting
 from benchmarks.runner import main
 from benchmarks.table import Claim, Column, Table
 from benchmarks.touching_check import Inspection, Inspector
-from palpate.physics.geometry import Block
 from palpate.physics.interactions import SphereProbe
 from palpate.physics.materials import NeoHookean
+from palpate.physics.shapes import Block
 from palpate.physics.solid import Body
 
 __all__ = ["HEIGHT", "RADIUS", "STEP", "STOP", "block", "probe", "stratified", "tables"]

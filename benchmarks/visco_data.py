@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from palpate.physics.geometry import Block
 from palpate.physics.interactions import SphereProbe
 from palpate.physics.materials import NeoHookean, Viscoelastic
+from palpate.physics.shapes import Block
 from palpate.physics.solid import Body
 from palpate.surrogates.relaxation import Drive, ramp, random_drive, sinusoid, step_hold
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.physics.geometry import (
+from palpate.physics.shapes import (
     Block,
     BodyMesh,
     Cylinder,

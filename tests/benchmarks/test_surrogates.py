@@ -15,8 +15,8 @@ from benchmarks.surrogate_springs import Springs, identified
 from benchmarks.touch_studies import STUDIES, TouchStudy
 
 from benchmarks import surrogate_cases, surrogate_relaxation, touch_data
-from palpate.physics.geometry import Block
 from palpate.physics.materials import NeoHookean
+from palpate.physics.shapes import Block
 from palpate.physics.solid import Body
 from palpate.surrogates.relaxation import Branches, Memory, Patches, course, random_drive, step_hold
 from palpate.validation import TouchSolves

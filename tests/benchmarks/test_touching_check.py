@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from benchmarks.touching_check import Inspector
 
-from palpate.physics.geometry import Block
+from palpate.physics.shapes import Block
 
 HEIGHT, RADIUS, STOP = 0.05, 0.010, 0.004
 

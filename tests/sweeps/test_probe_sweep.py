@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from palpate.dataset import Dataset
-from palpate.physics.geometry import Block
 from palpate.physics.interactions import SphereProbe
 from palpate.physics.materials import NeoHookean
+from palpate.physics.shapes import Block
 from palpate.physics.solid import Body
 from palpate.sweeps import sweep
 

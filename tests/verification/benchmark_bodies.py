@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from palpate.physics.geometry.mesh import BodyMesh, outer_faces, to_ngsolve
-from palpate.physics.geometry.shape import Shape
 from palpate.physics.interactions import Attached
+from palpate.physics.shapes.mesh import BodyMesh, outer_faces, to_ngsolve
+from palpate.physics.shapes.shape import Shape
 from palpate.units import Range
 
 BOX = ("left", "right", "front", "back", "bottom", "top")  # x, y, z: low and high

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate.physics.geometry import BodyMesh
+from palpate.physics.shapes import BodyMesh
 
 EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
 LIMIT = 120  # s

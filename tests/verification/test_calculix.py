@@ -13,9 +13,9 @@ import calculix
 import numpy as np
 import pytest
 
-from palpate.physics.geometry import Block
 from palpate.physics.interactions import PrescribedDisplacement
 from palpate.physics.materials import LinearElastic, LinearHardening, NeoHookean, Plastic
+from palpate.physics.shapes import Block
 from palpate.physics.solid import Body, density
 
 PRINTED = 2e-6  # some units in the seventh digit, which sums and differences of forces may lose

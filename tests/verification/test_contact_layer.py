@@ -10,9 +10,9 @@ import pytest
 from bonded_layer import FARTHEST, dimitriadis, exact, garcia, ground, hertz
 from scipy.integrate import quad
 
-from palpate.physics.geometry import Block, FineMesh
 from palpate.physics.interactions import Held, PrescribedDisplacement, SphereProbe
 from palpate.physics.materials import LinearElastic
+from palpate.physics.shapes import Block, FineMesh
 from palpate.physics.solid import Body
 
 YOUNG = 9e3

@@ -8,9 +8,9 @@ import ngsolve as ngs
 import numpy as np
 import pytest
 
-from palpate.physics.geometry import Block
 from palpate.physics.interactions import SphereProbe
 from palpate.physics.materials import NeoHookean
+from palpate.physics.shapes import Block
 from palpate.physics.solid import Body
 
 SIZE, RADIUS, PAD, STOP = (0.06, 0.06, 0.03), 0.01, 2e6, 0.004

@@ -1,6 +1,6 @@
-"""What the body does under load: geometry, materials, what acts on it, and the solve.
+"""The body under load: shapes, materials, what acts on it, and the solve.
 
-    geometry      shapes and their meshes, made or imported
+    shapes        shapes and their meshes, made or imported
     materials     what a body is made of, as energies
     interactions  what acts on it, as energies with inputs
     solid         solid bodies in three dimensions
@@ -30,21 +30,6 @@ from palpate.physics.beam import (
     StepAndHold,
     TipLoad,
     preset,
-)
-from palpate.physics.geometry import (
-    Block,
-    BodyMesh,
-    Cylinder,
-    Dome,
-    FineMesh,
-    Geometry,
-    ImportedMesh,
-    ImportedSolid,
-    Inclusion,
-    LayeredBlock,
-    Organ,
-    SurfacePatch,
-    Tube,
 )
 from palpate.physics.interactions import (
     BodyForce,
@@ -78,6 +63,21 @@ from palpate.physics.materials import (
     VoceHardening,
     Yeoh,
     named_material,
+)
+from palpate.physics.shapes import (
+    Block,
+    BodyMesh,
+    Cylinder,
+    Dome,
+    FineMesh,
+    Geometry,
+    ImportedMesh,
+    ImportedSolid,
+    Inclusion,
+    LayeredBlock,
+    Organ,
+    SurfacePatch,
+    Tube,
 )
 from palpate.physics.solid import (
     Body,

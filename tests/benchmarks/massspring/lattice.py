@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.physics.geometry.mesh import BodyMesh, outer_faces
+from palpate.physics.shapes.mesh import BodyMesh, outer_faces
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from benchmarks.massspring import MassSpringBody
-from palpate.physics.geometry import Block
 from palpate.physics.interactions import SphereProbe
 from palpate.physics.materials import NeoHookean
+from palpate.physics.shapes import Block
 from palpate.physics.solid import Body
 
 

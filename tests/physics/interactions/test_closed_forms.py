@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, fsolve
 
-from palpate.physics.geometry import Block
 from palpate.physics.interactions import (
     BodyForce,
     GluedPad,
@@ -18,6 +17,7 @@ from palpate.physics.interactions import (
     pad_share,
 )
 from palpate.physics.materials import LinearElastic, NeoHookean
+from palpate.physics.shapes import Block
 from palpate.physics.solid import Body
 
 SIZE = (0.04, 0.03, 0.02)

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from palpate.physics.geometry import Block, Dome, LayeredBlock
 from palpate.physics.interactions import SphereProbe
 from palpate.physics.materials import NeoHookean
+from palpate.physics.shapes import Block, Dome, LayeredBlock
 from palpate.physics.solid import Body
 
 GEL = NeoHookean(young=9e3, poisson=0.4)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from palpate.errors import UsageError
-from palpate.physics.geometry import Block, Dome
 from palpate.physics.interactions import SphereProbe
 from palpate.physics.materials import NeoHookean
+from palpate.physics.shapes import Block, Dome
 from palpate.physics.solid import Body
 
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from palpate.errors import UsageError
-from palpate.physics.geometry import Block, Cylinder, FineMesh
 from palpate.physics.interactions.footprint import (
     QUADRATURE,
     bump,
@@ -17,6 +16,7 @@ from palpate.physics.interactions.footprint import (
     footprint_area,
     require_on_surface,
 )
+from palpate.physics.shapes import Block, Cylinder, FineMesh
 
 BLOCK = Block((0.04, 0.03, 0.02), element=0.01)
 

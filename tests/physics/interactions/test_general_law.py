@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.physics.geometry import Block
 from palpate.physics.interactions import (
     BodyForce,
     GluedPad,
@@ -15,6 +14,7 @@ from palpate.physics.interactions import (
     SurfaceTraction,
 )
 from palpate.physics.materials import NeoHookean
+from palpate.physics.shapes import Block
 from palpate.physics.solid import Body
 from palpate.physics.solid.opening import open_problem
 

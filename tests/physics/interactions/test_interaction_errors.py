@@ -8,7 +8,6 @@ import pickle
 import pytest
 
 from palpate.errors import UsageError
-from palpate.physics.geometry import Block
 from palpate.physics.interactions import (
     BodyForce,
     GluedPad,
@@ -21,6 +20,7 @@ from palpate.physics.interactions import (
     require_held,
 )
 from palpate.physics.materials import NeoHookean
+from palpate.physics.shapes import Block
 from palpate.physics.solid import Body
 from palpate.physics.solid.field import SolidField
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from palpate.errors import UsageError
-from palpate.physics.geometry import Block
 from palpate.physics.interactions import SurfaceTraction, roller
 from palpate.physics.materials import NeoHookean
+from palpate.physics.shapes import Block
 from palpate.physics.solid import Body
 
 SIZE = (0.02, 0.02, 0.02)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from drawn import Made, block_mesh, dented
 
-from palpate.physics.geometry.mesh import BodyMesh
+from palpate.physics.shapes.mesh import BodyMesh
 
 
 @pytest.fixture(scope="session")

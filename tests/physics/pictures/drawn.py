@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from palpate.physics.geometry.block import Block
-from palpate.physics.geometry.mesh import BodyMesh, body_mesh
+from palpate.physics.shapes.block import Block
+from palpate.physics.shapes.mesh import BodyMesh, body_mesh
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.physics.geometry import Block
 from palpate.physics.interactions import Attached, SphereProbe
 from palpate.physics.materials import NeoHookean
+from palpate.physics.shapes import Block
 from palpate.physics.solid import Body
 from palpate.units import Range
 

@@ -9,10 +9,10 @@ import pytest
 from solids import PROBE, RADIUS, SIZE, pressed
 
 from palpate.errors import UsageError
-from palpate.physics.geometry import Block, Dome
 from palpate.physics.interactions import PointForce, SphereProbe
 from palpate.physics.interactions.patch import Patch
 from palpate.physics.materials import NeoHookean
+from palpate.physics.shapes import Block, Dome
 from palpate.physics.solid import Body
 
 PROBLEM = pressed()

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from solids import gel
 
-from palpate.physics.geometry import Block, Dome, ImportedSolid, LayeredBlock, Organ, Tube
 from palpate.physics.interactions import Held, PrescribedDisplacement, SphereProbe
 from palpate.physics.interactions.curved import surface_of
 from palpate.physics.materials import (
@@ -23,6 +22,7 @@ from palpate.physics.materials import (
     Viscoelastic,
     Yeoh,
 )
+from palpate.physics.shapes import Block, Dome, ImportedSolid, LayeredBlock, Organ, Tube
 from palpate.physics.solid import Body
 
 STEP = 1e-6  # m

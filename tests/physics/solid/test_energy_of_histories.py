@@ -7,9 +7,9 @@ import pytest
 from solids import SIZE, Stretched, above, gel
 
 from laws.histories import march
-from palpate.physics.geometry import Block
 from palpate.physics.interactions import SphereProbe
 from palpate.physics.materials import LinearElastic, LinearHardening, Plastic, Viscoelastic
+from palpate.physics.shapes import Block
 from palpate.physics.solid import Body
 
 PROBE = SphereProbe(radius=0.01, depth=(0.0, 0.005))

@@ -9,9 +9,9 @@ import pytest
 
 import palpate as pp
 from palpate.errors import UsageError
-from palpate.physics.geometry import Block, LayeredBlock
 from palpate.physics.interactions import SphereProbe
 from palpate.physics.materials import NeoHookean
+from palpate.physics.shapes import Block, LayeredBlock
 from palpate.physics.solid import Body, BodyFamily, FamilyProblem, SolidProblem, Varied
 
 PROBE = SphereProbe(0.01, depth=(0.0, 0.006), over=((0.03, 0.03), (0.05, 0.05)))

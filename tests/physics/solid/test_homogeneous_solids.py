@@ -7,9 +7,9 @@ import pytest
 from solids import SIZE, Stretched, gel
 
 from palpate.physics.deformed import nodal_strain
-from palpate.physics.geometry import Block, Dome, LayeredBlock
 from palpate.physics.materials import LinearElastic
 from palpate.physics.materials.tensors import gradient
+from palpate.physics.shapes import Block, Dome, LayeredBlock
 from palpate.physics.solid import Body, path
 from palpate.physics.solid.field import SolidField
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from solids import above, pressed
 
-from palpate.physics.geometry import Block
 from palpate.physics.interactions import Held, PrescribedDisplacement, SphereProbe
 from palpate.physics.materials import NeoHookean
+from palpate.physics.shapes import Block
 from palpate.physics.solid import Body, newton, path
 from palpate.physics.stop import Stop, Verdict
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from palpate.errors import UsageError
-from palpate.physics.geometry import Block
 from palpate.physics.interactions import Held, PrescribedDisplacement, SphereProbe, roller
 from palpate.physics.materials import NeoHookean, PreStretched
 from palpate.physics.materials.tensors import gradient
+from palpate.physics.shapes import Block
 from palpate.physics.solid import Body, BodyFamily, Varied
 from palpate.physics.solid.symmetry import symmetry_of
 

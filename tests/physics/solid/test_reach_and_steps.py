@@ -10,9 +10,9 @@ import pytest
 from solids import SIZE, Stretched, above, gel
 
 from palpate.errors import UsageError
-from palpate.physics.geometry import Block
 from palpate.physics.interactions import SphereProbe
 from palpate.physics.materials import LinearElastic, LinearHardening, Plastic
+from palpate.physics.shapes import Block
 from palpate.physics.solid import Body
 from palpate.physics.solid.system import sparse_solver
 from palpate.physics.stop import Stop

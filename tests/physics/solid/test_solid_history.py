@@ -7,9 +7,9 @@ import pytest
 from solids import SIZE, above, gel
 
 from palpate.errors import UsageError
-from palpate.physics.geometry import Block
 from palpate.physics.interactions import SphereProbe
 from palpate.physics.materials import Viscoelastic
+from palpate.physics.shapes import Block
 from palpate.physics.solid import Body
 
 SHARE, TIME = 0.4, 2.0

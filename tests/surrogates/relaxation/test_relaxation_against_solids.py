@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from relaxing import RADIUS, TERMS
 
-from palpate.physics.geometry import Block
 from palpate.physics.interactions import SphereProbe
 from palpate.physics.materials import NeoHookean, Viscoelastic
+from palpate.physics.shapes import Block
 from palpate.physics.solid import Body
 from palpate.surrogates.relaxation import Memory, Patches, Record, course, identify
 

@@ -148,8 +148,8 @@ def test_measured_distance_beside_a_plate_is_that_to_its_rim():
 
 
 def test_depths_into_a_dome_are_those_of_its_finite_elements():
-    from palpate.physics.geometry.dome import Dome
     from palpate.physics.interactions.curved import surface_of
+    from palpate.physics.shapes.dome import Dome
 
     dome = Dome(radius=0.05, element=0.01)
     mesh = dome.rest(())

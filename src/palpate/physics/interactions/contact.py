@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from palpate.physics.geometry.mesh import BodyMesh
 from palpate.physics.interactions.interaction import BEYOND, Field
 from palpate.physics.interactions.pad_law import REACH, pressed_energy
 from palpate.physics.interactions.patch import Patch, winding_number
+from palpate.physics.shapes.mesh import BodyMesh
 from palpate.physics.stop import Stop, Verdict
 
 __all__ = ["Contact", "pad_energy"]

@@ -16,8 +16,8 @@ from palpate.physics.interactions.patch import Patch
 if TYPE_CHECKING:
     from collections.abc import Hashable
 
-    from palpate.physics.geometry.refinement import FineMesh
-    from palpate.physics.geometry.shape import Geometry
+    from palpate.physics.shapes.meshing import FineMesh
+    from palpate.physics.shapes.shape import Geometry
 
 __all__ = ["surface_of"]
 

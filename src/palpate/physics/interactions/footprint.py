@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.physics.geometry.checks import require_known
-from palpate.physics.geometry.mesh import BodyMesh
-from palpate.physics.geometry.refinement import FineMesh
 from palpate.physics.interactions.arguments import AXES, axis_of
 from palpate.physics.interactions.patch import Patch
 from palpate.physics.interactions.plane import cross
+from palpate.physics.shapes.mesh import BodyMesh
+from palpate.physics.shapes.meshing import FineMesh
+from palpate.physics.shapes.naming import require_known
 
 __all__ = ["QUADRATURE", "Chart", "bump", "chart_at", "chart_of", "footprint_area", "require_on_surface"]
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_positive
-from palpate.physics.geometry.checks import require_known, require_triple
 from palpate.physics.interactions.arguments import AXES, Interval, interval, tag
 from palpate.physics.interactions.footprint import (
     MARGIN,
@@ -22,12 +21,13 @@ from palpate.physics.interactions.footprint import (
     require_on_surface,
 )
 from palpate.physics.interactions.interaction import Attached, Energy
+from palpate.physics.shapes.naming import require_known, require_triple
 from palpate.physics.words import millimetres, number
 from palpate.units import Range
 
 if TYPE_CHECKING:
-    from palpate.physics.geometry.mesh import BodyMesh
-    from palpate.physics.geometry.refinement import FineMesh
+    from palpate.physics.shapes.mesh import BodyMesh
+    from palpate.physics.shapes.meshing import FineMesh
 
 __all__ = ["GluedPad"]
 

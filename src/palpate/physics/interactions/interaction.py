@@ -23,8 +23,8 @@ from palpate.physics.stop import Verdict
 from palpate.physics.words import number
 
 if TYPE_CHECKING:
-    from palpate.physics.geometry.mesh import BodyMesh
-    from palpate.physics.geometry.refinement import FineMesh
+    from palpate.physics.shapes.mesh import BodyMesh
+    from palpate.physics.shapes.meshing import FineMesh
     from palpate.units import Range
 
 __all__ = ["Attached", "Energy", "Field", "Held", "Interaction", "Planned"]

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.physics.arguments import require_positive
-from palpate.physics.geometry.checks import require_known, require_triple
 from palpate.physics.interactions.arguments import along, direction_of, range_of
 from palpate.physics.interactions.footprint import (
     MARGIN,
@@ -23,12 +22,13 @@ from palpate.physics.interactions.footprint import (
     require_on_surface,
 )
 from palpate.physics.interactions.interaction import Attached
+from palpate.physics.shapes.naming import require_known, require_triple
 from palpate.physics.words import number
 from palpate.units import Range
 
 if TYPE_CHECKING:
-    from palpate.physics.geometry.mesh import BodyMesh
-    from palpate.physics.geometry.refinement import FineMesh
+    from palpate.physics.shapes.mesh import BodyMesh
+    from palpate.physics.shapes.meshing import FineMesh
 
 __all__ = ["BodyForce", "PointForce", "SurfaceTraction"]
 

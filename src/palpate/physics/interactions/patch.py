@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from palpate.physics.geometry.mesh import BodyMesh
 from palpate.physics.interactions.plane import cross
+from palpate.physics.shapes.mesh import BodyMesh
 
 __all__ = ["Patch", "winding_number"]
 

@@ -10,13 +10,13 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_positive
-from palpate.physics.geometry.checks import require_known, require_triple
 from palpate.physics.interactions.arguments import AXES, along, direction_of, interval, tag
 from palpate.physics.interactions.interaction import Attached
+from palpate.physics.shapes.naming import require_known, require_triple
 from palpate.units import Range
 
 if TYPE_CHECKING:
-    from palpate.physics.geometry.refinement import FineMesh
+    from palpate.physics.shapes.meshing import FineMesh
 
 __all__ = ["PrescribedDisplacement"]
 
@@ -109,7 +109,7 @@ class PrescribedDisplacement:
 
     def refinements(self, geometry: Any) -> tuple[FineMesh, ...]:
         """Fine elements on the moved part, if their size is given."""
-        from palpate.physics.geometry.refinement import FineMesh
+        from palpate.physics.shapes.meshing import FineMesh
 
         if self.element is None:
             return ()

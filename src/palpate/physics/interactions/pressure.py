@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.physics.geometry.checks import require_known, require_triple
 from palpate.physics.interactions.arguments import range_of
 from palpate.physics.interactions.interaction import Attached, Energy
+from palpate.physics.shapes.naming import require_known, require_triple
 from palpate.units import Range
 
 if TYPE_CHECKING:
-    from palpate.physics.geometry.refinement import FineMesh
+    from palpate.physics.shapes.meshing import FineMesh
 
 __all__ = ["Pressure", "volume_density"]
 

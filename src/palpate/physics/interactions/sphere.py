@@ -9,20 +9,20 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_positive
-from palpate.physics.geometry.checks import require_known
-from palpate.physics.geometry.refinement import FineMesh
 from palpate.physics.interactions import columns
 from palpate.physics.interactions.arguments import range_of
 from palpate.physics.interactions.curved import surface_of
 from palpate.physics.interactions.fit import require_fit
 from palpate.physics.interactions.interaction import Attached, Energy, Field
 from palpate.physics.interactions.patch import Patch
+from palpate.physics.shapes.meshing import FineMesh
+from palpate.physics.shapes.naming import require_known
 from palpate.physics.words import millimetres, number
 from palpate.units import Range
 
 if TYPE_CHECKING:
-    from palpate.physics.geometry.shape import Geometry
     from palpate.physics.interactions.contact import Contact
+    from palpate.physics.shapes.shape import Geometry
 
 __all__ = ["SphereProbe"]
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_choice, require_positive
-from palpate.physics.geometry.checks import require_triple
 from palpate.physics.interactions.interaction import Held, Interaction
+from palpate.physics.shapes.naming import require_triple
 from palpate.physics.solid.parts import (
     advise_on_modulus,
     by_region,
@@ -23,8 +23,8 @@ from palpate.physics.solid.parts import (
 from palpate.physics.words import number
 
 if TYPE_CHECKING:
-    from palpate.physics.geometry.shape import Geometry
     from palpate.physics.materials.material import Material
+    from palpate.physics.shapes.shape import Geometry
     from palpate.physics.solid.problem import SolidProblem
 
 __all__ = ["Body", "Formulation"]

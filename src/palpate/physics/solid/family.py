@@ -16,9 +16,9 @@ import numpy as np
 
 from palpate.dataset import Field, solid_fields
 from palpate.errors import UsageError
-from palpate.physics.geometry.refinement import FineMesh
 from palpate.physics.interactions.interaction import Interaction
 from palpate.physics.interactions.sphere import SphereProbe
+from palpate.physics.shapes.meshing import FineMesh
 from palpate.physics.solid.density import material_energies
 from palpate.physics.solid.system import System
 from palpate.physics.solid.varied import RADIUS, Varied, with_values

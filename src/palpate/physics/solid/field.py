@@ -12,9 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from palpate.physics.geometry.checks import require_known
-from palpate.physics.geometry.groups import members
-from palpate.physics.geometry.mesh import BodyMesh
+from palpate.physics.shapes.mesh import BodyMesh
+from palpate.physics.shapes.naming import members, require_known
 from palpate.physics.solid.midsides import Middles
 
 __all__ = ["SolidField"]

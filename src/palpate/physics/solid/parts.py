@@ -9,9 +9,8 @@ from typing import Any
 
 from palpate.errors import UsageError
 from palpate.physics.advice import advise
-from palpate.physics.geometry.checks import require_known
-from palpate.physics.geometry.groups import members
 from palpate.physics.interactions.interaction import Held, Interaction
+from palpate.physics.shapes.naming import members, require_known
 
 __all__ = [
     "advise_on_modulus",

@@ -13,11 +13,11 @@ import numpy as np
 from palpate.dataset import Field, Layout, solid_fields
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_positive
-from palpate.physics.geometry.checks import require_known
 from palpate.physics.interactions.estimate import advise_on_pad
 from palpate.physics.interactions.glued import GluedPad
 from palpate.physics.interactions.interaction import Interaction, Planned
 from palpate.physics.interactions.sphere import SphereProbe
+from palpate.physics.shapes.naming import require_known
 from palpate.physics.solid.lengths import (
     longest_side,
     require_element,
@@ -29,8 +29,8 @@ from palpate.physics.solid.symmetry import symmetry_of
 from palpate.units import Range
 
 if TYPE_CHECKING:
-    from palpate.physics.geometry.mesh import BodyMesh
-    from palpate.physics.geometry.refinement import FineMesh
+    from palpate.physics.shapes.mesh import BodyMesh
+    from palpate.physics.shapes.meshing import FineMesh
     from palpate.physics.solid.body import Body
     from palpate.physics.solid.solution import SolidSolution
     from palpate.physics.solid.solver import SolidSolver

@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.dataset import conjugate_unit
 from palpate.errors import UsageError
-from palpate.physics.geometry.mesh import BodyMesh
+from palpate.physics.shapes.mesh import BodyMesh
 from palpate.physics.stop import Stop
 from palpate.physics.words import number, span
 from palpate.units import Range

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.physics.geometry.groups import members
-from palpate.physics.geometry.isometries import NO_ISOMETRIES, Isometry
 from palpate.physics.interactions.sphere import SphereProbe
 from palpate.physics.materials.fibres import FibreReinforced
 from palpate.physics.materials.pre_stretched import PreStretched
 from palpate.physics.materials.user import UserMaterial
+from palpate.physics.shapes.naming import members
+from palpate.physics.shapes.shape import NO_ISOMETRIES, Isometry
 
 if TYPE_CHECKING:
     from palpate.physics.solid.body import Body

@@ -8,7 +8,7 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 from palpate.errors import UsageError
-from palpate.physics.geometry.layers import LayeredBlock
+from palpate.physics.shapes.block import LayeredBlock
 from palpate.units import Range
 
 if TYPE_CHECKING:

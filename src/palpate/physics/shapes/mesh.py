@@ -1,4 +1,9 @@
-"""The mesh of a body as plain arrays, and the way from and to NGSolve."""
+"""How well shaped the tetrahedra of a mesh are.
+
+The mesh of a body as plain arrays, and the way from and to NGSolve.
+
+Where the named surfaces of a body are: what tells ``face 3`` from ``face 4``.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +14,89 @@ from typing import Any
 import numpy as np
 
 from palpate.checks import own_arrays
-from palpate.physics.geometry.checks import require_known
-from palpate.physics.geometry.groups import members
-from palpate.physics.geometry.quality import MeshQuality, mesh_quality, tetrahedron_volumes
+from palpate.physics.shapes.naming import members, require_known
+from palpate.physics.words import number
 
-__all__ = ["UNNAMED", "BodyMesh", "body_mesh", "outer_faces", "to_ngsolve"]
+__all__ = [
+    "UNNAMED",
+    "BodyMesh",
+    "Face",
+    "MeshQuality",
+    "body_mesh",
+    "faces_of",
+    "mesh_quality",
+    "outer_faces",
+    "tetrahedron_volumes",
+    "to_ngsolve",
+]
+
+# pairs of faces that share an edge; face i is opposite to vertex i
+PAIRS = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
+
+
+@dataclass(frozen=True)
+class MeshQuality:
+    """The worst elements of a mesh.
+
+    Attributes
+    ----------
+    least_scaled_jacobian : float
+        Volume of the box that three edges of one corner span, over the product of their lengths, times √2; the
+        least over the corners and elements. 1 for regular tetrahedra, 0 for flat ones, negative for inverted
+        ones (Knupp 2001, Algebraic mesh quality metrics, SIAM J. Sci. Comput. 23, 193-218).
+    mean_scaled_jacobian : float
+        The mean over the elements of the least over each one's corners.
+    least_angle, largest_angle : float
+        Angles between two faces in rad; 1.231 in a regular tetrahedron.
+    shortest_edge, longest_edge : float
+        In m.
+    """
+
+    least_scaled_jacobian: float
+    mean_scaled_jacobian: float
+    least_angle: float
+    largest_angle: float
+    shortest_edge: float
+    longest_edge: float
+
+
+def tetrahedron_volumes(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
+    """Volumes in m³, shape (e,); negative for left-handed tetrahedra."""
+    origin, a, b, c = np.moveaxis(points[tetrahedra], 1, 0)
+    return np.asarray(np.einsum("ei,ei->e", np.cross(a - origin, b - origin), c - origin) / 6)
+
+
+def mesh_quality(points: np.ndarray, tetrahedra: np.ndarray) -> MeshQuality:
+    """The figures of `MeshQuality` for points (node, 3) and right-handed tetrahedra (e, 4)."""
+    corners = points[tetrahedra]
+    edges = corners[:, None, :, :] - corners[:, :, None, :]
+    lengths = np.linalg.norm(edges, axis=-1)
+    at_corner = lengths + np.eye(4)  # an edge from a corner to itself does not shrink the product
+    box = 6 * tetrahedron_volumes(points, tetrahedra)
+    scaled = np.sqrt(2) * box / at_corner.prod(axis=2).max(axis=1)
+    angles = _dihedral_angles(corners)
+    between = lengths[:, ~np.eye(4, dtype=bool)]
+    return MeshQuality(
+        least_scaled_jacobian=float(scaled.min()),
+        mean_scaled_jacobian=float(scaled.mean()),
+        least_angle=float(angles.min()),
+        largest_angle=float(angles.max()),
+        shortest_edge=float(between.min()),
+        longest_edge=float(between.max()),
+    )
+
+
+def _dihedral_angles(corners: np.ndarray) -> np.ndarray:
+    """Angles in rad between the faces of right-handed tetrahedra (e, 4, 3), shape (e, 6)."""
+    a, b, c, d = np.moveaxis(corners, 1, 0)
+    normals = np.stack(
+        [np.cross(c - b, d - b), np.cross(d - a, c - a), np.cross(b - a, d - a), np.cross(c - a, b - a)],
+        axis=1,
+    )
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    cosine = np.einsum("epi,epi->ep", normals[:, PAIRS[:, 0]], normals[:, PAIRS[:, 1]])
+    return np.asarray(np.pi - np.arccos(np.clip(cosine, -1, 1)))
+
 
 UNNAMED = "unnamed"
 # the faces of a right-handed tetrahedron, each counter-clockwise as seen from outside
@@ -226,3 +309,69 @@ def _region_behind(mesh: BodyMesh) -> np.ndarray:
     """Index of the region that each outer triangle bounds, shape (t,)."""
     faces = mesh.tetrahedra[:, FACES].reshape(-1, 3)
     return _look_up(faces, np.repeat(mesh.region_of, 4), mesh.triangles)
+
+
+ONE_WAY = 0.1  # length of the mean normal below which a surface faces nowhere in the mean
+
+Triple = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Face:
+    """A named surface.
+
+    Attributes
+    ----------
+    name : str
+    area : float
+        In m².
+    centre : (3,) tuple
+        Of its area, in m.
+    normal : (3,) tuple
+        Mean outward normal: of length one where the surface is plane, zero where it faces all ways.
+    lower, upper : (3,) tuple
+        Corners of the box around it, in m.
+    """
+
+    name: str
+    area: float
+    centre: Triple
+    normal: Triple
+    lower: Triple
+    upper: Triple
+
+    def __str__(self) -> str:
+        facing = "all ways" if np.linalg.norm(self.normal) < ONE_WAY else _words(self.normal, 1.0, 2)
+        box = f"{_words(self.lower)} … {_words(self.upper)} mm"
+        area = f"{number(1e6 * self.area)} mm²"
+        return f"{self.name}: {area} around {_words(self.centre)} mm, facing {facing}, in {box}"
+
+
+def faces_of(mesh: BodyMesh) -> tuple[Face, ...]:
+    """The surfaces of a mesh, in its order."""
+    return tuple(_face(mesh, name, mesh.surface_of == i) for i, name in enumerate(mesh.surfaces))
+
+
+def _face(mesh: BodyMesh, name: str, mine: np.ndarray) -> Face:
+    corners, vectors = mesh.points[mesh.triangles[mine]], mesh.area_vectors[mine]
+    areas = np.linalg.norm(vectors, axis=1)
+    area = float(areas.sum())
+    return Face(
+        name,
+        area,
+        _triple(areas @ corners.mean(axis=1) / area),
+        _triple(vectors.sum(axis=0) / area),
+        _triple(corners.min(axis=(0, 1))),
+        _triple(corners.max(axis=(0, 1))),
+    )
+
+
+def _triple(values: np.ndarray) -> Triple:
+    x, y, z = (float(value) for value in values)
+    return x, y, z
+
+
+def _words(values: Triple, scale: float = 1e3, digits: int = 4) -> str:
+    # what is nothing beside the largest is rounding dust
+    dust = 1e-9 * max(map(abs, values))
+    return f"({', '.join(number(0.0 if abs(v) < dust else scale * v, digits) for v in values)})"

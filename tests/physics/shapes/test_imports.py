@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from palpate.errors import FileFormatError, UsageError
-from palpate.physics.geometry import (
+from palpate.physics.shapes import (
     Block,
     Cylinder,
     FineMesh,
@@ -20,7 +20,7 @@ from palpate.physics.geometry import (
     LayeredBlock,
     SurfacePatch,
 )
-from palpate.physics.geometry.groups import UPRIGHT
+from palpate.physics.shapes.naming import UPRIGHT
 
 PLATE = 0.1 * 0.06 * 0.04 - np.pi * 0.015**2 * 0.04  # m³, a block with a round hole
 CUBE = np.array([[x, y, z] for x in (0.0, 0.1) for y in (0.0, 0.1) for z in (0.0, 0.1)])

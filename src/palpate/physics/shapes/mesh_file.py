@@ -6,19 +6,28 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from os import fspath
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.physics.geometry.checks import plain_name, require_size
-from palpate.physics.geometry.files import UNITS, digest_of, read_with_meshio, require_same, require_unit
-from palpate.physics.geometry.mesh import BodyMesh, outer_faces, to_ngsolve
-from palpate.physics.geometry.quality import tetrahedron_volumes
-from palpate.physics.geometry.refinement import MOST_ELEMENTS, FineMesh
-from palpate.physics.geometry.segments import SurfacePatch, patched, segments
-from palpate.physics.geometry.shape import Shape
-from palpate.physics.geometry.triangulation import Triangulation
+from palpate.physics.shapes.body_file import (
+    UNITS,
+    SurfacePatch,
+    digest_of,
+    patched,
+    read_with_meshio,
+    require_same,
+    require_unit,
+    segments,
+)
+from palpate.physics.shapes.mesh import BodyMesh, outer_faces, tetrahedron_volumes, to_ngsolve
+from palpate.physics.shapes.meshing import MOST_ELEMENTS, FineMesh
+from palpate.physics.shapes.naming import plain_name, require_size
+from palpate.physics.shapes.shape import Shape
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
 
 __all__ = ["ImportedMesh"]
 
@@ -163,9 +172,11 @@ def _right_handed(points: np.ndarray, tetrahedra: np.ndarray, source: str) -> np
 
 def _with_surfaces(bare: BodyMesh, source: Any, used: np.ndarray, shape: ImportedMesh) -> BodyMesh:
     """Add the outer triangles with the names of the file, of sharp-edged parts and of patches."""
+    from trimesh import Trimesh
+
     outer = outer_faces(bare.tetrahedra)
-    surface = Triangulation(bare.points, outer)
-    _require_manifold(outer, shape.path)
+    surface = Trimesh(bare.points, outer, process=False)
+    _require_manifold(surface, shape.path)
     labelled, names, group = _cells(source, "triangle", 3, "surface")
     known = {}
     if names:
@@ -180,14 +191,12 @@ def _with_surfaces(bare: BodyMesh, source: Any, used: np.ndarray, shape: Importe
     part_of = np.unique(parts[index < 0], return_inverse=True)[1]
     index[index < 0] = len(names) + part_of
     every = (*names, *(f"face {i + 1}" for i in range(int(part_of.max(initial=-1)) + 1)))
-    surfaces, surface_of = patched(every, index, surface.corners.mean(axis=1), shape.patches)
+    surfaces, surface_of = patched(every, index, surface.triangles_center, shape.patches)
     return replace(bare, triangles=outer, surface_of=surface_of, surfaces=surfaces)
 
 
-def _require_manifold(outer: np.ndarray, source: str) -> None:
-    from palpate.physics.geometry.triangulation import edge_faces
-
-    crowded = int((edge_faces(outer)[2] != 2).sum())
+def _require_manifold(surface: Trimesh, source: str) -> None:
+    crowded = int((np.bincount(surface.edges_unique_inverse) != 2).sum())
     if crowded:
         raise UsageError(
             f"The surface of the mesh in {source} is not a manifold: {crowded} edges don't belong to two triangles.",

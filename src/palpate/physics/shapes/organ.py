@@ -9,8 +9,8 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_positive
-from palpate.physics.geometry.checks import require_size
-from palpate.physics.geometry.shape import Solid
+from palpate.physics.shapes.naming import require_size
+from palpate.physics.shapes.shape import Solid
 from palpate.physics.words import millimetres
 
 __all__ = ["Organ"]

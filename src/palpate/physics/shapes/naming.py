@@ -1,4 +1,7 @@
-"""Arguments that all shapes check alike."""
+"""Names that stand for several surfaces at once.
+
+Arguments that all shapes check alike.
+"""
 
 from __future__ import annotations
 
@@ -10,17 +13,32 @@ from typing import Any
 
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_number
-from palpate.physics.geometry.groups import GROUPS, members
 
 __all__ = [
+    "GROUPS",
     "LARGEST",
     "SMALLEST",
+    "UPRIGHT",
+    "members",
     "plain_name",
     "require_known",
     "require_name",
     "require_size",
     "require_triple",
 ]
+
+UPRIGHT = ("x_min", "x_max", "y_min", "y_max")  # the upright faces of a box, by where they are
+GROUPS = {"side": UPRIGHT}
+
+
+def members(name: str, surfaces: Iterable[str]) -> tuple[str, ...]:
+    """The surfaces that a name stands for: itself, or the four upright faces of a box for ``"side"``; or none."""
+    known = tuple(surfaces)
+    if name in known:
+        return (name,)
+    group = GROUPS.get(name, ()) if isinstance(name, str) else ()
+    return group if group and set(group) <= set(known) else ()
+
 
 LARGEST, SMALLEST = 10.0, 1e-3  # m, longest side of a body that a hand or a tool would press
 

@@ -1,18 +1,137 @@
-"""Parts of a surface: split along sharp edges, or chosen by a box or a function."""
+"""Files of shapes: their place, content and unit.
+
+Parts of a surface: split along sharp edges, or chosen by a box or a function.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
+import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.errors import UsageError
-from palpate.physics.geometry.checks import require_name, require_triple
-from palpate.physics.geometry.triangulation import Triangulation, edge_faces
+from palpate.errors import FileFormatError, UsageError
+from palpate.physics.shapes.naming import require_name, require_triple
 
-__all__ = ["FEATURE_ANGLE", "SurfacePatch", "patched", "segments"]
+if TYPE_CHECKING:
+    from trimesh import Trimesh
+
+__all__ = [
+    "FEATURE_ANGLE",
+    "UNITS",
+    "SurfacePatch",
+    "digest_of",
+    "patched",
+    "read_with_meshio",
+    "require_same",
+    "require_unit",
+    "segments",
+]
+
+UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
+
+
+def require_unit(unit: Any) -> None:
+    """Refuse an unknown unit of length."""
+    if unit not in UNITS:
+        raise UsageError(
+            f"The unit of a file is {unit!r}.",
+            why=f"Units of length are {', '.join(UNITS)}.",
+            fix='Pass unit="mm" if the file is in millimetres.',
+        )
+
+
+def digest_of(path: str) -> str:
+    """SHA-256 of a file's content, as hexadecimal digits.
+
+    Raises
+    ------
+    UsageError
+        If there is no such file.
+    FileFormatError
+        If it is empty.
+    """
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise UsageError(
+            f"The file {path} can't be read.",
+            why=f"{error.strerror}.",
+            fix="Check the path; a relative one starts from the directory of the running program.",
+        ) from error
+    if not content.strip():
+        raise FileFormatError(
+            f"The file {path} is empty.", why="It has no content.", fix="Export the shape again."
+        )
+    return hashlib.sha256(content).hexdigest()
+
+
+def require_same(path: str, digest: str) -> None:
+    """Refuse a file whose content is no longer the one that the body was made from."""
+    if digest_of(path) != digest:
+        raise UsageError(
+            f"The file {path} has changed.",
+            why="Its content is not the one that this body was made from.",
+            fix="Make the body anew from the file as it is now.",
+        )
+
+
+def read_with_meshio(path: str) -> Any:
+    """Read a file of a mesh.
+
+    Returns
+    -------
+    meshio.Mesh
+
+    Raises
+    ------
+    FileFormatError
+        If the format is unknown or the file corrupt.
+    """
+    import struct
+    from xml.etree.ElementTree import ParseError
+
+    import meshio
+
+    try:
+        # Where no reader takes the file, meshio prints and ends the program. Its reader of STL takes four letters
+        # of an ASCII file for a count, which may overflow: no harm.
+        silent = io.StringIO()
+        with (
+            contextlib.redirect_stdout(silent),
+            contextlib.redirect_stderr(silent),
+            np.errstate(over="ignore"),
+        ):
+            return meshio.read(path)
+    except (meshio.ReadError, SystemExit, struct.error, ParseError) as error:
+        raise _unreadable(path, error) from error
+    except (
+        ValueError,
+        KeyError,
+        IndexError,
+        TypeError,
+        AssertionError,
+        AttributeError,
+        OSError,
+        EOFError,
+    ) as error:
+        raise _unreadable(path, error) from error
+
+
+def _unreadable(path: str, error: BaseException) -> FileFormatError:
+    said = str(error).strip() or type(error).__name__
+    said = "no reader of meshio takes it" if isinstance(error, SystemExit) else said
+    return FileFormatError(
+        f"The file {path} can't be read as a mesh.",
+        why=f"It is corrupt, cut short or of another format than its name says ({said}).",
+        fix="Open it in the program that made it and export it again, as VTU, MSH or STL for example.",
+    )
+
 
 FEATURE_ANGLE = 40.0  # degrees between neighbouring triangles from which the edge between them is sharp
 Point = tuple[float, float, float]
@@ -67,33 +186,26 @@ class SurfacePatch:
         return {"name": self.name, "lower": self.lower, "upper": self.upper, "where": function}
 
 
-def segments(surface: Triangulation, angle: float = FEATURE_ANGLE) -> np.ndarray:
+def segments(surface: Trimesh, angle: float = FEATURE_ANGLE) -> np.ndarray:
     """Number the parts of a closed surface that sharp edges bound, the largest area first.
 
     Parameters
     ----------
-    surface : Triangulation
-        Closed: each edge belongs to two triangles.
+    surface : trimesh.Trimesh
+        A closed one: each edge belongs to two triangles.
     angle : float
         In degrees; an edge is sharp where the normals of its two triangles differ by more.
 
     Returns
     -------
     (t,) int array
+        Number of each triangle's part.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
+    from trimesh.graph import connected_component_labels
 
-    _, edge_of, _ = edge_faces(surface.triangles)
-    order = np.argsort(edge_of.ravel(), kind="stable")
-    first, second = (order // 3)[0::2], (order // 3)[1::2]
-    cosine = np.einsum("ei,ei->e", surface.normals[first], surface.normals[second])
-    smooth = cosine > np.cos(np.radians(angle))
-    size = len(surface.triangles)
-    graph = coo_array((np.ones(smooth.sum()), (first[smooth], second[smooth])), shape=(size, size))
-    count, label = connected_components(graph, directed=False)
-    a, b, c = np.moveaxis(surface.corners, 1, 0)
-    areas = np.bincount(label, np.linalg.norm(np.cross(b - a, c - a), axis=1), minlength=count)
+    smooth = surface.face_adjacency[surface.face_adjacency_angles < np.radians(angle)]
+    label = connected_component_labels(smooth, node_count=len(surface.faces))
+    areas = np.bincount(label, surface.area_faces)
     # rounded, so that equal parts keep the order of their first triangles
     rank = np.argsort(np.argsort(-np.round(areas / areas.max(), 6), kind="stable"), kind="stable")
     return np.asarray(rank[label])

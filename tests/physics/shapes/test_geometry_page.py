@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-import palpate.physics.geometry as package
+import palpate.physics.shapes as package
 
 PAGE = (Path(__file__).parents[3] / "docs" / "guide" / "geometry.md").read_text(encoding="utf-8")
 

@@ -7,9 +7,8 @@ from typing import Any, ClassVar
 
 from palpate.errors import UsageError
 from palpate.physics.arguments import require_positive
-from palpate.physics.geometry.checks import require_size, require_triple
-from palpate.physics.geometry.isometries import Isometry, mirror, round_isometries
-from palpate.physics.geometry.shape import Solid
+from palpate.physics.shapes.naming import require_size, require_triple
+from palpate.physics.shapes.shape import Isometry, Solid, mirror, round_isometries
 from palpate.physics.words import millimetres
 
 __all__ = ["Dome", "Inclusion"]

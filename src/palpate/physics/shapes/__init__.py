@@ -1,0 +1,43 @@
+"""Shapes of bodies, and their meshes.
+
+block       Block, LayeredBlock        cylinder    Cylinder, Tube
+dome        Dome, Inclusion            organ       Organ
+solid_file  a body from a STEP or STL file; stl_file reads, checks and fills closed surfaces
+mesh_file   a body from a volume mesh
+body_file   files of bodies: unit, content, names for parts of their surface
+shape       what every shape offers, and its rotations and reflections
+mesh        the mesh as plain arrays, from and to NGSolve; its quality, and where its surfaces are
+meshing     tetrahedra for solids of the CAD kernel, fine where they are asked to be
+naming      names of surfaces and regions, and groups of them
+"""
+
+from palpate.physics.shapes.block import Block, LayeredBlock
+from palpate.physics.shapes.body_file import SurfacePatch
+from palpate.physics.shapes.cylinder import Cylinder, Tube
+from palpate.physics.shapes.dome import Dome, Inclusion
+from palpate.physics.shapes.mesh import BodyMesh, Face, MeshQuality, body_mesh, to_ngsolve
+from palpate.physics.shapes.mesh_file import ImportedMesh
+from palpate.physics.shapes.meshing import FineMesh
+from palpate.physics.shapes.organ import Organ
+from palpate.physics.shapes.shape import Geometry
+from palpate.physics.shapes.solid_file import ImportedSolid
+
+__all__ = [
+    "Block",
+    "BodyMesh",
+    "Cylinder",
+    "Dome",
+    "Face",
+    "FineMesh",
+    "Geometry",
+    "ImportedMesh",
+    "ImportedSolid",
+    "Inclusion",
+    "LayeredBlock",
+    "MeshQuality",
+    "Organ",
+    "SurfacePatch",
+    "Tube",
+    "body_mesh",
+    "to_ngsolve",
+]

@@ -1,0 +1,357 @@
+"""Where a mesh shall be fine, and how many elements that would take.
+
+Points spread over a part of a surface, where the element size shall be small.
+
+Tetrahedra for solids of the CAD kernel, fine where it is asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.physics.arguments import require_positive
+from palpate.physics.shapes.mesh import BodyMesh, body_mesh
+from palpate.physics.shapes.naming import GROUPS, members, require_triple
+
+__all__ = [
+    "GRADING",
+    "MOST_ELEMENTS",
+    "THREADS",
+    "FineMesh",
+    "mesh_solid",
+    "points_on",
+    "require_budget",
+    "scattered",
+]
+
+GRADING = 0.4  # growth of the element size per distance from a fine surface
+THREADS = 1  # of Netgen; its own four gain nothing, and spin: ten times slower where another process works
+MOST_ELEMENTS = 400_000  # about half a million nodes of second order: beyond any direct solver on one machine
+Point = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class FineMesh:
+    """A part of a surface that shall have small elements.
+
+    Attributes
+    ----------
+    surface : str
+        Name of a surface of the body.
+    element : float
+        Length of an element's edge in m.
+    lower, upper : tuple of three floats, optional
+        Corners in m of an upright box; the part of the surface within it becomes fine. Without a box, all of it.
+
+    Raises
+    ------
+    UsageError
+        If the size is not positive, or the box is empty or has only one corner.
+    """
+
+    surface: str
+    element: float
+    lower: Point | None = None
+    upper: Point | None = None
+
+    def __post_init__(self) -> None:
+        require_positive("The element size of a refinement", self.element, "m")
+        if (self.lower is None) != (self.upper is None):
+            raise UsageError(
+                f"The refinement of {self.surface!r} has one corner only.",
+                why="A box needs its lower and its upper corner.",
+                fix="Give both, or neither for the whole surface.",
+            )
+        if self.lower is None or self.upper is None:
+            return
+        lower = require_triple("The lower corner of a refinement", self.lower)
+        upper = require_triple("The upper corner of a refinement", self.upper)
+        object.__setattr__(self, "lower", lower)
+        object.__setattr__(self, "upper", upper)
+        if any(a > b for a, b in zip(lower, upper, strict=True)):
+            raise UsageError(
+                f"The box of the refinement of {self.surface!r} is empty: {lower} … {upper} m.",
+                why="Each coordinate of the lower corner must be at most that of the upper one.",
+                fix="Swap the coordinates that are in the wrong order.",
+            )
+
+    def is_on(self, name: str | None) -> bool:
+        """Whether the named surface is the refined one, or one of those that its name stands for."""
+        return name == self.surface or name in GROUPS.get(self.surface, ())
+
+
+def require_budget(volumes: Iterable[tuple[float, float]], fine: Iterable[tuple[float, float]]) -> None:
+    """Refuse a mesh of more than `MOST_ELEMENTS` elements before it is made.
+
+    A size h grows with the distance d from a fine surface as h + grading · d, and a tetrahedron of edge h fills
+    h³/6√2. Integrated over d, an area A takes 6√2 A / (2 grading h²) elements.
+
+    Parameters
+    ----------
+    volumes : iterable of (float, float)
+        Volume in m³ and element size in m of each region.
+    fine : iterable of (float, float)
+        Area in m² and element size in m of each refined part.
+
+    Raises
+    ------
+    UsageError
+        With the estimate.
+    """
+    per_volume = 6 * 2**0.5
+    count = sum(per_volume * volume / h**3 for volume, h in volumes)
+    count += sum(per_volume * area / (2 * GRADING * h**2) for area, h in fine)
+    if count > MOST_ELEMENTS:
+        raise UsageError(
+            f"The mesh would have about {count:.2g} elements, more than {MOST_ELEMENTS}.",
+            why="Halving the size takes 8 times the elements in a volume, 4 times at a surface.",
+            fix="Choose larger elements, or refine a smaller part of the surface.",
+        )
+
+
+def points_on(mesh: BodyMesh, refinement: FineMesh) -> tuple[np.ndarray, float]:
+    """Points of the refined part of a surface, at most half an element size apart.
+
+    The triangles are halved across their longest edges until they are small enough. Where the box holds no point,
+    the refinement asks for nothing.
+
+    Parameters
+    ----------
+    mesh : BodyMesh
+        Any mesh of the body, coarse for example.
+    refinement : FineMesh
+
+    Returns
+    -------
+    points : (n, 3) array
+        In m, on the mesh's triangles.
+    area : float
+        That the points stand for, in m².
+
+    Raises
+    ------
+    UsageError
+        If the surface would take too many elements.
+    """
+    if not members(refinement.surface, mesh.surfaces):
+        return np.empty((0, 3)), 0.0
+    corners = mesh.points[mesh.triangles_of(refinement.surface)]
+    small = []
+    while len(corners):
+        corners = corners[_meets(corners, refinement)]
+        require_budget([], [(_areas(corners).sum(), refinement.element)])
+        fits = _longest(corners)[1] <= refinement.element / 2
+        small.append(corners[fits])
+        corners = _halved(corners[~fits])
+    triangles = np.concatenate(small) if small else np.empty((0, 3, 3))
+    centres = triangles.mean(axis=1)
+    kept = _within(centres, refinement)
+    return centres[kept], float(_areas(triangles[kept]).sum())
+
+
+def scattered(corners: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (t, 3, 3) halved until no edge is longer than `size` m; and the index of the triangle of each."""
+    origin = np.arange(len(corners))
+    small, origins = [], []
+    while len(corners):
+        fits = _longest(corners)[1] <= size
+        small.append(corners[fits])
+        origins.append(origin[fits])
+        corners, origin = _halved(corners[~fits]), np.tile(origin[~fits], 2)
+    return np.concatenate(small), np.concatenate(origins)
+
+
+def _areas(corners: np.ndarray) -> np.ndarray:
+    a, b, c = np.moveaxis(corners, 1, 0)
+    return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
+
+
+def _meets(corners: np.ndarray, refinement: FineMesh) -> np.ndarray:
+    """Which triangles (t, 3, 3) have a box that touches the refinement's, bool (t,)."""
+    if refinement.lower is None or refinement.upper is None:
+        return np.ones(len(corners), dtype=bool)
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    return np.asarray(((low <= refinement.upper) & (high >= refinement.lower)).all(axis=1))
+
+
+def _within(points: np.ndarray, refinement: FineMesh) -> np.ndarray:
+    if refinement.lower is None or refinement.upper is None:
+        return np.ones(len(points), dtype=bool)
+    return np.asarray(((points >= refinement.lower) & (points <= refinement.upper)).all(axis=1))
+
+
+def _longest(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Index of the corner opposite to the longest edge, and that edge's length in m; each (t,)."""
+    lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - np.roll(corners, -2, axis=1), axis=2)
+    return lengths.argmax(axis=1), lengths.max(axis=1)
+
+
+def _halved(corners: np.ndarray) -> np.ndarray:
+    """Each triangle cut in two across its longest edge, shape (2t, 3, 3)."""
+    apex, _ = _longest(corners)
+    rows = np.arange(len(corners))
+    a, b, c = (corners[rows, (apex + k) % 3] for k in range(3))
+    middle = (b + c) / 2
+    return np.concatenate([np.stack([a, b, middle], axis=1), np.stack([a, middle, c], axis=1)])
+
+
+FLAT = 1e-5  # thickness over length below which a face counts as upright and plane
+PADDING = 1e-7  # m by which the CAD kernel's boxes are larger than the faces within
+SHORTEST = 1e-5  # shortest edge over the body's length that is meshed as such; Netgen's own default is in mm
+
+
+def mesh_solid(solid: Any, coarse: float, refinements: tuple[FineMesh, ...]) -> Any:
+    """Mesh a solid whose faces and solids carry names.
+
+    The fine part of an upright plane rectangle is cut out of it as a face of its own, so that the size of its
+    elements is even; on other faces the element size is restricted at points.
+
+    Parameters
+    ----------
+    solid : netgen.occ.TopoDS_Shape
+        In m.
+    coarse : float
+        Largest element size in m.
+    refinements : tuple of FineMesh
+
+    Returns
+    -------
+    netgen.meshing.Mesh
+
+    Raises
+    ------
+    UsageError
+        If there would be too many elements, or Netgen can't mesh the solid.
+    """
+    from netgen.occ import OCCGeometry
+
+    flat = [r for r in refinements if all(_is_rectangle(f) for f in solid.faces if r.is_on(f.name))]
+    solid = _imprinted(solid, flat)
+    fine = _restricted_faces(solid, flat)
+    points = []
+    for refinement in refinements:
+        if refinement not in flat:
+            at, area = points_on(body_mesh(_generate(OCCGeometry(solid), solid, coarse)), refinement)
+            points.append((at, refinement.element))
+            fine.append((area, refinement.element))
+    require_budget([(s.mass, min(coarse, s.maxh)) for s in solid.solids], fine)
+    geometry = OCCGeometry(solid)
+    for at, element in points:
+        _restrict(geometry, at, element)
+    return _generate(geometry, solid, coarse)
+
+
+def _generate(geometry: Any, solid: Any, coarse: float, **options: Any) -> Any:
+    import ngsolve
+    from netgen.meshing import NgException
+
+    ngsolve.SetNumThreads(1)
+    low, high = solid.bounding_box
+    longest = max(high[i] - low[i] for i in range(3))
+    try:
+        return geometry.GenerateMesh(
+            maxh=coarse, grading=GRADING, minedgelen=SHORTEST * longest, nthreads=THREADS, **options
+        )
+    except NgException as error:
+        raise UsageError(
+            f"Netgen could not mesh the body: {str(error).strip()}.",
+            why="Its faces may intersect or leave gaps, or a detail is far smaller than the elements.",
+            fix=f"Check the shape, or choose elements smaller than {coarse:.3g} m.",
+        ) from error
+
+
+def _is_rectangle(face: Any) -> bool:
+    """Whether a face is an upright plane rectangle.
+
+    In others a cut may run close to an edge, where only flat elements would fit.
+    """
+    if _upright(face) is None:
+        return False
+    low, high = face.bounding_box
+    extent = sorted(high[i] - low[i] for i in range(3))
+    return bool(abs(face.mass - extent[1] * extent[2]) < 10 * FLAT * face.mass)
+
+
+def _upright(face: Any) -> int | None:
+    """Axis that a plane face is normal to, None for others."""
+    low, high = face.bounding_box
+    extent = np.array([high[i] - low[i] for i in range(3)])
+    axis = int(extent.argmin())
+    return axis if extent[axis] < FLAT * extent.max() + 2 * PADDING else None
+
+
+def _imprinted(solid: Any, refinements: list[FineMesh]) -> Any:
+    """The solid whose plane faces are cut along the boxes of the refinements."""
+    from netgen.occ import Glue
+
+    for refinement in refinements:
+        if refinement.lower is None or refinement.upper is None:
+            continue
+        patches = [
+            patch
+            for face in solid.faces
+            if refinement.is_on(face.name)
+            for patch in _patch(face, np.array(refinement.lower), np.array(refinement.upper))
+        ]
+        if patches:
+            solid = Glue([solid, *patches])
+    return solid
+
+
+def _patch(face: Any, lower: np.ndarray, upper: np.ndarray) -> list[Any]:
+    """The part of an upright plane face inside a box; nothing where that is all of it or none."""
+    from netgen.occ import Face, Pnt, Segment, Wire
+
+    axis = _upright(face)
+    low, high = (np.array([p[i] for i in range(3)]) for p in face.bounding_box)
+    slack = FLAT * (high - low).max() + 2 * PADDING
+    level = (low[axis] + high[axis]) / 2
+    if axis is None or not lower[axis] - slack <= level <= upper[axis] + slack:
+        return []
+    a, b = np.maximum(low, lower), np.minimum(high, upper)
+    across = [i for i in range(3) if i != axis]
+    if any(b[i] - a[i] <= slack for i in across):
+        return []
+    if all(lower[i] <= low[i] + slack and upper[i] >= high[i] - slack for i in across):
+        return []
+    corners = []
+    for first, second in ((a, a), (b, a), (b, b), (a, b)):
+        corner = np.empty(3)
+        corner[axis], corner[across[0]], corner[across[1]] = level, first[across[0]], second[across[1]]
+        corners.append(Pnt(*corner.tolist()))
+    rectangle = Face(Wire([Segment(p, q) for p, q in pairwise([*corners, corners[0]])]))
+    return [rectangle * face]
+
+
+def _restricted_faces(solid: Any, refinements: list[FineMesh]) -> list[tuple[float, float]]:
+    """Set the element size of the faces inside the boxes; area and size of each."""
+    fine = {}
+    for number, face in enumerate(solid.faces):
+        for refinement in refinements:
+            if refinement.is_on(face.name) and _inside(face, refinement):
+                face.maxh = min(face.maxh, refinement.element)
+                fine[number] = (face.mass, face.maxh)
+    return list(fine.values())
+
+
+def _inside(face: Any, refinement: FineMesh) -> bool:
+    if refinement.lower is None or refinement.upper is None:
+        return True
+    low, high = face.bounding_box
+    slack = FLAT * max(high[i] - low[i] for i in range(3)) + 2 * PADDING
+    return all(
+        refinement.lower[i] - slack <= low[i] and high[i] <= refinement.upper[i] + slack for i in range(3)
+    )
+
+
+def _restrict(geometry: Any, at: np.ndarray, element: float) -> None:
+    from netgen.meshing import Pnt
+
+    for point in at.tolist():
+        geometry.RestrictH(Pnt(*point), element)

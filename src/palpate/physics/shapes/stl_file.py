@@ -1,0 +1,265 @@
+"""Closed surfaces from STL files: read, cleaned, checked for the faults that make them no body, and filled."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.errors import FileFormatError, UsageError
+from palpate.physics.shapes.body_file import UNITS, SurfacePatch, patched, read_with_meshio, segments
+from palpate.physics.shapes.mesh import BodyMesh, body_mesh
+from palpate.physics.shapes.meshing import GRADING, THREADS, FineMesh, points_on, require_budget, scattered
+from palpate.physics.shapes.naming import require_size
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
+
+__all__ = ["fill", "merged", "named", "read_stl", "require_closed"]
+
+
+def merged(points: np.ndarray, triangles: np.ndarray) -> Trimesh:
+    """Return a surface whose coinciding points are united and whose triangles without area are dropped.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+        Positions in m; those that agree to about 1e-6 of the body's length are one.
+    triangles : (t, 3) int array
+        Nodes, counter-clockwise as seen from outside.
+    """
+    from trimesh import Trimesh
+
+    surface = Trimesh(points, triangles, process=False)
+    tolerance = 1e-6 * float(surface.extents.max() or 1.0)
+    surface.merge_vertices(digits_vertex=round(-np.log10(tolerance)))
+    surface.update_faces(surface.area_faces > tolerance**2 / 2)
+    return surface
+
+
+def require_closed(surface: Trimesh, source: str) -> None:
+    """Refuse a surface that bounds no body: empty, open, not a manifold, facing inwards or cutting itself.
+
+    Raises
+    ------
+    UsageError
+        Naming the fault, how many edges have it and where.
+    """
+    if not len(surface.faces):
+        raise UsageError(
+            f"{source} holds no triangles.",
+            why="The file is empty.",
+            fix="Export the surface of the body again.",
+        )
+    edges, count = surface.edges_unique, np.bincount(surface.edges_unique_inverse)
+    open_edges, crowded = edges[count == 1], edges[count > 2]
+    if len(open_edges):
+        raise UsageError(
+            f"The surface of {source} is open: {len(open_edges)} edges belong to one triangle only.",
+            why=f"There is a hole {_where(surface, open_edges)}, and a body needs a closed surface.",
+            fix="Close the hole in the program that made the file, with its repair or fill-holes function.",
+        )
+    if len(crowded):
+        raise UsageError(
+            f"The surface of {source} is not a manifold: {len(crowded)} edges belong to more than two triangles.",
+            why=f"Sheets meet {_where(surface, crowded)}, so that inside and outside are not defined.",
+            fix="Remove inner walls and doubled sheets, or unite touching bodies, before the export.",
+        )
+    if not surface.is_winding_consistent:
+        twice = len(surface.edges) - len(np.unique(surface.edges, axis=0))
+        raise UsageError(
+            f"The triangles of {source} disagree on which side is outside, along {twice} edges.",
+            why="Some of them are inverted: their corners run the other way than their neighbours'.",
+            fix="Make the normals consistent (recalculate outside) and export again.",
+        )
+    if surface.volume < 0:
+        raise UsageError(
+            f"The surface of {source} is inside out.",
+            why="Its triangles face inwards, so that the body would be everything around it.",
+            fix="Flip the normals and export again.",
+        )
+    if (crossing := _crossing(surface)) is not None:
+        at = ", ".join(f"{v:.4g}" for v in surface.triangles_center[crossing[0]])
+        raise UsageError(
+            f"The surface of {source} cuts itself: triangles {crossing[0]} and {crossing[1]} cross.",
+            why=f"They do so near ({at}) m; a body's surface has an inside and an outside everywhere.",
+            fix="Unite overlapping parts (Boolean union) in the program that made the file.",
+        )
+
+
+def _where(surface: Trimesh, edges: np.ndarray) -> str:
+    middle = surface.vertices[edges].mean(axis=(0, 1))
+    return "around (" + ", ".join(f"{v:.4g}" for v in middle) + ") m"
+
+
+def _crossing(surface: Trimesh) -> tuple[int, int] | None:
+    """Two triangles that cross without sharing a node; None where there are none."""
+    corners, nodes = np.asarray(surface.triangles), np.asarray(surface.faces)
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    order = np.argsort(low[:, 0], kind="stable")
+    starts = low[order, 0]
+    for rank, i in enumerate(order):
+        stop = int(np.searchsorted(starts, high[i, 0], side="right"))
+        others = order[rank + 1 : stop]
+        near = others[((low[others] <= high[i]) & (high[others] >= low[i])).all(axis=1)]
+        near = near[~(nodes[near][:, :, None] == nodes[i]).any(axis=(1, 2))]
+        if len(near):
+            mine = np.broadcast_to(corners[i], (len(near), 3, 3))
+            hit = _pierces(mine, corners[near]) | _pierces(corners[near], mine)
+            if hit.any():
+                return int(i), int(near[hit.argmax()])
+    return None
+
+
+def _pierces(edges_of: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Whether an edge of one triangle passes through the inside of the other; both (n, 3, 3), result (n,).
+
+    Segment against triangle by Möller & Trumbore 1997 (J. Graph. Tools 2, 21-28).
+    """
+    a, u, v = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    hit = np.zeros(len(triangles), dtype=bool)
+    for k in range(3):
+        start = edges_of[:, k]
+        along = edges_of[:, (k + 1) % 3] - start
+        across = np.cross(along, v)
+        determinant = np.einsum("ni,ni->n", u, across)
+        slanted = np.abs(determinant) > 1e-12 * np.linalg.norm(u, axis=1) * np.linalg.norm(across, axis=1)
+        scale = 1 / np.where(slanted, determinant, 1.0)
+        reach = start - a
+        turned = np.cross(reach, u)
+        p = scale * np.einsum("ni,ni->n", reach, across)
+        q = scale * np.einsum("ni,ni->n", along, turned)
+        t = scale * np.einsum("ni,ni->n", v, turned)
+        edge = 1e-9
+        hit |= slanted & (p > edge) & (q > edge) & (p + q < 1 - edge) & (t > edge) & (t < 1 - edge)
+    return hit
+
+
+LENGTH = 100.0  # longest side in the units in which Netgen meshes: its tolerances are those of millimetres
+SHARP = (
+    0.05  # weight of a normal's direction against distance over the body's length, when faces are told apart
+)
+
+
+def read_stl(path: str, unit: str) -> Trimesh:
+    """The cleaned surface of an STL file in m.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is no STL file.
+    UsageError
+        If the surface bounds no body, or its size tells of mistaken units.
+    """
+    mesh = read_with_meshio(path)
+    blocks = [np.asarray(block.data) for block in mesh.cells if block.type == "triangle"]
+    if not blocks or not sum(map(len, blocks)) or not np.isfinite(mesh.points).all():
+        raise FileFormatError(
+            f"The file {path} holds no surface of finite triangles.",
+            why="It is empty, cut short or damaged.",
+            fix="Export the surface again.",
+        )
+    surface = merged(np.asarray(mesh.points, dtype=float) * UNITS[unit], np.concatenate(blocks))
+    require_size(path, float(surface.extents.max()), unit)
+    require_closed(surface, path)
+    return surface
+
+
+def named(surface: Trimesh, patches: tuple[SurfacePatch, ...], angle: float) -> BodyMesh:
+    """The surface, split along sharp edges into ``face 1``, ``face 2``, …; a mesh without tetrahedra."""
+    part = segments(surface, angle)
+    names = [f"face {i + 1}" for i in range(part.max() + 1)]
+    surfaces, surface_of = patched(names, part, surface.triangles_center, patches)
+    return BodyMesh(
+        surface.vertices, np.empty((0, 4)), surface.faces, surface_of, np.empty(0), surfaces, ("body",)
+    )
+
+
+def fill(skin: BodyMesh, volume: float, coarse: float, refinements: tuple[FineMesh, ...]) -> BodyMesh:
+    """Tetrahedra inside a closed surface, whose triangles are renewed.
+
+    Parameters
+    ----------
+    skin : BodyMesh
+        The surface with its names, in m.
+    volume : float
+        Enclosed, in m³.
+    coarse : float
+        Largest element size in m.
+    refinements : tuple of FineMesh
+
+    Raises
+    ------
+    UsageError
+        If there would be too many elements, or Netgen can't mesh the body.
+    """
+    low, high = skin.corners
+    scale = LENGTH / float((high - low).max())
+    fine = [(*points_on(skin, refinement), refinement.element) for refinement in refinements]
+    require_budget([(volume, coarse)], [(area, size) for _, area, size in fine])
+    geometry = _geometry(skin.points[skin.triangles] * scale)
+    netgen = _filled(geometry, coarse * scale, [(at * scale, size * scale) for at, _, size in fine])
+    netgen.Scale(1 / scale)
+    return _renamed(body_mesh(netgen), skin)
+
+
+def _geometry(corners: np.ndarray) -> Any:
+    """The triangles (t, 3, 3) as Netgen's geometry, which only a file can be made of."""
+    from netgen.stl import STLGeometry
+
+    a, b, c = np.moveaxis(corners, 1, 0)
+    normals = np.cross(b - a, c - a)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    lines = ["solid body"]
+    for normal, triangle in zip(normals.tolist(), corners.tolist(), strict=True):
+        lines.append("facet normal {!r} {!r} {!r}\nouter loop".format(*normal))
+        lines.extend("vertex {!r} {!r} {!r}".format(*corner) for corner in triangle)
+        lines.append("endloop\nendfacet")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "body.stl"
+        path.write_text("\n".join([*lines, "endsolid body"]) + "\n", encoding="ascii")
+        return STLGeometry(str(path))
+
+
+def _filled(geometry: Any, coarse: float, fine: list[tuple[np.ndarray, float]]) -> Any:
+    import ngsolve
+    from netgen.meshing import NgException
+
+    ngsolve.SetNumThreads(1)
+    rows = [(*point, size) for points, size in fine for point in points.tolist()]
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            # Netgen takes sizes at points of such a geometry from a file only
+            sizes = Path(folder) / "sizes.txt"
+            lines = [str(len(rows)), *(" ".join(map(repr, row)) for row in rows), "0"]
+            sizes.write_text("\n".join(lines) + "\n", encoding="ascii")
+            return geometry.GenerateMesh(
+                maxh=coarse, grading=GRADING, meshsizefilename=str(sizes), nthreads=THREADS
+            )
+    except NgException as error:
+        raise UsageError(
+            f"Netgen could not mesh the surface: {str(error).strip()}.",
+            why="Its triangles are too slender or its details too fine for the element size.",
+            fix=f"Remesh the surface evenly, or choose elements smaller than {coarse / LENGTH:.2g} of the length.",
+        ) from error
+
+
+def _renamed(mesh: BodyMesh, skin: BodyMesh) -> BodyMesh:
+    """Give each new triangle the name of the nearest old one that faces the same way."""
+    from scipy.spatial import cKDTree
+
+    low, high = skin.corners
+    length = float((high - low).max())
+    corners, origin = scattered(skin.points[skin.triangles], length / 100)
+    known = np.hstack([corners.mean(axis=1) / length, SHARP * skin.normals[origin]])
+    wanted = np.hstack([mesh.points[mesh.triangles].mean(axis=1) / length, SHARP * mesh.normals])
+    _, nearest = cKDTree(known).query(wanted)
+    index = skin.surface_of[origin[nearest]]
+    present = np.unique(index)
+    position = np.full(len(skin.surfaces), -1)
+    position[present] = np.arange(len(present))
+    surfaces = tuple(skin.surfaces[i] for i in present)
+    return replace(mesh, surface_of=position[index], surfaces=surfaces, regions=("body",))

@@ -20,8 +20,8 @@ from benchmarks.table import Claim, Column, Table
 from palpate.learning import refine
 from palpate.network import TrainedRegion
 from palpate.network.radial import RadialFunction
-from palpate.rbf.units.forms import form
-from palpate.rbf.units.regressors import Regressors
+from palpate.rbf.forms import unit_form
+from palpate.rbf.regressors import Regressors
 
 __all__ = ["tables"]
 
@@ -90,7 +90,7 @@ def _rows(setting: Setting, times: Sequence[float]) -> list[dict[str, Any]]:
     centre = Y.mean(axis=0)
     scale = np.sqrt(((Y - centre) ** 2).mean())
     Y, answers = (Y - centre) / scale, (answers - centre) / scale
-    r = Regressors(form(setting.form, X.shape[1]), setting.radial)
+    r = Regressors(unit_form(setting.form, X.shape[1]), setting.radial)
     places = X[np.random.default_rng(0).choice(len(X), setting.units, replace=False)]
     start = np.array([r.form.unit(x, setting.width, seed=i) for i, x in enumerate(places)])
     refine(X[:50], Y[:50], start[:5], r, iterations=1)  # compiles

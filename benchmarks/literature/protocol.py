@@ -20,8 +20,8 @@ from palpate.learning import Learner, Refining, Settings, State, default, initia
 from palpate.learning.refinement.structure import grow
 from palpate.network import Scaling
 from palpate.rbf.filter.prediction import value
-from palpate.rbf.units.forms import form
-from palpate.rbf.units.regressors import Regressors
+from palpate.rbf.forms import unit_form
+from palpate.rbf.regressors import Regressors
 from palpate.units import Quantity, Range
 
 __all__ = [
@@ -172,7 +172,7 @@ def refined(
     began = time.process_time()
     scaling = Scaling.of(problem.box, problem.Y)
     xs, ys = scaling.scale_inputs(problem.X), scaling.scale_outputs(problem.Y)
-    regressors = Regressors(form(kind, xs.shape[1]))
+    regressors = Regressors(unit_form(kind, xs.shape[1]))
     fit = partial(refine, ridge=ridge, iterations=iterations)
     found, _ = grow(xs, ys, regressors, target=target, units_max=units, fit=fit)
     seconds = time.process_time() - began

@@ -11,8 +11,8 @@ from palpate.learning.choosing.committee import Member, averaged, expected_error
 from palpate.learning.choosing.kernel_layer import KernelLayer, Metric, _unlikelihood, likely_metric
 from palpate.learning.choosing.race import Race, Runner, Split, carried, start
 from palpate.network.radial import RADIAL_FUNCTIONS
-from palpate.rbf.units.forms import form
-from palpate.rbf.units.regressors import Regressors
+from palpate.rbf.forms import unit_form
+from palpate.rbf.regressors import Regressors
 from palpate.units import Quantity, Range
 
 INPUTS = tuple(Range(f"x{i}", 2.0, 6.0, "N") for i in range(3))
@@ -176,7 +176,7 @@ def test_kernel_layer_interpolates_and_its_units_are_itself():
 @pytest.mark.parametrize("name", ["rank-1", "rank-2", "rotated", "axis-aligned"])
 def test_carried_units_stand_where_they_stood_as_wide_at_half_height(name):
     X = np.random.default_rng(0).uniform(-1, 1, (50, 3))
-    f = form(name, 3)
+    f = unit_form(name, 3)
     theta = start(f, X, np.array([0.5, 1.0, 2.0]), 7, seed=0)
     before = Runner(Regressors(f, "inverse-multiquadric"), theta)
     after = carried(before, "gaussian")

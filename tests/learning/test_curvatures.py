@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from palpate.network.radial import radial, third
-from palpate.rbf.refinement.leave_one_out import left_out_rows
+from palpate.rbf.forms import unit_form
+from palpate.rbf.refinement.leave_one_out import leave_one_out_row_errors
 from palpate.rbf.refinement.projection import project, span_of_units
 from palpate.rbf.refinement.refine import refine
 from palpate.rbf.refinement.rows import Rows
-from palpate.rbf.units.forms import form
-from palpate.rbf.units.regressors import Regressors, pairs
+from palpate.rbf.regressors import Regressors, pairs
 
 FORMS = ("isotropic", "axis-aligned", "rotated", "rank-1", "rank-2")
 RADIALS = ("gaussian", "inverse-multiquadric", "matern-5/2")
@@ -24,7 +24,7 @@ every_kind = pytest.mark.parametrize(("kind", "name"), list(product(FORMS, RADIA
 
 def some_units(kind, name, *, tail="affine", h=4, n=3, N=7, seed=0):
     rng = np.random.default_rng(seed)
-    r = Regressors(form(kind, n), name, tail)
+    r = Regressors(unit_form(kind, n), name, tail)
     X = rng.uniform(-1, 1, (N, n))
     theta = np.array([r.form.unit(x, 0.7, seed=i) for i, x in enumerate(X[:h])])
     return r, X, theta + rng.normal(0, 0.2, theta.shape)
@@ -131,7 +131,7 @@ def test_leaving_groups_of_samples_out_in_closed_form_equals_fitting_without_the
     r, X, theta = some_units("rotated", "gaussian", N=12)
     Y, known = some_samples(r, X)
     rows, penalty = Rows.of(r, X, Y, groups=groups, **known), 0.05
-    found = left_out_rows(rows, project(rows, theta, penalty))
+    found = leave_one_out_row_errors(rows, project(rows, theta, penalty))
     F = rows.matrix(theta)
     ridge = np.diag(np.r_[np.zeros(r.tail_size), np.full(len(theta), penalty)])
     of_row = np.arange(12)[rows.samples] if groups is None else np.array(groups)[rows.samples]
@@ -148,7 +148,7 @@ def test_the_leave_one_out_error_counts_all_that_is_known_of_a_sample():
     Y, known = some_samples(r, X)
     refined = refine(X, Y, np.zeros((0, r.form.size)), r, **known)
     rows = Rows.of(r, X, Y, **known)
-    missed = left_out_rows(rows, project(rows, refined.theta, 0.0))
+    missed = leave_one_out_row_errors(rows, project(rows, refined.theta, 0.0))
     assert refined.loo == pytest.approx(np.sqrt((missed**2).sum() / known["weights"].sum()), rel=1e-8)
     assert refined.rows == len(rows.targets)
 

@@ -13,8 +13,8 @@ from palpate.learning import Observation, freeze, observe, step
 from palpate.network import Scaling
 from palpate.rbf.filter.growth import add_unit, remove_unit
 from palpate.rbf.filter.prediction import linearise, measurement, regressors_at, value
+from palpate.rbf.forms import Centred, unit_form
 from palpate.rbf.refinement.rows import Rows
-from palpate.rbf.units.forms import Centred, form
 from palpate.units import Quantity, Range
 
 n, m = 3, 2
@@ -114,7 +114,7 @@ def test_derivatives_of_the_slopes_by_every_parameter(name, radial):
 def test_a_rotated_unit_that_is_not_rotated_is_the_axis_aligned_one(widths):
     rng = np.random.default_rng(2)
     centres, sigma = rng.uniform(-1, 1, (5, n)), rng.uniform(0.4, 1.5, (5, n))
-    rotated, aligned = form("rotated", n, widths), form("axis-aligned", n, widths)
+    rotated, aligned = unit_form("rotated", n, widths), unit_form("axis-aligned", n, widths)
     assert isinstance(rotated, Centred)
     assert isinstance(aligned, Centred)
     for one, other in zip(
@@ -136,7 +136,7 @@ def test_metric_is_positive_semidefinite_of_the_forms_rank(name):
 
 @every_form
 def test_a_new_unit_peaks_where_it_was_added(name):
-    shape = form(name, n)
+    shape = unit_form(name, n)
     x = np.array([0.2, -0.7, 0.4])
     A, b = shape.factors(shape.unit(x, 0.6, seed=3)[None])
     np.testing.assert_allclose(A[0] @ x, b[0], atol=1e-14)
@@ -206,7 +206,7 @@ def test_slopes_teach_what_values_do(name):
 @pytest.mark.parametrize("name", ["rank-0", "rank-4", "oval", "rank-x"])
 def test_an_unknown_form_is_refused_by_name(name):
     with pytest.raises(UsageError, match=name):
-        form(name, n)
+        unit_form(name, n)
 
 
 def known_of(state, count, seed=8):

@@ -13,9 +13,9 @@ from palpate.learning.choosing.calibration import Evidence
 from palpate.learning.choosing.fitted import Fitted
 from palpate.learning.choosing.kernel_layer import KernelLayer, Metric
 from palpate.network import Network, Uncertainty
+from palpate.rbf.forms import unit_form
 from palpate.rbf.refinement.refine import refine
-from palpate.rbf.units.forms import form
-from palpate.rbf.units.regressors import Regressors
+from palpate.rbf.regressors import Regressors
 
 NOISE = 0.05
 
@@ -89,7 +89,7 @@ def test_a_kernel_layers_widths_are_its_gaussian_process():
 def test_root_gives_the_coefficients_of_least_squares():
     rng = np.random.default_rng(0)
     X, Y = rng.uniform(-1, 1, (60, 2)), rng.normal(size=(60, 3))
-    r = Regressors(form("isotropic", 2), "gaussian")
+    r = Regressors(unit_form("isotropic", 2), "gaussian")
     units = np.array([r.form.unit(x, 0.3, seed=0) for x in X[:10]])
     two = [refine(X, Y, theta, r, ridge=1e-12, iterations=0) for theta in (units[:4], units[4:])]
     np.testing.assert_allclose(calibration.regressor_root(two[0], X) @ Y, two[0].coefficients, atol=1e-6)

@@ -16,7 +16,7 @@ from palpate.learning.energy.search import Problem, Search
 from palpate.learning.energy.strategy import time_for
 from palpate.learning.energy.trust import trust_of
 from palpate.rbf.refinement.rows import Rows
-from palpate.rbf.units.regressors import pairs
+from palpate.rbf.regressors import pairs
 from palpate.surrogates import ContactLaw, TouchedSurface
 from palpate.units import Range
 

@@ -12,19 +12,19 @@ from palpate.errors import UsageError
 from palpate.learning import Observation, Settings, initial, observe, posterior, refine, step
 from palpate.network import Scaling
 from palpate.rbf.filter.prediction import value
+from palpate.rbf.forms import unit_form
 from palpate.rbf.freezing import freeze_refined
-from palpate.rbf.refinement.laplace import Posterior
-from palpate.rbf.units.forms import form
-from palpate.rbf.units.regressors import Regressors
+from palpate.rbf.refinement.posterior import Posterior
+from palpate.rbf.regressors import Regressors
 from palpate.units import Quantity, Range
 
-LINE = Regressors(form("axis-aligned", 1))
+LINE = Regressors(unit_form("axis-aligned", 1))
 
 
 def small(name, radial, tail="affine", *, m=3, N=30):
     """A network refined a little on random data of two inputs."""
     rng = np.random.default_rng(7)
-    r = Regressors(form(name, 2), radial, tail)
+    r = Regressors(unit_form(name, 2), radial, tail)
     X, Y = rng.uniform(-1, 1, (N, 2)), rng.normal(size=(N, m))
     start = np.array([r.form.unit(x, 0.8, seed=i) for i, x in enumerate(X[:3])])
     start += rng.normal(0, 0.1, start.shape)  # round units have no defined rotation
@@ -117,7 +117,7 @@ def test_many_outputs_and_few_take_two_ways_to_one_variance():
 def test_structured_posterior_is_small():
     """h = 100, n = 3, m = 60: the dense joint covariance would take 350 MB."""
     rng = np.random.default_rng(0)
-    r = Regressors(form("axis-aligned", 3), "inverse-multiquadric")
+    r = Regressors(unit_form("axis-aligned", 3), "inverse-multiquadric")
     X, Y = rng.uniform(-1, 1, (500, 3)), rng.normal(size=(500, 60))
     found = refine(X, Y, np.array([r.form.unit(x, 0.8) for x in X[:100]]), r, iterations=1)
     p = Posterior.of(found, X, Y)

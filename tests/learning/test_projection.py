@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from palpate.errors import UsageError
+from palpate.rbf.forms import unit_form
 from palpate.rbf.output_modes import every_mode
-from palpate.rbf.refinement.leave_one_out import left_out, without_each
+from palpate.rbf.refinement.leave_one_out import errors_without_each_unit, leave_one_out_errors
 from palpate.rbf.refinement.projection import gauss_newton, leverage_of_units, project
 from palpate.rbf.refinement.rows import Rows
-from palpate.rbf.units.forms import form
-from palpate.rbf.units.regressors import Regressors
+from palpate.rbf.regressors import Regressors
 
 FORMS = ("isotropic", "axis-aligned", "rotated", "rank-1")
 RADIALS = ("gaussian", "inverse-multiquadric", "matern-5/2")
@@ -20,7 +20,7 @@ RADIALS = ("gaussian", "inverse-multiquadric", "matern-5/2")
 def some_rows(name="rotated", radial="gaussian", *, slopes=False, N=40, h=3, m=4, seed=0):
     """Random samples, weights, and slopes for half of the samples."""
     rng = np.random.default_rng(seed)
-    r = Regressors(form(name, 2), radial, "affine")
+    r = Regressors(unit_form(name, 2), radial, "affine")
     X, Y = rng.uniform(-1, 1, (N, 2)), rng.normal(size=(N, m))
     theta = np.array([r.form.unit(x, 0.8, seed=i) for i, x in enumerate(X[:h])])
     theta += rng.normal(0, 0.1, theta.shape)
@@ -139,7 +139,7 @@ def test_modes_lose_nothing(shape):
 def test_leaving_one_out_in_closed_form_equals_fitting_without_it(slopes):
     rows, theta = some_rows(slopes=slopes, N=15)
     penalty, N = 0.05, len(rows.X)
-    found = left_out(rows, project(rows, theta, penalty))
+    found = leave_one_out_errors(rows, project(rows, theta, penalty))
     F = rows.matrix(theta)
     ridge = np.diag(np.r_[np.zeros(3), np.full(3, penalty)])
     own = np.r_[np.arange(N), np.repeat(rows.sloped, 2)]
@@ -153,15 +153,15 @@ def test_leaving_one_out_in_closed_form_equals_fitting_without_it(slopes):
 def test_leave_one_out_error_without_each_unit_equals_removing_it():
     rows, theta = some_rows(h=5, N=30)
     penalty = 0.05
-    found = without_each(rows, project(rows, theta, penalty), 5)
+    found = errors_without_each_unit(rows, project(rows, theta, penalty), 5)
     for k in range(5):
         fewer = np.delete(theta, k, axis=0)
-        missed = left_out(rows, project(rows, fewer, penalty)) * rows.scale[:, None]
+        missed = leave_one_out_errors(rows, project(rows, fewer, penalty)) * rows.scale[:, None]
         assert found[k] == pytest.approx((missed**2).sum(), rel=1e-8)
 
 
 def test_what_is_not_a_sample_is_refused():
-    r = Regressors(form("isotropic", 2))
+    r = Regressors(unit_form("isotropic", 2))
     X, Y = np.zeros((5, 2)), np.zeros((5, 3))
     for bad in (
         {"weights": -np.ones(5)},

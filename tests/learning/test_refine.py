@@ -13,10 +13,10 @@ from laws.beams import INPUT, stiffening
 from palpate.errors import UsageError
 from palpate.learning import refine
 from palpate.network import Scaling
-from palpate.rbf.units.forms import form
-from palpate.rbf.units.regressors import Regressors
+from palpate.rbf.forms import unit_form
+from palpate.rbf.regressors import Regressors
 
-LINE = Regressors(form("axis-aligned", 1))
+LINE = Regressors(unit_form("axis-aligned", 1))
 NONE = np.zeros((0, 2))
 
 
@@ -34,7 +34,7 @@ def two_gaussians(X):
 def known_network(name, radial="gaussian", *, n=2, h=3, m=3, seed=0):
     """Regressors, θ and coefficients of a random network, and a start near it."""
     rng = np.random.default_rng(seed)
-    r = Regressors(form(name, n), radial)
+    r = Regressors(unit_form(name, n), radial)
     theta = np.array([r.form.unit(x, 0.9, seed=i) for i, x in enumerate(rng.uniform(-0.7, 0.7, (h, n)))])
     C = rng.normal(size=(r.tail_size + h, m))
     return r, theta, C, theta + rng.normal(0, 0.05, theta.shape)
@@ -80,7 +80,7 @@ def test_values_and_slopes_of_a_network_lead_back_to_it(name, radial, solver):
 def test_without_units_it_is_least_squares():
     rng = np.random.default_rng(0)
     X, Y = rng.normal(size=(30, 2)), rng.normal(size=(30, 3))
-    found = refine(X, Y, np.zeros((0, 5)), Regressors(form("rotated", 2)))
+    found = refine(X, Y, np.zeros((0, 5)), Regressors(unit_form("rotated", 2)))
     A = np.hstack([np.ones((30, 1)), X])
     np.testing.assert_allclose(found.tail, np.linalg.lstsq(A, Y, rcond=None)[0], rtol=1e-9)
 
@@ -89,7 +89,7 @@ def test_without_units_it_is_least_squares():
 def test_leave_one_out_in_closed_form_equals_leaving_one_out(tail):
     rng = np.random.default_rng(1)
     X, Y = rng.normal(size=(15, 1)), rng.normal(size=(15, 2))
-    r = Regressors(form("axis-aligned", 1), tail=tail)
+    r = Regressors(unit_form("axis-aligned", 1), tail=tail)
     found = refine(X, Y, NONE, r)
     errors = []
     for i in range(15):
@@ -207,7 +207,7 @@ def test_duplicate_samples_are_no_trouble():
 
 def test_time_limit_is_kept_to_within_an_iteration():
     rng = np.random.default_rng(0)
-    r = Regressors(form("rotated", 3), "inverse-multiquadric")
+    r = Regressors(unit_form("rotated", 3), "inverse-multiquadric")
     X, Y = rng.uniform(-1, 1, (400, 3)), rng.normal(size=(400, 20))
     start = np.array([r.form.unit(x, 0.7) for x in X[:60]])
     refine(X, Y, start, r, iterations=1)
@@ -290,5 +290,5 @@ def test_lists_are_samples_too():
 @pytest.mark.parametrize("bad", [{"tail": "bogus"}, {"radial": "bogus"}])
 def test_regressors_are_those_there_are(bad):
     with pytest.raises(UsageError, match="bogus") as caught:
-        Regressors(form("rotated", 2), **bad)
+        Regressors(unit_form("rotated", 2), **bad)
     assert caught.value.fix

@@ -10,8 +10,8 @@ import pytest
 from laws.beams import INPUT, OUTPUTS, stiffening
 from palpate.learning import refine, refined_network
 from palpate.learning.refinement.structure import grow, placed, prune
-from palpate.rbf.units.forms import form
-from palpate.rbf.units.regressors import Regressors
+from palpate.rbf.forms import unit_form
+from palpate.rbf.regressors import Regressors
 
 RADIALS = ("gaussian", "inverse-multiquadric", "matern-5/2")
 
@@ -51,7 +51,7 @@ def test_units_are_limited_by_the_samples_there_are():
 
 def test_growth_goes_on_to_the_target():
     X, Y = bumps(200)
-    r = Regressors(form("rotated", 2))
+    r = Regressors(unit_form("rotated", 2))
     found, trials = grow(X, Y, r, target=1e-3, units_max=12)
     assert found.loo <= 1e-3
     assert trials[0].units == 0
@@ -62,7 +62,7 @@ def test_growth_goes_on_to_the_target():
 
 def test_growth_stops_at_the_limit():
     X, Y = bumps(60)
-    found, trials = grow(X, Y, Regressors(form("isotropic", 2)), target=0.0, units_max=5)
+    found, trials = grow(X, Y, Regressors(unit_form("isotropic", 2)), target=0.0, units_max=5)
     assert max(t.units for t in trials) == 5
     assert found.loo == min(t.loo for t in trials)
 
@@ -74,14 +74,14 @@ def test_noise_is_never_learnt(N, n):
     for seed in range(5):
         rng = np.random.default_rng(seed)
         X, Y = rng.uniform(-1, 1, (N, n)), rng.normal(size=(N, 1))
-        found, trials = grow(X, Y, Regressors(form("axis-aligned", n)), target=1e-3, units_max=40)
+        found, trials = grow(X, Y, Regressors(unit_form("axis-aligned", n)), target=1e-3, units_max=40)
         assert all(t.loo > 0.1 for t in trials)
         assert found.loo > 0.1
 
 
 def test_growth_has_room_for_what_slopes_decide_as_well():
     X = np.linspace(-1, 1, 11)[:, None]
-    r = Regressors(form("axis-aligned", 1))
+    r = Regressors(unit_form("axis-aligned", 1))
     curve, slope = np.sin(5 * X), 5 * np.cos(5 * X)
     fit = functools.partial(refine, slopes=slope[:, :, None], iterations=20)
     plain = grow(X, curve, r, target=0.0, units_max=40)[1]
@@ -92,7 +92,7 @@ def test_growth_has_room_for_what_slopes_decide_as_well():
 
 def test_new_units_stand_where_the_error_is():
     X, Y = bumps(200)
-    found = refine(X, Y, np.zeros((0, 3)), Regressors(form("isotropic", 2)))
+    found = refine(X, Y, np.zeros((0, 3)), Regressors(unit_form("isotropic", 2)))
     new = placed(X, Y, found, 3)[:, :2]
     error = ((Y - found.predict(X)) ** 2).sum(axis=1)
     np.testing.assert_array_equal(new[0], X[error.argmax()])
@@ -100,7 +100,7 @@ def test_new_units_stand_where_the_error_is():
 
 
 def test_pruning_finds_back_to_the_units_that_made_the_data():
-    r = Regressors(form("axis-aligned", 1))
+    r = Regressors(unit_form("axis-aligned", 1))
     X = np.linspace(-1, 1, 60)[:, None]
     truth = np.array([[-0.4, np.log(0.4)], [0.5, np.log(0.6)]])
     Y = r.phi(X, truth) @ np.array([[1.0, -0.5], [0.3, 2.0]])
@@ -114,7 +114,7 @@ def test_pruning_finds_back_to_the_units_that_made_the_data():
 
 def test_pruning_keeps_what_already_misses_the_target():
     X, Y = bumps(60)
-    found, _ = grow(X, Y, Regressors(form("isotropic", 2)), target=0.0, units_max=3)
+    found, _ = grow(X, Y, Regressors(unit_form("isotropic", 2)), target=0.0, units_max=3)
     kept, trials = prune(X, Y, found, target=0.0)
     assert kept is found
     assert len(trials) == 1

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from palpate.errors import UsageError
+from palpate.rbf.forms import unit_form
 from palpate.rbf.refinement.rows import Rows
-from palpate.rbf.units.forms import form
-from palpate.rbf.units.regressors import Regressors, pairs
-from palpate.rbf.units.symmetric import Images, SymmetricRegressors
+from palpate.rbf.regressors import Regressors, pairs
+from palpate.rbf.symmetric_units import Images, SymmetricRegressors
 
 FORMS = ("isotropic", "axis-aligned", "rotated", "rank-1", "rank-2")
 every_form = pytest.mark.parametrize("kind", FORMS)
@@ -26,7 +26,7 @@ def square():
 
 def some_units(kind, N=6, h=3, seed=0):
     rng = np.random.default_rng(seed)
-    r = SymmetricRegressors(form(kind, 3), "inverse-multiquadric", "affine", square())
+    r = SymmetricRegressors(unit_form(kind, 3), "inverse-multiquadric", "affine", square())
     X = rng.uniform(-1, 1, (N, 3))
     theta = np.array([r.form.unit(x, 0.7, seed=i) for i, x in enumerate(X[:h])])
     return r, X, theta + rng.normal(0, 0.2, theta.shape)

@@ -12,10 +12,10 @@ from palpate.errors import UsageError
 from palpate.learning import refine
 from palpate.network import Network, Scaling
 from palpate.network.uncertainty import Uncertainty
+from palpate.rbf.forms import unit_form
 from palpate.rbf.freezing import freeze_refined
-from palpate.rbf.refinement.laplace import Posterior
-from palpate.rbf.units.forms import form
-from palpate.rbf.units.regressors import Regressors
+from palpate.rbf.refinement.posterior import Posterior
+from palpate.rbf.regressors import Regressors
 from palpate.units import Quantity, Range
 
 RANGES = (Range("Fx", -2.0, 2.0, "N"), Range("Fy", 0.0, 5.0, "N"))
@@ -41,7 +41,7 @@ def learnt(noise, name="rotated", radial="gaussian", h=10):
     X, Y = sampled(250, noise, 1)
     scaling = Scaling.of(RANGES, Y)
     x, y = scaling.scale_inputs(X), scaling.scale_outputs(Y)
-    r = Regressors(form(name, 2), radial)
+    r = Regressors(unit_form(name, 2), radial)
     start = np.array([r.form.unit(a, 0.7, seed=i) for i, a in enumerate(x[:h])])
     found = refine(x, y, start, r, iterations=40, ridge=1e-9)
     outputs = tuple(Quantity(f"u{j}", "m") for j in range(4))

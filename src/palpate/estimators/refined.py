@@ -20,9 +20,9 @@ from palpate.learning.choosing.fitted import Choice
 from palpate.learning.refinement.structure import Trial, freeze_refined, placed
 from palpate.network import Scaling, Uncertainty
 from palpate.network.radial import RADIAL_FUNCTIONS
+from palpate.rbf.forms import unit_form
 from palpate.rbf.refinement.refine import Refined, refine
-from palpate.rbf.units.forms import form as form_of
-from palpate.rbf.units.regressors import Regressors, Tail
+from palpate.rbf.regressors import Regressors, Tail
 
 __all__ = ["RBFNetworkRegressor"]
 
@@ -46,7 +46,7 @@ class RBFNetworkRegressor(RadialRegressor):
         Error wanted on samples kept apart, relative to the outputs' spread: root mean square error over root mean
         square deviation from the mean.
     form : str, optional
-        Of a unit (see `palpate.rbf.units.forms`); if left out rotated up to three inputs, ridges above.
+        Of a unit (see `palpate.rbf.forms`); if left out rotated up to three inputs, ridges above.
         "auto" tries forms, radial functions and sizes against each other (`palpate.learning.fit`) and takes up to
         `seconds`; `radial`, `tail` and `units_max` then have no effect. Where weights differ, or below 20
         samples, it is as if left out.
@@ -221,7 +221,7 @@ class RBFNetworkRegressor(RadialRegressor):
             if self.form not in {None, "auto"}
             else ("axis-aligned" if n == 1 else "rotated" if n <= 3 else "rank-1")
         )
-        made = Regressors(form_of(form, n), self.radial, self.tail)  # type: ignore[arg-type]
+        made = Regressors(unit_form(form, n), self.radial, self.tail)  # type: ignore[arg-type]
         m = Y.shape[1]
         room = max(0.0, Y.size / 1.25 - m * made.tail_size) / (m + made.form.size)
         return made, min(self.units_max, int(room), len(Y) // 2)

@@ -31,8 +31,7 @@ from palpate.rbf.filter.observation import Observation
 from palpate.rbf.filter.settings import PRESETS, Settings, default, founding, recommended
 from palpate.rbf.filter.state import State, initial
 from palpate.rbf.filter.step import Event, observe, step
-from palpate.rbf.refinement.laplace import Posterior
-from palpate.rbf.refinement.posterior import posterior
+from palpate.rbf.refinement.posterior import Posterior, posterior
 from palpate.rbf.refinement.refine import Refined, refine
 
 __all__ = [

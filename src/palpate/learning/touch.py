@@ -17,7 +17,7 @@ from palpate.learning.learn import Learned, learn
 from palpate.learning.refinement.structure import refined_network
 from palpate.network import Network
 from palpate.rbf.filter.settings import Settings, recommended
-from palpate.rbf.units.forms import Centred
+from palpate.rbf.forms import Centred
 from palpate.surrogates import TouchModel
 from palpate.units import Quantity, Range, bounds
 

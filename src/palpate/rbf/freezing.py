@@ -15,7 +15,7 @@ from palpate.network import Network, Scaling
 from palpate.rbf.filter.settings import Settings
 from palpate.rbf.filter.state import State
 from palpate.rbf.refinement.refine import Refined
-from palpate.rbf.units.regressors import Regressors
+from palpate.rbf.regressors import Regressors
 from palpate.units import Quantity, Range
 
 __all__ = ["freeze", "freeze_refined", "frozen", "training_record"]

@@ -24,9 +24,9 @@ from palpate.learning.choosing.kernel_layer import KernelLayer, Metric, likely_m
 from palpate.learning.choosing.problem import Problem
 from palpate.learning.choosing.race import RIDGE, Race, Runner, Split, best_of, carried, forms_for
 from palpate.network.radial import RADIAL_FUNCTIONS
+from palpate.rbf.forms import unit_form
 from palpate.rbf.refinement.refine import refine
-from palpate.rbf.units.forms import form as form_of
-from palpate.rbf.units.regressors import Regressors
+from palpate.rbf.regressors import Regressors
 from palpate.units import Quantity, Range
 
 __all__ = ["Choice", "Fitted", "fit"]
@@ -324,7 +324,7 @@ class _Chooser:
 
     def _tail(self) -> tuple[Runner, float]:
         """An affine function without units, and its error."""
-        form = form_of("axis-aligned", self.X.shape[1])
+        form = unit_form("axis-aligned", self.X.shape[1])
         regressors, none = Regressors(form, "gaussian"), np.zeros((0, form.size))
         found = refine(self.split.X, self.split.Y, none, regressors, heldout=self.split.unseen)
         return Runner(regressors, none, found.heldout, found=found), found.heldout

@@ -14,10 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from palpate.network.radial import RadialFunction
+from palpate.rbf.forms import Centred, Form, unit_form
 from palpate.rbf.refinement.refine import Refined, refine
-from palpate.rbf.units.forms import Centred, Form
-from palpate.rbf.units.forms import form as form_of
-from palpate.rbf.units.regressors import Regressors
+from palpate.rbf.regressors import Regressors
 
 __all__ = ["Race", "Runner", "Split", "carried", "forms_for", "start"]
 
@@ -101,7 +100,7 @@ class Race:
 
     def entered(self, name: str, numbers: int, fewest: int = 2) -> Runner:
         """A runner of a form with about `numbers` numbers in its units."""
-        form = form_of(name, self.split.X.shape[1])
+        form = unit_form(name, self.split.X.shape[1])
         h = int(np.clip(numbers // form.size, fewest, max(fewest, self.room(form.size))))
         return Runner(Regressors(form, _FIRST), start(form, self.split.X, self.scales, h, self.seed))
 

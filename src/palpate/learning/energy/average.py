@@ -16,7 +16,7 @@ import numpy as np
 
 from palpate.learning.energy.search import LeftOut
 from palpate.rbf.refinement.refine import Refined
-from palpate.rbf.units.regressors import Regressors
+from palpate.rbf.regressors import Regressors
 
 __all__ = ["Average", "average"]
 

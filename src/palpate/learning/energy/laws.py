@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.learning.energy.samples import EnergySamples
 from palpate.learning.energy.search import EnergyTrial, Problem, Search
-from palpate.rbf.units.symmetric import Images
+from palpate.rbf.symmetric_units import Images
 from palpate.surrogates import ContactLaw
 
 __all__ = ["chosen_law"]

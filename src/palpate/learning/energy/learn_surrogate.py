@@ -125,7 +125,7 @@ def learn_surrogate(
         Depth (m) that the solves were to reach, or that they did reach where they came less far than nine tenths of
         it: beyond it nothing counts as trained, whatever the ranges say. By default they alone decide.
     form : str
-        Of a unit (see `palpate.rbf.units.forms`), or "auto".
+        Of a unit (see `palpate.rbf.forms`), or "auto".
     radial : {"gaussian", "inverse-multiquadric", "matern-5/2", "auto"}
     seed : int
         Decides the starts. With a limit on time the result also depends on the machine's speed and cores.

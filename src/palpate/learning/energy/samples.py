@@ -25,8 +25,8 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.learning.energy.columns import columns_of
+from palpate.rbf.regressors import pairs
 from palpate.rbf.sample_checks import numbers
-from palpate.rbf.units.regressors import pairs
 from palpate.surrogates import ContactLaw, TouchedSurface
 from palpate.units import Range, bounds
 

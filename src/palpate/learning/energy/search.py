@@ -18,13 +18,13 @@ from palpate.rbf.filter.observation import Observation
 from palpate.rbf.filter.settings import default
 from palpate.rbf.filter.state import initial
 from palpate.rbf.filter.step import observe
-from palpate.rbf.refinement.leave_one_out import left_out_rows
+from palpate.rbf.forms import unit_form
+from palpate.rbf.refinement.leave_one_out import leave_one_out_row_errors
 from palpate.rbf.refinement.projection import Fit, project, span_of_units
 from palpate.rbf.refinement.refine import Refined, refine
 from palpate.rbf.refinement.rows import Rows
-from palpate.rbf.units.forms import form as form_of
-from palpate.rbf.units.regressors import Regressors
-from palpate.rbf.units.symmetric import Images, SymmetricRegressors
+from palpate.rbf.regressors import Regressors
+from palpate.rbf.symmetric_units import Images, SymmetricRegressors
 
 __all__ = ["EnergyTrial", "Found", "LeftOut", "Problem", "Search"]
 
@@ -89,7 +89,7 @@ class Problem:
 
     def regressors(self, form: str, radial: RadialFunction) -> Regressors:
         """Units of a form, with their images where there is a symmetry."""
-        of = form_of(form, self.X.shape[1])
+        of = unit_form(form, self.X.shape[1])
         return (
             Regressors(of, radial)
             if self.images is None
@@ -132,7 +132,7 @@ class Problem:
         if refined.theta.size + len(fit.tau) >= len(rows.targets):
             return LeftOut(rows, fit, np.full(rows.targets.shape, np.inf), rows.groups)
         span = span_of_units(rows, refined.theta, fit) if len(refined.theta) else None
-        return LeftOut(rows, fit, left_out_rows(rows, fit, basis=span, most=_MOST), rows.groups)
+        return LeftOut(rows, fit, leave_one_out_row_errors(rows, fit, basis=span, most=_MOST), rows.groups)
 
     def of(self, kept: np.ndarray) -> Problem:
         """The problem of some samples, (N,) true, alone."""

@@ -10,7 +10,7 @@ import numpy as np
 from palpate.learning.energy.average import Average
 from palpate.network import Network, Scaling, TrainedRegion
 from palpate.rbf.freezing import training_record
-from palpate.rbf.units.symmetric import Images, SymmetricRegressors
+from palpate.rbf.symmetric_units import Images, SymmetricRegressors
 from palpate.units import Quantity, Range, bounds
 
 __all__ = ["Solves", "trained_region", "training_meta", "written_out"]

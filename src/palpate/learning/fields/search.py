@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.network.radial import RadialFunction
+from palpate.rbf.forms import unit_form
 from palpate.rbf.refinement.refine import Refined, refine
-from palpate.rbf.units.forms import form as form_of
-from palpate.rbf.units.regressors import Regressors
+from palpate.rbf.regressors import Regressors
 
 __all__ = ["Coefficients", "FieldTrial", "parts_of", "searched"]
 
@@ -159,7 +159,7 @@ def _starts(
         of = last.regressors
         yield of, np.vstack([last.theta, _drawn(of, units - len(last.theta), X, rng)])
     for form, radial in kinds:
-        of = Regressors(form_of(form, X.shape[1]), radial, "affine")
+        of = Regressors(unit_form(form, X.shape[1]), radial, "affine")
         yield of, _drawn(of, units, X, rng)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.learning.energy.images import images_of
 from palpate.rbf.sample_checks import numbers
-from palpate.rbf.units.symmetric import Images
+from palpate.rbf.symmetric_units import Images
 from palpate.units import Range, bounds
 
 __all__ = ["hold_images"]

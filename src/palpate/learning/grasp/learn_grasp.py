@@ -125,7 +125,7 @@ def learn_grasp(
         Processes that search at a time, each from starts of its own; one for each core by default, at most eight,
         and one alone where there are less than 20 s.
     form : str
-        Of a unit (see `palpate.rbf.units.forms`), or "auto".
+        Of a unit (see `palpate.rbf.forms`), or "auto".
     radial : {"gaussian", "inverse-multiquadric", "matern-5/2", "auto"}
     seed : int
         Decides the starts. With a limit on time the result also depends on the machine's speed and cores.

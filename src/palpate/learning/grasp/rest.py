@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from palpate.learning.grasp.samples import GraspSamples
-from palpate.rbf.units.regressors import pairs
-from palpate.rbf.units.symmetric import Images
+from palpate.rbf.regressors import pairs
+from palpate.rbf.symmetric_units import Images
 from palpate.surrogates.grasp.rest import MOST, RestStiffness, monomials
 from palpate.surrogates.grasp.stiffening import HIGHEST, Stiffening, exponents, powers
 

@@ -20,8 +20,8 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.learning.energy.samples import CURVATURE_SHARE
+from palpate.rbf.regressors import pairs
 from palpate.rbf.sample_checks import numbers
-from palpate.rbf.units.regressors import pairs
 from palpate.surrogates.grasp.rest import ENTRIES, RestStiffness, monomials
 from palpate.surrogates.grasp.stiffening import Stiffening
 from palpate.units import Range, bounds

@@ -9,11 +9,11 @@ import numpy as np
 
 from palpate.network import Network, Scaling
 from palpate.network.radial import RadialFunction
+from palpate.rbf.forms import unit_form
 from palpate.rbf.freezing import freeze_refined, training_record
 from palpate.rbf.refinement.refine import Refined, refine
+from palpate.rbf.regressors import Regressors, Tail
 from palpate.rbf.sample_checks import samples
-from palpate.rbf.units.forms import form as form_of
-from palpate.rbf.units.regressors import Regressors, Tail
 from palpate.units import Quantity, Range
 
 __all__ = ["Trial", "freeze_refined", "grow", "placed", "prune", "refined_network", "spread"]
@@ -70,7 +70,7 @@ def refined_network(
     known : (h, p), optional
         Scaled units of this form that the sequential filter found; they are one of the starts.
     form : str
-        Of a unit: isotropic, axis-aligned, rotated, rank-1, … (see `palpate.rbf.units.forms`).
+        Of a unit: isotropic, axis-aligned, rotated, rank-1, … (see `palpate.rbf.forms`).
     radial : {"gaussian", "inverse-multiquadric", "matern-5/2"}
     tail : {"affine", "constant", "none"}
 
@@ -86,7 +86,7 @@ def refined_network(
     X, Y, _, _, _ = samples(X, Y, inputs=len(inputs), outputs=len(outputs))
     scaling = Scaling.of(inputs, Y)
     xs, ys = scaling.scale_inputs(X), scaling.scale_outputs(Y)
-    regressors = Regressors(form_of(form, len(inputs)), radial, tail)
+    regressors = Regressors(unit_form(form, len(inputs)), radial, tail)
     best = refine(xs, ys, _none(regressors), regressors)
     trials = [Trial.of(best)]
     for h in _sizes(min(units_max, _room(best))):

@@ -13,7 +13,7 @@ from palpate.rbf.filter.settings import Settings
 from palpate.rbf.filter.state import State, initial
 from palpate.rbf.freezing import freeze
 from palpate.rbf.output_modes import output_modes
-from palpate.rbf.units.regressors import pairs
+from palpate.rbf.regressors import pairs
 from palpate.units import Quantity, Range, bounds
 
 __all__ = ["Gauge", "declared"]

@@ -11,7 +11,7 @@ from palpate.errors import UsageError
 from palpate.learning.stream.reservoir import Keeping, Reservoir
 from palpate.rbf.filter.settings import Settings
 from palpate.rbf.filter.state import State
-from palpate.rbf.refinement.nudge import nudged
+from palpate.rbf.refinement.levenberg import levenberg_step
 from palpate.rbf.refinement.posterior import posterior
 from palpate.rbf.refinement.projection import Fit, project
 from palpate.rbf.refinement.refine import Refined
@@ -119,7 +119,7 @@ def refined_state(
     penalty = max(refining.ridge, 1e-30)
     rows = _rows(state, kept, settings, np.where(judging, 0.0, weights))
     start, damping, new = _start(state, kept, settings, refining, last)
-    found = nudged(rows, start, penalty * rows.total, damping=damping, tries=refining.tries)
+    found = levenberg_step(rows, start, penalty * rows.total, damping=damping, tries=refining.tries)
     before = _error(
         rows, kept, judging, weights, state.theta, project(rows, state.theta, penalty * rows.total)
     )

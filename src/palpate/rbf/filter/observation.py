@@ -25,7 +25,7 @@ class Observation:
         How many ordinary values a slope counts as, on top of the observation's weight. A slope of no weight is
         not looked at, and may be not-a-number.
     curvatures : (m, n(n+1)/2), optional
-        ∂²y/∂x_i∂x_j, i ≤ j (see `palpate.rbf.units.regressors.pairs`).
+        ∂²y/∂x_i∂x_j, i ≤ j (see `palpate.rbf.regressors.pairs`).
     curvature_weight : float or (n(n+1)/2,)
         The same for curvatures. Those off the diagonal count twice, as they stand twice in the matrix.
     """

@@ -25,8 +25,8 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.network.radial import RadialFunction
-from palpate.rbf.units.forms import Widths, form
-from palpate.rbf.units.regressors import Regressors, Tail
+from palpate.rbf.forms import Widths, unit_form
+from palpate.rbf.regressors import Regressors, Tail
 
 __all__ = [
     "PRESETS",
@@ -72,7 +72,7 @@ class Settings:
     Attributes
     ----------
     form : str
-        Of a unit: isotropic, axis-aligned, rotated, rank-1, rank-2, … (see `palpate.rbf.units.forms`).
+        Of a unit: isotropic, axis-aligned, rotated, rank-1, rank-2, … (see `palpate.rbf.forms`).
     radial : {"gaussian", "inverse-multiquadric", "matern-5/2"}
     tail : {"affine", "constant", "none"}
         What is added to the units: T·[1, x], T, or nothing.
@@ -235,7 +235,7 @@ _CHOICES: dict[str, tuple[str, ...]] = {
 
 @lru_cache(maxsize=64)
 def _regressors(name: str, inputs: int, widths: Widths, radial: RadialFunction, tail: Tail) -> Regressors:
-    return Regressors(form(name, inputs, widths), radial, tail)
+    return Regressors(unit_form(name, inputs, widths), radial, tail)
 
 
 def default() -> Settings:

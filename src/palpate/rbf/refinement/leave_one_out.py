@@ -19,20 +19,22 @@ from scipy.linalg import lapack
 from palpate.rbf.refinement.projection import Fit
 from palpate.rbf.refinement.rows import Rows
 
-__all__ = ["left_out", "left_out_rows", "without_each"]
+__all__ = ["errors_without_each_unit", "leave_one_out_errors", "leave_one_out_row_errors"]
 
 
-def left_out(
+def leave_one_out_errors(
     rows: Rows, fit: Fit, *, shared: float | np.ndarray = 0.0, most: float = 1.0 - 1e-12
 ) -> np.ndarray:
     """Errors (N, k) of the values at each sample, in modes, when all that is known of it is left out.
 
-    See `left_out_rows`, of whose result these are the first N rows without their weights.
+    See `leave_one_out_row_errors`, of whose result these are the first N rows without their weights.
     """
-    return np.asarray(left_out_rows(rows, fit, shared=shared, most=most)[: len(rows.X)] / rows.scale[:, None])
+    return np.asarray(
+        leave_one_out_row_errors(rows, fit, shared=shared, most=most)[: len(rows.X)] / rows.scale[:, None]
+    )
 
 
-def left_out_rows(
+def leave_one_out_row_errors(
     rows: Rows,
     fit: Fit,
     *,
@@ -65,7 +67,7 @@ def _blocks(rows: Rows) -> list[np.ndarray]:
     return [block for block in np.split(order, starts) if len(block) > 1]
 
 
-def without_each(
+def errors_without_each_unit(
     rows: Rows, fit: Fit, units: int, *, shared: float = 0.0, most: float = 1.0 - 1e-12
 ) -> np.ndarray:
     """Weighted sums (h,) of squared leave-one-out errors over all rows, were one unit removed, for each unit.

@@ -3,8 +3,6 @@
 Variable projection (Golub & Pereyra 1973): for given units θ the best weights and tail are a linear least-squares
 solution, so only θ is searched (see `projection`). The sequential filter says how many units are needed and where;
 this buys the last digits.
-
-The steps themselves are `marquardt`'s.
 """
 
 from __future__ import annotations
@@ -17,8 +15,8 @@ from typing import get_args
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.rbf.refinement.leave_one_out import left_out_rows, without_each
-from palpate.rbf.refinement.marquardt import DAMPING, Scaled, held_back, next_damping
+from palpate.rbf.refinement.leave_one_out import errors_without_each_unit, leave_one_out_row_errors
+from palpate.rbf.refinement.levenberg import DAMPING, MORE, DampedSystem, damped_step
 from palpate.rbf.refinement.projection import (
     Fit,
     Solver,
@@ -28,8 +26,8 @@ from palpate.rbf.refinement.projection import (
     span_of_units,
 )
 from palpate.rbf.refinement.rows import Rows
+from palpate.rbf.regressors import Regressors
 from palpate.rbf.sample_checks import samples
-from palpate.rbf.units.regressors import Regressors
 
 __all__ = ["Refined", "refine"]
 
@@ -141,7 +139,7 @@ def refine(
     slope_weight : float, (N,) or (N, n)
         s; zero where no slopes are known.
     curvatures : (N, m, n(n+1)/2), optional
-        ∂²y/∂x_l∂x_k, l ≤ k (see `pairs` of `palpate.rbf.units.regressors`).
+        ∂²y/∂x_l∂x_k, l ≤ k (see `pairs` of `palpate.rbf.regressors`).
     curvature_weight : float, (N,) or (N, n(n+1)/2)
         c; zero where no curvatures are known.
     groups : (N,) int, optional
@@ -233,27 +231,17 @@ class _Search:
     deadline: float
 
     def improved(self, now: _Point) -> _Point:
-        """After one accepted step; `done` where none helps or hardly any is gained."""
+        """The point after one accepted step; `done` where none helps or hardly any is gained."""
         single = now.single and now.theta.size >= _SINGLE_FROM and now.damping > _SINGLE_DAMPING
-        G, descent = gauss_newton(self.rows, now.theta, now.fit, self.solver, single=single)
-        system = Scaled(G, descent)
+        system = DampedSystem(*gauss_newton(self.rows, now.theta, now.fit, self.solver, single=single))
         damping = now.damping
         while damping < DAMPING[1]:
-            step = system.step(damping)
-            if step is None:
-                damping *= 4.0
-                continue
-            step = held_back(self.rows.regressors.form, now.theta, step.reshape(now.theta.shape))
-            new = now.theta + step
-            fit = project(self.rows, new, self.penalty)
-            gain = now.fit.cost - fit.cost
-            if gain > 0:
-                ratio = gain / max(system.predicted(step.ravel()), 1e-300)
-                done = gain < self.tolerance * now.fit.cost and not single
-                return _Point(
-                    new, fit, next_damping(damping, ratio), now.single and gain > 1e-7 * fit.cost, done
-                )
-            damping *= 4.0
+            step = damped_step(self.rows, now.theta, now.fit, self.penalty, system, damping)
+            if step is not None:
+                done = step.gain < self.tolerance * now.fit.cost and not single
+                single = now.single and step.gain > 1e-7 * step.fit.cost
+                return _Point(step.theta, step.fit, step.damping, single, done)
+            damping *= MORE
             if time.monotonic() > self.deadline:
                 return replace(now, damping=damping)
         # rounding may have hidden a step; double precision has the last word
@@ -287,11 +275,11 @@ def _result(rows: Rows, point: _Point, count: int, done: bool, error: float) -> 
     counted = judges and 0 < point.theta.size <= _COUNTED
     if counted and rows.targets.shape[1] == 1:
         span = span_of_units(rows, point.theta, fit)
-        missed = left_out_rows(rows, fit, basis=span, most=_MOST_LEVERAGE)
+        missed = leave_one_out_row_errors(rows, fit, basis=span, most=_MOST_LEVERAGE)
     else:
         shared = leverage_of_units(rows, point.theta, fit) if counted else even
-        missed = left_out_rows(rows, fit, shared=shared, most=_MOST_LEVERAGE)
-    reduced = without_each(rows, fit, len(point.theta), shared=even, most=_MOST_LEVERAGE)
+        missed = leave_one_out_row_errors(rows, fit, shared=shared, most=_MOST_LEVERAGE)
+    reduced = errors_without_each_unit(rows, fit, len(point.theta), shared=even, most=_MOST_LEVERAGE)
     F = rows.matrix(point.theta)
     squares = float((fit.residual[: len(rows.X)] ** 2).sum())
     judged = float(np.sqrt((missed**2).sum() / (rows.total * m)))

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from palpate.rbf.output_modes import every_mode
+from palpate.rbf.regressors import Regressors, pairs
 from palpate.rbf.sample_checks import numbers, samples, second_derivatives
-from palpate.rbf.units.regressors import Regressors, pairs
 
 __all__ = ["Rows"]
 

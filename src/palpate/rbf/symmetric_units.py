@@ -16,7 +16,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.network.radial import radial
-from palpate.rbf.units.regressors import Regressors, pairs
+from palpate.rbf.regressors import Regressors, pairs
 
 __all__ = ["Images", "SymmetricRegressors"]
 

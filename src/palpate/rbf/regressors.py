@@ -1,4 +1,4 @@
-"""The regressors of a network, units and tail, and their derivatives by every parameter.
+"""Regressors of a network, units and tail, and their derivatives by every parameter.
 
     f(x) = T·[1, x] + Σ_k w_k φ_k(x),   φ_k = g(q_k),   q_k = ‖v_k‖²,   v_k = A_k x − b_k
 
@@ -22,19 +22,23 @@ from functools import lru_cache
 from typing import Literal, get_args
 
 import numpy as np
+from numba import njit
 
 from palpate.errors import UsageError
 from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction, radial, third
-from palpate.rbf.units.chained import chained
-from palpate.rbf.units.derivative_kernels import (
+from palpate.rbf.derivative_kernels import (
     Derivatives,
     Pattern,
     curvatures_by_factors,
     slopes_by_factors,
 )
-from palpate.rbf.units.forms import Form
+from palpate.rbf.forms import Form, chain_of
 
-__all__ = ["Regressors", "Tail", "pairs"]
+__all__ = [
+    "Regressors",
+    "Tail",
+    "pairs",
+]
 
 Tail = Literal["affine", "constant", "none"]
 
@@ -108,7 +112,8 @@ class Regressors:
         A, b = self.form.factors(theta)
         v = self._v(X, A, b)
         by_q = radial(self.radial, np.einsum("nkr,nkr->nk", v, v))[1]
-        chained(self.form, theta, X, v, 2.0 * by_q * scale[:, None], out)
+        by_v = 2.0 * by_q * scale[:, None]
+        _chain_into(X, v, by_v, self.form.rows, self.form.columns, chain_of(self.form, theta), out)
 
     def slopes(self, X: np.ndarray, theta: np.ndarray) -> np.ndarray:
         """∂φ_k/∂x_i (N, n, h)."""
@@ -176,3 +181,30 @@ class Regressors:
         """A_k x − b_k (N, h, r)."""
         h, r, n = A.shape
         return np.asarray((X @ A.reshape(h * r, n).T).reshape(len(X), h, r) - b)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _chain_into(
+    X: np.ndarray,
+    v: np.ndarray,
+    by_v: np.ndarray,
+    rows: np.ndarray,
+    columns: np.ndarray,
+    chain: np.ndarray,
+    out: np.ndarray,
+) -> None:
+    """∂φ/∂θ into out (N, h, p): the largest array of a refinement is written once."""
+    N, h, r = v.shape
+    e, p = rows.size, out.shape[2]
+    for i in range(N):
+        for k in range(h):
+            t, o = by_v[i, k], out[i, k]
+            o[:] = 0.0
+            for a in range(e):
+                d = t * v[i, k, rows[a]] * X[i, columns[a]]
+                for j in range(p):
+                    o[j] += d * chain[k, a, j]
+            for a in range(r):
+                d = -t * v[i, k, a]
+                for j in range(p):
+                    o[j] += d * chain[k, e + a, j]

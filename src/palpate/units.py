@@ -16,7 +16,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 
-__all__ = ["Quantity", "Range", "to_si"]
+__all__ = ["Quantity", "Range", "bounds", "to_si"]
 
 
 @dataclass(frozen=True)

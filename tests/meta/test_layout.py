@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+import ast
+import collections
 import importlib
 import pkgutil
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
+from sources import FUNCTIONS, PACKAGE, ROOT, body_without_docstring, files, package_of, text, tree
 
 import palpate
-
-PACKAGE = Path(palpate.__file__).parent
 
 
 def modules() -> list[str]:
@@ -62,18 +62,79 @@ def test_heavy_packages_wait_until_they_are_needed(code, absent):
     assert done.stdout.strip() == "[]"
 
 
+# Packages whose files still wait for a name of their own, or lie too deep; it only gets shorter.
+UNFINISHED = {
+    "cli",
+    "learning",
+    "network",
+    "physics",
+    "rbf",
+    "runtime",
+    "study",
+    "surrogates",
+    "validation",
+    "viewer",
+}
+LONGEST_FILE, LONGEST_FUNCTION, SHORT_FILE = 500, 50, 60
+SHARE_OF_SHORT_FILES = 0.14
+
+
 def test_files_stay_readable():
+    long = {str(file): n for file in files() if (n := len(text(file).splitlines())) > LONGEST_FILE}
+    assert long == {}, "one idea is worth 100 to 350 lines"
+
+
+def test_few_files_are_short():
+    ideas = [file for file in files() if not file.name.startswith("__")]
+    short = [str(file) for file in ideas if len(text(file).splitlines()) < SHORT_FILE]
+    assert len(short) <= SHARE_OF_SHORT_FILES * len(ideas), f"join some of them: {short}"
+
+
+def test_functions_stay_short():
     long = {
-        str(p.relative_to(PACKAGE)): n
-        for p in PACKAGE.rglob("*.py")
-        if (n := len(p.read_text(encoding="utf-8").splitlines())) > 500
+        f"{file}:{node.name}": lines
+        for file in files()
+        for node in ast.walk(tree(file))
+        if isinstance(node, FUNCTIONS)
+        and (body := body_without_docstring(node))
+        and (lines := body[-1].end_lineno - body[0].lineno + 1) > LONGEST_FUNCTION
     }
     assert long == {}
+
+
+def test_a_file_name_occurs_once():
+    places = collections.defaultdict(list)
+    for file in files():
+        if not file.name.startswith("__") and package_of(file) not in UNFINISHED:
+            places[file.name].append(str(file))
+    assert {name: there for name, there in places.items() if len(there) > 1} == {}, "go to file must find one"
+
+
+def test_folders_are_two_deep_at_most():
+    deep = [str(file) for file in files() if len(file.parts) > 3 and package_of(file) not in UNFINISHED]
+    assert deep == []
+
+
+def test_public_functions_and_classes_are_listed():
+    """`__all__` is the list of public names; a function or class that is not in it begins with an underscore."""
+    unlisted = {}
+    for file in files():
+        listed = {
+            name
+            for node in tree(file).body
+            if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
+            for name in ast.literal_eval(node.value)
+        }
+        defined = {node.name for node in tree(file).body if isinstance(node, (*FUNCTIONS, ast.ClassDef))}
+        public = {name for name in defined if not name.startswith("_")}
+        if not public <= listed and not file.name.startswith("__") and package_of(file) not in UNFINISHED:
+            unlisted[str(file)] = sorted(public - listed)
+    assert unlisted == {}
 
 
 def test_the_package_is_typed_and_its_version_is_one():
     import tomllib
 
     assert (PACKAGE / "py.typed").exists()
-    project = Path(__file__).parents[2] / "pyproject.toml"
-    assert tomllib.loads(project.read_text(encoding="utf-8"))["project"]["version"] == palpate.__version__
+    project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    assert tomllib.loads(project)["project"]["version"] == palpate.__version__

@@ -28,7 +28,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from typing import BinaryIO
 
-from palpate.dataset.measured.columns import Columns, Measured
+from palpate.dataset.measured.measured_columns import Columns, Measured
 from palpate.errors import DeviceError, PortInUseError, UsageError
 
 __all__ = [

@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.dataset.measured.columns import NAMES, Columns, Measured, UnitError, number
+from palpate.dataset.measured.measured_columns import NAMES, Columns, Measured, UnitError, number
 from palpate.errors import FileFormatError, UsageError
 
 __all__ = ["read_measured", "write_measured"]

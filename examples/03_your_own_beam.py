@@ -8,7 +8,7 @@ import palpate as pp
 strip = pp.Cantilever(
     length=0.15,
     section=pp.Rectangle(width=0.02, height=0.006),
-    material=pp.LinearElastic(young=1.1e6, poisson=0.49, density=1080.0, name="silicone"),
+    material=pp.materials.LinearElastic(young=1.1e6, poisson=0.49, density=1080.0, name="silicone"),
     self_weight=True,
     nodes=(0.0, 0.05, 0.10, 0.15),
 )

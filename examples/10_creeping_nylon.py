@@ -22,7 +22,7 @@ for state, load in zip(problem.solve_path(loads, times), loads, strict=True):
 
 # at first it is the elastic beam of the instantaneous modulus, in the end that of the relaxed one
 for what, share in (("at once", 1.0), ("in the end", rod.material.prony.equilibrium)):
-    elastic = pp.LinearElastic(share * rod.material.young, rod.material.poisson)
+    elastic = pp.materials.LinearElastic(share * rod.material.young, rod.material.poisson)
     solution = pp.Cantilever(rod.length, rod.section, elastic).problem(pp.TipLoad(0.0, 5.0)).solve(3.0)
     print(f"elastic with the modulus {what}: {-1000 * solution.displacement[-1, 1]:.2f} mm")
 

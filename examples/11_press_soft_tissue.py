@@ -8,11 +8,13 @@ import numpy as np
 
 import palpate as pp
 
-flesh = pp.LayeredBlock(extent=(0.06, 0.06), layers=(("skin", 0.003), ("fat", 0.010), ("muscle", 0.020)))
+flesh = pp.shapes.LayeredBlock(
+    extent=(0.06, 0.06), layers=(("skin", 0.003), ("fat", 0.010), ("muscle", 0.020))
+)
 tissue = {
-    "skin": pp.NeoHookean(young=30e3, poisson=0.45),
-    "fat": pp.NeoHookean(young=4e3, poisson=0.47),
-    "muscle": pp.NeoHookean(young=20e3, poisson=0.47),
+    "skin": pp.materials.NeoHookean(young=30e3, poisson=0.45),
+    "fat": pp.materials.NeoHookean(young=4e3, poisson=0.47),
+    "muscle": pp.materials.NeoHookean(young=20e3, poisson=0.47),
 }
 body = pp.Body(flesh, tissue, fixed="bottom")
 ball = pp.SphereProbe(radius=0.010, touches="top", depth=(0.0, 0.006), over=((0.025, 0.025), (0.035, 0.035)))

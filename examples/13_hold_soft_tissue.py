@@ -10,7 +10,9 @@ import numpy as np
 
 import palpate as pp
 
-tissue = pp.Body(pp.Block((0.06, 0.06, 0.03)), pp.NeoHookean(young=9e3, poisson=0.45), fixed="bottom")
+tissue = pp.Body(
+    pp.shapes.Block((0.06, 0.06, 0.03)), pp.materials.NeoHookean(young=9e3, poisson=0.45), fixed="bottom"
+)
 cup = pp.GluedPad(
     radius=0.012, over=((0.025, 0.025), (0.035, 0.035)), displacement=((-0.004, 0.004),) * 3, element=0.012
 )

@@ -1,5 +1,7 @@
 """Public names of palpate: what `import palpate as pp` offers, each loaded when it is first used."""
 
+__version__: str
+
 from .dataset import Dataset as Dataset
 from .dataset import Field as Field
 from .dataset import Layout as Layout
@@ -11,52 +13,29 @@ from .learning import Settings as Settings
 from .learning import fit as fit
 from .learning.dispatch import learn as learn
 from .network import Network as Network
-from .physics import Block as Block
 from .physics import Body as Body
 from .physics import BodyFamily as BodyFamily
 from .physics import BodyForce as BodyForce
 from .physics import Cantilever as Cantilever
 from .physics import Circle as Circle
-from .physics import Cylinder as Cylinder
-from .physics import Dome as Dome
-from .physics import FibreFamily as FibreFamily
-from .physics import FibreReinforced as FibreReinforced
 from .physics import GluedPad as GluedPad
 from .physics import Held as Held
-from .physics import ImportedMesh as ImportedMesh
-from .physics import ImportedSolid as ImportedSolid
-from .physics import Inclusion as Inclusion
-from .physics import LayeredBlock as LayeredBlock
-from .physics import LinearElastic as LinearElastic
-from .physics import LinearHardening as LinearHardening
 from .physics import LoadAndUnload as LoadAndUnload
-from .physics import MooneyRivlin as MooneyRivlin
-from .physics import NeoHookean as NeoHookean
-from .physics import Ogden as Ogden
-from .physics import Organ as Organ
-from .physics import Plastic as Plastic
 from .physics import PointForce as PointForce
 from .physics import PointLoad as PointLoad
 from .physics import PrescribedDisplacement as PrescribedDisplacement
 from .physics import Pressure as Pressure
-from .physics import PreStretched as PreStretched
-from .physics import PronySeries as PronySeries
 from .physics import Rectangle as Rectangle
 from .physics import Section as Section
 from .physics import SphereProbe as SphereProbe
 from .physics import StepAndHold as StepAndHold
-from .physics import StVenantKirchhoff as StVenantKirchhoff
-from .physics import SurfacePatch as SurfacePatch
 from .physics import SurfaceTraction as SurfaceTraction
 from .physics import TipLoad as TipLoad
-from .physics import Tube as Tube
-from .physics import UserMaterial as UserMaterial
 from .physics import Varied as Varied
-from .physics import Viscoelastic as Viscoelastic
-from .physics import VoceHardening as VoceHardening
-from .physics import Yeoh as Yeoh
+from .physics import materials as materials
 from .physics import named_material as named_material
 from .physics import roller as roller
+from .physics import shapes as shapes
 from .study import Study as Study
 from .study import TouchStudy as TouchStudy
 from .study import preset_study as preset_study
@@ -78,5 +57,3 @@ from .validation import validate as validate
 from .validation import write_report as write_report
 from .viewer import serve as serve
 from .viewer import show as show
-
-__version__: str

@@ -375,7 +375,7 @@ def test_what_cannot_be_learnt_is_refused(face):
 def test_a_pressed_block_is_seen_within_stated_errors(tmp_path):
     import palpate as pp
 
-    body = pp.Body(pp.Block(size=(0.06, 0.06, 0.03)), pp.NeoHookean(young=9e3, poisson=0.45))
+    body = pp.Body(pp.shapes.Block(size=(0.06, 0.06, 0.03)), pp.materials.NeoHookean(young=9e3, poisson=0.45))
     probe = pp.SphereProbe(
         radius=RADIUS, touches="top", depth=(0.0, DEEPEST), over=((0.02, 0.02), (0.04, 0.04))
     )

@@ -76,7 +76,9 @@ A, B, WIDE, STRESS = 1e4, 400.0, 0.012, 3e5  # J/m³, 1/m², m, Pa/m
 
 def block() -> tuple[pp.Body, pp.SphereProbe]:
     """A small square block with coarse elements."""
-    body = pp.Body(pp.Block((0.06, 0.06, 0.03), element=0.02), pp.NeoHookean(9e3, 0.45), fixed="bottom")
+    body = pp.Body(
+        pp.shapes.Block((0.06, 0.06, 0.03), element=0.02), pp.materials.NeoHookean(9e3, 0.45), fixed="bottom"
+    )
     return body, pp.SphereProbe(RADIUS, depth=(5e-4, 0.004), over=((0.01, 0.01), (0.05, 0.05)))
 
 

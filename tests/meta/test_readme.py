@@ -22,6 +22,9 @@ COMMAND_LINES = (
     r'py -m venv .venv; .venv\Scripts\Activate.ps1; pip install ".[test]"; pytest',
 )
 
+# files that a reader of the documentation writes
+THE_READERS_OWN = {"mine.py"}
+
 # serving would never end: the program's last line is answered by this
 STANDS_IN = """
 import palpate
@@ -125,6 +128,28 @@ def test_links_to_files_lead_somewhere(page: Path):
     for target in targets:
         if not target.startswith(("http://", "https://")):
             assert (page.parent / target).exists(), target
+
+
+def repository_paths() -> set[str]:
+    """Every file and folder of the repository's own parts, relative to its root."""
+    parts = ("src", "tests", "docs", "examples", "benchmarks", ".ci")
+    paths = [ROOT / part for part in parts] + [path for part in parts for path in (ROOT / part).rglob("*")]
+    return {
+        path.relative_to(ROOT).as_posix()
+        for path in paths
+        if not {"node_modules", "__pycache__"} & set(path.parts) and (path.is_file() or any(path.iterdir()))
+    }
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.relative_to(ROOT).as_posix())
+def test_every_path_named_exists(page: Path):
+    """A path from the root, or the last part of one: `runtime/devices/page.py`, `test_cook.py`."""
+    known = ["/" + path for path in repository_paths()]
+    text = code(page.read_text(encoding="utf-8"))
+    named = re.findall(r"(?<![\w./-])(?:[\w.-]+/)*\w+\.(?:py|ts)\b", text)
+    named += re.findall(r"(?<![\w./-])(?:src|tests|docs|examples|benchmarks)(?:/[\w.-]+)+", text)
+    missing = {path for path in named if not any(there.endswith("/" + path.rstrip("/.")) for there in known)}
+    assert not missing - THE_READERS_OWN
 
 
 def test_pictures_are_small():

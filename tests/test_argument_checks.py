@@ -105,3 +105,11 @@ def test_the_first_number_that_is_not_finite_is_named():
     table[1, 2] = math.nan
     assert "nan at index (1, 2)" in refusal(checks.shape, "The table", table, (3, 3)).what
     assert "inf at index 1" in refusal(checks.shape, "The point", [0, math.inf], (2,)).what
+
+
+def test_three_numbers_come_back_as_a_tuple():
+    assert checks.triple("The place", np.array([1, 2, 3]), "m") == (1.0, 2.0, 3.0)
+    assert "three numbers" in refusal(checks.triple, "The place", (1, 2), "m").why
+    assert "of type str" in refusal(checks.triple, "The place", ("100 mm", 0.1, 0.1), "m").why
+    refusal(checks.triple, "The place", (0, 0, math.nan), "m")
+    refusal(checks.triple, "The place", None, "m")

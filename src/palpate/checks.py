@@ -5,6 +5,7 @@
     fits      a number, or a whole number, between bounds
     one_of    a word among a few; the error offers the nearest
     shape     an array of real numbers of a given shape
+    triple    three numbers along x, y and z
 
 and `own_arrays`, which makes the arrays of a frozen dataclass read-only.
 
@@ -25,7 +26,7 @@ from palpate.errors import UsageError
 if TYPE_CHECKING:
     import numpy as np
 
-__all__ = ["finite", "fits", "one_of", "own_arrays", "positive", "shape"]
+__all__ = ["finite", "fits", "one_of", "own_arrays", "positive", "shape", "triple"]
 
 
 def finite(what: str, value: Any, unit: str = "") -> float:
@@ -204,15 +205,17 @@ def shape(
     form = f"({', '.join('any' if n is None else str(n) for n in wanted)}{',' if len(wanted) == 1 else ''})"
     try:
         array = np.asarray(value)
-        if array.dtype.kind not in "fiu" and array.size:
-            raise TypeError(f"they are of type {array.dtype}")  # noqa: TRY301 - one message for both causes
-        array = array.astype(np.float64, copy=False)
-    except (TypeError, ValueError) as error:
+    except ValueError:  # rows of different lengths
+        array = np.asarray(None)
+    if array.dtype.kind not in "fiu" and array.size:
+        strange = [x for x in np.asarray(value, dtype=object).ravel() if not isinstance(x, Real)]
+        reason = f"It holds {strange[0]!r:.40}, of type {type(strange[0]).__name__}." if strange else ""
         raise UsageError(
             f"{what} does not consist of real numbers: {value!r:.80}.",
-            why=why or f"Its numbers can't be read: {error}.",
+            why=reason or why or "Its rows differ in length.",
             fix=f"Pass an array of shape {form}{_in(unit)}.",
-        ) from error
+        )
+    array = array.astype(np.float64, copy=False)
     if array.ndim != len(wanted) or any(
         n == 0 if m is None else n != m for n, m in zip(array.shape, wanted, strict=True)
     ):
@@ -253,6 +256,27 @@ def own_arrays(value: object, *names: str, dtype: Any = "float64") -> None:
         array = np.array(getattr(value, name), dtype=dtype, order="C")
         array.flags.writeable = False
         object.__setattr__(value, name, array)
+
+
+def triple(what: str, value: Any, unit: str = "") -> tuple[float, float, float]:
+    """Return three finite numbers along x, y and z as a tuple of floats.
+
+    Parameters
+    ----------
+    what : str
+        Name of the place, size or direction, which begins the message.
+    value : sequence of three numbers
+        Tuple, list or array to check.
+    unit : str
+        SI unit that the message names; empty for pure numbers.
+
+    Raises
+    ------
+    UsageError
+        If there are not three, or one of them is no finite real number.
+    """
+    x, y, z = shape(what, value, (3,), unit, why="It needs three numbers, along x, y and z.").tolist()
+    return x, y, z
 
 
 def _real(what: str, value: Any, unit: str) -> float:

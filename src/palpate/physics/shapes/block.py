@@ -1,7 +1,4 @@
-"""The block: a rectangular box.
-
-The layered block: slabs of different tissue on each other.
-"""
+"""Rectangular boxes: the block of one material, and slabs of different tissue on each other."""
 
 from __future__ import annotations
 
@@ -11,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from palpate import checks
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_positive
 from palpate.physics.shapes.meshing import FineMesh
-from palpate.physics.shapes.naming import UPRIGHT, require_name, require_size, require_triple
+from palpate.physics.shapes.naming import UPRIGHT, require_name
 from palpate.physics.shapes.shape import Isometry, Solid, box_isometries
 from palpate.physics.words import millimetres
 
@@ -50,12 +47,11 @@ class Block(Solid):
     element: float | None = None
 
     def __post_init__(self) -> None:
-        size = require_triple("The size of a block", self.size)
+        size = checks.triple("The size of a block", self.size, "m")
         for axis, extent in zip("xyz", size, strict=True):
-            require_positive(f"The block's extent along {axis}", extent, "m")
-        require_size("The block", max(size))
+            checks.positive(f"The block's extent along {axis}", extent, "m")
         object.__setattr__(self, "size", size)
-        self._check_element()
+        self.check_extent("The block")
 
     @property
     def surfaces(self) -> tuple[str, ...]:
@@ -64,7 +60,7 @@ class Block(Solid):
 
     @property
     def isometries(self) -> tuple[Isometry, ...]:
-        """Those of the box."""
+        """Rotations and reflections of the box."""
         return box_isometries(self.size)
 
     def __str__(self) -> str:
@@ -133,12 +129,11 @@ class LayeredBlock(Solid):
     meshed: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "extent", _pair(self.extent))
-        object.__setattr__(self, "layers", _layers(self.layers))
+        object.__setattr__(self, "extent", _extents(self.extent))
+        object.__setattr__(self, "layers", _named_layers(self.layers))
         if self.meshed is not None:
-            object.__setattr__(self, "meshed", _as_thick(self.meshed, self.layers))
-        require_size("The layered block", max(self.size))
-        self._check_element()
+            object.__setattr__(self, "meshed", _mesh_thicknesses(self.meshed, self.layers))
+        self.check_extent("The layered block")
 
     @property
     def surfaces(self) -> tuple[str, ...]:
@@ -163,17 +158,24 @@ class LayeredBlock(Solid):
 
     @property
     def isometries(self) -> tuple[Isometry, ...]:
-        """Those of the box that keep the layers."""
+        """Rotations and reflections of the box that keep the layers."""
         return box_isometries(self.size, layered=True)
 
     def __str__(self) -> str:
         layers = ", ".join(f"{name} {millimetres(thickness)}" for name, thickness in self.layers)
         return f"layered block {millimetres(*self.size)} ({layers})"
 
-    def thick(self, layer: str, thickness: float) -> LayeredBlock:
-        """The block with one layer of this thickness in m, the same height and the same elements, moved.
+    def with_thickness(self, layer: str, thickness: float) -> LayeredBlock:
+        """Return the block with another thickness of one layer: its height and its elements stay, moved.
 
         What the layer takes, the deepest one gives.
+
+        Parameters
+        ----------
+        layer : str
+            Name of a layer above the deepest.
+        thickness : float
+            New thickness in m, below that of the layer and the deepest together.
 
         Raises
         ------
@@ -204,19 +206,19 @@ class LayeredBlock(Solid):
 
     def describe(self) -> dict[str, Any]:
         """Everything that decides the mesh, as plain data for a JSON file."""
-        told = super().describe()
-        return told if self.meshed is not None else {k: v for k, v in told.items() if k != "meshed"}
+        data = super().describe()
+        return data if self.meshed is not None else {k: v for k, v in data.items() if k != "meshed"}
 
     def generate(self, refinements: tuple[FineMesh, ...]) -> Any:
         """A new `netgen.meshing.Mesh` in m, whose names of surfaces and regions are set."""
         if self.meshed is None:
             return super().generate(refinements)
         names = [name for name, _ in self.layers]
-        drawn = replace(self, layers=tuple(zip(names, self.meshed, strict=True)), meshed=None)
-        mesh = drawn.generate(refinements)
-        was, now = drawn.levels[::-1], self.levels[::-1]
+        as_meshed = replace(self, layers=tuple(zip(names, self.meshed, strict=True)), meshed=None)
+        mesh = as_meshed.generate(refinements)
+        old, new = as_meshed.levels[::-1], self.levels[::-1]
         for point in mesh.Points():
-            point[2] = float(np.interp(point[2], was, now))
+            point[2] = float(np.interp(point[2], old, new))
         return mesh
 
     def solid(self) -> Any:
@@ -238,7 +240,7 @@ class LayeredBlock(Solid):
         return block
 
 
-def _as_thick(value: Any, layers: tuple[tuple[str, float], ...]) -> tuple[float, ...]:
+def _mesh_thicknesses(value: Any, layers: tuple[tuple[str, float], ...]) -> tuple[float, ...]:
     """Thickness of each layer as it is meshed, of the same sum."""
     meshed: tuple[float, ...] = tuple(float(t) for t in value)
     height = sum(t for _, t in layers)
@@ -246,12 +248,12 @@ def _as_thick(value: Any, layers: tuple[tuple[str, float], ...]) -> tuple[float,
         raise UsageError(
             f"A mesh for layers of {meshed} m does not fit layers of {tuple(t for _, t in layers)} m.",
             why="Both need as many layers, all of some thickness, that are equally high together.",
-            fix="Leave `meshed` out, or use `LayeredBlock.thick`.",
+            fix="Leave `meshed` out, or use `LayeredBlock.with_thickness`.",
         )
     return meshed
 
 
-def _pair(value: Any) -> tuple[float, float]:
+def _extents(value: Any) -> tuple[float, float]:
     try:
         x, y = value
     except (TypeError, ValueError):
@@ -260,12 +262,12 @@ def _pair(value: Any) -> tuple[float, float]:
             why="It is the extent along x and y; the height is the sum of the layers.",
             fix="Pass (0.10, 0.10) for 100 mm by 100 mm.",
         ) from None
-    require_positive("The layered block's extent along x", x, "m")
-    require_positive("The layered block's extent along y", y, "m")
+    checks.positive("The layered block's extent along x", x, "m")
+    checks.positive("The layered block's extent along y", y, "m")
     return float(x), float(y)
 
 
-def _layers(value: Any) -> tuple[tuple[str, float], ...]:
+def _named_layers(value: Any) -> tuple[tuple[str, float], ...]:
     try:
         layers = tuple((name, thickness) for name, thickness in value)
     except (TypeError, ValueError):
@@ -278,7 +280,7 @@ def _layers(value: Any) -> tuple[tuple[str, float], ...]:
         )
     for name, thickness in layers:
         require_name("A layer's name", name)
-        require_positive(f"The thickness of the layer {name!r}", thickness, "m")
+        checks.positive(f"The thickness of the layer {name!r}", thickness, "m")
     names = [name for name, _ in layers]
     if len(set(names)) < len(names):
         raise UsageError(

@@ -1,6 +1,9 @@
-"""Files of shapes: their place, content and unit.
+"""Files of bodies: their unit and content, and names for parts of the surfaces that they hold.
 
-Parts of a surface: split along sharp edges, or chosen by a box or a function.
+digest_of, require_same   the body is the file's content, not its name
+read_with_meshio          meshes and surfaces of other tools
+segments                  parts of a surface between sharp edges
+SurfacePatch              a part of a surface, chosen by a box or a function
 """
 
 from __future__ import annotations
@@ -15,8 +18,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate import checks
 from palpate.errors import FileFormatError, UsageError
-from palpate.physics.shapes.naming import require_name, require_triple
+from palpate.physics.shapes.naming import require_name
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -25,8 +29,8 @@ __all__ = [
     "FEATURE_ANGLE",
     "UNITS",
     "SurfacePatch",
+    "apply_patches",
     "digest_of",
-    "patched",
     "read_with_meshio",
     "require_same",
     "require_unit",
@@ -144,6 +148,7 @@ class SurfacePatch:
     Attributes
     ----------
     name : str
+        Name that the part gets.
     lower, upper : tuple of three floats, optional
         Corners in m of an upright box: what has its centre inside gets the name.
     where : callable, optional
@@ -171,17 +176,17 @@ class SurfacePatch:
                 fix="Pass lower=(x, y, z) and upper=(x, y, z), or where=function.",
             )
         if boxed:
-            object.__setattr__(self, "lower", require_triple("A patch's lower corner", self.lower))
-            object.__setattr__(self, "upper", require_triple("A patch's upper corner", self.upper))
+            object.__setattr__(self, "lower", checks.triple("A patch's lower corner", self.lower, "m"))
+            object.__setattr__(self, "upper", checks.triple("A patch's upper corner", self.upper, "m"))
 
     def contains(self, centres: np.ndarray) -> np.ndarray:
-        """Which of the centres (n, 3) in m belong to the patch, bool (n,)."""
+        """Mask (n,) of the centres (n, 3) in m that belong to the patch."""
         if self.where is not None:
             return np.asarray(self.where(centres), dtype=bool)
         return np.asarray(((centres >= self.lower) & (centres <= self.upper)).all(axis=1))
 
     def describe(self) -> dict[str, Any]:
-        """The patch as plain data."""
+        """Return the patch as plain data."""
         function = self.where and f"{self.where.__module__}.{self.where.__qualname__}"
         return {"name": self.name, "lower": self.lower, "upper": self.upper, "where": function}
 
@@ -211,7 +216,7 @@ def segments(surface: Trimesh, angle: float = FEATURE_ANGLE) -> np.ndarray:
     return np.asarray(rank[label])
 
 
-def patched(
+def apply_patches(
     names: Sequence[str], index: np.ndarray, centres: np.ndarray, patches: Sequence[SurfacePatch]
 ) -> tuple[tuple[str, ...], np.ndarray]:
     """Give the parts inside the patches their names; a later patch goes over an earlier one.
@@ -219,17 +224,20 @@ def patched(
     Parameters
     ----------
     names : sequence of str
+        Names of the parts.
     index : (n,) int array
-        Into `names`.
+        Index into `names` for each face.
     centres : (n, 3) array
-        In m.
+        Centres of the faces, m.
     patches : sequence of SurfacePatch
+        Names to give, and where.
 
     Returns
     -------
     names : tuple of str
-        Those that are left, the patches' first.
+        Names that are left, the patches' first.
     index : (n,) int array
+        Index into them for each face.
 
     Raises
     ------
@@ -248,6 +256,6 @@ def patched(
             )
         label[inside] = patch.name
     present = set(label)
-    kept = tuple(dict.fromkeys(n for n in (*[p.name for p in patches], *names) if n in present))
-    position = {name: i for i, name in enumerate(kept)}
-    return kept, np.array([position[n] for n in label], dtype=np.int64)
+    left = tuple(dict.fromkeys(n for n in (*[p.name for p in patches], *names) if n in present))
+    position = {name: i for i, name in enumerate(left)}
+    return left, np.array([position[n] for n in label], dtype=np.int64)

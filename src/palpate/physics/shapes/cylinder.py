@@ -1,17 +1,13 @@
-"""The cylinder.
-
-The tube: a hollow cylinder.
-"""
+"""Round bodies that stand upright: the cylinder, and the tube, which is hollow."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from palpate import checks
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_positive
 from palpate.physics.shapes.block import name_upright_faces
-from palpate.physics.shapes.naming import require_size
 from palpate.physics.shapes.shape import Isometry, Solid, round_isometries
 from palpate.physics.words import millimetres
 
@@ -30,7 +26,7 @@ class Cylinder(Solid):
     Attributes
     ----------
     radius, height : float
-        In m.
+        Radius and extent along z, m.
     element : float, optional
         Largest element size in m, by default a third of the least extent.
 
@@ -47,10 +43,9 @@ class Cylinder(Solid):
     element: float | None = None
 
     def __post_init__(self) -> None:
-        require_positive("The cylinder's radius", self.radius, "m")
-        require_positive("The cylinder's height", self.height, "m")
-        require_size("The cylinder", max(self.size))
-        self._check_element()
+        checks.positive("The cylinder's radius", self.radius, "m")
+        checks.positive("The cylinder's height", self.height, "m")
+        self.check_extent("The cylinder")
 
     @property
     def surfaces(self) -> tuple[str, ...]:
@@ -90,7 +85,7 @@ class Tube(Solid):
     Attributes
     ----------
     inner_radius, outer_radius, height : float
-        In m.
+        Radii of the wall's two sides and extent along z, m.
     element : float, optional
         Largest element size in m, by default half the wall's thickness or a third of the height.
 
@@ -109,15 +104,14 @@ class Tube(Solid):
 
     def __post_init__(self) -> None:
         for name in ("inner_radius", "outer_radius", "height"):
-            require_positive(f"The tube's {name}", getattr(self, name), "m")
+            checks.positive(f"The tube's {name}", getattr(self, name), "m")
         if self.inner_radius >= self.outer_radius:
             raise UsageError(
                 f"The tube's inner radius is {self.inner_radius:g} m, its outer radius {self.outer_radius:g} m.",
                 why="The wall would have no thickness.",
                 fix="Give the inner radius first, smaller than the outer one.",
             )
-        require_size("The tube", max(self.size))
-        self._check_element()
+        self.check_extent("The tube")
 
     @property
     def surfaces(self) -> tuple[str, ...]:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from palpate import checks
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_positive
-from palpate.physics.shapes.naming import require_size, require_triple
-from palpate.physics.shapes.shape import Isometry, Solid, mirror, round_isometries
+from palpate.physics.shapes.shape import Isometry, Solid, mirror_isometries, round_isometries
 from palpate.physics.words import millimetres
 
 __all__ = ["Dome", "Inclusion"]
@@ -23,17 +22,17 @@ class Inclusion:
     Attributes
     ----------
     centre : tuple of three floats
-        In m.
+        Place of the ball's centre in the body's frame, m.
     radius : float
-        In m.
+        Radius of the ball, m.
     """
 
     centre: tuple[float, float, float]
     radius: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "centre", require_triple("The centre of an inclusion", self.centre))
-        require_positive("The radius of an inclusion", self.radius, "m")
+        object.__setattr__(self, "centre", checks.triple("The centre of an inclusion", self.centre, "m"))
+        checks.positive("The radius of an inclusion", self.radius, "m")
 
 
 @dataclass(frozen=True)
@@ -46,9 +45,9 @@ class Dome(Solid):
     Attributes
     ----------
     radius : float
-        Of the base, in m.
+        Radius of the base, m.
     height : float, optional
-        In m; by default the radius, which makes half a ball.
+        Extent along z, m; by default the radius, which makes half a ball.
     layer : float
         Thickness of the skin in m, at the base and at the top; 0 for none.
     inclusion : Inclusion, optional
@@ -72,11 +71,10 @@ class Dome(Solid):
     element: float | None = None
 
     def __post_init__(self) -> None:
-        require_positive("The dome's radius", self.radius, "m")
-        require_positive("The dome's height", self.rise, "m")
+        checks.positive("The dome's radius", self.radius, "m")
+        checks.positive("The dome's height", self.rise, "m")
         if self.layer:
-            require_positive("The thickness of the dome's skin", self.layer, "m")
-        require_size("The dome", max(self.size))
+            checks.positive("The thickness of the dome's skin", self.layer, "m")
         if self.layer >= min(self.radius, self.rise):
             raise UsageError(
                 f"The dome's skin is {self.layer:g} m thick, the dome {min(self.radius, self.rise):g} m.",
@@ -85,7 +83,7 @@ class Dome(Solid):
             )
         if self.inclusion is not None:
             self._check_inclusion(self.inclusion)
-        self._check_element()
+        self.check_extent("The dome")
 
     @property
     def rise(self) -> float:
@@ -111,7 +109,7 @@ class Dome(Solid):
     def isometries(self) -> tuple[Isometry, ...]:
         """Turns about the axis and mirror images; one mirror image if an inclusion lies beside the axis."""
         x, y = self.inclusion.centre[:2] if self.inclusion else (0.0, 0.0)
-        return mirror(x, y) if x or y else round_isometries()
+        return mirror_isometries(x, y) if x or y else round_isometries()
 
     def __str__(self) -> str:
         skin = f", skin of {millimetres(self.layer)}" if self.layer else ""

@@ -1,8 +1,8 @@
-"""How well shaped the tetrahedra of a mesh are.
+"""The mesh of a body as plain arrays, the way from and to NGSolve, its quality, and where its surfaces are.
 
-The mesh of a body as plain arrays, and the way from and to NGSolve.
-
-Where the named surfaces of a body are: what tells ``face 3`` from ``face 4``.
+BodyMesh     points, tetrahedra, and the triangles of the outer surface, with names
+MeshQuality  shape of the worst elements
+Face         place, size and direction of a named surface
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class MeshQuality:
     least_angle, largest_angle : float
         Angles between two faces in rad; 1.231 in a regular tetrahedron.
     shortest_edge, longest_edge : float
-        In m.
+        Lengths of the mesh's extreme edges, m.
     """
 
     least_scaled_jacobian: float
@@ -98,7 +98,9 @@ def _dihedral_angles(corners: np.ndarray) -> np.ndarray:
     return np.asarray(np.pi - np.arccos(np.clip(cosine, -1, 1)))
 
 
+ONE_WAY = 0.1  # length of the mean normal below which a surface faces nowhere in the mean
 UNNAMED = "unnamed"
+Triple = tuple[float, float, float]
 # the faces of a right-handed tetrahedron, each counter-clockwise as seen from outside
 FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 
@@ -188,7 +190,7 @@ class BodyMesh:
         return mesh_quality(self.points, self.tetrahedra)
 
     def on(self, surface: str) -> np.ndarray:
-        """Which triangles belong to a surface, bool of shape (t,).
+        """Mask of the triangles that belong to a surface or a group of surfaces, bool of shape (t,).
 
         Raises
         ------
@@ -204,7 +206,7 @@ class BodyMesh:
         return np.asarray(self.triangles[self.on(surface)])
 
     def ngsolve(self) -> Any:
-        """The same mesh for NGSolve, as `to_ngsolve` gives it."""
+        """Return the mesh for NGSolve, as `to_ngsolve` gives it."""
         return to_ngsolve(self)
 
 
@@ -249,16 +251,18 @@ def body_mesh(mesh: Any, surfaces: tuple[str, ...] = (), regions: tuple[str, ...
     tetrahedra[left_handed] = tetrahedra[left_handed][:, [0, 2, 1, 3]]
     triangles = outer_faces(tetrahedra)
     names = [netgen.FaceDescriptor(i + 1).bcname for i in range(netgen.GetNFaceDescriptors())]
-    found = _look_up(skin["nodes"][:, :3].astype(np.int64) - 1, skin["index"].astype(np.int64) - 1, triangles)
-    outer, surface_of = _compact([*names, UNNAMED], found, surfaces)
+    number = _look_up(
+        skin["nodes"][:, :3].astype(np.int64) - 1, skin["index"].astype(np.int64) - 1, triangles
+    )
+    outer, surface_of = _compact([*names, UNNAMED], number, surfaces)
     materials = [netgen.GetMaterial(i + 1) for i in range(netgen.GetNDomains())]
     inner, region_of = _compact(materials, solid["index"].astype(np.int64) - 1, regions)
     return BodyMesh(points, tetrahedra, triangles, surface_of, region_of, outer, inner)
 
 
-def _look_up(known: np.ndarray, value: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """The value that belongs to each wanted triangle among the known ones; -1 where there is none."""
-    table = {tuple(key): int(v) for key, v in zip(np.sort(known, axis=1).tolist(), value, strict=True)}
+def _look_up(triangles: np.ndarray, value: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Value of each wanted triangle (w, 3), whatever the order of its corners; -1 for those not among `triangles`."""
+    table = {tuple(key): int(v) for key, v in zip(np.sort(triangles, axis=1).tolist(), value, strict=True)}
     return np.array([table.get(tuple(key), -1) for key in np.sort(wanted, axis=1).tolist()], dtype=np.int64)
 
 
@@ -274,7 +278,7 @@ def _compact(
 
 
 def to_ngsolve(mesh: BodyMesh) -> Any:
-    """The mesh for NGSolve: straight elements, names of surfaces and regions set.
+    """Return the mesh for NGSolve: straight elements, names of surfaces and regions set.
 
     Vertices keep their numbers. Elements are sorted by region.
 
@@ -311,22 +315,18 @@ def _region_behind(mesh: BodyMesh) -> np.ndarray:
     return _look_up(faces, np.repeat(mesh.region_of, 4), mesh.triangles)
 
 
-ONE_WAY = 0.1  # length of the mean normal below which a surface faces nowhere in the mean
-
-Triple = tuple[float, float, float]
-
-
 @dataclass(frozen=True)
 class Face:
-    """A named surface.
+    """Place, size and direction of a surface with a name.
 
     Attributes
     ----------
     name : str
+        Name of the surface, as `BodyMesh.surfaces` has it.
     area : float
-        In m².
+        Area in m².
     centre : (3,) tuple
-        Of its area, in m.
+        Centre of the area, m.
     normal : (3,) tuple
         Mean outward normal: of length one where the surface is plane, zero where it faces all ways.
     lower, upper : (3,) tuple
@@ -341,19 +341,19 @@ class Face:
     upper: Triple
 
     def __str__(self) -> str:
-        facing = "all ways" if np.linalg.norm(self.normal) < ONE_WAY else _words(self.normal, 1.0, 2)
-        box = f"{_words(self.lower)} … {_words(self.upper)} mm"
+        facing = "all ways" if np.linalg.norm(self.normal) < ONE_WAY else _text(self.normal, 1.0, 2)
+        box = f"{_text(self.lower)} … {_text(self.upper)} mm"
         area = f"{number(1e6 * self.area)} mm²"
-        return f"{self.name}: {area} around {_words(self.centre)} mm, facing {facing}, in {box}"
+        return f"{self.name}: {area} around {_text(self.centre)} mm, facing {facing}, in {box}"
 
 
 def faces_of(mesh: BodyMesh) -> tuple[Face, ...]:
-    """The surfaces of a mesh, in its order."""
+    """Return the faces of a mesh, one for each of its surfaces."""
     return tuple(_face(mesh, name, mesh.surface_of == i) for i, name in enumerate(mesh.surfaces))
 
 
-def _face(mesh: BodyMesh, name: str, mine: np.ndarray) -> Face:
-    corners, vectors = mesh.points[mesh.triangles[mine]], mesh.area_vectors[mine]
+def _face(mesh: BodyMesh, name: str, chosen: np.ndarray) -> Face:
+    corners, vectors = mesh.points[mesh.triangles[chosen]], mesh.area_vectors[chosen]
     areas = np.linalg.norm(vectors, axis=1)
     area = float(areas.sum())
     return Face(
@@ -371,7 +371,7 @@ def _triple(values: np.ndarray) -> Triple:
     return x, y, z
 
 
-def _words(values: Triple, scale: float = 1e3, digits: int = 4) -> str:
+def _text(values: Triple, scale: float = 1e3, digits: int = 4) -> str:
     # what is nothing beside the largest is rounding dust
     dust = 1e-9 * max(map(abs, values))
     return f"({', '.join(number(0.0 if abs(v) < dust else scale * v, digits) for v in values)})"

@@ -14,8 +14,8 @@ from palpate.errors import UsageError
 from palpate.physics.shapes.body_file import (
     UNITS,
     SurfacePatch,
+    apply_patches,
     digest_of,
-    patched,
     read_with_meshio,
     require_same,
     require_unit,
@@ -23,8 +23,8 @@ from palpate.physics.shapes.body_file import (
 )
 from palpate.physics.shapes.mesh import BodyMesh, outer_faces, tetrahedron_volumes, to_ngsolve
 from palpate.physics.shapes.meshing import MOST_ELEMENTS, FineMesh
-from palpate.physics.shapes.naming import plain_name, require_size
-from palpate.physics.shapes.shape import Shape
+from palpate.physics.shapes.naming import plain_name
+from palpate.physics.shapes.shape import Shape, require_size
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -46,8 +46,9 @@ class ImportedMesh(Shape):
     Attributes
     ----------
     path : str
+        The file; its ending tells the format.
     unit : {"m", "dm", "cm", "mm", "um", "in"}
-        Of the file's coordinates.
+        Unit of the file's coordinates.
     patches : tuple of SurfacePatch
         Names for parts of the surface; they go over those of the file.
     digest : str
@@ -117,7 +118,7 @@ def _read(shape: ImportedMesh) -> BodyMesh:
     used, renumbered = np.unique(tetrahedra, return_inverse=True)
     require_size(shape.path, float(np.ptp(points[used], axis=0).max()), shape.unit)
     tetrahedra = renumbered.reshape(tetrahedra.shape)
-    tetrahedra = _right_handed(points[used], tetrahedra, shape.path)
+    tetrahedra = _turn_right_handed(points[used], tetrahedra, shape.path)
     order = np.argsort(region_of, kind="stable")
     bare = BodyMesh(
         points[used],
@@ -143,27 +144,27 @@ def _cells(source: Any, kind: str, corners: int, word: str) -> tuple[np.ndarray,
         return nodes, (), np.zeros(len(nodes), dtype=np.int64)
     tag = np.concatenate([np.asarray(source.cell_data[key][i]).ravel() for i in blocks]).astype(np.int64)
     dimension = corners - 1
-    given = {
+    group_names = {
         int(v[0]): plain_name(n) for n, v in source.field_data.items() if len(v) == 2 and v[1] == dimension
     }
     numbers, index = np.unique(tag, return_inverse=True)
-    if word == "region" and len(numbers) == 1 and not given:
+    if word == "region" and len(numbers) == 1 and not group_names:
         return nodes, (), np.zeros(len(nodes), dtype=np.int64)
-    return nodes, tuple(given.get(int(k), f"{word} {k}") for k in numbers), index.ravel()
+    return nodes, tuple(group_names.get(int(k), f"{word} {k}") for k in numbers), index.ravel()
 
 
-def _right_handed(points: np.ndarray, tetrahedra: np.ndarray, source: str) -> np.ndarray:
+def _turn_right_handed(points: np.ndarray, tetrahedra: np.ndarray, source: str) -> np.ndarray:
     """Tetrahedra numbered right-handed; refuses a mesh that mixes both, or has flat ones."""
     volumes = tetrahedron_volumes(points, tetrahedra)
     inverted = volumes < 0
     flat = np.abs(volumes) < 1e-9 * np.abs(volumes).max()
     if flat.any() or 0 < inverted.sum() < len(tetrahedra):
         fault = flat if flat.any() else inverted if inverted.mean() < 0.5 else ~inverted
-        at = ", ".join(f"{v:.4g}" for v in points[tetrahedra[fault.argmax()]].mean(axis=0))
+        place = ", ".join(f"{v:.4g}" for v in points[tetrahedra[fault.argmax()]].mean(axis=0))
         raise UsageError(
             f"{int(fault.sum())} of {len(tetrahedra)} tetrahedra of {source} are "
             f"{'flat' if flat.any() else 'inverted'}.",
-            why=f"The first is element {int(fault.argmax())} near ({at}) m; its energy would not be defined.",
+            why=f"The first is element {int(fault.argmax())} near ({place}) m; its energy would not be defined.",
             fix="Repair or optimise the mesh in the program that made it.",
         )
     # all of them the other way round is another convention of numbering, no fault
@@ -178,20 +179,20 @@ def _with_surfaces(bare: BodyMesh, source: Any, used: np.ndarray, shape: Importe
     surface = Trimesh(bare.points, outer, process=False)
     _require_manifold(surface, shape.path)
     labelled, names, group = _cells(source, "triangle", 3, "surface")
-    known = {}
+    group_of: dict[tuple[int, ...], int] = {}
     if names:
         new = np.full(len(source.points), -1)
         new[used] = np.arange(len(used))
         keys = np.sort(new[labelled], axis=1).tolist()
         # 0 is what writers put where nothing was said
         named = [names[g] != "surface 0" for g in group]
-        known = {tuple(k): int(g) for k, g, told in zip(keys, group, named, strict=True) if told}
-    index = np.array([known.get(tuple(key), -1) for key in np.sort(outer, axis=1).tolist()])
+        group_of = {tuple(k): int(g) for k, g, has_name in zip(keys, group, named, strict=True) if has_name}
+    index = np.array([group_of.get(tuple(key), -1) for key in np.sort(outer, axis=1).tolist()])
     parts = segments(surface)
     part_of = np.unique(parts[index < 0], return_inverse=True)[1]
     index[index < 0] = len(names) + part_of
     every = (*names, *(f"face {i + 1}" for i in range(int(part_of.max(initial=-1)) + 1)))
-    surfaces, surface_of = patched(every, index, surface.triangles_center, shape.patches)
+    surfaces, surface_of = apply_patches(every, index, surface.triangles_center, shape.patches)
     return replace(bare, triangles=outer, surface_of=surface_of, surfaces=surfaces)
 
 

@@ -1,8 +1,9 @@
-"""Where a mesh shall be fine, and how many elements that would take.
+"""Tetrahedra for solids of the CAD kernel, fine where they are asked to be.
 
-Points spread over a part of a surface, where the element size shall be small.
-
-Tetrahedra for solids of the CAD kernel, fine where it is asked for.
+FineMesh        a part of a surface that shall have small elements
+require_budget  refuses meshes that no direct solver could take
+points_on       points on a refined part, at which the element size is restricted
+mesh_solid      the mesh
 """
 
 from __future__ import annotations
@@ -14,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from palpate import checks
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_positive
 from palpate.physics.shapes.mesh import BodyMesh, body_mesh
-from palpate.physics.shapes.naming import GROUPS, members, require_triple
+from palpate.physics.shapes.naming import GROUPS, members
 
 __all__ = [
     "GRADING",
@@ -27,7 +28,7 @@ __all__ = [
     "mesh_solid",
     "points_on",
     "require_budget",
-    "scattered",
+    "split_triangles",
 ]
 
 GRADING = 0.4  # growth of the element size per distance from a fine surface
@@ -61,7 +62,7 @@ class FineMesh:
     upper: Point | None = None
 
     def __post_init__(self) -> None:
-        require_positive("The element size of a refinement", self.element, "m")
+        checks.positive("The element size of a refinement", self.element, "m")
         if (self.lower is None) != (self.upper is None):
             raise UsageError(
                 f"The refinement of {self.surface!r} has one corner only.",
@@ -70,8 +71,8 @@ class FineMesh:
             )
         if self.lower is None or self.upper is None:
             return
-        lower = require_triple("The lower corner of a refinement", self.lower)
-        upper = require_triple("The upper corner of a refinement", self.upper)
+        lower = checks.triple("The lower corner of a refinement", self.lower, "m")
+        upper = checks.triple("The upper corner of a refinement", self.upper, "m")
         object.__setattr__(self, "lower", lower)
         object.__setattr__(self, "upper", upper)
         if any(a > b for a, b in zip(lower, upper, strict=True)):
@@ -82,7 +83,7 @@ class FineMesh:
             )
 
     def is_on(self, name: str | None) -> bool:
-        """Whether the named surface is the refined one, or one of those that its name stands for."""
+        """Return True for the refined surface, and for those that its name stands for."""
         return name == self.surface or name in GROUPS.get(self.surface, ())
 
 
@@ -126,6 +127,7 @@ def points_on(mesh: BodyMesh, refinement: FineMesh) -> tuple[np.ndarray, float]:
     mesh : BodyMesh
         Any mesh of the body, coarse for example.
     refinement : FineMesh
+        The part of a surface, and the element size there.
 
     Returns
     -------
@@ -148,14 +150,14 @@ def points_on(mesh: BodyMesh, refinement: FineMesh) -> tuple[np.ndarray, float]:
         require_budget([], [(_areas(corners).sum(), refinement.element)])
         fits = _longest(corners)[1] <= refinement.element / 2
         small.append(corners[fits])
-        corners = _halved(corners[~fits])
+        corners = _halve(corners[~fits])
     triangles = np.concatenate(small) if small else np.empty((0, 3, 3))
     centres = triangles.mean(axis=1)
-    kept = _within(centres, refinement)
-    return centres[kept], float(_areas(triangles[kept]).sum())
+    inside = _within(centres, refinement)
+    return centres[inside], float(_areas(triangles[inside]).sum())
 
 
-def scattered(corners: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
+def split_triangles(corners: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
     """Triangles (t, 3, 3) halved until no edge is longer than `size` m; and the index of the triangle of each."""
     origin = np.arange(len(corners))
     small, origins = [], []
@@ -163,7 +165,7 @@ def scattered(corners: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]
         fits = _longest(corners)[1] <= size
         small.append(corners[fits])
         origins.append(origin[fits])
-        corners, origin = _halved(corners[~fits]), np.tile(origin[~fits], 2)
+        corners, origin = _halve(corners[~fits]), np.tile(origin[~fits], 2)
     return np.concatenate(small), np.concatenate(origins)
 
 
@@ -173,7 +175,7 @@ def _areas(corners: np.ndarray) -> np.ndarray:
 
 
 def _meets(corners: np.ndarray, refinement: FineMesh) -> np.ndarray:
-    """Which triangles (t, 3, 3) have a box that touches the refinement's, bool (t,)."""
+    """Mask (t,) of the triangles (t, 3, 3) whose boxes touch that of the refinement."""
     if refinement.lower is None or refinement.upper is None:
         return np.ones(len(corners), dtype=bool)
     low, high = corners.min(axis=1), corners.max(axis=1)
@@ -192,7 +194,7 @@ def _longest(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return lengths.argmax(axis=1), lengths.max(axis=1)
 
 
-def _halved(corners: np.ndarray) -> np.ndarray:
+def _halve(corners: np.ndarray) -> np.ndarray:
     """Each triangle cut in two across its longest edge, shape (2t, 3, 3)."""
     apex, _ = _longest(corners)
     rows = np.arange(len(corners))
@@ -215,10 +217,11 @@ def mesh_solid(solid: Any, coarse: float, refinements: tuple[FineMesh, ...]) -> 
     Parameters
     ----------
     solid : netgen.occ.TopoDS_Shape
-        In m.
+        Solid in m, whose faces and solids carry the names.
     coarse : float
         Largest element size in m.
     refinements : tuple of FineMesh
+        Parts of surfaces that shall have smaller elements.
 
     Returns
     -------
@@ -229,21 +232,23 @@ def mesh_solid(solid: Any, coarse: float, refinements: tuple[FineMesh, ...]) -> 
     UsageError
         If there would be too many elements, or Netgen can't mesh the solid.
     """
+    from netgen.meshing import Pnt
     from netgen.occ import OCCGeometry
 
     flat = [r for r in refinements if all(_is_rectangle(f) for f in solid.faces if r.is_on(f.name))]
-    solid = _imprinted(solid, flat)
+    solid = _imprint(solid, flat)
     fine = _restricted_faces(solid, flat)
     points = []
     for refinement in refinements:
         if refinement not in flat:
-            at, area = points_on(body_mesh(_generate(OCCGeometry(solid), solid, coarse)), refinement)
-            points.append((at, refinement.element))
+            places, area = points_on(body_mesh(_generate(OCCGeometry(solid), solid, coarse)), refinement)
+            points.append((places, refinement.element))
             fine.append((area, refinement.element))
     require_budget([(s.mass, min(coarse, s.maxh)) for s in solid.solids], fine)
     geometry = OCCGeometry(solid)
-    for at, element in points:
-        _restrict(geometry, at, element)
+    for places, element in points:
+        for place in places.tolist():
+            geometry.RestrictH(Pnt(*place), element)
     return _generate(geometry, solid, coarse)
 
 
@@ -267,18 +272,18 @@ def _generate(geometry: Any, solid: Any, coarse: float, **options: Any) -> Any:
 
 
 def _is_rectangle(face: Any) -> bool:
-    """Whether a face is an upright plane rectangle.
+    """Return True for an upright plane rectangle.
 
     In others a cut may run close to an edge, where only flat elements would fit.
     """
-    if _upright(face) is None:
+    if _upright_axis(face) is None:
         return False
     low, high = face.bounding_box
     extent = sorted(high[i] - low[i] for i in range(3))
     return bool(abs(face.mass - extent[1] * extent[2]) < 10 * FLAT * face.mass)
 
 
-def _upright(face: Any) -> int | None:
+def _upright_axis(face: Any) -> int | None:
     """Axis that a plane face is normal to, None for others."""
     low, high = face.bounding_box
     extent = np.array([high[i] - low[i] for i in range(3)])
@@ -286,7 +291,7 @@ def _upright(face: Any) -> int | None:
     return axis if extent[axis] < FLAT * extent.max() + 2 * PADDING else None
 
 
-def _imprinted(solid: Any, refinements: list[FineMesh]) -> Any:
+def _imprint(solid: Any, refinements: list[FineMesh]) -> Any:
     """The solid whose plane faces are cut along the boxes of the refinements."""
     from netgen.occ import Glue
 
@@ -308,7 +313,7 @@ def _patch(face: Any, lower: np.ndarray, upper: np.ndarray) -> list[Any]:
     """The part of an upright plane face inside a box; nothing where that is all of it or none."""
     from netgen.occ import Face, Pnt, Segment, Wire
 
-    axis = _upright(face)
+    axis = _upright_axis(face)
     low, high = (np.array([p[i] for i in range(3)]) for p in face.bounding_box)
     slack = FLAT * (high - low).max() + 2 * PADDING
     level = (low[axis] + high[axis]) / 2
@@ -348,10 +353,3 @@ def _inside(face: Any, refinement: FineMesh) -> bool:
     return all(
         refinement.lower[i] - slack <= low[i] and high[i] <= refinement.upper[i] + slack for i in range(3)
     )
-
-
-def _restrict(geometry: Any, at: np.ndarray, element: float) -> None:
-    from netgen.meshing import Pnt
-
-    for point in at.tolist():
-        geometry.RestrictH(Pnt(*point), element)

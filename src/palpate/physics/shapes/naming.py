@@ -1,100 +1,54 @@
-"""Names that stand for several surfaces at once.
-
-Arguments that all shapes check alike.
-"""
+"""Names of surfaces and regions, and names that stand for several surfaces at once."""
 
 from __future__ import annotations
 
 import difflib
-import math
 import re
 from collections.abc import Iterable
 from typing import Any
 
+from palpate import checks
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_number
 
-__all__ = [
-    "GROUPS",
-    "LARGEST",
-    "SMALLEST",
-    "UPRIGHT",
-    "members",
-    "plain_name",
-    "require_known",
-    "require_name",
-    "require_size",
-    "require_triple",
-]
+__all__ = ["GROUPS", "UPRIGHT", "members", "plain_name", "require_known", "require_name", "require_triple"]
 
 UPRIGHT = ("x_min", "x_max", "y_min", "y_max")  # the upright faces of a box, by where they are
 GROUPS = {"side": UPRIGHT}
 
 
 def members(name: str, surfaces: Iterable[str]) -> tuple[str, ...]:
-    """The surfaces that a name stands for: itself, or the four upright faces of a box for ``"side"``; or none."""
-    known = tuple(surfaces)
-    if name in known:
-        return (name,)
-    group = GROUPS.get(name, ()) if isinstance(name, str) else ()
-    return group if group and set(group) <= set(known) else ()
-
-
-LARGEST, SMALLEST = 10.0, 1e-3  # m, longest side of a body that a hand or a tool would press
-
-
-def require_triple(what: str, value: Any, unit: str = "m") -> tuple[float, float, float]:
-    """Three finite numbers in `unit` as a tuple of floats."""
-    try:
-        x, y, z = value
-    except (TypeError, ValueError):
-        raise UsageError(
-            f"{what} is {value!r}.",
-            why="It needs three numbers, along x, y and z.",
-            fix=f"Pass (x, y, z) in {unit}.",
-        ) from None
-    for number in (x, y, z):
-        require_number(what, number, unit)
-        if not math.isfinite(number):
-            raise UsageError(
-                f"{what} is {value!r}.",
-                why="It must be finite.",
-                fix=f"Pass finite numbers in {unit}, as (x, y, z).",
-            )
-    return float(x), float(y), float(z)
-
-
-def require_size(what: str, longest: float, unit: str = "") -> None:
-    """Refuse a body whose longest side in m tells of mistaken units.
+    """Surfaces that a name stands for: itself, or the four upright faces of a box for ``"side"``; or none.
 
     Parameters
     ----------
-    what : str
-        The body.
-    longest : float
-        Its longest side in m.
-    unit : str
-        The unit in which its lengths were read from a file; empty where they are given in m by the user.
+    name : str
+        Name of a surface or of a group.
+    surfaces : iterable of str
+        Names of the body's surfaces.
     """
-    if SMALLEST <= longest <= LARGEST:
-        return
-    taken = f"Its lengths were taken as {unit}" if unit else "Lengths are in m"
-    guess = "mm" if longest > LARGEST else "m"
-    advice = f'Pass unit="{guess}" if the file is in {guess}' if unit else "Pass 0.1 for 100 mm"
-    raise UsageError(
-        f"{what} would be {longest:.4g} m long.",
-        why=f"{taken}, and a body to be touched measures between {SMALLEST:g} and {LARGEST:g} m.",
-        fix=f"{advice}.",
-    )
+    names = tuple(surfaces)
+    if name in names:
+        return (name,)
+    group = GROUPS.get(name, ()) if isinstance(name, str) else ()
+    return group if group and set(group) <= set(names) else ()
 
 
 def require_known(kind: str, name: str, known: Iterable[str]) -> None:
-    """Refuse a name that is not among the known ones, and offer the nearest.
+    """Refuse a name that the body does not have, and offer the nearest.
 
     Parameters
     ----------
     kind : str
-        For example ``"surface"``.
+        Word for what is named, for example ``"surface"``; of surfaces, names of groups are taken too.
+    name : str
+        Name to look up.
+    known : iterable of str
+        Names that the body has.
+
+    Raises
+    ------
+    UsageError
+        If the name is none of them.
     """
     names = tuple(known)
     if name in names or (kind == "surface" and members(name, names)):
@@ -109,7 +63,13 @@ def require_known(kind: str, name: str, known: Iterable[str]) -> None:
 
 
 def require_name(what: str, name: Any) -> None:
-    """Refuse a name that NGSolve would read as a pattern."""
+    """Refuse a name that NGSolve would read as a pattern.
+
+    Raises
+    ------
+    UsageError
+        If it has other signs than letters, digits, spaces, - and _.
+    """
     if isinstance(name, str) and re.fullmatch(r"\w[\w \-]*", name):
         return
     raise UsageError(
@@ -120,6 +80,11 @@ def require_name(what: str, name: Any) -> None:
 
 
 def plain_name(name: str) -> str:
-    """A name from a file with the signs that NGSolve reads as patterns replaced by ``_``."""
+    """Return a name from a file with the signs that NGSolve reads as patterns replaced by ``_``."""
     plain = re.sub(r"[^\w \-]+", "_", name).strip(" -")
     return plain or "unnamed"
+
+
+def require_triple(what: str, value: Any, unit: str = "m") -> tuple[float, float, float]:
+    """Return three finite numbers; see `palpate.checks.triple`."""
+    return checks.triple(what, value, unit)

@@ -7,9 +7,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from palpate import checks
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_positive
-from palpate.physics.shapes.naming import require_size
 from palpate.physics.shapes.shape import Solid
 from palpate.physics.words import millimetres
 
@@ -55,15 +54,14 @@ class Organ(Solid):
     element: float | None = None
 
     def __post_init__(self) -> None:
-        require_positive("The organ's length", self.length, "m")
-        require_size("The organ", self.length)
+        checks.positive("The organ's length", self.length, "m")
         if not isinstance(self.seed, int) or self.seed < 0:
             raise UsageError(
                 f"The seed of an organ is {self.seed!r}.",
                 why="It selects one of the organs and must be a whole number, 0 or more.",
                 fix="Pass seed=0, 1, 2, …",
             )
-        self._check_element()
+        self.check_extent("The organ")
 
     @property
     def surfaces(self) -> tuple[str, ...]:

@@ -1,6 +1,9 @@
-"""Rotations and reflections that leave a shape where it is, and which surface each of them takes where.
+"""The contract of shapes: names, a mesh that is made once, and the rotations and reflections that keep it.
 
-What every shape offers, and the shapes that are made of solids.
+Geometry   the contract: a value with names that can be meshed
+Shape      base of all shapes here
+Solid      base of those that are built from solids of the CAD kernel
+Isometry   a rotation or reflection, and which surface it takes where
 """
 
 from __future__ import annotations
@@ -13,8 +16,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, cast, runtime_checkab
 
 import numpy as np
 
+from palpate import checks
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_positive
 from palpate.physics.shapes.mesh import BodyMesh, Face, body_mesh, faces_of
 from palpate.physics.shapes.meshing import FineMesh
 from palpate.physics.shapes.naming import require_known
@@ -29,7 +32,8 @@ __all__ = [
     "Shape",
     "Solid",
     "box_isometries",
-    "mirror",
+    "mirror_isometries",
+    "require_size",
     "round_isometries",
 ]
 
@@ -43,91 +47,7 @@ BOX_FACES = {
     (1, -1): "y_min",
     (1, 1): "y_max",
 }
-
-
-@dataclass(frozen=True, eq=False)
-class Isometry:
-    """A rotation or reflection M about a point p: a place X goes to p + M (X − p).
-
-    Attributes
-    ----------
-    matrix : (3, 3) array
-        Orthogonal.
-    about : (3,) array
-        In m.
-    goes : mapping of surface to surface
-        Where surfaces go; those not named stay where they are.
-    """
-
-    matrix: np.ndarray
-    about: np.ndarray
-    goes: Mapping[str, str] = field(default_factory=dict)
-
-    def surface(self, name: str) -> str:
-        """The surface on which that of this name comes to lie."""
-        return self.goes.get(name, name)
-
-    @property
-    def is_identity(self) -> bool:
-        """Whether it moves nothing."""
-        return bool(np.allclose(self.matrix, np.eye(3)))
-
-
-NO_ISOMETRIES: tuple[Isometry, ...] = (Isometry(np.eye(3), np.zeros(3)),)
-"""Of a shape that is not symmetric: the identity alone."""
-
-
-def box_isometries(size: tuple[float, float, float], *, layered: bool = False) -> tuple[Isometry, ...]:
-    """Of a box with a corner at the origin: 8 of a brick, 16 of a square prism, 48 of a cube.
-
-    A `layered` one keeps its upright direction.
-    """
-    found = []
-    for order in itertools.permutations(range(3)):
-        if any(abs(size[i] - size[j]) > EQUAL * size[i] for i, j in enumerate(order)):
-            continue
-        for signs in itertools.product((1, -1), repeat=3):
-            matrix = np.zeros((3, 3))
-            matrix[range(3), order] = signs
-            if not layered or matrix[2, 2] == 1:
-                found.append(Isometry(matrix, np.array(size) / 2, _box_faces(matrix)))
-    return tuple(found)
-
-
-def _box_faces(matrix: np.ndarray) -> dict[str, str]:
-    """Where the faces of a box go: a normal ±e_j goes to ±M e_j."""
-    goes = {}
-    for (axis, sign), name in BOX_FACES.items():
-        normal = sign * matrix[:, axis]
-        to = int(np.argmax(np.abs(normal)))
-        goes[name] = BOX_FACES[to, int(np.sign(normal[to]))]
-    return goes
-
-
-def round_isometries() -> tuple[Isometry, ...]:
-    """Of a body of revolution about the z axis: a finite group of its turns and mirror images, 16 in all."""
-    half = IMAGES // 2
-    found = []
-    for k in range(half):
-        c, s = _exact(np.cos(2 * np.pi * k / half)), _exact(np.sin(2 * np.pi * k / half))
-        for sign in (1.0, -1.0):
-            matrix = np.array([[c, -sign * s, 0.0], [s, sign * c, 0.0], [0.0, 0.0, 1.0]])
-            found.append(Isometry(matrix, np.zeros(3)))
-    return tuple(found)
-
-
-def mirror(x: float, y: float) -> tuple[Isometry, ...]:
-    """Of a body with one mirror plane, which holds the z axis and the point (x, y) in m."""
-    angle = 2 * np.arctan2(y, x)
-    c, s = _exact(np.cos(angle)), _exact(np.sin(angle))
-    reflection = np.array([[c, s, 0.0], [s, -c, 0.0], [0.0, 0.0, 1.0]])
-    return (*NO_ISOMETRIES, Isometry(reflection, np.zeros(3)))
-
-
-def _exact(value: float) -> float:
-    """Cosines of right angles without their rounding."""
-    nearest = float(round(value))
-    return nearest if abs(value - nearest) < 1e-12 else float(value)
+LARGEST, SMALLEST = 10.0, 1e-3  # m, longest side of a body that a hand or a tool would press
 
 
 @runtime_checkable
@@ -152,10 +72,39 @@ class Geometry(Protocol):
         """Tetrahedra in m as an `ngsolve.Mesh`, with the names set; curved where the shape is."""
 
     def rest(self, refinements: tuple[FineMesh, ...] = ()) -> BodyMesh:
-        """The same mesh as plain arrays."""
+        """Plain arrays of the same mesh."""
 
     def describe(self) -> dict[str, Any]:
         """Everything that decides the mesh, as plain data for a JSON file."""
+
+
+def require_size(what: str, longest: float, unit: str = "") -> None:
+    """Refuse a body whose longest side tells of mistaken units.
+
+    Parameters
+    ----------
+    what : str
+        The body in words, as the message begins.
+    longest : float
+        Its longest side in m.
+    unit : str
+        Unit in which its lengths were read from a file; empty where the user gives them in m.
+
+    Raises
+    ------
+    UsageError
+        If the side is shorter than 1 mm or longer than 10 m.
+    """
+    if SMALLEST <= longest <= LARGEST:
+        return
+    taken = f"Its lengths were taken as {unit}" if unit else "Lengths are in m"
+    guess = "mm" if longest > LARGEST else "m"
+    advice = f'Pass unit="{guess}" if the file is in {guess}' if unit else "Pass 0.1 for 100 mm"
+    raise UsageError(
+        f"{what} would be {longest:.4g} m long.",
+        why=f"{taken}, and a body to be touched measures between {SMALLEST:g} and {LARGEST:g} m.",
+        fix=f"{advice}.",
+    )
 
 
 class Shape:
@@ -215,7 +164,7 @@ class Shape:
         return mesh
 
     def rest(self, refinements: tuple[FineMesh, ...] = ()) -> BodyMesh:
-        """The same mesh as plain arrays, with straight faces.
+        """Plain arrays of the same mesh, with straight faces.
 
         Raises
         ------
@@ -269,12 +218,18 @@ class Solid(Shape):
 
         return mesh_solid(self.solid(), self.coarse, refinements)
 
-    def _check_element(self) -> None:
-        """Refuse an element size that the body has no room for."""
-        if self.element is None:
-            return
-        require_positive("The element size", self.element, "m")
-        if self.element > max(self.size):
+    def check_extent(self, what: str) -> None:
+        """Refuse sizes that tell of mistaken units, and elements that the body has no room for.
+
+        Parameters
+        ----------
+        what : str
+            The shape in words, as the message begins: ``"The block"``.
+        """
+        require_size(what, max(self.size))
+        if self.element is not None and checks.positive("The element size", self.element, "m") > max(
+            self.size
+        ):
             raise UsageError(
                 f"The element size is {self.element:g} m, the body's longest side {max(self.size):g} m.",
                 why="An element can't be larger than the body.",
@@ -292,3 +247,88 @@ def _generated(shape: Hashable, refinements: tuple[FineMesh, ...]) -> Any:
 def _plain(shape: Hashable, refinements: tuple[FineMesh, ...]) -> BodyMesh:
     geometry = cast("Shape", shape)
     return body_mesh(_generated(shape, refinements), geometry.surfaces, geometry.regions)
+
+
+@dataclass(frozen=True, eq=False)
+class Isometry:
+    """A rotation or reflection M about a point p: a place X goes to p + M (X − p).
+
+    Attributes
+    ----------
+    matrix : (3, 3) array
+        Orthogonal matrix M.
+    about : (3,) array
+        Point p, m.
+    goes : mapping of surface to surface
+        Name of the surface onto which each goes; those not named stay where they are.
+    """
+
+    matrix: np.ndarray
+    about: np.ndarray
+    goes: Mapping[str, str] = field(default_factory=dict)
+
+    def surface(self, name: str) -> str:
+        """The surface on which that of this name comes to lie."""
+        return self.goes.get(name, name)
+
+    @property
+    def is_identity(self) -> bool:
+        """True for the one that moves nothing."""
+        return bool(np.allclose(self.matrix, np.eye(3)))
+
+
+NO_ISOMETRIES: tuple[Isometry, ...] = (Isometry(np.eye(3), np.zeros(3)),)
+"""Isometries of a shape that is not symmetric: the identity alone."""
+
+
+def box_isometries(size: tuple[float, float, float], *, layered: bool = False) -> tuple[Isometry, ...]:
+    """Isometries of a box with a corner at the origin: 8 of a brick, 16 of a square prism, 48 of a cube.
+
+    Those of a `layered` box keep its upright direction.
+    """
+    isometries = []
+    for order in itertools.permutations(range(3)):
+        if any(abs(size[i] - size[j]) > EQUAL * size[i] for i, j in enumerate(order)):
+            continue
+        for signs in itertools.product((1, -1), repeat=3):
+            matrix = np.zeros((3, 3))
+            matrix[range(3), order] = signs
+            if not layered or matrix[2, 2] == 1:
+                isometries.append(Isometry(matrix, np.array(size) / 2, _box_faces(matrix)))
+    return tuple(isometries)
+
+
+def _box_faces(matrix: np.ndarray) -> dict[str, str]:
+    """Names of the faces of a box, and of those onto which they go: a normal ±e_j goes to ±M e_j."""
+    goes = {}
+    for (axis, sign), name in BOX_FACES.items():
+        normal = sign * matrix[:, axis]
+        to = int(np.argmax(np.abs(normal)))
+        goes[name] = BOX_FACES[to, int(np.sign(normal[to]))]
+    return goes
+
+
+def round_isometries() -> tuple[Isometry, ...]:
+    """Isometries of a body of revolution about the z axis: a finite group of turns and mirror images, 16 in all."""
+    half = IMAGES // 2
+    isometries = []
+    for k in range(half):
+        c, s = _exact(np.cos(2 * np.pi * k / half)), _exact(np.sin(2 * np.pi * k / half))
+        for sign in (1.0, -1.0):
+            matrix = np.array([[c, -sign * s, 0.0], [s, sign * c, 0.0], [0.0, 0.0, 1.0]])
+            isometries.append(Isometry(matrix, np.zeros(3)))
+    return tuple(isometries)
+
+
+def mirror_isometries(x: float, y: float) -> tuple[Isometry, ...]:
+    """Isometries of a body with one mirror plane, which holds the z axis and the point (x, y) in m."""
+    angle = 2 * np.arctan2(y, x)
+    c, s = _exact(np.cos(angle)), _exact(np.sin(angle))
+    reflection = np.array([[c, s, 0.0], [s, -c, 0.0], [0.0, 0.0, 1.0]])
+    return (*NO_ISOMETRIES, Isometry(reflection, np.zeros(3)))
+
+
+def _exact(value: float) -> float:
+    """Cosines of right angles without their rounding."""
+    nearest = float(round(value))
+    return nearest if abs(value - nearest) < 1e-12 else float(value)

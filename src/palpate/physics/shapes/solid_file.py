@@ -1,7 +1,4 @@
-"""Solids from STEP files, with the names that their faces and solids carry.
-
-Bodies from CAD files and surface scans.
-"""
+"""Bodies from CAD files and surface scans: solids of STEP files with their names, and the insides of STL surfaces."""
 
 from __future__ import annotations
 
@@ -14,21 +11,21 @@ from typing import Any
 
 import numpy as np
 
+from palpate import checks
 from palpate.errors import FileFormatError, UsageError
-from palpate.physics.arguments import require_positive
 from palpate.physics.shapes.body_file import (
     FEATURE_ANGLE,
     SurfacePatch,
+    apply_patches,
     digest_of,
-    patched,
     require_same,
     require_unit,
 )
 from palpate.physics.shapes.mesh import BodyMesh, Face, faces_of, to_ngsolve
 from palpate.physics.shapes.meshing import FineMesh, mesh_solid
-from palpate.physics.shapes.naming import plain_name, require_size
-from palpate.physics.shapes.shape import Shape
-from palpate.physics.shapes.stl_file import fill, named, read_stl
+from palpate.physics.shapes.naming import plain_name
+from palpate.physics.shapes.shape import Shape, require_size
+from palpate.physics.shapes.stl_file import fill_surface, name_parts, read_stl
 
 __all__ = [
     "INTERFACE",
@@ -41,7 +38,7 @@ MILLIMETRE = 1e-3  # the CAD kernel turns every unit that a STEP file states int
 
 
 def read_step(path: str, patches: tuple[SurfacePatch, ...]) -> Any:
-    """The solids of a STEP file, glued where they touch.
+    """Read the solids of a STEP file, glued where they touch.
 
     A face is called by its name, else by its colour (``colour ff0000``), else ``face 1``, ``face 2``, … in the
     order of the file; a solid by its name, else ``body``, or ``body 1``, ``body 2``, … where there are several.
@@ -49,6 +46,7 @@ def read_step(path: str, patches: tuple[SurfacePatch, ...]) -> Any:
     Parameters
     ----------
     path : str
+        A STEP file, in any unit that it states.
     patches : tuple of SurfacePatch
         Names for the faces whose centres they contain.
 
@@ -64,23 +62,23 @@ def read_step(path: str, patches: tuple[SurfacePatch, ...]) -> Any:
     UsageError
         If it holds no closed solid, or its size tells of mistaken units.
     """
-    shape = _loaded(path)
+    shape = _load(path)
     solids = list(shape.solids)
     if not solids:
-        raise _open(path, shape)
+        raise _not_a_solid(path, shape)
     for number, solid in enumerate(solids):
         _name_faces(solid)
         name = plain_name(solid.name) if solid.name else "body" if len(solids) == 1 else f"body {number + 1}"
         solid.mat(name)
-    body = _in_metres(solids)
+    body = _scale_to_metres(solids)
     low, high = body.bounding_box
     require_size(path, max(high[i] - low[i] for i in range(3)), "stated in the file")
     _name_interfaces(body)
-    _apply(patches, body)
+    _name_patches(patches, body)
     return body
 
 
-def _loaded(path: str) -> Any:
+def _load(path: str) -> Any:
     from netgen.meshing import NgException
     from netgen.occ import OCCException, OCCGeometry
 
@@ -94,7 +92,7 @@ def _loaded(path: str) -> Any:
         ) from error
 
 
-def _open(path: str, shape: Any) -> UsageError:
+def _not_a_solid(path: str, shape: Any) -> UsageError:
     places = [tuple(round(v, 7) for v in edge.center) for face in shape.faces for edge in face.edges]
     lone = [place for place, count in Counter(places).items() if count == 1]
     if not places:
@@ -122,7 +120,7 @@ def _name_faces(solid: Any) -> None:
             face.name = f"face {number + 1}"
 
 
-def _in_metres(solids: list[Any]) -> Any:
+def _scale_to_metres(solids: list[Any]) -> Any:
     from netgen.occ import Glue, Pnt
 
     scaled = []
@@ -143,11 +141,11 @@ def _name_interfaces(body: Any) -> None:
             face.name = INTERFACE
 
 
-def _apply(patches: tuple[SurfacePatch, ...], body: Any) -> None:
+def _name_patches(patches: tuple[SurfacePatch, ...], body: Any) -> None:
     if not patches:
         return
     faces = list(body.faces)
-    names, index = patched(
+    names, index = apply_patches(
         [face.name for face in faces],
         np.arange(len(faces)),
         np.array([[face.center[i] for i in range(3)] for face in faces]),
@@ -172,7 +170,7 @@ class ImportedSolid(Shape):
     path : str
         Ending in .step, .stp or .stl.
     unit : {"m", "dm", "cm", "mm", "um", "in"}, optional
-        Of an STL file's coordinates, which are bare numbers. A STEP file states its own.
+        Unit of an STL file's coordinates, which are bare numbers. A STEP file states its own.
     element : float, optional
         Largest element size in m, by default a third of the least extent.
     patches : tuple of SurfacePatch
@@ -202,8 +200,8 @@ class ImportedSolid(Shape):
         object.__setattr__(self, "path", fspath(self.path))
         object.__setattr__(self, "patches", tuple(self.patches))
         if self.element is not None:
-            require_positive("The element size", self.element, "m")
-        require_positive("The feature angle", self.feature_angle, "degrees")
+            checks.positive("The element size", self.element, "m")
+        checks.positive("The feature angle", self.feature_angle, "degrees")
         self._check_kind()
         if not self.digest:
             object.__setattr__(self, "digest", digest_of(self.path))
@@ -233,12 +231,12 @@ class ImportedSolid(Shape):
 
     @property
     def is_step(self) -> bool:
-        """Whether this is a STEP file."""
+        """True for a STEP file, False for an STL file."""
         return Path(self.path).suffix.lower() in STEP
 
     @property
     def curved(self) -> bool:  # type: ignore[override]  # a class variable of shapes of one kind
-        """Whether elements follow the surface between their vertices: those of a STEP file do."""
+        """True where elements follow the surface between their vertices: those of a STEP file do."""
         return self.is_step
 
     @property
@@ -281,7 +279,7 @@ class ImportedSolid(Shape):
             solid = _solid.__wrapped__(self)
             return mesh_solid(solid, self._coarse(*solid.bounding_box), refinements)
         skin, volume = _skin(self)
-        return to_ngsolve(fill(skin, volume, self._coarse(*skin.corners), refinements)).ngmesh
+        return to_ngsolve(fill_surface(skin, volume, self._coarse(*skin.corners), refinements)).ngmesh
 
     def _coarse(self, low: Any, high: Any) -> float:
         return self.element if self.element is not None else min(high[i] - low[i] for i in range(3)) / 3
@@ -297,4 +295,4 @@ def _solid(shape: ImportedSolid) -> Any:
 def _skin(shape: ImportedSolid) -> tuple[BodyMesh, float]:
     require_same(shape.path, shape.digest)
     surface = read_stl(shape.path, shape.unit or "m")
-    return named(surface, shape.patches, shape.feature_angle), float(surface.volume)
+    return name_parts(surface, shape.patches, shape.feature_angle), float(surface.volume)

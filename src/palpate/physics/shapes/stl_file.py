@@ -1,4 +1,4 @@
-"""Closed surfaces from STL files: read, cleaned, checked for the faults that make them no body, and filled."""
+"""Closed surfaces of STL files: read, cleaned, searched for faults, split into named parts, filled with tetrahedra."""
 
 from __future__ import annotations
 
@@ -10,18 +10,26 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.errors import FileFormatError, UsageError
-from palpate.physics.shapes.body_file import UNITS, SurfacePatch, patched, read_with_meshio, segments
+from palpate.physics.shapes.body_file import UNITS, SurfacePatch, apply_patches, read_with_meshio, segments
 from palpate.physics.shapes.mesh import BodyMesh, body_mesh
-from palpate.physics.shapes.meshing import GRADING, THREADS, FineMesh, points_on, require_budget, scattered
-from palpate.physics.shapes.naming import require_size
+from palpate.physics.shapes.meshing import (
+    GRADING,
+    THREADS,
+    FineMesh,
+    points_on,
+    require_budget,
+    split_triangles,
+)
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
-__all__ = ["fill", "merged", "named", "read_stl", "require_closed"]
+from palpate.physics.shapes.shape import require_size
+
+__all__ = ["fill_surface", "name_parts", "read_stl", "require_closed", "unite_points"]
 
 
-def merged(points: np.ndarray, triangles: np.ndarray) -> Trimesh:
+def unite_points(points: np.ndarray, triangles: np.ndarray) -> Trimesh:
     """Return a surface whose coinciding points are united and whose triangles without area are dropped.
 
     Parameters
@@ -82,10 +90,10 @@ def require_closed(surface: Trimesh, source: str) -> None:
             fix="Flip the normals and export again.",
         )
     if (crossing := _crossing(surface)) is not None:
-        at = ", ".join(f"{v:.4g}" for v in surface.triangles_center[crossing[0]])
+        place = ", ".join(f"{v:.4g}" for v in surface.triangles_center[crossing[0]])
         raise UsageError(
             f"The surface of {source} cuts itself: triangles {crossing[0]} and {crossing[1]} cross.",
-            why=f"They do so near ({at}) m; a body's surface has an inside and an outside everywhere.",
+            why=f"They do so near ({place}) m; a body's surface has an inside and an outside everywhere.",
             fix="Unite overlapping parts (Boolean union) in the program that made the file.",
         )
 
@@ -115,7 +123,7 @@ def _crossing(surface: Trimesh) -> tuple[int, int] | None:
 
 
 def _pierces(edges_of: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Whether an edge of one triangle passes through the inside of the other; both (n, 3, 3), result (n,).
+    """Mask (n,) of pairs (n, 3, 3) in which an edge of the first triangle passes through the inside of the second.
 
     Segment against triangle by Möller & Trumbore 1997 (J. Graph. Tools 2, 21-28).
     """
@@ -145,7 +153,7 @@ SHARP = (
 
 
 def read_stl(path: str, unit: str) -> Trimesh:
-    """The cleaned surface of an STL file in m.
+    """Read the surface of an STL file, cleaned, in m.
 
     Raises
     ------
@@ -162,34 +170,35 @@ def read_stl(path: str, unit: str) -> Trimesh:
             why="It is empty, cut short or damaged.",
             fix="Export the surface again.",
         )
-    surface = merged(np.asarray(mesh.points, dtype=float) * UNITS[unit], np.concatenate(blocks))
+    surface = unite_points(np.asarray(mesh.points, dtype=float) * UNITS[unit], np.concatenate(blocks))
     require_size(path, float(surface.extents.max()), unit)
     require_closed(surface, path)
     return surface
 
 
-def named(surface: Trimesh, patches: tuple[SurfacePatch, ...], angle: float) -> BodyMesh:
-    """The surface, split along sharp edges into ``face 1``, ``face 2``, …; a mesh without tetrahedra."""
+def name_parts(surface: Trimesh, patches: tuple[SurfacePatch, ...], angle: float) -> BodyMesh:
+    """Return the surface, split along sharp edges into ``face 1``, ``face 2``, …; a mesh without tetrahedra."""
     part = segments(surface, angle)
     names = [f"face {i + 1}" for i in range(part.max() + 1)]
-    surfaces, surface_of = patched(names, part, surface.triangles_center, patches)
+    surfaces, surface_of = apply_patches(names, part, surface.triangles_center, patches)
     return BodyMesh(
         surface.vertices, np.empty((0, 4)), surface.faces, surface_of, np.empty(0), surfaces, ("body",)
     )
 
 
-def fill(skin: BodyMesh, volume: float, coarse: float, refinements: tuple[FineMesh, ...]) -> BodyMesh:
-    """Tetrahedra inside a closed surface, whose triangles are renewed.
+def fill_surface(skin: BodyMesh, volume: float, coarse: float, refinements: tuple[FineMesh, ...]) -> BodyMesh:
+    """Return tetrahedra inside a closed surface, whose triangles are renewed.
 
     Parameters
     ----------
     skin : BodyMesh
         The surface with its names, in m.
     volume : float
-        Enclosed, in m³.
+        Volume that the surface encloses, m³.
     coarse : float
         Largest element size in m.
     refinements : tuple of FineMesh
+        Parts of surfaces that shall have smaller elements.
 
     Raises
     ------
@@ -200,31 +209,25 @@ def fill(skin: BodyMesh, volume: float, coarse: float, refinements: tuple[FineMe
     scale = LENGTH / float((high - low).max())
     fine = [(*points_on(skin, refinement), refinement.element) for refinement in refinements]
     require_budget([(volume, coarse)], [(area, size) for _, area, size in fine])
-    geometry = _geometry(skin.points[skin.triangles] * scale)
-    netgen = _filled(geometry, coarse * scale, [(at * scale, size * scale) for at, _, size in fine])
+    geometry = _stl_geometry(skin.points * scale, skin.triangles)
+    netgen = _generate_mesh(geometry, coarse * scale, [(at * scale, size * scale) for at, _, size in fine])
     netgen.Scale(1 / scale)
-    return _renamed(body_mesh(netgen), skin)
+    return _rename_surfaces(body_mesh(netgen), skin)
 
 
-def _geometry(corners: np.ndarray) -> Any:
-    """The triangles (t, 3, 3) as Netgen's geometry, which only a file can be made of."""
+def _stl_geometry(points: np.ndarray, triangles: np.ndarray) -> Any:
+    """Return Netgen's geometry of a surface, which only a file can be made into."""
     from netgen.stl import STLGeometry
+    from trimesh import Trimesh
 
-    a, b, c = np.moveaxis(corners, 1, 0)
-    normals = np.cross(b - a, c - a)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    lines = ["solid body"]
-    for normal, triangle in zip(normals.tolist(), corners.tolist(), strict=True):
-        lines.append("facet normal {!r} {!r} {!r}\nouter loop".format(*normal))
-        lines.extend("vertex {!r} {!r} {!r}".format(*corner) for corner in triangle)
-        lines.append("endloop\nendfacet")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "body.stl"
-        path.write_text("\n".join([*lines, "endsolid body"]) + "\n", encoding="ascii")
+        # as text, which keeps all digits
+        Trimesh(points, triangles, process=False).export(str(path), file_type="stl_ascii")
         return STLGeometry(str(path))
 
 
-def _filled(geometry: Any, coarse: float, fine: list[tuple[np.ndarray, float]]) -> Any:
+def _generate_mesh(geometry: Any, coarse: float, fine: list[tuple[np.ndarray, float]]) -> Any:
     import ngsolve
     from netgen.meshing import NgException
 
@@ -247,13 +250,13 @@ def _filled(geometry: Any, coarse: float, fine: list[tuple[np.ndarray, float]]) 
         ) from error
 
 
-def _renamed(mesh: BodyMesh, skin: BodyMesh) -> BodyMesh:
+def _rename_surfaces(mesh: BodyMesh, skin: BodyMesh) -> BodyMesh:
     """Give each new triangle the name of the nearest old one that faces the same way."""
     from scipy.spatial import cKDTree
 
     low, high = skin.corners
     length = float((high - low).max())
-    corners, origin = scattered(skin.points[skin.triangles], length / 100)
+    corners, origin = split_triangles(skin.points[skin.triangles], length / 100)
     known = np.hstack([corners.mean(axis=1) / length, SHARP * skin.normals[origin]])
     wanted = np.hstack([mesh.points[mesh.triangles].mean(axis=1) / length, SHARP * mesh.normals])
     _, nearest = cKDTree(known).query(wanted)

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from palpate.errors import UsageError
-from palpate.network.radial import RADIAL_FUNCTIONS
+from palpate.network.radial import HEAD, RADIAL_FUNCTIONS, Q, constants, radial_into
 from palpate.network.radial import radial as reference
-from palpate.network.radial_kernels import HEAD, Q, constants, radial_into
 
 from .networks import FORMS, any_network, formula, points
 

@@ -7,8 +7,8 @@ import pytest
 
 from palpate.errors import UsageError
 from palpate.network import Network, Scaling
+from palpate.network.network_kernels import gram, regressors_into, second_order_into
 from palpate.network.radial import RADIAL_FUNCTIONS
-from palpate.network.second_order import gram, regressors_into, second_order_into
 from palpate.units import Quantity, Range
 
 n = 4

@@ -24,8 +24,7 @@ import numpy as np
 
 from palpate.errors import FileFormatError, UsageError
 from palpate.network.container import MAKE_ANEW, Container, read_container, write_container
-from palpate.network.network import Network
-from palpate.network.scaling import Scaling
+from palpate.network.network import Network, Scaling
 from palpate.network.soundness import flaw
 from palpate.units import Quantity, Range
 

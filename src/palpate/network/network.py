@@ -1,27 +1,158 @@
-"""A trained radial-basis-function network as a frozen value."""
+"""A trained radial-basis-function network as a frozen value, its scaling, and its allocation-free evaluator."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numba.core.errors import TypingError
 
 from palpate.checks import own_arrays
 from palpate.errors import UsageError
-from palpate.network import evaluate
-from palpate.network.compiled import Precision, packed, pattern, workspace
-from palpate.network.evaluator import Evaluator, refused
+from palpate.network.network_kernels import (
+    Precision,
+    hessian_into,
+    jacobian_into,
+    packed,
+    pattern,
+    value_and_jacobian_into,
+    value_into,
+    values_into,
+    workspace,
+)
 from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction
-from palpate.network.scaling import Scaling
 from palpate.network.soundness import check_shapes, unreal
-from palpate.units import Quantity, Range
+from palpate.units import Quantity, Range, bounds
 
-__all__ = ["Network"]
+__all__ = [
+    "Evaluator",
+    "Network",
+    "Scaling",
+]
+
+
+@dataclass(frozen=True, eq=False)
+class Scaling:
+    """Affine maps between physical and scaled quantities.
+
+    Inputs: ξ = (x − input_centre)/input_half, in [−1, 1] over the declared ranges. Outputs:
+    y = output_centre + output_scale · η, one scale for a whole group of outputs so that their errors compare.
+
+    Attributes
+    ----------
+    input_centre, input_half : (n,)
+    output_centre, output_scale : (m,)
+    """
+
+    input_centre: np.ndarray
+    input_half: np.ndarray
+    output_centre: np.ndarray
+    output_scale: np.ndarray
+
+    @classmethod
+    def of(cls, inputs: Sequence[Range], Y: np.ndarray, *, scale: float | None = None) -> Scaling:
+        """Scaling from declared ranges and training outputs Y (N, m), one scale for all of them."""
+        low, high = bounds(inputs)
+        centre = Y.mean(axis=0)
+        size = scale if scale is not None else float(np.abs(Y - centre).max())
+        return cls((low + high) / 2, (high - low) / 2, centre, np.full(Y.shape[1], size if size > 0 else 1.0))
+
+    def scale_inputs(self, X: np.ndarray) -> np.ndarray:
+        """Physical inputs (…, n) to scaled ones."""
+        return np.asarray((X - self.input_centre) / self.input_half)
+
+    def scale_outputs(self, Y: np.ndarray) -> np.ndarray:
+        """Physical outputs (…, m) to scaled ones."""
+        return np.asarray((Y - self.output_centre) / self.output_scale)
+
+    def select(self, outputs: slice | Sequence[int]) -> Scaling:
+        """The scaling of some of the outputs."""
+        rows = outputs if isinstance(outputs, slice) else list(outputs)
+        return Scaling(self.input_centre, self.input_half, self.output_centre[rows], self.output_scale[rows])
+
+
+_DOUBLE = np.dtype(np.float64)
+
+
+class Evaluator:
+    """Evaluates one point at a time into arrays it owns: `y = evaluator(x)` allocates nothing.
+
+    The returned array (m,), and `jacobian` (m, n) if it was asked for, are overwritten by the next call; copy
+    them to keep them. One evaluator serves one thread at a time.
+
+    Parameters
+    ----------
+    network : Network
+    precision : {"double", "single"}
+        In single precision units, weights and outputs are 32-bit numbers; how much that costs is for
+        `Network.precision_error` to measure, it is not known beforehand.
+    jacobian : bool
+        Whether each call also renews `jacobian`.
+    """
+
+    def __init__(self, network: Network, *, precision: Precision = "double", jacobian: bool = False) -> None:
+        compiled = network.compiled(precision)
+        self._inputs = network.inputs
+        kind = compiled[0].dtype
+        self._y = np.zeros(len(network.outputs), kind)
+        self._J = np.zeros((len(network.inputs) if jacobian else 0, len(network.outputs)), kind)
+        self._kernel: Callable[..., bool]
+        self._rest: tuple[np.ndarray, ...]
+        if jacobian:
+            self._kernel, self._rest = value_and_jacobian_into, (self._y, self._J, *compiled)
+        else:
+            self._kernel, self._rest = value_into, (self._y, *compiled)
+        self(np.array([r.low for r in network.inputs]))  # compile now, not in the loop
+
+    def __call__(self, x: np.ndarray) -> np.ndarray:
+        """Outputs (m,) at x (n,), in SI units.
+
+        A contiguous float64 array is taken as it is; anything else is converted first.
+
+        Raises
+        ------
+        UsageError
+            If x has not n numbers.
+        """
+        if type(x) is not np.ndarray or x.dtype is not _DOUBLE:
+            x = np.ascontiguousarray(x, dtype=np.float64)
+        try:
+            fits = self._kernel(x, *self._rest)
+        except TypingError:  # not one-dimensional
+            fits = False
+        if not fits:
+            raise _refused(x, len(self._inputs))
+        return self._y
+
+    @property
+    def jacobian(self) -> np.ndarray:
+        """∂f/∂x (m, n) where the last call evaluated, in output units per input unit.
+
+        Raises
+        ------
+        UsageError
+            If the evaluator was made without it.
+        """
+        if not len(self._J):
+            raise UsageError(
+                "This evaluator gives no Jacobian.", fix="Make it by network.evaluator(jacobian=True)."
+            )
+        return self._J.T
+
+    def __repr__(self) -> str:
+        return f"Evaluator: {len(self._inputs)} inputs → {np.array2string(self._y, threshold=8)}"
+
+
+def _refused(x: np.ndarray, inputs: int) -> UsageError:
+    """The error for a point that has another shape than (n,)."""
+    return UsageError(
+        f"A point of shape {x.shape} can't be evaluated.", fix=f"Pass an array of shape ({inputs},)."
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,7 +311,7 @@ class Network:
             )
         compiled = self.compiled(precision)
         Y = np.empty((X.shape[0], len(self.outputs)), compiled[0].dtype)
-        evaluate.values_into(X, Y, *compiled)
+        values_into(X, Y, *compiled)
         return Y
 
     def precision_error(self, X: np.ndarray) -> np.ndarray:
@@ -203,7 +334,7 @@ class Network:
             If x has another shape.
         """
         J = np.empty((len(self.inputs), len(self.outputs)))
-        evaluate.jacobian_into(self._point(x), J, *self.compiled())
+        jacobian_into(self._point(x), J, *self.compiled())
         return np.ascontiguousarray(J.T)
 
     def hessian(self, x: np.ndarray) -> np.ndarray:
@@ -221,13 +352,13 @@ class Network:
             )
         n = len(self.inputs)
         H = np.empty((n, n))
-        evaluate.hessian_into(self._point(x), H, np.empty((n, n)), np.empty(n), *self.compiled())
+        hessian_into(self._point(x), H, np.empty((n, n)), np.empty(n), *self.compiled())
         return H
 
     def _point(self, x: np.ndarray) -> np.ndarray:
         x = np.ascontiguousarray(x, dtype=np.float64)
         if x.shape != (len(self.inputs),):
-            raise refused(x, len(self.inputs))
+            raise _refused(x, len(self.inputs))
         return x
 
     def evaluator(self, *, precision: Precision = "double", jacobian: bool = False) -> Evaluator:

@@ -74,7 +74,7 @@ def _blank(v: np.ndarray, count: int, pattern: Pattern | None) -> Derivatives:
 
 
 @_jit
-def _slopes_into(points, turns, v, g, A, pattern, found) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def _slopes_into(points, turns, v, g, A, pattern, found) -> None:
     (g1, g2), (rows, columns), (slopes, by_entry, by_shift) = g, pattern, found
     c, N, n = points.shape
     h, r, _ = A.shape
@@ -104,7 +104,7 @@ def _slopes_into(points, turns, v, g, A, pattern, found) -> None:  # type: ignor
 
 
 @_jit
-def _curvatures_into(points, turns, v, g, A, pattern, pairs, found) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001, PLR0912
+def _curvatures_into(points, turns, v, g, A, pattern, pairs, found) -> None:  # noqa: PLR0912
     (g1, g2, g3), (rows, columns), (first, second) = g, pattern, pairs
     bends, by_entry, by_shift = found
     c, N, n = points.shape

@@ -1,8 +1,8 @@
 """The memory that the real-time process shares with everyone else: state and prints out, commands in.
 
 Three records are shared: `STATE` is one tick of the loop, `PRINTS` the prints that stay on a body which yields, and
-`COMMAND` what the loop is asked to do. All of them live in one memory-mapped file (`network.mapped`), whose path is
-its name, each behind a sequence lock (`network.seqlock`).
+`COMMAND` what the loop is asked to do. All of them live in one memory-mapped file, whose path is
+its name, each behind a sequence lock (`network.shared_memory`).
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from typing import Any, Self
 import numpy as np
 
 from palpate.errors import DeviceError, UsageError
-from palpate.network import mapped
-from palpate.network.seqlock import Block
+from palpate.network import shared_memory
+from palpate.network.shared_memory import Block
 from palpate.runtime.loop_report import BINS, percentile
 
 __all__ = [
@@ -215,12 +215,12 @@ class Shared:
             If the system gives no shared memory.
         """
         try:
-            name = mapped.create(_MAGIC, _SIZE)
+            name = shared_memory.create(_MAGIC, _SIZE)
         except OSError as error:
             raise DeviceError(
                 "No shared memory for the real-time process.",
                 why=str(error),
-                fix=f"Free some space in {mapped.folder()}.",
+                fix=f"Free some space in {shared_memory.folder()}.",
             ) from error
         shared = cls.attach(name)
         shared.command.record["parameters"] = np.nan
@@ -239,7 +239,7 @@ class Shared:
             If there are none of that name, or another version of palpate made them.
         """
         try:
-            memory = mapped.attach(name)
+            memory = shared_memory.attach(name)
         except (OSError, ValueError) as error:
             raise DeviceError(
                 f"There is no shared memory named {name!r}.",
@@ -339,7 +339,7 @@ class Shared:
     def unlink(self) -> None:
         """Remove the name; who has attached keeps the memory. Harmless when repeated."""
         if self.name:
-            mapped.remove(self.name)
+            shared_memory.remove(self.name)
 
     def __enter__(self) -> Self:
         return self

@@ -38,7 +38,7 @@ from numba import njit
 
 from palpate.errors import FileFormatError, UsageError
 from palpate.network import Archive, Network, load_archive, save_archive
-from palpate.network.evaluate import value_into
+from palpate.network.network_kernels import value_into
 from palpate.units import Range, bounds
 
 __all__ = ["TouchEvaluator", "TouchModel"]

@@ -25,7 +25,7 @@ import math
 
 from numba import njit
 
-from palpate.network.second_order import second_order_into
+from palpate.network.network_kernels import second_order_into
 from palpate.surrogates.continuation import saturated
 from palpate.surrogates.laws import law_at
 from palpate.surrogates.surface import distance_into

@@ -21,7 +21,7 @@ import numpy as np
 from palpate.checks import own_arrays
 from palpate.errors import UsageError
 from palpate.network import Network, TrainedRegion
-from palpate.network.second_order import gram
+from palpate.network.network_kernels import gram
 from palpate.surrogates.continuation import Continuation
 from palpate.surrogates.laws import ContactLaw
 from palpate.surrogates.learnt_energy import LearntEnergy, history_in_words

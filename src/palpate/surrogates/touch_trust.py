@@ -16,8 +16,7 @@ import math
 
 from numba import njit
 
-from palpate.network.combine import combine_lines
-from palpate.network.second_order import regressors_into
+from palpate.network.network_kernels import combine_lines, regressors_into
 
 __all__ = ["covariances_into", "trust_at", "trusts_into"]
 

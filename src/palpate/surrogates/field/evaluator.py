@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.network.compiled import PRECISIONS, Precision
+from palpate.network.network_kernels import PRECISIONS, Precision
 from palpate.surrogates.arguments import NONE, touch_at
 from palpate.surrogates.field.kernels import FRAME, coefficients_into, field_into, profile_into
 from palpate.surrogates.field.variation import OFFSETS

@@ -22,7 +22,7 @@ import numpy as np
 from palpate.checks import own_arrays
 from palpate.errors import UsageError
 from palpate.network import Network
-from palpate.network.compiled import Precision
+from palpate.network.network_kernels import Precision
 from palpate.surrogates.arguments import rows_of
 from palpate.surrogates.continuation import Continuation
 from palpate.surrogates.field.carrying import Carrier, node_normals

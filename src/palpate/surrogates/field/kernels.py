@@ -27,8 +27,7 @@ import math
 
 from numba import njit, uint64
 
-from palpate.network.combine import combine
-from palpate.network.evaluate import value_into
+from palpate.network.network_kernels import combine, value_into
 from palpate.surrogates.continuation import saturated
 from palpate.surrogates.field.rise import rise_at
 from palpate.surrogates.surface import distance_into

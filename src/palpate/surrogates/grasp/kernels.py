@@ -14,7 +14,7 @@ import math
 
 from numba import njit
 
-from palpate.network.second_order import second_order_into
+from palpate.network.network_kernels import second_order_into
 from palpate.surrogates.grasp.rest import root_at
 from palpate.surrogates.grasp.stiffening import stiffening_into
 from palpate.surrogates.touch_kernels import boxed, gathered, near, through_box

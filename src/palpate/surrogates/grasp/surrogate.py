@@ -22,7 +22,7 @@ import numpy as np
 from palpate.checks import own_arrays
 from palpate.errors import UsageError
 from palpate.network import Network, TrainedRegion
-from palpate.network.second_order import gram
+from palpate.network.network_kernels import gram
 from palpate.surrogates.continuation import Continuation
 from palpate.surrogates.grasp.evaluator import GraspEvaluator
 from palpate.surrogates.grasp.kernels import grasps_into

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from palpate.errors import UsageError
-from palpate.network.evaluate import value_and_jacobian_into, value_into
+from palpate.network.network_kernels import value_and_jacobian_into, value_into
 from palpate.surrogates.plastic.element_kernels import advance, free_step
 
 if TYPE_CHECKING:

@@ -1,18 +1,76 @@
-"""A record in shared bytes with one writer, any number of readers, and nobody who waits.
+"""Memory that processes share under a name: a mapped file, in RAM where the system has ``/dev/shm``.
 
-The writer makes a counter odd, copies, makes it even; a reader who sees an odd or a changed counter tries
-again (Boehm 2012, "Can seqlocks get along with programming language memory models?"). Processors with weakly
-ordered memory may still reorder the copies and Python has no fence, so the block also carries a checksum: a
-torn record never leaves `Block.fetch`.
+A plain mapped file and not `multiprocessing.shared_memory`: that one starts a tracker process, and before
+Python 3.13 every process that merely attached removed the block when it ended.
+
+A `Block` is a record in shared bytes with one writer, any number of readers, and nobody who waits. The writer makes
+a counter odd, copies, makes it even; a reader who sees an odd or a changed counter tries again (Boehm 2012, "Can
+seqlocks get along with programming language memory models?"). Processors with weakly ordered memory may still reorder
+the copies and Python has no fence, so the block also carries a checksum: a torn record never leaves `Block.fetch`.
 """
 
 from __future__ import annotations
 
+import contextlib
+import mmap
+import os
+import tempfile
 import zlib
+from pathlib import Path
 
 import numpy as np
 
-__all__ = ["Block"]
+__all__ = [
+    "Block",
+    "attach",
+    "create",
+    "folder",
+    "remove",
+]
+
+_RAM = Path("/dev/shm")
+
+
+def folder() -> Path:
+    """Where the files are made."""
+    return _RAM if os.access(_RAM, os.W_OK) else Path(tempfile.gettempdir())
+
+
+def create(head: bytes, size: int) -> str:
+    """Make a file of `size` bytes that begins with `head`, readable by its owner alone; its path is its name.
+
+    Raises
+    ------
+    OSError
+        If there is no room for it.
+    """
+    handle, name = tempfile.mkstemp(prefix="palpate-", suffix=".shm", dir=folder())
+    try:
+        with os.fdopen(handle, "r+b") as file:
+            # every byte is written: room that is only promised ends a process that touches it
+            file.write(head.ljust(size, b"\0"))
+    except OSError:
+        remove(name)
+        raise
+    return name
+
+
+def attach(name: str) -> mmap.mmap:
+    """Map the file of that name.
+
+    Raises
+    ------
+    OSError, ValueError
+        If there is none, or nothing in it.
+    """
+    with Path(name).open("r+b") as file:
+        return mmap.mmap(file.fileno(), 0)
+
+
+def remove(name: str) -> None:
+    """Take the name away; who has attached keeps the memory. Harmless when repeated."""
+    with contextlib.suppress(PermissionError):  # Windows removes only what nobody maps: the last to go does
+        Path(name).unlink(missing_ok=True)
 
 
 class Block:

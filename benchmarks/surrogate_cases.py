@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.touch_studies import RADIUS, STUDIES, TouchStudy
-from palpate.physics.interactions.curved import surface_of
+from palpate.physics.interactions.surface_patch import surface_of
 from palpate.surrogates import TouchedSurface
 from palpate.units import Range
 from palpate.validation import TouchSolves

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from benchmarks.touch_studies import CLEAR, LEAST, RADIUS, STUDIES, TouchStudy
-from palpate.physics.interactions.curved import surface_of
+from palpate.physics.interactions.surface_patch import surface_of
 
 __all__ = ["Column", "columns_of", "join", "main"]
 

@@ -18,8 +18,8 @@ import numpy as np
 from benchmarks.runner import main
 from benchmarks.table import Claim, Column, Table
 from benchmarks.touching import HEIGHT, RADIUS, block, probe
-from palpate.physics.solid.opening import open_problem
-from palpate.physics.solid.system import sparse_solver
+from palpate.physics.solid.solid_model import open_problem
+from palpate.physics.solid.solid_system import sparse_solver
 
 __all__ = ["measured", "tables"]
 

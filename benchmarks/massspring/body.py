@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.massspring.pad import PointPad, point_areas
 from benchmarks.massspring.springs import SpringNetwork, spring_network
 from palpate.errors import UsageError
-from palpate.physics.solid.parts import by_region, surfaces_of
+from palpate.physics.solid.solid_checks import by_region, surfaces_of
 
 if TYPE_CHECKING:
     from benchmarks.massspring.solver import MassSpringSolver

@@ -18,8 +18,8 @@ from .physics import BodyFamily as BodyFamily
 from .physics import BodyForce as BodyForce
 from .physics import Cantilever as Cantilever
 from .physics import Circle as Circle
+from .physics import Fixed as Fixed
 from .physics import GluedPad as GluedPad
-from .physics import Held as Held
 from .physics import LoadAndUnload as LoadAndUnload
 from .physics import PointForce as PointForce
 from .physics import PointLoad as PointLoad

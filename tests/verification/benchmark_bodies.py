@@ -124,7 +124,7 @@ class Moved:
             part[component.start : component.stop] = True
             held |= part & field.surface_dofs(name)
         lift = field.interpolate(ng.CF(self.displacement(ng.x, ng.y, ng.z))) * held
-        return Attached((ng.Parameter(0.0),), lifts=lift[None, :], held=held)
+        return Attached((ng.Parameter(0.0),), lifts=lift[None, :], constrained=held)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ import pytest
 from palpate.physics.interactions import PrescribedDisplacement
 from palpate.physics.materials import LinearElastic, LinearHardening, NeoHookean, Plastic
 from palpate.physics.shapes import Block
-from palpate.physics.solid import Body, density
+from palpate.physics.solid import Body, solid_energy
 
 PRINTED = 2e-6  # some units in the seventh digit, which sums and differences of forces may lose
 SIZE = (0.06, 0.05, 0.03)
@@ -64,7 +64,7 @@ def test_a_pushed_patch_resists_as_in_calculix(
 ):
     """A patch of 20 × 20 mm of the top is pushed down by a fifth of the height and aside; the bottom is fixed."""
     if points == 4:
-        monkeypatch.setattr(density, "rule_order", lambda *_: 2)
+        monkeypatch.setattr(solid_energy, "rule_order", lambda *_: 2)
     problem = Body(Block(SIZE, element=0.012), law, formulation="displacement").problem(PUSH)
     solution, mesh = problem.solve(push), problem.mesh
     assert solution.converged, solution.message

@@ -10,7 +10,7 @@ import pytest
 from bonded_layer import FARTHEST, dimitriadis, exact, garcia, ground, hertz
 from scipy.integrate import quad
 
-from palpate.physics.interactions import Held, PrescribedDisplacement, SphereProbe
+from palpate.physics.interactions import Fixed, PrescribedDisplacement, SphereProbe
 from palpate.physics.materials import LinearElastic
 from palpate.physics.shapes import Block, FineMesh
 from palpate.physics.solid import Body
@@ -38,7 +38,7 @@ def mirror(axis):
     upper = [FAR, FAR, FAR]
     upper["xyz".index(axis)] = 0.0
     box = ((-FAR, -FAR, -FAR), tuple(upper))
-    return Held(PrescribedDisplacement("side", axis, (-FAR, FAR), sliding=True, within=box), (0.0,))
+    return Fixed(PrescribedDisplacement("side", axis, (-FAR, FAR), sliding=True, within=box), (0.0,))
 
 
 def quarter(poisson, chi, width):

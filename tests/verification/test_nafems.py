@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from benchmark_bodies import Drawn
 
-from palpate.physics.interactions import Attached, Held, PrescribedDisplacement, SurfaceTraction, roller
+from palpate.physics.interactions import Attached, Fixed, PrescribedDisplacement, SurfaceTraction, roller
 from palpate.physics.materials import LinearElastic
 from palpate.physics.solid import Body
 
@@ -85,7 +85,7 @@ class HeldEdge:
         found = np.fromiter(
             field.space.GetDofs(field.mesh.BBoundaries(self.edge)), dtype=bool, count=field.size
         )
-        return Attached((), held=held & found, lifts=np.zeros((0, field.size)))
+        return Attached((), constrained=held & found, lifts=np.zeros((0, field.size)))
 
 
 def at_d(found, height, values=None):
@@ -110,8 +110,8 @@ def plate(element, fine):
     held = (
         roller("on y", "x"),
         roller("on x", "y"),
-        Held(edge, (0.0, 0.0)),
-        Held(HeldEdge("middle of the outside"), ()),
+        Fixed(edge, (0.0, 0.0)),
+        Fixed(HeldEdge("middle of the outside"), ()),
     )
     body = Body(shape, STEEL, fixed=(), held=held)
     return body.problem(SurfaceTraction("top", "z", (-2e6, 0.0))).solve(-1e6, fields=True)

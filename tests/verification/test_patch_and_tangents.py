@@ -23,8 +23,7 @@ from palpate.physics.materials import (
     VoceHardening,
     Yeoh,
 )
-from palpate.physics.materials.isochoric import isochoric_first
-from palpate.physics.materials.tensors import gradient, log
+from palpate.physics.materials.tensors import gradient, isochoric_first, log
 from palpate.physics.materials.user import material
 from palpate.physics.solid import Body
 

@@ -33,8 +33,8 @@ from palpate.physics.beam import (
 )
 from palpate.physics.interactions import (
     BodyForce,
+    Fixed,
     GluedPad,
-    Held,
     Interaction,
     PointForce,
     PrescribedDisplacement,
@@ -107,9 +107,9 @@ __all__ = [
     "FibreFamily",
     "FibreReinforced",
     "FineMesh",
+    "Fixed",
     "Geometry",
     "GluedPad",
-    "Held",
     "ImportedMesh",
     "ImportedSolid",
     "Inclusion",

@@ -19,7 +19,7 @@ from palpate.learning.bodies.images import snapshots_of
 from palpate.learning.fields import Snapshots, lumped_mass
 from palpate.learning.fields.dimples import faded, fitted_dimple
 from palpate.learning.fields.solves import Solves
-from palpate.physics.solid.symmetry import fundamental_part
+from palpate.physics.solid.body_symmetry import fundamental_part
 from palpate.surrogates import ContactLaw, TouchedBody, TouchModel
 from palpate.surrogates.field import Rise
 from palpate.surrogates.field.carrying import Carrier

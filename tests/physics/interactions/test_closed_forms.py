@@ -8,8 +8,8 @@ from scipy.optimize import brentq, fsolve
 
 from palpate.physics.interactions import (
     BodyForce,
+    Fixed,
     GluedPad,
-    Held,
     PointForce,
     PrescribedDisplacement,
     Pressure,
@@ -34,7 +34,7 @@ def roller(axis, surface="side"):
     upper = [FAR, FAR, FAR]
     upper["xyz".index(axis)] = 0.0
     box = ((-FAR, -FAR, -FAR), tuple(upper))
-    return Held(PrescribedDisplacement(surface, axis, (-FAR, FAR), sliding=True, within=box), (0.0,))
+    return Fixed(PrescribedDisplacement(surface, axis, (-FAR, FAR), sliding=True, within=box), (0.0,))
 
 
 ROLLERS = (roller("x"), roller("y"), roller("z", "bottom"))
@@ -65,7 +65,7 @@ def test_pre_stretch_changes_the_stiffness_as_the_homogeneous_state():
     """Stretched by half along x and held there, pulled along z; y is free."""
     x = 1.5
     ends = ((SIZE[0], -FAR, -FAR), (FAR, FAR, FAR))
-    stretch = Held(
+    stretch = Fixed(
         PrescribedDisplacement("side", "x", (0, 0.1), sliding=True, within=ends), ((x - 1) * SIZE[0],)
     )
     pull = PrescribedDisplacement("top", "z", (-0.01, 0.01), sliding=True)
@@ -127,7 +127,7 @@ def test_a_pad_takes_its_share_of_the_compliance():
 
 def test_a_pad_glued_to_a_settled_body_pulls_only_when_it_moves():
     """Under gravity and beside a pad that was glued before; both keep the state in which they were glued."""
-    before = Held(GluedPad("top", pad=5e5, displacement=(0.0, 0.0, (-0.01, 0.01))), (0.001,))
+    before = Fixed(GluedPad("top", pad=5e5, displacement=(0.0, 0.0, (-0.01, 0.01))), (0.001,))
     body = Body(BLOCK, CORK, gravity=(0, 0, -9.80665), held=before)
     pad = GluedPad("top", pad=1e6, displacement=(0.0, 0.0, (-0.005, 0.005)))
     solver = body.problem(pad).open()

@@ -16,7 +16,7 @@ from palpate.physics.interactions import (
 from palpate.physics.materials import NeoHookean
 from palpate.physics.shapes import Block
 from palpate.physics.solid import Body
-from palpate.physics.solid.opening import open_problem
+from palpate.physics.solid.solid_model import open_problem
 
 BLOCK = Block((0.04, 0.04, 0.02), element=0.02)
 CORNERS = ((0.015, 0.015), (0.025, 0.025))

@@ -22,7 +22,7 @@ from palpate.physics.interactions import (
 from palpate.physics.materials import NeoHookean
 from palpate.physics.shapes import Block
 from palpate.physics.solid import Body
-from palpate.physics.solid.field import SolidField
+from palpate.physics.solid.solid_field import SolidField
 
 BLOCK = Block((0.04, 0.03, 0.02), element=0.02)
 PLACE = (0.02, 0.015, 0.02)

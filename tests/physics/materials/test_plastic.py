@@ -13,9 +13,9 @@ from scipy.optimize import least_squares
 from laws.histories import march, tube_first_yield_pressure, tube_limit_pressure, tube_plastic_front
 from palpate.errors import UsageError
 from palpate.physics.materials.hardening import LinearHardening, VoceHardening
+from palpate.physics.materials.library import MATERIALS
 from palpate.physics.materials.linear import LinearElastic
 from palpate.physics.materials.material import initial_state
-from palpate.physics.materials.metals import METALS
 from palpate.physics.materials.neo_hooke import NeoHookean
 from palpate.physics.materials.plastic import Plastic
 from palpate.physics.materials.tensors import gradient
@@ -189,7 +189,7 @@ def test_flow_does_not_touch_the_volume_even_where_it_can_not_change():
 
 
 def test_copper_follows_the_published_flow_stress():
-    law = METALS["annealed copper"].hardening
+    law = MATERIALS["annealed copper"].hardening
     alpha = np.linspace(0, 0.2, 2001)[1:]
     published = 90e6 + 292e6 * alpha**0.31
     deviation = law.flow_stress(alpha) / published - 1
@@ -206,7 +206,7 @@ def test_copper_follows_the_published_flow_stress():
 
 
 def test_values_travel_and_describe_themselves():
-    copper = METALS["annealed copper"]
+    copper = MATERIALS["annealed copper"]
     assert pickle.loads(pickle.dumps(copper)) == copper
     assert hash(copper) == hash(pickle.loads(pickle.dumps(copper)))
     told = json.loads(json.dumps(copper.describe()))

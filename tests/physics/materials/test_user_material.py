@@ -14,13 +14,13 @@ from netgen.csg import unit_cube
 from palpate.errors import UsageError
 from palpate.physics.materials import LinearElastic, NeoHookean, StateVariable, UserMaterial
 from palpate.physics.materials.homogeneous import uniaxial
-from palpate.physics.materials.isochoric import isochoric_first
 from palpate.physics.materials.material import log_volume, small_volume
 from palpate.physics.materials.tensors import (
     determinant,
     gradient,
     identity,
     inner,
+    isochoric_first,
     log,
     matmul,
     second_gradient,

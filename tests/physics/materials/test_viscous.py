@@ -20,10 +20,9 @@ from palpate.physics.materials.mooney_rivlin import MooneyRivlin
 from palpate.physics.materials.neo_hooke import NeoHookean
 from palpate.physics.materials.plastic import Plastic
 from palpate.physics.materials.prony import PronySeries
-from palpate.physics.materials.scaled import Scaled
 from palpate.physics.materials.st_venant import StVenantKirchhoff
 from palpate.physics.materials.tensors import gradient
-from palpate.physics.materials.viscous import Viscoelastic
+from palpate.physics.materials.viscous import Scaled, Viscoelastic
 
 TERMS = ((0.3, 0.5), (0.2, 20.0))
 PRONY = PronySeries(TERMS)

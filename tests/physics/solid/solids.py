@@ -54,4 +54,4 @@ class Stretched:
         rows = [ngs.CF(row) * place for row in self.matrix]
         held = np.any([field.surface_dofs(name) for name in field.rest.surfaces], axis=0)
         lift = field.interpolate(ngs.CF(tuple(rows))) * held
-        return Attached((ngs.Parameter(0.0),), lifts=lift[None, :], held=held)
+        return Attached((ngs.Parameter(0.0),), lifts=lift[None, :], constrained=held)

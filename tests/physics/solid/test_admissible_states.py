@@ -8,8 +8,8 @@ import pytest
 from solids import FOOT, PROBE, RADIUS, SIZE, above, pressed
 
 from palpate.physics.interactions import SphereProbe
-from palpate.physics.interactions.contact import Contact
-from palpate.physics.interactions.patch import winding_number
+from palpate.physics.interactions.sphere_contact import Contact
+from palpate.physics.interactions.surface_patch import winding_number
 from palpate.physics.stop import Stop
 
 

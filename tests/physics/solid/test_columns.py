@@ -10,7 +10,7 @@ from solids import PROBE, RADIUS, SIZE, pressed
 
 from palpate.errors import UsageError
 from palpate.physics.interactions import PointForce, SphereProbe
-from palpate.physics.interactions.patch import Patch
+from palpate.physics.interactions.surface_patch import Patch
 from palpate.physics.materials import NeoHookean
 from palpate.physics.shapes import Block, Dome
 from palpate.physics.solid import Body
@@ -80,7 +80,7 @@ def test_the_default_footprint_keeps_three_radii_from_the_rim():
 def test_any_surface_can_be_touched_from_outside(surface):
     block = Block(SIZE)
     points = SphereProbe(radius=RADIUS, touches=surface, depth=(0.0, 0.005)).design(block, 16, 0)
-    patch = Patch.of(block.rest(), surface)
+    patch = Patch.from_mesh(block.rest(), surface)
     distance = [patch.nearest(point)[2] for point in points]
     assert min(distance) >= RADIUS - 0.005 - 1e-9
     assert max(distance) <= RADIUS + 1e-9

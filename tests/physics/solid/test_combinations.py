@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from solids import gel
 
-from palpate.physics.interactions import Held, PrescribedDisplacement, SphereProbe
-from palpate.physics.interactions.curved import surface_of
+from palpate.physics.interactions import Fixed, PrescribedDisplacement, SphereProbe
+from palpate.physics.interactions.surface_patch import surface_of
 from palpate.physics.materials import (
     LinearElastic,
     LinearHardening,
@@ -88,7 +88,7 @@ def tube(_):
 
 def stretched(_):
     end = PrescribedDisplacement("side", "x", (0.0, 0.01), within=((SIZE[0] - 1e-4, -1, -1), (1, 1, 1)))
-    body = Body(Block(SIZE), gel(), held=Held(end, (0.003,)))
+    body = Body(Block(SIZE), gel(), held=Fixed(end, (0.003,)))
     return body.problem(SphereProbe(SMALL), element=0.01), np.array([0.021, 0.019, 0.02 + SMALL]), None
 
 

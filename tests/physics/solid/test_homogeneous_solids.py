@@ -10,8 +10,8 @@ from palpate.physics.deformed import nodal_strain
 from palpate.physics.materials import LinearElastic
 from palpate.physics.materials.tensors import gradient
 from palpate.physics.shapes import Block, Dome, LayeredBlock
-from palpate.physics.solid import Body, path
-from palpate.physics.solid.field import SolidField
+from palpate.physics.solid import Body, solid_path
+from palpate.physics.solid.solid_field import SolidField
 
 MATRIX = ((-0.1, 0.2, 0.05), (0.0, 0.15, -0.1), (0.1, 0.0, -0.2))
 VOLUME = float(np.prod(SIZE))
@@ -53,7 +53,7 @@ def test_middles_of_edges_are_found_on_every_mesh(shape):
 
     field = SolidField(shape.mesh(), shape.rest(), 2, ())
     field.show(field.interpolate(ngsolve.CF((ngsolve.x, ngsolve.y, ngsolve.z))))
-    middles = field.middles.show()
+    middles = field.mid_sides()
     size = np.ptp(field.rest.points)
     np.testing.assert_allclose(middles.displacement, middles.points, atol=1e-9 * size)
     ends = field.rest.points[middles.edges]
@@ -92,7 +92,7 @@ def test_a_long_step_is_cut_back(monkeypatch):
     squeezed = Stretched(((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, -1.0)))
     solver = Body(Block(SIZE, element=0.02), gel(0.4), fixed=()).problem(squeezed).open()
     # without the slope at the start the inside stays behind at first
-    monkeypatch.setattr(path, "_sloped", lambda model, start: start)
+    monkeypatch.setattr(solid_path, "_with_slope", lambda model, start: start)
     found = solver.solve(0.9)
     assert found.converged
     assert next(step.stop.name for step in found.log) != "CONVERGED"

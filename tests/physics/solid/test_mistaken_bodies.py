@@ -12,8 +12,8 @@ from palpate.physics import (
     Block,
     Body,
     BodyForce,
+    Fixed,
     GluedPad,
-    Held,
     LinearElastic,
     LinearHardening,
     ModelWarning,
@@ -25,8 +25,8 @@ from palpate.physics import (
     VoceHardening,
     roller,
 )
-from palpate.physics.interactions.estimate import pad_depth
-from palpate.physics.solid.times import durations
+from palpate.physics.interactions.pads import pad_depth
+from palpate.physics.solid.solid_solver import step_lengths
 from palpate.physics.vtu import write_vtu
 from palpate.sweeps import sweep
 from palpate.units import Range
@@ -46,15 +46,15 @@ PROBLEM = BODY.problem(PUSH)
         (lambda: Body(BLOCK, "liver"), 'named_material("liver")'),
         (lambda: Body("block", TISSUE), "Pass for example Block"),
         (lambda: Body(Block, TISSUE), "Pass for example Block"),
-        (lambda: Body(BLOCK, TISSUE, held=PUSH), "Wrap it: held=Held(interaction, values)"),
+        (lambda: Body(BLOCK, TISSUE, held=PUSH), "Wrap it: held=Fixed(interaction, values)"),
         (lambda: Body(BLOCK, TISSUE, order="2"), "Use order=2"),
         (lambda: Body(BLOCK, TISSUE, formulation="Mixed"), "Did you mean 'mixed'"),
         (lambda: Body(BLOCK, TISSUE, formulation=3), "'auto', 'displacement', 'mixed'"),
         (lambda: Body(BLOCK, TISSUE, gravity=(0, 0, -9.81)), "density in kg/m³"),
         (lambda: Body(BLOCK, TISSUE, gravity=9.81), "m/s²"),
         (lambda: Body(BLOCK, TISSUE, fixed="sides"), "Did you mean 'side'"),
-        (lambda: Held("top", 1.0), "no interaction"),
-        (lambda: Held(PUSH, "1 mm"), "In Python it is a number"),
+        (lambda: Fixed("top", 1.0), "no interaction"),
+        (lambda: Fixed(PUSH, "1 mm"), "In Python it is a number"),
         (lambda: SphereProbe(radius=0.01, depth=0.01), "Give (low, high)"),
         (lambda: BODY.problem(SphereProbe(radius=10)), "0.010 for 10 mm"),
         (lambda: BODY.problem(SphereProbe(radius=0.01, depth=(0, 5))), "0.010 for 10 mm"),
@@ -102,8 +102,8 @@ def test_times_of_a_march_are_refused_with_what_is_wrong(times, words):
 
 def test_times_that_turn_back_are_named():
     with pytest.raises(UsageError, match=r"The time 0\.5 s comes after the time 1 s"):
-        durations([1.0, 0.5], 2)
-    assert durations([0.5, 2.0], 2) == [0.5, 1.5]
+        step_lengths([1.0, 0.5], 2)
+    assert step_lengths([0.5, 2.0], 2) == [0.5, 1.5]
 
 
 def test_a_modulus_in_kilopascals_is_doubted():

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from solids import above, pressed
 
-from palpate.physics.interactions import Held, PrescribedDisplacement, SphereProbe
+from palpate.physics.interactions import Fixed, PrescribedDisplacement, SphereProbe
 from palpate.physics.materials import NeoHookean
 from palpate.physics.shapes import Block
-from palpate.physics.solid import Body, newton, path
+from palpate.physics.solid import Body, solid_newton, solid_path, solid_solver
 from palpate.physics.stop import Stop, Verdict
 
 TOP = PrescribedDisplacement("top", "z", (-0.03, 0.03))
@@ -27,7 +27,7 @@ def solver():
 @pytest.mark.parametrize("limit", [1, 3, 5])
 def test_a_path_without_iterations_left_never_converges_short_of_its_target(monkeypatch, solver, limit):
     solver.reset()
-    monkeypatch.setattr(path, "MOST_ITERATIONS", limit)
+    monkeypatch.setattr(solid_path, "MOST_ITERATIONS", limit)
     found = solver.solve(above(0.006))
     if found.converged:
         np.testing.assert_array_equal(found.log[-1].position, 1.0)
@@ -39,7 +39,7 @@ def test_a_path_without_iterations_left_never_converges_short_of_its_target(monk
 
 def test_nor_does_one_whose_steps_get_too_short(monkeypatch, solver):
     solver.reset()
-    monkeypatch.setattr(path, "SMALLEST_STEP", 0.9)
+    monkeypatch.setattr(solid_path, "SMALLEST_STEP", 0.9)
     found = solver.solve(above(0.006))
     assert found.log[-1].stop is Stop.CONVERGED
     assert found.stop is Stop.STEP_TOO_SMALL
@@ -49,11 +49,11 @@ def test_nor_does_one_whose_steps_get_too_short(monkeypatch, solver):
 def test_constant_loads_that_were_not_reached_are_refused(monkeypatch):
     from palpate.errors import SolverError
 
-    hold = Held(
+    hold = Fixed(
         PrescribedDisplacement("side", "x", (0, 0.01), within=((0.0599, -1, -1), (1, 1, 1))), (0.003,)
     )
-    monkeypatch.setattr(path, "MOST_ITERATIONS", 1)
-    monkeypatch.setattr(path, "_stretched", lambda position, step: position + step / 2)
+    monkeypatch.setattr(solid_path, "MOST_ITERATIONS", 1)
+    monkeypatch.setattr(solid_path, "_step_end", lambda position, step: position + step / 2)
     with pytest.raises(SolverError, match="constant loads"):
         pressed(held=hold).open()
 
@@ -62,14 +62,12 @@ def test_the_end_of_a_path_is_checked_anew(solver, monkeypatch):
     """Whatever a path says of itself, a state that is no equilibrium under the inputs asked is refused."""
     solver.reset()
     good = solver.solve(above(0.002))
-    from palpate.physics.solid import solver as module
-
-    stale = path.Known(above(0.004), good.state)
-    monkeypatch.setattr(module, "follow", lambda *_: path.Followed(stale, Verdict(), good.log))
+    stale = solid_path.PathPoint(above(0.004), good.state)
+    monkeypatch.setattr(solid_solver, "follow", lambda *_: solid_path.PathResult(stale, Verdict(), good.log))
     solver.reset()
     assert not solver.solve(above(0.004)).converged
-    short = path.Known(above(0.002), good.state)
-    monkeypatch.setattr(module, "follow", lambda *_: path.Followed(short, Verdict(), good.log))
+    short = solid_path.PathPoint(above(0.002), good.state)
+    monkeypatch.setattr(solid_solver, "follow", lambda *_: solid_path.PathResult(short, Verdict(), good.log))
     solver.reset()
     assert not solver.solve(above(0.004)).converged
 
@@ -126,7 +124,7 @@ def test_a_failed_solve_can_be_looked_at(solver):
 def test_the_last_equilibrium_of_a_failed_solve_is_one(monkeypatch, solver, tmp_path):
     """Asked for by itself, it is found again."""
     solver.reset()
-    monkeypatch.setattr(path, "MOST_ITERATIONS", 1)
+    monkeypatch.setattr(solid_path, "MOST_ITERATIONS", 1)
     failed = solver.solve(above(0.006))
     last = failed.last_good
     assert last.inputs[2] > above(0.006)[2]
@@ -142,7 +140,7 @@ def test_the_last_equilibrium_of_a_failed_solve_is_one(monkeypatch, solver, tmp_
 def test_what_is_held_is_checked_too(solver):
     """A held sphere that has been swallowed is as inadmissible as one that moves."""
     swallowed = SphereProbe(radius=0.01, stop=None, over=((0.01, 0.01), (0.02, 0.02)))
-    held = Held(swallowed, (0.015, 0.015, 0.034))
+    held = Fixed(swallowed, (0.015, 0.015, 0.034))
     model = pressed(held=held, probe=SphereProbe(radius=0.01)).open()._model
     inside = model._constants[0].values.copy()
     outside = above(-0.01)
@@ -176,7 +174,7 @@ class OneSaddle:
 
 def test_a_state_refused_for_growing_corrections_clears_the_blame_of_an_earlier_one():
     """The first, longest trial is out of reach; the shorter ones are not, and are refused for another reason."""
-    found = newton.equilibrate(OneSaddle(), np.array([1.0]), newton.Scale(0.0, 1.0), 1e-9, 5)
+    found = solid_newton.equilibrate(OneSaddle(), np.array([1.0]), solid_newton.Scale(0.0, 1.0), 1e-9, 5)
     assert found.stop is Stop.STEP_TOO_SMALL
     assert found.cuts > 0
     assert found.rejected is None
@@ -184,8 +182,8 @@ def test_a_state_refused_for_growing_corrections_clears_the_blame_of_an_earlier_
 
 def test_a_path_of_ever_shorter_steps_is_given_up(monkeypatch, solver):
     solver.reset()
-    monkeypatch.setattr(path, "MOST_STEPS", 1)
-    monkeypatch.setattr(path, "_pace", lambda _: 0.1)
+    monkeypatch.setattr(solid_path, "MOST_STEPS", 1)
+    monkeypatch.setattr(solid_path, "_pace", lambda _: 0.1)
     found = solver.solve(above(0.006))
     assert found.stop is Stop.ITERATION_LIMIT
     assert "1 steps along the path" in found.message

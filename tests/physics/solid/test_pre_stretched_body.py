@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from palpate.errors import UsageError
-from palpate.physics.interactions import Held, PrescribedDisplacement, SphereProbe, roller
+from palpate.physics.interactions import Fixed, PrescribedDisplacement, SphereProbe, roller
 from palpate.physics.materials import NeoHookean, PreStretched
 from palpate.physics.materials.tensors import gradient
 from palpate.physics.shapes import Block
 from palpate.physics.solid import Body, BodyFamily, Varied
-from palpate.physics.solid.symmetry import symmetry_of
+from palpate.physics.solid.body_symmetry import symmetry_of
 
 SIDE, HEIGHT, RADIUS = 0.06, 0.03, 0.01
 HELD = ("bottom", "side")
@@ -70,7 +70,7 @@ def drawn_out(stretch, thinning, planes):
     """A smaller and thicker block whose sides are moved until it has the size of the others, on a smooth ground."""
     side, height = SIDE / stretch, HEIGHT / thinning
     moved = tuple(
-        Held(PrescribedDisplacement(face, axis, (-SIDE, SIDE), sliding=True), (SIDE - side,))
+        Fixed(PrescribedDisplacement(face, axis, (-SIDE, SIDE), sliding=True), (SIDE - side,))
         for face, axis in (("x_max", "x"), ("y_max", "y"))
     )
     return Body(Block((side, side, height)), GEL, fixed=(), held=(*planes, *moved))

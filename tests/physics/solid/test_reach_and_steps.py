@@ -14,7 +14,7 @@ from palpate.physics.interactions import SphereProbe
 from palpate.physics.materials import LinearElastic, LinearHardening, Plastic
 from palpate.physics.shapes import Block
 from palpate.physics.solid import Body
-from palpate.physics.solid.system import sparse_solver
+from palpate.physics.solid.solid_system import sparse_solver
 from palpate.physics.stop import Stop
 
 METAL = Plastic(LinearElastic(1e6, 0.35), LinearHardening(1e4, 2e4))

@@ -20,7 +20,7 @@ from palpate.physics import (
     SphereProbe,
     Tube,
 )
-from palpate.physics.solid.symmetry import fundamental_part, symmetry_of
+from palpate.physics.solid.body_symmetry import fundamental_part, symmetry_of
 
 SOFT = NeoHookean(9e3, 0.45)
 CUBE = Block((0.1, 0.1, 0.1))

@@ -148,7 +148,7 @@ def test_measured_distance_beside_a_plate_is_that_to_its_rim():
 
 
 def test_depths_into_a_dome_are_those_of_its_finite_elements():
-    from palpate.physics.interactions.curved import surface_of
+    from palpate.physics.interactions.surface_patch import surface_of
     from palpate.physics.shapes.dome import Dome
 
     dome = Dome(radius=0.05, element=0.01)

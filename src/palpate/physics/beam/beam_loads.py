@@ -15,8 +15,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from palpate import checks
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_number
 from palpate.units import Range
 
 __all__ = [
@@ -79,17 +79,17 @@ class PointLoad:
     direction: tuple[float, float] = (0.0, -1.0)
 
     def __post_init__(self) -> None:
-        require_number(f"The lower end of the load {self.name!r}", self.low, "N")
-        require_number(f"The upper end of the load {self.name!r}", self.high, "N")
+        checks.finite(f"The lower end of the load {self.name!r}", self.low, "N")
+        checks.finite(f"The upper end of the load {self.name!r}", self.high, "N")
         if self.at is not None:
-            require_number(f"The position of the load {self.name!r}", self.at, "m")
+            checks.finite(f"The position of the load {self.name!r}", self.at, "m")
         Range(self.name, self.low, self.high, "N")  # raises for an empty range
         x, y = _pair(self.name, self.direction)
         length = math.hypot(x, y)
-        if not (math.isfinite(length) and length > 0):
+        if length == 0:
             raise UsageError(
                 f"The load {self.name!r} has no direction: {self.direction}.",
-                why="A direction needs a finite length above zero.",
+                why="A direction needs a length above zero.",
                 fix="Give (x, y), for example (0, -1) for downwards.",
             )
         # adding zero turns -0.0 into 0.0, so that equal directions are written alike
@@ -118,9 +118,8 @@ def _pair(name: str, direction: object) -> tuple[float, float]:
             why="It must be two numbers, along the beam and across it.",
             fix="Give (x, y), for example (0, -1) for downwards.",
         )
-    for part in parts:
-        require_number(f"The direction of the load {name!r}", part)
-    return float(parts[0]), float(parts[1])
+    x, y = (checks.finite(f"The direction of the load {name!r}", part) for part in parts)
+    return x, y
 
 
 def TipLoad(
@@ -247,8 +246,8 @@ class StepAndHold:
 
     def __post_init__(self) -> None:
         held = _ends(f"The range of the time for which {self.name!r} is held", self.held, "s")
-        require_number(f"The time in which {self.name!r} rises", self.rise, "s")
-        if held[0] < 0 or not 0 <= self.rise < float("inf"):
+        checks.finite(f"The time in which {self.name!r} rises", self.rise, "s")
+        if held[0] < 0 or self.rise < 0:
             raise UsageError(
                 f"The load {self.name!r} rises in {self.rise} s and is held for {held[0]} … {held[1]} s.",
                 why="Times are finite and not negative.",
@@ -263,7 +262,7 @@ class StepAndHold:
     def inputs(self) -> tuple[Range, ...]:
         """Names, ranges and units of the inputs."""
         for what, end in (("lower", self.low), ("upper", self.high)):
-            require_number(f"The {what} end of the load {self.name!r}", end, "N")
+            checks.finite(f"The {what} end of the load {self.name!r}", end, "N")
         return Range(self.name, self.low, self.high, "N"), Range(f"{self.name}_held", *self.held, "s")
 
     def knots(self, values: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
@@ -279,9 +278,8 @@ def _ends(what: str, pair: object, unit: str) -> tuple[float, float]:
             why=f"It must be two numbers in {unit}.",
             fix="Give for example (0.0, 10.0).",
         )
-    for end in pair:
-        require_number(what, end, unit)
-    return float(pair[0]), float(pair[1])
+    low, high = (checks.finite(what, end, unit) for end in pair)
+    return low, high
 
 
 def _checked(name: str, at: float | None, direction: tuple[float, float]) -> PointLoad:

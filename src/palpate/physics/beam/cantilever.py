@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
+from palpate import checks
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_number
 from palpate.physics.beam.beam_loads import Load, LoadAndUnload, StepAndHold, as_loads
 from palpate.physics.beam.beam_problem import BeamProblem
 from palpate.physics.beam.cross_section import CrossSection
@@ -74,16 +73,18 @@ class Cantilever:
     tolerance: float | None = None
 
     def __post_init__(self) -> None:
-        self._check_kinds()
-        _check(math.isfinite(self.length) and self.length > 0, "length", self.length, "positive, in m")
-        _check(self.elements >= 1, "elements", self.elements, "at least 1")
+        checks.positive("The cantilever's length", self.length, "m")
+        checks.fits("The cantilever's number of elements", self.elements, least=1)
+        checks.finite("The cantilever's order", self.order)
         _check(2 <= self.order <= 8, "order", self.order, "between 2 and 8: linear elements lock in shear")
-        _check(self.kinematics in {"large", "small"}, "kinematics", self.kinematics, "'large' or 'small'")
-        _check(self.strain_limit > 0, "strain_limit", self.strain_limit, "positive")
+        checks.one_of("The cantilever's kinematics", self.kinematics, get_args(Kinematics))
+        checks.positive("The cantilever's strain limit", self.strain_limit, infinite=True)
+        _check_section(self.section)
+        _check_material(self.material)
         self._check_memory()
         nodes = tuple(self.nodes) or tuple(float(x) for x in np.linspace(0, self.length, 6))
         for x in nodes:
-            _check(0 <= x <= self.length, "node of interest", x, f"on the beam, 0 … {self.length} m")
+            checks.fits("A node of interest", x, "m", least=0, most=self.length)
         object.__setattr__(self, "nodes", tuple(sorted({float(x) for x in nodes})))
 
     @property
@@ -133,20 +134,11 @@ class Cantilever:
         ]
         return np.concatenate([*pieces, fixed[-1:]])
 
-    def _check_kinds(self) -> None:
-        require_number("The cantilever's length", self.length, "m")
-        for name in ("elements", "order", "strain_limit"):
-            require_number(f"The cantilever's {name}", getattr(self, name))
-        for x in self.nodes:
-            require_number("A node of interest", x, "m")
-        _check_section(self.section)
-        _check_material(self.material)
-
     def _check_memory(self) -> None:
         for name, value in (("fibres", self.fibres), ("tolerance", self.tolerance)):
             if value is None:
                 continue
-            require_number(f"The cantilever's {name}", value)
+            checks.finite(f"The cantilever's {name}", value)
             useful = self.kind == "plastic" or (name == "tolerance" and self.kind == "viscous")
             _check(useful, name, value, f"left out: {self.material.name} has no use for it")
         if self.kind == "plastic":

@@ -15,8 +15,8 @@ from typing import Protocol
 
 import numpy as np
 
+from palpate import checks
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_number
 
 __all__ = ["Circle", "CrossSection", "FibreSection", "Rectangle", "Section"]
 
@@ -60,7 +60,7 @@ class Circle:
     radius: float
 
     def __post_init__(self) -> None:
-        _check_positive("radius", self.radius)
+        checks.positive("The section's radius", self.radius, "m")
 
     @property
     def area(self) -> float:
@@ -102,8 +102,8 @@ class Rectangle:
     height: float
 
     def __post_init__(self) -> None:
-        _check_positive("width", self.width)
-        _check_positive("height", self.height)
+        checks.positive("The section's width", self.width, "m")
+        checks.positive("The section's height", self.height, "m")
 
     @property
     def area(self) -> float:
@@ -152,9 +152,9 @@ class Section:
     height: float | None = None
 
     def __post_init__(self) -> None:
-        _check_positive("area", self.area)
-        _check_positive("second_moment", self.second_moment)
-        _check_positive("shear", self.shear)
+        checks.positive("The section's area", self.area, "m²")
+        checks.positive("The section's second_moment", self.second_moment, "m⁴")
+        checks.positive("The section's shear factor", self.shear)
         if self.shear > 1:
             raise UsageError(
                 f"A shear factor of {self.shear} is above 1.",
@@ -162,7 +162,7 @@ class Section:
                 fix="Take it from a table such as Cowper 1966; a solid circle has about 0.9.",
             )
         if self.height is not None:
-            _check_positive("height", self.height)
+            checks.positive("The section's height", self.height, "m")
 
     @property
     def half_height(self) -> float:
@@ -173,13 +173,3 @@ class Section:
     def shear_factor(self, poisson: float) -> float:
         """The factor that was given; Poisson's ratio has no say."""
         return self.shear
-
-
-def _check_positive(name: str, value: float) -> None:
-    require_number(f"The section's {name}", value, "SI units")
-    if not (math.isfinite(value) and value > 0):
-        raise UsageError(
-            f"The section's {name} is {value}.",
-            why="Areas, lengths and moments of a section are positive and finite.",
-            fix=f"Give a positive {name} in SI units.",
-        )

@@ -17,37 +17,35 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.physics.interactions.arguments import AXES, axis_of
-from palpate.physics.interactions.patch import Patch
-from palpate.physics.interactions.plane import cross
+from palpate.physics.interactions.interaction_checks import AXES, axis_of
+from palpate.physics.interactions.surface_patch import Patch, cross
 from palpate.physics.shapes.mesh import BodyMesh
 from palpate.physics.shapes.meshing import FineMesh
 from palpate.physics.shapes.naming import require_known
 
 __all__ = ["QUADRATURE", "Chart", "bump", "chart_at", "chart_of", "footprint_area", "require_on_surface"]
 
-QUADRATURE = (
-    6  # orders of quadrature beyond the elements' own: the bump is no polynomial on an element it cuts
-)
+# orders of quadrature beyond the elements' own: the bump is no polynomial on an element it cuts
+QUADRATURE = 6
 MARGIN = 1.2  # a fine mesh reaches that many radii from the footprint's centre
 PLAIN = 0.1  # a surface has a mean direction if its area vectors add up to more than this share of its area
 ON_SURFACE = 0.02  # share of the body's size by which a point may miss a curved surface's triangles
-COVERED = (
-    0.98  # share of a footprint that must lie on the surface; the rest is for the triangles of a round edge
-)
+# share of a footprint that must lie on the surface; the rest is for the triangles of a round edge
+COVERED = 0.98
 
 
 @dataclass(frozen=True)
 class Chart:
-    """A surface seen along an axis: two coordinates tell its points.
+    """A surface seen along an axis: two coordinates give its points.
 
     Attributes
     ----------
     surface : str
+        Name of the surface.
     axis : int
         Index of the axis that the surface faces.
     sign : float
-        1 or -1: whether it faces along or against the axis.
+        1 where it faces along the axis, -1 against it.
     """
 
     surface: str
@@ -66,18 +64,19 @@ class Chart:
         return AXES[self.across[0]], AXES[self.across[1]]
 
     def refinement(self, mesh: BodyMesh, lower: np.ndarray, upper: np.ndarray, element: float) -> FineMesh:
-        """Fine elements between two corners (2,) in m, all along the axis."""
+        """Return fine elements between two corners (2,) in m, all along the axis."""
         low, high = (corner.copy() for corner in mesh.corners)
         low[list(self.across)], high[list(self.across)] = lower, upper
         return FineMesh(self.surface, element, _triple(low), _triple(high))
 
 
 def bump(chart: Chart, centre: tuple[Any, Any], radius: float) -> Any:
-    """ρ as a coefficient function on the surface.
+    """Return ρ as a coefficient function on the surface.
 
     Parameters
     ----------
     chart : Chart
+        How the surface is seen.
     centre : tuple of two floats or ngsolve.Parameter
         p in m.
     radius : float
@@ -94,12 +93,12 @@ def bump(chart: Chart, centre: tuple[Any, Any], radius: float) -> Any:
 
 
 def footprint_area(radius: float) -> float:
-    """∫ρ dA = πa²/4 on a plane, in m²."""
+    """Return ∫ρ dA = πa²/4 on a plane, in m²."""
     return math.pi * radius**2 / 4
 
 
 def chart_of(mesh: BodyMesh, surface: str, facing: str | None = None) -> Chart:
-    """Chart of a whole surface, along `facing` or the axis nearest to its mean normal.
+    """Return the chart of a whole surface, along `facing` or the axis nearest to its mean normal.
 
     Raises
     ------
@@ -109,7 +108,7 @@ def chart_of(mesh: BodyMesh, surface: str, facing: str | None = None) -> Chart:
     require_known("surface", surface, mesh.surfaces)
     if facing is not None:
         return Chart(surface, *axis_of("The direction that the surface faces", facing))
-    mean = Patch.of(mesh, surface).facing
+    mean = Patch.from_mesh(mesh, surface).facing
     if np.linalg.norm(mean) < PLAIN:
         raise UsageError(
             f"The surface {surface!r} faces all ways.",
@@ -120,7 +119,7 @@ def chart_of(mesh: BodyMesh, surface: str, facing: str | None = None) -> Chart:
 
 
 def chart_at(mesh: BodyMesh, surface: str, point: tuple[float, float, float]) -> Chart:
-    """Chart along the axis that the surface faces at a point (3,) in m.
+    """Return the chart along the axis that the surface faces at a point (3,) in m.
 
     Raises
     ------
@@ -128,7 +127,7 @@ def chart_at(mesh: BodyMesh, surface: str, point: tuple[float, float, float]) ->
         If there is no such surface, or the point is not on it.
     """
     require_known("surface", surface, mesh.surfaces)
-    nearest, normal, distance = Patch.of(mesh, surface).nearest(np.asarray(point))
+    nearest, normal, distance = Patch.from_mesh(mesh, surface).nearest(np.asarray(point))
     size = float(np.linalg.norm(mesh.corners[1] - mesh.corners[0]))
     if abs(distance) > ON_SURFACE * size:
         raise UsageError(
@@ -151,10 +150,14 @@ def require_on_surface(
 
     Parameters
     ----------
+    mesh : BodyMesh
+        The body at rest.
+    chart : Chart
+        How the surface is seen.
     lower, upper : (2,) array
         Corners in m of the rectangle in which the centre of the footprint may be.
     radius : float
-        Of the footprint in m.
+        Radius of the footprint in m.
 
     Raises
     ------
@@ -176,7 +179,7 @@ def require_on_surface(
 
 
 def _disc(radius: float) -> tuple[np.ndarray, np.ndarray]:
-    """Points (400, 2) spread evenly over a disc, and their share of the bump, adding up to 1."""
+    """Return points (400, 2) spread evenly over a disc, and their share of the bump, adding up to 1."""
     i = np.arange(400) + 0.5
     r, angle = np.sqrt(i / len(i)), math.pi * (1 + 5**0.5) * i  # Vogel's (1979) spiral
     weight = (1 - r**2) ** 3
@@ -184,12 +187,12 @@ def _disc(radius: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _inside(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Whether each point (n, 2) lies in one of the triangles (t, 3, 2), shape (n,)."""
+    """Return 1 for each point (n, 2) that lies in one of the triangles (t, 3, 2), else 0, shape (n,)."""
     a, b, c = np.moveaxis(triangles, 1, 0)
     sides = np.stack([cross(q - p, points[:, None] - p) for p, q in ((a, b), (b, c), (c, a))])
     slack = 1e-9 * np.abs(cross(b - a, c - a))
-    found = (sides >= -slack).all(axis=0) | (sides <= slack).all(axis=0)
-    return np.asarray(found.any(axis=1), dtype=float)
+    inside = (sides >= -slack).all(axis=0) | (sides <= slack).all(axis=0)
+    return np.asarray(inside.any(axis=1), dtype=float)
 
 
 def _words(point: Any) -> str:

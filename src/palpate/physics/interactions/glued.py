@@ -1,4 +1,4 @@
-"""A pad that is glued to a surface: what grasps, or holds by suction."""
+"""A pad that is glued to a surface, as of a hand that grasps or holds by suction."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate import checks
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_positive
-from palpate.physics.interactions.arguments import AXES, Interval, interval, tag
 from palpate.physics.interactions.footprint import (
     MARGIN,
     QUADRATURE,
@@ -21,6 +20,7 @@ from palpate.physics.interactions.footprint import (
     require_on_surface,
 )
 from palpate.physics.interactions.interaction import Attached, Energy
+from palpate.physics.interactions.interaction_checks import AXES, Interval, interval, tag
 from palpate.physics.shapes.naming import require_known, require_triple
 from palpate.physics.words import millimetres, number
 from palpate.units import Range
@@ -80,10 +80,10 @@ class GluedPad:
     name: str = ""
 
     def __post_init__(self) -> None:
-        require_positive("The stiffness of a glued pad", self.pad, "N/m³")
+        checks.positive("The stiffness of a glued pad", self.pad, "N/m³")
         for what, size in (("radius of a glued pad", self.radius), ("element under a pad", self.element)):
             if size is not None:
-                require_positive(f"The {what}", size, "m")
+                checks.positive(f"The {what}", size, "m")
         self._require_place()
         if self.at is not None:
             object.__setattr__(self, "at", require_triple("The point of a glued pad", self.at))
@@ -103,38 +103,38 @@ class GluedPad:
         )
 
     def ranges(self, geometry: Any) -> tuple[Range, ...]:
-        """Inputs: the components of d that vary, then the place's two coordinates if it varies.
+        """Return the inputs: the components of d that vary, then the place's two coordinates if it varies.
 
         Raises
         ------
         UsageError
             If the body has no such surface, the point is not on it, or the pad hangs over its edge.
         """
-        chart = _placed(self, geometry.rest())[0]
-        found = []
+        chart = _placement(self, geometry.rest())[0]
+        ranges = []
         for axis, ends in zip(AXES, self.displacement, strict=True):
             if isinstance(ends, tuple):
-                found.append(Range(tag(self.name, f"d_{axis}"), *ends, "m"))
+                ranges.append(Range(tag(self.name, f"d_{axis}"), *ends, "m"))
         if self.over is not None and chart is not None:
             for axis, low, high in zip(chart.names, *self.over, strict=True):
-                found.append(Range(tag(self.name, f"p_{axis}"), low, high, "m"))
-        return tuple(found)
+                ranges.append(Range(tag(self.name, f"p_{axis}"), low, high, "m"))
+        return tuple(ranges)
 
     def __str__(self) -> str:
         size = f" of radius {millimetres(self.radius)}" if self.radius is not None else ""
         return f"pad{size} glued to {self.touches!r}, {number(self.pad)} N/m³"
 
     def describe(self) -> dict[str, Any]:
-        """Its fields, with ``"type": "GluedPad"``."""
+        """Return its fields, with ``"type": "GluedPad"``."""
         return {"type": "GluedPad", **asdict(self)}
 
     def keeps(self, matrix: np.ndarray, about: np.ndarray, geometry: Any) -> bool:
-        """Whether an isometry M about a point (m) of the body leaves the pads' energy and places the same.
+        """Return whether an isometry M about a point (m) of the body leaves the pads' energy and places the same.
 
         The footprint is seen along one axis, so that must stay; a fixed place must stay where it is. A place that
         is an input, and the displacement, turn with M.
         """
-        chart = _placed(self, geometry.rest())[0]
+        chart = _placement(self, geometry.rest())[0]
         if chart is None:
             return True
         at = about if self.at is None else np.asarray(self.at)
@@ -142,8 +142,8 @@ class GluedPad:
         return bool(np.isclose(along, 1.0) and np.allclose(about + matrix @ (at - about), at))
 
     def refinements(self, geometry: Any) -> tuple[FineMesh, ...]:
-        """Fine elements wherever the footprint may be."""
-        chart, lower, upper = _placed(self, geometry.rest())
+        """Return fine elements wherever the footprint may be."""
+        chart, lower, upper = _placement(self, geometry.rest())
         if chart is None or self.radius is None:
             return ()
         margin = MARGIN * self.radius
@@ -151,10 +151,10 @@ class GluedPad:
         return (chart.refinement(geometry.rest(), lower - margin, upper + margin, element),)
 
     def attach(self, field: Any) -> Attached:
-        """The pad's energy on an opened body."""
+        """Return the pad's energy on an opened body."""
         import ngsolve as ng
 
-        chart, centre, _ = _placed(self, field.rest)
+        chart, centre, _ = _placement(self, field.rest)
         place = [ng.Parameter(0.0) for _ in range(2)] if self.over is not None else []
         weight: Any = 1.0
         if chart is not None and self.radius is not None:
@@ -176,8 +176,8 @@ class GluedPad:
         return Attached(parameters=inputs, energies=(energy,), approach=approach)
 
 
-def _placed(pad: GluedPad, mesh: BodyMesh) -> tuple[Chart | None, np.ndarray, np.ndarray]:
-    """Chart of the touched surface, and the corners (2,) in m between which the pad's place is.
+def _placement(pad: GluedPad, mesh: BodyMesh) -> tuple[Chart | None, np.ndarray, np.ndarray]:
+    """Return the chart of the touched surface, and the corners (2,) in m between which the pad's place is.
 
     No chart, and corners that mean nothing, for a pad that covers all of the surface.
     """
@@ -221,7 +221,7 @@ def _three(value: Any) -> tuple[Interval, Interval, Interval]:
 
 
 def _from_rest(what: str, ends: Interval) -> Interval:
-    """A pad is glued to a body at rest, so a component that is no input is zero."""
+    """Return a component of the displacement; one that is no input is zero, as the pad is glued at rest."""
     if isinstance(ends, tuple) or ends == 0.0:
         return ends
     raise UsageError(

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from palpate import checks
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_number
 from palpate.physics.stop import Verdict
 from palpate.physics.words import number
 
@@ -27,19 +27,20 @@ if TYPE_CHECKING:
     from palpate.physics.shapes.meshing import FineMesh
     from palpate.units import Range
 
-__all__ = ["Attached", "Energy", "Field", "Held", "Interaction", "Planned"]
+__all__ = ["Attached", "Energy", "Field", "Fixed", "Interaction", "Planned"]
 
 
 class Field(Protocol):
-    """The opened displacement field of a body: what an interaction attaches to.
+    """The opened displacement field of a body, to which an interaction attaches.
 
     Attributes
     ----------
     mesh : ngsolve.Mesh
+        The finite-element mesh.
     rest : BodyMesh
         The same mesh as plain arrays, its nodes the mesh's vertices.
     space : ngsolve.FESpace
-        Of all unknowns z, displacement first; its second component, where there is one, is the pressure.
+        Space of all unknowns z, displacement first; its second component, where there is one, is the pressure.
     trial : ngsolve.CoefficientFunction
         The displacement u (3,) as the unknown, for use in a density.
     displacement : ngsolve.GridFunction
@@ -60,19 +61,19 @@ class Field(Protocol):
         """Number of all unknowns."""
 
     def surface(self, name: str) -> Any:
-        """NGSolve region of a named surface; `UsageError` if there is none."""
+        """Return the NGSolve region of a named surface; `UsageError` if there is none."""
 
     def surface_dofs(self, name: str) -> np.ndarray:
-        """Which unknowns are displacements on a named surface, bool of shape (dof,)."""
+        """Return a mask of the displacements on a named surface, bool of shape (dof,)."""
 
     def at_nodes(self, field: Any = None) -> np.ndarray:
-        """Values (node, 3) in m of `displacement`, or of another such grid function, at the mesh's vertices."""
+        """Return values (node, 3) in m of `displacement`, or of another such grid function, at the mesh's vertices."""
 
     def interpolate(self, displacement: Any) -> np.ndarray:
-        """Unknowns (dof,) of a displacement given as a coefficient function (3,), on the whole body."""
+        """Return unknowns (dof,) of a displacement given as a coefficient function (3,), on the whole body."""
 
     def load(self, integrand: Callable[[Any], Any]) -> np.ndarray:
-        """Load vector l (dof,) of a linear form, from a test displacement v to its integral: ``t * v * ds(...)``."""
+        """Return the load vector l (dof,) of a linear form, given as a function of the test displacement v."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,19 +109,20 @@ class Attached:
     parameters : tuple of ngsolve.Parameter
         One per input, read by the densities; the solver sets them.
     energies : tuple of Energy
+        Its terms of the energy.
     loads : (n, dof) array, optional
         Vectors lᵢ: the energy is less by qᵢ lᵢ·z.
     lifts : (n, dof) array, optional
-        What one unit of each input adds to the constrained unknowns.
-    held : (dof,) bool array, optional
-        Which unknowns it constrains, to their base state plus lifts.
+        Rows Lᵢ that one unit of each input adds to the constrained unknowns.
+    constrained : (dof,) bool array, optional
+        True for the unknowns that it constrains, to their base state plus lifts.
     inspect : callable
         Verdict on the state in `Field.displacement` under inputs (n,), independent of how it was found.
     approach : callable
-        From inputs (n,) to inputs (n,) at which the interaction leaves the body alone and from which a straight
+        Leads from inputs (n,) to inputs (n,) at which the interaction leaves the body alone and from which a straight
         line leads to the former: the path along which the equilibrium is followed. None where there is none.
     distance : callable, optional
-        From two inputs (n,) to a length that says how dear it is to go from one to the other, on the scale of
+        Length that says how dear it is to go from one vector of inputs (n,) to another, on the scale of
         going straight from `approach`; by default the Euclidean length.
     first_step : float
         Longest first step along a path, as such a length; later ones adapt.
@@ -130,7 +132,7 @@ class Attached:
     energies: tuple[Energy, ...] = ()
     loads: np.ndarray | None = None
     lifts: np.ndarray | None = None
-    held: np.ndarray | None = None
+    constrained: np.ndarray | None = None
     inspect: Callable[[np.ndarray], Verdict] = _nothing
     approach: Callable[[np.ndarray], np.ndarray | None] = np.zeros_like
     distance: Callable[[np.ndarray, np.ndarray], float] | None = None
@@ -139,19 +141,19 @@ class Attached:
 
 @runtime_checkable
 class Interaction(Protocol):
-    """What acts on a body, with n inputs: a frozen value that can be hashed and pickled."""
+    """An action on a body, with n inputs: a frozen value that can be hashed and pickled."""
 
     def ranges(self, geometry: Any) -> tuple[Range, ...]:
-        """Name, range and unit of each input on a body of this geometry."""
+        """Return name, range and unit of each input on a body of this geometry."""
 
     def describe(self) -> dict[str, Any]:
-        """Everything that decides what it does, as plain data for a JSON file, with a ``"type"``."""
+        """Return everything that decides its energy, as plain data for a JSON file, with a ``"type"``."""
 
     def refinements(self, geometry: Any) -> tuple[FineMesh, ...]:
-        """Where it needs a fine mesh."""
+        """Return the places where it needs a fine mesh."""
 
     def attach(self, field: Field) -> Attached:
-        """Its terms on an opened body.
+        """Return its terms on an opened body.
 
         Raises
         ------
@@ -165,21 +167,22 @@ class Planned(Protocol):
     """An interaction that knows in which order its inputs are solved best."""
 
     def design(self, geometry: Any, samples: int, seed: int) -> np.ndarray:
-        """Inputs (samples, n) in an order of good chains."""
+        """Return inputs (samples, n) in an order of good chains."""
 
     def chains(self, geometry: Any, points: np.ndarray) -> list[np.ndarray]:
-        """Rows of `points` (N, n) to be solved one after the other, chain by chain."""
+        """Return rows of `points` (N, n) to be solved one after the other, chain by chain."""
 
 
 @dataclass(frozen=True)
-class Held:
-    """An interaction that is always there, such as a pre-stress.
+class Fixed:
+    """An interaction with fixed inputs, which is always there, such as a pre-stress or a support.
 
     Attributes
     ----------
     interaction : Interaction
+        The interaction that acts.
     values : tuple of float
-        Its inputs; a single number will do for one.
+        Its inputs in SI units; a single number will do for one.
 
     Raises
     ------
@@ -193,13 +196,13 @@ class Held:
     def __post_init__(self) -> None:
         if not isinstance(self.interaction, Interaction):
             raise UsageError(
-                f"{self.interaction!r} can't be held: it is no interaction.",
+                f"{self.interaction!r} can't be fixed: it is no interaction.",
                 why="An interaction has ranges, describe, refinements and attach.",
-                fix='For example Held(PrescribedDisplacement("top", "z", (-0.01, 0.0)), -0.004).',
+                fix='For example Fixed(PrescribedDisplacement("top", "z", (-0.01, 0.0)), -0.004).',
             )
         values = tuple(self.values) if isinstance(self.values, Iterable) else (self.values,)
         for value in values:
-            require_number("A held input", value)
+            checks.finite("A fixed input", value)
         object.__setattr__(self, "values", values)
 
     def __str__(self) -> str:

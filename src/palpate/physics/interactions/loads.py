@@ -1,7 +1,16 @@
-"""Dead loads: forces whose size and direction do not follow the body as it deforms.
+"""Loads on bodies: dead loads, and a pressure that follows its surface.
 
-With the load vector l of one unit the energy is Π = W - q l·u. The response is -∂U/∂q = l·u: the displacement
-(a mean of it, or its integral) that the load does work on.
+Size and direction of a dead load do not follow the body as it deforms. With the load vector l of one unit the energy is
+Π = W - q l·u. The response is -∂U/∂q = l·u: the displacement (a mean of it, or its integral) that the load does work
+on.
+
+A pressure q exerts the force -q n da on the deformed surface. If the rim of the surface does not move, or there is
+none, that force is the derivative of the energy q V with
+
+    V(u) = ⅓ ∫ (X + u) · cof(F) N dA,
+
+the volume under the deformed surface (Nanson's formula for n da; Bonet & Wood 2008, section 8.5). Where a rim
+moves freely, the work of a pressure depends on the path, and no energy exists.
 """
 
 from __future__ import annotations
@@ -11,8 +20,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.physics.arguments import require_positive
-from palpate.physics.interactions.arguments import along, direction_of, range_of
+from palpate import checks
+from palpate.errors import UsageError
 from palpate.physics.interactions.footprint import (
     MARGIN,
     QUADRATURE,
@@ -21,7 +30,8 @@ from palpate.physics.interactions.footprint import (
     chart_at,
     require_on_surface,
 )
-from palpate.physics.interactions.interaction import Attached
+from palpate.physics.interactions.interaction import Attached, Energy
+from palpate.physics.interactions.interaction_checks import along, direction_of, range_of
 from palpate.physics.shapes.naming import require_known, require_triple
 from palpate.physics.words import number
 from palpate.units import Range
@@ -30,14 +40,20 @@ if TYPE_CHECKING:
     from palpate.physics.shapes.mesh import BodyMesh
     from palpate.physics.shapes.meshing import FineMesh
 
-__all__ = ["BodyForce", "PointForce", "SurfaceTraction"]
+__all__ = [
+    "BodyForce",
+    "PointForce",
+    "Pressure",
+    "SurfaceTraction",
+    "volume_density",
+]
 
 Ends = tuple[float, float]
 Point = tuple[float, float, float]
 
 
 def dead_load(load: np.ndarray) -> Attached:
-    """One input whose load vector is (dof,)."""
+    """Return one input whose load vector is (dof,)."""
     import ngsolve as ng
 
     return Attached(parameters=(ng.Parameter(0.0),), loads=load[None, :])
@@ -62,6 +78,7 @@ class PointForce:
     direction : direction
         An axis such as ``"-z"``, or three numbers, taken to length 1.
     surface : str
+        Name of the surface.
     element : float, optional
         Size in m of the elements under the footprint; by default a third of the radius.
     name : str
@@ -82,16 +99,16 @@ class PointForce:
     name: str = "F"
 
     def __post_init__(self) -> None:
-        require_positive("The radius of a point force", self.radius, "m")
+        checks.positive("The radius of a point force", self.radius, "m")
         if self.element is not None:
-            require_positive("The element under a point force", self.element, "m")
+            checks.positive("The element under a point force", self.element, "m")
         object.__setattr__(self, "at", require_triple("The point of a force", self.at))
         object.__setattr__(self, "force", range_of("A point force", self.force, "N"))
         direction = direction_of("The direction of a point force", self.direction)
         object.__setattr__(self, "direction", direction)
 
     def ranges(self, geometry: Any) -> tuple[Range, ...]:
-        """The size of the force, in N.
+        """Return the size of the force, in N.
 
         Raises
         ------
@@ -106,11 +123,11 @@ class PointForce:
         return f"force along {along(self.direction)} at ({at}) mm of {self.surface!r}"
 
     def describe(self) -> dict[str, Any]:
-        """Everything that decides what it does, as plain data for a JSON file."""
+        """Return everything that decides its energy, as plain data for a JSON file."""
         return {"type": "PointForce", **asdict(self)}
 
     def refinements(self, geometry: Any) -> tuple[FineMesh, ...]:
-        """Fine elements under the footprint."""
+        """Return fine elements under the footprint."""
         mesh = geometry.rest()
         chart = self._chart(mesh)
         centre, margin = np.asarray(self.at)[list(chart.across)], MARGIN * self.radius
@@ -118,7 +135,7 @@ class PointForce:
         return (chart.refinement(mesh, centre - margin, centre + margin, element),)
 
     def attach(self, field: Any) -> Attached:
-        """Its load on an opened body."""
+        """Return its load on an opened body."""
         import ngsolve as ng
 
         chart = self._chart(field.rest)
@@ -146,6 +163,7 @@ class SurfaceTraction:
     Attributes
     ----------
     surface : str
+        Name of the surface.
     direction : direction or "normal"
         An axis, three numbers, or the outward normal of the surface at rest.
     traction : range
@@ -171,7 +189,7 @@ class SurfaceTraction:
             object.__setattr__(self, "direction", direction)
 
     def ranges(self, geometry: Any) -> tuple[Range, ...]:
-        """The size of the traction, in Pa; `UsageError` if the body has no such surface."""
+        """Return the size of the traction, in Pa; `UsageError` if the body has no such surface."""
         require_known("surface", self.surface, geometry.surfaces)
         return (Range(self.name, *self.traction, "Pa"),)
 
@@ -179,15 +197,15 @@ class SurfaceTraction:
         return f"traction on {self.surface!r} along {along(self.direction)}"
 
     def describe(self) -> dict[str, Any]:
-        """Everything that decides what it does, as plain data for a JSON file."""
+        """Return everything that decides its energy, as plain data for a JSON file."""
         return {"type": "SurfaceTraction", **asdict(self)}
 
     def refinements(self, geometry: Any) -> tuple[FineMesh, ...]:
-        """None."""
+        """Return none: it needs no fine mesh."""
         return ()
 
     def attach(self, field: Any) -> Attached:
-        """Its load on an opened body."""
+        """Return its load on an opened body."""
         import ngsolve as ng
 
         direction = ng.specialcf.normal(3) if self.direction == "normal" else ng.CF(self.direction)
@@ -230,7 +248,7 @@ class BodyForce:
         object.__setattr__(self, "direction", direction)
 
     def ranges(self, geometry: Any) -> tuple[Range, ...]:
-        """The size of the force, in N/m³; `UsageError` if the body has no such region."""
+        """Return the size of the force, in N/m³; `UsageError` if the body has no such region."""
         if self.region is not None:
             require_known("region", self.region, geometry.regions)
         return (Range(self.name, *self.force, "N/m³"),)
@@ -239,16 +257,134 @@ class BodyForce:
         return f"body force along {along(self.direction)}{f' on {self.region!r}' if self.region else ''}"
 
     def describe(self) -> dict[str, Any]:
-        """Everything that decides what it does, as plain data for a JSON file."""
+        """Return everything that decides its energy, as plain data for a JSON file."""
         return {"type": "BodyForce", **asdict(self)}
 
     def refinements(self, geometry: Any) -> tuple[FineMesh, ...]:
-        """None."""
+        """Return none: it needs no fine mesh."""
         return ()
 
     def attach(self, field: Any) -> Attached:
-        """Its load on an opened body."""
+        """Return its load on an opened body."""
         import ngsolve as ng
 
         part = ng.dx if self.region is None else ng.dx(definedon=field.mesh.Materials(self.region))
         return dead_load(field.load(lambda v: ng.InnerProduct(ng.CF(self.direction), v) * part))
+
+
+POTENTIAL = 1e-8  # largest difference, relative to the force, that round-off may leave
+
+
+def volume_density(displacement: Any, origin: Point) -> Any:
+    """Return ⅓ (X + u - origin) · cof(F) N on a surface, as a coefficient function in m.
+
+    Parameters
+    ----------
+    displacement : ngsolve.CoefficientFunction
+        u (3,), a trial function or a grid function.
+    origin : tuple of three floats
+        In m.
+    """
+    import ngsolve as ng
+
+    # the tangential part of F decides cof(F) N
+    gradient = ng.Id(3) + ng.Grad(displacement).Trace()
+    place = ng.CF((ng.x, ng.y, ng.z)) + displacement - ng.CF(origin)
+    return ng.InnerProduct(ng.Cof(gradient) * ng.specialcf.normal(3), place) / 3
+
+
+@dataclass(frozen=True)
+class Pressure:
+    """A pressure that pushes on a surface and follows it as it deforms.
+
+    The response is the volume in m³ by which the pressure pushes the surface in, -∂U/∂q = V(base) - V(u).
+
+    Attributes
+    ----------
+    surface : str
+        Name of the surface.
+    pressure : range
+        (low, high) in Pa; a negative pressure sucks.
+    symmetry : tuple of three floats, optional
+        A point of all planes of symmetry in which the rim slides, in m: a statement of the user's, who also has
+        to see to it that the rim stays in these planes. Without it the rim must be fixed.
+    name : str
+        Name of the input.
+
+    Raises
+    ------
+    UsageError
+        For an empty range.
+    """
+
+    surface: str
+    pressure: tuple[float, float]
+    symmetry: Point | None = None
+    name: str = "p"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pressure", range_of("A pressure", self.pressure, "Pa"))
+        if self.symmetry is not None:
+            symmetry = require_triple("The point of a pressure's planes of symmetry", self.symmetry)
+            object.__setattr__(self, "symmetry", symmetry)
+
+    def ranges(self, geometry: Any) -> tuple[Range, ...]:
+        """Return the pressure, in Pa; `UsageError` if the body has no such surface."""
+        require_known("surface", self.surface, geometry.surfaces)
+        return (Range(self.name, *self.pressure, "Pa"),)
+
+    def __str__(self) -> str:
+        return f"pressure on {self.surface!r}"
+
+    def describe(self) -> dict[str, Any]:
+        """Return everything that decides its energy, as plain data for a JSON file."""
+        return {"type": "Pressure", **asdict(self)}
+
+    def refinements(self, geometry: Any) -> tuple[FineMesh, ...]:
+        """Return none: it needs no fine mesh."""
+        return ()
+
+    def attach(self, field: Any) -> Attached:
+        """Return its energy on an opened body.
+
+        Raises
+        ------
+        UsageError
+            If the rim of the surface is neither fixed nor said to lie in planes of symmetry.
+        """
+        import ngsolve as ng
+
+        if self.symmetry is None:
+            self._require_potential(field)
+        origin = self.symmetry or (0.0, 0.0, 0.0)
+        q = ng.Parameter(0.0)
+        start = ng.GridFunction(field.base.space)
+        start.vec.data = field.base.vec
+        volume = volume_density(field.trial, origin) - volume_density(start, origin)
+        surface = ng.ds(definedon=field.surface(self.surface))
+        return Attached(parameters=(q,), energies=(Energy(q * volume, surface),))
+
+    def _require_potential(self, field: Any) -> None:
+        """Compare the volume's derivative with the force n da, at a displacement that is zero where fixed."""
+        import ngsolve as ng
+
+        space = field.base.space
+        image, free = ng.GridFunction(space), np.fromiter(space.FreeDofs(), dtype=bool, count=space.ndof)
+        size = float(np.linalg.norm(field.rest.corners[1] - field.rest.corners[0]))
+        image.vec.FV().NumPy()[:] = 0.01 * size * np.random.default_rng(0).standard_normal(space.ndof) * free
+        surface = ng.ds(definedon=field.surface(self.surface))
+        form, found = ng.BilinearForm(space), image.vec.CreateVector()
+        form += ng.Variation(volume_density(space.TrialFunction(), (0.0, 0.0, 0.0)) * surface)
+        form.Apply(image.vec, found)
+        normal = ng.Cof(ng.Id(3) + ng.Grad(image).Trace()) * ng.specialcf.normal(3)
+        force = ng.LinearForm(space)
+        force += ng.InnerProduct(normal, space.TestFunction()) * surface
+        force.Assemble()
+        wanted = force.vec.FV().NumPy()
+        if np.abs((found.FV().NumPy() - wanted)[free]).max() > POTENTIAL * np.abs(wanted).max():
+            raise UsageError(
+                f"A pressure that follows the surface {self.surface!r} has no potential.",
+                why="The rim of this surface can move, so the work of the pressure would depend on the path.",
+                fix="Fix the surfaces around it; or use SurfaceTraction(..., 'normal', ...), which does not follow; or "
+                "give symmetry=(x, y, z) if the rim slides in planes of symmetry through that point.",
+            )

@@ -1,4 +1,7 @@
-"""A part of a surface that is moved by given amounts."""
+"""Displacements that are prescribed on a surface, and supports on which it slides.
+
+The prescribed unknowns are u = u_base + Σ qᵢ eᵢ, so the response -∂U/∂qᵢ is a sum of reactions.
+"""
 
 from __future__ import annotations
 
@@ -8,17 +11,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate import checks
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_positive
-from palpate.physics.interactions.arguments import AXES, along, direction_of, interval, tag
-from palpate.physics.interactions.interaction import Attached
+from palpate.physics.interactions.interaction import Attached, Fixed
+from palpate.physics.interactions.interaction_checks import AXES, along, direction_of, interval, tag
 from palpate.physics.shapes.naming import require_known, require_triple
 from palpate.units import Range
 
 if TYPE_CHECKING:
     from palpate.physics.shapes.meshing import FineMesh
 
-__all__ = ["PrescribedDisplacement"]
+__all__ = [
+    "PrescribedDisplacement",
+    "roller",
+]
 
 Point = tuple[float, float, float]
 Ends = tuple[float, float]
@@ -34,13 +40,13 @@ class PrescribedDisplacement:
     Attributes
     ----------
     surface : str
+        Name of the surface.
     directions : direction, or tuple of directions
         The eᵢ, each an axis such as ``"-z"`` or three numbers, taken to length 1.
     displacement : range, or tuple of ranges
         (low, high) in m of each qᵢ.
     sliding : bool
-        Whether displacements across all eᵢ, which must then be axes, are left free; they are held at zero
-        otherwise.
+        True leaves displacements across all eᵢ, which must then be axes, free; False keeps them at zero.
     within : pair of points, optional
         Corners in m of an upright box: only elements of the surface that lie in it are moved.
     element : float, optional
@@ -78,15 +84,15 @@ class PrescribedDisplacement:
             raise UsageError(
                 f"The surface {self.surface!r} can't slide across {directions}.",
                 why="Free sliding is a matter of single displacement components, so directions must be axes.",
-                fix="Give axes such as 'z', or sliding=False to hold the displacement across at zero.",
+                fix="Give axes such as 'z', or sliding=False to keep the displacement across at zero.",
             )
         if self.within is not None:
             object.__setattr__(self, "within", _box(self.within))
         if self.element is not None:
-            require_positive("The element on a moved surface", self.element, "m")
+            checks.positive("The element on a moved surface", self.element, "m")
 
     def ranges(self, geometry: Any) -> tuple[Range, ...]:
-        """One input for each direction, in m.
+        """Return one input for each direction, in m.
 
         Raises
         ------
@@ -104,11 +110,11 @@ class PrescribedDisplacement:
         return f"{self.surface!r}{part} moved along {axes}{', free across' if self.sliding else ''}"
 
     def describe(self) -> dict[str, Any]:
-        """Everything that decides what it does, as plain data for a JSON file."""
+        """Return everything that decides its energy, as plain data for a JSON file."""
         return {"type": "PrescribedDisplacement", **asdict(self)}
 
     def refinements(self, geometry: Any) -> tuple[FineMesh, ...]:
-        """Fine elements on the moved part, if their size is given."""
+        """Return fine elements on the moved part, if their size is given."""
         from palpate.physics.shapes.meshing import FineMesh
 
         if self.element is None:
@@ -118,7 +124,7 @@ class PrescribedDisplacement:
         return (FineMesh(self.surface, self.element, lower, upper),)
 
     def attach(self, field: Any) -> Attached:
-        """Its constraints on an opened body.
+        """Return its constraints on an opened body.
 
         Raises
         ------
@@ -127,13 +133,13 @@ class PrescribedDisplacement:
         """
         import ngsolve as ng
 
-        held = self._held(field)
-        lifts = np.array([field.interpolate(ng.CF(e)) * held for e in self.directions])
+        constrained = self._constrained(field)
+        lifts = np.array([field.interpolate(ng.CF(e)) * constrained for e in self.directions])
         inputs = tuple(ng.Parameter(0.0) for _ in self.directions)
-        return Attached(parameters=inputs, lifts=lifts, held=held)
+        return Attached(parameters=inputs, lifts=lifts, constrained=constrained)
 
-    def _held(self, field: Any) -> np.ndarray:
-        """Which unknowns are constrained, bool of shape (dof,)."""
+    def _constrained(self, field: Any) -> np.ndarray:
+        """Return a mask of the constrained unknowns, bool of shape (dof,)."""
         found = field.surface_dofs(self.surface) if self.within is None else self._in_box(field)
         if self.sliding:
             space, across = field.displacement.space, np.zeros(field.size, dtype=bool)
@@ -211,3 +217,33 @@ def _box(value: Any) -> tuple[Point, Point]:
             fix="Swap the coordinates that are in the wrong order.",
         )
     return lower, upper
+
+
+def roller(surface: str, axis: str, within: tuple[Point, Point] | None = None) -> Fixed:
+    """Return a support that keeps one component of the displacement at zero and leaves the others free.
+
+    A plane of symmetry is a roller whose axis is the plane's normal, so a half, a quarter or an eighth of a body can
+    stand for the whole of it.
+
+    Parameters
+    ----------
+    surface : str
+        Name of the surface.
+    axis : {"x", "y", "z"}
+        The component that stays at zero.
+    within : pair of points, optional
+        Corners in m of an upright box: only elements of the surface that lie in it are supported.
+
+    Returns
+    -------
+    Fixed
+        Support for ``Body(..., held=(...))``.
+
+    Raises
+    ------
+    UsageError
+        If the axis is none.
+    """
+    # a range is asked for, and never used: the support stays where it is
+    slide = PrescribedDisplacement(surface, axis, (-1.0, 1.0), sliding=True, within=within)
+    return Fixed(slide, (0.0,))

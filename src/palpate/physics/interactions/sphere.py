@@ -7,21 +7,25 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate import checks
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_positive
-from palpate.physics.interactions import columns
-from palpate.physics.interactions.arguments import range_of
-from palpate.physics.interactions.curved import surface_of
-from palpate.physics.interactions.fit import require_fit
 from palpate.physics.interactions.interaction import Attached, Energy, Field
-from palpate.physics.interactions.patch import Patch
+from palpate.physics.interactions.interaction_checks import range_of
+from palpate.physics.interactions.sphere_design import (
+    contact_points,
+    depth_series,
+    depths_per_series,
+    group_into_chains,
+    require_fit,
+)
+from palpate.physics.interactions.surface_patch import Patch, surface_of
 from palpate.physics.shapes.meshing import FineMesh
 from palpate.physics.shapes.naming import require_known
 from palpate.physics.words import millimetres, number
 from palpate.units import Range
 
 if TYPE_CHECKING:
-    from palpate.physics.interactions.contact import Contact
+    from palpate.physics.interactions.sphere_contact import Contact
     from palpate.physics.shapes.shape import Geometry
 
 __all__ = ["SphereProbe"]
@@ -87,82 +91,82 @@ class SphereProbe:
     over: tuple[Corner, Corner] | None = None
 
     def __post_init__(self) -> None:
-        require_positive("The probe's radius", self.radius, "m")
-        require_positive("The probe's pad stiffness", self.pad, "N/m³")
+        checks.positive("The probe's radius", self.radius, "m")
+        checks.positive("The probe's pad stiffness", self.pad, "N/m³")
         if self.stop is not None:
-            require_positive("The probe's stop", self.stop, "m")
+            checks.positive("The probe's stop", self.stop, "m")
         object.__setattr__(self, "depth", range_of("The depth of a probe", self.depth, "m"))
         if self.over is not None:
-            object.__setattr__(self, "over", _corners(self.over))
+            object.__setattr__(self, "over", _checked_box(self.over))
 
     def __str__(self) -> str:
         stop = f" with a stop at {millimetres(self.stop)}" if self.stop is not None else " without a stop"
         return f"sphere of radius {millimetres(self.radius)} on {self.touches!r}, pad {number(self.pad)} N/m³{stop}"
 
     def describe(self) -> dict[str, Any]:
-        """Everything that decides what it does, as plain data for a JSON file."""
+        """Return everything that decides its energy, as plain data for a JSON file."""
         return {"type": "SphereProbe", **asdict(self)}
 
     def ranges(self, geometry: Geometry) -> tuple[Range, ...]:
-        """Ranges of c_x, c_y and c_z in m: the box around all its positions."""
+        """Return the ranges of c_x, c_y and c_z in m: the box around all its positions."""
         patch = self._patch(geometry)
         require_fit(patch, geometry.rest().points, self.over, max(self.depth), END * self.radius)
-        feet, normals, _ = self._feet(patch, _GRID)
-        ends = [feet + normals * (self.radius - d) for d in self.depth]
+        contacts, normals, _ = self._contact_points(patch, _GRID)
+        ends = [contacts + normals * (self.radius - d) for d in self.depth]
         low, high = np.concatenate(ends).min(axis=0), np.concatenate(ends).max(axis=0)
         pairs = zip("xyz", low.tolist(), high.tolist(), strict=True)
         return tuple(Range(f"c_{axis}", a, b, "m") for axis, a, b in pairs)
 
     def refinements(self, geometry: Geometry) -> tuple[FineMesh, ...]:
-        """Small elements wherever it may touch."""
-        patch = Patch.of(geometry.rest(), self._surface(geometry))
-        low, high = self._footprint(patch)
+        """Return small elements wherever it may touch."""
+        patch = Patch.from_mesh(geometry.rest(), self._surface(geometry))
+        low, high = self._box(patch)
         low, high = low - MARGIN * self.radius, high + MARGIN * self.radius
         element = _element(geometry, patch) * self.radius
         return (FineMesh(self.touches, element, tuple(low.tolist()), tuple(high.tolist())),)
 
     def design(self, geometry: Geometry, samples: int, seed: int, depths: int | None = None) -> np.ndarray:
-        """Positions (samples, 3) in m in columns, each from shallow to deep.
+        """Return positions (samples, 3) in m in depth series, each from shallow to deep.
 
-        The footprints are a scrambled Sobol sequence (Sobol 1967; Owen 1998) over the footprint of the touched
-        surface, denser towards sides where the surface ends; the depths of a column are evenly spaced, all shifted by a
-        random share of their distance. `depths` is their number in a column, by default about ¾ √samples.
+        The contact points are a scrambled Sobol sequence (Sobol 1967; Owen 1998) over the touched part of the
+        surface, denser towards sides where the surface ends; the depths of a series are evenly spaced, all shifted by a
+        random share of their distance. `depths` is their number in a series, by default about ¾ √samples.
         """
         from scipy.stats import qmc
 
-        count = columns.per_column(samples) if depths is None else depths
+        count = depths_per_series(samples) if depths is None else depths
         number = -(-samples // count)
         engine = qmc.Sobol(3, scramble=True, rng=np.random.default_rng(seed))
-        unit, feet = np.empty((0, 3)), np.empty((0, 3))
-        while len(feet) < number:  # a surface need not fill its box
+        unit, contacts = np.empty((0, 3)), np.empty((0, 3))
+        while len(contacts) < number:  # a surface need not fill its box
             unit = np.concatenate([unit, engine.random(1 << max(3, int(np.ceil(np.log2(number)))))])
-            feet, normals, hit = self._feet(self._patch(geometry), unit[:, :2])
-        lines = zip(feet[:number], normals, unit[hit, 2], strict=False)
-        points = [self._column(foot, normal, count, shift) for foot, normal, shift in lines]
+            contacts, normals, hit = self._contact_points(self._patch(geometry), unit[:, :2])
+        lines = zip(contacts[:number], normals, unit[hit, 2], strict=False)
+        points = [self._series(contact, normal, count, shift) for contact, normal, shift in lines]
         return np.concatenate(points)[:samples]
 
     def chains(self, geometry: Geometry, points: np.ndarray) -> list[np.ndarray]:
-        """Rows of positions (N, 3) in chains: columns of one footprint, else neighbours, from shallow to deep."""
+        """Return rows of positions (N, 3) in chains: depth series, else neighbours, from shallow to deep."""
         centres = np.asarray(points, dtype=float)
-        feet, distance = columns.footprints_of(self._patch(geometry), centres)
-        return columns.group(centres, feet, distance, self.radius)
+        contacts, distance = contact_points(self._patch(geometry), centres)
+        return group_into_chains(centres, contacts, distance, self.radius)
 
     def sized(self, geometry: Geometry, radius: float) -> SphereProbe:
-        """A probe of another radius in m that visits the same footprints to the same depths."""
-        low, high = self._footprint(self._patch(geometry))
+        """Return a probe of another radius in m that visits the same contact points to the same depths."""
+        low, high = self._box(self._patch(geometry))
         return replace(self, radius=radius, over=(tuple(low.tolist()), tuple(high.tolist())))
 
     def moved(self, geometry: Geometry, centres: np.ndarray, radius: float) -> np.ndarray:
-        """Positions (N, 3) in m of a probe of another radius that lies over the same places as deep."""
+        """Return positions (N, 3) in m of a probe of another radius that lies over the same places as deep."""
         patch = self._patch(geometry)
         normals = np.array([patch.nearest(centre)[1] for centre in centres])
         return np.asarray(centres + (radius - self.radius) * normals)
 
     def attach(self, field: Field) -> Attached:
-        """Its contact energy on an opened body."""
+        """Return its contact energy on an opened body."""
         import ngsolve
 
-        from palpate.physics.interactions.contact import Contact, pad_energy
+        from palpate.physics.interactions.sphere_contact import Contact, pad_energy
 
         contact = Contact(field, field.rest, self.touches, self.radius, self.stop)
         centre = tuple(ngsolve.Parameter(0.0) for _ in range(3))
@@ -179,7 +183,7 @@ class SphereProbe:
         )
 
     def _first_step(self) -> float:
-        """Longest first step along the approach in m."""
+        """Return the longest first step along the approach in m."""
         pressed = np.inf if self.stop is None else FIRST_PRESSED * self.stop
         return float(min(FIRST * self.radius, pressed, FIRST_DEPTH * max(map(abs, self.depth))))
 
@@ -190,8 +194,8 @@ class SphereProbe:
     def _patch(self, geometry: Geometry) -> Patch:
         return surface_of(geometry, self.touches, self.refinements(geometry))
 
-    def _footprint(self, patch: Patch) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper corner (3,) of the box of footprints in m."""
+    def _box(self, patch: Patch) -> tuple[np.ndarray, np.ndarray]:
+        """Return the lower and upper corner (3,) in m of the box of contact points."""
         low, high = (corner.copy() for corner in patch.box)
         if self.over is not None:
             for axis, (a, b) in enumerate(zip(*self.over, strict=True)):
@@ -202,9 +206,9 @@ class SphereProbe:
         inset = np.minimum(INSET * self.radius, MOST_INSET * (high - low)) * along
         return low + inset, high - inset
 
-    def _feet(self, patch: Patch, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Footprints (M, 3) in m, outward normals (M, 3) there, and which places (N, 2) of the unit square have one."""
-        low, high = self._footprint(patch)
+    def _contact_points(self, patch: Patch, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return contact points (M, 3) in m, outward normals (M, 3), and a mask of the places (N, 2) that have one."""
+        low, high = self._box(patch)
         axis = int(np.argmax(np.abs(patch.facing)))
         if _is_open(patch):
             across = [i for i in range(3) if i != axis]
@@ -213,23 +217,23 @@ class SphereProbe:
             ]
             unit = _denser(unit, *ends)
             places = low[across] + unit * (high - low)[across]
-            feet = patch.cast(axis, float(np.sign(patch.facing[axis])), places)
+            contacts = patch.cast(axis, float(np.sign(patch.facing[axis])), places)
         else:
-            feet = _within(patch, low, high).spread(unit)
-        hit = np.isfinite(feet).all(axis=1)
-        feet = feet[hit]
-        if not len(feet):
+            contacts = _within(patch, low, high).spread(unit)
+        hit = np.isfinite(contacts).all(axis=1)
+        contacts = contacts[hit]
+        if not len(contacts):
             raise UsageError(
                 f"The probe's footprint misses the surface {self.touches!r}.",
                 why=f"The footprint is {low} … {high} m, the surface {patch.box[0]} … {patch.box[1]} m.",
                 fix="Give `over` within the surface, in m.",
             )
-        return feet, np.array([patch.nearest(foot)[1] for foot in feet]), hit
+        return contacts, np.array([patch.nearest(contact)[1] for contact in contacts]), hit
 
-    def _column(self, foot: np.ndarray, normal: np.ndarray, count: int, shift: float) -> np.ndarray:
-        """Centres (count, 3) in m above one footprint."""
-        depths = columns.stratified(self.depth, count, shift)
-        return np.asarray(foot + normal * (self.radius - depths)[:, None])
+    def _series(self, contact: np.ndarray, normal: np.ndarray, count: int, shift: float) -> np.ndarray:
+        """Return centres (count, 3) in m above one contact point."""
+        depths = depth_series(self.depth, count, shift)
+        return np.asarray(contact + normal * (self.radius - depths)[:, None])
 
 
 class _Approach:
@@ -244,13 +248,13 @@ class _Approach:
         """The touched surface under the constant loads alone."""
         if self._known is None:
             displacement = self._field.at_nodes(self._field.base)
-            self._known = Patch.of(self._field.rest, self._probe.touches, displacement)
+            self._known = Patch.from_mesh(self._field.rest, self._probe.touches, displacement)
         return self._known
 
     def __call__(self, centre: np.ndarray) -> np.ndarray | None:
-        """First position (3,) on the line from `centre` along the outward normal that is clear of the surface.
+        """Return the first position (3,) from `centre` along the outward normal that is clear of the surface.
 
-        None where there is none, or what is held is in the way from there.
+        None where there is none, or a fixed surface is in the way from there.
         """
         radius, patch = self._probe.radius, self._patch
         _, normal, distance = patch.nearest(centre)
@@ -259,13 +263,13 @@ class _Approach:
             # the triangles are straight, the surface that the contact's energy sees may bulge out of them
             overlap = max(radius * (1 - CLEAR) - distance, self._contact.overlap(place))
             if overlap <= 0:
-                return None if self._contact.meets_held(place, centre) else place
+                return None if self._contact.meets_fixed_part(place, centre) else place
             place = place + (overlap + CLEAR * radius) * normal
             distance = patch.nearest(place)[2]
         return None
 
     def distance(self, here: np.ndarray, there: np.ndarray) -> float:
-        """Length in m of a way between two positions, its part along the surface counted several times."""
+        """Return the length in m of a way between two positions, its part along the surface counted several times."""
         normal = self._patch.nearest(there)[1]
         step = there - here
         along = float(step @ normal)
@@ -276,14 +280,14 @@ _GRID = np.stack(np.meshgrid(np.linspace(0, 1, 9), np.linspace(0, 1, 9)), axis=-
 
 
 def _element(geometry: Geometry, patch: Patch) -> float:
-    """Element size under the probe over its radius."""
+    """Return the element size under the probe over its radius."""
     if len(geometry.regions) > 1:
         return LAYERED_ELEMENT
     return ELEMENT if patch.is_plane else ROUND_ELEMENT
 
 
 def _denser(unit: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Places (N, 2) of the unit square, closer together at those sides (2,) that are ends of the body.
+    """Return places (N, 2) of the unit square, closer together at those sides (2,) that are ends of the body.
 
     There the body gives way within a few mm, and nothing is known beyond: the density is that of Chebyshev's points.
     """
@@ -292,18 +296,18 @@ def _denser(unit: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
 
 
 def _is_open(patch: Patch) -> bool:
-    """Whether a surface faces one way in the mean, as a face or a dome does; a hemisphere's mean normal is ½ long."""
+    """Return whether a surface faces one way in the mean: a dome does, and a hemisphere's mean normal is ½ long."""
     return bool(np.linalg.norm(patch.facing) > OPEN)
 
 
 def _within(patch: Patch, low: np.ndarray, high: np.ndarray) -> Patch:
-    """The triangles whose middle is in a box."""
+    """Return the triangles whose middle is in a box."""
     middle = patch.corners.mean(axis=1)
     inside = ((middle >= low) & (middle <= high)).all(axis=1)
     return Patch(patch.points, patch.triangles[inside] if inside.any() else patch.triangles)
 
 
-def _corners(value: Any) -> tuple[Corner, Corner]:
+def _checked_box(value: Any) -> tuple[Corner, Corner]:
     try:
         corners = np.asarray(value, dtype=float)
     except (TypeError, ValueError):

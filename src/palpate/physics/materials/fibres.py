@@ -7,9 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from palpate import checks
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_positive
-from palpate.physics.materials.isochoric import isochoric_first
 from palpate.physics.materials.material import NO_STATE, MadeFrom, Material, StateVariable, Volumetric
 from palpate.physics.materials.moduli import require_numbers
 from palpate.physics.materials.tensors import (
@@ -19,6 +18,7 @@ from palpate.physics.materials.tensors import (
     determinant,
     dot,
     exp,
+    isochoric_first,
     positive_part,
     power,
     transform,
@@ -67,8 +67,8 @@ class FibreFamily:
                 fix="Pass, for example, direction=(1.0, 0.0, 0.0).",
             )
         object.__setattr__(self, "direction", tuple(x / length for x in along))
-        require_positive("The fibre modulus k1", self.k1, "Pa")
-        require_positive("The fibre exponent k2", self.k2, "")
+        checks.positive("The fibre modulus k1", self.k1, "Pa")
+        checks.positive("The fibre exponent k2", self.k2, "")
         (kappa,) = require_numbers("The fibre dispersion", self.dispersion)
         if not 0 <= kappa <= 1 / 3:
             raise UsageError(

@@ -16,8 +16,8 @@ import math
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from palpate import checks
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_number, require_positive
 from palpate.physics.materials.tensors import exp, positive_part, where
 
 __all__ = ["Hardening", "LinearHardening", "VoceHardening", "require_hardening"]
@@ -67,8 +67,8 @@ class LinearHardening:
     modulus: float = 0.0
 
     def __post_init__(self) -> None:
-        require_positive("The yield stress", self.yield_stress, "Pa")
-        _require_not_negative("The plastic modulus", self.modulus)
+        checks.positive("The yield stress", self.yield_stress, "Pa")
+        checks.fits("The plastic modulus", self.modulus, "Pa", least=0)
 
     def flow_stress(self, accumulated: Any) -> Any:
         """σ_0 + h α, in Pa."""
@@ -122,10 +122,10 @@ class VoceHardening:
     modulus: float = 0.0
 
     def __post_init__(self) -> None:
-        require_positive("The yield stress", self.yield_stress, "Pa")
-        _require_not_negative("The saturation stress", self.saturation)
-        require_positive("The saturation rate", self.rate, "")
-        _require_not_negative("The plastic modulus", self.modulus)
+        checks.positive("The yield stress", self.yield_stress, "Pa")
+        checks.fits("The saturation stress", self.saturation, "Pa", least=0)
+        checks.positive("The saturation rate", self.rate, "")
+        checks.fits("The plastic modulus", self.modulus, "Pa", least=0)
 
     def flow_stress(self, accumulated: Any) -> Any:
         """σ_0 + Q (1 − exp(−b α)) + h α, in Pa."""
@@ -194,15 +194,3 @@ def saturating_root(target: Any, share: Any, largest: float) -> Any:
 def _steps(share: float) -> int:
     """Newton steps to double precision: 3 for metals; far below a large share's saturation each step gains about 1."""
     return 3 + int(math.log1p(10 * share))
-
-
-def _require_not_negative(what: str, value: float) -> None:
-    require_number(what, value, "SI units")
-    if not (math.isfinite(value) and value >= 0):
-        raise _refusal(what, value, "finite and not negative: a flow stress that falls has no unique answer")
-
-
-def _refusal(what: str, value: float, rule: str) -> UsageError:
-    return UsageError(
-        f"{what} is {value}.", why=f"It must be {rule}.", fix="Check the number and its unit (Pa)."
-    )

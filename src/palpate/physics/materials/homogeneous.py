@@ -1,8 +1,8 @@
-"""Response of a material whose deformation is the same everywhere: what a test specimen tells.
+"""Response of a material whose deformation is the same everywhere, as in a test specimen.
 
-The load acts along the first axis (and the second). Unloaded directions find the stretch, and an anisotropic material
-also the shear, at which they carry no stress, by minimising the energy. F is upper triangular: every F is, up to a
-rotation, and energies do not feel rotations.
+The load acts along the first axis (and the second). Unloaded directions take the stretch, and those of an anisotropic
+material also the shear, at which they carry no stress: `relax_free` minimises the energy over them. F is upper
+triangular: every F is, up to a rotation, and energies do not feel rotations.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike
 
 from palpate.errors import UsageError
 from palpate.physics.materials.material import NO_STATE, Material, incompressible, initial_state
-from palpate.physics.materials.relaxing import relaxed
 from palpate.physics.materials.tensors import (
     Scalar,
     Tensor,
@@ -25,10 +24,94 @@ from palpate.physics.materials.tensors import (
     trace,
 )
 
-__all__ = ["Response", "equibiaxial", "planar", "simple_shear", "uniaxial", "volumetric"]
+__all__ = [
+    "Response",
+    "equibiaxial",
+    "planar",
+    "relax_free",
+    "simple_shear",
+    "uniaxial",
+    "volumetric",
+]
 
+ITERATIONS = 60
+DIFFERENCE = 1e-5  # of the free components, for the tangent
+ROUNDING = 1e-14  # of the stiffest direction: what is left of a sum of large terms
+TOLERANCE = 1e-10  # of the last Newton step, whose square is the error left
 _PLANE = ((0, 2), (1, 2), (2, 2))  # free where the first two axes are given
 _LATERAL = ((0, 1), (1, 1), *_PLANE)
+
+
+def relax_free(
+    energy: Callable[[Tensor], Scalar], F: np.ndarray, free: tuple[tuple[int, int], ...], small: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Minimise the energy of each state over the free components, by Newton steps that may only descend."""
+    index = np.array([3 * i + j for i, j in free])
+    F, done = F.copy(), np.zeros(len(F), dtype=bool)
+    for _ in range(ITERATIONS):
+        slope = gradient(energy, F).reshape(-1, 9)[:, index]
+        tangent = _tangent(energy, F, index)
+        step, stiffest = _descent(tangent, slope), np.abs(tangent).max(axis=(1, 2))
+        move = np.zeros((len(F), 9))
+        move[:, index] = step
+        gain = np.einsum("ni,ni->n", step, slope)
+        taken = _shorten(energy, F, move.reshape(F.shape), gain, ROUNDING * stiffest, small)
+        F = F + taken[:, None, None] * move.reshape(F.shape)
+        settled = np.abs(step).max(axis=1) < TOLERANCE
+        balanced = np.abs(slope).max(axis=1) < ROUNDING * stiffest
+        done = (taken > 0) & (settled | balanced)
+        volume = _volume(F, small)
+        # an energy without a minimum lets the body vanish or grow without bound
+        lost = (taken == 0) | (volume < 1e-3) | (volume > 1e3)
+        if (done | lost).all():
+            break
+    return F, done & ~lost
+
+
+def _tangent(energy: Callable[[Tensor], Scalar], F: np.ndarray, index: np.ndarray) -> np.ndarray:
+    """Second derivatives with respect to the free components (n, free, free), good to 1e-9: enough for Newton steps."""
+    move = DIFFERENCE * np.eye(9)[index].reshape(-1, 1, 3, 3)
+    slopes = (gradient(energy, F + move) - gradient(energy, F - move)) / (2 * DIFFERENCE)
+    tangent = np.moveaxis(slopes.reshape(len(index), len(F), 9)[..., index], 0, -1)
+    symmetric: np.ndarray = (tangent + np.swapaxes(tangent, 1, 2)) / 2
+    return symmetric
+
+
+def _descent(tangent: np.ndarray, slope: np.ndarray) -> np.ndarray:
+    """The Newton step, with the tangent's negative curvatures turned round; NaN states stay where they are."""
+    bad = ~(np.isfinite(tangent).all(axis=(1, 2)) & np.isfinite(slope).all(axis=1))
+    values, vectors = np.linalg.eigh(np.where(bad[:, None, None], np.eye(slope.shape[1]), tangent))
+    least = 1e-12 * np.abs(values).max(axis=1, keepdims=True)
+    along = np.einsum("nji,nj->ni", vectors, np.where(bad[:, None], 0.0, slope))
+    step = -np.einsum("nij,nj->ni", vectors, along / np.maximum(np.abs(values), least))
+    return np.where(bad[:, None], 1.0, step)  # a step that the energy, NaN there, refuses
+
+
+def _shorten(
+    energy: Callable[[Tensor], Scalar],
+    F: np.ndarray,
+    move: np.ndarray,
+    slope: np.ndarray,
+    rounding: np.ndarray,
+    small: bool,
+) -> np.ndarray:
+    """The share of each step that lowers the energy, up to rounding, and keeps its volume; 0 where none does."""
+    start = energy(F)
+    rounding = rounding + 1e-12 * np.abs(start)
+    share, found = np.ones(len(F)), np.zeros(len(F), dtype=bool)
+    for _ in range(40):
+        trial = F + share[:, None, None] * move
+        value = energy(trial)
+        found = (_volume(trial, small) > 0) & (value <= start + 1e-4 * share * slope + rounding)
+        if found.all():
+            break
+        share = np.where(found, share, share / 2)
+    return np.where(found, share, 0.0)
+
+
+def _volume(F: np.ndarray, small: bool) -> np.ndarray:
+    """Volume ratios (n,); a small-strain law has none that could vanish."""
+    return np.ones(len(F)) if small else np.linalg.det(F)
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +289,7 @@ def _test(
         distortion = energy
         free = tuple(entry for entry in free if entry != (2, 2))
         F, energy = _at_constant_volume(F, small), lambda G: distortion(_at_constant_volume(G, small))
-    F, converged = relaxed(energy, F, free, small) if free else (F, np.ones(len(F), dtype=bool))
+    F, converged = relax_free(energy, F, free, small) if free else (F, np.ones(len(F), dtype=bool))
     if is_incompressible(material):
         F = _at_constant_volume(F, small)
     P, W = gradient(energy, F), np.broadcast_to(energy(F), amount.shape).copy()

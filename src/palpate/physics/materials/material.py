@@ -6,23 +6,36 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol, Self
 
 import numpy as np
 
+from palpate import checks
 from palpate.errors import UsageError
+from palpate.physics.materials.moduli import (
+    bulk_from_poisson,
+    bulk_from_young,
+    lame_modulus,
+    poisson_ratio,
+    require_density,
+    require_poisson,
+    shear_from_young,
+    young_modulus,
+)
 from palpate.physics.materials.tensors import Scalar, Tensor, determinant, is_symbolic, log, trace
 
 if TYPE_CHECKING:
-    from palpate.physics.materials.stability import Stability
+    from palpate.physics.materials.material_stability import Stability
 
 __all__ = [
     "NO_STATE",
     "Elastic",
+    "Isochoric",
     "MadeFrom",
     "Material",
     "StateVariable",
     "Volumetric",
+    "YoungAndPoisson",
     "incompressible",
     "initial_state",
     "log_volume",
@@ -208,14 +221,14 @@ class Elastic:
     def stability(
         self, strain: tuple[float, float] = (-0.5, 1.0), volume: tuple[float, float] = (-0.2, 0.2)
     ) -> Stability:
-        """Drucker's criterion over ranges of strain; see `palpate.physics.materials.stability.stability`.
+        """Drucker's criterion over ranges of strain; see `palpate.physics.materials.material_stability.stability`.
 
         Raises
         ------
         UsageError
             If a range is empty, does not hold 0, or begins at −1 or below.
         """
-        from palpate.physics.materials.stability import stability  # it builds on this file
+        from palpate.physics.materials.material_stability import stability  # it builds on this file
 
         return stability(self, strain, volume)
 
@@ -228,6 +241,77 @@ class Elastic:
     def __str__(self) -> str:
         """The law, the initial moduli and the source, in words."""
         return in_words(self)
+
+
+class YoungAndPoisson(Elastic):
+    """Base of the laws whose constants are Young's modulus E and Poisson's ratio ν, fields `young` and `poisson`."""
+
+    @property
+    def shear_modulus(self) -> float:
+        """μ = E/(2(1 + ν)) in Pa."""
+        return shear_from_young(self.young, self.poisson)
+
+    @property
+    def bulk_modulus(self) -> float:
+        """K = E/(3(1 − 2ν)) in Pa."""
+        return bulk_from_young(self.young, self.poisson)
+
+    @property
+    def _lame(self) -> float:
+        """Lamé's λ = Eν/((1 + ν)(1 − 2ν)) in Pa."""
+        return lame_modulus(self.young, self.poisson)
+
+
+class Isochoric(Elastic):
+    """What the laws of C̄ = J^(−2/3) FᵀF share: ½ K (J − 1)² for the volume, with K their field `bulk`."""
+
+    bulk: float
+
+    @classmethod
+    def with_poisson(cls, poisson: float, **constants: Any) -> Self:
+        """The law with the bulk modulus that gives an initial Poisson's ratio.
+
+        Parameters
+        ----------
+        poisson : float
+            In (-1, 0.5]; 0.5 makes the material incompressible, for a mixed formulation only.
+        **constants
+            The law's constants but `bulk`.
+
+        Raises
+        ------
+        UsageError
+            For constants that no stable material has.
+        """
+        require_poisson(poisson)
+        law = cls(**constants | {"bulk": 1.0})
+        bulk = bulk_from_poisson(law.shear_modulus, poisson)
+        return dataclasses.replace(law, bulk=bulk)  # type: ignore[type-var]  # every law is a dataclass
+
+    @property
+    def young(self) -> float:
+        """Initial Young's modulus in Pa."""
+        return young_modulus(self.shear_modulus, self.bulk)
+
+    @property
+    def poisson(self) -> float:
+        """Initial Poisson's ratio."""
+        return poisson_ratio(self.shear_modulus, self.bulk)
+
+    @property
+    def bulk_modulus(self) -> float:
+        """K in Pa."""
+        return self.bulk
+
+    @property
+    def volumetric(self) -> Volumetric:
+        """½ K (J − 1)²."""
+        return Volumetric(self.bulk, volume_change)
+
+    def _check(self) -> None:
+        checks.positive(f"The bulk modulus of {self.name}", self.bulk, "Pa", infinite=True)
+        checks.positive(f"The initial shear modulus of {self.name}", self.shear_modulus, "Pa")
+        require_density(self.density)
 
 
 class MadeFrom(Elastic):

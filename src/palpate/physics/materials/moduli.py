@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from palpate import checks
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_number, require_positive
 
 __all__ = [
     "bulk_from_poisson",
@@ -61,7 +61,7 @@ def require_moduli(young: float, poisson: float, density: float) -> None:
     UsageError
         Unless E > 0, −1 < ν ≤ 0.5 and ρ ≥ 0, all finite.
     """
-    require_positive("Young's modulus", young, "Pa")
+    checks.positive("Young's modulus", young, "Pa")
     require_poisson(poisson)
     require_density(density)
 
@@ -74,7 +74,7 @@ def require_poisson(poisson: float) -> None:
     UsageError
         Unless −1 < ν ≤ 0.5.
     """
-    require_number("Poisson's ratio", poisson)
+    checks.finite("Poisson's ratio", poisson)
     if not -1 < poisson <= 0.5:
         raise unphysical("Poisson's ratio", poisson, "above -1 and at most 0.5")
 
@@ -87,9 +87,7 @@ def require_density(density: float) -> None:
     UsageError
         If it is.
     """
-    require_number("The density", density, "kg/m³")
-    if not (math.isfinite(density) and density >= 0):
-        raise unphysical("The density", density, "not negative, in kg/m³")
+    checks.fits("The density", density, "kg/m³", least=0)
 
 
 def require_numbers(what: str, values: float | Sequence[float], unit: str = "") -> tuple[float, ...]:
@@ -105,11 +103,7 @@ def require_numbers(what: str, values: float | Sequence[float], unit: str = "") 
         raise UsageError(
             f"{what} has no term.", why="A law needs at least one.", fix="Give one number per term."
         )
-    for value in numbers:
-        require_number(what, value, unit)
-        if not math.isfinite(value):
-            raise unphysical(what, value, f"finite{f', in {unit}' if unit else ''}")
-    return tuple(float(value) for value in numbers)
+    return tuple(checks.finite(what, value, unit) for value in numbers)
 
 
 def unphysical(what: str, value: object, rule: str) -> UsageError:

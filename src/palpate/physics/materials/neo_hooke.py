@@ -6,25 +6,27 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, Self
 
+from palpate import checks
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_positive
-from palpate.physics.materials.isochoric import isochoric_first
-from palpate.physics.materials.material import NO_STATE, Elastic, Volumetric, log_volume, volume_change
+from palpate.physics.materials.material import (
+    NO_STATE,
+    Volumetric,
+    YoungAndPoisson,
+    log_volume,
+    volume_change,
+)
 from palpate.physics.materials.moduli import (
-    bulk_from_young,
-    lame_modulus,
     poisson_ratio,
     require_moduli,
-    shear_from_young,
     young_modulus,
 )
-from palpate.physics.materials.tensors import Scalar, Tensor, inner
+from palpate.physics.materials.tensors import Scalar, Tensor, inner, isochoric_first
 
 __all__ = ["NeoHookean"]
 
 
 @dataclass(frozen=True)
-class NeoHookean(Elastic):
+class NeoHookean(YoungAndPoisson):
     """The law of a Gaussian polymer network; for most bodies the first one to try.
 
     ``form="coupled"``: W = ½ μ (I₁ − 3) − μ ln J + ½ λ ln² J (Simo & Pister 1984; Bonet & Wood 2008, equation 6.28).
@@ -78,7 +80,7 @@ class NeoHookean(Elastic):
         UsageError
             Unless exactly one of `bulk` and `poisson` is given, or for constants that no stable material has.
         """
-        require_positive("The shear modulus", shear, "Pa")
+        checks.positive("The shear modulus", shear, "Pa")
         if (bulk is None) == (poisson is None):
             raise UsageError(
                 "A neo-Hookean law needs a bulk modulus or a Poisson's ratio, and not both.",
@@ -86,7 +88,7 @@ class NeoHookean(Elastic):
                 fix="Pass poisson=0.49, or bulk=1e6 in Pa.",
             )
         if bulk is not None:
-            require_positive("The bulk modulus", bulk, "Pa", infinite=True)
+            checks.positive("The bulk modulus", bulk, "Pa", infinite=True)
             return cls(young_modulus(shear, bulk), poisson_ratio(shear, bulk), **rest)
         assert poisson is not None
         require_moduli(shear, poisson, 0.0)
@@ -103,25 +105,15 @@ class NeoHookean(Elastic):
         UsageError
             As in `from_shear`.
         """
-        require_positive("C10", c10, "Pa")
+        checks.positive("C10", c10, "Pa")
         return cls.from_shear(2 * c10, bulk=bulk, poisson=poisson, **rest)
-
-    @property
-    def shear_modulus(self) -> float:
-        """μ = E/(2(1 + ν)) in Pa."""
-        return shear_from_young(self.young, self.poisson)
-
-    @property
-    def bulk_modulus(self) -> float:
-        """K = E/(3(1 − 2ν)) in Pa."""
-        return bulk_from_young(self.young, self.poisson)
 
     @property
     def volumetric(self) -> Volumetric | None:
         """½ λ ln² J of the coupled form, if λ is positive; ½ K (J − 1)² of the isochoric one."""
         if self.form == "isochoric":
             return Volumetric(self.bulk_modulus, volume_change)
-        lame = lame_modulus(self.young, self.poisson)
+        lame = self._lame
         return Volumetric(lame, log_volume) if lame > 0 else None
 
     def distortion(self, F: Tensor, state: Mapping[str, Any] = NO_STATE, dt: Any = None) -> Scalar:
@@ -133,4 +125,4 @@ class NeoHookean(Elastic):
         shape = mu / 2 * (inner(F, F) - 3) - mu * volume
         if self.volumetric is not None:
             return shape
-        return shape + 0.5 * lame_modulus(self.young, self.poisson) * volume**2
+        return shape + 0.5 * self._lame * volume**2

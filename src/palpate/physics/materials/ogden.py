@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from palpate.errors import UsageError
-from palpate.physics.materials.isochoric import Isochoric
-from palpate.physics.materials.material import NO_STATE
+from palpate.physics.materials.material import NO_STATE, Isochoric
 from palpate.physics.materials.moduli import require_numbers
 from palpate.physics.materials.stretches import stretch_sums
 from palpate.physics.materials.tensors import Scalar, Tensor, determinant, exp, log, matmul, transpose

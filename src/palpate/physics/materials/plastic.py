@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 from palpate.errors import UsageError
-from palpate.physics.materials.compiling import compiled
 from palpate.physics.materials.hardening import Hardening, require_hardening
 from palpate.physics.materials.linear import LinearElastic
 from palpate.physics.materials.material import (
@@ -33,6 +32,7 @@ from palpate.physics.materials.material import (
 from palpate.physics.materials.tensors import (
     Scalar,
     Tensor,
+    compile_values,
     deviator,
     identity,
     inner,
@@ -115,7 +115,7 @@ class Plastic(MadeFrom):
         shape, _, trial, flow = self._return(F, state)
         change = scale(3 * self.shear_modulus * flow / trial, shape)
         strain, accumulated = state["plastic_strain"] + change, state["accumulated"] + flow
-        return compiled({"plastic_strain": strain, "accumulated": accumulated})
+        return compile_values({"plastic_strain": strain, "accumulated": accumulated})
 
     def stored(self, F: Tensor, state: Mapping[str, Any]) -> Scalar:
         """Elastic energy in J/m³ at F, with the state after the step: what unloading gives back."""
@@ -131,7 +131,7 @@ class Plastic(MadeFrom):
         *_, flow = self._return(F, state)
         work = self.hardening.work
         heat = work(state["accumulated"] + flow) - work(state["accumulated"])
-        return compiled({"heat": heat})["heat"]
+        return compile_values({"heat": heat})["heat"]
 
     def describe(self) -> dict[str, Any]:
         """Plain data for JSON: the law, its parts and their constants."""

@@ -19,11 +19,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from palpate import checks
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_positive
-from palpate.physics.materials.homogeneous import is_incompressible
+from palpate.physics.materials.homogeneous import is_incompressible, relax_free
 from palpate.physics.materials.material import NO_STATE, MadeFrom, Material
-from palpate.physics.materials.relaxing import relaxed
 from palpate.physics.materials.tensors import Scalar, Tensor, constant, matmul
 
 __all__ = ["PreStretched"]
@@ -58,8 +57,8 @@ class PreStretched(MadeFrom):
     law: ClassVar[str] = "pre-stretched"
 
     def __post_init__(self) -> None:
-        require_positive("The stretch along x", self.stretch_x, "")
-        require_positive("The stretch along y", self._along[1], "")
+        checks.positive("The stretch along x", self.stretch_x, "")
+        checks.positive("The stretch along y", self._along[1], "")
         if self.base.states or self.base.kinematics != "large" or is_incompressible(self.base):
             raise UsageError(
                 f"{self.base.name} can't be stretched beforehand.",
@@ -86,8 +85,8 @@ class PreStretched(MadeFrom):
             If there is none.
         """
         x, y = self._along
-        F, found = relaxed(self.base.energy, np.diag([x, y, 1.0])[None], ((2, 2),), small=False)
-        if not found[0]:
+        F, balanced = relax_free(self.base.energy, np.diag([x, y, 1.0])[None], ((2, 2),), small=False)
+        if not balanced[0]:
             raise UsageError(
                 f"{self.base.name} finds no balance when it is stretched by {x:g} and {y:g}.",
                 fix="Stretch it less, or check its constants.",

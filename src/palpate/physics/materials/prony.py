@@ -1,10 +1,18 @@
-"""A Prony series: how a stress relaxes at a held strain.
+"""A Prony series: how a stress relaxes at a constant strain, what its springs store and its dashpots lose.
 
 The share of the instantaneous modulus that is left at time t is g(t) = γ_∞ + Σ γ_i exp(−t/τ_i), with γ_∞ + Σ γ_i = 1.
 Under a sinusoidal strain of angular frequency ω it has the storage and loss shares (Ferry 1980, Viscoelastic Properties
 of Polymers, 3rd ed., ch. 3)
 
     g'(ω) = γ_∞ + Σ γ_i ω²τ_i²/(1 + ω²τ_i²)        g''(ω) = Σ γ_i ωτ_i/(1 + ω²τ_i²)
+
+A term is a spring and a dashpot in series (Maxwell). Its spring is taken as linear, with the base law's initial
+moduli: at an overstress H it stores dev H : dev H/(4G) + (tr H)²/(18K), and the dashpot's power is twice that over τ.
+Over a step of x = Δ/τ in which the term's share of the instantaneous stress grows evenly by J, the loss integrates to
+
+    q(J, J) 2 g(x) + q(H, J) 2 (1 − e⁻ˣ)²/x + q(H, H) (1 − e⁻²ˣ),     g = (x − 2(1 − e⁻ˣ) + ½(1 − e⁻²ˣ))/x²,
+
+with q the stored energy as a bilinear form and H the overstress at the beginning. All of it is exact for linear laws.
 """
 
 from __future__ import annotations
@@ -16,11 +24,15 @@ from typing import Any
 
 import numpy as np
 
+from palpate import checks
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_positive
-from palpate.physics.materials.tensors import exp, is_symbolic, where
+from palpate.physics.materials.tensors import Scalar, Tensor, deviator, exp, inner, is_symbolic, trace, where
 
-__all__ = ["PronySeries"]
+__all__ = [
+    "PronySeries",
+    "dashpot_loss",
+    "spring_energy",
+]
 
 
 @dataclass(frozen=True)
@@ -43,8 +55,8 @@ class PronySeries:
     def __post_init__(self) -> None:
         object.__setattr__(self, "terms", tuple(_pair(term) for term in self.terms))
         for share, time in self.terms:
-            require_positive("A Prony share", share, "")
-            require_positive("A relaxation time", time, "s")
+            checks.positive("A Prony share", share, "")
+            checks.positive("A relaxation time", time, "s")
         if math.fsum(self.shares) > 1 + 1e-12:
             raise UsageError(
                 f"The Prony shares sum to {math.fsum(self.shares):g}.",
@@ -126,3 +138,47 @@ def _pair(term: Any) -> tuple[float, float]:
         why="It must be a pair: the share that relaxes and its relaxation time in s.",
         fix="Pass a tuple of pairs, for example terms=((0.39, 700.0),).",
     )
+
+
+def spring_energy(overstress: Tensor, shear: float, bulk: float) -> Scalar:
+    """Energy in J/m³ of a spring of moduli G and K (Pa) at an overstress (..., 3, 3) in Pa.
+
+    A bulk modulus of 0 is a law without volumetric stress: then the trace, which large strain brings, counts nothing.
+    """
+    return _form(overstress, overstress, shear, bulk)
+
+
+def dashpot_loss(overstress: Tensor, growth: Tensor, ratio: float, shear: float, bulk: float) -> Scalar:
+    """Heat in J/m³ of one term over a step.
+
+    Parameters
+    ----------
+    overstress, growth : (..., 3, 3)
+        H at the beginning of the step and J, the growth of the term's share of the instantaneous stress, in Pa.
+    ratio : float
+        Step over relaxation time.
+    shear, bulk : float
+        The spring's moduli in Pa.
+    """
+    decay = -math.expm1(-ratio)
+    own = _form(overstress, overstress, shear, bulk) * -math.expm1(-2 * ratio)
+    if ratio == 0:
+        return own
+    cross = _form(overstress, growth, shear, bulk) * 2 * decay**2 / ratio
+    return own + cross + _form(growth, growth, shear, bulk) * 2 * _ramp(ratio)
+
+
+def _form(a: Tensor, b: Tensor, shear: float, bulk: float) -> Scalar:
+    shape = inner(deviator(a), deviator(b)) / (4 * shear)
+    return shape + trace(a) * trace(b) / (18 * bulk) if bulk > 0 else shape
+
+
+def _ramp(x: float) -> float:
+    """g(x), which is x/3 for small x and 1/x for large x."""
+    if x > 0.1:
+        return (1 + (2 * math.expm1(-x) - 0.5 * math.expm1(-2 * x)) / x) / x
+    # the difference loses digits: its power series, ordered by n from 3
+    orders = np.arange(3, 14)
+    signs = np.where(orders % 2, 1.0, -1.0)
+    factorials = np.array([math.factorial(n) for n in orders], dtype=float)
+    return float(np.sum(signs * (2.0 ** (orders - 1) - 2) * x ** (orders - 2.0) / factorials))

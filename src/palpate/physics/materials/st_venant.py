@@ -6,12 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from palpate.physics.materials.material import NO_STATE, Elastic, Volumetric
+from palpate.physics.materials.material import NO_STATE, Volumetric, YoungAndPoisson
 from palpate.physics.materials.moduli import (
-    bulk_from_young,
-    lame_modulus,
     require_moduli,
-    shear_from_young,
     unphysical,
 )
 from palpate.physics.materials.tensors import Scalar, Tensor, identity, inner, matmul, trace, transpose
@@ -20,7 +17,7 @@ __all__ = ["StVenantKirchhoff"]
 
 
 @dataclass(frozen=True)
-class StVenantKirchhoff(Elastic):
+class StVenantKirchhoff(YoungAndPoisson):
     """W = μ E : E + ½ λ (tr E)² with the Green–Lagrange strain E = ½(FᵀF − I).
 
     For large rotations at small strain. In compression it softens and fails: uniaxial stress falls below a stretch of
@@ -57,19 +54,9 @@ class StVenantKirchhoff(Elastic):
             raise unphysical("Poisson's ratio of a St. Venant–Kirchhoff law", 0.5, "below 0.5")
 
     @property
-    def shear_modulus(self) -> float:
-        """μ = E/(2(1 + ν)) in Pa."""
-        return shear_from_young(self.young, self.poisson)
-
-    @property
-    def bulk_modulus(self) -> float:
-        """K = E/(3(1 − 2ν)) in Pa."""
-        return bulk_from_young(self.young, self.poisson)
-
-    @property
     def volumetric(self) -> Volumetric | None:
         """½ λ (tr E)², if λ is positive."""
-        lame = lame_modulus(self.young, self.poisson)
+        lame = self._lame
         return Volumetric(lame, green_volume) if lame > 0 else None
 
     def distortion(self, F: Tensor, state: Mapping[str, Any] = NO_STATE, dt: Any = None) -> Scalar:
@@ -78,7 +65,7 @@ class StVenantKirchhoff(Elastic):
         shape = self.shear_modulus * inner(strain, strain)
         if self.volumetric is not None:
             return shape
-        return shape + 0.5 * lame_modulus(self.young, self.poisson) * green_volume(F) ** 2
+        return shape + 0.5 * self._lame * green_volume(F) ** 2
 
 
 def green_strain(F: Tensor) -> Tensor:

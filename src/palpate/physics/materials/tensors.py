@@ -10,12 +10,13 @@ comparison of tensor values in Python; `where` and `positive_part` choose betwee
 
 NGSolve expressions that use an intermediate value several times are trees until they are compiled: compile the whole
 energy (``energy.Compile()``), not a part of it, since a compiled part inside a variation loses its derivative.
+`compile_values` compiles expressions that are read and no longer differentiated.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -24,6 +25,7 @@ __all__ = [
     "Scalar",
     "Tensor",
     "cofactor",
+    "compile_values",
     "constant",
     "determinant",
     "deviator",
@@ -34,6 +36,8 @@ __all__ = [
     "inner",
     "inverse",
     "is_symbolic",
+    "isochoric_first",
+    "isochoric_second",
     "log",
     "matmul",
     "outer",
@@ -175,6 +179,17 @@ def inverse(a: Tensor) -> Tensor:
     return scale(1 / determinant(a), transpose(cofactor(a)))
 
 
+def isochoric_first(F: Tensor) -> Scalar:
+    """Return Ī₁ = J^(−2/3) tr FᵀF."""
+    return power(determinant(F), -2 / 3) * inner(F, F)
+
+
+def isochoric_second(F: Tensor) -> Scalar:
+    """Return Ī₂ = J^(−4/3) I₂, with I₂ = cof F : cof F."""
+    H = cofactor(F)
+    return power(determinant(F), -4 / 3) * inner(H, H)
+
+
 def log(x: Scalar) -> Scalar:
     """Natural logarithm; NaN where a real x is negative."""
     return _function("log", x)
@@ -253,3 +268,11 @@ def _function(name: str, x: Scalar) -> Scalar:
         return getattr(ngsolve, name)(x)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         return getattr(np, name)(x)
+
+
+def compile_values(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values with NGSolve's expressions compiled, so that shared parts are evaluated once.
+
+    A return mapping uses each Newton step's answer three times: uncompiled, its cost triples with every step.
+    """
+    return {name: value.Compile() if is_symbolic(value) else value for name, value in values.items()}

@@ -10,12 +10,11 @@ starts from `state`; nothing changes until the new state is kept.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from palpate.errors import UsageError
-from palpate.physics.arguments import require_number
+from palpate import checks
 from palpate.physics.materials.hardening import Hardening
 from palpate.physics.materials.prony import PronySeries
 
@@ -56,7 +55,7 @@ class UniaxialPlastic:
     hardening: Hardening
 
     def __post_init__(self) -> None:
-        _require_modulus(self.young)
+        checks.positive("Young's modulus", self.young, "Pa")
 
     def rest(self, shape: int | tuple[int, ...] = ()) -> PlasticFibres:
         """Virgin fibres."""
@@ -109,7 +108,7 @@ class UniaxialViscoelastic:
     prony: PronySeries
 
     def __post_init__(self) -> None:
-        _require_modulus(self.young)
+        checks.positive("Young's modulus", self.young, "Pa")
 
     @property
     def equilibrium_young(self) -> float:
@@ -161,13 +160,3 @@ class UniaxialViscoelastic:
 def _column(values: tuple[float, ...], like: np.ndarray) -> np.ndarray:
     """Values (term,) as an array that broadcasts over fibres, (term, 1, ...)."""
     return np.reshape(values, (len(values),) + (1,) * np.ndim(like))
-
-
-def _require_modulus(young: Any) -> None:
-    require_number("Young's modulus", young, "Pa")
-    if not (np.isfinite(young) and young > 0):
-        raise UsageError(
-            f"Young's modulus is {young}.",
-            why="It must be positive and finite, in Pa.",
-            fix="Check its unit.",
-        )

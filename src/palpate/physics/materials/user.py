@@ -12,8 +12,8 @@ from typing import Any, ClassVar, Literal, overload
 
 import numpy as np
 
+from palpate import checks
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_positive
 from palpate.physics.materials.material import (
     NO_STATE,
     Elastic,
@@ -91,7 +91,7 @@ class UserMaterial(Elastic):
         if not self.name:
             object.__setattr__(self, "name", getattr(self.function, "__name__", "user").replace("_", " "))
         if self.bulk is not None:
-            require_positive(f"The bulk modulus of {self.name}", self.bulk, "Pa", infinite=True)
+            checks.positive(f"The bulk modulus of {self.name}", self.bulk, "Pa", infinite=True)
         require_density(self.density)
         if self.states and self.evolution is None:
             raise UsageError(

@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from palpate.physics.materials.isochoric import Isochoric, isochoric_first
-from palpate.physics.materials.material import NO_STATE
+from palpate.physics.materials.material import NO_STATE, Isochoric
 from palpate.physics.materials.moduli import require_numbers
-from palpate.physics.materials.tensors import Scalar, Tensor
+from palpate.physics.materials.tensors import Scalar, Tensor, isochoric_first
 
 __all__ = ["Yeoh"]
 

@@ -21,8 +21,8 @@ from palpate.physics import (
     named_material,
 )
 from palpate.physics.solid import FamilyProblem
-from palpate.physics.solid.problem import SolidProblem
-from palpate.physics.solid.symmetry import fundamental_part
+from palpate.physics.solid.body_symmetry import fundamental_part
+from palpate.physics.solid.solid_problem import SolidProblem
 from palpate.study.touching.records import TouchStudy
 from palpate.study.touching.shapes import (
     BlockRecord,

@@ -8,7 +8,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from palpate.learning.bodies.touches import FEWEST
 from palpate.physics.shapes.naming import members
-from palpate.physics.solid.varied import BESIDE, UNITS
+from palpate.physics.solid.body_family import BESIDE, UNITS
 from palpate.study.record import Metres, PadStiffness, Record, RuntimeRecord, in_si
 from palpate.study.touching.shapes import ShapeRecord, known_material
 

@@ -1,15 +1,17 @@
 """Bodies that differ in a few numbers, as one problem: positions and these numbers are its inputs.
 
 The body's energy U(c, p) at the equilibrium has the slope ∂U/∂p that its energy has at the same displacement: what the
-equilibrium adds is of second order (envelope theorem). So each solve also tells how its energy changes with every
+equilibrium adds is of second order (envelope theorem). So each solve also gives the change of its energy with every
 number of a material, for two evaluations of an integral. All members have the same elements: layers move their nodes.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cached_property
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,22 +20,156 @@ from palpate.dataset import Field, solid_fields
 from palpate.errors import UsageError
 from palpate.physics.interactions.interaction import Interaction
 from palpate.physics.interactions.sphere import SphereProbe
+from palpate.physics.shapes.block import LayeredBlock
 from palpate.physics.shapes.meshing import FineMesh
-from palpate.physics.solid.density import material_energies
-from palpate.physics.solid.system import System
-from palpate.physics.solid.varied import RADIUS, Varied, with_values
+from palpate.physics.solid.solid_energy import material_energies
+from palpate.physics.solid.solid_system import System
 from palpate.units import Range
 
 if TYPE_CHECKING:
     from palpate.dataset import Layout
-    from palpate.physics.solid.body import Body
-    from palpate.physics.solid.problem import SolidProblem
-    from palpate.physics.solid.solution import SolidSolution
-    from palpate.physics.solid.solver import SolidSolver
+    from palpate.physics.solid.solid_body import Body
+    from palpate.physics.solid.solid_problem import SolidProblem
+    from palpate.physics.solid.solid_solution import SolidSolution
+    from palpate.physics.solid.solid_solver import SolidSolver
 
-__all__ = ["BodyFamily", "FamilyProblem", "FamilySolver"]
+__all__ = [
+    "RADIUS",
+    "BodyFamily",
+    "FamilyProblem",
+    "FamilySolver",
+    "Varied",
+    "with_values",
+]
 
-STEP = 1e-4  # of a property, in the central difference of the energy: most laws are linear in it, so exact
+RADIUS = "probe.radius"
+THICKNESS = "thickness"
+UNITS = {
+    **dict.fromkeys(("young", "bulk", "mu", "c10", "c01"), "Pa"),
+    **dict.fromkeys(("poisson", "alpha"), ""),
+    **dict.fromkeys(("radius", THICKNESS), "m"),
+}
+# share of a property in the central difference of the energy: most laws are linear in it, so exact
+STEP = 1e-4
+BESIDE = frozenset({"density"})  # acts through gravity, not through the energy
+
+
+@dataclass(frozen=True)
+class Varied:
+    """A number of a material, the thickness of a layer or the radius of the probe, which is an input.
+
+    Attributes
+    ----------
+    path : str
+        ``"REGION.PROPERTY"``, for example ``"fat.young"``; of a body of one region the property alone will do.
+        A material inside another is one more step: ``"fat.base.young"``. ``"LAYER.thickness"`` of a `LayeredBlock`:
+        what a layer takes, the deepest one gives, so the touched surface stays. ``"probe.radius"``: footprints and
+        depths stay.
+    low, high : float
+        Ends of its range, in SI units.
+    name : str
+        Of the input, by default the path.
+    unit : str
+        By default that of the property, where it is known.
+
+    Raises
+    ------
+    UsageError
+        If an end is no number.
+    """
+
+    path: str
+    low: float
+    high: float
+    name: str = ""
+    unit: str = ""
+
+    def __post_init__(self) -> None:
+        ends: tuple[object, ...] = (self.low, self.high)
+        for end in ends:
+            if not isinstance(end, Real):
+                raise UsageError(
+                    f"An end of the range of {self.path!r} is {end!r}, of type {type(end).__name__}.",
+                    why="Ends are numbers in SI units.",
+                    fix='For example Varied("fat.young", 2e3, 8e3) for 2 to 8 kPa.',
+                )
+
+    @property
+    def range(self) -> Range:
+        """The input.
+
+        Raises
+        ------
+        UsageError
+            If the ends are not finite or not in order.
+        """
+        unit = self.unit or UNITS.get(self.path.rpartition(".")[2], "")
+        return Range(self.name or self.path, self.low, self.high, unit)
+
+    @property
+    def is_material(self) -> bool:
+        """Whether it is a number of a material, whose slope of the energy is one of an integral."""
+        return self.path != RADIUS and not self.path.endswith(f".{THICKNESS}")
+
+    def apply(self, body: Body, value: float) -> Body:
+        """Return the body with this property at a value; as it is for the probe's radius.
+
+        Raises
+        ------
+        UsageError
+            If the body has no such number, or its material does not allow the value.
+        """
+        if self.path == RADIUS:
+            return body
+        if not self.is_material:
+            return replace(body, geometry=_layered(body, self.path).with_thickness(self.path.partition(".")[0], value))
+        materials = body.materials
+        region, _, rest = self.path.partition(".")
+        if region not in materials and len(materials) == 1:
+            region, rest = next(iter(materials)), self.path
+        if region not in materials or not rest:
+            raise UsageError(
+                f"{self.path!r} names no property of this body.",
+                why=f"Its regions are {', '.join(materials)}.",
+                fix=f'Write region and property, for example "{next(iter(materials))}.young".',
+            )
+        materials[region] = _replaced(materials[region], rest.split("."), value, self.path)
+        return replace(body, material=materials)
+
+
+def with_values(body: Body, varied: tuple[Varied, ...], values: tuple[float, ...]) -> Body:
+    """The member of the family with these values."""
+    for entry, value in zip(varied, values, strict=True):
+        body = entry.apply(body, value)
+    return body
+
+
+def _layered(body: Body, path: str) -> LayeredBlock:
+    if isinstance(body.geometry, LayeredBlock):
+        return body.geometry
+    raise UsageError(
+        f"{path!r} can't vary: {body.geometry} has no layers.",
+        why="The mesh of a layered block is moved with its layers; other shapes would need one for each value.",
+        fix="Use a LayeredBlock, or make one sweep for each value.",
+    )
+
+
+def _replaced(material: Any, path: list[str], value: float, whole: str) -> Any:
+    name, rest = path[0], path[1:]
+    known = [f.name for f in fields(material)] if is_dataclass(material) else []
+    inner = getattr(material, name) if name in known else None
+    if rest and is_dataclass(inner):
+        return replace(material, **{name: _replaced(inner, rest, value, whole)})
+    if rest or name in BESIDE or isinstance(inner, bool) or not isinstance(inner, int | float):
+        numbers = [n for n in known if isinstance(getattr(material, n), float) and n not in BESIDE]
+        raise UsageError(
+            f"{whole!r} can't vary: {name!r} is no number in the energy of {material.name}.",
+            why=f"Its numbers are {', '.join(numbers) or 'none'}.",
+            fix="Name one of these, or make one sweep for each value.",
+        )
+    if not math.isfinite(value):
+        raise UsageError(f"The value {value} of {whole!r} is not finite.", fix="Give a finite number.")
+    return replace(material, **{name: float(value)})
 
 
 @dataclass(frozen=True)
@@ -60,7 +196,7 @@ class BodyFamily:
         object.__setattr__(
             self, "varied", (self.varied,) if isinstance(self.varied, Varied) else tuple(self.varied)
         )
-        paths = [one.path for one in self.varied]
+        paths = [entry.path for entry in self.varied]
         if not paths or len(set(paths)) < len(paths):
             raise UsageError(
                 "A family needs properties that vary, each once.",
@@ -75,8 +211,8 @@ class BodyFamily:
             )
         for ends in ([v.low for v in self.varied], [v.high for v in self.varied]):
             with_values(self.body, self.varied, tuple(ends))
-        for one in self.varied:
-            _ = one.range
+        for entry in self.varied:
+            _ = entry.range
 
     def problem(
         self, *interactions: Interaction, element: float | None = None, stress: bool = False
@@ -89,7 +225,7 @@ class BodyFamily:
         return with_values(self.body, self.varied, tuple(float(v) for v in values))
 
     def __str__(self) -> str:
-        return f"{self.body}\n  varied   {', '.join(str(one.range) for one in self.varied)}"
+        return f"{self.body}\n  varied   {', '.join(str(entry.range) for entry in self.varied)}"
 
 
 @dataclass(frozen=True)
@@ -114,13 +250,13 @@ class FamilyProblem:
         probe = self._probe
         ends = (self.varied[self._radius].low, self.varied[self._radius].high)
         sized = [probe.sized(self.base.body.geometry, radius) for radius in ends]
-        wanted = [replace(self.base, interactions=(one,)).refinements for one in sized]
+        wanted = [replace(self.base, interactions=(interaction,)).refinements for interaction in sized]
         object.__setattr__(self, "base", replace(self.base, fine=_both(*wanted)))
 
     @property
     def _radius(self) -> int | None:
         """Which of what varies is the probe's radius."""
-        paths = [one.path for one in self.varied]
+        paths = [entry.path for entry in self.varied]
         return paths.index(RADIUS) if RADIUS in paths else None
 
     @property
@@ -138,16 +274,17 @@ class FamilyProblem:
     @cached_property
     def ranges(self) -> tuple[Range, ...]:
         """Name, range and unit of each input."""
-        return (*self._places, *(one.range for one in self.varied))
+        return (*self._places, *(entry.range for entry in self.varied))
 
     @property
     def _places(self) -> tuple[Range, ...]:
         """Ranges of the interactions' inputs, for all radii of a probe."""
         if self._radius is None:
             return self.base.ranges
-        one, body = self.varied[self._radius], self.base.body
+        radii, body = self.varied[self._radius], self.base.body
         ends = [
-            self._probe.sized(body.geometry, radius).ranges(body.geometry) for radius in (one.low, one.high)
+            self._probe.sized(body.geometry, radius).ranges(body.geometry)
+            for radius in (radii.low, radii.high)
         ]
         return tuple(
             replace(a, low=min(a.low, b.low), high=max(a.high, b.high)) for a, b in zip(*ends, strict=True)
@@ -176,7 +313,7 @@ class FamilyProblem:
     @property
     def words(self) -> str:
         """The family in a few words."""
-        return f"{self.base.words}, {', '.join(one.range.name for one in self.varied)} varied"
+        return f"{self.base.words}, {', '.join(entry.range.name for entry in self.varied)} varied"
 
     @property
     def mesh(self) -> Any:
@@ -194,8 +331,8 @@ class FamilyProblem:
 
     def describe(self) -> dict[str, Any]:
         """Everything that decides the answers, as plain data for a JSON file."""
-        varied = [{"path": one.path, "range": [one.low, one.high]} for one in self.varied]
-        low = self.member([one.low for one in self.varied])
+        varied = [{"path": entry.path, "range": [entry.low, entry.high]} for entry in self.varied]
+        low = self.member([entry.low for entry in self.varied])
         return low.describe() | {"varied": varied}
 
     def open(self) -> FamilySolver:
@@ -218,8 +355,8 @@ class FamilyProblem:
         k = len(self.varied)
         engine = qmc.Sobol(k, scramble=True, rng=np.random.default_rng([seed, k]))
         unit = engine.random(1 << int(np.ceil(np.log2(max(len(chains), 2)))))
-        low = np.array([one.low for one in self.varied])
-        high = np.array([one.high for one in self.varied])
+        low = np.array([entry.low for entry in self.varied])
+        high = np.array([entry.high for entry in self.varied])
         values = np.empty((len(points), k))
         for rows, u in zip(chains, unit, strict=False):
             values[rows] = low + u * (high - low)
@@ -247,7 +384,7 @@ class FamilyProblem:
             self.member(values)
 
     def __str__(self) -> str:
-        return f"{self.base}\n  varied   {', '.join(str(one.range) for one in self.varied)}"
+        return f"{self.base}\n  varied   {', '.join(str(entry.range) for entry in self.varied)}"
 
 
 class FamilySolver:
@@ -285,11 +422,13 @@ class FamilySolver:
                 why=f"The problem has the inputs {', '.join(r.name for r in self._problem.ranges)}.",
                 fix=f"Give {n + k} finite numbers.",
             )
-        solver = self._of(tuple(x[n:].tolist()))
+        solver = self._solver_for(tuple(x[n:].tolist()))
         found = solver.solve(x[:n])
         gradient = np.full((n + k, n + k), np.nan)
         gradient[:n, :n] = found.response_gradient
-        slopes = [s.at(found.state) if s is not None and found.converged else np.nan for s in self._slopes]
+        slopes = [
+            s.evaluate(found.state) if s is not None and found.converged else np.nan for s in self._slopes
+        ]
         return replace(
             found,
             ranges=self._problem.ranges,
@@ -299,23 +438,23 @@ class FamilySolver:
             reached=np.concatenate([found.reached, x[n:]]),
         )
 
-    def _of(self, values: tuple[float, ...]) -> SolidSolver:
+    def _solver_for(self, values: tuple[float, ...]) -> SolidSolver:
         if self._solver is None or values != self._values:
             self._solver = None  # at most one is open: each takes hundreds of megabytes
             member = self._problem.member(values)
             solver = member.open()
             self._slopes = [
-                _EnergySlope(solver, member.body, one, value) if one.is_material else None
-                for one, value in zip(self._problem.varied, values, strict=True)
+                _EnergySlope(solver, member.body, entry, value) if entry.is_material else None
+                for entry, value in zip(self._problem.varied, values, strict=True)
             ]
             self._solver, self._values = solver, values
         return self._solver
 
 
-def _both(one: tuple[FineMesh, ...], other: tuple[FineMesh, ...]) -> tuple[FineMesh, ...]:
-    """What satisfies two wishes for a fine mesh of one surface: the smaller elements, in a box around both."""
+def _both(first: tuple[FineMesh, ...], second: tuple[FineMesh, ...]) -> tuple[FineMesh, ...]:
+    """Return meshes that satisfy two wishes for each surface: the smaller elements, in a box around both."""
     found = []
-    for a, b in zip(one, other, strict=True):
+    for a, b in zip(first, second, strict=True):
         if a == b:  # wanted by what holds the body
             found.append(a)
             continue
@@ -333,13 +472,13 @@ class _EnergySlope:
         model = solver.model
         self._step = STEP * abs(value) or STEP
         free = np.zeros(model.field.size, dtype=bool)
-        ends = (varied.of(body, value - self._step), varied.of(body, value + self._step))
+        ends = (varied.apply(body, value - self._step), varied.apply(body, value + self._step))
         self._low, self._high = (
             System(model.field, material_energies(model.field, end.materials, {}), free, "") for end in ends
         )
         self._base = self._difference(model.base)
 
-    def at(self, z: np.ndarray) -> float:
+    def evaluate(self, z: np.ndarray) -> float:
         """∂U/∂p at the unknowns z (dof,) of an equilibrium."""
         return self._difference(z) - self._base
 

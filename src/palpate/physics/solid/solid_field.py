@@ -6,17 +6,47 @@ pressure of its own, so that it may jump between materials.
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from palpate.physics.shapes.mesh import BodyMesh
 from palpate.physics.shapes.naming import members, require_known
-from palpate.physics.solid.midsides import Middles
 
-__all__ = ["SolidField"]
+__all__ = [
+    "CORNERS",
+    "MIDDLES",
+    "MidSides",
+    "SolidField",
+]
+
+CORNERS = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]])  # of NGSolve's tetrahedron
+PAIRS = list(itertools.combinations(range(4), 2))
+MIDDLES = np.array([(CORNERS[i] + CORNERS[j]) / 2 for i, j in PAIRS])  # of its edges
+
+
+@dataclass(frozen=True, eq=False)
+class MidSides:
+    """Nodes in the middle of edges.
+
+    Attributes
+    ----------
+    edges : (m, 2) int array
+        Vertices that each lies between, the lower number first, in ascending order.
+    points : (m, 3) array
+        Places at rest in m; beside the straight edge where elements are curved.
+    displacement : (m, 3) array
+        In m.
+    """
+
+    edges: np.ndarray
+    points: np.ndarray
+    displacement: np.ndarray
 
 
 class SolidField:
@@ -60,7 +90,6 @@ class SolidField:
         self.pressure = dict(zip(mixed, parts[1:], strict=True))
         self.base = ngsolve.GridFunction(motion)
         self.motion_size = int(motion.ndof)
-        self.middles = Middles(self)
         self.free = np.fromiter(self.space.FreeDofs(), dtype=bool, count=self.space.ndof)
 
     @property
@@ -123,6 +152,25 @@ class SolidField:
         form += integrand(self.base.space.TestFunction())
         form.Assemble()
         return self._embedded(form.vec.FV().NumPy())
+
+    def mid_sides(self) -> MidSides:
+        """Return the middles of edges, displaced as the field is."""
+        edges, places, points = self._middles
+        return MidSides(edges, points, np.asarray(self.displacement(places)))
+
+    @cached_property
+    def _middles(self) -> tuple[np.ndarray, Any, np.ndarray]:
+        """Edges (m, 2), NGSolve's mapped points in their middles, and these places (m, 3) in m."""
+        import ngsolve
+
+        rule = ngsolve.IntegrationRule(points=[tuple(m) for m in MIDDLES], weights=[1 / 36] * 6)
+        mapped = self.mesh.MapToAllElements(rule, self.mesh.Materials(".*"))
+        nodes = self.mesh.ngmesh.Elements3D().NumPy()["nodes"][:, :4].astype(np.int64) - 1
+        ends = np.sort(nodes[:, PAIRS].reshape(-1, 2), axis=1)
+        edges, first = np.unique(ends, axis=0, return_index=True)
+        places = mapped[first]
+        points = np.asarray(ngsolve.CF((ngsolve.x, ngsolve.y, ngsolve.z))(places))
+        return edges, places, points
 
     def _embedded(self, motion: np.ndarray) -> np.ndarray:
         unknowns = np.zeros(self.size)

@@ -1,30 +1,43 @@
-"""What a body is made of, checked when it is made."""
+"""Checks of a body, its parts and its inputs, with hints on mistaken units."""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from numbers import Integral
 from typing import Any
 
+import numpy as np
+
+from palpate import checks
 from palpate.errors import UsageError
 from palpate.physics.advice import advise
-from palpate.physics.interactions.interaction import Held, Interaction
+from palpate.physics.interactions.interaction import Fixed, Interaction
 from palpate.physics.shapes.naming import members, require_known
+from palpate.units import Range, bounds
 
 __all__ = [
     "advise_on_modulus",
     "by_region",
+    "longest_side",
+    "require_element",
+    "require_finite",
     "require_geometry",
     "require_held_values",
+    "require_lengths",
+    "require_near",
     "require_order",
     "require_weight",
     "surfaces_of",
 ]
 
-SOFTEST = (
-    50.0  # Pa: tissue by its number of kPa is mostly below, the softest gels that keep a shape are above
-)
+# Pa: tissue by its number of kPa is mostly below, the softest gels that keep a shape are above
+SOFTEST = 50.0
+# radius over the body's longest side: larger spheres are flat, millimetres taken for metres larger
+FLATTEST = 20.0
+# lengths of interactions in m, and how many times the body's longest side they may be
+LENGTHS = {"radius": FLATTEST, "depth": 1.0, "stop": 1.0, "displacement": 1.0, "element": 1.0}
 GEOMETRY = ("surfaces", "regions", "mesh", "rest", "describe")
 MATERIAL = ("poisson", "density", "kinematics", "states", "volumetric", "energy", "advance", "describe")
 
@@ -96,7 +109,7 @@ def by_region(
     return tuple((region, given[region]) for region in regions)
 
 
-def require_held_values(given: Any) -> tuple[Held, ...]:
+def require_held_values(given: Any) -> tuple[Fixed, ...]:
     """Interactions that always act, each with its inputs.
 
     Raises
@@ -106,15 +119,15 @@ def require_held_values(given: Any) -> tuple[Held, ...]:
     """
     parts = tuple(given) if isinstance(given, tuple | list) else (given,)
     for part in parts:
-        if isinstance(part, Held):
+        if isinstance(part, Fixed):
             continue
         raise UsageError(
             f"{part} is held by the body without inputs."
             if isinstance(part, Interaction)
             else f"{part!r} is held.",
             why="What always acts is an interaction with the values of its inputs.",
-            fix="Wrap it: held=Held(interaction, values), for example "
-            'Held(PrescribedDisplacement("top", "z", (-0.01, 0.0)), -0.004).',
+            fix="Wrap it: held=Fixed(interaction, values), for example "
+            'Fixed(PrescribedDisplacement("top", "z", (-0.01, 0.0)), -0.004).',
         )
     return parts
 
@@ -180,3 +193,103 @@ def _lacks(thing: Any, names: tuple[str, ...]) -> bool:
     """Whether a member is missing; none is evaluated, for a file would be read."""
     nothing = object()
     return any(inspect.getattr_static(thing, name, nothing) is nothing for name in names)
+
+
+def longest_side(geometry: Any) -> float:
+    """The body's longest side in m."""
+    size = getattr(geometry, "size", None)
+    if size is None:
+        low, high = geometry.rest().corners
+        size = high - low
+    return float(np.max(size))
+
+
+def require_lengths(interaction: Any, longest: float) -> None:
+    """Refuse an interaction with a length that the body's longest side in m leaves no room for.
+
+    Raises
+    ------
+    UsageError
+        With the length and a hint on units.
+    """
+    for what, share in LENGTHS.items():
+        for length in _numbers(getattr(interaction, what, None)):
+            if abs(length) > share * longest:
+                raise _too_long(f"The {what} of the {_kind(interaction)}", length, longest)
+
+
+def require_element(element: Any, longest: float) -> None:
+    """Refuse an element size that is not positive, or larger than the body.
+
+    Raises
+    ------
+    UsageError
+        With a hint on units.
+    """
+    checks.positive("The element size of a problem", element, "m")
+    if element > longest:
+        raise _too_long("The element size of the problem", element, longest)
+
+
+def require_finite(values: np.ndarray, ranges: Sequence[Range]) -> None:
+    """Refuse inputs (n,) that are no finite numbers.
+
+    Raises
+    ------
+    UsageError
+        With the first one's name.
+    """
+    for value, given in zip(values.tolist(), ranges, strict=True):
+        if not math.isfinite(value):
+            raise UsageError(
+                f"The input {given.name} is {value}.",
+                why="It is no finite number: often the outcome of a division by zero, or a gap in a table.",
+                fix=f"Pass finite numbers; the range of {given.name} is {given.low:.4g} … {given.high:.4g} "
+                f"{given.unit}".rstrip()
+                + ".",
+            )
+
+
+def require_near(points: np.ndarray, ranges: Sequence[Range], longest: float) -> None:
+    """Refuse inputs (N, n) in m that are farther from their ranges than the body is long.
+
+    Raises
+    ------
+    UsageError
+        With the input and a hint on units.
+    """
+    low, high = bounds(ranges)
+    beyond = np.maximum(low - points, points - high)
+    beyond[:, [r.unit != "m" for r in ranges]] = 0.0
+    beyond[~np.isfinite(beyond)] = 0.0  # what is no number is refused by its name
+    if not beyond.size or beyond.max() <= longest:
+        return
+    row, column = divmod(int(np.argmax(beyond)), len(ranges))
+    given = ranges[column]
+    raise UsageError(
+        f"The input {given.name} is {points[row, column]:g} m, far from the body.",
+        why=f"Its range is {given.low:.4g} … {given.high:.4g} m, the body's longest side "
+        f"{longest:.4g} m: out there nothing touches.",
+        fix="Lengths are in m: pass 0.030 for 30 mm.",
+    )
+
+
+def _numbers(value: Any) -> Iterator[float]:
+    """The numbers in a value, a range or several of them."""
+    if isinstance(value, int | float):
+        yield float(value)
+    elif isinstance(value, tuple | list):
+        for part in value:
+            yield from _numbers(part)
+
+
+def _kind(interaction: Any) -> str:
+    return type(interaction).__name__
+
+
+def _too_long(what: str, length: float, longest: float) -> UsageError:
+    return UsageError(
+        f"{what} is {length:g} m, the body's longest side {longest:.4g} m.",
+        why="That is out of all proportion to the body.",
+        fix="Lengths are in m: pass 0.010 for 10 mm.",
+    )

@@ -19,7 +19,7 @@ from palpate.physics.shapes.naming import members
 from palpate.physics.shapes.shape import NO_ISOMETRIES, Isometry
 
 if TYPE_CHECKING:
-    from palpate.physics.solid.body import Body
+    from palpate.physics.solid.solid_body import Body
 
 __all__ = ["Symmetry", "fundamental_part", "symmetry_of"]
 

@@ -18,10 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.physics.solid.system import System
+from palpate.physics.solid.solid_system import System
 from palpate.physics.stop import Stop
 
-__all__ = ["Found", "Scale", "equilibrate", "error_at"]
+__all__ = ["NewtonResult", "Scale", "equilibrate", "error_at"]
 
 ARMIJO = 1e-4  # share of the predicted decrease that a step must bring
 SMALLEST = 2.0**-6
@@ -58,7 +58,7 @@ def _error(
 
 
 @dataclass(frozen=True)
-class Found:
+class NewtonResult:
     """Where the iteration ended.
 
     Attributes
@@ -100,7 +100,7 @@ class _Point:
 
 def equilibrate(
     system: System, start: np.ndarray, scale: Scale, tolerance: float, limit: int, *, fresh: bool = True
-) -> Found:
+) -> NewtonResult:
     """Find the equilibrium near `start`.
 
     Parameters
@@ -118,7 +118,7 @@ def equilibrate(
 
     Returns
     -------
-    Found
+    NewtonResult
         Never raises for want of convergence: `stop` says how it ended.
     """
     return _Iteration(system, scale, tolerance).run(start, limit, fresh=fresh)
@@ -132,7 +132,7 @@ class _Iteration:
         self._chords = self._cuts = self._iterations = 0
         self._rejected: np.ndarray | None = None
 
-    def run(self, start: np.ndarray, limit: int, *, fresh: bool) -> Found:
+    def run(self, start: np.ndarray, limit: int, *, fresh: bool) -> NewtonResult:
         potential = self._system.potential(start)
         if not math.isfinite(potential):
             self._rejected = start
@@ -227,5 +227,5 @@ class _Iteration:
         error = _error(self._system, self._scale, point.residual, correction, point.potential)
         return _Point(point.z, point.potential, point.residual, correction, error)
 
-    def _end(self, z: np.ndarray, stop: Stop, error: float) -> Found:
-        return Found(z, stop, self._iterations, error, self._chords, self._cuts, self._rejected)
+    def _end(self, z: np.ndarray, stop: Stop, error: float) -> NewtonResult:
+        return NewtonResult(z, stop, self._iterations, error, self._chords, self._cuts, self._rejected)

@@ -16,8 +16,8 @@ from palpate.units import Range
 
 if TYPE_CHECKING:
     from palpate.physics.interactions.sphere import SphereProbe
-    from palpate.physics.solid.midsides import MidSides
-    from palpate.physics.solid.path import LoadStep
+    from palpate.physics.solid.solid_field import MidSides
+    from palpate.physics.solid.solid_path import LoadStep
 
 __all__ = ["SolidSolution"]
 

@@ -18,21 +18,42 @@ from typing import Any
 import numpy as np
 
 from palpate.physics.interactions.interaction import BEYOND, Field
-from palpate.physics.interactions.pad_law import REACH, pressed_energy
-from palpate.physics.interactions.patch import Patch, winding_number
+from palpate.physics.interactions.surface_patch import Patch, winding_number
 from palpate.physics.shapes.mesh import BodyMesh
 from palpate.physics.stop import Stop, Verdict
 
-__all__ = ["Contact", "pad_energy"]
+__all__ = [
+    "REACH",
+    "Contact",
+    "pad_energy",
+    "pressed_energy",
+]
 
+REACH = 0.98  # share of the stop up to which states are admissible
 BONUS = 6  # orders of quadrature beyond the elements' own: contact has an edge within elements
 WAY = 0.05  # distance over the radius at which a way is looked at
 TINY = 1e-9  # m; keeps the distance to the sphere's centre differentiable
 FACING_AWAY = -0.1  # cosine; less than a right angle by more than a fold of the surface takes
 
 
+def pressed_energy(penetration: Any, pad: float, stop: float | None) -> Any:
+    """Return φ(p) = ½ k p²/(1 − p/p_m) in J/m² for 0 ≤ p < p_m.
+
+    Parameters
+    ----------
+    penetration : number, array or ngsolve.CoefficientFunction
+        p in m.
+    pad : float
+        k in N/m³.
+    stop : float or None
+        p_m in m; None, or infinity, for a pad without a stop.
+    """
+    spring = pad / 2 * penetration**2
+    return spring if stop is None else spring / (1 - penetration / stop)
+
+
 def pad_energy(penetration: Any, pad: float, stop: float | None) -> Any:
-    """φ(p) in J/m² as an NGSolve coefficient function.
+    """Return φ(p) in J/m² as an NGSolve coefficient function.
 
     Parameters
     ----------
@@ -58,13 +79,15 @@ class Contact:
     Attributes
     ----------
     field : Field
+        Displacement of the body.
     mesh : BodyMesh
-        Of the body, its nodes those of the field's mesh.
+        The body at rest, its nodes those of the field's mesh.
     surface : str
+        Name of the surface.
     radius : float
-        In m.
+        R in m.
     stop : float or None
-        In m.
+        p_m in m; None for a pad without a stop.
     """
 
     field: Field
@@ -74,20 +97,20 @@ class Contact:
     stop: float | None
 
     def measure(self) -> Any:
-        """The surface's differential symbol."""
+        """Return the surface's differential symbol."""
         import ngsolve
 
         return ngsolve.ds(definedon=self.field.surface(self.surface), bonus_intorder=BONUS)
 
     def penetration(self, displacement: Any, centre: Any) -> Any:
-        """P = R - |X + u - c| as a coefficient function, positive in contact."""
+        """Return p = R - |X + u - c| as a coefficient function, positive in contact."""
         import ngsolve as ngs
 
         to_surface = ngs.CF((ngs.x, ngs.y, ngs.z)) + displacement - centre
         return self.radius - ngs.sqrt(ngs.InnerProduct(to_surface, to_surface) + TINY**2)
 
     def inspect(self, centre: np.ndarray) -> Verdict:
-        """Whether the state in `field.displacement` is one that a sphere at (3,) m can be in.
+        """Return a verdict on the state in `field.displacement` under a sphere at (3,) m.
 
         The surface must not be pressed past the pad's stop; where it is pressed it must face the centre, so that
         the pad pushes and never pulls; and the centre must be outside the deformed body.
@@ -109,31 +132,31 @@ class Contact:
         return Verdict(figures=figures)
 
     def overlap(self, centre: np.ndarray) -> float:
-        """How far in m a sphere at (3,) m is in the surface under the constant loads alone; negative outside."""
+        """Return the depth in m of a sphere at (3,) m in the surface in its base state; negative outside."""
         return float(self.radius - np.linalg.norm(self._places - centre, axis=1).min())
 
-    def meets_held(self, outside: np.ndarray, centre: np.ndarray) -> bool:
-        """Whether a sphere on its way from `outside` (3,) to `centre` (3,) in m must overlap what is held.
+    def meets_fixed_part(self, outside: np.ndarray, centre: np.ndarray) -> bool:
+        """Return whether a sphere on its way from `outside` (3,) to `centre` (3,) in m must overlap a fixed surface.
 
         A fixed surface stays where it is, so the body reaches up to it. A sphere on the body's side of it that is
         nearer than its radius less what the pad yields would have the body pressed past the stop.
         """
-        if self.stop is None or self._held is None:
+        if self.stop is None or self._fixed_part is None:
             return False
         reach = self.radius - self.stop
         count = max(2, int(np.ceil(np.linalg.norm(centre - outside) / (WAY * self.radius))) + 1)
         way = outside + np.linspace(0, 1, count)[:, None] * (centre - outside)
-        low, high = self._held.box
+        low, high = self._fixed_part.box
         near = (way > low - reach).all(axis=1) & (way < high + reach).all(axis=1)
-        return any(-reach < self._held.nearest(place)[2] < 0 for place in way[near])
+        return any(-reach < self._fixed_part.nearest(place)[2] < 0 for place in way[near])
 
     @cached_property
-    def _held(self) -> Patch | None:
+    def _fixed_part(self) -> Patch | None:
         """The fixed part of the body's surface."""
         count = len(self.mesh.points)
         fixed = ~np.fromiter(self.field.space.FreeDofs(), dtype=bool, count=self.field.size)[:count]
-        held = fixed[self.mesh.triangles].all(axis=1)
-        return Patch(self.mesh.points, self.mesh.triangles[held]) if held.any() else None
+        whole = fixed[self.mesh.triangles].all(axis=1)
+        return Patch(self.mesh.points, self.mesh.triangles[whole]) if whole.any() else None
 
     @cached_property
     def _places(self) -> np.ndarray:
@@ -143,7 +166,7 @@ class Contact:
         return np.asarray((ngs.CF((ngs.x, ngs.y, ngs.z)) + self.field.base)(self._points()))
 
     def _deformed(self) -> tuple[np.ndarray, np.ndarray]:
-        """Positions (N, 3) in m and outward unit normals (N, 3) of the deformed surface."""
+        """Return positions (N, 3) in m and outward unit normals (N, 3) of the deformed surface."""
         import ngsolve as ngs
 
         points = self._points()

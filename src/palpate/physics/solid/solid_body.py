@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
+from palpate import checks
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_choice, require_positive
-from palpate.physics.interactions.interaction import Held, Interaction
+from palpate.physics.interactions.interaction import Fixed, Interaction
 from palpate.physics.shapes.naming import require_triple
-from palpate.physics.solid.parts import (
+from palpate.physics.solid.solid_checks import (
     advise_on_modulus,
     by_region,
     require_geometry,
@@ -25,7 +25,7 @@ from palpate.physics.words import number
 if TYPE_CHECKING:
     from palpate.physics.materials.material import Material
     from palpate.physics.shapes.shape import Geometry
-    from palpate.physics.solid.problem import SolidProblem
+    from palpate.physics.solid.solid_problem import SolidProblem
 
 __all__ = ["Body", "Formulation"]
 
@@ -51,7 +51,7 @@ class Body:
         Surfaces whose displacement is zero.
     gravity : (3,) tuple
         Acceleration in m/s² that acts on the material's density.
-    held : tuple of Held
+    held : tuple of Fixed
         Interactions that always act, with their inputs: pre-stress, and supports that slide (`roller`).
     formulation : {"auto", "displacement", "mixed"}
         ``"auto"`` takes the mixed form in regions whose initial Poisson's ratio is 0.48 or more and whose
@@ -76,7 +76,7 @@ class Body:
     material: Any
     fixed: Any = "bottom"
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    held: tuple[Held, ...] = ()
+    held: tuple[Fixed, ...] = ()
     formulation: Formulation = "auto"
     order: int = 2
     strain_limit: float = 0.5
@@ -91,9 +91,9 @@ class Body:
         if any(self.gravity):
             require_weight(self.materials)
         require_order(self.order)
-        require_choice("The formulation of a body", self.formulation, get_args(Formulation))
-        require_positive("The strain limit of a body", self.strain_limit, "")
-        require_positive("The error of a step", self.step_error, "", infinite=True)
+        checks.one_of("The formulation of a body", self.formulation, get_args(Formulation))
+        checks.positive("The strain limit of a body", self.strain_limit, "")
+        checks.positive("The error of a step", self.step_error, "", infinite=True)
         for region, material in self.materials.items():
             self.formulation_of(region)
             advise_on_modulus(region, material)
@@ -182,7 +182,7 @@ class Body:
         UsageError
             For what is no interaction, or lengths that are larger than the body.
         """
-        from palpate.physics.solid.problem import SolidProblem
+        from palpate.physics.solid.solid_problem import SolidProblem
 
         return SolidProblem(self, _flat(interactions), element, stress)
 

@@ -10,30 +10,30 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate import checks
 from palpate.dataset import Field, Layout, solid_fields
 from palpate.errors import UsageError
-from palpate.physics.arguments import require_positive
-from palpate.physics.interactions.estimate import advise_on_pad
 from palpate.physics.interactions.glued import GluedPad
 from palpate.physics.interactions.interaction import Interaction, Planned
+from palpate.physics.interactions.pads import advise_on_pad
 from palpate.physics.interactions.sphere import SphereProbe
 from palpate.physics.shapes.naming import require_known
-from palpate.physics.solid.lengths import (
+from palpate.physics.solid.body_symmetry import symmetry_of
+from palpate.physics.solid.solid_checks import (
     longest_side,
     require_element,
     require_finite,
     require_lengths,
     require_near,
 )
-from palpate.physics.solid.symmetry import symmetry_of
 from palpate.units import Range
 
 if TYPE_CHECKING:
     from palpate.physics.shapes.mesh import BodyMesh
     from palpate.physics.shapes.meshing import FineMesh
-    from palpate.physics.solid.body import Body
-    from palpate.physics.solid.solution import SolidSolution
-    from palpate.physics.solid.solver import SolidSolver
+    from palpate.physics.solid.solid_body import Body
+    from palpate.physics.solid.solid_solution import SolidSolution
+    from palpate.physics.solid.solid_solver import SolidSolver
 
 __all__ = ["SolidProblem"]
 
@@ -191,14 +191,14 @@ class SolidProblem:
         SolverError
             If the body has no equilibrium under its constant loads.
         """
-        require_positive("The tolerance of a solver", tolerance, "")
+        checks.positive("The tolerance of a solver", tolerance, "")
         if tolerance >= 1:
             raise UsageError(
                 f"The tolerance of a solver is {tolerance:g}.",
                 why="It is a relative error: at 1 anything would do.",
                 fix="Leave it out for 1e-9, or pass a number such as 1e-6.",
             )
-        from palpate.physics.solid.solver import SolidSolver
+        from palpate.physics.solid.solid_solver import SolidSolver
 
         return SolidSolver(self, solver=solver, tolerance=tolerance)
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.physics.solid.density import cauchy_stress, deformation_gradient, mixed_density, volume_rule
-from palpate.physics.solid.midsides import CORNERS, MIDDLES
+from palpate.physics.solid.solid_energy import cauchy_stress, deformation_gradient, mixed_density, volume_rule
+from palpate.physics.solid.solid_field import CORNERS, MIDDLES
 
 if TYPE_CHECKING:
     from palpate.physics.materials.material import Material
-    from palpate.physics.solid.field import SolidField
-    from palpate.physics.solid.history import History
+    from palpate.physics.solid.solid_energy import History
+    from palpate.physics.solid.solid_field import SolidField
 
 __all__ = ["Measures"]
 

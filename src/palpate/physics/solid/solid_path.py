@@ -1,0 +1,373 @@
+"""Following an equilibrium along a straight line of inputs, in steps that adapt themselves.
+
+Prediction. The factorised tangent gives z + z' h + ½ z'' h², with z'' from the last two derivatives where the path goes
+straight on. Where that is not admissible, or worse than staying, less of it is taken.
+
+Error in time. Plastic and viscous flow in a step depend on its length. So the step of a body with a history is taken
+once whole and once in two halves; the difference of the two responses is the error that the step is judged by (Hairer,
+Nørsett & Wanner 1993, Solving Ordinary Differential Equations I, II.4), and the halves are the result.
+
+Length. Steps grow and shrink with the iterations that they take and, for bodies with a history, with their error in
+time.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from palpate.physics.stop import Stop, Verdict
+
+if TYPE_CHECKING:
+    from palpate.physics.solid.solid_model import SolidModel
+    from palpate.physics.solid.solid_newton import NewtonResult
+
+__all__ = [
+    "LoadStep",
+    "PathPoint",
+    "PathResult",
+    "StepResult",
+    "follow",
+    "predict",
+    "take_step",
+]
+
+STRAIGHT = 0.999  # cosine from which on two steps are on one line
+SMALLEST_STEP = 2.0**-10  # of the whole path
+# Where equilibria are found but lie beyond a law's reach, shorter steps find them too
+SMALLEST_REFUSED = 2.0**-4
+# Where a step errs too much in time: the first moments of a long creep may be short
+SMALLEST_IN_TIME = 2.0**-30
+# Of steps that led nowhere, and of all where nothing is remembered: bounds the time that pointless inputs cost
+MOST_ITERATIONS = 200
+MOST_STEPS = 400  # a body that flows without end, near collapse, is followed in ever shorter steps
+EASY, HARD = 3, 6  # factorisations of a search up to which steps grow, beyond which they shrink
+GROWTH, SHRINKAGE = 1.6, 0.7
+LONGEST, SHORTEST, SAFETY = 4.0, 0.2, 0.8  # factors of the next step that the error in time allows
+
+logger = logging.getLogger("palpate.physics.solid")  # progress, for those who ask for it
+
+
+@dataclass(frozen=True)
+class PathPoint:
+    """An equilibrium on a path.
+
+    Attributes
+    ----------
+    q : (n,) array
+        Its inputs.
+    z : (dof,) array
+        Its unknowns.
+    slope : (n, dof) array or None
+        About ∂z/∂q; None where it is not known yet.
+    previous : PathPoint or None
+        The equilibrium from which it was reached.
+    """
+
+    q: np.ndarray
+    z: np.ndarray
+    slope: np.ndarray | None = None
+    previous: PathPoint | None = None
+
+    def without_previous(self) -> PathPoint:
+        """Return the equilibrium without the one before it, so that chains don't pile up in memory."""
+        return replace(self, previous=None)
+
+
+def predict(model: SolidModel, here: PathPoint, q: np.ndarray) -> np.ndarray:
+    """Return the best admissible guess of the equilibrium under inputs q (n,).
+
+    In displacement form that is the guess of the least energy. In mixed form, where an equilibrium is a saddle of the
+    energy, it is the guess whose residual is least, measured by the present tangent.
+    """
+    model.set(q)
+    best = model.impose(here.z, q)
+    if here.slope is None or (model.histories and _turns_back(here, q)):
+        return best
+    least = _badness(model, best)
+    for guess in _extrapolated(here, q):
+        guess = model.impose(guess, q)
+        badness = _badness(model, guess)
+        if badness < least or not np.isfinite(least):
+            best, least = guess, badness
+    return best
+
+
+def _turns_back(here: PathPoint, q: np.ndarray) -> bool:
+    """Return whether the way to q (n,) leads back: what has yielded then answers as it did before it yielded."""
+    return here.previous is not None and float((here.q - here.previous.q) @ (q - here.q)) < 0
+
+
+def _badness(model: SolidModel, guess: np.ndarray) -> float:
+    """Return a measure of a guess, the lower the better; infinite where the guess is not admissible."""
+    potential = model.system.potential(guess)
+    if not np.isfinite(potential):
+        return np.inf
+    if not model.system.saddle:
+        return potential
+    return model.error(guess) if model.has_tangent else 0.0
+
+
+def _extrapolated(here: PathPoint, q: np.ndarray) -> Iterator[np.ndarray]:
+    """Yield extrapolations from the boldest to the most timid."""
+    ahead = q - here.q
+    assert here.slope is not None  # only a state with a slope is extrapolated
+    first = ahead @ here.slope
+    bend = _bend(here, ahead)
+    if bend is not None:
+        yield here.z + first + bend
+    for share in (1.0, 0.5, 0.25):
+        yield here.z + share * first
+
+
+def _bend(here: PathPoint, ahead: np.ndarray) -> np.ndarray | None:
+    """Return ½ z'' h² from the change of slope in the last step, if the path goes straight on."""
+    previous = here.previous
+    if previous is None or previous.slope is None or here.slope is None:
+        return None
+    taken = here.q - previous.q
+    lengths = float(np.linalg.norm(taken)), float(np.linalg.norm(ahead))
+    if min(lengths) == 0 or taken @ ahead < STRAIGHT * lengths[0] * lengths[1]:
+        return None
+    ratio = min(lengths[1] / lengths[0], 2.0)
+    change: np.ndarray = ahead @ (here.slope - previous.slope)
+    return ratio / 2 * change
+
+
+@dataclass(frozen=True, eq=False)
+class StepResult:
+    """The result of one tried step.
+
+    Attributes
+    ----------
+    z : (dof,) array
+        Unknowns at its end.
+    verdict : Verdict
+        Whether its end is admissible, and why not.
+    searches : tuple of NewtonResult
+        The searches that it took: one, or those of the whole step and its halves.
+    error : float
+        Error in time over the tolerated one.
+    """
+
+    z: np.ndarray
+    verdict: Verdict
+    searches: tuple[NewtonResult, ...]
+    error: float = 0.0
+
+    @property
+    def good(self) -> bool:
+        """Whether the step counts."""
+        return self.verdict.stop is Stop.CONVERGED and self.error <= 1.0
+
+
+def take_step(model: SolidModel, here: PathPoint, q: np.ndarray, share: float) -> StepResult:
+    """Take a step from an equilibrium to inputs q (n,) in a share of the path's duration.
+
+    Afterwards the model is in the last half of the step, its internal variables those at the beginning of that half.
+    """
+    whole = _single(model, here, q, share)
+    if not model.histories or whole.verdict.stop is not Stop.CONVERGED or np.isinf(model.step_error):
+        return whole
+    expected = model.response(whole.z)
+    middle = (here.q + q) / 2
+    model.begin(share / 2)
+    first = model.search(middle, model.impose((here.z + whole.z) / 2, middle))
+    if first.stop is not Stop.CONVERGED:
+        return StepResult(first.z, model.explain(first, middle), (*whole.searches, first))
+    model.commit(first.z)
+    model.begin(share / 2)
+    second = model.search(q, whole.z)
+    searches = (*whole.searches, first, second)
+    verdict = _verdict(model, second, q)
+    if verdict.stop is not Stop.CONVERGED:
+        return StepResult(second.z, verdict, searches)
+    return StepResult(second.z, verdict, searches, model.step_mismatch(expected, model.response(second.z)))
+
+
+def _single(model: SolidModel, here: PathPoint, q: np.ndarray, share: float) -> StepResult:
+    """Take the step in one go."""
+    model.begin(share)
+    back = bool(model.histories) and _turns_back(here, q)
+    end = model.search(q, predict(model, here, q), fresh=back)
+    return StepResult(end.z, _verdict(model, end, q), (end,))
+
+
+def _verdict(model: SolidModel, end: NewtonResult, q: np.ndarray) -> Verdict:
+    return model.judge(end.z, q) if end.stop is Stop.CONVERGED else model.explain(end, q)
+
+
+@dataclass(frozen=True)
+class LoadStep:
+    """One tried step along a path.
+
+    Attributes
+    ----------
+    position : float
+        Share of the path at its end.
+    step : float
+        Its length as a share of the path.
+    stop : Stop
+        Why its search ended; the step counts only if it converged.
+    iterations : int
+        Newton iterations: tangents assembled and factorised.
+    chords : int
+        Cheap steps with a tangent used before.
+    residual : float
+        √(|rᵀK⁻¹r|/energy) before the last correction.
+    cuts : int
+        Halvings in the line search.
+    error : float
+        Error in time over the tolerated one: a step counts only if it is at most 1. 0 without a history.
+    """
+
+    position: float
+    step: float
+    stop: Stop
+    iterations: int
+    chords: int
+    residual: float
+    cuts: int
+    error: float = 0.0
+
+    def __str__(self) -> str:
+        failed = "" if self.stop is Stop.CONVERGED else f", cut back: {self.stop}"
+        late = ", cut back: it errs too much in time" if not failed and self.error > 1 else ""
+        return (
+            f"load step to {self.position:.1%} of the path, {self.iterations} Newton iterations{failed}{late}"
+        )
+
+
+@dataclass(frozen=True)
+class PathResult:
+    """The end of a path: the last equilibrium, the verdict and the steps."""
+
+    last: PathPoint
+    verdict: Verdict
+    log: tuple[LoadStep, ...]
+
+    @property
+    def iterations(self) -> int:
+        """Newton iterations over all steps, also those that failed."""
+        return sum(step.iterations for step in self.log)
+
+    @property
+    def chords(self) -> int:
+        """Steps with a tangent used before, over all steps of the path."""
+        return sum(step.chords for step in self.log)
+
+
+def follow(model: SolidModel, start: PathPoint, target: np.ndarray) -> PathResult:
+    """Follow the equilibrium from `start` along a straight line of inputs to `target` (n,).
+
+    Internal variables are taken over after each step but the last: what belongs to the last one can then still be
+    asked of the model.
+
+    Parameters
+    ----------
+    model : SolidModel
+        Equations of the body; afterwards they are at the end of the path.
+    start : PathPoint
+        Equilibrium at the beginning of the path.
+    target : (n,) array
+        Inputs at its end.
+
+    Returns
+    -------
+    PathResult
+        With `Stop.CONVERGED` where it arrived, else with the reason and the last equilibrium before it.
+    """
+    here, position, log = _with_slope(model, start), 0.0, list[LoadStep]()
+    length = model.distance(start.q, target)
+    step = min(1.0, model.first_step() / length) if length > 0 else 1.0
+    while True:
+        end = _step_end(position, step)
+        q = start.q + end * (target - start.q) if end < 1.0 else target
+        before = model.snapshot()
+        tried = take_step(model, here, q, end - position)
+        log.append(_record(end, end - position, tried))
+        logger.info("%s", log[-1])
+        if len(log) == 1 and here is not start:
+            log[0] = replace(log[0], iterations=log[0].iterations + 1)  # the tangent that gave the slope
+        if tried.good:
+            if end == 1.0:
+                return PathResult(
+                    PathPoint(q, tried.z, None, here.without_previous()), tried.verdict, tuple(log)
+                )
+            here = PathPoint(q, tried.z, model.sensitivity(tried.z), here.without_previous())
+            model.commit(tried.z)
+            step = (end - position) * _pace(tried)
+            position = end
+        else:
+            model.restore(before)
+            step = (end - position) * min(_growth_in_time(tried.error), 0.5)
+        if step < _smallest(tried) or _spent(model, log) >= MOST_ITERATIONS or len(log) >= MOST_STEPS:
+            return PathResult(here, _given_up(tried, _spent(model, log), len(log)), tuple(log))
+
+
+def _with_slope(model: SolidModel, start: PathPoint) -> PathPoint:
+    """Return the start with its slope where inputs move a part of the body, which alone would turn elements over."""
+    if start.slope is not None or not model.inputs.lifts.any():
+        return start
+    model.begin(0.0)
+    return replace(start, slope=model.fresh_sensitivity(start.z, start.q))
+
+
+def _step_end(position: float, step: float) -> float:
+    """Return the end of a step, the path's own where little would be left of it."""
+    end = position + step
+    return 1.0 if end > 1.0 - 0.25 * step else end
+
+
+def _pace(tried: StepResult) -> float:
+    """Return the factor by which the next step is longer."""
+    hardest = max(search.iterations for search in tried.searches)
+    easy = GROWTH if hardest <= EASY else SHRINKAGE if hardest > HARD else 1.0
+    return min(easy, _growth_in_time(tried.error)) if tried.error > 0 else easy
+
+
+def _growth_in_time(error: float) -> float:
+    """Return the factor that an error in time allows, which goes at least with the square of the step."""
+    return float(np.clip(SAFETY / np.sqrt(max(error, 1e-9)), SHORTEST, LONGEST))
+
+
+def _smallest(tried: StepResult) -> float:
+    """Return the shortest step that is worth while after this one."""
+    if tried.verdict.stop is Stop.STRAIN_LIMIT:
+        return SMALLEST_REFUSED
+    return SMALLEST_IN_TIME if tried.verdict.stop is Stop.CONVERGED and tried.error > 0 else SMALLEST_STEP
+
+
+def _spent(model: SolidModel, log: list[LoadStep]) -> int:
+    """Return the iterations that count against the limit."""
+    counted = (entry for entry in log if not model.histories or entry.stop is not Stop.CONVERGED)
+    return sum(entry.iterations for entry in counted)
+
+
+def _given_up(last: StepResult, spent: int, steps: int) -> Verdict:
+    """Return the verdict on a path that ends before its target: never that of a good step on the way."""
+    if last.verdict.stop is not Stop.CONVERGED:
+        return last.verdict
+    if spent >= MOST_ITERATIONS:
+        return Verdict(Stop.ITERATION_LIMIT, f"{spent} iterations along the path")
+    if steps >= MOST_STEPS:
+        return Verdict(Stop.ITERATION_LIMIT, f"{steps} steps along the path")
+    return Verdict(Stop.STEP_TOO_SMALL)
+
+
+def _record(end: float, step: float, tried: StepResult) -> LoadStep:
+    searches = tried.searches
+    return LoadStep(
+        position=end,
+        step=step,
+        stop=tried.verdict.stop,
+        iterations=sum(search.iterations for search in searches),
+        chords=sum(search.chords for search in searches),
+        residual=searches[-1].error,
+        cuts=sum(search.cuts for search in searches),
+        error=tried.error,
+    )

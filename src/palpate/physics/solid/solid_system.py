@@ -1,0 +1,288 @@
+"""Equations of an opened body: energy, residual, factorised tangent, and derivatives in the inputs.
+
+`System` is Π(z) = ∫ φ(z) - l·z and its derivatives. `is_accurate` and `is_stable` look at a factorised tangent.
+
+`Inputs` gives the response of an interaction, -∂U/∂q, and its change with the inputs. For Π(z; q) with
+z = z_free + z_base + Σ qᵢ Lᵢ on given unknowns, by the envelope theorem
+
+    ∂U/∂qᵢ = ∂Π/∂qᵢ + Lᵢ · ∂Π/∂z,
+    ∂²U/∂qᵢ∂qⱼ = Dᵢⱼ - Bᵢᵀ K⁻¹ Bⱼ,   Bᵢ = ∂²Π/∂z∂qᵢ + K Lᵢ,
+    Dᵢⱼ = ∂²Π/∂qᵢ∂qⱼ + Lᵢ · ∂²Π/∂z∂qⱼ + Lⱼ · ∂²Π/∂z∂qᵢ + Lᵢ · K Lⱼ,
+
+and the states follow the inputs with ∂z/∂qᵢ = Lᵢ - K⁻¹ Bᵢ. The derivatives of densities in their parameters are
+taken symbolically.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.physics.interactions.interaction import BEYOND, Attached, Energy
+from palpate.physics.solid.solid_field import SolidField
+
+__all__ = [
+    "Inputs",
+    "System",
+    "is_accurate",
+    "is_stable",
+    "sparse_solver",
+]
+
+STEPS = 6  # Lanczos steps: each costs a back-substitution
+ACCURATE = 1e-6  # relative residual of a back-substitution
+SOLVERS = ("auto", "sparsecholesky", "pardiso", "umfpack")
+
+
+class System:
+    """Π(z) and its derivatives on the free unknowns.
+
+    Parameters
+    ----------
+    field : SolidField
+        The unknowns.
+    energies : sequence of Energy
+        Terms of ∫ φ.
+    free : (dof,) bool array
+        True for unknowns that are solved for; the others are given.
+    solver : str
+        NGSolve's name of a sparse solver.
+    """
+
+    def __init__(self, field: SolidField, energies: Sequence[Energy], free: np.ndarray, solver: str) -> None:
+        import ngsolve
+
+        self.field, self.free, self._solver = field, free, solver
+        self.load = np.zeros(field.size)
+        self._form = ngsolve.BilinearForm(field.space, symmetric=True)
+        for term in energies:
+            self._form += ngsolve.Variation(term.density.Compile() * term.measure)
+        self._state = field.state.vec.CreateVector()
+        self._right, self._left = (field.state.vec.CreateVector() for _ in range(2))
+        self._bits = ngsolve.BitArray(free.tolist())
+        self._inverse: Any = None
+        self.saddle = bool(field.pressure)
+        self.factorisations = 0
+
+    def potential(self, z: np.ndarray) -> float:
+        """Return Π in J at unknowns z (dof,); NaN where the state is not admissible."""
+        energy = float(self._form.Energy(self._at(z)))
+        return energy - float(self.load @ z) if abs(energy) < BEYOND * 1e-100 else np.nan
+
+    def gradient(self, z: np.ndarray) -> np.ndarray:
+        """Return ∂Π/∂z (dof,) at all unknowns: on given ones the reactions."""
+        self._form.Apply(self._at(z), self._left)
+        return np.asarray(self._left.FV().NumPy() - self.load)
+
+    def residual(self, z: np.ndarray) -> np.ndarray:
+        """Return ∂Π/∂z (dof,), zero on given unknowns."""
+        return np.asarray(self.gradient(z) * self.free)
+
+    def factorise(self, z: np.ndarray) -> None:
+        """Make ∂²Π/∂z² at z the tangent that `solve` and `multiply` use."""
+        self._form.AssembleLinearization(self._at(z))
+        if self._inverse is None:
+            self._inverse = self._form.mat.Inverse(self._bits, inverse=self._solver)
+        else:
+            self._inverse.Update()  # the symbolic analysis stays
+        self.factorisations += 1
+
+    def solve(self, rhs: np.ndarray) -> np.ndarray:
+        """Return K⁻¹ rhs on the free unknowns, zero elsewhere, shape (dof,)."""
+        self._right.FV().NumPy()[:] = rhs
+        self._left.data = self._inverse * self._right
+        return np.asarray(self._left.FV().NumPy() * self.free)
+
+    def multiply(self, vector: np.ndarray) -> np.ndarray:
+        """Return K times a vector (dof,)."""
+        self._right.FV().NumPy()[:] = vector
+        self._left.data = self._form.mat * self._right
+        return np.array(self._left.FV().NumPy())
+
+    def _at(self, z: np.ndarray) -> Any:
+        self._state.FV().NumPy()[:] = z
+        return self._state
+
+
+def sparse_solver(name: str = "auto") -> str:
+    """Return NGSolve's name of the sparse solver to use.
+
+    Parameters
+    ----------
+    name : {"auto", "sparsecholesky", "pardiso", "umfpack"}
+        ``"auto"`` takes NGSolve's own Cholesky factorisation. MKL's PARDISO, where the package `mkl` is installed, is
+        to be asked for: it was slower on one thread, and what is installed must not change an answer's last digits.
+
+    Raises
+    ------
+    UsageError
+        For another name, or PARDISO where it is not installed.
+    """
+    from ngsolve.la import BaseMatrix
+
+    if name not in SOLVERS:
+        raise UsageError(
+            f"There is no sparse solver {name!r}.",
+            why=f"Known are {', '.join(SOLVERS)}.",
+            fix='Use solver="auto".',
+        )
+    # NGSolve makes PARDISO its default where it has found the package
+    if name == "pardiso" and BaseMatrix.GetDefaultInverseType() != "pardiso":
+        raise UsageError(
+            "PARDISO is not to be had.",
+            why="It belongs to MKL, and the Python package mkl is not installed.",
+            fix='Install mkl, or use solver="auto", NGSolve\'s own Cholesky factorisation.',
+        )
+    return "sparsecholesky" if name == "auto" else name
+
+
+def is_accurate(system: System) -> bool:
+    """Return whether K K⁻¹ b = b for a vector b: elimination without pivoting can fail on a saddle point."""
+    right = _start(system)
+    error = (system.multiply(system.solve(right)) - right) * system.free
+    return bool(np.linalg.norm(error) <= ACCURATE * np.linalg.norm(right))
+
+
+def is_stable(system: System) -> bool:
+    """Return whether the tangent is positive definite on the displacements, as far as a few Lanczos steps can see.
+
+    For loads on the displacements alone, the displacement part of K⁻¹ is S⁻¹ with the Schur complement S that
+    the pressures leave, so mixed and displacement form are one case. Lanczos' method (1950) on S⁻¹ finds its
+    outermost eigenvalues first: a slightly negative one of S is a very negative one of S⁻¹.
+    """
+    vectors = [_start(system)]
+    vectors[0] /= np.linalg.norm(vectors[0])
+    diagonal, off = [], []
+    moving = system.field.moving
+    for _ in range(STEPS):
+        image = system.solve(vectors[-1]) * moving
+        diagonal.append(float(image @ vectors[-1]))
+        for vector in vectors:  # orthogonalised against all: rounding would bring back what was found
+            image = image - (image @ vector) * vector
+        length = float(np.linalg.norm(image))
+        if length <= 1e-12 * abs(diagonal[0]):
+            break
+        off.append(length)
+        vectors.append(image / length)
+    size = len(diagonal)
+    band = np.diag(diagonal) + np.diag(off[: size - 1], 1) + np.diag(off[: size - 1], -1)
+    return bool(np.linalg.eigvalsh(band)[0] > 0)
+
+
+def _start(system: System) -> np.ndarray:
+    """Return a vector, each time the same, with a share of every mode."""
+    values = np.random.default_rng(0).standard_normal(system.field.size)
+    return np.asarray(values * system.free * system.field.moving)
+
+
+class Inputs:
+    """The n inputs of all interactions of a problem, and derivatives of the potential in them.
+
+    Parameters
+    ----------
+    field : SolidField
+        The unknowns.
+    attached : sequence of Attached
+        Interactions whose inputs these are, in their order.
+    """
+
+    def __init__(self, field: SolidField, attached: Sequence[Attached]) -> None:
+        self._field = field
+        self.attached = tuple(attached)
+        self.parameters = [parameter for part in attached for parameter in part.parameters]
+        self.size = len(self.parameters)
+        counts = np.cumsum([0, *(len(part.parameters) for part in attached)])
+        self.slices = [slice(a, b) for a, b in itertools.pairwise(counts)]
+        self.loads = np.zeros((self.size, field.size))
+        self.lifts = np.zeros((self.size, field.size))
+        self.constrained = np.zeros(field.size, dtype=bool)
+        self._first: list[list[Any]] = [[] for _ in range(self.size)]
+        self._second: dict[tuple[int, int], list[Any]] = {}
+        for part, rows in zip(attached, self.slices, strict=True):
+            self._add(part, rows)
+
+    def set(self, q: np.ndarray) -> None:
+        """Let the densities see inputs q (n,)."""
+        for parameter, value in zip(self.parameters, q, strict=True):
+            parameter.Set(float(value))
+
+    def gradient(self, z: np.ndarray, reactions: np.ndarray) -> np.ndarray:
+        """Return ∂U/∂q (n,) at an equilibrium z (dof,) with ∂Π/∂z (dof,)."""
+        state = self._at(z)
+        explicit = [sum(form.Energy(state) for form in forms) for forms in self._first]
+        return np.asarray(explicit - self.loads @ z + self.lifts @ reactions)
+
+    def sensitivity(self, system: System, z: np.ndarray) -> np.ndarray:
+        """Return ∂z/∂q (n, dof) with the system's present tangent."""
+        coupling = self._coupling(z) + self._lifted(system)
+        return np.asarray(self.lifts - self._solved(system, coupling))
+
+    def hessian(self, system: System, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return ∂²U/∂q∂q (n, n) and ∂z/∂q (n, dof), with the system's present tangent, which is to be that at z."""
+        raw, slope = self.raw_hessian(system, z)
+        return (raw + raw.T) / 2, slope
+
+    def raw_hessian(self, system: System, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return ∂²U/∂q∂q as it is computed, symmetric but for roundings, and ∂z/∂q."""
+        explicit, lifted = self._coupling(z), self._lifted(system)
+        coupling = explicit + lifted
+        inner = self._solved(system, coupling)
+        mixed = self.lifts @ explicit.T
+        own = self._own(z) + mixed + mixed.T + self.lifts @ lifted.T
+        return own - coupling @ inner.T, self.lifts - inner
+
+    def _add(self, part: Attached, rows: slice) -> None:
+        """Take over one interaction's loads, lifts and the derivatives of its densities."""
+        if part.loads is not None:
+            self.loads[rows] = part.loads
+        if part.lifts is not None:
+            self.lifts[rows] = part.lifts
+        if part.constrained is not None:
+            self.constrained |= part.constrained
+        for term in part.energies:
+            for i, first in enumerate(part.parameters):
+                slope = term.density.Diff(first)
+                self._first[rows.start + i].append(self._form(slope, term.measure))
+                for j, second in enumerate(part.parameters[: i + 1]):
+                    key = (rows.start + i, rows.start + j)
+                    self._second.setdefault(key, []).append(self._form(slope.Diff(second), term.measure))
+
+    def _form(self, density: Any, measure: Any) -> Any:
+        import ngsolve
+
+        form = ngsolve.BilinearForm(self._field.space, symmetric=True)
+        form += ngsolve.Variation(density.Compile() * measure)
+        return form
+
+    def _coupling(self, z: np.ndarray) -> np.ndarray:
+        """Return ∂²Π/∂z∂q without the lifts, shape (n, dof)."""
+        state, result = self._at(z), self._field.state.vec.CreateVector()
+        coupling = -self.loads
+        for row, forms in zip(coupling, self._first, strict=True):
+            for form in forms:
+                form.Apply(state, result)
+                row += result.FV().NumPy()
+        return coupling
+
+    def _own(self, z: np.ndarray) -> np.ndarray:
+        """Return ∂²Π/∂q∂q, shape (n, n)."""
+        state, own = self._at(z), np.zeros((self.size, self.size))
+        for (i, j), forms in self._second.items():
+            own[i, j] = own[j, i] = sum(form.Energy(state) for form in forms)
+        return own
+
+    def _lifted(self, system: System) -> np.ndarray:
+        """Return K Lᵢ, shape (n, dof)."""
+        return np.array([system.multiply(lift) if lift.any() else lift for lift in self.lifts])
+
+    def _solved(self, system: System, rows: np.ndarray) -> np.ndarray:
+        return np.array([system.solve(row) for row in rows]).reshape(self.size, -1)
+
+    def _at(self, z: np.ndarray) -> Any:
+        state = self._field.state.vec.CreateVector()
+        state.FV().NumPy()[:] = z
+        return state

@@ -122,7 +122,9 @@ class Varied:
         if self.path == RADIUS:
             return body
         if not self.is_material:
-            return replace(body, geometry=_layered(body, self.path).with_thickness(self.path.partition(".")[0], value))
+            return replace(
+                body, geometry=_layered(body, self.path).with_thickness(self.path.partition(".")[0], value)
+            )
         materials = body.materials
         region, _, rest = self.path.partition(".")
         if region not in materials and len(materials) == 1:

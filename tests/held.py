@@ -1,10 +1,12 @@
-"""A held body whose energy is known in closed form: a point on springs that are slack where it is glued."""
+"""Held bodies with energies in closed form: a point on springs that are slack where it is glued, and a pad."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from palpate.units import Range
+from models import linear_network
+from palpate.surrogates.grasp import GraspSurrogate, RestStiffness
+from palpate.units import Quantity, Range
 
 INPUTS = (
     *(Range(f"d_{axis}", -0.01, 0.01, "m") for axis in "xyz"),
@@ -53,3 +55,17 @@ def drawn(count: int, seed: int = 0) -> np.ndarray:
     """Inputs (count, 5) at random."""
     low, high = np.array([[r.low for r in INPUTS], [r.high for r in INPUTS]])
     return np.random.default_rng(seed).uniform(low, high, (count, 5))
+
+
+PAD_SPRING = np.diag([80.0, 90.0, 110.0])  # N/m
+
+
+def pad() -> GraspSurrogate:
+    """U = ½ d·K d exp(−10 p_x): softer the farther the pad is along x."""
+    network = linear_network(list(INPUTS), [Quantity("ln U/U0")], np.array([[0.0, 0.0, 0.0, 0.0, -0.2, 0.0]]))
+    return GraspSurrogate(network, RestStiffness.even(PAD_SPRING, 2), meta={"name": "pad"})
+
+
+def pad_force(d: np.ndarray, p_x: float = 0.0) -> np.ndarray:
+    """F of the pad displaced by d (3,), m, N."""
+    return -np.exp(-10.0 * p_x) * PAD_SPRING @ d

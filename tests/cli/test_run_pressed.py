@@ -7,6 +7,7 @@ import json
 import pytest
 
 import pressed as slab
+from held import pad
 from palpate.runtime.touchable import touchable
 
 pytestmark = pytest.mark.timeout(60)
@@ -48,3 +49,10 @@ def test_the_warning_of_a_correction_is_told_again(palpate, tmp_path):
     answer = palpate("run", wrong, "--seconds", "0.2", "--device", stroke(0.002))
     assert answer.code == 0
     assert "its correction was warned of: Change their sign." in answer.err
+
+
+def test_a_pad_is_pulled_by_the_script(palpate, tmp_path):
+    file = pad().save(tmp_path / "pad.palpate")
+    answer = palpate("run", file, "--seconds", "0.5", "--device", "stroke:frequency=2")
+    assert answer.code == 0, answer.err
+    assert "mm from rest" in answer.out

@@ -9,27 +9,12 @@ from test_process import wait_for, watch
 import pressed
 from allocated import kept_by
 from bent import CREEPS, body
-from held import INPUTS
-from models import linear_network, spring_beam
+from held import INPUTS, PAD_SPRING, pad, pad_force
+from models import spring_beam
 from palpate.runtime import LoopProcess, now
 from palpate.runtime.touchable import load_touchable, touchable
-from palpate.surrogates.grasp import GraspSurrogate, RestStiffness
-from palpate.units import Quantity
 
-SPRING = np.diag([80.0, 90.0, 110.0])  # N/m
 PLACE = np.array([0.005, -0.01])  # m
-
-
-def pad() -> GraspSurrogate:
-    """U = ½ d·K d, softer the farther the pad is along x: κ = exp(−10 p_x)."""
-    network = linear_network(list(INPUTS), [Quantity("ln U/U0")], np.array([[0.0, 0.0, 0.0, 0.0, -0.2, 0.0]]))
-    return GraspSurrogate(network, RestStiffness.even(SPRING, 2), meta={"name": "pad"})
-
-
-def expected(d: np.ndarray, p_x: float) -> np.ndarray:
-    """F of the pad, N."""
-    return -np.exp(-10.0 * p_x) * SPRING @ d
-
 
 BODIES = {
     "beam": spring_beam,
@@ -67,11 +52,11 @@ def test_a_pad_is_felt_as_its_energy_says():
     position = d.copy()
     answer.place(position, holding=True, believed=True)
     answer(position, PLACE)
-    np.testing.assert_allclose(answer.force, expected(d, PLACE[0]), rtol=1e-12)
+    np.testing.assert_allclose(answer.force, pad_force(d, PLACE[0]), rtol=1e-12)
     assert answer.depth == pytest.approx(np.linalg.norm(d))
     assert answer.inside
     n = answer.force / np.linalg.norm(answer.force)
-    assert answer.stiffness == pytest.approx(np.exp(-10 * PLACE[0]) * n @ SPRING @ n)
+    assert answer.stiffness == pytest.approx(np.exp(-10 * PLACE[0]) * n @ PAD_SPRING @ n)
     assert np.exp(0.2) * 110 > model.stiffness_max > 0.9 * np.exp(0.2) * 110
 
 
@@ -96,7 +81,7 @@ def test_a_held_pad_stays_where_it_has_taken_hold():
     first = felt(True, 0.005)
     np.testing.assert_array_equal(felt(True, -0.015), first)
     assert not felt(False, -0.015).any()
-    np.testing.assert_allclose(felt(True, -0.015), expected(d, -0.015), rtol=1e-12)
+    np.testing.assert_allclose(felt(True, -0.015), pad_force(d, -0.015), rtol=1e-12)
 
 
 def test_a_pad_in_the_real_process(tmp_path):
@@ -109,7 +94,7 @@ def test_a_pad_in_the_real_process(tmp_path):
         wait_for(lambda: np.linalg.norm(loop.read().position - d) < 1e-9)
         watch(loop, 0.2)  # the force ramps in
         state = loop.read()
-        np.testing.assert_allclose(state.force, expected(d, PLACE[0]), rtol=1e-9)
+        np.testing.assert_allclose(state.force, pad_force(d, PLACE[0]), rtol=1e-9)
         assert state.inside
         loop.shared.write_command(grabbed=False)
         wait_for(lambda: not loop.read().force.any())

@@ -13,7 +13,7 @@ from chromium_page import ARGUMENTS, assert_no, open_page, settled
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from palpate.surrogates import TouchModel
-from palpate.viewer import Viewer, picture
+from palpate.viewer import Viewer, page_model
 
 
 @pytest.fixture(scope="session")
@@ -31,7 +31,7 @@ def viewer(rod: TouchModel) -> Iterator[Viewer]:
 def brief_swing() -> Iterator[None]:
     """The swing back to rest takes 0.2 s instead of two, for tests that only wait for its end."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(picture, "FREQUENCY", 10 * picture.FREQUENCY)
+        patch.setattr(page_model, "FREQUENCY", 10 * page_model.FREQUENCY)
         yield
 
 

@@ -31,7 +31,7 @@ def said(client: Client, y: float, *, grabbed: bool, seconds: float = 0.5) -> Fr
 
 def test_the_picture_is_that_of_the_place_and_the_force():
     with Viewer(ROD, port=0, max_force=100.0) as viewer, client_of(viewer) as client:
-        assert client.hello.travel[0][1] == pytest.approx(-ROD.reach)
+        assert client.hello.line.travel[0][1] == pytest.approx(-ROD.reach)
         said(client, 0.0, grabbed=True)
         for y in np.linspace(0.0, -0.3, 20):
             held = said(client, float(y), grabbed=True, seconds=0.03)

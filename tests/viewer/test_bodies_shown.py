@@ -12,8 +12,8 @@ from blocks import SIZE, ball, block_mesh, dent, dents
 
 from palpate.errors import FileFormatError, UsageError
 from palpate.viewer import BodyViewer
-from palpate.viewer.bodies import ShownBody, body_of
 from palpate.viewer.messages import Shown, Step, Surface
+from palpate.viewer.shown_body import ShownBody, body_of
 from palpate.viewer.surfaces import outer_triangles, split
 
 
@@ -147,6 +147,6 @@ def test_a_dataset_is_shown_sample_by_sample(tmp_path: Path):
 
 
 def test_a_long_dataset_is_thinned_from_end_to_end(monkeypatch):
-    monkeypatch.setattr("palpate.viewer.files.MOST_STEPS", 3)
+    monkeypatch.setattr("palpate.viewer.shown_body.MOST_STEPS", 3)
     _, data = solid_dataset(8)
     assert [s.label for s in body_of(data).steps] == ["sample 0", "sample 3", "sample 6"]

@@ -13,7 +13,7 @@ from chromium_page import assert_no
 from playwright.sync_api import Browser, Page, expect
 
 from palpate.viewer import BodyViewer
-from palpate.viewer.bodies import ShownBody, ShownStep
+from palpate.viewer.shown_body import ShownBody, ShownStep
 
 pytestmark = pytest.mark.timeout(120)
 

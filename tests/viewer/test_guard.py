@@ -10,8 +10,7 @@ from websockets.sync.client import connect
 
 from palpate.errors import UsageError
 from palpate.viewer import Viewer
-from palpate.viewer.guard import refusal
-from palpate.viewer.ports import listen
+from palpate.viewer.web_server import listen, refusal
 
 
 def headers(**values: str) -> Headers:

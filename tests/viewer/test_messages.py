@@ -12,25 +12,48 @@ import pytest
 
 import palpate.viewer
 from palpate.errors import UsageError
-from palpate.viewer import typescript
-from palpate.viewer.messages import Credit, Frame, Hand, Hello, Hold, Loop, Notice, RangeInfo
+from palpate.viewer import messages, typescript
+from palpate.viewer.messages import (
+    PROTOCOL,
+    FieldInfo,
+    Frame,
+    Hello,
+    Hold,
+    Line,
+    Loop,
+    Notice,
+    RangeInfo,
+    Shown,
+    StepInfo,
+)
 from palpate.viewer.wire import Binary, Json, Layout
 
 VIEWER = Path(palpate.viewer.__file__).parent
 # the sources are part of the repository, not of the installed package
 CLIENT = Path(__file__).parents[2] / "src" / "palpate" / "viewer" / "client"
 
-HELLO = Hello(
-    protocol=2,
-    name="rod",
+LINE = Line(
     rest=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
-    radius=0.005,
     touch_node=1,
     nodes_of_interest=(0, 1),
+    travel=((-0.4, -0.7, 0.0), (0.0, 0.7, 0.0)),
+)
+FIELD = FieldInfo("displacement", "m", 0.0, 0.01, 3, 12)
+HELLO = Hello(
+    protocol=PROTOCOL,
+    name="rod",
     inputs=(RangeInfo("tip force", 0.0, 5.0, "N"),),
     parameters=(),
-    reach=0.7,
-    travel=((-0.4, -0.7, 0.0), (0.0, 0.7, 0.0)),
+    holds=True,
+    radius=0.005,
+    radius_parameter=-1,
+    deepest=0.7,
+    force_max=5.0,
+    stiffness_max=24.0,
+    centre=(0.0, 0.0, 0.0),
+    line=LINE,
+    fields=(),
+    remembers="",
     scale=11.7,
     workspace=0.075,
     max_force=20.0,
@@ -38,6 +61,9 @@ HELLO = Hello(
     faults=("no fault", "a bad number"),
     meta={"errors": {"rmse": 1e-5}, "seed": 3},
 )
+PRESSED = dataclasses.replace(HELLO, holds=False, line=None, fields=(FIELD,), radius_parameter=1)
+SHOWN = Shown(PROTOCOL, "block", (FIELD,), (StepInfo("sample 3", {"energy": "1 mJ"}),), 0.01)
+WRITTEN = (HELLO, PRESSED, SHOWN, Notice("what", "why", "fix"))
 
 
 def sample(message: type[Binary]) -> Binary:
@@ -71,11 +97,9 @@ def test_generated_typescript_is_up_to_date():
 
 def test_the_built_page_is_of_these_sources():
     own = [
-        "body.html",
         "index.html",
         "package-lock.json",
         "package.json",
-        "pressed.html",
         "tsconfig.json",
         "vite.config.js",
     ]
@@ -105,9 +129,18 @@ def test_binary_messages_come_back_the_same(message: type[Binary]):
     assert same(message.unpack(data), before)
 
 
-@pytest.mark.parametrize("message", [HELLO, Notice("what", "why", "fix")])
+@pytest.mark.parametrize("message", WRITTEN)
 def test_json_messages_come_back_the_same(message: Json):
     assert type(message).from_json(message.to_json()) == message
+
+
+def test_every_message_class_is_among_those_that_come_back():
+    known = {*typescript.BINARY, *typescript.JSON}
+    declared = {
+        c for c in vars(messages).values() if isinstance(c, type) and issubclass(c, Binary | Json)
+    } - {Binary, Json}
+    assert declared == known
+    assert {type(m) for m in WRITTEN} == set(typescript.JSON)
 
 
 def test_a_number_that_is_not_finite_becomes_null():
@@ -131,10 +164,11 @@ def test_text_that_is_no_message_is_refused(text: str):
 
 
 def test_a_frame_of_21_nodes_is_small():
-    frame = dataclasses.replace(sample(Frame), parameters=np.zeros(0), displacement=np.zeros((21, 3)))
+    nothing = dict.fromkeys(("parameters", "coefficients", "prints"), np.zeros(0))
+    frame = dataclasses.replace(sample(Frame), displacement=np.zeros((21, 3)), **nothing)
     assert len(frame.pack()) < 400
 
 
 def test_enumerations_and_kinds_are_distinct():
-    assert len({m.KIND for m in (Frame, Hand, Credit)}) == 3
+    assert len({m.KIND for m in typescript.BINARY}) == len(typescript.BINARY)
     assert {Loop(0), Hold(0)} == {0}

@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 from chromium_page import READ, check_force, drag, let_go, number, settled, tip, vector
 from playwright.sync_api import Page
-from test_messages import HELLO, sample
+from test_messages import WRITTEN, sample
 
 from palpate.surrogates import TouchModel
 from palpate.viewer import Viewer, typescript
-from palpate.viewer.messages import Notice
 
 pytestmark = pytest.mark.timeout(120)
 
@@ -155,7 +154,7 @@ def test_messages_mean_the_same_in_typescript(page: Page):
         values = dataclasses.asdict(before)
         plain = {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in values.items()}
         assert json.loads(read) == json.loads(json.dumps(plain))
-    for message in (HELLO, Notice("what", "why", "fix")):
+    for message in WRITTEN:
         back, known = page.evaluate(
             """async ([name, text]) => {
                 const m = await import("/assets/messages.js");

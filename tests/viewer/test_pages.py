@@ -18,7 +18,7 @@ from websocket_page import client_of
 from models import linear_network, spring_beam
 from palpate.surrogates import TouchModel
 from palpate.units import Quantity, Range
-from palpate.viewer import Viewer, hands
+from palpate.viewer import Viewer, hand_lock
 
 pytestmark = pytest.mark.timeout(120)
 
@@ -62,7 +62,7 @@ def held_elsewhere(viewer: Viewer, y: float) -> Iterator[None]:
 
     other = threading.Thread(target=hold)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(hands, "FORGOTTEN", 60.0)
+        patch.setattr(hand_lock, "FORGOTTEN", 60.0)
         other.start()
         try:
             assert held.wait(10.0)

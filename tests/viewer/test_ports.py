@@ -9,7 +9,7 @@ import pytest
 from palpate.errors import PortInUseError, UsageError
 from palpate.surrogates import TouchModel
 from palpate.viewer import Viewer, free_port
-from palpate.viewer.ports import listen
+from palpate.viewer.web_server import listen
 
 
 @pytest.fixture

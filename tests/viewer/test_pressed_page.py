@@ -14,7 +14,7 @@ from slabs import DEVIATION, dents, touched_slab
 import pressed
 from palpate.surrogates import TouchedBody
 from palpate.viewer import Viewer
-from palpate.viewer.pressing import PressedExhibit
+from palpate.viewer.surface_drawing import SurfaceDrawing
 
 pytestmark = pytest.mark.timeout(180)
 
@@ -192,8 +192,8 @@ def test_colours_are_chosen_with_their_own_scale(page: Page, keep, slab: Touched
 def test_the_browser_sums_a_field_as_numpy_does(page: Page, slab: TouchedBody):
     from palpate.runtime.touchable import touchable
 
-    exhibit = PressedExhibit(touchable(slab))
-    rest = exhibit.skin.rest.reshape(-1, 3)
+    drawing = SurfaceDrawing(touchable(slab))
+    rest = drawing.surface.rest.reshape(-1, 3)
     for index, one in enumerate(slab.fields.values()):
         for c in ([0.004, 0.006, 0.0061], [-0.018, 0.0199, 0.0095], [0.011, 0.0, 0.0041], [0.0, 0.0, 0.0035]):
             eye = one.evaluator(precision="double")
@@ -204,10 +204,10 @@ def test_the_browser_sums_a_field_as_numpy_does(page: Page, slab: TouchedBody):
                     const m = await import("/assets/messages.js");
                     const { Field } = await import("/assets/field.js");
                     const get = async path => (await fetch(path)).arrayBuffer();
-                    const skin = m.decodeSkin(await get("/skin"));
+                    const surface = m.decodeSurface(await get("/surface"));
                     const modes = m.decodeModes(await get(`/fields/${index}`));
                     const look = { components, modes: modes_count };
-                    const field = new Field(look, modes, skin.rest);
+                    const field = new Field(look, modes, surface.rest);
                     if (field.count !== numbers.length) throw new Error(`${field.count} numbers`);
                     field.update(Float32Array.from(numbers), foot);
                     return JSON.stringify([...field.values]);
@@ -218,7 +218,7 @@ def test_the_browser_sums_a_field_as_numpy_does(page: Page, slab: TouchedBody):
             back = np.array(json.loads(got)).reshape(len(rest), -1)
             # single precision of the sums: a few ulp of the largest value
             slack = 8 * np.finfo("f4").eps * np.abs(wanted).max()
-            nodes = exhibit._nodes
+            nodes = drawing.nodes
             np.testing.assert_allclose(back, wanted[nodes], rtol=0, atol=slack)
 
 

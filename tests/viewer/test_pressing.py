@@ -18,10 +18,9 @@ from palpate.runtime.touchable import touchable
 from palpate.runtime.workspace import Workspace
 from palpate.surrogates import TouchedBody
 from palpate.viewer import Viewer
-from palpate.viewer.messages import Credit, Hand, Hold
-from palpate.viewer.pressed_messages import Modes, Press, Skin, Touched
-from palpate.viewer.pressing import PressedExhibit
-from palpate.viewer.skins import relief
+from palpate.viewer.messages import Credit, Frame, Hand, Hello, Hold, Modes, Surface
+from palpate.viewer.surface_drawing import SurfaceDrawing
+from palpate.viewer.surfaces import relief
 
 pytestmark = pytest.mark.timeout(120)
 
@@ -42,11 +41,11 @@ class PressClient:
 
     def __init__(self, socket: ClientConnection) -> None:
         self.socket = socket
-        self.hello = Touched.from_json(str(socket.recv(timeout=10)))
+        self.hello = Hello.from_json(str(socket.recv(timeout=10)))
         hello = self.hello
         self.space = Workspace(hello.workspace, hello.scale, hello.centre, upright=True)
 
-    def say(self, place=None, parameters=()) -> Press:
+    def say(self, place=None, parameters=()) -> Frame:
         """Put the probe's centre somewhere (m), or lift it; the picture after that."""
         target = np.zeros(3) if place is None else self.space.to_hand(np.asarray(place))
         held = place is not None
@@ -55,10 +54,10 @@ class PressClient:
         self.socket.send(Credit(1).pack())
         data = self.socket.recv(timeout=10)
         assert isinstance(data, bytes)
-        return Press.unpack(data)
+        return Frame.unpack(data)
 
-    def held(self, place, parameters=()) -> Press:
-        """Press until the loop is there with its full force, and that stands still."""
+    def held(self, place, parameters=()) -> Frame:
+        """Frame until the loop is there with its full force, and that stands still."""
         before = None
         for _ in range(400):
             frame = self.say(place, parameters)
@@ -116,7 +115,7 @@ def test_coefficients_are_the_fields_and_a_frame_is_small(pressed_viewer: Viewer
         at += len(one.modes) + profile.size
         np.testing.assert_allclose(frame.coefficients[at - profile.size : at], profile, rtol=1e-5, atol=1e-9)
     assert at == frame.coefficients.size
-    np.testing.assert_allclose(frame.foot, [*x[0, :2], 0.0], atol=1e-5)
+    np.testing.assert_allclose(frame.contact, [*x[0, :2], 0.0], atol=1e-5)
     np.testing.assert_allclose(frame.normal, [0.0, 0.0, 1.0], atol=1e-5)
     # two modes each, and profiles of 14 splines, 1 and three offsets: of three components, and of one
     assert len(frame.pack()) < 256 + 4 * (14 * 4 * 3 + 14 * 4 * 1)
@@ -171,13 +170,13 @@ def test_the_hello_says_what_there_is(pressed_viewer: Viewer, slab: TouchedBody)
 
 
 def test_the_page_gets_the_skin_and_the_modes_once(pressed_viewer: Viewer, slab: TouchedBody):
-    assert b"pressed.js" in fetched(pressed_viewer, "")
-    skin = Skin.unpack(fetched(pressed_viewer, "skin"))
-    corners = skin.rest.reshape(-1, 3)[skin.triangles.astype(int).reshape(-1, 3)]
+    assert b"page.js" in fetched(pressed_viewer, "")
+    surface = Surface.unpack(fetched(pressed_viewer, "surface"))
+    corners = surface.rest.reshape(-1, 3)[surface.triangles.astype(int).reshape(-1, 3)]
     top = (np.abs(corners[:, :, 2]) < 1e-6).all(axis=1)
-    np.testing.assert_array_equal(skin.touchable > 0, top)
+    np.testing.assert_array_equal(surface.touchable > 0, top)
     modes = Modes.unpack(fetched(pressed_viewer, "fields/0"))
-    assert modes.modes.size == 2 * skin.rest.size
+    assert modes.modes.size == 2 * surface.rest.size
     assert modes.rows == slab.fields["displacement"].dimple.table.shape[1]
     with pytest.raises(HTTPError, match="404"):
         fetched(pressed_viewer, "fields/2")
@@ -191,10 +190,10 @@ def test_a_surrogate_alone_is_drawn_from_its_distance():
     np.testing.assert_allclose(np.abs(used[:, :2]).max(axis=0), 0.02, rtol=0.01)
     a, b, c = (points[triangles[:, k]] for k in range(3))
     assert (np.cross(b - a, c - a)[:, 2] > 0).all(), "counter-clockwise as seen from outside"
-    exhibit = PressedExhibit(body)
-    assert exhibit.fields == ()
-    assert exhibit.skin.touchable.all()
-    assert np.abs(exhibit.skin.rest).max() < HALF
+    drawing = SurfaceDrawing(body)
+    assert drawing.fields == ()
+    assert drawing.surface.touchable.all()
+    assert np.abs(drawing.surface.rest).max() < HALF
 
 
 def test_a_family_hears_its_slider_and_relaxes(tmp_path):

@@ -20,12 +20,27 @@ from palpate.runtime.touchable import Touchable, load_touchable, touchable
 from palpate.surrogates import TouchedBody
 from palpate.surrogates.plastic import Dents
 from palpate.surrogates.relaxation import Branches
-from palpate.viewer.messages import Beat
-from palpate.viewer.pressing import PressedExhibit
+from palpate.viewer.messages import Frame
+from palpate.viewer.page_model import PageModel
 from palpate.viewer.prints import Prints
 
 SPACING, NONE = 0.002, np.zeros(0)
-BEAT = {f.name: (0.0, 0.0, 0.0) if f.name in {"position", "force"} else 0 for f in dataclasses.fields(Beat)}
+DRAWN = {
+    "contact",
+    "normal",
+    "depth",
+    "stiffness",
+    "deviation",
+    "drawn",
+    "displacement",
+    "coefficients",
+    "prints",
+}
+LOOP = {
+    f.name: (0.0, 0.0, 0.0) if f.name in {"position", "force"} else 0
+    for f in dataclasses.fields(Frame)
+    if f.name not in DRAWN
+}
 
 
 def above(depth, x=0.0):
@@ -153,23 +168,23 @@ def test_a_virgin_body_draws_no_print(file):
 
 
 def test_all_points_of_the_top_may_keep_a_print_and_no_others(file, dents, tmp_path):
-    exhibit = PressedExhibit(load_touchable(file))
-    own, rest = exhibit.skin.printable.astype(int), np.reshape(exhibit.skin.rest, (-1, 3))
+    model = PageModel(load_touchable(file))
+    own, rest = model.surface.printable.astype(int), np.reshape(model.surface.rest, (-1, 3))
     # those of the sides' upper rims too: they stand at the top's own border
     assert set(own) == set(np.flatnonzero(rest[:, 2] > -1e-9))
-    normals = np.reshape(exhibit.skin.normals, (-1, 3))
+    normals = np.reshape(model.surface.normals, (-1, 3))
     np.testing.assert_allclose(normals, np.tile([0.0, 0.0, 1.0], (len(own), 1)), atol=1e-9)
     assert (
-        exhibit.hello(Shared.private().read_state(), 1e3).remembers
+        model.hello(Shared.private().read_state(), 1e3).remembers
         == "pressed deeper than 1 mm it keeps a print"
     )
     travelling = touched_slab().yielding(dents).save(tmp_path / "one.palpate")
-    assert len(PressedExhibit(load_touchable(travelling)).skin.printable) == 0
+    assert len(PageModel(load_touchable(travelling)).surface.printable) == 0
 
 
 def test_print_and_elastic_shape_together_touch_the_ball(file):
     body = load_touchable(file)
-    exhibit, elastic = PressedExhibit(body), PressedExhibit(touchable(touched_slab()))
+    model, elastic = PageModel(body), PageModel(touchable(touched_slab()))
     with LoopProcess(file) as loop:
         space = body.workspace(loop.read().radius)
 
@@ -178,13 +193,13 @@ def test_print_and_elastic_shape_together_touch_the_ball(file):
             loop.shared.write_command(beat=now() + 60, grabbed=held, target=target)
             time.sleep(0.4)
             state = loop.read()
-            return exhibit.frame(BEAT, state, held, NONE), elastic.frame(BEAT, state, held, NONE)
+            return model.frame(LOOP, state, held, NONE), elastic.frame(LOOP, state, held, NONE)
 
         first, alone = picture(0.0005)
         assert len(first.prints) == 0, "nothing has yielded yet"
         np.testing.assert_array_equal(first.coefficients, alone.coefficients)
         deep, alone = picture(0.004)
-        middle = np.argmin(np.linalg.norm(_printable(exhibit), axis=1))
+        middle = np.argmin(np.linalg.norm(_printable(model), axis=1))
         kept = deep.prints[middle]
         assert kept == deep.prints.max() > 5e-4
         np.testing.assert_allclose(
@@ -200,8 +215,8 @@ def test_print_and_elastic_shape_together_touch_the_ball(file):
         np.testing.assert_array_equal(gone.prints, deep.prints)
 
 
-def _printable(exhibit):
-    return np.reshape(exhibit.skin.rest, (-1, 3))[exhibit.skin.printable.astype(int)]
+def _printable(model):
+    return np.reshape(model.surface.rest, (-1, 3))[model.surface.printable.astype(int)]
 
 
 def test_more_places_than_the_shared_memory_carries_are_refused(dents):

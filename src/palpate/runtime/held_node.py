@@ -37,6 +37,16 @@ class BeamTouchable(Touchable):
         return False
 
     @property
+    def is_line(self) -> bool:
+        """The body is drawn as a line."""
+        return True
+
+    @property
+    def stays(self) -> bool:
+        """Whether the body lies elsewhere after a touch, so that there is no swing back to rest."""
+        return False
+
+    @property
     def radius(self) -> float:
         """Half the height of the section, for drawing, m."""
         return float(self.energy.radius)
@@ -88,6 +98,11 @@ class BeamTouchable(Touchable):
 
 class RodTouchable(BeamTouchable):
     """A body held at one node that remembers; `energy` is the `HeldBody` itself."""
+
+    @property
+    def stays(self) -> bool:
+        """The body remembers."""
+        return True
 
     @property
     def force_max(self) -> float:  # type: ignore[override]  # known beforehand here

@@ -92,6 +92,11 @@ class Touchable:
         return True
 
     @property
+    def is_line(self) -> bool:
+        """Whether the body is drawn as a line of nodes, of which a hand holds one."""
+        return False
+
+    @property
     def radius_parameter(self) -> int | None:
         """Which of the further inputs is the probe's radius; None where that is fixed."""
         own = getattr(self.energy, "radius_input", None)
@@ -180,6 +185,17 @@ class Touchable:
     def away(self) -> np.ndarray:
         """Where a probe (3,) is that nobody holds, m: a radius above `home`, in the air. What is held is at rest."""
         return self.home if self.holds else self.home + self.radius * self.normal
+
+    def held_place(self, parameters: np.ndarray) -> np.ndarray:
+        """Return the place (3,) at rest of what is held at further inputs (p,), m.
+
+        Further inputs that are lengths and whose names end with an axis, such as ``p_x``, are its coordinates.
+        """
+        place = np.zeros(3)
+        for value, known in zip(parameters, self.parameters, strict=True):
+            if known.unit == "m" and known.name[-2:] in {"_x", "_y", "_z"}:
+                place["xyz".index(known.name[-1])] = value
+        return place
 
     @cached_property
     def reach(self) -> float:

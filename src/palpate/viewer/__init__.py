@@ -1,20 +1,18 @@
 """In the eye: a page that shows the body deform and lets a hand pull on it, and one to look at solved bodies.
 
-==============  ====================================================================================
-`server`        `serve` and `Viewer`: the page, its websocket and the real-time process behind them
-`messages`      every message between server and page, as dataclasses that generate the TypeScript
-`wire`          how those dataclasses become bytes
-`typescript`    how they become TypeScript
-`hands`         which of several pages holds the hand
-`picture`       from a published tick to a frame, including the spring-back after release
-`session`       the pages of one server: credits, frames, heartbeats
-`showing`       `show` and `BodyViewer`: the page of a solved body
-`bodies`        from solutions to plain arrays; `files`: from VTU, PVD and datasets; `surfaces`: their skin
-`running`       a web application in a thread of its own
-`guard`         Host, Origin and content-security rules
-`ports`         a free port on this machine
-``client/``     the page's sources (TypeScript, three.js); ``static/`` is what they build to
-==============  ====================================================================================
+=================  ====================================================================================
+`server`           `serve` and `Viewer`: the page, its websocket and the real-time process behind them
+`session`          the pages of one server: credits, frames, heartbeats
+`hand_lock`        which of several pages holds the hand
+`page_model`       a touchable body as its pages see it; drawn as a line
+`surface_drawing`  drawn as a surface; `surfaces`: its mesh; `prints`: what stays on it
+`messages`         every message between server and page, as dataclasses that generate the TypeScript
+`wire`             how those dataclasses become bytes; `typescript`: how they become TypeScript
+`body_viewer`      `show` and `BodyViewer`: the page of a solved body
+`shown_body`       that body as plain arrays, of solutions, VTU, PVD or datasets
+`web_server`       a server for this machine alone: port, Host and Origin rules, a thread of its own
+``client/``        the page's sources (TypeScript, three.js); ``static/`` is what they build to
+=================  ====================================================================================
 
 The built page is under version control, so that installing needs no node. After a change in ``client/``:
 

@@ -1,7 +1,7 @@
 """Public names of `palpate.viewer`, each loaded when it is first used."""
 
-from .ports import free_port as free_port
+from .body_viewer import BodyViewer as BodyViewer
+from .body_viewer import show as show
 from .server import Viewer as Viewer
 from .server import serve as serve
-from .showing import BodyViewer as BodyViewer
-from .showing import show as show
+from .web_server import free_port as free_port

@@ -2,7 +2,8 @@
 
 The conversation, over one websocket at ``/touch``:
 
-1. The server says `Hello` (JSON): the body's geometry, ranges, scales, and the settings of the loop.
+1. The server says `Hello` (JSON): what the body is and what a hand does to it, ranges, scales, and the settings of
+   the loop.
 2. The page grants *credits* (`Credit`). The server sends a `Frame` only against a credit, and composes it at
    that moment from the newest tick, so nothing ever queues: a slow page gets fewer pictures, not older ones.
    The page grants one credit for each frame it has drawn, two at the start.
@@ -11,15 +12,15 @@ The conversation, over one websocket at ``/touch``:
 4. Only one page holds the hand at a time; `Frame.hold` tells each page where it stands.
 5. Rare events in plain words are `Notice` (JSON).
 
-A body pressed anywhere (`pressed_messages`) says `Touched` in place of `Hello`, and its frames are `Press`: where the
-probe is, and the coefficients of the modes of every field. The page asks for the body's surface once, as `Skin` at
-``/skin``, and for the modes of each field as `Modes` at ``/fields/N``, and sums them itself. There z is up.
+A body drawn as a line (`Line`) is sent node by node in each frame. Of any other the page asks for the surface once, as
+`Surface` at ``/surface``, and for the modes of each field as `Modes` at ``/fields/N``; a frame carries the coefficients
+of the modes, and the page sums them itself.
 
 A body that is only looked at needs no conversation: its page asks for `Shown` (JSON) at ``/shown``, for `Surface` at
-``/surface`` and for each `Step` when it is wanted at ``/steps/N``. There z is up.
+``/surface`` and for each `Step` when it is wanted at ``/steps/N``.
 
-Frames, signs and units: x along the beam, y up, z towards the viewer; metres, newtons, seconds;
-displacements are offsets from rest; force is the force *on the hand*, in the body's axes.
+Frames, signs and units: a line lies in the x–y plane, y up, z towards the viewer; a surface has z up. Metres, newtons,
+seconds; displacements are offsets from rest; force is the force *on the hand*, in the body's axes.
 
     python -m palpate.viewer.messages > src/palpate/viewer/client/src/messages.ts
 """
@@ -37,25 +38,25 @@ from palpate.viewer.wire import Binary, Json, Wire
 
 __all__ = [
     "PROTOCOL",
-    "Beat",
     "Credit",
-    "Faceted",
     "FieldInfo",
     "Frame",
-    "Greeting",
     "Hand",
     "Hello",
     "Hold",
+    "Line",
     "Loop",
+    "Modes",
     "Notice",
     "RangeInfo",
     "Shown",
     "Step",
     "StepInfo",
     "Surface",
+    "Vec3",
 ]
 
-PROTOCOL = 2  # a page of another protocol reloads itself
+PROTOCOL = 3  # a page of another protocol reloads itself
 
 Vec3 = tuple[float, float, float]
 
@@ -77,14 +78,16 @@ class Hold(IntEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Beat(Binary):
-    """What every picture tells of the loop."""
+class Frame(Binary):
+    """One picture of the loop and of a touched body, server to page."""
+
+    KIND: ClassVar[int] = 1
 
     tick: Annotated[float, Wire("f64", "counts the loop's ticks")]
     time: Annotated[float, Wire("f64", "s, when the frame was composed, on the loop's clock")]
     echo: Annotated[float, Wire("f64", "ms, page clock: `sent` of the last Hand that this page sent")]
     position: Annotated[
-        Vec3, Wire("vec3", "m, the probe's centre, or the hand's offset from the held node at rest")
+        Vec3, Wire("vec3", "m, the probe's centre, or the hand's offset from what it holds at rest")
     ]
     force: Annotated[Vec3, Wire("vec3", "N, on the hand")]
     rate: Annotated[float, Wire("f32", "Hz, ticks per second achieved")]
@@ -105,16 +108,30 @@ class Beat(Binary):
     grabbed: Annotated[bool, Wire("flag", "a hand holds the body")]
     stalled: Annotated[bool, Wire("flag", "the input is older than the loop allows")]
     parameters: Annotated[np.ndarray, Wire("floats", "current values of the parameters")]
-
-
-@dataclass(frozen=True, eq=False)
-class Frame(Beat):
-    """One picture of a body held at a node, server to page."""
-
-    KIND: ClassVar[int] = 1
-
-    contact: Annotated[Vec3, Wire("vec3", "m, where the held node is, as an offset from rest")]
-    displacement: Annotated[np.ndarray, Wire("floats", "m, x y z of each node's offset from Hello.rest")]
+    contact: Annotated[
+        Vec3,
+        Wire("vec3", "m, where a line's node is, as an offset from rest; else the foot of the touch at rest"),
+    ]
+    normal: Annotated[Vec3, Wire("vec3", "of the surface there; zero where nothing touches")]
+    depth: Annotated[
+        float,
+        Wire("f32", "m, of the probe in the surface at rest, negative in the air; or how far displaced"),
+    ]
+    stiffness: Annotated[float, Wire("f32", "N/m, along the force; 0 where unknown")]
+    deviation: Annotated[
+        float, Wire("f32", "standard deviation of the force relative to it, NaN where unknown")
+    ]
+    drawn: Annotated[float, Wire("f32", "m, depth of the shape drawn: after release it goes back to 0")]
+    displacement: Annotated[
+        np.ndarray, Wire("floats", "m, x y z of each of a line's nodes, as an offset from rest")
+    ]
+    coefficients: Annotated[
+        np.ndarray, Wire("floats", "for each field its modes' coefficients and its local mode's profile")
+    ]
+    prints: Annotated[
+        np.ndarray,
+        Wire("floats", "m, how deep it stays pressed at each of Surface.printable; empty if nowhere"),
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,21 +158,20 @@ class Credit(Binary):
 
 
 @dataclass(frozen=True, eq=False)
-class Faceted(Binary):
-    """A surface at rest, as every kind of body has one. Points are split along sharp edges."""
-
-    rest: Annotated[np.ndarray, Wire("floats", "m, x y z of each point")]
-    triangles: Annotated[np.ndarray, Wire("floats", "three points each; exact up to 16 million")]
-    creases: Annotated[np.ndarray, Wire("floats", "two points for each sharp edge")]
-
-
-@dataclass(frozen=True, eq=False)
-class Surface(Faceted):
+class Surface(Binary):
     """The surface of a body at rest, server to page. Points are split along sharp edges."""
 
     KIND: ClassVar[int] = 4
 
+    rest: Annotated[np.ndarray, Wire("floats", "m, x y z of each point")]
+    triangles: Annotated[np.ndarray, Wire("floats", "three points each; exact up to 16 million")]
+    creases: Annotated[np.ndarray, Wire("floats", "two points for each sharp edge")]
     fixed: Annotated[np.ndarray, Wire("floats", "two points for each edge around the fixed surfaces")]
+    touchable: Annotated[np.ndarray, Wire("floats", "1 for each triangle that a hand may touch, else 0")]
+    printable: Annotated[
+        np.ndarray, Wire("floats", "points that keep prints; none where the body keeps none")
+    ]
+    normals: Annotated[np.ndarray, Wire("floats", "outward unit normal of each of them")]
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,6 +190,19 @@ class Step(Binary):
     ]
 
 
+@dataclass(frozen=True, eq=False)
+class Modes(Binary):
+    """A field on a Surface's points, server to page: rest + coefficients · modes + the local mode of a profile."""
+
+    KIND: ClassVar[int] = 6
+
+    reach: Annotated[float, Wire("f32", "m, of the local mode from its foot; 0 for none")]
+    rows: Annotated[int, Wire("u16", "splines of the distance from the foot; 0 for none")]
+    rest: Annotated[np.ndarray, Wire("floats", "components of each point")]
+    modes: Annotated[np.ndarray, Wire("floats", "the same of each mode")]
+    touched: Annotated[np.ndarray, Wire("floats", "points that the local mode may move")]
+
+
 @dataclass(frozen=True)
 class RangeInfo:
     """A named interval."""
@@ -185,8 +214,41 @@ class RangeInfo:
 
 
 @dataclass(frozen=True)
-class Greeting(Json):
-    """What every page is told of its body and of the loop, once per connection, server to page.
+class FieldInfo:
+    """A quantity that deforms or colours a body, and its range over all that is shown."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    components: int
+    modes: int  # that a frame has coefficients of
+
+
+@dataclass(frozen=True)
+class Line:
+    """A body held at one node and drawn as a line.
+
+    Attributes
+    ----------
+    rest : (N, 3)
+        Rest positions of the nodes along the body's axis, m.
+    touch_node : int
+        The node that a hand holds.
+    nodes_of_interest : indices into rest
+    travel : (2, 3)
+        Lower and upper corner of the box of the held node's offsets under all trained loads, m.
+    """
+
+    rest: tuple[Vec3, ...]
+    touch_node: int
+    nodes_of_interest: tuple[int, ...]
+    travel: tuple[Vec3, ...]
+
+
+@dataclass(frozen=True)
+class Hello(Json):
+    """A touchable body and its loop, once per connection, server to page.
 
     Attributes
     ----------
@@ -194,6 +256,26 @@ class Greeting(Json):
     name : str
     inputs, parameters : ranges
         All inputs; those that the hand does not drive.
+    holds : bool
+        Whether the hand holds a node or a patch, and doesn't press a free probe.
+    radius : float
+        Of the probe, or of what is held, for drawing, m.
+    radius_parameter : int
+        The parameter that is the probe's radius; -1 where none is.
+    deepest : float
+        Deepest trained depth, or largest trained displacement of what is held, m.
+    force_max : float
+        Largest force of the trained region, N.
+    stiffness_max : float
+        Largest stiffness of the trained region, N/m.
+    centre : (3,)
+        The device's centre in the body's coordinates, m.
+    line : Line or null
+        Set where the body is drawn as a line, and not as a surface.
+    fields : quantities to colour by
+        The first moves the surface where it has three components; none where the file holds no field.
+    remembers : str
+        How the force relaxes, or prints stay, in words; empty where neither does.
     scale : float
         Body metres per metre of hand.
     workspace : float
@@ -211,48 +293,22 @@ class Greeting(Json):
     name: str
     inputs: tuple[RangeInfo, ...]
     parameters: tuple[RangeInfo, ...]
+    holds: bool
+    radius: float
+    radius_parameter: int
+    deepest: float
+    force_max: float
+    stiffness_max: float
+    centre: Vec3
+    line: Line | None
+    fields: tuple[FieldInfo, ...]
+    remembers: str
     scale: float
     workspace: float
     max_force: float
     rate: float
     faults: tuple[str, ...]
     meta: Mapping[str, Any]
-
-
-@dataclass(frozen=True)
-class Hello(Greeting):
-    """A body held at one node and its loop, once per connection, server to page.
-
-    Attributes
-    ----------
-    rest : (N, 3)
-        Rest positions of the nodes along the body's axis, m.
-    radius : float
-        Of the body, for drawing, m.
-    touch_node : int
-    nodes_of_interest : indices into rest
-    reach : float
-        Largest trained displacement of the held node, m.
-    travel : (2, 3)
-        Lower and upper corner of the box of the held node's offsets under all trained loads, m.
-    """
-
-    rest: tuple[Vec3, ...]
-    radius: float
-    touch_node: int
-    nodes_of_interest: tuple[int, ...]
-    reach: float
-    travel: tuple[Vec3, ...]
-
-
-@dataclass(frozen=True)
-class FieldInfo:
-    """A quantity that colours a body, and its range over all steps."""
-
-    name: str
-    unit: str
-    low: float
-    high: float
 
 
 @dataclass(frozen=True)

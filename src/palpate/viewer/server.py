@@ -2,7 +2,7 @@
 
 `Viewer` is a context manager that starts all three and stops them; `serve` keeps one open until interrupted.
 The server runs in a thread with an event loop of its own, so both work in a script, in a notebook and on
-standard input. What page and server say to each other stands in `messages`, who may talk at all in `guard`,
+standard input. What page and server say to each other stands in `messages`, who may talk at all in `web_server`,
 and credits and heartbeats in `session`.
 """
 
@@ -12,36 +12,27 @@ import asyncio
 import contextlib
 import functools
 import os
-import sys
 import tempfile
-import webbrowser
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 from starlette.applications import Starlette
-from starlette.middleware import Middleware
-from starlette.routing import BaseRoute, Mount, WebSocketRoute
-from starlette.staticfiles import StaticFiles
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import Route, WebSocketRoute
 
 from palpate.runtime import LoopProcess
 from palpate.runtime.touchable import Learnt, load_touchable, touchable
-from palpate.viewer.guard import Guard
-from palpate.viewer.ports import listen
-from palpate.viewer.pressing import PressedExhibit
-from palpate.viewer.pressing_routes import pressing_routes
-from palpate.viewer.running import STATIC, Running, address, termination_interrupts
+from palpate.viewer.page_model import PageModel
 from palpate.viewer.session import Session
+from palpate.viewer.web_server import LocalServer, local_application, wait_until_interrupted
 
 __all__ = ["Viewer", "application", "serve"]
 
 
 def application(session: Session) -> Starlette:
-    """The web application of a session: the built page, and its websocket at ``/touch``."""
-    more: list[BaseRoute] = []
-    if isinstance(session.exhibit, PressedExhibit):
-        more = pressing_routes(session.exhibit)
+    """Return the web application of a session: the built page, its websocket, and the body's surface and fields."""
 
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
@@ -50,23 +41,34 @@ def application(session: Session) -> Starlette:
         watcher.cancel()
         await asyncio.gather(watcher, return_exceptions=True)
 
-    return Starlette(
-        routes=[
-            WebSocketRoute("/touch", session.talk),
-            *more,
-            Mount("/", StaticFiles(directory=STATIC, html=True)),
-        ],
-        middleware=[Middleware(Guard)],
-        lifespan=lifespan,
-    )
+    model, binary = session.model, "application/octet-stream"
+
+    async def surface(_: Request) -> Response:
+        if model.surface is None:
+            raise HTTPException(404)
+        return Response(model.surface.pack(), media_type=binary)
+
+    async def modes(request: Request) -> Response:
+        index = request.path_params["index"]
+        if index >= model.field_count:
+            raise HTTPException(404)
+        return Response(model.modes(index).pack(), media_type=binary)
+
+    routes = [
+        WebSocketRoute("/touch", session.talk),
+        Route("/surface", surface),
+        Route("/fields/{index:int}", modes),
+    ]
+    return local_application(routes, lifespan=lifespan)
 
 
-class Viewer:
+class Viewer(LocalServer):
     """A body to look at and touch, at `url`, while the context lasts.
 
     Parameters
     ----------
     model : learnt body or path
+        Whatever `palpate.load` reads and gives a force, or its file.
     port : int
         The port wanted; 0 takes any free one.
     host : str
@@ -83,6 +85,7 @@ class Viewer:
     Attributes
     ----------
     model : Touchable
+        The body as a hand finds it.
     loop : LoopProcess
         The real-time process, once started.
     port : int
@@ -105,68 +108,29 @@ class Viewer:
         max_force: float | None = None,
         strict_port: bool = False,
     ) -> None:
+        super().__init__(port, host, strict_port=strict_port)
         self._source = model
         if isinstance(model, str | os.PathLike):
             self.model = load_touchable(model)
         else:
             self.model = touchable(model)
-        self.host, self.port = host, port
-        self._wanted = (port, host, strict_port)
         self._loop = functools.partial(LoopProcess, device=device, rate=rate, max_force=max_force)
-        self._closing = contextlib.ExitStack()
 
     @property
-    def url(self) -> str:
-        """The page's address."""
-        return address(self.host, self.port)
+    def caption(self) -> str:
+        """The body's name, and what a hand does to it."""
+        return f"{self.model.name}. {'Pull on it' if self.model.holds else 'Press it'};"
 
-    def start(self) -> Self:
-        """Start the real-time process and the server; the page can be opened when this returns.
+    def _application(self) -> Starlette:
+        self.loop = self._closing.enter_context(self._loop(self._file()))
+        return application(Session(PageModel(self.model), self.loop))
 
-        Raises
-        ------
-        PortInUseError
-            If no port is free, or the one wanted isn't and `strict_port` is set.
-        UsageError
-            If the host, the port or the device can't be.
-        DeviceError
-            If the real-time process or the server doesn't start.
-        """
-        try:
-            port, host, strict = self._wanted
-            socket = self._closing.enter_context(listen(port, host, strict=strict))
-            self.port = int(socket.getsockname()[1])
-            path = self._written()
-            self.loop = self._closing.enter_context(self._loop(path))
-            page = application(Session(self.model, self.loop))
-            self._running = self._closing.enter_context(Running(page, socket))
-        except BaseException:
-            self.stop()
-            raise
-        return self
-
-    def stop(self) -> None:
-        """End the server and the real-time process. Harmless when repeated."""
-        self._closing.close()
-
-    def wait(self) -> None:
-        """Return when the server has ended."""
-        self._running.wait()
-
-    def _written(self) -> str | os.PathLike[str]:
-        """A file of the model, which the real-time process can read."""
+    def _file(self) -> str | os.PathLike[str]:
+        """Return a file of the model, which the real-time process can read."""
         if isinstance(self._source, str | os.PathLike):
             return self._source
         folder = self._closing.enter_context(tempfile.TemporaryDirectory(prefix="palpate-"))
         return self._source.save(Path(folder) / "model.palpate")
-
-    def __enter__(self) -> Self:
-        return self.start()
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.stop()
 
 
 def serve(
@@ -196,14 +160,4 @@ def serve(
     viewer = Viewer(
         model, port=port, host=host, device=device, rate=rate, max_force=max_force, strict_port=strict_port
     )
-    with termination_interrupts(), contextlib.suppress(KeyboardInterrupt), viewer:
-        (on_ready or _announce)(viewer)
-        if open_browser:
-            webbrowser.open(viewer.url)
-        viewer.wait()
-
-
-def _announce(viewer: Viewer) -> None:
-    how = "Press it" if not viewer.model.holds else "Pull the tip"
-    sys.stderr.write(f"{viewer.url} shows {viewer.model.name}. {how}; Ctrl-C ends it.\n")
-    sys.stderr.flush()
+    wait_until_interrupted(viewer, open_browser=open_browser, on_ready=on_ready)

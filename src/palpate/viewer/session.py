@@ -21,11 +21,9 @@ from palpate.errors import DeviceError, UsageError
 from palpate.runtime.loop_report import EDGES
 from palpate.runtime.safety import Fault
 from palpate.runtime.shared_state import Shared, State, now
-from palpate.runtime.touchable import Touchable
-from palpate.viewer.exhibits import exhibit_of, vector
-from palpate.viewer.hands import Command, Hands
-from palpate.viewer.messages import Beat, Credit, Hand, Loop, Notice
-from palpate.viewer.wire import Json
+from palpate.viewer.hand_lock import Command, HandLock
+from palpate.viewer.messages import Credit, Frame, Hand, Hello, Loop, Notice
+from palpate.viewer.page_model import PageModel, vector
 
 __all__ = ["LoopLike", "Session"]
 
@@ -90,9 +88,9 @@ class Page:
 class Session:
     """A body, its real-time process and the pages that look at it."""
 
-    def __init__(self, model: Touchable, loop: LoopLike) -> None:
-        self.model, self.loop, self.exhibit = model, loop, exhibit_of(model)
-        self._hands = Hands(np.array([(r.low + r.high) / 2 for r in model.parameters]))
+    def __init__(self, model: PageModel, loop: LoopLike) -> None:
+        self.model, self.loop = model, loop
+        self._lock = HandLock(np.array([(r.low + r.high) / 2 for r in model.body.parameters]))
         self._pages: dict[int, Page] = {}
         self._numbers: Iterator[int] = itertools.count(1)
         self._ended = False
@@ -126,19 +124,18 @@ class Session:
             with contextlib.suppress(WebSocketDisconnect, RuntimeError):  # RuntimeError: just closed
                 await page.socket.send_text(ENDED.to_json())
 
-    def hello(self) -> Json:
+    def hello(self) -> Hello:
         """The first message to every page."""
-        return self.exhibit.hello(self._read()[0], self.loop.rate)
+        return self.model.hello(self._read()[0], self.loop.rate)
 
-    def frame(self, page: Page) -> Beat:
+    def frame(self, page: Page) -> Frame:
         """The newest state as one page sees it."""
         state, loop = self._read()
         held = state.grabbed and not state.stalled and loop is Loop.RUNNING
-        beat = self._beat(page, state, loop, held)
-        return self.exhibit.frame(beat, state, held, self._hands.parameters)
+        return self.model.frame(self._facts(page, state, loop, held), state, held, self._lock.parameters)
 
-    def _beat(self, page: Page, state: State, loop: Loop, held: bool) -> dict[str, Any]:
-        """The fields of `Beat`."""
+    def _facts(self, page: Page, state: State, loop: Loop, held: bool) -> dict[str, Any]:
+        """Return the fields of `Frame` that tell of the loop and the page."""
         fault, faults, last_fault = _faults(state)
         return {
             "tick": state.tick,
@@ -156,12 +153,12 @@ class Session:
             "fault": fault,
             "last_fault": last_fault,
             "loop": loop,
-            "hold": self._hands.hold(page.number),
+            "hold": self._lock.hold(page.number),
             "inside": state.inside or not held,
             "clamped": state.clamped and held,
             "grabbed": state.grabbed and loop is Loop.RUNNING,
             "stalled": state.stalled,
-            "parameters": self._hands.parameters,
+            "parameters": self._lock.parameters,
         }
 
     def _read(self) -> tuple[State, Loop]:
@@ -197,7 +194,7 @@ class Session:
             return
         hand = Hand.unpack(data)
         page.echo = hand.sent
-        if (command := self._hands.hear(page.number, hand, now())) is not None:
+        if (command := self._lock.hear(page.number, hand, now())) is not None:
             self._tell(command)
 
     def _tell(self, command: Command) -> None:
@@ -212,7 +209,7 @@ class Session:
 
     def _forget(self, page: Page) -> None:
         del self._pages[page.number]
-        if self._hands.leave(page.number):
+        if self._lock.leave(page.number):
             self.loop.shared.write_command(grabbed=False)
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import types
 import typing
 from collections.abc import Mapping
 from enum import IntEnum
 from typing import Any
 
-from palpate.viewer import messages, pressed_messages
+from palpate.viewer import messages
 from palpate.viewer.wire import CODES, Binary, Json, Wire
 
 __all__ = ["generate"]
@@ -19,12 +20,10 @@ BINARY: tuple[type[Binary], ...] = (
     messages.Credit,
     messages.Surface,
     messages.Step,
-    pressed_messages.Press,
-    pressed_messages.Skin,
-    pressed_messages.Modes,
+    messages.Modes,
 )
-JSON: tuple[type[Json], ...] = (messages.Hello, pressed_messages.Touched, messages.Notice, messages.Shown)
-RECORDS: tuple[type, ...] = (messages.RangeInfo, pressed_messages.Look, messages.FieldInfo, messages.StepInfo)
+JSON: tuple[type[Json], ...] = (messages.Hello, messages.Notice, messages.Shown)
+RECORDS: tuple[type, ...] = (messages.RangeInfo, messages.FieldInfo, messages.Line, messages.StepInfo)
 ENUMS: tuple[type[IntEnum], ...] = (messages.Loop, messages.Hold)
 
 # wire type → TypeScript type, DataView suffix, bytes of one number
@@ -41,7 +40,7 @@ TYPES = {
 }
 
 HEAD = """\
-// Generated from palpate/viewer/messages.py and pressed_messages.py; change it there, then
+// Generated from palpate/viewer/messages.py; change it there, then
 //   python -m palpate.viewer.messages > src/palpate/viewer/client/src/messages.ts
 
 export type Vec3 = [number, number, number];
@@ -79,6 +78,8 @@ def _type(hint: Any) -> str:
     if hint in plain:
         return plain[hint]
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    if origin is types.UnionType:
+        return f"{_type(arguments[0])} | null"
     if origin is tuple and arguments[-1] is Ellipsis:
         return f"{_type(arguments[0])}[]"
     if origin is Mapping:

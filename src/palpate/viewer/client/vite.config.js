@@ -8,7 +8,7 @@ const here = import.meta.dirname;
 /** Names of the files that the bundle is made of; the tests compare their digest with the bundle's. */
 function sources() {
   const inside = (folder) => readdirSync(join(here, folder)).map((name) => `${folder}/${name}`);
-  const own = ["body.html", "index.html", "package-lock.json", "package.json", "pressed.html", "tsconfig.json", "vite.config.js"];
+  const own = ["index.html", "package-lock.json", "package.json", "tsconfig.json", "vite.config.js"];
   return [...own, ...inside("public"), ...inside("src")].sort();
 }
 
@@ -39,8 +39,6 @@ export default defineConfig({
       // messages and fields stay modules of their own, whole, so that tests can speak through them
       input: {
         page: join(here, "index.html"),
-        pressed: join(here, "pressed.html"),
-        body: join(here, "body.html"),
         messages: join(here, "src/messages.ts"),
         field: join(here, "src/field.ts"),
       },

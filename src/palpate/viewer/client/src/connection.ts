@@ -1,34 +1,25 @@
 // The websocket: reconnects by itself, grants credits, keeps only the newest frame.
 
-import { encodeCredit, encodeHand, isNotice, PROTOCOL } from "./messages";
-import type { Hand, Notice } from "./messages";
+import { decodeFrame, encodeCredit, encodeHand, isHello, isNotice, PROTOCOL } from "./messages";
+import type { Frame, Hand, Hello, Notice } from "./messages";
 
 const CREDITS_AT_START = 2; // one frame on its way while one is drawn
 const FIRST_DELAY = 300; // ms until the first new attempt
 const LONGEST_DELAY = 3000; // ms
 
-/** How the first message and the pictures of one kind of body are told. */
-export interface Language<Hello, Frame> {
-  isHello(message: { kind: string }): message is Hello & { kind: string };
-  decode(data: ArrayBuffer): Frame;
-}
-
-export interface Listener<Hello> {
+export interface Listener {
   hello(hello: Hello): void;
   notice(notice: Notice): void;
   lost(): void;
 }
 
-export class Connection<Hello extends { protocol: number }, Frame> {
+export class Connection {
   private socket: WebSocket | null = null;
   private delay = FIRST_DELAY;
   private newest: Frame | null = null;
   private owed = 0;
 
-  constructor(
-    private readonly language: Language<Hello, Frame>,
-    private readonly listener: Listener<Hello>,
-  ) {
+  constructor(private readonly listener: Listener) {
     this.open();
   }
 
@@ -61,16 +52,13 @@ export class Connection<Hello extends { protocol: number }, Frame> {
 
   private receive(socket: WebSocket, data: string | ArrayBuffer): void {
     if (typeof data !== "string") {
-      this.newest = this.language.decode(data);
+      this.newest = decodeFrame(data);
       this.owed += 1;
       return;
     }
     const message = JSON.parse(data) as { kind: string };
     if (isNotice(message)) this.listener.notice(message);
-    if (!this.language.isHello(message)) {
-      if (!isNotice(message)) location.reload(); // the server is back with another kind of body, and its page
-      return;
-    }
+    if (!isHello(message)) return;
     if (message.protocol !== PROTOCOL) {
       location.reload(); // the server is of another version than this page
       return;

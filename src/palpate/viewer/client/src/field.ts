@@ -2,7 +2,7 @@
 // travels with the probe: cubic B-splines in the distance from its foot, times 1 and the coordinates of the offset from
 // it (docs/method/touch-field.md); the server sends its profile with each picture.
 
-import type { Look, Modes, Vec3 } from "./messages";
+import type { FieldInfo, Modes, Surface, Vec3 } from "./messages";
 
 const OFFSETS = 4; // 1 and three coordinates
 
@@ -12,7 +12,7 @@ export class Field {
   readonly touched: Int32Array;
 
   constructor(
-    readonly look: Look,
+    readonly info: FieldInfo,
     private readonly modes: Modes,
     private readonly points: Float32Array, // m, x y z at rest
   ) {
@@ -20,9 +20,9 @@ export class Field {
     this.touched = Int32Array.from(modes.touched);
   }
 
-  /** Numbers of `Press.coefficients` that this field takes. */
+  /** Numbers of `Frame.coefficients` that this field takes. */
   get count(): number {
-    return this.look.modes + OFFSETS * this.modes.rows * this.look.components;
+    return this.info.modes + OFFSETS * this.modes.rows * this.info.components;
   }
 
   /** Sum it up: `numbers` are its modes' coefficients and its dimple's profile. */
@@ -30,18 +30,18 @@ export class Field {
     const { values, modes } = this;
     const n = values.length;
     values.set(modes.rest);
-    for (let k = 0; k < this.look.modes; k++) {
+    for (let k = 0; k < this.info.modes; k++) {
       const b = numbers[k]!;
       if (b === 0) continue;
       const mode = modes.modes.subarray(k * n, (k + 1) * n);
       for (let i = 0; i < n; i++) values[i]! += b * mode[i]!;
     }
-    if (modes.rows > 0) this.dimple(numbers.subarray(this.look.modes), foot);
+    if (modes.rows > 0) this.dimple(numbers.subarray(this.info.modes), foot);
   }
 
   /** The size of the field at each point. */
   sizes(): Float32Array {
-    const [u, per] = [this.values, this.look.components];
+    const [u, per] = [this.values, this.info.components];
     if (per === 1) return u;
     return Float32Array.from({ length: u.length / per }, (_, i) => {
       let sum = 0;
@@ -54,7 +54,7 @@ export class Field {
     if (!profile.some((x) => x !== 0)) return;
     const { values, points } = this;
     const { reach, rows } = this.modes;
-    const per = this.look.components;
+    const per = this.info.components;
     for (const i of this.touched) {
       const offset = [1, ...foot.map((o, c) => (points[3 * i + c]! - o) / reach)];
       const far = Math.hypot(offset[1]!, offset[2]!, offset[3]!);
@@ -71,6 +71,25 @@ export class Field {
         }
         values[per * i + c]! += sum;
       }
+    }
+  }
+}
+
+/** What stays pressed in a body that yields: depths along the normals of those points that may keep a print. */
+export class Prints {
+  private readonly points: Int32Array;
+
+  constructor(private readonly surface: Surface) {
+    this.points = Int32Array.from(surface.printable);
+  }
+
+  /** Press displacements (x y z of each point, m) down by the depths (m) of a picture; empty where nothing stays. */
+  into(moved: Float32Array, depths: Float32Array): void {
+    const { normals } = this.surface;
+    for (let k = 0; k < depths.length; k++) {
+      const depth = depths[k]!;
+      if (depth === 0) continue;
+      for (let i = 0; i < 3; i++) moved[3 * this.points[k]! + i]! -= depth * normals[3 * k + i]!;
     }
   }
 }

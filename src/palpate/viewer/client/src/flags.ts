@@ -1,20 +1,10 @@
-// What is out of the ordinary, in plain words.
+// What a page says in plain words: what is out of the ordinary, its banner and its status.
 
 import { Hold, Loop } from "./messages";
-import type { Frame } from "./messages";
-import { tidy } from "./units";
+import type { Frame, Hello, Notice } from "./messages";
+import { element, tidy } from "./units";
 
 const SLOW = 0.9; // of the rate aimed at
-
-/** What every picture tells of the loop, whatever the body. */
-export type Beat = Omit<Frame, "contact" | "displacement">;
-
-/** What is told once of the loop. */
-export interface LoopFacts {
-  faults: string[];
-  max_force: number;
-  rate: number;
-}
 
 /** How a kind of body says where the hand is. */
 export interface Places {
@@ -30,7 +20,7 @@ export interface Flag {
 }
 
 /** The flags of one frame, the worst first. */
-export function flags(frame: Beat, hello: LoopFacts, places: Places): Flag[] {
+export function flags(frame: Frame, hello: Hello, places: Places): Flag[] {
   const found = [...failures(frame, hello), ...limits(frame, hello, places)];
   if (found.length === 0) found.push(ordinary(frame, places));
   if (frame.hold === Hold.ANOTHER) {
@@ -43,7 +33,7 @@ export function flags(frame: Beat, hello: LoopFacts, places: Places): Flag[] {
   return found;
 }
 
-function failures(frame: Beat, hello: LoopFacts): Flag[] {
+function failures(frame: Frame, hello: Hello): Flag[] {
   if (frame.loop === Loop.ENDED) {
     return [{ id: "ended", tone: "bad", words: "The real-time process has ended. The force is zero." }];
   }
@@ -65,7 +55,7 @@ function failures(frame: Beat, hello: LoopFacts): Flag[] {
   return found;
 }
 
-function limits(frame: Beat, hello: LoopFacts, places: Places): Flag[] {
+function limits(frame: Frame, hello: Hello, places: Places): Flag[] {
   const found: Flag[] = [];
   if (!frame.inside) {
     found.push({ id: "outside", tone: "warn", words: places.outside });
@@ -80,7 +70,33 @@ function limits(frame: Beat, hello: LoopFacts, places: Places): Flag[] {
   return found;
 }
 
-function ordinary(frame: Beat, places: Places): Flag {
+function ordinary(frame: Frame, places: Places): Flag {
   if (!frame.grabbed) return { id: "free", tone: "calm", words: places.free };
   return { id: "inside", tone: "good", words: places.inside };
+}
+
+export function say(words: string, tone: "bad" | "calm"): void {
+  const banner = element("banner");
+  banner.textContent = words;
+  banner.dataset["tone"] = tone;
+  banner.hidden = false;
+}
+
+export function warn(notice: Notice): void {
+  say(`${notice.what} ${notice.fix}`, "bad");
+}
+
+export function status(state: string, words: string): void {
+  const pill = element("status");
+  if (pill.textContent === words) return;
+  pill.dataset["state"] = state;
+  pill.textContent = words;
+}
+
+export function describe(frame: Frame): void {
+  if (frame.loop === Loop.ENDED) status("ended", "real-time process ended");
+  else if (frame.loop === Loop.FROZEN) status("warn", "real-time process stands still");
+  else if (frame.hold === Hold.ANOTHER) status("warn", "watching");
+  else if (frame.stalled && frame.grabbed) status("warn", "no word from the hand");
+  else status("live", frame.grabbed ? "holding" : "live");
 }

@@ -1,11 +1,10 @@
-// Where the camera stands: in front, as near as the whole travel of the held node allows.
+// Where the camera stands: as near as all that must be seen allows.
 
 import { Vector2, Vector3 } from "three";
 import type { PerspectiveCamera } from "three";
 import { WALL, WALL_DEPTH } from "./surroundings";
 import type { Extent } from "./surroundings";
 
-const FRONT = new Vector3(0.16, 0.2, 1).normalize();
 const GAP = 8; // px between the picture and the words around it
 const ROUNDS = 9; // each leaves a small part of the misfit of the one before
 
@@ -51,7 +50,7 @@ export function fit(
   size: Size,
   room: Free,
   points: Vector3[],
-  from = FRONT,
+  from: Vector3,
 ): { centre: Vector3; distance: number } {
   const centre = points.reduce((sum, p) => sum.add(p), new Vector3()).divideScalar(points.length);
   let distance = 3 * Math.max(...points.map((p) => p.distanceTo(centre)));

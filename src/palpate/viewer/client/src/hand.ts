@@ -1,11 +1,12 @@
-// The hand: mouse, finger or arrow keys hold the body's tip. Sends at display rate while holding, else every 50 ms.
+// The hand: what every kind of body has of it, and the one that takes hold of a node or a pad and pulls. Sends at display
+// rate while it holds, else every 50 ms.
 
+import type { Vector2, Vector3 } from "three";
 import type { Connection } from "./connection";
-import type { Frame, Hello, Vec3 } from "./messages";
-import type { View } from "./scene";
+import type { Hello, Vec3 } from "./messages";
 
 const BEAT = 50; // ms between heartbeats
-const NEAR_MOUSE = 26; // px around the tip that count as on it
+const NEAR_MOUSE = 26; // px around what is held that count as on it
 const NEAR_FINGER = 44;
 const KEYS: Record<string, readonly [number, number]> = {
   ArrowLeft: [-1, 0],
@@ -13,23 +14,20 @@ const KEYS: Record<string, readonly [number, number]> = {
   ArrowUp: [0, 1],
   ArrowDown: [0, -1],
 };
-const STEP = 0.02; // of the reach per key press
+const STEP = 0.02; // of the deepest trained displacement, per key press
 const SMALL_STEP = 0.004;
 
-export class HandInput {
+export abstract class Hand {
   grabbed = false;
-  /** m, where the hand wants the held node, as an offset from rest */
-  wanted: Vec3 = [0, 0, 0];
   parameters = new Float32Array();
 
-  private view: View | null = null;
-  private pointer: number | null = null;
-  private grip: Vec3 = [0, 0, 0]; // from the pointer to the node at the moment of grabbing
+  protected pointer: number | null = null;
   private lastSent = 0;
 
   constructor(
-    private readonly canvas: HTMLCanvasElement,
-    private readonly connection: Connection<Hello, Frame>,
+    protected readonly canvas: HTMLCanvasElement,
+    private readonly connection: Connection,
+    protected readonly hello: Hello,
   ) {
     // registered before the view's own handlers, so that a grab can keep the view still
     canvas.addEventListener("pointerdown", (e) => this.down(e));
@@ -37,7 +35,10 @@ export class HandInput {
     for (const kind of ["pointerup", "pointercancel", "lostpointercapture"] as const) {
       canvas.addEventListener(kind, (e) => e.pointerId === this.pointer && this.release());
     }
-    canvas.addEventListener("keydown", (e) => this.key(e));
+    canvas.addEventListener("keydown", (e) => {
+      if (e.key === "Escape") this.release();
+      if (this.pointer === null) this.key(e);
+    });
     canvas.addEventListener("blur", () => this.pointer === null && this.release());
     document.addEventListener("visibilitychange", () => {
       this.release();
@@ -46,10 +47,13 @@ export class HandInput {
     setInterval(() => performance.now() - this.lastSent > 0.9 * BEAT && this.send(), BEAT);
   }
 
-  attach(view: View): void {
-    this.release();
-    this.view = view;
-  }
+  /** Where the hand wants what it holds, or the probe's centre, m from the device's centre in the body's axes. */
+  protected abstract wish(): Vec3;
+  protected abstract down(e: PointerEvent): void;
+  protected abstract move(e: PointerEvent): void;
+  protected abstract key(e: KeyboardEvent): void;
+  /** What the view does when the hand takes hold or lets go. */
+  protected abstract held(on: boolean): void;
 
   /** Called for every picture: while holding, the hand is told at display rate. */
   tick(): void {
@@ -61,92 +65,117 @@ export class HandInput {
     if (!this.grabbed) return;
     this.grabbed = false;
     this.canvas.dataset["cursor"] = "";
-    if (this.view) {
-      this.view.turnable = true;
-      this.view.highlight(false);
-    }
+    this.held(false);
     this.send();
   }
 
   send(): void {
     this.lastSent = performance.now();
-    const scale = this.view?.hello.scale ?? 1;
+    const { hello } = this;
+    const [x, y, z] = this.wish().map((v) => v / hello.scale) as Vec3;
+    // devices have y up and z towards the user, as a line has; a solid's z is the device's y
+    const device: Vec3 = hello.line ? [x, y, z] : [x, z, -y];
+    const size = Math.hypot(...device);
     this.connection.send({
       sent: this.lastSent,
       period: BEAT / 1000,
-      target: this.wanted.map((x) => x / scale) as Vec3,
+      target: size > hello.workspace ? (device.map((v) => (v * hello.workspace) / size) as Vec3) : device,
       grabbed: this.grabbed,
       hidden: document.hidden,
       parameters: this.parameters,
     });
   }
 
-  private near(e: PointerEvent): boolean {
-    if (!this.view) return false;
-    const tip = this.view.project(this.view.tip);
-    const limit = e.pointerType === "touch" ? NEAR_FINGER : NEAR_MOUSE;
-    return Math.hypot(tip.x - e.offsetX, tip.y - e.offsetY) < limit;
+  protected capture(e: PointerEvent): void {
+    this.pointer = e.pointerId;
+    this.canvas.setPointerCapture(e.pointerId);
   }
 
-  private down(e: PointerEvent): void {
+  protected grab(): void {
+    this.grabbed = true;
+    this.held(true);
+    this.send();
+  }
+}
+
+/** What a view offers to a hand that takes hold. */
+export interface Handle {
+  readonly grip: Vector3;
+  turnable: boolean;
+  project(point: Vector3): Vector2;
+  offsetAt(x: number, y: number): Vec3 | null;
+  offset(): Vec3;
+  highlight(on: boolean): void;
+}
+
+export class PullHand extends Hand {
+  private view: Handle | null = null;
+  private wanted: Vec3 = [0, 0, 0]; // m, of what is held, from rest
+  private gap: Vec3 = [0, 0, 0]; // from the pointer to what is held at the moment of grabbing
+
+  attach(view: Handle): void {
+    this.release();
+    this.view = view;
+  }
+
+  protected override wish(): Vec3 {
+    return this.wanted;
+  }
+
+  protected override held(on: boolean): void {
+    if (!this.view) return;
+    this.view.turnable = !on;
+    this.view.highlight(on);
+  }
+
+  protected override down(e: PointerEvent): void {
     if (!this.view || e.button !== 0 || this.pointer !== null || !this.near(e)) return;
     const at = this.view.offsetAt(e.offsetX, e.offsetY);
     if (!at) return;
-    const tip = this.tip();
-    this.grip = [tip[0] - at[0], tip[1] - at[1], 0];
-    this.pointer = e.pointerId;
-    this.canvas.setPointerCapture(e.pointerId);
+    this.wanted = this.view.offset();
+    this.gap = this.wanted.map((v, k) => v - at[k]!) as Vec3;
+    this.capture(e);
     this.canvas.dataset["cursor"] = "grabbing";
-    this.grab(tip);
+    this.grab();
   }
 
-  private move(e: PointerEvent): void {
+  protected override move(e: PointerEvent): void {
     if (!this.view) return;
-    if (e.pointerId !== this.pointer) {
-      if (e.pointerType === "mouse" && !this.grabbed) this.hover(this.near(e));
-      return;
+    if (e.pointerId === this.pointer) {
+      const at = this.view.offsetAt(e.offsetX, e.offsetY);
+      if (at) this.want(at.map((v, k) => v + this.gap[k]!) as Vec3);
+    } else if (e.pointerType === "mouse" && !this.grabbed) {
+      const near = this.near(e);
+      this.canvas.dataset["cursor"] = near ? "grab" : "";
+      this.view.highlight(near);
     }
-    const at = this.view.offsetAt(e.offsetX, e.offsetY);
-    if (at) this.want([at[0] + this.grip[0], at[1] + this.grip[1], 0]);
   }
 
-  private hover(near: boolean): void {
-    this.canvas.dataset["cursor"] = near ? "grab" : "";
-    this.view?.highlight(near);
-  }
-
-  private key(e: KeyboardEvent): void {
-    if (e.key === "Escape") this.release();
+  /** Arrow keys pull along x, and upwards. */
+  protected override key(e: KeyboardEvent): void {
     const step = KEYS[e.key];
-    if (!step || !this.view || this.pointer !== null) return;
+    if (!step || !this.view) return;
     e.preventDefault();
-    if (!this.grabbed) this.grab(this.tip());
-    const size = (e.shiftKey ? SMALL_STEP : STEP) * this.view.hello.reach;
-    this.want([this.wanted[0] + size * step[0], this.wanted[1] + size * step[1], 0]);
+    if (!this.grabbed) {
+      this.wanted = this.view.offset();
+      this.grab();
+    }
+    const size = (e.shiftKey ? SMALL_STEP : STEP) * this.hello.deepest;
+    const [right, up] = step.map((s) => size * s) as [number, number];
+    const [x, y, z] = this.wanted;
+    this.want(this.hello.line ? [x + right, y + up, z] : [x + right, y, z + up]);
   }
 
-  private grab(at: Vec3): void {
-    this.want(at);
-    this.grabbed = true;
-    if (this.view) {
-      this.view.turnable = false;
-      this.view.highlight(true);
-    }
-    this.send();
+  private near(e: PointerEvent): boolean {
+    const at = this.view!.project(this.view!.grip);
+    const limit = e.pointerType === "touch" ? NEAR_FINGER : NEAR_MOUSE;
+    return Math.hypot(at.x - e.offsetX, at.y - e.offsetY) < limit;
   }
 
   /** The hand stays inside its workspace. */
   private want(offset: Vec3): void {
-    const hello = this.view!.hello;
-    const limit = hello.workspace * hello.scale;
+    const limit = this.hello.workspace * this.hello.scale;
     const size = Math.hypot(...offset);
     this.wanted = size > limit ? (offset.map((x) => (x * limit) / size) as Vec3) : offset;
-  }
-
-  /** Offset (m) at which the held node is drawn now. */
-  private tip(): Vec3 {
-    const view = this.view!;
-    const rest = view.hello.rest[view.hello.touch_node]!;
-    return [0, 1, 2].map((k) => (view.tip.getComponent(k) - rest[k]!) / view.enlarged) as Vec3;
   }
 }

@@ -1,9 +1,9 @@
-// Generated from palpate/viewer/messages.py and pressed_messages.py; change it there, then
+// Generated from palpate/viewer/messages.py; change it there, then
 //   python -m palpate.viewer.messages > src/palpate/viewer/client/src/messages.ts
 
 export type Vec3 = [number, number, number];
 
-export const PROTOCOL = 2;
+export const PROTOCOL = 3;
 
 /** The real-time process as the server sees it. */
 export const Loop = {
@@ -27,8 +27,8 @@ export interface RangeInfo {
   unit: string;
 }
 
-/** A field that deforms or colours a touched body, and its range over the trained region. */
-export interface Look {
+/** A quantity that deforms or colours a body, and its range over all that is shown. */
+export interface FieldInfo {
   name: string;
   unit: string;
   low: number;
@@ -37,12 +37,12 @@ export interface Look {
   modes: number;
 }
 
-/** A quantity that colours a body, and its range over all steps. */
-export interface FieldInfo {
-  name: string;
-  unit: string;
-  low: number;
-  high: number;
+/** A body held at one node and drawn as a line. */
+export interface Line {
+  rest: Vec3[];
+  touch_node: number;
+  nodes_of_interest: number[];
+  travel: Vec3[];
 }
 
 /** What is known of a state in words and figures. */
@@ -51,46 +51,28 @@ export interface StepInfo {
   figures: Record<string, unknown>;
 }
 
-/** A body held at one node and its loop, once per connection, server to page. */
+/** A touchable body and its loop, once per connection, server to page. */
 export interface Hello {
   protocol: number;
   name: string;
   inputs: RangeInfo[];
   parameters: RangeInfo[];
-  scale: number;
-  workspace: number;
-  max_force: number;
-  rate: number;
-  faults: string[];
-  meta: Record<string, unknown>;
-  rest: Vec3[];
-  radius: number;
-  touch_node: number;
-  nodes_of_interest: number[];
-  reach: number;
-  travel: Vec3[];
-}
-
-/** A body pressed anywhere and its loop, once per connection, server to page. */
-export interface Touched {
-  protocol: number;
-  name: string;
-  inputs: RangeInfo[];
-  parameters: RangeInfo[];
-  scale: number;
-  workspace: number;
-  max_force: number;
-  rate: number;
-  faults: string[];
-  meta: Record<string, unknown>;
+  holds: boolean;
   radius: number;
   radius_parameter: number;
   deepest: number;
   force_max: number;
   stiffness_max: number;
   centre: Vec3;
-  fields: Look[];
+  line: Line | null;
+  fields: FieldInfo[];
   remembers: string;
+  scale: number;
+  workspace: number;
+  max_force: number;
+  rate: number;
+  faults: string[];
+  meta: Record<string, unknown>;
 }
 
 /** An event in plain words, server to page. */
@@ -113,10 +95,6 @@ export function isHello(message: { kind: string }): message is Hello & { kind: s
   return message.kind === "Hello";
 }
 
-export function isTouched(message: { kind: string }): message is Touched & { kind: string } {
-  return message.kind === "Touched";
-}
-
 export function isNotice(message: { kind: string }): message is Notice & { kind: string } {
   return message.kind === "Notice";
 }
@@ -127,7 +105,7 @@ export function isShown(message: { kind: string }): message is Shown & { kind: s
 
 export const FRAME = 1;
 
-/** One picture of a body held at a node, server to page. */
+/** One picture of the loop and of a touched body, server to page. */
 export interface Frame {
   /** counts the loop's ticks */
   tick: number;
@@ -135,7 +113,7 @@ export interface Frame {
   time: number;
   /** ms, page clock: `sent` of the last Hand that this page sent */
   echo: number;
-  /** m, the probe's centre, or the hand's offset from the held node at rest */
+  /** m, the probe's centre, or the hand's offset from what it holds at rest */
   position: Vec3;
   /** N, on the hand */
   force: Vec3;
@@ -169,16 +147,30 @@ export interface Frame {
   grabbed: boolean;
   /** the input is older than the loop allows */
   stalled: boolean;
-  /** m, where the held node is, as an offset from rest */
+  /** m, where a line's node is, as an offset from rest; else the foot of the touch at rest */
   contact: Vec3;
+  /** of the surface there; zero where nothing touches */
+  normal: Vec3;
+  /** m, of the probe in the surface at rest, negative in the air; or how far displaced */
+  depth: number;
+  /** N/m, along the force; 0 where unknown */
+  stiffness: number;
+  /** standard deviation of the force relative to it, NaN where unknown */
+  deviation: number;
+  /** m, depth of the shape drawn: after release it goes back to 0 */
+  drawn: number;
   /** current values of the parameters */
   parameters: Float32Array;
-  /** m, x y z of each node's offset from Hello.rest */
+  /** m, x y z of each of a line's nodes, as an offset from rest */
   displacement: Float32Array;
+  /** for each field its modes' coefficients and its local mode's profile */
+  coefficients: Float32Array;
+  /** m, how deep it stays pressed at each of Surface.printable; empty if nowhere */
+  prints: Float32Array;
 }
 
 export function encodeFrame(m: Frame): ArrayBuffer {
-  const view = new DataView(new ArrayBuffer(97 + 4 + 4 * m.parameters.length + 4 + 4 * m.displacement.length));
+  const view = new DataView(new ArrayBuffer(125 + 4 + 4 * m.parameters.length + 4 + 4 * m.displacement.length + 4 + 4 * m.coefficients.length + 4 + 4 * m.prints.length));
   view.setUint8(0, 1);
   view.setFloat64(1, m.tick, true);
   view.setFloat64(9, m.time, true);
@@ -207,7 +199,14 @@ export function encodeFrame(m: Frame): ArrayBuffer {
   view.setFloat32(85, m.contact[0], true);
   view.setFloat32(89, m.contact[1], true);
   view.setFloat32(93, m.contact[2], true);
-  let at = 97;
+  view.setFloat32(97, m.normal[0], true);
+  view.setFloat32(101, m.normal[1], true);
+  view.setFloat32(105, m.normal[2], true);
+  view.setFloat32(109, m.depth, true);
+  view.setFloat32(113, m.stiffness, true);
+  view.setFloat32(117, m.deviation, true);
+  view.setFloat32(121, m.drawn, true);
+  let at = 125;
   view.setUint32(at, m.parameters.length, true);
   at += 4;
   for (const value of m.parameters) {
@@ -220,15 +219,31 @@ export function encodeFrame(m: Frame): ArrayBuffer {
     view.setFloat32(at, value, true);
     at += 4;
   }
+  view.setUint32(at, m.coefficients.length, true);
+  at += 4;
+  for (const value of m.coefficients) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
+  view.setUint32(at, m.prints.length, true);
+  at += 4;
+  for (const value of m.prints) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
   return view.buffer;
 }
 
 export function decodeFrame(buffer: ArrayBuffer): Frame {
   const view = new DataView(buffer);
-  const parametersAt = 97;
+  const parametersAt = 125;
   const parametersEnd = parametersAt + 4 + 4 * view.getUint32(parametersAt, true);
   const displacementAt = parametersEnd;
   const displacementEnd = displacementAt + 4 + 4 * view.getUint32(displacementAt, true);
+  const coefficientsAt = displacementEnd;
+  const coefficientsEnd = coefficientsAt + 4 + 4 * view.getUint32(coefficientsAt, true);
+  const printsAt = coefficientsEnd;
+  const printsEnd = printsAt + 4 + 4 * view.getUint32(printsAt, true);
   return {
     tick: view.getFloat64(1, true),
     time: view.getFloat64(9, true),
@@ -251,8 +266,15 @@ export function decodeFrame(buffer: ArrayBuffer): Frame {
     grabbed: view.getUint8(83) !== 0,
     stalled: view.getUint8(84) !== 0,
     contact: [view.getFloat32(85, true), view.getFloat32(89, true), view.getFloat32(93, true)],
+    normal: [view.getFloat32(97, true), view.getFloat32(101, true), view.getFloat32(105, true)],
+    depth: view.getFloat32(109, true),
+    stiffness: view.getFloat32(113, true),
+    deviation: view.getFloat32(117, true),
+    drawn: view.getFloat32(121, true),
     parameters: new Float32Array(buffer.slice(parametersAt + 4, parametersEnd)),
     displacement: new Float32Array(buffer.slice(displacementAt + 4, displacementEnd)),
+    coefficients: new Float32Array(buffer.slice(coefficientsAt + 4, coefficientsEnd)),
+    prints: new Float32Array(buffer.slice(printsAt + 4, printsEnd)),
   };
 }
 
@@ -342,10 +364,16 @@ export interface Surface {
   creases: Float32Array;
   /** two points for each edge around the fixed surfaces */
   fixed: Float32Array;
+  /** 1 for each triangle that a hand may touch, else 0 */
+  touchable: Float32Array;
+  /** points that keep prints; none where the body keeps none */
+  printable: Float32Array;
+  /** outward unit normal of each of them */
+  normals: Float32Array;
 }
 
 export function encodeSurface(m: Surface): ArrayBuffer {
-  const view = new DataView(new ArrayBuffer(1 + 4 + 4 * m.rest.length + 4 + 4 * m.triangles.length + 4 + 4 * m.creases.length + 4 + 4 * m.fixed.length));
+  const view = new DataView(new ArrayBuffer(1 + 4 + 4 * m.rest.length + 4 + 4 * m.triangles.length + 4 + 4 * m.creases.length + 4 + 4 * m.fixed.length + 4 + 4 * m.touchable.length + 4 + 4 * m.printable.length + 4 + 4 * m.normals.length));
   view.setUint8(0, 4);
   let at = 1;
   view.setUint32(at, m.rest.length, true);
@@ -372,6 +400,24 @@ export function encodeSurface(m: Surface): ArrayBuffer {
     view.setFloat32(at, value, true);
     at += 4;
   }
+  view.setUint32(at, m.touchable.length, true);
+  at += 4;
+  for (const value of m.touchable) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
+  view.setUint32(at, m.printable.length, true);
+  at += 4;
+  for (const value of m.printable) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
+  view.setUint32(at, m.normals.length, true);
+  at += 4;
+  for (const value of m.normals) {
+    view.setFloat32(at, value, true);
+    at += 4;
+  }
   return view.buffer;
 }
 
@@ -385,11 +431,20 @@ export function decodeSurface(buffer: ArrayBuffer): Surface {
   const creasesEnd = creasesAt + 4 + 4 * view.getUint32(creasesAt, true);
   const fixedAt = creasesEnd;
   const fixedEnd = fixedAt + 4 + 4 * view.getUint32(fixedAt, true);
+  const touchableAt = fixedEnd;
+  const touchableEnd = touchableAt + 4 + 4 * view.getUint32(touchableAt, true);
+  const printableAt = touchableEnd;
+  const printableEnd = printableAt + 4 + 4 * view.getUint32(printableAt, true);
+  const normalsAt = printableEnd;
+  const normalsEnd = normalsAt + 4 + 4 * view.getUint32(normalsAt, true);
   return {
     rest: new Float32Array(buffer.slice(restAt + 4, restEnd)),
     triangles: new Float32Array(buffer.slice(trianglesAt + 4, trianglesEnd)),
     creases: new Float32Array(buffer.slice(creasesAt + 4, creasesEnd)),
     fixed: new Float32Array(buffer.slice(fixedAt + 4, fixedEnd)),
+    touchable: new Float32Array(buffer.slice(touchableAt + 4, touchableEnd)),
+    printable: new Float32Array(buffer.slice(printableAt + 4, printableEnd)),
+    normals: new Float32Array(buffer.slice(normalsAt + 4, normalsEnd)),
   };
 }
 
@@ -452,260 +507,11 @@ export function decodeStep(buffer: ArrayBuffer): Step {
   };
 }
 
-export const PRESS = 6;
+export const MODES = 6;
 
-/** One picture of a body pressed anywhere, server to page. */
-export interface Press {
-  /** counts the loop's ticks */
-  tick: number;
-  /** s, when the frame was composed, on the loop's clock */
-  time: number;
-  /** ms, page clock: `sent` of the last Hand that this page sent */
-  echo: number;
-  /** m, the probe's centre, or the hand's offset from the held node at rest */
-  position: Vec3;
-  /** N, on the hand */
-  force: Vec3;
-  /** Hz, ticks per second achieved */
-  rate: number;
-  /** s, the latest tick since the frame before, to a quarter of itself */
-  lateness: number;
-  /** s, median since the start, 0 below a microsecond */
-  lateness_p50: number;
-  /** s, 99th percentile since the start */
-  lateness_p99: number;
-  /** s, largest since the start */
-  lateness_max: number;
-  /** s, median CPU time of one tick */
-  work_p50: number;
-  /** faults since the start, stalls apart */
-  faults: number;
-  /** code of this tick's fault, 0 for none; words in Hello.faults */
-  fault: number;
-  /** code of the latest fault */
-  last_fault: number;
-  /** a Loop */
-  loop: number;
-  /** a Hold */
-  hold: number;
-  /** the hand is within the trained range */
-  inside: boolean;
-  /** the force limit acted */
-  clamped: boolean;
-  /** a hand holds the body */
-  grabbed: boolean;
-  /** the input is older than the loop allows */
-  stalled: boolean;
-  /** m, of the rigid probe in the surface at rest; negative in the air */
-  depth: number;
-  /** N/m, along the force */
-  stiffness: number;
-  /** standard deviation of the force relative to it, NaN where unknown */
-  deviation: number;
-  /** m, depth of the shape drawn: after release it goes back to 0 */
-  drawn: number;
-  /** m, of the dimples at rest */
-  foot: Vec3;
-  /** of the surface there */
-  normal: Vec3;
-  /** current values of the parameters */
-  parameters: Float32Array;
-  /** for each field its modes' coefficients and its dimple's profile */
-  coefficients: Float32Array;
-  /** m, how deep it stays pressed at each of Skin.printable; empty if nowhere */
-  prints: Float32Array;
-}
-
-export function encodePress(m: Press): ArrayBuffer {
-  const view = new DataView(new ArrayBuffer(125 + 4 + 4 * m.parameters.length + 4 + 4 * m.coefficients.length + 4 + 4 * m.prints.length));
-  view.setUint8(0, 6);
-  view.setFloat64(1, m.tick, true);
-  view.setFloat64(9, m.time, true);
-  view.setFloat64(17, m.echo, true);
-  view.setFloat32(25, m.position[0], true);
-  view.setFloat32(29, m.position[1], true);
-  view.setFloat32(33, m.position[2], true);
-  view.setFloat32(37, m.force[0], true);
-  view.setFloat32(41, m.force[1], true);
-  view.setFloat32(45, m.force[2], true);
-  view.setFloat32(49, m.rate, true);
-  view.setFloat32(53, m.lateness, true);
-  view.setFloat32(57, m.lateness_p50, true);
-  view.setFloat32(61, m.lateness_p99, true);
-  view.setFloat32(65, m.lateness_max, true);
-  view.setFloat32(69, m.work_p50, true);
-  view.setUint32(73, m.faults, true);
-  view.setUint8(77, m.fault);
-  view.setUint8(78, m.last_fault);
-  view.setUint8(79, m.loop);
-  view.setUint8(80, m.hold);
-  view.setUint8(81, m.inside ? 1 : 0);
-  view.setUint8(82, m.clamped ? 1 : 0);
-  view.setUint8(83, m.grabbed ? 1 : 0);
-  view.setUint8(84, m.stalled ? 1 : 0);
-  view.setFloat32(85, m.depth, true);
-  view.setFloat32(89, m.stiffness, true);
-  view.setFloat32(93, m.deviation, true);
-  view.setFloat32(97, m.drawn, true);
-  view.setFloat32(101, m.foot[0], true);
-  view.setFloat32(105, m.foot[1], true);
-  view.setFloat32(109, m.foot[2], true);
-  view.setFloat32(113, m.normal[0], true);
-  view.setFloat32(117, m.normal[1], true);
-  view.setFloat32(121, m.normal[2], true);
-  let at = 125;
-  view.setUint32(at, m.parameters.length, true);
-  at += 4;
-  for (const value of m.parameters) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  view.setUint32(at, m.coefficients.length, true);
-  at += 4;
-  for (const value of m.coefficients) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  view.setUint32(at, m.prints.length, true);
-  at += 4;
-  for (const value of m.prints) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  return view.buffer;
-}
-
-export function decodePress(buffer: ArrayBuffer): Press {
-  const view = new DataView(buffer);
-  const parametersAt = 125;
-  const parametersEnd = parametersAt + 4 + 4 * view.getUint32(parametersAt, true);
-  const coefficientsAt = parametersEnd;
-  const coefficientsEnd = coefficientsAt + 4 + 4 * view.getUint32(coefficientsAt, true);
-  const printsAt = coefficientsEnd;
-  const printsEnd = printsAt + 4 + 4 * view.getUint32(printsAt, true);
-  return {
-    tick: view.getFloat64(1, true),
-    time: view.getFloat64(9, true),
-    echo: view.getFloat64(17, true),
-    position: [view.getFloat32(25, true), view.getFloat32(29, true), view.getFloat32(33, true)],
-    force: [view.getFloat32(37, true), view.getFloat32(41, true), view.getFloat32(45, true)],
-    rate: view.getFloat32(49, true),
-    lateness: view.getFloat32(53, true),
-    lateness_p50: view.getFloat32(57, true),
-    lateness_p99: view.getFloat32(61, true),
-    lateness_max: view.getFloat32(65, true),
-    work_p50: view.getFloat32(69, true),
-    faults: view.getUint32(73, true),
-    fault: view.getUint8(77),
-    last_fault: view.getUint8(78),
-    loop: view.getUint8(79),
-    hold: view.getUint8(80),
-    inside: view.getUint8(81) !== 0,
-    clamped: view.getUint8(82) !== 0,
-    grabbed: view.getUint8(83) !== 0,
-    stalled: view.getUint8(84) !== 0,
-    depth: view.getFloat32(85, true),
-    stiffness: view.getFloat32(89, true),
-    deviation: view.getFloat32(93, true),
-    drawn: view.getFloat32(97, true),
-    foot: [view.getFloat32(101, true), view.getFloat32(105, true), view.getFloat32(109, true)],
-    normal: [view.getFloat32(113, true), view.getFloat32(117, true), view.getFloat32(121, true)],
-    parameters: new Float32Array(buffer.slice(parametersAt + 4, parametersEnd)),
-    coefficients: new Float32Array(buffer.slice(coefficientsAt + 4, coefficientsEnd)),
-    prints: new Float32Array(buffer.slice(printsAt + 4, printsEnd)),
-  };
-}
-
-export const SKIN = 7;
-
-/** The surface of a touchable body at rest, server to page. Points are split along sharp edges. */
-export interface Skin {
-  /** m, x y z of each point */
-  rest: Float32Array;
-  /** three points each; exact up to 16 million */
-  triangles: Float32Array;
-  /** two points for each sharp edge */
-  creases: Float32Array;
-  /** 1 for each triangle that a probe may touch, else 0 */
-  touchable: Float32Array;
-  /** points that keep prints; none where the body keeps none */
-  printable: Float32Array;
-  /** outward unit normal of each of them */
-  normals: Float32Array;
-}
-
-export function encodeSkin(m: Skin): ArrayBuffer {
-  const view = new DataView(new ArrayBuffer(1 + 4 + 4 * m.rest.length + 4 + 4 * m.triangles.length + 4 + 4 * m.creases.length + 4 + 4 * m.touchable.length + 4 + 4 * m.printable.length + 4 + 4 * m.normals.length));
-  view.setUint8(0, 7);
-  let at = 1;
-  view.setUint32(at, m.rest.length, true);
-  at += 4;
-  for (const value of m.rest) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  view.setUint32(at, m.triangles.length, true);
-  at += 4;
-  for (const value of m.triangles) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  view.setUint32(at, m.creases.length, true);
-  at += 4;
-  for (const value of m.creases) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  view.setUint32(at, m.touchable.length, true);
-  at += 4;
-  for (const value of m.touchable) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  view.setUint32(at, m.printable.length, true);
-  at += 4;
-  for (const value of m.printable) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  view.setUint32(at, m.normals.length, true);
-  at += 4;
-  for (const value of m.normals) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  return view.buffer;
-}
-
-export function decodeSkin(buffer: ArrayBuffer): Skin {
-  const view = new DataView(buffer);
-  const restAt = 1;
-  const restEnd = restAt + 4 + 4 * view.getUint32(restAt, true);
-  const trianglesAt = restEnd;
-  const trianglesEnd = trianglesAt + 4 + 4 * view.getUint32(trianglesAt, true);
-  const creasesAt = trianglesEnd;
-  const creasesEnd = creasesAt + 4 + 4 * view.getUint32(creasesAt, true);
-  const touchableAt = creasesEnd;
-  const touchableEnd = touchableAt + 4 + 4 * view.getUint32(touchableAt, true);
-  const printableAt = touchableEnd;
-  const printableEnd = printableAt + 4 + 4 * view.getUint32(printableAt, true);
-  const normalsAt = printableEnd;
-  const normalsEnd = normalsAt + 4 + 4 * view.getUint32(normalsAt, true);
-  return {
-    rest: new Float32Array(buffer.slice(restAt + 4, restEnd)),
-    triangles: new Float32Array(buffer.slice(trianglesAt + 4, trianglesEnd)),
-    creases: new Float32Array(buffer.slice(creasesAt + 4, creasesEnd)),
-    touchable: new Float32Array(buffer.slice(touchableAt + 4, touchableEnd)),
-    printable: new Float32Array(buffer.slice(printableAt + 4, printableEnd)),
-    normals: new Float32Array(buffer.slice(normalsAt + 4, normalsEnd)),
-  };
-}
-
-export const MODES = 8;
-
-/** A field on a Skin's points, server to page: rest + coefficients · modes + the dimple of a profile. */
+/** A field on a Surface's points, server to page: rest + coefficients · modes + the local mode of a profile. */
 export interface Modes {
-  /** m, of the dimple from its foot; 0 for none */
+  /** m, of the local mode from its foot; 0 for none */
   reach: number;
   /** splines of the distance from the foot; 0 for none */
   rows: number;
@@ -713,13 +519,13 @@ export interface Modes {
   rest: Float32Array;
   /** the same of each mode */
   modes: Float32Array;
-  /** points that the dimple may move */
+  /** points that the local mode may move */
   touched: Float32Array;
 }
 
 export function encodeModes(m: Modes): ArrayBuffer {
   const view = new DataView(new ArrayBuffer(7 + 4 + 4 * m.rest.length + 4 + 4 * m.modes.length + 4 + 4 * m.touched.length));
-  view.setUint8(0, 8);
+  view.setUint8(0, 6);
   view.setFloat32(1, m.reach, true);
   view.setUint16(5, m.rows, true);
   let at = 7;

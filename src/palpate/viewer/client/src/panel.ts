@@ -1,22 +1,39 @@
-// The side panel of a held body: numbers, flags, plots, sliders, and what is known of the model.
+// The side panel of a touched body: force, displacement or depth, how far to trust it, sliders, the loop's timing.
 
 import { about } from "./about";
 import { flags } from "./flags";
-import type { Frame, Hello } from "./messages";
+import type { Flag, Places } from "./flags";
+import { Hold, Loop } from "./messages";
+import type { Frame, Hello, RangeInfo } from "./messages";
 import { Plot } from "./plot";
-import { element, EVERY, Flags, follow, put, record, sliders, Timing, trained } from "./readings";
-import { metres, round125 } from "./units";
+import { element, fixed, input, measured, metres, printed, round125, share, tidy, worded } from "./units";
 
-const PLACES = {
-  free: "Nobody holds the body. Drag the ball at its tip.",
-  inside: "Within what the network was trained on.",
-  outside: "Outside the trained range: the force is the one at its edge.",
+const EVERY = 80; // ms between changes of the numbers: faster can't be read
+const AT_FIRST = 0.5; // of the deepest trained depth, how deep a press goes
+const MOST = 1.25; // so that it can be seen what lies outside
+const NUMBERS = ["force-norm", "force-x", "force-y", "force-z", "tip-x", "tip-y", "tip-z", "tip-norm"];
+const UNKNOWN = [...NUMBERS, "depth", "stiffness", "rate", "picture-rate"];
+
+const PULLING: Places = {
+  free: "Nobody holds the body. Drag what is held.",
+  inside: "Within what it was trained on.",
+  outside: "Outside the trained range: nothing vouches for the force.",
 };
+const PRESSING: Places = {
+  free: "Nobody presses. Hold the mouse button, a finger or the space bar on the body.",
+  inside: "Inside what the surrogate was trained on.",
+  outside: "Outside the trained region: the energy is continued, and nothing vouches for the force.",
+};
+
+export interface Wishes {
+  moved(i: number, value: number): void;
+  deeper(depth: number): void;
+}
 
 export class Panel {
   private readonly force = new Plot(element<HTMLCanvasElement>("force-plot"), "--accent");
   private readonly timing = new Timing();
-  private readonly flags = new Flags();
+  private flagged = "";
   private hello: Hello | null = null;
   private last = 0;
 
@@ -26,60 +43,216 @@ export class Panel {
     this.last = 0;
   }
 
-  /** Another body, or the same after a restart. `moved` hears of slider i at a value. */
-  start(hello: Hello, moved: (i: number, value: number) => void): void {
+  /** How deep a press goes at first and at most, m. */
+  static depths(hello: Hello): readonly [first: number, most: number] {
+    return [AT_FIRST * hello.deepest, MOST * hello.deepest];
+  }
+
+  /** Another body, or the same after a restart. */
+  start(hello: Hello, wishes: Wishes): void {
     this.hello = hello;
     element("model-name").textContent = hello.name;
-    element("model-line").replaceChildren("trained on ", ...hello.inputs.flatMap(trained));
+    element("model-line").replaceChildren(...subtitle(hello), hello.remembers ? `; ${hello.remembers}` : "");
     document.title = `${hello.name} · palpate`;
-    sliders(hello.parameters, moved);
+    sliders(hello.parameters, (i, value) => wishes.moved(i, value));
+    const [first, most] = Panel.depths(hello);
+    const slider = input("depth-wanted");
+    [slider.max, slider.step] = [String(most), String(most / 250)];
+    slider.oninput = () => {
+      wishes.deeper(slider.valueAsNumber);
+      this.depth(slider.valueAsNumber);
+    };
+    this.depth(first);
     about(hello, [
-      ["reach of the tip", metres(hello.reach, hello.reach)],
-      ["nodes", String(hello.rest.length)],
+      [hello.holds ? "largest trained displacement" : "deepest trained press", metres(hello.deepest, hello.deepest)],
+      ["largest trained force", `${tidy(hello.force_max)} N`],
+      ["largest trained stiffness", `${tidy(hello.stiffness_max)} N/m`],
+      ...(hello.line ? [["nodes", String(hello.line.rest.length)] as const] : []),
+      ...hello.fields.map((info) => [info.name, `${info.modes} modes`] as const),
     ]);
   }
 
+  /** Show how deep (m) the next press goes. */
+  depth(depth: number): void {
+    input("depth-wanted").valueAsNumber = depth;
+    const beyond = depth > this.hello!.deepest * (1 + 1e-9);
+    element("depth-label").textContent = `${metres(depth, 0)}${beyond ? ", untrained" : ""}`;
+  }
+
   /** Record every frame; now and then show it. */
-  update(frame: Frame, drawn: boolean): void {
+  update(frame: Frame): void {
     const hello = this.hello;
     if (!hello) return;
     this.force.add(frame.time, Math.hypot(...frame.force));
-    this.timing.add(frame, drawn);
+    this.timing.add(frame);
     const now = performance.now();
     if (now - this.last < EVERY) return;
     this.last = now;
     this.numbers(frame);
     this.timing.show(frame, now);
-    this.flags.tell(flags(frame, hello, PLACES));
+    this.tell(flags(frame, hello, hello.holds ? PULLING : PRESSING));
     follow(frame);
-    const peak = round125(Math.max(this.force.peak(frame.time), 0.1));
+    const peak = round125(Math.max(this.force.peak(frame.time), 0.05 * hello.force_max, 1e-9));
     this.force.draw(frame.time, { unit: "N", low: 0, high: peak, logarithmic: false, stepped: false });
   }
 
   /** The tab went to the background. */
   hidden(): void {
-    this.flags.hidden();
+    this.tell([{ id: "hidden", tone: "warn", words: "This tab is in the background: the hand has let go." }]);
   }
 
   /** Nothing is known any more. */
   lost(): void {
-    for (const id of ["force-norm", "force-x", "force-y", "tip-x", "tip-y", "tip-norm", "rate", "picture-rate"]) {
-      put(id, NaN, 0);
-    }
+    for (const id of UNKNOWN) put(id, NaN, 0);
+    element("trust").textContent = element("deviation").textContent = "–";
     delete document.documentElement.dataset["tick"];
-    this.flags.lost();
+    this.tell([{ id: "lost", tone: "bad", words: "Disconnected: nothing is known of the body. Trying again." }]);
   }
 
   private numbers(frame: Frame): void {
-    const [fx, fy] = frame.force;
+    const felt = frame.grabbed;
+    const offset = this.hello!.line ? frame.contact : frame.position;
     put("force-norm", Math.hypot(...frame.force), 3);
-    put("force-x", fx, 3);
-    put("force-y", fy, 3);
-    const mm = frame.contact.map((x) => 1000 * x);
-    put("tip-x", mm[0]!, 1);
-    put("tip-y", mm[1]!, 1);
-    put("tip-norm", Math.hypot(...mm), 1);
+    put("tip-norm", 1000 * Math.hypot(...offset), 1);
+    ["x", "y", "z"].forEach((axis, k) => {
+      put(`force-${axis}`, frame.force[k]!, 3);
+      put(`tip-${axis}`, 1000 * offset[k]!, 1);
+    });
+    put("depth", felt ? 1000 * Math.max(frame.depth, 0) : NaN, 2);
+    put("stiffness", felt ? frame.stiffness : NaN, 0);
+    element("trust").textContent = !felt ? "–" : frame.inside ? "inside" : "outside";
+    element("deviation").textContent = deviation(frame);
     record(frame); // one frame, whole
-    document.documentElement.dataset["contact"] = frame.contact.join(" ");
   }
+
+  /** The list of flags; changed only when they change, since it is read aloud. */
+  private tell(found: Flag[]): void {
+    const key = JSON.stringify(found);
+    if (key === this.flagged) return;
+    this.flagged = key;
+    element("flags").replaceChildren(
+      ...found.map((flag) => {
+        const row = worded("li", flag.words);
+        [row.dataset["flag"], row.dataset["tone"]] = [flag.id, flag.tone];
+        return row;
+      }),
+    );
+  }
+}
+
+/** How late the loop is, and how far pictures trail the hand. */
+class Timing {
+  private readonly lateness = new Plot(element<HTMLCanvasElement>("lateness-plot"), "--accent-2");
+  private pictures = 0;
+  private since = 0;
+  private delay = NaN; // ms from the hand's message to the picture, smoothed
+
+  recolour(): void {
+    this.lateness.recolour();
+  }
+
+  /** Every frame. */
+  add(frame: Frame): void {
+    if (frame.loop === Loop.RUNNING) this.lateness.add(frame.time, 1e6 * frame.lateness);
+    this.pictures += 1;
+  }
+
+  /** Now and then. */
+  show(frame: Frame, now: number): void {
+    duration("lateness-p50", frame.lateness_p50);
+    duration("lateness-p99", frame.lateness_p99);
+    duration("lateness-max", frame.lateness_max);
+    put("rate", frame.rate, 0);
+    this.delay += 0.2 * (now - frame.echo - this.delay);
+    if (!frame.grabbed || frame.hold !== Hold.YOURS) this.delay = NaN;
+    else if (Number.isNaN(this.delay)) this.delay = now - frame.echo;
+    put("delay", this.delay, 0);
+    duration("work", frame.work_p50);
+    if (now - this.since > 1000) {
+      put("picture-rate", (1000 * this.pictures) / (now - this.since), 0);
+      [this.pictures, this.since] = [0, now];
+    }
+    const scale = { unit: "µs", low: 1, high: 1e5, logarithmic: true, stepped: true };
+    this.lateness.draw(frame.time, scale, [1e6 * frame.lateness_p50, 1e6 * frame.lateness_p99]);
+  }
+}
+
+/** The line under the body's name: the probe, and the ranges that were trained. */
+function subtitle(hello: Hello): (Node | string)[] {
+  const probe = [`probe of radius ${measured(hello.radius, "m")}`, `trained to ${measured(hello.deepest, "m")} deep`];
+  const ranges = hello.holds ? hello.inputs : hello.parameters;
+  const parts = [...(hello.holds ? [] : probe.map(whole)), ...ranges.map(trained)];
+  const joined = parts.flatMap((part, i) => (i === 0 ? [part] : [", ", part]));
+  return hello.holds ? ["trained on ", ...joined] : joined;
+}
+
+/** What every frame tells programs that read the page. */
+function record(frame: Frame): void {
+  const data = document.documentElement.dataset;
+  for (const name of ["position", "force", "contact", "parameters"] as const) data[name] = frame[name].join(" ");
+  for (const name of ["tick", "time", "grabbed", "inside", "loop", "hold", "depth", "deviation"] as const) {
+    data[name] = String(frame[name]);
+  }
+}
+
+/** Words that no line break parts. */
+function whole(words: string): HTMLElement {
+  const span = worded("span", words);
+  span.className = "whole";
+  return span;
+}
+
+/** An input and its range. */
+function trained(range: RangeInfo): HTMLElement {
+  const words = whole("");
+  words.append(...printed(range.name), ` ${tidy(range.low)} … ${tidy(range.high)} ${range.unit}`);
+  return words;
+}
+
+/** How far the force may be off, in words. */
+function deviation(frame: Frame): string {
+  if (!frame.grabbed) return "–";
+  return Number.isNaN(frame.deviation) ? "not known" : `± ${share(frame.deviation)}`;
+}
+
+function put(id: string, value: number, decimals: number): void {
+  const output = element(id);
+  output.textContent = Number.isFinite(value) ? fixed(value, decimals) : "–";
+  output.dataset["value"] = String(value);
+}
+
+/** A duration in s as µs or ms. */
+function duration(id: string, seconds: number): void {
+  const [us, output] = [1e6 * seconds, element(id)];
+  output.dataset["value"] = String(us);
+  if (us < 1) output.textContent = "< 1 µs"; // where the loop's histogram starts
+  else output.textContent = us < 9999.5 ? `${fixed(us, us < 9.95 ? 1 : 0)} µs` : `${fixed(us / 1000, 0)} ms`;
+}
+
+function sliders(parameters: RangeInfo[], moved: (i: number, value: number) => void): void {
+  element("parameters").hidden = parameters.length === 0;
+  element("sliders").replaceChildren(
+    ...parameters.map((range, i) => {
+      const [label, value, name] = ["label", "output", "span"].map((tag) => document.createElement(tag));
+      const slider = document.createElement("input");
+      [slider.type, slider.id] = ["range", `parameter-${i}`];
+      [slider.min, slider.max] = [String(range.low), String(range.high)];
+      slider.step = String((range.high - range.low) / 200);
+      slider.dataset["unit"] = range.unit;
+      slider.addEventListener("input", () => moved(i, slider.valueAsNumber));
+      name!.append(...printed(range.name));
+      label!.append(name!, value!, slider);
+      return label!;
+    }),
+  );
+}
+
+/** Sliders show the values in force, whoever set them, except under the user's finger. */
+function follow(frame: Frame): void {
+  frame.parameters.forEach((value, i) => {
+    const slider = document.getElementById(`parameter-${i}`) as HTMLInputElement | null;
+    if (!slider) return;
+    if (!slider.matches(":active")) slider.valueAsNumber = value;
+    slider.previousElementSibling!.textContent = `${tidy(value)} ${slider.dataset["unit"]}`;
+  });
 }

@@ -1,4 +1,19 @@
-// Numbers as a person reads them, and the theme's colours.
+// Numbers as a person reads them, the page's elements, and the theme's colours.
+
+export function element<T extends HTMLElement>(id: string): T {
+  return document.getElementById(id) as T;
+}
+
+export function input(id: string): HTMLInputElement {
+  return element<HTMLInputElement>(id);
+}
+
+/** An element that says something. */
+export function worded(tag: string, words: string): HTMLElement {
+  const made = document.createElement(tag);
+  made.textContent = words;
+  return made;
+}
 
 /** The value of a custom property of the page's style sheet. */
 export function css(name: string): string {

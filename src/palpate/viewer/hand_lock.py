@@ -1,4 +1,4 @@
-"""Which of several pages holds the hand.
+"""The lock on the hand: of several pages one holds it, the others watch.
 
 Whoever grabs while the hand is free holds it until it lets go, leaves, or has not been heard for a second;
 the others watch. While nobody holds it, the heartbeats and slider changes of every page count.
@@ -12,7 +12,7 @@ import numpy as np
 
 from palpate.viewer.messages import Hand, Hold
 
-__all__ = ["Command", "Hands"]
+__all__ = ["Command", "HandLock"]
 
 FORGOTTEN = 1.0  # s without a word from the holder until another page may take the hand
 LONGEST_PERIOD = 0.25  # s; a page may not promise itself out of the stall rule
@@ -38,7 +38,7 @@ class _Heard:
     parameters: np.ndarray
 
 
-class Hands:
+class HandLock:
     """The pages heard of, the one that holds the hand, and the parameters in force.
 
     Attributes

@@ -1,82 +1,77 @@
-// The 3-D view: the body, its ghost at rest, the hand, the force. Rendered only when something changed.
+// A body held at one node and drawn as a line, y up: the tube, its ghost at rest, the hand, the force.
 
 import {
   BufferGeometry,
-  Color,
-  DirectionalLight,
-  HemisphereLight,
   LessDepth,
-  Line,
+  Line as ThreeLine,
   LineBasicMaterial,
   Matrix4,
   Mesh,
   MeshBasicMaterial,
   MeshLambertMaterial,
   MOUSE,
-  PerspectiveCamera,
   Plane,
-  Raycaster,
-  Scene,
   SphereGeometry,
   TOUCH,
-  Vector2,
   Vector3,
-  WebGLRenderer,
 } from "three";
 import type { Group } from "three";
-import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { Arrow } from "./arrow";
-import { fit, free, outline, pixel, project } from "./framing";
-import type { Size } from "./framing";
-import type { Frame, Hello, Vec3 } from "./messages";
+import { outline, pixel } from "./framing";
+import type { Frame, Hello, Line, Vec3 } from "./messages";
 import { sizeLabels, surroundings } from "./surroundings";
 import type { Extent } from "./surroundings";
 import { Tube } from "./tube";
-import { css, round125 } from "./units";
+import { css, round125, tidy } from "./units";
+import { View } from "./view";
 
 const THINNEST = 0.011; // radius as drawn, of the length: thinner would be lost on a small screen
 const LIVELY = 0.1; // a reach below this share of the length is drawn enlarged
 const LIVELY_AIM = 0.3;
+const STANCE = {
+  up: new Vector3(0, 1, 0),
+  from: new Vector3(0.16, 0.2, 1).normalize(),
+  sky: 2.3,
+  sun: 1.5,
+  sunFrom: new Vector3(-0.5, 1.5, 1.2),
+};
 
-export class View {
+export class LineView extends View {
   enlarged = 1; // displacement as drawn / true displacement
-  readonly thickened: number;
   readonly enlargement: number;
-  readonly extent: Extent;
-  readonly tip = new Vector3();
+  readonly grip = new Vector3(); // where the held node is drawn
   readonly arrow: Arrow;
 
-  private readonly renderer: WebGLRenderer;
-  private readonly scene = new Scene();
-  private readonly camera = new PerspectiveCamera(30, 1, 0.01, 100);
-  private readonly controls: OrbitControls;
+  private readonly line: Line;
+  private readonly thickened: number;
+  private readonly extent: Extent;
   private readonly tube: Tube;
   private readonly ghost: Mesh;
   private readonly shadow: Mesh;
   private readonly handle: Mesh<SphereGeometry, MeshLambertMaterial>;
   private readonly hand: Mesh<SphereGeometry, MeshLambertMaterial>;
-  private readonly thread = new Line(new BufferGeometry(), new LineBasicMaterial());
+  private readonly thread = new ThreeLine(new BufferGeometry(), new LineBasicMaterial());
   private readonly beads: Mesh<SphereGeometry, MeshLambertMaterial>[];
   private around: Group | null = null;
   private readonly rest: Float32Array;
   private readonly points: Float32Array;
   private readonly shares: Float32Array;
   private readonly length: number;
-  private dirty = true;
 
   constructor(
-    readonly canvas: HTMLCanvasElement,
-    readonly hello: Hello,
-    private readonly words: readonly Element[], // that stand in front of the canvas
+    canvas: HTMLCanvasElement,
+    private readonly hello: Hello,
+    words: readonly Element[],
   ) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
-    this.rest = Float32Array.from(hello.rest.flat());
+    super(canvas, words, STANCE);
+    const line = (this.line = hello.line!);
+    this.rest = Float32Array.from(line.rest.flat());
     this.points = new Float32Array(this.rest.length);
-    this.shares = new Float32Array(hello.rest.length);
-    const xs = hello.rest.map((p) => p[0]);
-    this.length = Math.max(...xs) - Math.min(...xs) || hello.reach;
-    const lively = hello.reach < LIVELY * this.length;
-    this.enlargement = lively ? round125((LIVELY_AIM * this.length) / hello.reach) : 1;
+    this.shares = new Float32Array(line.rest.length);
+    const xs = line.rest.map((p) => p[0]);
+    this.length = Math.max(...xs) - Math.min(...xs) || hello.deepest;
+    const lively = hello.deepest < LIVELY * this.length;
+    this.enlargement = lively ? round125((LIVELY_AIM * this.length) / hello.deepest) : 1;
     this.enlarged = this.enlargement;
     this.thickened = Math.max(1, Math.ceil((THINNEST * this.length) / hello.radius));
     const cell = round125(this.length / 14);
@@ -84,19 +79,18 @@ export class View {
     this.extent = { root: Math.min(...xs), length: this.length, floor: 0, cell, depth };
 
     const radius = this.thickened * hello.radius;
-    this.tube = new Tube(hello.rest.length, radius);
+    this.tube = new Tube(line.rest.length, radius);
     const ball = Math.max(1.9 * radius, 0.022 * this.length);
     this.handle = new Mesh(new SphereGeometry(ball, 28, 18), new MeshLambertMaterial());
     this.hand = new Mesh(new SphereGeometry(0.5 * ball, 18, 12), new MeshLambertMaterial());
     const bead = new SphereGeometry(1.25 * radius, 18, 12);
-    const beads = hello.nodes_of_interest.filter((i) => i !== hello.touch_node);
-    this.beads = beads.map(() => new Mesh(bead, new MeshLambertMaterial()));
-    this.arrow = new Arrow(0.3 * this.length, fullForce(hello), 1.15 * ball);
+    this.beads = this.marked().map(() => new Mesh(bead, new MeshLambertMaterial()));
+    this.arrow = new Arrow(0.3 * this.length, Math.max(hello.force_max, 1e-9), 1.15 * ball);
     this.ghost = new Mesh(this.restGeometry(radius), ghostMaterial());
     this.shadow = new Mesh(this.tube.geometry, shadowMaterial());
     this.shadow.matrixAutoUpdate = false;
     this.assemble();
-    this.controls = this.orbit();
+    this.hold();
     this.place();
     this.recolour();
     this.resize();
@@ -111,55 +105,45 @@ export class View {
     this.look();
   }
 
+  /** How it is drawn, in words. */
+  notes(): string[] {
+    const times = (n: number): string => (n === 1 ? "to scale" : `drawn × ${tidy(n)}`);
+    return [`displacement ${times(this.enlarged)}`, `thickness ${times(this.thickened)}`, "bands: nodes of interest"];
+  }
+
   /** Take over one frame's shape; true force, drawn displacement. */
   show(frame: Frame): void {
     const { rest, points, shares, hello, enlarged } = this;
     const u = frame.displacement;
     for (let i = 0; i < shares.length; i++) {
       const size = Math.hypot(u[3 * i]!, u[3 * i + 1]!, u[3 * i + 2]!);
-      shares[i] = size / hello.reach;
+      shares[i] = size / hello.deepest;
       for (let k = 3 * i; k < 3 * i + 3; k++) points[k] = rest[k]! + enlarged * u[k]!;
     }
     this.tube.update(points, shares);
-    this.each((bead, node) => bead.position.fromArray(points, 3 * node));
-    this.drawn(frame.contact, this.tip);
-    this.handle.position.copy(this.tip);
+    this.marked().forEach((node, k) => this.beads[k]!.position.fromArray(points, 3 * node));
+    this.drawn(frame.contact, this.grip);
+    this.handle.position.copy(this.grip);
     this.drawn(frame.position, this.hand.position);
-    const apart = frame.grabbed && this.hand.position.distanceTo(this.tip) > 0.004 * this.length;
+    const apart = frame.grabbed && this.hand.position.distanceTo(this.grip) > 0.004 * this.length;
     this.hand.visible = this.thread.visible = apart;
-    if (apart) this.thread.geometry.setFromPoints([this.tip, this.hand.position]);
-    this.arrow.update(this.tip, frame.force);
+    if (apart) this.thread.geometry.setFromPoints([this.grip, this.hand.position]);
+    this.arrow.update(this.grip, frame.force);
     this.dirty = true;
-  }
-
-  /** Render if anything changed since. */
-  render(): boolean {
-    if (!this.dirty) return false;
-    this.dirty = false;
-    this.renderer.render(this.scene, this.camera);
-    return true;
-  }
-
-  /** Where a point of the scene is on the canvas, CSS pixels. */
-  project(point: Vector3): Vector2 {
-    return project(this.camera, this.size(), point);
   }
 
   /** The offset of the held node (m, true) under a canvas point, in the plane of the body; null beside it. */
   offsetAt(x: number, y: number): Vec3 | null {
-    const at = new Vector2((2 * x) / this.canvas.clientWidth - 1, 1 - (2 * y) / this.canvas.clientHeight);
-    const ray = new Raycaster();
-    ray.setFromCamera(at, this.camera);
     const node = this.node();
-    const hit = ray.ray.intersectPlane(new Plane(new Vector3(0, 0, 1), -node.z), new Vector3());
+    const hit = this.ray(x, y).ray.intersectPlane(new Plane(new Vector3(0, 0, 1), -node.z), new Vector3());
     if (!hit) return null;
     hit.sub(node).divideScalar(this.enlarged);
     return [hit.x, hit.y, 0];
   }
 
-  /** Whether right-drag, wheel and two fingers turn the view. */
-  set turnable(on: boolean) {
-    this.controls.enabled = on;
+  /** The offset (m, true) at which the held node is drawn now. */
+  offset(): Vec3 {
+    return this.grip.clone().sub(this.node()).divideScalar(this.enlarged).toArray() as Vec3;
   }
 
   /** Make the handle answer the pointer. */
@@ -170,38 +154,19 @@ export class View {
     this.dirty = true;
   }
 
-  resize(): void {
-    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
-    if (!width || !height) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
-    this.renderer.setSize(width, height, false);
-    this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
+  override resize(): void {
+    super.resize();
     this.sizeLabels();
-    this.dirty = true;
   }
 
-  /** Look from the front, a little from above, with all that the held node can do in the picture. */
-  look(): void {
-    const room = free(this.canvas, this.words);
-    const { centre, distance } = fit(this.camera, this.size(), room, outline(this.extent, ...this.room()));
-    this.controls.target.copy(centre);
-    [this.camera.near, this.camera.far] = [distance / 50, distance * 20];
-    [this.controls.minDistance, this.controls.maxDistance] = [0.1 * distance, 4 * distance];
-    this.camera.updateProjectionMatrix();
-    this.controls.update();
-    this.dirty = true;
-  }
-
-  /** Take the theme's colours. */
-  recolour(): void {
+  override recolour(): void {
     if (this.around) this.scene.remove(this.around);
     this.around = surroundings(this.extent);
     this.scene.add(this.around);
     this.sizeLabels();
     this.handle.material.color.set(css("--accent"));
     this.handle.material.emissive.set(css("--accent")).multiplyScalar(0.3);
-    this.each((bead) => bead.material.color.set(css("--bead")));
+    for (const bead of this.beads) bead.material.color.set(css("--bead"));
     this.hand.material.color.set(css("--accent-2"));
     this.hand.material.emissive.set(css("--accent-2")).multiplyScalar(0.3);
     this.thread.material.color.set(css("--accent-2"));
@@ -210,31 +175,26 @@ export class View {
     this.dirty = true;
   }
 
+  protected override outline(): Vector3[] {
+    return outline(this.extent, ...this.room());
+  }
+
   private assemble(): void {
     const body = new Mesh(this.tube.geometry, new MeshLambertMaterial({ vertexColors: true }));
     body.frustumCulled = this.shadow.frustumCulled = this.thread.frustumCulled = false;
     this.scene.add(body, this.ghost, this.shadow, this.handle, this.hand, this.thread, this.arrow.group, ...this.beads);
-    this.scene.add(new HemisphereLight(new Color(0xffffff), new Color(0xb9c4cc), 2.3));
-    const sun = new DirectionalLight(0xffffff, 1.5);
-    sun.position.set(-0.5, 1.5, 1.2);
-    this.scene.add(sun);
     this.hand.visible = this.thread.visible = this.arrow.group.visible = false;
   }
 
-  private orbit(): OrbitControls {
-    const controls = new OrbitControls(this.camera, this.canvas);
+  /** The left button is the hand's, and the view stays in front. */
+  private hold(): void {
+    const { controls } = this;
     controls.mouseButtons = { LEFT: null, MIDDLE: MOUSE.DOLLY, RIGHT: MOUSE.ROTATE };
     controls.touches = { ONE: null, TWO: TOUCH.DOLLY_ROTATE };
     controls.enablePan = false;
     // seen edge-on, the plane in which the hand moves would vanish
     [controls.minAzimuthAngle, controls.maxAzimuthAngle] = [-1.2, 1.2];
     [controls.minPolarAngle, controls.maxPolarAngle] = [0.5, 1.7];
-    controls.addEventListener("change", () => (this.dirty = true));
-    return controls;
-  }
-
-  private size(): Size {
-    return [this.canvas.clientWidth || 1, this.canvas.clientHeight || 1];
   }
 
   private sizeLabels(): void {
@@ -243,7 +203,7 @@ export class View {
 
   /** Opposite corners of the box that the ball at the held node may fill, as drawn. */
   private room(): [Vector3, Vector3] {
-    const [low, high] = this.hello.travel.map((corner) => this.drawn(corner, new Vector3()));
+    const [low, high] = this.line.travel.map((corner) => this.drawn(corner, new Vector3()));
     const ball = 1.3 * this.handle.geometry.parameters.radius; // a highlighted one is larger
     return [low!.subScalar(ball), high!.addScalar(ball)];
   }
@@ -257,19 +217,18 @@ export class View {
   }
 
   private restGeometry(radius: number): BufferGeometry {
-    const tube = new Tube(this.hello.rest.length, 0.9 * radius);
+    const tube = new Tube(this.line.rest.length, 0.9 * radius);
     tube.update(this.rest, this.shares);
     return tube.geometry;
   }
 
-  /** Visit the beads that mark the nodes of interest. */
-  private each(visit: (bead: Mesh<SphereGeometry, MeshLambertMaterial>, node: number) => void): void {
-    const nodes = this.hello.nodes_of_interest.filter((i) => i !== this.hello.touch_node);
-    this.beads.forEach((bead, k) => visit(bead, nodes[k]!));
+  /** The nodes that beads mark. */
+  private marked(): number[] {
+    return this.line.nodes_of_interest.filter((i) => i !== this.line.touch_node);
   }
 
   private node(): Vector3 {
-    return new Vector3(...this.hello.rest[this.hello.touch_node]!);
+    return new Vector3(...this.line.rest[this.line.touch_node]!);
   }
 
   private drawn(offset: Vec3, into: Vector3): Vector3 {
@@ -284,11 +243,4 @@ function ghostMaterial(): MeshBasicMaterial {
 /** The body squeezed flat on the floor; the strict depth test keeps its two sides from darkening twice. */
 function shadowMaterial(): MeshBasicMaterial {
   return new MeshBasicMaterial({ color: 0x000000, transparent: true, opacity: 0.13, depthFunc: LessDepth });
-}
-
-/** The largest load that the hand can be asked to supply, N. */
-function fullForce(hello: Hello): number {
-  const others = new Set(hello.parameters.map((r) => r.name));
-  const own = hello.inputs.filter((r) => !others.has(r.name));
-  return Math.max(...own.map((r) => Math.max(Math.abs(r.low), Math.abs(r.high))), 1e-9);
 }

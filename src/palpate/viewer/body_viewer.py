@@ -1,0 +1,132 @@
+"""A page on which a solved body is looked at: turned, coloured, stepped through."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, Response
+from starlette.routing import Route
+
+from palpate.viewer.shown_body import ShownBody, body_of
+from palpate.viewer.web_server import STATIC, LocalServer, local_application, wait_until_interrupted
+
+__all__ = ["BodyViewer", "body_application", "show"]
+
+_BINARY = "application/octet-stream"
+
+
+def body_application(body: ShownBody) -> Starlette:
+    """Return the web application of a body: the built page, ``/shown``, ``/surface`` and ``/steps/N``."""
+    parts = body.split()
+    facts, mesh = body.shown(parts).to_json(), body.surface(parts).pack()
+
+    # the skeleton of all pages; a touched body's is the other one
+    html = (
+        (STATIC / "index.html").read_text(encoding="utf-8").replace('data-mode="touch"', 'data-mode="shown"')
+    )
+
+    async def page(_: Request) -> Response:
+        return HTMLResponse(html)
+
+    async def shown(_: Request) -> Response:
+        return Response(facts, media_type="application/json")
+
+    async def surface(_: Request) -> Response:
+        return Response(mesh, media_type=_BINARY)
+
+    async def step(request: Request) -> Response:
+        index = request.path_params["index"]
+        if index >= len(body.steps):
+            raise HTTPException(404)
+        return Response(body.step(index, parts).pack(), media_type=_BINARY)
+
+    return local_application(
+        [
+            Route("/", page),
+            Route("/shown", shown),
+            Route("/surface", surface),
+            Route("/steps/{index:int}", step),
+        ]
+    )
+
+
+class BodyViewer(LocalServer):
+    """A solved body to look at, at `url`, while the context lasts.
+
+    Parameters
+    ----------
+    source : solution, sequence of solutions, Dataset, or path of a .vtu, .pvd or .zarr
+        All that `palpate.viewer.shown_body.body_of` takes.
+    name : str
+        Title of the page.
+    port : int
+        The port wanted; 0 takes any free one.
+    host : str
+        ``127.0.0.1``, ``localhost`` or ``::1``: the viewer serves this machine only.
+    strict_port : bool
+        Whether a busy port is an error; otherwise the next free one is taken.
+
+    Attributes
+    ----------
+    body : ShownBody
+        What the page shows.
+    port : int
+        The port taken, once started.
+
+    Raises
+    ------
+    UsageError
+        If there is nothing to show.
+    FileFormatError
+        If the file can't be read.
+    """
+
+    def __init__(
+        self,
+        source: Any,
+        *,
+        name: str = "",
+        port: int = 8080,
+        host: str = "127.0.0.1",
+        strict_port: bool = False,
+    ) -> None:
+        super().__init__(port, host, strict_port=strict_port)
+        self.body = body_of(source, name)
+
+    @property
+    def caption(self) -> str:
+        """The body's name."""
+        return f"{self.body.name}."
+
+    def _application(self) -> Starlette:
+        return body_application(self.body)
+
+
+def show(
+    source: Any,
+    *,
+    name: str = "",
+    port: int = 8080,
+    host: str = "127.0.0.1",
+    strict_port: bool = False,
+    open_browser: bool = False,
+    on_ready: Callable[[BodyViewer], object] | None = None,
+) -> None:
+    """Show solved bodies in the browser until interrupted (Ctrl-C) or terminated.
+
+    Parameters
+    ----------
+    open_browser : bool
+        Whether to open the page in the user's browser.
+    on_ready : callable, optional
+        Called once with the running `BodyViewer`; by default its address is written to stderr, because a script
+        that waits here must say where to look.
+
+    The other parameters and the errors are those of `BodyViewer`, which does the same without waiting.
+    """
+    viewer = BodyViewer(source, name=name, port=port, host=host, strict_port=strict_port)
+    wait_until_interrupted(viewer, open_browser=open_browser, on_ready=on_ready)

@@ -1,0 +1,58 @@
+// The colour scale: which quantity colours the body, between which values, and how large it is now.
+
+import { gradient } from "./colour";
+import type { FieldInfo } from "./messages";
+import { element, multiple, tidy, worded } from "./units";
+
+/** Show the scale of a quantity; null hides it. */
+export function legend(info: FieldInfo | null): void {
+  element("legend").hidden = !info;
+  if (!info) return;
+  const { size, unit } = scale(info);
+  element("legend-bar").style.background = gradient();
+  element("legend-title").textContent = unit ? `${info.name} (${unit})` : info.name;
+  element("legend-ticks").replaceChildren(
+    ...[0, 0.5, 1].map((t) => worded("span", tidy((info.low + t * (info.high - info.low)) / size))),
+  );
+}
+
+/** A button for each quantity; `choose` hears of the one taken. */
+export function choices(infos: FieldInfo[], choose: (index: number) => void): void {
+  element("colours").hidden = infos.length < 2;
+  const buttons = infos.map((info, i) => {
+    const button = worded("button", info.name) as HTMLButtonElement;
+    button.type = "button";
+    button.setAttribute("aria-pressed", String(i === 0));
+    button.addEventListener("click", () => {
+      buttons.forEach((other, j) => other.setAttribute("aria-pressed", String(j === i)));
+      choose(i);
+    });
+    return button;
+  });
+  element("fields").replaceChildren(...buttons);
+}
+
+/** Say how large a quantity is at most, of its values at the body's points. */
+export function largest(info: FieldInfo | null, values: Float32Array): void {
+  element("largest-section").hidden = !info;
+  if (!info) return;
+  const { size, unit } = scale(info);
+  const most = values.reduce((a, b) => Math.max(a, b), -Infinity);
+  element("largest-title").textContent = info.name.startsWith("largest") ? capital(info.name) : `Largest ${info.name}`;
+  element("largest").textContent = tidy(most / size);
+  element("largest-unit").textContent = unit;
+  document.documentElement.dataset["largest"] = String(most); // for programs that read the page
+}
+
+/** Each point's share of the scale. */
+export function shares(info: FieldInfo, values: Float32Array): Float32Array {
+  return values.map((v) => (v - info.low) / (info.high - info.low));
+}
+
+function scale(info: FieldInfo): { size: number; unit: string } {
+  return multiple(Math.max(Math.abs(info.low), Math.abs(info.high)), info.unit);
+}
+
+function capital(words: string): string {
+  return words.charAt(0).toUpperCase() + words.slice(1);
+}

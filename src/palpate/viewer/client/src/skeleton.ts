@@ -1,0 +1,41 @@
+// The skeleton that all pages share, whose parts belong to modes:
+//
+// line    a touched body that is drawn as a line and held at a node
+// press   one that is pressed by a probe
+// pad     one that is held by a pad
+// shown   a solved body that is looked at
+
+import { element } from "./units";
+import type { View } from "./view";
+
+export type Mode = "line" | "press" | "pad" | "shown";
+
+const LABELS: Record<Mode, string> = {
+  line: "The body. Arrow keys pull the held end, Escape lets it go.",
+  press: "The body. Hold the space bar to press, arrow keys move the probe, Page Up and Page Down change the depth.",
+  pad: "The body. Arrow keys pull the pad, Escape lets it go.",
+  shown: "The body. Arrow keys left and right change the state, the mouse turns it.",
+};
+
+/** Show the parts that belong to a mode; at first none of them are seen. */
+export function mode(name: Mode): void {
+  for (const part of document.querySelectorAll<HTMLElement>("[data-for]")) {
+    part.classList.toggle("here", part.dataset["for"]!.split(" ").includes(name));
+  }
+  element("view").setAttribute("aria-label", LABELS[name]);
+}
+
+/** Keep a view fitting its canvas and the theme; `recolour` is told of a new theme as well. */
+export function watch(view: () => View | null, recolour: () => void = () => {}): void {
+  const canvas = element("view");
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+    view()?.recolour();
+    recolour();
+  });
+  new ResizeObserver(() => {
+    view()?.resize();
+    view()?.look();
+  }).observe(canvas);
+  canvas.addEventListener("dblclick", () => view()?.look());
+  element("reset-view").addEventListener("click", () => view()?.look());
+}

@@ -1,0 +1,218 @@
+// A solid body, z up: its deformed surface, its outline at rest, the probe, a floor with a scale.
+
+import {
+  BoxGeometry,
+  BufferAttribute,
+  BufferGeometry,
+  Color,
+  DoubleSide,
+  Float32BufferAttribute,
+  LessDepth,
+  LineBasicMaterial,
+  LineSegments,
+  Mesh,
+  MeshBasicMaterial,
+  MeshLambertMaterial,
+  MeshPhongMaterial,
+  SphereGeometry,
+  SRGBColorSpace,
+  Vector3,
+} from "three";
+import { shade } from "./colour";
+import type { Surface, Vec3 } from "./messages";
+import { css, round125 } from "./units";
+import { View } from "./view";
+
+const PALETTE = Array.from({ length: 256 }, (_, i) => new Color().setRGB(...shade(i / 255), SRGBColorSpace));
+const STANCE = {
+  up: new Vector3(0, 0, 1),
+  from: new Vector3(0.62, -1, 0.72).normalize(),
+  sky: 2.1,
+  sun: 1.7,
+  sunFrom: new Vector3(-0.4, -0.9, 1.6),
+};
+
+export interface Layers {
+  ghost: boolean;
+  mesh: boolean;
+}
+
+/** A rigid sphere, m; null where there is none to draw. */
+export interface Probe {
+  centre: Vec3;
+  radius: number;
+}
+
+export class SurfaceView extends View {
+  readonly cell: number; // m, spacing of the floor's grid
+
+  private readonly geometry = new BufferGeometry();
+  private readonly position: BufferAttribute;
+  private readonly colour: BufferAttribute;
+  private readonly body: Mesh<BufferGeometry, MeshPhongMaterial>;
+  private readonly wires: Mesh<BufferGeometry, MeshBasicMaterial>;
+  private readonly creases: LineSegments<BufferGeometry, LineBasicMaterial>;
+  private readonly ghost: LineSegments<BufferGeometry, LineBasicMaterial>;
+  protected readonly still: Mesh<BufferGeometry, MeshBasicMaterial>; // the surface at rest
+  private readonly fixed: LineSegments<BufferGeometry, LineBasicMaterial>;
+  private readonly floor: LineSegments<BufferGeometry, LineBasicMaterial>;
+  protected readonly probe: Mesh<SphereGeometry, MeshLambertMaterial>;
+  private readonly low = new Vector3().setScalar(Infinity);
+  private readonly high = new Vector3().setScalar(-Infinity);
+  protected roof: number; // m, room that a view leaves above the body
+
+  constructor(
+    canvas: HTMLCanvasElement,
+    protected readonly surface: Surface,
+    words: readonly Element[],
+  ) {
+    super(canvas, words, STANCE);
+    const { rest, triangles } = surface;
+    this.position = new BufferAttribute(Float32Array.from(rest), 3);
+    this.colour = new BufferAttribute(new Float32Array(rest.length), 3);
+    this.geometry.setAttribute("position", this.position);
+    this.geometry.setAttribute("color", this.colour);
+    this.geometry.setIndex(Array.from(triangles));
+    this.geometry.computeVertexNormals(); // a material that first sees a geometry without normals stays flat
+    this.body = new Mesh(
+      this.geometry,
+      new MeshPhongMaterial({ vertexColors: true, side: DoubleSide, shininess: 24, specular: 0x1c1c1c }),
+    );
+    // pulled a little towards the camera, so that the lines on the surface are not half lost in it
+    this.body.material.polygonOffset = true;
+    [this.body.material.polygonOffsetFactor, this.body.material.polygonOffsetUnits] = [1, 1];
+    this.wires = new Mesh(this.geometry, new MeshBasicMaterial({ wireframe: true, transparent: true, opacity: 0.22 }));
+    this.creases = this.lines(surface.creases, this.position);
+    const still = new BufferAttribute(rest, 3);
+    this.ghost = this.lines(surface.creases, still);
+    // where the body did not move, its own edges win
+    [this.ghost.material.transparent, this.ghost.material.depthFunc] = [true, LessDepth];
+    this.fixed = this.lines(surface.fixed, this.position);
+    this.still = new Mesh(this.atRest(still), ghostMaterial());
+    this.probe = new Mesh(
+      new SphereGeometry(1, 48, 32),
+      new MeshLambertMaterial({ transparent: true, opacity: 0.5, depthWrite: false }),
+    );
+    for (let i = 0; i < rest.length; i += 3) {
+      const point = new Vector3(rest[i]!, rest[i + 1]!, rest[i + 2]!);
+      this.low.min(point);
+      this.high.max(point);
+    }
+    this.roof = 0.08 * this.across();
+    this.cell = round125(this.across() / 14);
+    this.floor = new LineSegments(this.grid(), new LineBasicMaterial());
+    this.scene.add(this.floor, this.still, this.body, this.wires, this.creases, this.ghost, this.fixed, this.probe);
+    this.scene.add(this.plate());
+    for (const moving of [this.body, this.wires, this.creases, this.fixed]) moving.frustumCulled = false;
+    this.recolour();
+    this.resize();
+    this.look();
+  }
+
+  /** Take over one state: displacements at `factor` times their size, colours by each point's share of the scale. */
+  deform(
+    displacement: Float32Array,
+    factor: number,
+    shares: ArrayLike<number>,
+    probe: Probe | null,
+    layers: Layers,
+  ): void {
+    const { rest } = this.surface;
+    const at = this.position.array as Float32Array;
+    for (let i = 0; i < at.length; i++) at[i] = rest[i]! + factor * displacement[i]!;
+    for (let i = 0; i < shares.length; i++) {
+      const tint = PALETTE[Math.round(255 * Math.min(Math.max(shares[i]!, 0), 1))]!;
+      this.colour.setXYZ(i, tint.r, tint.g, tint.b);
+    }
+    this.position.needsUpdate = this.colour.needsUpdate = true;
+    this.geometry.computeVertexNormals();
+    this.geometry.computeBoundingSphere();
+    this.probe.visible = probe !== null;
+    if (probe) {
+      this.probe.position.set(...probe.centre);
+      this.probe.scale.setScalar(Math.max(probe.radius, 1e-9));
+    }
+    this.wires.visible = layers.mesh;
+    this.ghost.visible = this.still.visible = layers.ghost;
+    this.dirty = true;
+  }
+
+  override recolour(): void {
+    this.wires.material.color.set(css("--ink"));
+    this.creases.material.color.set(css("--ink"));
+    this.ghost.material.color.set(css("--soft"));
+    this.still.material.color.set(css("--soft"));
+    this.fixed.material.color.set(css("--accent-2"));
+    this.floor.material.color.set(css("--grid"));
+    this.probe.material.color.set(css("--accent"));
+    this.probe.material.emissive.set(css("--accent")).multiplyScalar(0.25);
+    this.dirty = true;
+  }
+
+  /** The size of the body, m. */
+  protected across(): number {
+    return this.low.distanceTo(this.high);
+  }
+
+  protected override outline(): Vector3[] {
+    const all: Vector3[] = [];
+    for (const x of [this.low.x, this.high.x]) {
+      for (const y of [this.low.y, this.high.y]) {
+        for (const z of [this.low.z - 0.03 * this.across(), this.high.z + this.roof]) all.push(new Vector3(x, y, z));
+      }
+    }
+    return all;
+  }
+
+  private lines(ends: Float32Array, position: BufferAttribute): LineSegments<BufferGeometry, LineBasicMaterial> {
+    const geometry = new BufferGeometry();
+    geometry.setAttribute("position", position);
+    geometry.setIndex(Array.from(ends));
+    return new LineSegments(geometry, new LineBasicMaterial());
+  }
+
+  private atRest(rest: BufferAttribute): BufferGeometry {
+    const geometry = new BufferGeometry();
+    geometry.setAttribute("position", rest);
+    geometry.setIndex(Array.from(this.surface.triangles));
+    return geometry;
+  }
+
+  /** A grid just below the body, so that the two don't fight for the same pixels. */
+  private grid(): BufferGeometry {
+    const { low, high, cell } = this;
+    const ends = (a: number, b: number): [number, number] => [
+      (Math.floor(a / cell) - 2) * cell,
+      (Math.ceil(b / cell) + 2) * cell,
+    ];
+    const [[x0, x1], [y0, y1]] = [ends(low.x, high.x), ends(low.y, high.y)];
+    const points: number[] = [];
+    const z = low.z - 0.012 * this.across();
+    for (let x = x0; x < x1 + cell / 2; x += cell) points.push(x, y0, z, x, y1, z);
+    for (let y = y0; y < y1 + cell / 2; y += cell) points.push(x0, y, z, x1, y, z);
+    const geometry = new BufferGeometry();
+    geometry.setAttribute("position", new Float32BufferAttribute(points, 3));
+    return geometry;
+  }
+
+  /** What a clamped body stands on, if its lowest surface is the fixed one. */
+  private plate(): Mesh {
+    const thickness = 0.008 * this.across();
+    const span = new Vector3().subVectors(this.high, this.low);
+    const box = new BoxGeometry(1.02 * span.x, 1.02 * span.y, thickness);
+    const mesh = new Mesh(box, new MeshLambertMaterial({ color: css("--wall") }));
+    mesh.position.copy(this.low).addScaledVector(span, 0.5).setZ(this.low.z - thickness);
+    mesh.visible = this.standsOnFixed();
+    return mesh;
+  }
+
+  private standsOnFixed(): boolean {
+    const { fixed, rest } = this.surface;
+    const near = 1e-3 * this.across();
+    return fixed.length > 0 && Array.from(fixed).every((i) => rest[3 * i + 2]! - this.low.z < near);
+  }
+}
+
+function ghostMaterial(): MeshBasicMaterial {
+  return new MeshBasicMaterial({ transparent: true, opacity: 0.1, depthWrite: false });
+}

@@ -1,0 +1,140 @@
+// The page of a touched body: joins the connection, the hand, the view and the panel, one picture at a time.
+
+import { bodyOf } from "./bodies";
+import type { Body } from "./bodies";
+import { Connection } from "./connection";
+import { describe, say, status, warn } from "./flags";
+import { LineView } from "./line_view";
+import type { Frame, Hello } from "./messages";
+import { Panel } from "./panel";
+import { mode, watch } from "./skeleton";
+import { element, fixed, worded } from "./units";
+
+const SILENT = 1500; // ms without a picture until the page says so
+const SAME = 1e-9; // what differs by less is drawn alike
+
+const canvas = element<HTMLCanvasElement>("view");
+
+export function touch(): void {
+  const panel = new Panel();
+  let hello: Hello | null = null;
+  let body: Body | null = null;
+  let latest: Frame | null = null;
+  let drawn: Frame | null = null;
+  let lastFrame = 0;
+
+  const connection = new Connection({ hello: start, notice: warn, lost });
+
+  function start(told: Hello): void {
+    if (hello && JSON.stringify(hello) !== JSON.stringify(told)) {
+      location.reload(); // the server is back with another body: a fresh page is simpler than a changed one
+      return;
+    }
+    element("banner").hidden = true;
+    mode(told.line ? "line" : told.holds ? "pad" : "press");
+    panel.start(told, {
+      moved: (i, value) => {
+        const values = Float32Array.from(latest?.parameters ?? []);
+        values[i] = value;
+        body!.hand.parameters = values;
+        body!.hand.send();
+      },
+      deeper: (depth) => body && "wanted" in body.hand && (body.hand.wanted = depth),
+    });
+    lastFrame = performance.now();
+    if (!body) open(told).catch((error: unknown) => say(`The body can't be shown: ${String(error)}.`, "calm"));
+    hello = told;
+  }
+
+  async function open(told: Hello): Promise<void> {
+    body = bodyOf(told, canvas, connection, panel);
+    await body.open(); // without WebGL this fails, and the numbers are still shown
+    notes();
+    body.view!.look(); // now that the words stand where they will
+    if (latest) show(latest);
+  }
+
+  function notes(): void {
+    element("scale-notes").replaceChildren(...body!.notes().map((words) => worded("div", words)));
+  }
+
+  function show(frame: Frame): void {
+    if (!body?.view) return;
+    body.show(frame);
+    drawn = frame;
+  }
+
+  function lost(): void {
+    latest = drawn = null;
+    body?.hand.release();
+    panel.lost();
+    element("arrow-label").hidden = true;
+    status("lost", "disconnected, trying again");
+    say("Disconnected from palpate. This page connects again as soon as the server is back.", "bad");
+  }
+
+  function picture(): void {
+    requestAnimationFrame(picture);
+    if (document.hidden) return; // grants no credit, so nothing is sent either
+    body?.hand.tick();
+    const frame = connection.take();
+    const now = performance.now();
+    if (frame) {
+      [latest, lastFrame] = [frame, now];
+      describe(frame);
+      if (changed(frame, drawn)) show(frame);
+      panel.update(frame);
+    } else if (connection.connected && latest && now - lastFrame > SILENT) {
+      status("warn", "no pictures from the server");
+    }
+    if (body?.view?.render() && latest) {
+      label(body.view, latest);
+      body.place();
+    }
+  }
+
+  watch(
+    () => body?.view ?? null,
+    () => panel.recolour(),
+  );
+  document.addEventListener("visibilitychange", () => {
+    if (!document.hidden) return;
+    panel.hidden();
+    status("warn", "in the background");
+  });
+  element("true-scale").addEventListener("click", (event) => {
+    const view = body?.view;
+    if (!(view instanceof LineView)) return;
+    const on = view.enlarged !== 1;
+    view.enlarge(on ? 1 : view.enlargement);
+    (event.currentTarget as HTMLElement).setAttribute("aria-pressed", String(on));
+    if (latest) show(latest);
+    notes();
+  });
+  requestAnimationFrame(picture);
+}
+
+/** The force in words beside the arrow's end, where it hides neither the arrow nor what is held. */
+function label(view: NonNullable<Body["view"]>, frame: Frame): void {
+  const tag = element("arrow-label");
+  tag.hidden = !view.arrow.group.visible;
+  if (tag.hidden) return;
+  tag.textContent = `${fixed(Math.hypot(...frame.force), 2)} N`;
+  const [at, from] = [view.project(view.arrow.end), view.project(view.grip)];
+  const [width, height] = [tag.offsetWidth, tag.offsetHeight];
+  const level = Math.abs(at.x - from.x) > Math.abs(at.y - from.y);
+  const beside = at.x + 16 + width < canvas.clientWidth ? at.x + 12 : at.x - 12 - width;
+  const x = level ? at.x - width / 2 : beside;
+  const y = level ? at.y - height - 14 : at.y - 12;
+  tag.style.transform = `translate(${Math.max(x, 4)}px, ${Math.max(y, 4)}px)`;
+}
+
+/** Whether two frames look different: a body at rest is not drawn again. */
+function changed(a: Frame, b: Frame | null): boolean {
+  if (!b || a.grabbed !== b.grabbed) return true;
+  const parts = ["displacement", "coefficients", "prints", "contact", "force", "position", "parameters"] as const;
+  return parts.some((name) => {
+    const [p, q]: ArrayLike<number>[] = [a[name], b[name]];
+    return p!.length !== q!.length || Array.from(p!).some((x, i) => Math.abs(x - q![i]!) > SAME);
+  });
+}

@@ -1,0 +1,140 @@
+// A solid body under a hand: pressed by a free probe, or held by a pad; the force as an arrow.
+
+import { CylinderGeometry, DoubleSide, Mesh, MeshLambertMaterial, Plane, SphereGeometry, Vector3 } from "three";
+import type { Vector2 } from "three";
+import { Arrow } from "./arrow";
+import type { Frame, Hello, Surface, Vec3 } from "./messages";
+import { SurfaceView } from "./surface_view";
+import type { Layers } from "./surface_view";
+import { css } from "./units";
+
+const LONG = 0.22; // of the body's size: the arrow at the largest trained force
+
+/** A place on the surface at rest. */
+export interface Spot {
+  point: Vec3; // m
+  normal: Vec3; // outwards
+  touchable: boolean;
+}
+
+export class PressView extends SurfaceView {
+  readonly arrow: Arrow;
+  readonly grip = new Vector3(); // the probe's centre
+
+  private readonly hover: Mesh<SphereGeometry, MeshLambertMaterial>;
+
+  constructor(canvas: HTMLCanvasElement, surface: Surface, hello: Hello, words: readonly Element[]) {
+    super(canvas, surface, words);
+    this.arrow = new Arrow(LONG * this.across(), Math.max(hello.force_max, 1e-9), hello.radius);
+    this.hover = new Mesh(
+      new SphereGeometry(1, 48, 32),
+      new MeshLambertMaterial({ transparent: true, opacity: 0.28, depthWrite: false }),
+    );
+    this.hover.visible = this.arrow.group.visible = false;
+    this.probe.material.opacity = 0.62;
+    this.still.geometry.computeVertexNormals();
+    this.still.material.side = DoubleSide;
+    this.scene.add(this.hover, this.arrow.group);
+    this.roof = 2 * hello.radius + LONG * this.across(); // the probe and its arrow
+    this.recolour();
+  }
+
+  /** Take over one picture: displacement of each point, colours by each point's share of the scale. */
+  touch(frame: Frame, radius: number, moved: Float32Array, shares: ArrayLike<number>, layers: Layers): void {
+    const seen = frame.grabbed;
+    this.deform(moved, 1, shares, seen ? { centre: frame.position, radius } : null, layers);
+    this.grip.set(...frame.position);
+    this.arrow.resize(radius);
+    this.arrow.update(this.grip, seen ? frame.force : [0, 0, 0]);
+    if (seen) this.hover.visible = false;
+  }
+
+  /** Draw where a press would begin; null draws nothing. */
+  point(spot: Spot | null, radius: number): void {
+    if (!spot && !this.hover.visible) return;
+    this.hover.visible = spot !== null;
+    if (spot) {
+      this.hover.position.set(...spot.point).addScaledVector(new Vector3(...spot.normal), radius);
+      this.hover.scale.setScalar(radius);
+    }
+    this.dirty = true;
+  }
+
+  /** What lies under a point of the canvas (CSS pixels) on the surface at rest; null beside the body. */
+  spotAt(x: number, y: number): Spot | null {
+    const ray = this.ray(x, y);
+    const hit = ray.intersectObject(this.still, false)[0];
+    if (!hit?.normal || hit.faceIndex == null) return null;
+    const normal = hit.normal.clone().normalize();
+    const touchable = this.surface.touchable[hit.faceIndex]! > 0 && ray.ray.direction.dot(hit.face!.normal) < 0;
+    return { point: hit.point.toArray() as Vec3, normal: normal.toArray() as Vec3, touchable };
+  }
+
+  /** Where a point in body coordinates (m) is on the canvas, CSS pixels. */
+  middle(point: Vec3): Vector2 {
+    return this.project(new Vector3(...point));
+  }
+
+  override recolour(): void {
+    super.recolour();
+    this.hover?.material.color.set(css("--accent-2")); // not there yet while the base class is made
+    this.arrow?.recolour();
+  }
+}
+
+/** A patch that a hand holds and displaces; the surface around it is drawn at rest. */
+export class PadView extends SurfaceView {
+  readonly arrow: Arrow;
+  readonly grip = new Vector3(); // the middle of the pad
+
+  private readonly pad: Mesh<CylinderGeometry, MeshLambertMaterial>;
+  private readonly place = new Vector3(); // at rest
+
+  constructor(canvas: HTMLCanvasElement, surface: Surface, hello: Hello, words: readonly Element[]) {
+    super(canvas, surface, words);
+    const { radius } = hello;
+    this.arrow = new Arrow(LONG * this.across(), Math.max(hello.force_max, 1e-9), 0.4 * radius);
+    const disc = new CylinderGeometry(radius, radius, 0.25 * radius, 48).rotateX(Math.PI / 2);
+    this.pad = new Mesh(disc, new MeshLambertMaterial());
+    this.arrow.group.visible = false;
+    this.scene.add(this.pad, this.arrow.group);
+    this.roof = hello.deepest + LONG * this.across();
+    this.recolour();
+  }
+
+  /** Take over one picture: where the pad is, and its force. */
+  hold(frame: Frame, shares: ArrayLike<number>): void {
+    this.deform(new Float32Array(this.surface.rest.length), 1, shares, null, { ghost: false, mesh: false });
+    this.place.set(...frame.contact);
+    this.grip.set(...frame.position).add(this.place);
+    this.pad.position.copy(this.grip);
+    this.arrow.update(this.grip, frame.grabbed ? frame.force : [0, 0, 0]);
+  }
+
+  /** The offset (m) of the pad from rest under a canvas point, in the plane through it that faces the camera. */
+  offsetAt(x: number, y: number): Vec3 | null {
+    const plane = new Plane().setFromNormalAndCoplanarPoint(this.camera.getWorldDirection(new Vector3()), this.grip);
+    const hit = this.ray(x, y).ray.intersectPlane(plane, new Vector3());
+    return hit ? (hit.sub(this.place).toArray() as Vec3) : null;
+  }
+
+  /** The offset (m) at which the pad is drawn now. */
+  offset(): Vec3 {
+    return this.grip.clone().sub(this.place).toArray() as Vec3;
+  }
+
+  /** Make the pad answer the pointer. */
+  highlight(on: boolean): void {
+    const size = on ? 1.15 : 1;
+    if (this.pad.scale.x === size) return;
+    this.pad.scale.setScalar(size);
+    this.dirty = true;
+  }
+
+  override recolour(): void {
+    super.recolour();
+    this.pad?.material.color.set(css("--accent")); // not there yet while the base class is made
+    this.pad?.material.emissive.set(css("--accent")).multiplyScalar(0.25);
+    this.arrow?.recolour();
+  }
+}

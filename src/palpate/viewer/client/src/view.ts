@@ -1,0 +1,107 @@
+// A picture in three dimensions, rendered only when something has changed: camera, lights, how to look and to turn.
+
+import {
+  Color,
+  DirectionalLight,
+  HemisphereLight,
+  PerspectiveCamera,
+  Raycaster,
+  Scene,
+  Vector2,
+  Vector3,
+  WebGLRenderer,
+} from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { fit, free, project } from "./framing";
+import type { Size } from "./framing";
+
+/** How a kind of body is looked at first, and lit. */
+export interface Stance {
+  up: Vector3;
+  from: Vector3; // direction of the camera at first
+  sky: number;
+  sun: number;
+  sunFrom: Vector3;
+}
+
+export abstract class View {
+  protected readonly scene = new Scene();
+  protected readonly camera = new PerspectiveCamera(30, 1, 0.01, 100);
+  protected readonly controls: OrbitControls;
+  protected dirty = true;
+  private readonly renderer: WebGLRenderer;
+  private readonly caster = new Raycaster();
+
+  constructor(
+    readonly canvas: HTMLCanvasElement,
+    private readonly words: readonly Element[], // that stand in front of the canvas
+    private readonly stance: Stance,
+  ) {
+    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
+    const sky = new HemisphereLight(new Color(0xffffff), new Color(0xb9c4cc), stance.sky);
+    sky.position.copy(stance.up);
+    const sun = new DirectionalLight(0xffffff, stance.sun);
+    sun.position.copy(stance.sunFrom);
+    this.scene.add(sky, sun);
+    this.camera.up.copy(stance.up);
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.addEventListener("change", () => (this.dirty = true));
+  }
+
+  /** Points that the first view must have in it. */
+  protected abstract outline(): Vector3[];
+
+  /** Take the theme's colours. */
+  abstract recolour(): void;
+
+  /** Render if anything changed since. */
+  render(): boolean {
+    if (!this.dirty) return false;
+    this.dirty = false;
+    this.renderer.render(this.scene, this.camera);
+    return true;
+  }
+
+  /** Where a point of the scene is on the canvas, CSS pixels. */
+  project(point: Vector3): Vector2 {
+    return project(this.camera, this.size(), point);
+  }
+
+  resize(): void {
+    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
+    if (!width || !height) return;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.dirty = true;
+  }
+
+  /** Look as at first, with all of the outline in the picture. */
+  look(): void {
+    const room = free(this.canvas, this.words);
+    const { centre, distance } = fit(this.camera, this.size(), room, this.outline(), this.stance.from);
+    this.controls.target.copy(centre);
+    [this.camera.near, this.camera.far] = [distance / 50, distance * 20];
+    [this.controls.minDistance, this.controls.maxDistance] = [0.1 * distance, 4 * distance];
+    this.camera.updateProjectionMatrix();
+    this.controls.update();
+    this.dirty = true;
+  }
+
+  /** Whether the mouse and fingers turn the view. */
+  set turnable(on: boolean) {
+    this.controls.enabled = on;
+  }
+
+  /** The ray through a point of the canvas, CSS pixels. */
+  protected ray(x: number, y: number): Raycaster {
+    const at = new Vector2((2 * x) / this.canvas.clientWidth - 1, 1 - (2 * y) / this.canvas.clientHeight);
+    this.caster.setFromCamera(at, this.camera);
+    return this.caster;
+  }
+
+  protected size(): Size {
+    return [this.canvas.clientWidth || 1, this.canvas.clientHeight || 1];
+  }
+}

@@ -1,0 +1,201 @@
+"""The model of a page: a touchable body as the pages of one server see it.
+
+What is drawn is a line of nodes or a surface with fields; what a hand does is to press a free probe or to hold a node
+or a patch. Both follow from the body, which is asked for what it can do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from palpate.runtime.safety import Fault
+from palpate.runtime.shared_state import State, now
+from palpate.runtime.touchable import Touchable
+from palpate.units import Range, bounds
+from palpate.viewer.messages import PROTOCOL, Frame, Hello, Line, Modes, RangeInfo, Surface, Vec3
+from palpate.viewer.prints import yielding_in_words
+from palpate.viewer.surface_drawing import SurfaceDrawing
+
+__all__ = ["LineDrawing", "PageModel", "swing", "vector"]
+
+FREQUENCY = 2.0  # Hz, a pace that the eye can follow; the model's file holds no mass
+DAMPING = 0.25  # of critical: at rest again within two seconds
+STILL = 1e-3  # share of the last shape below which the body counts as at rest
+
+_NO_TOUCH: dict[str, Any] = {
+    "contact": (0.0, 0.0, 0.0),
+    "normal": (0.0, 0.0, 0.0),
+    "deviation": math.nan,
+    "drawn": 0.0,
+    "displacement": np.zeros(0),
+    "coefficients": np.zeros(0),
+    "prints": np.zeros(0),
+}
+
+
+class PageModel:
+    """A touchable body with all that its pages are told and sent.
+
+    Attributes
+    ----------
+    body : Touchable
+    surface : Surface, optional
+        At rest; None for a body drawn as a line.
+    """
+
+    def __init__(self, body: Touchable) -> None:
+        self.body = body
+        self._drawing: LineDrawing | SurfaceDrawing = (
+            LineDrawing(body) if body.is_line else SurfaceDrawing(body)
+        )
+        self.surface: Surface | None = getattr(self._drawing, "surface", None)
+
+    @property
+    def field_count(self) -> int:
+        """Number of the fields on the surface."""
+        return len(self._drawing.infos)
+
+    def modes(self, index: int) -> Modes:
+        """Return what the page needs to sum up field `index` of the surface."""
+        assert isinstance(self._drawing, SurfaceDrawing)
+        return self._drawing.modes(index)
+
+    def hello(self, state: State, rate: float) -> Hello:
+        """Return what every page is told first.
+
+        Parameters
+        ----------
+        state : State
+            A tick of the loop, for its settings.
+        rate : float
+            Ticks per second that the loop aims at, Hz.
+        """
+        body = self.body
+        return Hello(
+            protocol=PROTOCOL,
+            name=body.name,
+            inputs=_ranges(body.inputs),
+            parameters=_ranges(body.parameters),
+            holds=body.holds,
+            radius=body.radius,
+            radius_parameter=-1 if body.radius_parameter is None else body.radius_parameter,
+            deepest=body.deepest,
+            force_max=body.force_max,
+            stiffness_max=body.stiffness_max,
+            centre=vector(body.home),
+            line=self._drawing.line if isinstance(self._drawing, LineDrawing) else None,
+            fields=self._drawing.infos,
+            remembers="" if body.is_line else yielding_in_words(body) or str(body.branches or ""),
+            scale=state.scale,
+            workspace=state.radius,
+            max_force=state.max_force,
+            rate=rate,
+            faults=tuple(f.meaning for f in Fault),
+            meta=body.meta,
+        )
+
+    def frame(self, loop: Mapping[str, Any], state: State, held: bool, parameters: np.ndarray) -> Frame:
+        """Return a picture.
+
+        Parameters
+        ----------
+        loop : mapping
+            The fields of `Frame` that tell of the loop and the page, whatever the body.
+        state : State
+            The tick that is drawn.
+        held : bool
+            Whether a hand holds or presses the body.
+        parameters : (p,)
+            The inputs that the hand doesn't supply.
+        """
+        drawn = self._drawing.frame(state, held, parameters)
+        felt = {"depth": state.depth, "stiffness": state.stiffness if held else 0.0}
+        return Frame(**{**_NO_TOUCH, **felt, **loop, **drawn})
+
+
+class LineDrawing:
+    """A body drawn as a line, and its way back to rest after the hand lets go.
+
+    While a hand holds the body, the drawn shape is the one under the loads that the loop published: the picture and the
+    force belong to one state. A body that remembers is drawn as it lies. Any other, once released, feels no hand and
+    the *force is zero*; the loop knows no inertia, so the swing back is a drawing, not a result: the loads decay from
+    their last value as a lightly damped oscillator of one degree of freedom (`swing`), and each drawn shape is the
+    body's static shape under that share of the last loads.
+    """
+
+    infos = ()
+
+    def __init__(self, body: Any) -> None:
+        self._body, self._model = body, body.energy
+        self._low, self._high = bounds(body.inputs)
+        self._loads = np.zeros(len(body.inputs))
+        self._mirrored, self._released = False, -math.inf
+
+    @property
+    def line(self) -> Line:
+        """The line at rest."""
+        model = self._model
+        return Line(
+            rest=tuple(vector(node) for node in model.rest),
+            touch_node=model.touch_node,
+            nodes_of_interest=tuple(int(i) for i in model.nodes_of_interest),
+            travel=tuple(vector(corner) for corner in self._body.travel),
+        )
+
+    def frame(self, state: State, held: bool, parameters: np.ndarray) -> dict[str, Any]:
+        """Return the shape's part of a frame; see `PageModel.frame`."""
+        loads, contact = state.loads[: len(self._loads)], state.contact
+        if self._body.stays:
+            displacement = self._model.displacement(loads)
+        elif held:
+            displacement = self.held(loads, state.mirrored, now())
+        else:
+            displacement = self.free(parameters, now())
+            contact = displacement[self._model.touch_node]
+        return {"contact": vector(contact), "displacement": displacement}
+
+    def held(self, loads: np.ndarray, mirrored: bool, at: float) -> np.ndarray:
+        """Return the displacement (N, 3) under the published loads (n,) at time `at` (s), while a hand holds, m."""
+        self._loads, self._mirrored, self._released = loads.copy(), mirrored, at
+        return np.asarray(self._model.displacement(loads, mirrored=mirrored))
+
+    def free(self, parameters: np.ndarray, at: float) -> np.ndarray:
+        """Return the displacement (N, 3) at time `at` (s) without a hand, under the untouched loads (p,) alone, m."""
+        share = swing(at - self._released)
+        loads, mirrored = self._loads.copy(), self._mirrored
+        touched = np.array(self._model.touched, dtype=np.int64)
+        loads[np.setdiff1d(np.arange(self._low.size), touched)] = parameters
+        if share < 0.0 and self._model.mirrors:
+            share, mirrored = -share, not mirrored
+        # a one-sided load of a body that doesn't mirror stops at its end of the range
+        driven = np.clip(share * loads, np.minimum(self._low, 0.0), self._high)
+        loads[touched] = driven[touched]
+        return np.asarray(self._model.displacement(loads, mirrored=mirrored))
+
+
+def swing(elapsed: float) -> float:
+    """Return the share s of the last loads that is drawn `elapsed` seconds after release.
+
+        s(t) = e^(−ζωt) (cos ω_d t + ζω/ω_d sin ω_d t),   ω_d = ω √(1 − ζ²)
+
+    It is 1 at first with zero slope, and 0 at last.
+    """
+    w = 2.0 * math.pi * FREQUENCY
+    envelope = math.exp(-DAMPING * w * elapsed)
+    if envelope < STILL:
+        return 0.0
+    root = math.sqrt(1.0 - DAMPING**2)
+    return envelope * (math.cos(root * w * elapsed) + DAMPING / root * math.sin(root * w * elapsed))
+
+
+def vector(v: np.ndarray) -> Vec3:
+    """Return three numbers as a tuple."""
+    return (float(v[0]), float(v[1]), float(v[2]))
+
+
+def _ranges(inputs: tuple[Range, ...]) -> tuple[RangeInfo, ...]:
+    return tuple(RangeInfo(r.name, r.low, r.high, r.unit) for r in inputs)

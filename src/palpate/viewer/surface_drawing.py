@@ -1,0 +1,178 @@
+"""A body drawn as a surface: its mesh once, then a probe or a patch and some coefficients a picture.
+
+While a hand touches, the picture is of the loop's own position: picture and force belong to one state. Released, the
+force is zero at once; for the eye a probe is withdrawn along the normal, s(t) = s₀ e^(−t/τ), and each shape on the way
+is the body's own at that depth.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from palpate.runtime.shared_state import State, now
+from palpate.runtime.touchable import Touchable
+from palpate.surrogates import FieldSurrogate
+from palpate.viewer.messages import FieldInfo, Modes, Surface
+from palpate.viewer.prints import Prints
+from palpate.viewer.surfaces import relief, split, touchable_triangles
+
+__all__ = ["SurfaceDrawing"]
+
+FREE = 0.040  # s, time constant of the withdrawal that is drawn
+STILL = 1e-3  # share of the deepest depth below which the body counts as at rest
+DEEPEST = 48  # touches from which the range of the colours is taken
+
+
+class SurfaceDrawing:
+    """A body with a touched surface, or one that is held at a patch.
+
+    Attributes
+    ----------
+    surface : Surface
+        At rest.
+    nodes : (p,) int
+        The field's node that each point of the surface stands for.
+    fields : tuple of FieldSurrogate
+        Those shown: all on the nodes of the first, which is the displacement where there is one.
+    infos : tuple of FieldInfo
+    """
+
+    def __init__(self, body: Touchable) -> None:
+        self.body = body
+        self.fields = _shown(body.fields)
+        self.surface, self.nodes, self._prints = self._at_rest()
+        self._evaluators = [field.evaluator() for field in self.fields]
+        self._judge = body.energy.evaluator()
+        self.infos = tuple(self._info(field) for field in self.fields)
+        self._last, self._depth, self._released = body.home, 0.0, -math.inf
+        self._normal = body.normal
+
+    def _at_rest(self) -> tuple[Surface, np.ndarray, Prints | None]:
+        if self.fields:
+            points, triangles = self.fields[0].points, self.fields[0].triangles
+            mark = touchable_triangles(self.body, self.fields[0])
+        else:
+            points, triangles = relief(self.body)
+            mark = np.ones(len(triangles), bool)
+        parts = split(points, triangles, np.zeros(len(triangles), bool))
+        printable = np.zeros(0, dtype=int)
+        if self._keeps_prints:  # on both sides of a sharp edge, or it would tear
+            printable = np.flatnonzero(np.isin(parts.nodes, parts.nodes[parts.triangles[mark > 0]]))
+        prints = Prints(self.body, points[parts.nodes[printable]]) if len(printable) else None
+        surface = Surface(
+            rest=points[parts.nodes].ravel(),
+            triangles=parts.triangles.ravel(),
+            creases=parts.creases.ravel(),
+            fixed=np.zeros(0),
+            touchable=mark,
+            printable=printable,
+            normals=np.zeros(0) if prints is None else prints.normals.ravel(),
+        )
+        return surface, parts.nodes, prints
+
+    @property
+    def _keeps_prints(self) -> bool:
+        """Whether prints stand at places; one that travels with the probe is nowhere when that is gone."""
+        return self.body.dents is not None and len(self.body.dents.points) > 1
+
+    def modes(self, index: int) -> Modes:
+        """Return what the page needs to sum up field `index`."""
+        field, nodes = self.fields[index], self.nodes
+        return Modes(
+            reach=0.0 if field.dimple is None else field.dimple.reach,
+            rows=0 if field.dimple is None else field.dimple.table.shape[1],
+            rest=field.rest[nodes].ravel(),
+            modes=field.modes[:, nodes].ravel(),
+            touched=np.flatnonzero(field.touched[nodes]),
+        )
+
+    def frame(self, state: State, held: bool, parameters: np.ndarray) -> dict[str, Any]:
+        """Return the touch's part of a frame: the fields of `Frame` from `contact` to `prints`.
+
+        Parameters
+        ----------
+        state : State
+            The tick that is drawn.
+        held : bool
+            Whether a hand holds or presses the body.
+        parameters : (p,)
+            The inputs that the hand doesn't supply.
+        """
+        touched = held and not state.let_go
+        deviation = self._judge.trust(state.position, parameters) if touched else 0.0
+        if self.body.holds:
+            place, normal = self.body.held_place(parameters), self.body.normal
+            return {
+                "deviation": deviation,
+                "drawn": state.depth if held else 0.0,
+                "contact": tuple(place.tolist()),
+                "normal": tuple(normal.tolist()),
+            }
+        foot, coefficients = self._coefficients(
+            self._pressed(state) if touched else self._withdrawn(), parameters
+        )
+        prints = np.zeros(0)
+        if self._prints is not None:
+            prints = self._prints.depths(state.prints)
+            coefficients *= 0.0 if foot is None else self._prints.elastic(foot, state.prints)
+        if foot is None:
+            return {"deviation": deviation, "coefficients": coefficients, "prints": prints}
+        if touched:
+            self._normal = foot[5:8].copy()
+        return {
+            "deviation": deviation,
+            "drawn": float(foot[0]),
+            "contact": tuple(foot[2:5].tolist()),
+            "normal": tuple(foot[5:8].tolist()),
+            "coefficients": coefficients,
+            "prints": prints,
+        }
+
+    def _pressed(self, state: State) -> np.ndarray:
+        self._last, self._depth, self._released = state.position, state.depth, now()
+        return state.position
+
+    def _withdrawn(self) -> np.ndarray:
+        """Where the probe is drawn after release; in the air at last."""
+        left = self._depth * math.exp(-(now() - self._released) / FREE)
+        if left < STILL * self.body.deepest:
+            return self.body.away
+        return self._last + (self._depth - left) * self._normal
+
+    def _coefficients(
+        self, centre: np.ndarray, parameters: np.ndarray
+    ) -> tuple[np.ndarray | None, np.ndarray]:
+        """Depth, growth, foot and normal (8,) where there is contact, and what the page sums each field up from."""
+        foot, parts = None, []
+        for evaluator, field in zip(self._evaluators, self.fields, strict=True):
+            if evaluator(centre, parameters):
+                foot = evaluator.place
+            parts.append(evaluator.coefficients)
+            if field.dimple is not None:
+                parts.append(evaluator.profile().ravel())
+        return foot, np.concatenate(parts) if parts else np.zeros(0)
+
+    def _info(self, field: FieldSurrogate) -> FieldInfo:
+        """Its range over the deepest trained touches, from zero where the values allow."""
+        X = self.body.trained_inputs
+        deep = X[np.argsort(self.body.depth(X))[-DEEPEST:]]
+        values = field.values(deep)
+        components = values.shape[2]
+        sizes = np.linalg.norm(values, axis=2) if components > 1 else values[..., 0]
+        low, high = float(sizes.min()), float(sizes.max())
+        low = low if low < -0.05 * abs(high) or low > 0.5 * high else 0.0
+        return FieldInfo(
+            field.name, field.unit, low, high if high > low else low + 1.0, components, len(field.modes)
+        )
+
+
+def _shown(fields: Mapping[str, FieldSurrogate]) -> tuple[FieldSurrogate, ...]:
+    """Return the fields on one set of nodes, the displacement first."""
+    moves = [field for field in fields.values() if field.rest.shape[1] == 3 and field.unit == "m"]
+    ordered = [*moves[:1], *(field for field in fields.values() if field not in moves[:1])]
+    first = ordered[0].points if ordered else np.zeros((0, 3))
+    return tuple(field for field in ordered if np.array_equal(field.points, first))

@@ -220,7 +220,7 @@ def test_a_body_keeps_energy_and_fields_in_one_file_with_one_surface(tmp_path):
     S = surrogate()
     F = {"displacement": field(), "von Mises stress": field(components=1, seed=2)}
     path = TouchedBody(S, F).save(tmp_path / "b.palpate")
-    assert sum(name.startswith("surface/") for name in load_archive(path).arrays) == 3
+    assert sum(name.startswith("surface/") for name in load_archive(path).arrays) == len(S.surface.arrays())
     again = TouchedBody.load(path)
     X = around_points(50)
     np.testing.assert_array_equal(again.touch.force(X), S.force(X))

@@ -5,11 +5,10 @@ import pytest
 from skins import ball, box, directions, plate, tube
 
 from palpate.errors import UsageError
-from palpate.surrogates.surface.curved import pieces_of
-from palpate.surrogates.surface.exact import Exact
-from palpate.surrogates.surface.nearest import DEEP, boxes_of, nearest_into, ordered
-from palpate.surrogates.surface.normals import corners_of
-from palpate.surrogates.surface.skin import Skin
+from palpate.surrogates.surface.curved_patches import patches_of
+from palpate.surrogates.surface.measured_distance import MeasuredDistance
+from palpate.surrogates.surface.nearest_triangle import DEEP, disc_tree, nearest_into
+from palpate.surrogates.surface.oriented_mesh import OrientedMesh, corners_of
 
 
 def broken(change):
@@ -54,76 +53,76 @@ def apart(points, triangles):
 )
 def test_what_is_no_oriented_surface_is_refused(change, word):
     with pytest.raises(UsageError, match=word):
-        Skin.of(*broken(change))
+        OrientedMesh.of(*broken(change))
 
 
 def test_neighbours_share_an_edge_and_the_rest_is_border():
-    skin = Skin.of(*plate(0.1, 4))
-    assert skin.border.sum() == 16
-    for t, k in np.argwhere(~skin.border):
-        s, m = divmod(skin.neighbours[t, k], 3)
-        assert skin.triangles[t, k] == skin.triangles[s, (m + 1) % 3]
-        assert skin.triangles[t, (k + 1) % 3] == skin.triangles[s, m]
-    assert not Skin.of(*ball(1.0, 4)).border.any()
+    mesh = OrientedMesh.of(*plate(0.1, 4))
+    assert mesh.border.sum() == 16
+    for t, k in np.argwhere(~mesh.border):
+        s, m = divmod(mesh.neighbours[t, k], 3)
+        assert mesh.triangles[t, k] == mesh.triangles[s, (m + 1) % 3]
+        assert mesh.triangles[t, (k + 1) % 3] == mesh.triangles[s, m]
+    assert not OrientedMesh.of(*ball(1.0, 4)).border.any()
 
 
 def test_normals_of_a_ball_are_exact_however_irregular():
-    skin = Skin.of(*ball(0.05, 8, scatter=0.1))
-    corners = corners_of(skin)
-    assert np.abs(corners.normals - skin.corners / 0.05).max() < 1e-9
+    mesh = OrientedMesh.of(*ball(0.05, 8, scatter=0.1))
+    corners = corners_of(mesh)
+    assert np.abs(corners.normals - mesh.corners / 0.05).max() < 1e-9
     assert not corners.sharp.any()
 
 
 def test_at_the_border_a_paraboloid_tells_the_normal():
     points, triangles = ball(0.05, 12, scatter=0.05)
     half = triangles[(points[triangles, 2] > -1e-3).all(axis=1)]
-    skin = Skin.of(points, half)
-    corners = corners_of(skin)
+    mesh = OrientedMesh.of(points, half)
+    corners = corners_of(mesh)
     assert corners.sharp.any()
-    angle = np.linalg.norm(corners.normals - skin.corners / 0.05, axis=2)
-    facet = np.linalg.norm(skin.facets[:, None] - skin.corners / 0.05, axis=2)
+    angle = np.linalg.norm(corners.normals - mesh.corners / 0.05, axis=2)
+    facet = np.linalg.norm(mesh.facets[:, None] - mesh.corners / 0.05, axis=2)
     # a facet leans by first order of the edge, the paraboloid by third: (h/R)³ with h/R = 0.13
     assert angle.max() < 0.01
     assert facet.max() > 0.06
 
 
 def test_creases_part_the_normals_and_stay_straight():
-    skin = Skin.of(*box(0.06, 3))
-    corners = corners_of(skin)
-    assert skin.creases.sum() == 2 * 12 * 3
+    mesh = OrientedMesh.of(*box(0.06, 3))
+    corners = corners_of(mesh)
+    assert mesh.creases.sum() == 2 * 12 * 3
     assert np.abs(np.abs(corners.normals).max(axis=2) - 1).max() < 1e-12
-    pieces = pieces_of(skin)
-    assert len(pieces.corners) == len(skin.triangles)
-    assert np.abs(np.abs(pieces.corners).max(axis=2) - 0.03).max() < 1e-15
+    patches = patches_of(mesh)
+    assert len(patches.corners) == len(mesh.triangles)
+    assert np.abs(np.abs(patches.corners).max(axis=2) - 0.03).max() < 1e-15
 
 
 def test_patches_of_a_coarse_tube_lie_on_it_and_its_rim_is_a_circle():
-    skin = Skin.of(*tube(0.03, 0.06, 24, 6))
-    pieces = pieces_of(skin)
+    mesh = OrientedMesh.of(*tube(0.03, 0.06, 24, 6))
+    patches = patches_of(mesh)
     sag = 0.03 * (1 - np.cos(np.pi / 24))
-    r = np.linalg.norm(pieces.corners[..., :2], axis=2)
-    assert len(pieces.corners) > 4 * len(skin.triangles)
+    r = np.linalg.norm(patches.corners[..., :2], axis=2)
+    assert len(patches.corners) > 4 * len(mesh.triangles)
     # a cubic with the circle's tangents misses 0.19 θ² of the sag, θ = 15°; across diagonals about twice that
     assert np.abs(r - 0.03).max() < sag / 30
-    rim = np.abs(pieces.corners[..., 2]) > 0.03 - 1e-9
+    rim = np.abs(patches.corners[..., 2]) > 0.03 - 1e-9
     assert np.abs(r[rim] - 0.03).max() < sag / 50
     radial = (
-        np.concatenate([pieces.corners[..., :2], np.zeros_like(pieces.corners[..., :1])], axis=2)
+        np.concatenate([patches.corners[..., :2], np.zeros_like(patches.corners[..., :1])], axis=2)
         / r[..., None]
     )
-    assert np.abs(pieces.normals - radial).max() < 0.005
+    assert np.abs(patches.normals - radial).max() < 0.005
 
 
 def test_the_tree_finds_the_nearest_of_all_triangles():
     rng = np.random.default_rng(0)
     corners = rng.uniform(-1, 1, (301, 1, 3)) + 0.2 * rng.normal(size=(301, 3, 3))
-    corners = corners[ordered(corners)]
-    boxes, foot, trial = boxes_of(corners), np.zeros(3), np.zeros(3)
+    order, discs = disc_tree(corners)
+    corners, foot, trial = corners[order], np.zeros(3), np.zeros(3)
     waiting = np.zeros(DEEP, dtype=np.int64)
     fine = np.array([(i, j, 20 - i - j) for i in range(21) for j in range(21 - i)]) / 20
     cloud = np.einsum("nk,tki->tni", fine, corners)
     for c in rng.uniform(-1.5, 1.5, (200, 3)):
-        square, t, _ = nearest_into(*c, 7, boxes, corners, waiting, foot, trial)
+        square, t, _ = nearest_into(*c, 7, discs, corners, waiting, foot, trial)
         assert foot.min() >= 0
         assert foot.sum() == pytest.approx(1)
         assert square == pytest.approx(((foot @ corners[t] - c) ** 2).sum(), abs=1e-12)
@@ -135,14 +134,16 @@ def test_the_tree_finds_the_nearest_of_all_triangles():
 def test_measured_distance_of_a_ball():
     points, triangles = ball(0.05, 12, scatter=0.06)
     truth = np.random.default_rng(0).uniform(-0.02, 0.02, 5000)
-    d, kinds = Exact.of(Skin.of(points, triangles), 0.01).at((0.05 + truth)[:, None] * directions(5000, 3))
+    d, kinds = MeasuredDistance.of(OrientedMesh.of(points, triangles), 0.01).at(
+        (0.05 + truth)[:, None] * directions(5000, 3)
+    )
     assert np.abs(d - truth).max() < 4e-6
     assert not kinds.any()
 
 
 def test_measured_distance_beside_a_plate_is_that_to_its_rim():
     C = np.random.default_rng(1).uniform([-0.06, -0.06, 0], [0.06, 0.06, 0.02], (5000, 3))
-    d, _ = Exact.of(Skin.of(*plate(0.08, 5, seed=3)), 0.01).at(C)
+    d, _ = MeasuredDistance.of(OrientedMesh.of(*plate(0.08, 5, seed=3)), 0.01).at(C)
     beyond = np.maximum(np.abs(C) - [0.04, 0.04, 0], 0)
     assert d == pytest.approx(np.linalg.norm(beyond, axis=1), abs=1e-15)
 
@@ -153,7 +154,7 @@ def test_depths_into_a_dome_are_those_of_its_finite_elements():
 
     dome = Dome(radius=0.05, element=0.01)
     mesh = dome.rest(())
-    exact = Exact.of(Skin.of(mesh.points, mesh.triangles_of("top")), 0.01)
+    exact = MeasuredDistance.of(OrientedMesh.of(mesh.points, mesh.triangles_of("top")), 0.01)
     v = directions(200, 4)
     v[:, 2] = np.abs(v[:, 2])
     C = 0.05 * v + [0, 0, 0.01]

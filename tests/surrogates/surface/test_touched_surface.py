@@ -250,7 +250,7 @@ def test_two_derivatives_are_continuous_at_nodes_and_at_the_box(axis):
 def test_the_kernel_is_the_tensor_product_spline():
     from scipy.interpolate import NdBSpline
 
-    surface = face()
+    surface = sphere()
     knots = [
         surface.frame[a] + surface.spacing * (np.arange(surface.coefficients.shape[a] + 4) - 2)
         for a in range(3)

@@ -57,13 +57,7 @@ def raised(surface: TouchedSurface, height: float, radius: float) -> TouchedSurf
             why=f"Its distance reaches {1e3 * surface.reach:.3g} mm outside, for a probe of {1e3 * radius:.3g} mm.",
             fix="Register the specimen more closely, give a smaller `offset`, or make the surface with more `reach`.",
         )
-    # cubic B-splines sum to one, so this moves d by exactly as much
-    return replace(
-        surface,
-        coefficients=surface.coefficients - height,
-        reach=surface.reach - height,
-        inner=surface.inner + height,
-    )
+    return surface.raised(height)
 
 
 def _largest(surrogate: TouchSurrogate) -> float:

@@ -2,17 +2,16 @@
 
 ::
 
-    skin      the triangles, checked: neighbours, borders, creases
-    normals   at their corners
-    curved    the curved surface that they stand for, in small triangles
-    nearest   the nearest of them
-    exact     signed distance, measured point by point
-    grid      a spline on a grid of such distances
-    spline    its compiled evaluation
-    touched   TouchedSurface, what the others make
+    oriented_mesh      the triangles, checked: neighbours, borders, creases; normals at their corners
+    curved_patches     the curved surface that they stand for, in small triangles
+    nearest_triangle   the nearest of them
+    measured_distance  the signed distance, point by point
+    distance_table     splines through such distances
+    distance_kernels   their compiled evaluation
+    touched_surface    TouchedSurface, which the others make
 """
 
-from palpate.surrogates.surface.spline import distance_into, distances_into
-from palpate.surrogates.surface.touched import TouchedSurface
+from palpate.surrogates.surface.distance_kernels import distance_into, distances_into
+from palpate.surrogates.surface.touched_surface import TouchedSurface
 
 __all__ = ["TouchedSurface", "distance_into", "distances_into"]

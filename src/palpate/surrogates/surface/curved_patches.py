@@ -11,10 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.surrogates.surface.normals import Corners, corners_of
-from palpate.surrogates.surface.skin import CREASE, Skin
+from palpate.surrogates.surface.oriented_mesh import CREASE, Corners, OrientedMesh, corners_of
 
-__all__ = ["SMOOTH", "Pieces", "pieces_of"]
+__all__ = ["SMOOTH", "Patches", "patches_of"]
 
 TURN = np.radians(6.0)  # between the normals of a small triangle's corners, at most
 PARTS = 8  # of an edge, at most
@@ -23,7 +22,7 @@ SMOOTH, SHARP, END = 0, 1, 2  # kinds of a place: inside a smooth piece, on a cr
 
 
 @dataclass(frozen=True, eq=False)
-class Pieces:
+class Patches:
     """Small triangles of a curved surface.
 
     Attributes
@@ -52,18 +51,18 @@ class Pieces:
     border: np.ndarray
 
 
-def pieces_of(skin: Skin) -> Pieces:
+def patches_of(mesh: OrientedMesh) -> Patches:
     """The curved surface behind a mesh, in as many parts as its curvature asks."""
-    corners = corners_of(skin)
-    parts = _parts(corners.normals, len(skin.triangles))
+    corners = corners_of(mesh)
+    parts = _parts(corners.normals, len(mesh.triangles))
     weights, pattern = _pattern(parts)
-    shape = _bulged(skin, corners, weights)
-    normals = _turned(skin.corners, corners.normals, weights)
-    kinds, outward, of_edges, of_vertices = _features(skin, corners)
+    shape = _bulged(mesh, corners, weights)
+    normals = _turned(mesh.corners, corners.normals, weights)
+    kinds, outward, of_edges, of_vertices = _features(mesh, corners)
     places = _places(parts, of_edges, of_vertices, pattern, weights)
-    ends = np.argwhere(skin.border)
-    border = skin.points[np.stack([skin.triangles[ends[:, 0], (ends[:, 1] + k) % 3] for k in (0, 1)], axis=1)]
-    return Pieces(
+    ends = np.argwhere(mesh.border)
+    border = mesh.points[np.stack([mesh.triangles[ends[:, 0], (ends[:, 1] + k) % 3] for k in (0, 1)], axis=1)]
+    return Patches(
         np.ascontiguousarray(shape[:, pattern].reshape(-1, 3, 3)),
         np.ascontiguousarray(normals[:, pattern].reshape(-1, 3, 3)),
         places,
@@ -94,10 +93,10 @@ def _pattern(parts: int) -> tuple[np.ndarray, np.ndarray]:
     return weights, np.array([[number[p] for p in one] for one in up + down])
 
 
-def _bulged(skin: Skin, corners: Corners, weights: np.ndarray) -> np.ndarray:
+def _bulged(mesh: OrientedMesh, corners: Corners, weights: np.ndarray) -> np.ndarray:
     """Points (t, N, 3) of the cubic patches."""
-    handles = _handles(skin, corners)
-    P, (a, b, c) = skin.corners, weights.T
+    handles = _handles(mesh, corners)
+    P, (a, b, c) = mesh.corners, weights.T
     E = handles.reshape(-1, 6, 3).mean(axis=1)
     centre = E + (E - P.mean(axis=1)) / 2
     parts = [(a**3, P[:, 0]), (b**3, P[:, 1]), (c**3, P[:, 2]), (6 * a * b * c, centre)]
@@ -111,12 +110,12 @@ def _bulged(skin: Skin, corners: Corners, weights: np.ndarray) -> np.ndarray:
     return np.asarray(flat + sum(f[:, None] * (q[:, None] - flat) for f, q in parts))
 
 
-def _handles(skin: Skin, corners: Corners) -> np.ndarray:
+def _handles(mesh: OrientedMesh, corners: Corners) -> np.ndarray:
     """Inner control points (t, 3, 2, 3) of each edge: near its first and near its second corner."""
-    P, N = skin.corners, corners.normals
-    ends = skin.border | skin.creases
+    P, N = mesh.corners, corners.normals
+    ends = mesh.border | mesh.creases
     chord = np.roll(P, -1, axis=1) - P
-    tangents = _curves(skin, ends)
+    tangents = _curves(mesh, ends)
     handles = np.empty((*P.shape[:2], 2, 3))
     for side, (base, normal) in enumerate(((P, N), (np.roll(P, -1, axis=1), np.roll(N, -1, axis=1)))):
         step = chord if side == 0 else -chord
@@ -127,17 +126,17 @@ def _handles(skin: Skin, corners: Corners) -> np.ndarray:
     return handles
 
 
-def _curves(skin: Skin, ends: np.ndarray) -> np.ndarray:
+def _curves(mesh: OrientedMesh, ends: np.ndarray) -> np.ndarray:
     """Unit tangents (t, 3, 2, 3) at both ends of the edges of borders and creases; a corner keeps its edge's."""
-    chord = np.roll(skin.corners, -1, axis=1) - skin.corners
+    chord = np.roll(mesh.corners, -1, axis=1) - mesh.corners
     length = np.linalg.norm(chord, axis=2)
     tangents = np.repeat((chord / length[..., None])[:, :, None], 2, axis=2)
     at: dict[int, list[tuple[int, int, int]]] = {}
     for t, k in np.argwhere(ends).tolist():
-        partner = int(skin.neighbours[t, k])
+        partner = int(mesh.neighbours[t, k])
         if partner > 3 * t + k or partner < 0:
-            at.setdefault(int(skin.triangles[t, k]), []).append((t, k, 0))
-            at.setdefault(int(skin.triangles[t, (k + 1) % 3]), []).append((t, k, 1))
+            at.setdefault(int(mesh.triangles[t, k]), []).append((t, k, 0))
+            at.setdefault(int(mesh.triangles[t, (k + 1) % 3]), []).append((t, k, 1))
     chosen = tangents.copy()
     for meeting in (m for m in at.values() if len(m) == 2):
         (t, k, i), (s, m, j) = meeting
@@ -148,8 +147,8 @@ def _curves(skin: Skin, ends: np.ndarray) -> np.ndarray:
             mean = one * length[s, m] + sign * other * length[t, k]
             mean /= np.linalg.norm(mean)
             chosen[t, k, i], chosen[s, m, j] = mean, sign * mean
-    for t, k in np.argwhere(ends & ~skin.border).tolist():
-        s, m = divmod(int(skin.neighbours[t, k]), 3)
+    for t, k in np.argwhere(ends & ~mesh.border).tolist():
+        s, m = divmod(int(mesh.neighbours[t, k]), 3)
         if 3 * s + m < 3 * t + k:
             chosen[t, k] = -chosen[s, m, ::-1]
     return chosen
@@ -170,34 +169,34 @@ def _turned(P: np.ndarray, N: np.ndarray, weights: np.ndarray) -> np.ndarray:
     return np.asarray(mean / np.linalg.norm(mean, axis=2, keepdims=True))
 
 
-def _features(skin: Skin, corners: Corners) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _features(mesh: OrientedMesh, corners: Corners) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """(kinds (f,), outward (f, 3), rows of the edges (t, 3), rows of the vertices (t, 3))."""
-    t = len(skin.triangles)
-    edge_kind = np.where(skin.border, END, np.where(skin.creases, SHARP, SMOOTH))
-    across = skin.facets[:, None] + skin.facets[skin.neighbours // 3]
-    edge_out = np.where(skin.creases[..., None], across, 0.0)
-    vertex_kind, vertex_out = _vertices(skin, corners, edge_kind)
+    t = len(mesh.triangles)
+    edge_kind = np.where(mesh.border, END, np.where(mesh.creases, SHARP, SMOOTH))
+    across = mesh.facets[:, None] + mesh.facets[mesh.neighbours // 3]
+    edge_out = np.where(mesh.creases[..., None], across, 0.0)
+    vertex_kind, vertex_out = _vertices(mesh, corners, edge_kind)
     kinds = np.concatenate([[SMOOTH], edge_kind.ravel(), vertex_kind])
     outward = np.concatenate([np.zeros((1, 3)), edge_out.reshape(-1, 3), vertex_out])
     of_edges = np.where(edge_kind != SMOOTH, 1 + np.arange(3 * t).reshape(t, 3), 0)
-    rows = 1 + 3 * t + skin.triangles
-    return kinds, outward, of_edges, np.where(vertex_kind[skin.triangles] != SMOOTH, rows, 0)
+    rows = 1 + 3 * t + mesh.triangles
+    return kinds, outward, of_edges, np.where(vertex_kind[mesh.triangles] != SMOOTH, rows, 0)
 
 
-def _vertices(skin: Skin, corners: Corners, edge_kind: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _vertices(mesh: OrientedMesh, corners: Corners, edge_kind: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Kinds (P,) of the vertices and their angle-weighted normals (P, 3), zero with but one smooth piece."""
-    kind = np.zeros(len(skin.points), dtype=np.int64)
-    ends = np.roll(skin.triangles, -1, axis=1)
-    np.maximum.at(kind, skin.triangles, edge_kind)
+    kind = np.zeros(len(mesh.points), dtype=np.int64)
+    ends = np.roll(mesh.triangles, -1, axis=1)
+    np.maximum.at(kind, mesh.triangles, edge_kind)
     np.maximum.at(kind, ends, edge_kind)
-    out = np.roll(skin.corners, -1, axis=1) - skin.corners
-    back = np.roll(skin.corners, -2, axis=1) - skin.corners
+    out = np.roll(mesh.corners, -1, axis=1) - mesh.corners
+    back = np.roll(mesh.corners, -2, axis=1) - mesh.corners
     angles = np.arctan2(np.linalg.norm(np.cross(out, back), axis=2), np.einsum("tki,tki->tk", out, back))
-    outward = np.zeros_like(skin.points)
-    np.add.at(outward, skin.triangles, angles[..., None] * skin.facets[:, None])
-    low, high = (np.full(len(skin.points), v) for v in (corners.pieces.max() + 1, -1))
-    np.minimum.at(low, skin.triangles, corners.pieces)
-    np.maximum.at(high, skin.triangles, corners.pieces)
+    outward = np.zeros_like(mesh.points)
+    np.add.at(outward, mesh.triangles, angles[..., None] * mesh.facets[:, None])
+    low, high = (np.full(len(mesh.points), v) for v in (corners.pieces.max() + 1, -1))
+    np.minimum.at(low, mesh.triangles, corners.pieces)
+    np.maximum.at(high, mesh.triangles, corners.pieces)
     outward[low == high] = 0.0
     return kind, outward
 

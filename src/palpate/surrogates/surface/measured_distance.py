@@ -1,4 +1,4 @@
-"""Signed distance to a curved surface, measured point by point: what the smooth field is made of.
+"""Signed distance to a curved surface, measured point by point: what a smooth field is made of.
 
 **On a smooth piece** the foot on the nearest small triangle is lifted to the curved surface, by the height of the
 paraboloid with the corners' normals, ½ Σ λ_i λ_j (n_j − n_i)·(x_j − x_i) over the edges; d is the distance along the
@@ -31,22 +31,33 @@ on, d turns back, and 2R later nothing is felt: a probe that comes from below me
 was pushed through the body is let go. There d is
 
     d (1 − τ) + (behind + 2R) τ,   τ = σ((r − behind)/2R)
+
+Over a plane all of this depends on two numbers only, the distance a from its outline and the height z.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numba import njit
 
-from palpate.surrogates.surface.curved import END, SMOOTH, Pieces, pieces_of
-from palpate.surrogates.surface.nearest import DEEP, boxes_of, nearest_into, ordered
-from palpate.surrogates.surface.skin import Skin
+from palpate.surrogates.surface.curved_patches import SHARP, SMOOTH, Patches, patches_of
+from palpate.surrogates.surface.nearest_triangle import DEEP, disc_tree, nearest_into
+from palpate.surrogates.surface.oriented_mesh import OrientedMesh
 
-__all__ = ["BRIDGED", "PLAIN", "ROUNDED", "Exact"]
+__all__ = [
+    "BEHIND",
+    "BRIDGED",
+    "PLAIN",
+    "ROLLED",
+    "ROUNDED",
+    "MeasuredDistance",
+]
 
-PLAIN, ROUNDED, BRIDGED = 0, 1, 2  # foot on a smooth piece, on a line; below the border or behind
+# the foot lies on a smooth piece, on a line, or on a border with a shoulder; below the border; behind the body
+PLAIN, ROUNDED, ROLLED, BRIDGED, BEHIND = 0, 1, 2, 3, 4
 TURN = 2.0  # of the radius: how far it takes to turn back behind
 START, FINISH = 0.5, 0.85  # of the radius: where the bridge below the border begins and ends
 # cosine between distance and normal, below which small triangles are too coarse for the normal
@@ -56,14 +67,14 @@ _jit = njit(cache=True, nogil=True, error_model="numpy")
 
 
 @dataclass(frozen=True, eq=False)
-class Exact:
+class MeasuredDistance:
     """Measures distances to a surface.
 
     Attributes
     ----------
-    pieces : Pieces
-        In the order of `boxes`.
-    boxes : (n, 6) array
+    patches : Patches
+        In the order of `discs`.
+    discs : (n, 8) array
         Their tree.
     radius : float
         R in m: of the smallest probe.
@@ -73,33 +84,60 @@ class Exact:
         In m; infinite where d shall fall on.
     """
 
-    pieces: Pieces
-    boxes: np.ndarray
+    patches: Patches
+    discs: np.ndarray
     radius: float
     shoulder: float = 0.0
     behind: float = np.inf
 
     @classmethod
-    def of(cls, skin: Skin, radius: float, shoulder: float = 0.0, behind: float = np.inf) -> Exact:
+    def of(
+        cls, mesh: OrientedMesh, radius: float, shoulder: float = 0.0, behind: float = np.inf
+    ) -> MeasuredDistance:
         """The curved surface behind a mesh, for probes from a radius in m on."""
-        p = pieces_of(skin)
-        order = ordered(p.corners)
+        p = patches_of(mesh)
+        order, discs = disc_tree(p.corners)
         corners = np.ascontiguousarray(p.corners[order])
-        pieces = Pieces(corners, p.normals[order], p.places[order], p.kinds, p.outward, p.border)
-        return cls(pieces, boxes_of(corners), radius, shoulder, behind)
+        patches = Patches(corners, p.normals[order], p.places[order], p.kinds, p.outward, p.border)
+        return cls(patches, discs, radius, shoulder, behind)
 
     def at(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Signed distances in m and their kinds (PLAIN, ROUNDED, BRIDGED) at places (N, 3), each of shape (N,).
+        """Signed distances in m and their kinds (PLAIN to BEHIND) at places (N, 3), each of shape (N,).
 
         Fast where each place is near the one before.
         """
         places = np.ascontiguousarray(places, dtype=np.float64)
         distances, kinds = np.empty(len(places)), np.empty(len(places), dtype=np.int8)
-        p = self.pieces
+        p = self.patches
         _measure_into(
-            places, distances, kinds, self.boxes, p.corners, p.normals, p.places, p.kinds, p.outward,
+            places, distances, kinds, self.discs, p.corners, p.normals, p.places, p.kinds, p.outward,
             p.border, self.radius, self.shoulder, self.behind,
         )  # fmt: skip
+        return distances, kinds
+
+    @cached_property
+    def extent(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper corner (3,) in m of a box around the surface."""
+        corners = self.patches.corners
+        return corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+
+    @cached_property
+    def extent_behind(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper corner (3,) in m of a box around the places behind it where nothing is felt any more."""
+        places = self.patches.corners - (self.behind + TURN * self.radius) * self.patches.normals
+        return places.min(axis=(0, 1)), places.max(axis=(0, 1))
+
+    def outline(self, places: np.ndarray) -> np.ndarray:
+        """Return distances (N,) in m from a flat surface's outline at places (N, 3) of its plane, negative within."""
+        inside, p = np.empty(len(places), dtype=np.bool_), self.patches
+        distances = np.empty(len(places))
+        _outline_into(places, distances, inside, self.discs, p.corners, p.places, p.kinds, p.border)
+        return np.where(inside, -distances, distances)
+
+    def profile(self, a: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return distances in m and their kinds over a flat surface, a from its outline and z above it, all (N,)."""
+        distances, kinds = np.empty(len(a)), np.empty(len(a), dtype=np.int8)
+        _profile_into(a, z, distances, kinds, self.radius, self.shoulder, self.behind)
         return distances, kinds
 
 
@@ -172,16 +210,13 @@ def _rolled(height: float, r: float, shoulder: float, radius: float) -> tuple[fl
     b = np.sqrt(max(r * r - height * height, 0.0) + start * start) - start
     if height < -shoulder:
         return b - shoulder + (height + shoulder) * (1.0 - _step(b / radius)), BRIDGED
-    return np.sqrt(b * b + (height + shoulder) ** 2) - shoulder, PLAIN
+    return np.sqrt(b * b + (height + shoulder) ** 2) - shoulder, ROLLED
 
 
 @_jit
-def _within(c: np.ndarray, d: float, border: np.ndarray, radius: float) -> tuple[float, int]:
-    """Distance where the nearest point is inside the surface, d away."""
-    if d > -START * radius or border.shape[0] == 0:
-        return d, PLAIN
-    square = _to_border(c, border) - d * d
-    if square >= radius * radius:
+def _within(d: float, square: float, radius: float) -> tuple[float, int]:
+    """Distance where the nearest point is inside the surface, d away; the border is √square away from that point."""
+    if d > -START * radius or square >= radius * radius:
         return d, PLAIN
     G = _bridge(-d / radius) * (1.0 - _step(np.sqrt(max(square, 0.0)) / radius))
     return d - 2.0 * d * G, BRIDGED
@@ -211,7 +246,7 @@ def _measure_into(
     places: np.ndarray,
     distances: np.ndarray,
     kinds: np.ndarray,
-    boxes: np.ndarray,
+    discs: np.ndarray,
     corners: np.ndarray,
     normals: np.ndarray,
     rows: np.ndarray,
@@ -228,7 +263,7 @@ def _measure_into(
     t = 0
     for k in range(places.shape[0]):
         c = places[k]
-        _, t, where = nearest_into(c[0], c[1], c[2], t, boxes, corners, waiting, foot, trial)
+        _, t, where = nearest_into(c[0], c[1], c[2], t, discs, corners, waiting, foot, trial)
         row = rows[t, where]
         lift = _lifted_into(corners[t], normals[t], foot, n)
         if feature_kinds[row] != SMOOTH:
@@ -246,15 +281,63 @@ def _measure_into(
                 height = np.copysign(RESOLVED * r, height)
         else:
             height = _over(c, foot, corners[t], outward[row], height)
-        if kind == SMOOTH and shoulder > 0.0:
-            distances[k], kinds[k] = height, PLAIN
-        elif kind == SMOOTH:
-            distances[k], kinds[k] = _within(c, height, border, radius)
-        elif kind == END and shoulder > 0.0:
-            distances[k], kinds[k] = _rolled(height, r, shoulder, radius)
-        elif kind == END:
-            distances[k], kinds[k] = _beyond(height, r, radius)
-        else:
+        if kind == SHARP:
             distances[k], kinds[k] = np.copysign(r, height), ROUNDED
+        else:
+            square = np.inf
+            if kind == SMOOTH and shoulder == 0.0 and height <= -START * radius:
+                square = _to_border(c, border) - height * height
+            distances[k], kinds[k] = _about_border(kind == SMOOTH, height, r, square, radius, shoulder)
         if height < 0.0 and r > behind:
-            distances[k], kinds[k] = _turned(distances[k], r, behind, end), BRIDGED
+            distances[k], kinds[k] = _turned(distances[k], r, behind, end), BEHIND
+
+
+@_jit
+def _about_border(
+    inside: bool, height: float, r: float, square: float, radius: float, shoulder: float
+) -> tuple[float, int]:
+    """Distance where the nearest point, r away, is inside the surface or on its border; `square` as in `_within`."""
+    if inside:
+        return _within(height, square, radius) if shoulder == 0.0 else (height, PLAIN)
+    if shoulder > 0.0:
+        return _rolled(height, r, shoulder, radius)
+    return _beyond(height, r, radius)
+
+
+@_jit
+def _outline_into(
+    places: np.ndarray,
+    distances: np.ndarray,
+    inside: np.ndarray,
+    discs: np.ndarray,
+    corners: np.ndarray,
+    rows: np.ndarray,
+    feature_kinds: np.ndarray,
+    border: np.ndarray,
+) -> None:
+    waiting, foot, trial = np.empty(DEEP, np.int64), np.empty(3), np.empty(3)
+    t = 0
+    for k in range(places.shape[0]):
+        c = places[k]
+        _, t, where = nearest_into(c[0], c[1], c[2], t, discs, corners, waiting, foot, trial)
+        inside[k] = feature_kinds[rows[t, where]] == SMOOTH
+        distances[k] = np.sqrt(_to_border(c, border))
+
+
+@_jit
+def _profile_into(
+    a: np.ndarray,
+    z: np.ndarray,
+    distances: np.ndarray,
+    kinds: np.ndarray,
+    radius: float,
+    shoulder: float,
+    behind: float,
+) -> None:
+    end = behind + TURN * radius
+    for k in range(a.size):
+        r = np.hypot(max(a[k], 0.0), z[k])
+        found = _about_border(a[k] <= 0.0, z[k], r, a[k] * a[k], radius, shoulder)
+        distances[k], kinds[k] = found
+        if z[k] < 0.0 and r > behind:
+            distances[k], kinds[k] = _turned(distances[k], r, behind, end), BEHIND

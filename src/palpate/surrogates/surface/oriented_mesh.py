@@ -1,4 +1,11 @@
-"""Triangles of a touched surface, checked: who borders on whom, where the surface ends, where it has a crease."""
+"""Triangles of a touched surface, checked: who borders on whom, where the surface ends, where it has a crease.
+
+Normals at the corners of triangles, one for each smooth piece of surface that meets there.
+
+Inside a smooth piece the facets' normals are summed by the weights of Max (1999, "Weights for computing vertex
+normals from facet normals"), exact on a sphere however irregular its mesh. Where the piece ends, that sum leans to one
+side; there a paraboloid through the neighbourhood tells the normal.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +16,12 @@ import numpy as np
 
 from palpate.errors import UsageError
 
-__all__ = ["CREASE", "Skin"]
+__all__ = [
+    "CREASE",
+    "Corners",
+    "OrientedMesh",
+    "corners_of",
+]
 
 CREASE = np.cos(np.radians(40.0))  # facets that turn by more meet in an edge of the body, not in a mesh's
 FLAT = 1e-7  # height of a triangle by its longest edge, below which it has no normal
@@ -17,7 +29,7 @@ SAME = 1e-9  # of the surface's size: points closer than that are one
 
 
 @dataclass(frozen=True, eq=False)
-class Skin:
+class OrientedMesh:
     """An oriented surface, open or closed, in which each edge belongs to one or two triangles.
 
     Attributes
@@ -35,7 +47,7 @@ class Skin:
     neighbours: np.ndarray
 
     @classmethod
-    def of(cls, points: np.ndarray, triangles: np.ndarray) -> Skin:
+    def of(cls, points: np.ndarray, triangles: np.ndarray) -> OrientedMesh:
         """Triangles (t, 3) between points (P, 3) in m, of which not all need be used.
 
         Raises
@@ -145,3 +157,108 @@ def _neighbours(count: int, triangles: np.ndarray) -> np.ndarray:
     partner = np.full(len(start), -1)
     partner[one], partner[other] = other, one
     return partner.reshape(triangles.shape)
+
+
+TURNS = 3  # of the paraboloid's frame towards the normal that it tells
+UNKNOWNS = 5
+FARTHEST = np.cos(np.radians(30.0))  # a fit that turns the normal by more has not understood the surface
+
+
+@dataclass(frozen=True, eq=False)
+class Corners:
+    """What is known at the corners of triangles.
+
+    Attributes
+    ----------
+    normals : (t, 3, 3) array
+        Outward unit normals.
+    sharp : (t, 3) bool array
+        Corners at the end of a smooth piece: on the border or on a crease.
+    pieces : (t, 3) int array
+        Number of the fan of triangles around its vertex to which each corner belongs.
+    """
+
+    normals: np.ndarray
+    sharp: np.ndarray
+    pieces: np.ndarray
+
+
+def corners_of(mesh: OrientedMesh) -> Corners:
+    """Normals of a surface at the corners of its triangles."""
+    ends = mesh.border | mesh.creases
+    pieces = _pieces(mesh, ends)
+    sharp = np.zeros(pieces.max() + 1, dtype=bool)
+    sharp[pieces[ends]] = True
+    sharp[np.roll(pieces, -1, axis=1)[ends]] = True
+    normals = _summed(mesh, pieces)
+    for piece, normal in _fitted(mesh, pieces, normals, np.flatnonzero(sharp)):
+        normals[piece] = normal
+    return Corners(normals[pieces], sharp[pieces], pieces)
+
+
+def _pieces(mesh: OrientedMesh, ends: np.ndarray) -> np.ndarray:
+    """Fan numbers (t, 3): corners are joined across edges at which the surface goes on smoothly."""
+    edge = np.flatnonzero(~ends.ravel())
+    partner = mesh.neighbours.ravel()[edge]
+    after = edge // 3 * 3 + (edge + 1) % 3
+    # the partner runs the other way: its start is this edge's end
+    links = np.stack([after, partner], axis=1)
+    label = np.arange(ends.size)
+    while True:
+        low = label[links].min(axis=1)
+        new = label.copy()
+        np.minimum.at(new, links[:, 0], low)
+        np.minimum.at(new, links[:, 1], low)
+        if (new == label).all():
+            break
+        label = new
+    return np.asarray(np.unique(label, return_inverse=True)[1]).reshape(ends.shape)
+
+
+def _summed(mesh: OrientedMesh, pieces: np.ndarray) -> np.ndarray:
+    """Unit normals of the fans (s, 3) by the weights of Max (1999)."""
+    out = np.roll(mesh.corners, -1, axis=1) - mesh.corners
+    back = np.roll(mesh.corners, -2, axis=1) - mesh.corners
+    shares = np.cross(out, back) / ((out**2).sum(axis=2) * (back**2).sum(axis=2))[..., None]
+    sums = np.zeros((pieces.max() + 1, 3))
+    np.add.at(sums, pieces.ravel(), shares.reshape(-1, 3))
+    some = np.zeros_like(sums)
+    some[pieces.ravel()] = np.repeat(mesh.facets, 3, axis=0)
+    length = np.linalg.norm(sums, axis=1, keepdims=True)
+    return np.where(length > 0, sums / np.where(length > 0, length, 1.0), some)
+
+
+def _fitted(
+    mesh: OrientedMesh, pieces: np.ndarray, normals: np.ndarray, chosen: np.ndarray
+) -> list[tuple[int, np.ndarray]]:
+    """(fan, unit normal) of the chosen fans, from the paraboloid through all points two edges around."""
+    order = np.argsort(pieces.ravel(), kind="stable")
+    begin = np.searchsorted(pieces.ravel()[order], np.arange(pieces.max() + 2))
+    fans = [order[begin[k] : begin[k + 1]] for k in range(len(begin) - 1)]
+    found = []
+    for piece in chosen.tolist():
+        vertex = mesh.triangles.ravel()[fans[piece][0]]
+        ring = np.unique(pieces[fans[piece] // 3])
+        near = np.unique(mesh.triangles[np.concatenate([fans[k] for k in ring]) // 3])
+        normal = _paraboloid(mesh.points[near[near != vertex]] - mesh.points[vertex], normals[piece])
+        if normal @ normals[piece] > FARTHEST:
+            found.append((piece, normal))
+    return found
+
+
+def _paraboloid(around: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Normal at the origin of z = p x + q y + quadratic terms through points (n, 3), from a first guess."""
+    if len(around) < UNKNOWNS:
+        return normal
+    size = np.sqrt((around**2).sum(axis=1).mean())
+    for _ in range(TURNS):
+        first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+        first /= np.linalg.norm(first)
+        frame = np.stack([first, np.cross(normal, first), normal])
+        x, y, z = frame @ around.T / size
+        slopes, _, rank, _ = np.linalg.lstsq(np.stack([x, y, x * x, x * y, y * y], axis=1), z, rcond=1e-6)
+        if rank < UNKNOWNS:
+            return normal
+        normal = np.array([-slopes[0], -slopes[1], 1.0]) @ frame
+        normal = normal / np.linalg.norm(normal)
+    return np.asarray(normal)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.util
 import re
 from pathlib import Path
@@ -21,9 +22,6 @@ COMMAND_LINES = (
     r"py -m venv .venv; .venv\Scripts\Activate.ps1; pip install .; palpate demo",
     r'py -m venv .venv; .venv\Scripts\Activate.ps1; pip install ".[test]"; pytest',
 )
-
-# files that a reader of the documentation writes
-THE_READERS_OWN = {"mine.py"}
 
 # serving would never end: the program's last line is answered by this
 STANDS_IN = """
@@ -130,26 +128,37 @@ def test_links_to_files_lead_somewhere(page: Path):
             assert (page.parent / target).exists(), target
 
 
-def repository_paths() -> set[str]:
-    """Every file and folder of the repository's own parts, relative to its root."""
+@functools.cache
+def repository_paths() -> tuple[str, ...]:
+    """Every file and folder of the repository's own parts, from a slash on."""
     parts = ("src", "tests", "docs", "examples", "benchmarks", ".ci")
-    paths = [ROOT / part for part in parts] + [path for part in parts for path in (ROOT / part).rglob("*")]
-    return {
-        path.relative_to(ROOT).as_posix()
-        for path in paths
-        if not {"node_modules", "__pycache__"} & set(path.parts) and (path.is_file() or any(path.iterdir()))
-    }
+    files = [
+        path.relative_to(ROOT)
+        for part in parts
+        for path in (ROOT / part).rglob("*")
+        if path.is_file() and not {"node_modules", "__pycache__"} & set(path.parts)
+    ]
+    return tuple("/" + path.as_posix() for file in files for path in (file, *file.parents))
+
+
+def exists(path: str) -> bool:
+    return any(there.endswith("/" + path.strip("/.")) for there in repository_paths())
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.relative_to(ROOT).as_posix())
 def test_every_path_named_exists(page: Path):
     """A path from the root, or the last part of one: `runtime/devices/page.py`, `test_cook.py`."""
-    known = ["/" + path for path in repository_paths()]
     text = code(page.read_text(encoding="utf-8"))
-    named = re.findall(r"(?<![\w./-])(?:[\w.-]+/)*\w+\.(?:py|ts)\b", text)
-    named += re.findall(r"(?<![\w./-])(?:src|tests|docs|examples|benchmarks)(?:/[\w.-]+)+", text)
-    missing = {path for path in named if not any(there.endswith("/" + path.rstrip("/.")) for there in known)}
-    assert not missing - THE_READERS_OWN
+    named = set(re.findall(r"(?<![\w./-])(?:[\w.-]+/)*\w+\.(?:py|ts)\b", text))
+    named |= set(re.findall(r"(?<![\w./-])(?:src|tests|docs|examples|benchmarks)(?:/[\w.-]+)+", text))
+    assert {path for path in named if not exists(path)} == set()
+
+
+def test_every_folder_of_the_architecture_exists():
+    text = code((ROOT / "docs" / "concepts" / "architecture.md").read_text(encoding="utf-8"))
+    folders = set(re.findall(r"(?<![\w./-])(\w+)/(?=[\s,;:]|$)", text, re.MULTILINE))
+    assert len(folders) > 20
+    assert {folder for folder in folders if not exists(folder)} == set()
 
 
 def test_pictures_are_small():

@@ -18,7 +18,7 @@ from sklearn.utils.estimator_checks import estimator_checks_generator, parametri
 
 from palpate.errors import UsageError
 from palpate.estimators import MRANRegressor, RBFNetworkRegressor
-from palpate.estimators.data import merged
+from palpate.estimators.radial_regressor import merge_rows
 from palpate.learning import Settings
 from palpate.network import Network
 
@@ -155,7 +155,7 @@ def test_order_of_rows_does_not_matter_and_the_seed_decides(model, wave):
 def test_equal_rows_become_one():
     X = np.array([[1.0], [0.0], [1.0], [-0.0], [2.0]])
     Y = np.array([[5.0], [6.0], [5.0], [6.0], [7.0]])
-    rows, values, weights = merged(X, Y, np.array([1.0, 2.0, 3.0, 2.0, 0.0]))
+    rows, values, weights = merge_rows(X, Y, np.array([1.0, 2.0, 3.0, 2.0, 0.0]))
     np.testing.assert_array_equal(rows, [[0.0], [1.0]])
     np.testing.assert_array_equal(values, [[6.0], [5.0]])
     np.testing.assert_allclose(weights, [1.0, 1.0])

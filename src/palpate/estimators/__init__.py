@@ -1,9 +1,8 @@
 """The networks as scikit-learn estimators, for pipelines, grid search and cross-validation.
 
-mran     MRANRegressor: the sequential filter, with `partial_fit`
-refined  RBFNetworkRegressor: all units at once
-data     rows and weights as the estimators take them
-base     what both share
+mran              MRANRegressor: the sequential filter, with `partial_fit`
+refined           RBFNetworkRegressor: all units at once
+radial_regressor  their base: rows, weights and parameters as scikit-learn has them
 
 They need scikit-learn: `pip install "palpate[sklearn]"`.
 """

@@ -9,8 +9,14 @@ from typing import Any, Literal
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from palpate.estimators.base import RadialRegressor
-from palpate.estimators.data import BadValue, Units, check_count, refused_as_bad_value, weights_of
+from palpate import checks
+from palpate.estimators.radial_regressor import (
+    BadValue,
+    RadialRegressor,
+    Units,
+    refused_as_bad_value,
+    weights_of,
+)
 from palpate.learning import PRESETS, Observation, Settings, freeze, initial, learn, observe
 from palpate.learning.choosing.automatic import UNITS_MAX, automatic
 from palpate.network import Scaling
@@ -111,35 +117,14 @@ class MRANRegressor(RadialRegressor):
         self.scale_outputs = scale_outputs
         self.random_state = random_state
 
-    def fit(self, X: Any, y: Any, sample_weight: Any = None) -> MRANRegressor:
-        """Learn anew from all samples, each presented `passes` times in shuffled order.
+    def _check_parameters(self) -> None:
+        checks.fits("The parameter passes", self.passes, least=1, whole=True)
+        super()._check_parameters()
 
-        Parameters
-        ----------
-        X : array-like (N, n)
-        y : array-like (N,) or (N, m)
-        sample_weight : array-like (N,), optional
-
-        Returns
-        -------
-        MRANRegressor
-
-        Raises
-        ------
-        ValueError
-            If arrays do not fit together or hold values that are not finite.
-        UsageError
-            If a parameter is out of its range.
-        """
-        check_count("passes", self.passes, 1)
-        X, Y, weights, units = self._prepared(X, y, sample_weight)
-        seed = self._seed()
-        settings = self._settings(X, Y / units.divisor, units, seed, weights)
+    def _learn(self, X: np.ndarray, Y: np.ndarray, weights: np.ndarray, units: Units, seed: int) -> None:
+        settings = self._settings(X, Y, units, seed, weights)
         learned = learn(
-            X,
-            Y / units.divisor,
-            units.inputs,
-            units.outputs,
+            *(X, Y, units.inputs, units.outputs),
             settings=settings,
             passes=self.passes,
             seed=seed,
@@ -147,7 +132,6 @@ class MRANRegressor(RadialRegressor):
         )
         self._keep(learned.state, settings, units, learned.scaling)
         self.history_ = learned.history
-        return self
 
     def partial_fit(self, X: Any, y: Any, sample_weight: Any = None) -> MRANRegressor:
         """Learn from some more samples, each presented once, in the order given.
@@ -155,13 +139,11 @@ class MRANRegressor(RadialRegressor):
         Parameters
         ----------
         X : array-like (N, n)
+            Inputs, one row a sample.
         y : array-like (N,) or (N, m)
+            Outputs, as in the first call.
         sample_weight : array-like (N,), optional
-            Samples of weight zero are passed over.
-
-        Returns
-        -------
-        MRANRegressor
+            Number of ordinary samples that each one counts as; those of weight zero are passed over.
 
         Raises
         ------
@@ -189,7 +171,7 @@ class MRANRegressor(RadialRegressor):
         return np.asarray(scaled * self._scaling.output_scale * self._units_.divisor)
 
     def _begin(self, X: np.ndarray, Y: np.ndarray) -> None:
-        units = self._units(X, Y)
+        units = self._units_of(X, Y)
         scaled = Y / units.divisor
         settings = self._settings(X, scaled, units, self._seed(), None)
         if self.settings is None and self.units_max is None:
@@ -212,16 +194,8 @@ class MRANRegressor(RadialRegressor):
             if self.settings is not None:
                 settings = replace(self._named(), **given)
             else:
-                settings = automatic(
-                    X,
-                    Y,
-                    units.inputs,
-                    target=self.target,
-                    passes=self.passes,
-                    seed=seed,
-                    weights=weights,
-                    **given,
-                )
+                options = {"target": self.target, "passes": self.passes, "seed": seed, "weights": weights}
+                settings = automatic(X, Y, units.inputs, **options, **given)
             settings.regressors(X.shape[1])  # whether there is such a form for so many inputs
         return settings
 
@@ -239,4 +213,4 @@ class MRANRegressor(RadialRegressor):
     def _keep(self, state: State, settings: Settings, units: Units, scaling: Scaling) -> None:
         self.state_, self.settings_ = state, settings
         self._units_, self._scaling = units, scaling
-        self.network_ = units.back(freeze(state, settings, units.inputs, units.outputs, scaling))
+        self.network_ = units.whole(freeze(state, settings, units.inputs, units.outputs, scaling))

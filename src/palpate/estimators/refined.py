@@ -11,8 +11,9 @@ from typing import Any, Literal, get_args
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from palpate.estimators.base import RadialRegressor
-from palpate.estimators.data import BadValue, Units, check_count, check_one_of, refused_as_bad_value
+from palpate import checks
+from palpate.errors import UsageError
+from palpate.estimators.radial_regressor import RadialRegressor, Units, refused_as_bad_value
 from palpate.learning.choosing import choice
 from palpate.learning.choosing.arrays import check_search, constant
 from palpate.learning.choosing.calibration import Evidence, calibrated, regressor_root, spread_of
@@ -118,79 +119,46 @@ class RBFNetworkRegressor(RadialRegressor):
         self.scale_outputs = scale_outputs
         self.random_state = random_state
 
-    def fit(self, X: Any, y: Any, sample_weight: Any = None) -> RBFNetworkRegressor:
-        """Learn from all samples.
+    def _check_parameters(self) -> None:
+        checks.one_of("The parameter radial", self.radial, RADIAL_FUNCTIONS)
+        checks.one_of("The parameter tail", self.tail, get_args(Tail))
+        checks.fits("The parameter units_max", self.units_max, least=0, whole=True)
+        if not (self.form is None or isinstance(self.form, str)):
+            raise UsageError(f"form is {self.form!r}.", fix='Give a name, such as "rotated", or "auto".')
+        check_search(self.seconds, 0, None, _LEVEL)
+        super()._check_parameters()
 
-        Parameters
-        ----------
-        X : array-like (N, n)
-        y : array-like (N,) or (N, m)
-        sample_weight : array-like (N,), optional
-
-        Returns
-        -------
-        RBFNetworkRegressor
-
-        Raises
-        ------
-        ValueError
-            If arrays do not fit together or hold values that are not finite.
-        UsageError
-            If a parameter is out of its range.
-        """
-        self._check_parameters()
-        X, Y, weights, units = self._prepared(X, y, sample_weight)
-        if (
-            self.form == "auto"
-            and len(X) >= _FEWEST
-            and not np.ptp(weights)
-            and not constant(Y / units.divisor)
-        ):
-            return self._chosen(X, Y, units)
-        scaling = Scaling.of(units.inputs, Y / units.divisor)
-        xs, ys = scaling.scale_inputs(X), scaling.scale_outputs(Y / units.divisor)
-        spread = float(np.sqrt((ys**2).mean())) or 1.0
-        with threadpool_limits(1), refused_as_bad_value():
-            grown = self._grown(xs, ys, weights, self.target * spread)
-            root = regressor_root(grown.found, xs, weights)
-        self.error_, self.trials_ = grown.error / spread, grown.trials
-        network = freeze_refined(grown.found, units.inputs, units.outputs, scaling)
-        self.network_ = units.back(network)
-        self.uncertainty_ = calibrated(self.network_, root @ root.T, [grown.evidence], _LEVEL)
-        return self
+    def _learn(self, X: np.ndarray, Y: np.ndarray, weights: np.ndarray, units: Units, seed: int) -> None:
+        if self.form == "auto" and len(X) >= _FEWEST and not np.ptp(weights) and not constant(Y):
+            self._choose(X, Y, units, seed)
+        else:
+            self._grow(X, Y, weights, units, seed)
 
     def _deviation(self, X: np.ndarray) -> np.ndarray:
         return self.uncertainty_.deviation(X)
 
-    def _check_parameters(self) -> None:
-        check_one_of("radial", self.radial, RADIAL_FUNCTIONS)
-        check_one_of("tail", self.tail, get_args(Tail))
-        check_count("units_max", self.units_max, 0)
-        if not (self.form is None or isinstance(self.form, str)):
-            raise BadValue(f"form is {self.form!r}.", fix='Give a name, such as "rotated", or "auto".')
+    def _choose(self, X: np.ndarray, Y: np.ndarray, units: Units, seed: int) -> None:
+        options = {"seconds": self.seconds, "seed": seed, "target": self.target, "level": _LEVEL}
         with refused_as_bad_value():
-            check_search(self.seconds, 0, None, _LEVEL)
+            fitted = choice.fit(X, Y, units.inputs, units.outputs, **options)
+        self.error_, self.trials_ = fitted.heldout, fitted.trials
+        self.network_ = units.whole(fitted.network)
+        self.uncertainty_ = replace(fitted.uncertainty, network=self.network_)
 
-    def _chosen(self, X: np.ndarray, Y: np.ndarray, units: Units) -> RBFNetworkRegressor:
-        with refused_as_bad_value():
-            found = choice.fit(
-                X,
-                Y / units.divisor,
-                units.inputs,
-                units.outputs,
-                seconds=self.seconds,
-                seed=self._seed(),
-                target=self.target,
-                level=_LEVEL,
-            )
-        self.error_, self.trials_ = found.heldout, found.trials
-        self.network_ = units.back(found.network)
-        self.uncertainty_ = replace(found.uncertainty, network=self.network_)
-        return self
+    def _grow(self, X: np.ndarray, Y: np.ndarray, weights: np.ndarray, units: Units, seed: int) -> None:
+        scaling = Scaling.of(units.inputs, Y)
+        xs, ys = scaling.scale_inputs(X), scaling.scale_outputs(Y)
+        spread = float(np.sqrt((ys**2).mean())) or 1.0
+        with threadpool_limits(1), refused_as_bad_value():
+            growth = self._growth(xs, ys, weights, self.target * spread, seed)
+            root = regressor_root(growth.network, xs, weights)
+        self.error_, self.trials_ = growth.error / spread, growth.trials
+        self.network_ = units.whole(freeze_refined(growth.network, units.inputs, units.outputs, scaling))
+        self.uncertainty_ = calibrated(self.network_, root @ root.T, [growth.evidence], _LEVEL)
 
-    def _grown(self, X: np.ndarray, Y: np.ndarray, weights: np.ndarray, target: float) -> _Grown:
+    def _growth(self, X: np.ndarray, Y: np.ndarray, weights: np.ndarray, target: float, seed: int) -> _Growth:
         """The first size that meets the target, or the best until more units bring nothing, or time is up."""
-        start, seed = time.monotonic(), self._seed()
+        start = time.monotonic()
         regressors, most = self._regressors(X.shape[1], Y)
         learns = _learns(len(X), seed)
         unseen = None if learns.all() else (X[~learns], Y[~learns])
@@ -212,10 +180,10 @@ class RBFNetworkRegressor(RadialRegressor):
                 best, least = now, _error(now)
         # units stay, weights learn from all samples
         whole = refine(X, Y, best.theta, regressors, weights=weights, iterations=0)
-        return _Grown(whole, least, tuple(trials), _evidence(best, xs, ys, weights[learns], unseen))
+        return _Growth(whole, least, tuple(trials), _evidence(best, xs, ys, weights[learns], unseen))
 
     def _regressors(self, n: int, Y: np.ndarray) -> tuple[Regressors, int]:
-        """What units are, and how many of them leave some data over."""
+        """The kind of units, and how many of them leave some data over."""
         form = (
             self.form
             if self.form not in {None, "auto"}
@@ -228,10 +196,10 @@ class RBFNetworkRegressor(RadialRegressor):
 
 
 @dataclass(frozen=True, eq=False)
-class _Grown:
-    """A network of all samples, its error and what it missed on those kept apart, and the sizes tried."""
+class _Growth:
+    """A network of all samples, its error and its residuals on those kept apart, and the sizes tried."""
 
-    found: Refined
+    network: Refined
     error: float
     trials: tuple[Trial, ...]
     evidence: Evidence
@@ -244,14 +212,14 @@ def _evidence(
     weights: np.ndarray,
     unseen: tuple[np.ndarray, np.ndarray] | None,
 ) -> Evidence:
-    """What a network that learnt from X (N, n), Y (N, m) missed on samples kept apart; or its leave-one-out error.
+    """Errors on samples kept apart of a network that learnt from X (N, n), Y (N, m); or its leave-one-out errors.
 
     Where so few samples say not even that, it is the outputs' own size.
     """
     root = regressor_root(best, X, weights)
     if unseen is not None:
-        held, wanted = unseen
-        return Evidence(wanted - best.predict(held), spread_of(best, root, held))
+        places, wanted = unseen
+        return Evidence(wanted - best.predict(places), spread_of(best, root, places))
     # leaving one out divides by 1 − leverage; the whole is as large as the error that counts the units' numbers too
     left = np.maximum(1.0 - weights * (spread_of(best, root, X) - 1.0), 0.02)
     missed = (Y - best.predict(X)) / left[:, None]
@@ -262,13 +230,13 @@ def _evidence(
 
 
 def _learns(rows: int, seed: int) -> np.ndarray:
-    """Which samples choose the units (N,); the others judge, where there are enough."""
+    """Mask (N,) of the samples that choose the units; the others judge, where there are enough."""
     learns = np.ones(rows, dtype=bool)
     if rows >= _FEWEST:
         learns[np.random.default_rng(seed).permutation(rows)[: rows // 5]] = False
     return learns
 
 
-def _error(found: Refined) -> float:
-    """On samples it has not seen; by leaving one out where all were needed."""
-    return found.loo if np.isnan(found.heldout) else found.heldout
+def _error(network: Refined) -> float:
+    """The error on samples it has not seen; by leaving one out where all were needed."""
+    return network.loo if np.isnan(network.heldout) else network.heldout

@@ -1,11 +1,7 @@
 """Loads on beams: point loads, and loads with a history that bodies with memory answer to.
 
-Point loads: the inputs of a sweep that are forces.
-
-Loads with a history: what a sweep asks of bodies that remember.
-
-A load says which values of its size it runs through, as knots (time in s, size in N) between which it changes evenly,
-from nothing at the time 0. Bodies that yield know no time: for them the time only counts the knots.
+A load gives the values of its size that it runs through, as knots (time in s, size in N) between which it changes
+evenly, from nothing at the time 0. Bodies that yield know no time: for them the time only counts the knots.
 """
 
 from __future__ import annotations
@@ -29,7 +25,7 @@ __all__ = [
 
 
 class Load(Protocol):
-    """What a beam asks of a load."""
+    """The members that a beam needs of a load."""
 
     @property
     def name(self) -> str:
@@ -37,7 +33,7 @@ class Load(Protocol):
 
     @property
     def at(self) -> float | None:
-        """Where it acts, in m along the undeformed beam; ``None`` is the tip."""
+        """Place in m along the undeformed beam; ``None`` is the tip."""
 
     @property
     def direction(self) -> tuple[float, float]:
@@ -48,7 +44,7 @@ class Load(Protocol):
         """Names, ranges and units of its inputs."""
 
     def knots(self, values: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
-        """Times in s and sizes in N that it runs through, of its inputs."""
+        """Return times in s and sizes in N that it runs through, of its inputs."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +56,7 @@ class PointLoad:
     name : str
         Name of the input.
     at : float or None
-        Where it acts, in m along the undeformed beam; ``None`` is the tip.
+        Place in m along the undeformed beam where it acts; ``None`` is the tip.
     low, high : float
         Range of its size in N; a negative size reverses the direction.
     direction : tuple of two floats
@@ -106,7 +102,7 @@ class PointLoad:
         return (self.range,)
 
     def knots(self, values: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
-        """A load without a history is put on first of all and stays."""
+        """Return its one knot: a load without a history is put on first of all and stays."""
         return ((0.0, values[0]),)
 
 
@@ -134,7 +130,7 @@ def TipLoad(
 
 
 def as_loads(loads: Load | Sequence[Load]) -> tuple[Load, ...]:
-    """One load or several, as a tuple with distinct names.
+    """Return one load or several, as a tuple with distinct names.
 
     Raises
     ------
@@ -149,7 +145,7 @@ def as_loads(loads: Load | Sequence[Load]) -> tuple[Load, ...]:
                 why=f"It is of type {type(load).__name__}.",
                 fix="Pass loads such as TipLoad(0, 5), with their ranges in N.",
             )
-    names = [one.name for load in several for one in load.inputs]
+    names = [entry.name for load in several for entry in load.inputs]
     if not names or len(set(names)) < len(names):
         raise UsageError(
             "A sweep needs at least one load, each with a name of its own.",
@@ -169,12 +165,13 @@ class LoadAndUnload:
     Attributes
     ----------
     name : str
+        Name of the final size among the inputs.
     peak : tuple of two floats
         Range of the peak in N.
     final : tuple of two floats, optional
         Range of the final size in N; by default from 0 to the highest peak.
     at : float or None
-        Where it acts, in m along the undeformed beam; ``None`` is the tip.
+        Place in m along the undeformed beam where it acts; ``None`` is the tip.
     direction : tuple of two floats
         Direction in the plane (x, y), normalised to length 1; the default pushes down.
 
@@ -195,7 +192,7 @@ class LoadAndUnload:
         final = self.final if self.final is not None else tuple(sorted((0.0, max(peak, key=abs))))
         object.__setattr__(self, "peak", peak)
         object.__setattr__(self, "final", _ends(f"The final range of {self.name!r}", final, "N"))
-        object.__setattr__(self, "direction", _checked(self.name, self.at, self.direction).direction)
+        object.__setattr__(self, "direction", _point_load(self.name, self.at, self.direction).direction)
         _ = self.inputs  # raises for an empty range
 
     @property
@@ -205,7 +202,7 @@ class LoadAndUnload:
         return Range(f"{self.name}_max", *self.peak, "N"), Range(self.name, *self.final, "N")
 
     def knots(self, values: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
-        """Times and sizes that the load runs through, of its inputs."""
+        """Return times and sizes that the load runs through, of its inputs."""
         peak, final = values
         return (1.0, peak), (2.0, final)
 
@@ -219,6 +216,7 @@ class StepAndHold:
     Attributes
     ----------
     name : str
+        Name of the size among the inputs.
     low, high : float
         Range of its size in N.
     held : tuple of two floats
@@ -226,7 +224,7 @@ class StepAndHold:
     rise : float
         Time in s over which it grows evenly to its size; 0 puts it on at once.
     at : float or None
-        Where it acts, in m along the undeformed beam; ``None`` is the tip.
+        Place in m along the undeformed beam where it acts; ``None`` is the tip.
     direction : tuple of two floats
         Direction in the plane (x, y), normalised to length 1; the default pushes down.
 
@@ -254,7 +252,7 @@ class StepAndHold:
                 fix="Give for example rise=0.5 and held=(0, 10).",
             )
         object.__setattr__(self, "held", held)
-        checked = _checked(self.name, self.at, self.direction)
+        checked = _point_load(self.name, self.at, self.direction)
         object.__setattr__(self, "direction", checked.direction)
         _ = self.inputs  # raises for an empty range
 
@@ -266,7 +264,7 @@ class StepAndHold:
         return Range(self.name, self.low, self.high, "N"), Range(f"{self.name}_held", *self.held, "s")
 
     def knots(self, values: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
-        """Times and sizes that the load runs through, of its inputs."""
+        """Return times and sizes that the load runs through, of its inputs."""
         size, held = values
         return (self.rise, size), (self.rise + held, size)
 
@@ -282,6 +280,6 @@ def _ends(what: str, pair: object, unit: str) -> tuple[float, float]:
     return low, high
 
 
-def _checked(name: str, at: float | None, direction: tuple[float, float]) -> PointLoad:
-    """A point load of this place and direction, for its checks."""
+def _point_load(name: str, at: float | None, direction: tuple[float, float]) -> PointLoad:
+    """Return a point load of this place and direction, for its checks."""
     return PointLoad(name, at, 0.0, 1.0, direction)

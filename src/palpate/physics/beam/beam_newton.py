@@ -73,7 +73,7 @@ class EnergyModel(Protocol):
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """Where the iteration ended: unknowns z (dof,), the reason, its cost and relative error."""
+    """The end of an iteration: unknowns z (dof,), the reason, its cost and relative error."""
 
     z: np.ndarray
     stop: Stop
@@ -215,19 +215,19 @@ def follow(
         target = min(1.0, position + step)
         load = path.at(target)
         guess = lower_state(model, load, state, predictor) if target == 1.0 and trusted else state
-        found = minimise(model, load, guess, limit=min(NEWTON_LIMIT, TOTAL_LIMIT - spent))
-        spent += found.iterations
+        end = minimise(model, load, guess, limit=min(NEWTON_LIMIT, TOTAL_LIMIT - spent))
+        spent += end.iterations
         half = (target - position) / 2
-        if found.stop is Stop.CONVERGED and (near(state, found.z) or half < SMALLEST_STEP):
-            verdict = admit(found.z)
+        if end.stop is Stop.CONVERGED and (near(state, end.z) or half < SMALLEST_STEP):
+            verdict = admit(end.z)
             if target == 1.0 or verdict is not Stop.CONVERGED:
-                return replace(found, stop=verdict, iterations=spent)
-            state, position, step = found.z, target, step * GROWTH
+                return replace(end, stop=verdict, iterations=spent)
+            state, position, step = end.z, target, step * GROWTH
         else:
-            trusted = trusted and found.stop is not Stop.CONVERGED  # else it led astray
+            trusted = trusted and end.stop is not Stop.CONVERGED  # else it led astray
             step = half
         if spent >= TOTAL_LIMIT or step < SMALLEST_STEP:
-            return replace(found, z=state, stop=_reason(found.stop), iterations=spent)
+            return replace(end, z=state, stop=_reason(end.stop), iterations=spent)
 
 
 def lower_state(model: EnergyModel, load: np.ndarray, state: np.ndarray, guess: np.ndarray) -> np.ndarray:

@@ -25,12 +25,15 @@ class Preset:
     Attributes
     ----------
     name, summary : str
+        Name, and one line on what it is.
     body : Cantilever
+        The beam.
     loads : tuple of loads
+        Its loads, whose inputs are the inputs of a sweep.
     design : "grid" or "sobol"
-        How the ranges of the loads are sampled.
+        Design by which the ranges of the loads are sampled.
     samples : int
-        How many solves; a grid of one load has its ends among them.
+        Number of solves; a grid of one load has its ends among them.
     """
 
     name: str
@@ -41,7 +44,7 @@ class Preset:
     samples: int
 
     def problem(self) -> BeamProblem:
-        """The body under its loads, ready to be solved."""
+        """Return the body under its loads, ready to be solved."""
         return self.body.problem(self.loads)
 
 
@@ -156,12 +159,12 @@ def preset(name: str) -> Preset:
     UsageError
         If the name is not known; the message lists the names that are.
     """
-    known = PRESETS | HISTORY_PRESETS
-    if name in known:
-        return known[name]()
-    close = difflib.get_close_matches(name, known, n=1)
+    presets = PRESETS | HISTORY_PRESETS
+    if name in presets:
+        return presets[name]()
+    close = difflib.get_close_matches(name, presets, n=1)
     raise UsageError(
         f"There is no preset called {name!r}.",
-        why=f"Known presets: {', '.join(known)}.",
+        why=f"Known presets: {', '.join(presets)}.",
         fix=f"Did you mean {close[0]!r}?" if close else "Choose one of these.",
     )

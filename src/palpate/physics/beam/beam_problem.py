@@ -40,7 +40,9 @@ class BeamProblem:
     Attributes
     ----------
     body : Cantilever
+        The beam.
     loads : tuple of loads
+        Its loads, whose inputs follow each other.
     """
 
     body: Cantilever
@@ -59,7 +61,7 @@ class BeamProblem:
 
     @property
     def of_interest(self) -> np.ndarray:
-        """Which nodes are of interest, bool of shape (node,)."""
+        """Mask of the nodes of interest, bool of shape (node,)."""
         marked = np.zeros(len(self.rest), dtype=bool)
         marked[self._nodes_at(self.body.nodes)] = True
         return marked
@@ -87,7 +89,7 @@ class BeamProblem:
 
     @property
     def schema(self) -> tuple[Field, ...]:
-        """What each solve answers; a sweep asks for it."""
+        """Fields of each answer; a sweep asks for it."""
         fields = beam_fields(len(self.rest))
         return fields if self.body.kind == "elastic" else (*fields, _DISSIPATED)
 
@@ -97,7 +99,7 @@ class BeamProblem:
         return hashlib.sha256(json.dumps(self.describe(), sort_keys=True).encode()).hexdigest()
 
     def describe(self) -> dict[str, Any]:
-        """Everything that decides the answers, as plain data for a JSON file."""
+        """Return everything that decides the answers, as plain data for a JSON file."""
         body = {"type": "Cantilever", **asdict(self.body)}
         body["section"] = {"type": type(self.body.section).__name__, **body["section"]}
         if self.body.kind == "elastic":
@@ -154,7 +156,7 @@ class BeamProblem:
         return self.open().march(loads, times)
 
     def program(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Times (N,) and loads (N, n) in N that the inputs `x` stand for."""
+        """Return times (N,) and loads (N, n) in N that the inputs `x` stand for."""
         values = iter(x.tolist())
         runs = [load.knots(tuple(next(values) for _ in load.inputs)) for load in self.loads]
         times = np.unique([time for run in runs for time, _ in run])
@@ -163,7 +165,7 @@ class BeamProblem:
         return times, np.stack(columns, axis=-1)
 
     def sizes(self, x: Any) -> np.ndarray:
-        """Inputs as an array of shape (n,); most are loads in N.
+        """Return inputs as an array of shape (n,); most are loads in N.
 
         Raises
         ------
@@ -242,7 +244,7 @@ class Solution:
 
     @property
     def converged(self) -> bool:
-        """Whether this is a stable equilibrium within the model's reach."""
+        """True for a stable equilibrium within the model's reach."""
         return self.stop is Stop.CONVERGED
 
     @property

@@ -30,26 +30,26 @@ class Cantilever:
     Attributes
     ----------
     length : float
-        In m.
+        Length in m.
     section : CrossSection
         For example ``Circle(radius=0.005)``.
     material : LinearElastic, Plastic or Viscoelastic
         It decides how the beam answers: always the same, or according to its history. A Viscoelastic one is over a
         LinearElastic and relaxes as a whole (``part="all"``), so that its Poisson's ratio stays.
     elements : int
-        About how many finite elements; every load and node of interest gets a vertex of its own.
+        Approximate number of finite elements; every load and node of interest gets a vertex of its own.
     order : int
         Polynomial order of the elements, 2 or more: linear ones lock in shear.
     kinematics : "large" or "small"
         Geometrically exact (Reissner 1972), or the small displacements of Timoshenko 1921.
     self_weight : bool
-        Whether gravity, 9.80665 m/s² along -y, acts.
+        True for gravity, 9.80665 m/s² along -y.
     nodes : tuple of float
         Positions of interest in m; by default six, evenly spaced from clamp to tip.
     strain_limit : float
         Largest fibre strain for which the material's law is believed; beyond it a solve fails.
     fibres : int, optional
-        Into how many layers a section that yields is cut, by default 48; only for such beams.
+        Number of layers into which a section that yields is cut, by default 48; only for such beams.
     tolerance : float, optional
         Largest error of a step of a history, relative to the deflection and the energy, by default 1e-5; only for
         beams that remember.
@@ -89,7 +89,7 @@ class Cantilever:
 
     @property
     def kind(self) -> Kind:
-        """Whether the beam is elastic, yields ("plastic") or creeps ("viscous"), by its material."""
+        """Kind of the beam by its material: it is elastic, yields ("plastic") or creeps ("viscous")."""
         kind = material_kind(self.material)
         assert kind is not None  # checked when the beam was made
         return kind
@@ -105,7 +105,7 @@ class Cantilever:
         return TOLERANCE if self.tolerance is None else self.tolerance
 
     def problem(self, loads: Load | Sequence[Load]) -> BeamProblem:
-        """Put loads on the beam: what comes back can be solved.
+        """Put loads on the beam, and return a problem that can be solved.
 
         Raises
         ------
@@ -120,7 +120,7 @@ class Cantilever:
         return BeamProblem(self, several)
 
     def position(self, load: Load) -> float:
-        """Where a load acts, in m along the beam."""
+        """Return the place of a load in m along the beam."""
         return self.length if load.at is None else float(load.at)
 
     def vertices(self, loads: Sequence[Load] = ()) -> np.ndarray:
@@ -196,7 +196,7 @@ def _check_histories(kind: Kind, loads: Sequence[Load]) -> None:
 
 
 def _memory_of(load: Load) -> str:
-    """Which kind of beam a load with a history is for; empty for one without."""
+    """Return the kind of beam that a load with a history is for; empty for one without."""
     if isinstance(load, LoadAndUnload):
         return "plastic"
     return "viscous" if isinstance(load, StepAndHold) else ""

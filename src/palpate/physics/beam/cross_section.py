@@ -22,7 +22,7 @@ __all__ = ["Circle", "CrossSection", "FibreSection", "Rectangle", "Section"]
 
 
 class CrossSection(Protocol):
-    """What a beam asks of its cross-section."""
+    """The members that a beam needs of its cross-section."""
 
     @property
     def area(self) -> float:
@@ -37,14 +37,14 @@ class CrossSection(Protocol):
         """Distance in m from the centre line to the outermost fibre: bending strain, and the drawn radius."""
 
     def shear_factor(self, poisson: float) -> float:
-        """Share k of the area that carries shear, a pure number."""
+        """Return the share k of the area that carries shear, a pure number."""
 
 
 class FibreSection(CrossSection, Protocol):
     """A cross-section that can be cut into fibres."""
 
     def fibres(self, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Heights y in m above the centre line, ascending, and areas in m², both of shape (count,)."""
+        """Return heights y in m above the centre line, ascending, and areas in m², both of shape (count,)."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Circle:
     Attributes
     ----------
     radius : float
-        In m.
+        Radius r in m.
     """
 
     radius: float
@@ -78,11 +78,11 @@ class Circle:
         return self.radius
 
     def shear_factor(self, poisson: float) -> float:
-        """6(1 + ν)/(7 + 6ν), Cowper 1966."""
+        """Return 6(1 + ν)/(7 + 6ν), Cowper 1966."""
         return 6 * (1 + poisson) / (7 + 6 * poisson)
 
     def fibres(self, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Heights in m and areas in m² of the Gauss-Chebyshev rule of the second kind, weighted by the width."""
+        """Return heights in m and areas in m² of the Gauss-Chebyshev rule of the second kind, weighted by the width."""
         angles = np.arange(count, 0, -1) * math.pi / (count + 1)
         # ∫ f(y) 2√(r² - y²) dy = 2r² ∫ f(r cos φ) sin²φ dφ (Abramowitz & Stegun 1964, 25.4.40)
         return self.radius * np.cos(angles), 2 * self.radius**2 * np.sin(angles) ** 2 * math.pi / (count + 1)
@@ -95,7 +95,7 @@ class Rectangle:
     Attributes
     ----------
     width, height : float
-        In m, along z and y.
+        Sides in m, along z and y.
     """
 
     width: float
@@ -121,11 +121,11 @@ class Rectangle:
         return self.height / 2
 
     def shear_factor(self, poisson: float) -> float:
-        """10(1 + ν)/(12 + 11ν), Cowper 1966."""
+        """Return 10(1 + ν)/(12 + 11ν), Cowper 1966."""
         return 10 * (1 + poisson) / (12 + 11 * poisson)
 
     def fibres(self, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Heights in m and areas in m² of the Gauss-Legendre rule."""
+        """Return heights in m and areas in m² of the Gauss-Legendre rule."""
         points, weights = np.polynomial.legendre.leggauss(count)
         return self.half_height * points, self.width * self.half_height * weights
 
@@ -137,13 +137,13 @@ class Section:
     Attributes
     ----------
     area : float
-        In m².
+        Area A in m².
     second_moment : float
-        About the bending axis, in m⁴.
+        Second moment of area I about the bending axis, in m⁴.
     shear : float
         Shear factor k, a pure number in (0, 1].
     height : float, optional
-        In m; by default that of a circle with the same radius of gyration.
+        Height in m; by default that of a circle with the same radius of gyration.
     """
 
     area: float
@@ -171,5 +171,5 @@ class Section:
         return self.height / 2 if self.height else 2 * math.sqrt(self.second_moment / self.area)
 
     def shear_factor(self, poisson: float) -> float:
-        """The factor that was given; Poisson's ratio has no say."""
+        """Return the factor that was given, whatever Poisson's ratio."""
         return self.shear

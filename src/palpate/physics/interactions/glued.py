@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from palpate.physics.interactions.footprint import (
     chart_of,
     require_on_surface,
 )
-from palpate.physics.interactions.interaction import Attached, Energy
+from palpate.physics.interactions.interaction import Attached, Energy, PlainInteraction
 from palpate.physics.interactions.interaction_checks import AXES, Interval, interval, tag
 from palpate.physics.shapes.naming import require_known, require_triple
 from palpate.physics.words import millimetres, number
@@ -35,7 +35,7 @@ Corner = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class GluedPad:
+class GluedPad(PlainInteraction):
     """A soft pad glued to a surface, moved by a displacement d without turning.
 
     Its energy is ½ ∫ k ρ |d - u|² dA, with the bump ρ of radius a around a point p of the surface; u counts from
@@ -123,10 +123,6 @@ class GluedPad:
     def __str__(self) -> str:
         size = f" of radius {millimetres(self.radius)}" if self.radius is not None else ""
         return f"pad{size} glued to {self.touches!r}, {number(self.pad)} N/m³"
-
-    def describe(self) -> dict[str, Any]:
-        """Return its fields, with ``"type": "GluedPad"``."""
-        return {"type": "GluedPad", **asdict(self)}
 
     def keeps(self, matrix: np.ndarray, about: np.ndarray, geometry: Any) -> bool:
         """Return whether an isometry M about a point (m) of the body leaves the pads' energy and places the same.

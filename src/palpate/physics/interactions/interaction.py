@@ -1,4 +1,4 @@
-"""What acts on a body and varies from solve to solve, as terms of its energy.
+"""Interactions: actions on a body that vary from solve to solve, as terms of its energy.
 
 One law serves all interactions. With inputs q, state z (displacement and, in mixed form, pressure) and
 
@@ -12,7 +12,7 @@ interaction has only to give its densities φ, its load vectors l or its lifts L
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from palpate.physics.shapes.meshing import FineMesh
     from palpate.units import Range
 
-__all__ = ["Attached", "Energy", "Field", "Fixed", "Interaction", "Planned"]
+__all__ = ["Attached", "Energy", "Field", "Fixed", "Interaction", "PlainInteraction", "Planned"]
 
 
 class Field(Protocol):
@@ -160,6 +160,18 @@ class Interaction(Protocol):
         UsageError
             If the body has no such surface.
         """
+
+
+class PlainInteraction:
+    """Base of interactions that are dataclasses: their fields are all that decides their energy."""
+
+    def describe(self) -> dict[str, Any]:
+        """Return everything that decides its energy, as plain data for a JSON file."""
+        return {"type": type(self).__name__, **asdict(self)}  # type: ignore[call-overload]  # a subclass is a dataclass
+
+    def refinements(self, geometry: Any) -> tuple[FineMesh, ...]:
+        """Return the places where it needs a fine mesh: none, unless it says so."""
+        return ()
 
 
 @runtime_checkable

@@ -15,7 +15,7 @@ moves freely, the work of a pressure depends on the path, and no energy exists.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,7 +30,7 @@ from palpate.physics.interactions.footprint import (
     chart_at,
     require_on_surface,
 )
-from palpate.physics.interactions.interaction import Attached, Energy
+from palpate.physics.interactions.interaction import Attached, Energy, PlainInteraction
 from palpate.physics.interactions.interaction_checks import along, direction_of, range_of
 from palpate.physics.shapes.naming import require_known, require_triple
 from palpate.physics.words import number
@@ -60,7 +60,7 @@ def dead_load(load: np.ndarray) -> Attached:
 
 
 @dataclass(frozen=True)
-class PointForce:
+class PointForce(PlainInteraction):
     """A force at a point of a surface, spread over a small footprint.
 
     A force on a mathematical point would sink in without bound as the mesh gets finer. So it is spread as a
@@ -122,10 +122,6 @@ class PointForce:
         at = ", ".join(number(1e3 * x) for x in self.at)
         return f"force along {along(self.direction)} at ({at}) mm of {self.surface!r}"
 
-    def describe(self) -> dict[str, Any]:
-        """Return everything that decides its energy, as plain data for a JSON file."""
-        return {"type": "PointForce", **asdict(self)}
-
     def refinements(self, geometry: Any) -> tuple[FineMesh, ...]:
         """Return fine elements under the footprint."""
         mesh = geometry.rest()
@@ -155,7 +151,7 @@ class PointForce:
 
 
 @dataclass(frozen=True)
-class SurfaceTraction:
+class SurfaceTraction(PlainInteraction):
     """A dead traction, per undeformed area, over all of a surface.
 
     The response is ∫ e·u dA over the surface, in m³.
@@ -196,14 +192,6 @@ class SurfaceTraction:
     def __str__(self) -> str:
         return f"traction on {self.surface!r} along {along(self.direction)}"
 
-    def describe(self) -> dict[str, Any]:
-        """Return everything that decides its energy, as plain data for a JSON file."""
-        return {"type": "SurfaceTraction", **asdict(self)}
-
-    def refinements(self, geometry: Any) -> tuple[FineMesh, ...]:
-        """Return none: it needs no fine mesh."""
-        return ()
-
     def attach(self, field: Any) -> Attached:
         """Return its load on an opened body."""
         import ngsolve as ng
@@ -214,7 +202,7 @@ class SurfaceTraction:
 
 
 @dataclass(frozen=True)
-class BodyForce:
+class BodyForce(PlainInteraction):
     """A dead force per undeformed volume: a weight whose size varies.
 
     What is always there, such as the weight of a body at rest, is `Body(..., gravity=...)`. The response is
@@ -256,14 +244,6 @@ class BodyForce:
     def __str__(self) -> str:
         return f"body force along {along(self.direction)}{f' on {self.region!r}' if self.region else ''}"
 
-    def describe(self) -> dict[str, Any]:
-        """Return everything that decides its energy, as plain data for a JSON file."""
-        return {"type": "BodyForce", **asdict(self)}
-
-    def refinements(self, geometry: Any) -> tuple[FineMesh, ...]:
-        """Return none: it needs no fine mesh."""
-        return ()
-
     def attach(self, field: Any) -> Attached:
         """Return its load on an opened body."""
         import ngsolve as ng
@@ -294,7 +274,7 @@ def volume_density(displacement: Any, origin: Point) -> Any:
 
 
 @dataclass(frozen=True)
-class Pressure:
+class Pressure(PlainInteraction):
     """A pressure that pushes on a surface and follows it as it deforms.
 
     The response is the volume in m³ by which the pressure pushes the surface in, -∂U/∂q = V(base) - V(u).
@@ -335,14 +315,6 @@ class Pressure:
 
     def __str__(self) -> str:
         return f"pressure on {self.surface!r}"
-
-    def describe(self) -> dict[str, Any]:
-        """Return everything that decides its energy, as plain data for a JSON file."""
-        return {"type": "Pressure", **asdict(self)}
-
-    def refinements(self, geometry: Any) -> tuple[FineMesh, ...]:
-        """Return none: it needs no fine mesh."""
-        return ()
 
     def attach(self, field: Any) -> Attached:
         """Return its energy on an opened body.

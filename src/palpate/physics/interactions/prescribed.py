@@ -6,14 +6,14 @@ The prescribed unknowns are u = u_base + Σ qᵢ eᵢ, so the response -∂U/∂
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from palpate import checks
 from palpate.errors import UsageError
-from palpate.physics.interactions.interaction import Attached, Fixed
+from palpate.physics.interactions.interaction import Attached, Fixed, PlainInteraction
 from palpate.physics.interactions.interaction_checks import AXES, along, direction_of, interval, tag
 from palpate.physics.shapes.naming import require_known, require_triple
 from palpate.units import Range
@@ -32,7 +32,7 @@ SLACK = 1e-6  # share of the body's size by which a node may miss the box that t
 
 
 @dataclass(frozen=True)
-class PrescribedDisplacement:
+class PrescribedDisplacement(PlainInteraction):
     """Points of a surface moved by u = Σ qᵢ eᵢ from where they are under the constant loads alone.
 
     The response is the force with which the body resists, -∂U/∂qᵢ: the sum of the reactions along eᵢ.
@@ -108,10 +108,6 @@ class PrescribedDisplacement:
         axes = ", ".join(map(along, self.directions))
         part = " in a box" if self.within is not None else ""
         return f"{self.surface!r}{part} moved along {axes}{', free across' if self.sliding else ''}"
-
-    def describe(self) -> dict[str, Any]:
-        """Return everything that decides its energy, as plain data for a JSON file."""
-        return {"type": "PrescribedDisplacement", **asdict(self)}
 
     def refinements(self, geometry: Any) -> tuple[FineMesh, ...]:
         """Return fine elements on the moved part, if their size is given."""

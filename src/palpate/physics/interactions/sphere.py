@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from palpate import checks
 from palpate.errors import UsageError
-from palpate.physics.interactions.interaction import Attached, Energy, Field
+from palpate.physics.interactions.interaction import Attached, Energy, Field, PlainInteraction
 from palpate.physics.interactions.interaction_checks import range_of
 from palpate.physics.interactions.sphere_design import (
     contact_points,
@@ -53,7 +53,7 @@ Corner = tuple[float, ...]
 
 
 @dataclass(frozen=True)
-class SphereProbe:
+class SphereProbe(PlainInteraction):
     """A rigid sphere with a compliant skin (the pad), whose centre c = (c_x, c_y, c_z) is the input.
 
     The response is the force on the probe, -∂U/∂c in N. The equilibrium meant is the one that is reached along a
@@ -102,10 +102,6 @@ class SphereProbe:
     def __str__(self) -> str:
         stop = f" with a stop at {millimetres(self.stop)}" if self.stop is not None else " without a stop"
         return f"sphere of radius {millimetres(self.radius)} on {self.touches!r}, pad {number(self.pad)} N/m³{stop}"
-
-    def describe(self) -> dict[str, Any]:
-        """Return everything that decides its energy, as plain data for a JSON file."""
-        return {"type": "SphereProbe", **asdict(self)}
 
     def ranges(self, geometry: Geometry) -> tuple[Range, ...]:
         """Return the ranges of c_x, c_y and c_z in m: the box around all its positions."""

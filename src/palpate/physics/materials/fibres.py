@@ -40,11 +40,11 @@ class FibreFamily:
     direction : tuple of float
         Mean direction in the undeformed body, of any length but zero; normalised.
     k1 : float
-        k₁ in Pa, positive.
+        Modulus k₁ in Pa, positive.
     k2 : float
-        k₂, a pure number, positive.
+        Exponent k₂, a pure number, positive.
     dispersion : float
-        κ, a pure number in [0, 1/3]: 0 for aligned, 1/3 for isotropic fibres.
+        Dispersion κ, a pure number in [0, 1/3]: 0 for aligned, 1/3 for isotropic fibres.
 
     Raises
     ------
@@ -78,18 +78,18 @@ class FibreFamily:
             )
 
     def strain(self, F: Tensor) -> Scalar:
-        """E = κ (Ī₁ − 3) + (1 − 3κ)(Ī₄ − 1), a pure number."""
+        """Return E = κ (Ī₁ − 3) + (1 − 3κ)(Ī₄ − 1), a pure number."""
         kappa = self.dispersion
         along = transform(F, constant(self.direction, F))
         stretched = power(determinant(F), -2 / 3) * dot(along, along) - 1
         return kappa * (isochoric_first(F) - 3) + (1 - 3 * kappa) * stretched
 
     def energy(self, F: Tensor) -> Scalar:
-        """Energy density in J/m³."""
+        """Return the energy density in J/m³."""
         return self.k1 / (2 * self.k2) * (exp(self.k2 * positive_part(self.strain(F)) ** 2) - 1)
 
     def describe(self) -> dict[str, Any]:
-        """Plain data for JSON."""
+        """Return plain data for JSON."""
         return {
             "direction": list(self.direction),
             "k1": self.k1,
@@ -113,9 +113,9 @@ class FibreReinforced(MadeFrom):
     matrix : Material
         Such as `NeoHookean` in its isochoric form.
     families : FibreFamily or tuple of FibreFamily
-        One or more.
+        One family of fibres or more.
     name, source : str
-        What it is called and where its constants are from.
+        Name of the material, and source of its constants.
 
     Raises
     ------
@@ -131,8 +131,8 @@ class FibreReinforced(MadeFrom):
     law: ClassVar[str] = "fibre-reinforced"
 
     def __post_init__(self) -> None:
-        one = isinstance(self.families, FibreFamily)
-        object.__setattr__(self, "families", (self.families,) if one else tuple(self.families))
+        single = isinstance(self.families, FibreFamily)
+        object.__setattr__(self, "families", (self.families,) if single else tuple(self.families))
         if not (self.families and all(isinstance(f, FibreFamily) for f in self.families)):
             raise UsageError(
                 "A fibre-reinforced material has no fibres.",
@@ -162,25 +162,25 @@ class FibreReinforced(MadeFrom):
         return self.matrix.volumetric
 
     def distortion(self, F: Tensor, state: Mapping[str, Any] = NO_STATE, dt: Any = None) -> Scalar:
-        """The matrix's distortion energy and that of the fibres, in J/m³."""
+        """Return the matrix's distortion energy and that of the fibres, in J/m³."""
         base = self.matrix.energy if self.volumetric is None else self.matrix.distortion
         return base(F, state, dt) + sum(family.energy(F) for family in self.families)
 
     def advance(self, F: Tensor, state: Mapping[str, Any], dt: Any) -> dict[str, Any]:
-        """The matrix's internal variables at the end of the step."""
+        """Return the matrix's internal variables at the end of the step."""
         return self.matrix.advance(F, state, dt)
 
     def stored(self, F: Tensor, state: Mapping[str, Any]) -> Scalar:
-        """Free energy in J/m³: the matrix's and the fibres'."""
-        kept = getattr(self.matrix, "stored", self.matrix.energy)
-        return kept(F, state) + sum(family.energy(F) for family in self.families)
+        """Return the free energy in J/m³: the matrix's and the fibres'."""
+        stored = getattr(self.matrix, "stored", self.matrix.energy)
+        return stored(F, state) + sum(family.energy(F) for family in self.families)
 
     def stored_distortion(self, F: Tensor, state: Mapping[str, Any]) -> Scalar:
-        """The same without the matrix's volumetric part, which a mixed formulation writes in its own way."""
-        kept = getattr(self.matrix, "stored_distortion", self.matrix.distortion)
-        return kept(F, state) + sum(family.energy(F) for family in self.families)
+        """Return `stored` without the matrix's volumetric part, which a mixed formulation writes in its own way."""
+        stored = getattr(self.matrix, "stored_distortion", self.matrix.distortion)
+        return stored(F, state) + sum(family.energy(F) for family in self.families)
 
     def dissipated(self, F: Tensor, state: Mapping[str, Any], dt: Any) -> Scalar:
-        """Dissipation of a step in J/m³: the matrix's; fibres are elastic."""
-        lost = getattr(self.matrix, "dissipated", None)
-        return lost(F, state, dt) if lost else 0.0
+        """Return the dissipation of a step in J/m³: the matrix's; fibres are elastic."""
+        heat = getattr(self.matrix, "dissipated", None)
+        return heat(F, state, dt) if heat else 0.0

@@ -1,4 +1,4 @@
-"""How the flow stress of a metal rises with accumulated plastic strain.
+"""Laws of hardening: the flow stress of a metal over its accumulated plastic strain.
 
 A hardening law is a curve σ_y(α) over the accumulated (equivalent) plastic strain α ≥ 0. What a return mapping asks of
 it is the plastic increment Δ ≥ 0 that brings the stress back to the curve,
@@ -24,26 +24,26 @@ __all__ = ["Hardening", "LinearHardening", "VoceHardening", "require_hardening"]
 
 
 class Hardening(Protocol):
-    """What plasticity asks of a hardening law; α is a number, an array or a coefficient function of NGSolve."""
+    """The methods of a hardening law; α is a number, an array or a coefficient function of NGSolve."""
 
     @property
     def yield_stress(self) -> float:
         """Flow stress of the virgin material in Pa."""
 
     def flow_stress(self, accumulated: Any) -> Any:
-        """σ_y(α) in Pa."""
+        """Return σ_y(α) in Pa."""
 
     def slope(self, accumulated: Any) -> Any:
-        """dσ_y/dα in Pa."""
+        """Return dσ_y/dα in Pa."""
 
     def work(self, accumulated: Any) -> Any:
-        """Plastic work ∫σ_y dα from 0 to α, in J/m³."""
+        """Return the plastic work ∫σ_y dα from 0 to α, in J/m³."""
 
     def increment(self, excess: Any, stiffness: float, accumulated: Any) -> Any:
-        """Plastic increment Δ ≥ 0 of the return mapping; 0 where the excess is not positive."""
+        """Return the plastic increment Δ ≥ 0 of the return mapping; 0 where the excess is not positive."""
 
     def describe(self) -> dict[str, Any]:
-        """Plain data for JSON: the law's name and its constants in SI units."""
+        """Return plain data for JSON: the law's name and its constants in SI units."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class LinearHardening:
     Attributes
     ----------
     yield_stress : float
-        σ_0 in Pa, positive.
+        First flow stress σ_0 in Pa, positive.
     modulus : float
         Plastic modulus h in Pa, not negative; 0 is perfect plasticity.
 
@@ -71,23 +71,23 @@ class LinearHardening:
         checks.fits("The plastic modulus", self.modulus, "Pa", least=0)
 
     def flow_stress(self, accumulated: Any) -> Any:
-        """σ_0 + h α, in Pa."""
+        """Return σ_0 + h α, in Pa."""
         return self.yield_stress + self.modulus * accumulated
 
     def slope(self, accumulated: Any) -> Any:
-        """h in Pa, in the shape of α."""
+        """Return h in Pa, in the shape of α."""
         return self.modulus + 0 * accumulated
 
     def work(self, accumulated: Any) -> Any:
-        """σ_0 α + ½ h α², in J/m³."""
+        """Return σ_0 α + ½ h α², in J/m³."""
         return (self.yield_stress + 0.5 * self.modulus * accumulated) * accumulated
 
     def increment(self, excess: Any, stiffness: float, accumulated: Any) -> Any:
-        """Excess over the sum of both moduli."""
+        """Return the excess over the sum of both moduli."""
         return positive_part(excess) / (stiffness + self.modulus)
 
     def describe(self) -> dict[str, Any]:
-        """Plain data for JSON: the law's name and its constants in SI units."""
+        """Return plain data for JSON: the law's name and its constants in SI units."""
         return {"law": "linear hardening", **dataclasses.asdict(self)}
 
     def __str__(self) -> str:
@@ -102,11 +102,11 @@ class VoceHardening:
     Attributes
     ----------
     yield_stress : float
-        σ_0 in Pa, positive.
+        First flow stress σ_0 in Pa, positive.
     saturation : float
-        Q in Pa, not negative: what the flow stress gains in the end.
+        Saturation Q in Pa, not negative: the gain of the flow stress in the end.
     rate : float
-        b, a pure number, positive: α = 1/b brings 63 % of Q.
+        Rate b, a pure number, positive: α = 1/b brings 63 % of Q.
     modulus : float
         Linear part h in Pa, not negative.
 
@@ -128,29 +128,29 @@ class VoceHardening:
         checks.fits("The plastic modulus", self.modulus, "Pa", least=0)
 
     def flow_stress(self, accumulated: Any) -> Any:
-        """σ_0 + Q (1 − exp(−b α)) + h α, in Pa."""
+        """Return σ_0 + Q (1 − exp(−b α)) + h α, in Pa."""
         gained = self.saturation * (1 - exp(-self.rate * accumulated))
         return self.yield_stress + gained + self.modulus * accumulated
 
     def slope(self, accumulated: Any) -> Any:
-        """Q b exp(−b α) + h, in Pa."""
+        """Return Q b exp(−b α) + h, in Pa."""
         return self.saturation * self.rate * exp(-self.rate * accumulated) + self.modulus
 
     def work(self, accumulated: Any) -> Any:
-        """(σ_0 + Q) α − Q (1 − exp(−b α))/b + ½ h α², in J/m³."""
+        """Return (σ_0 + Q) α − Q (1 − exp(−b α))/b + ½ h α², in J/m³."""
         exponential = self.saturation / self.rate * (1 - exp(-self.rate * accumulated))
         linear = self.yield_stress + self.saturation + 0.5 * self.modulus * accumulated
         return linear * accumulated - exponential
 
     def increment(self, excess: Any, stiffness: float, accumulated: Any) -> Any:
-        """Root of stiffness Δ + σ_y(α + Δ) − σ_y(α) = excess, by Newton iteration."""
+        """Return the root of stiffness Δ + σ_y(α + Δ) − σ_y(α) = excess, by Newton iteration."""
         both = stiffness + self.modulus
         target = positive_part(excess) * self.rate / both
         share = self.saturation * self.rate / both * exp(-self.rate * accumulated)
         return saturating_root(target, share, self.saturation * self.rate / both) / self.rate
 
     def describe(self) -> dict[str, Any]:
-        """Plain data for JSON: the law's name and its constants in SI units."""
+        """Return plain data for JSON: the law's name and its constants in SI units."""
         return {"law": "Voce hardening", **dataclasses.asdict(self)}
 
     def __str__(self) -> str:
@@ -177,7 +177,7 @@ def require_hardening(thing: Any) -> None:
 
 
 def saturating_root(target: Any, share: Any, largest: float) -> Any:
-    """x ≥ 0 with x + share (1 − exp(−x)) = target, for target ≥ 0 and 0 ≤ share ≤ largest.
+    """Return x ≥ 0 with x + share (1 − exp(−x)) = target, for target ≥ 0 and 0 ≤ share ≤ largest.
 
     The left side is concave and rises, so Newton's method climbs to the root from any point below it and needs no
     safeguard. Two points below it are target/(1 + share), as 1 − exp(−x) ≤ x, and target − share. The number of steps
@@ -192,5 +192,8 @@ def saturating_root(target: Any, share: Any, largest: float) -> Any:
 
 
 def _steps(share: float) -> int:
-    """Newton steps to double precision: 3 for metals; far below a large share's saturation each step gains about 1."""
+    """Return the number of Newton steps to double precision: 3 for metals.
+
+    Far below a large share's saturation each step gains about 1.
+    """
     return 3 + int(math.log1p(10 * share))

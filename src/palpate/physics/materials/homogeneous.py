@@ -78,7 +78,7 @@ def _tangent(energy: Callable[[Tensor], Scalar], F: np.ndarray, index: np.ndarra
 
 
 def _descent(tangent: np.ndarray, slope: np.ndarray) -> np.ndarray:
-    """The Newton step, with the tangent's negative curvatures turned round; NaN states stay where they are."""
+    """Return the Newton step, with the tangent's negative curvatures turned round; NaN states stay where they are."""
     bad = ~(np.isfinite(tangent).all(axis=(1, 2)) & np.isfinite(slope).all(axis=1))
     values, vectors = np.linalg.eigh(np.where(bad[:, None, None], np.eye(slope.shape[1]), tangent))
     least = 1e-12 * np.abs(values).max(axis=1, keepdims=True)
@@ -95,7 +95,7 @@ def _shorten(
     rounding: np.ndarray,
     small: bool,
 ) -> np.ndarray:
-    """The share of each step that lowers the energy, up to rounding, and keeps its volume; 0 where none does."""
+    """Return the share of each step that lowers the energy, up to rounding, and keeps its volume; 0 where none does."""
     start = energy(F)
     rounding = rounding + 1e-12 * np.abs(start)
     share, found = np.ones(len(F)), np.zeros(len(F), dtype=bool)
@@ -110,7 +110,7 @@ def _shorten(
 
 
 def _volume(F: np.ndarray, small: bool) -> np.ndarray:
-    """Volume ratios (n,); a small-strain law has none that could vanish."""
+    """Return volume ratios (n,); a small-strain law has none that could vanish."""
     return np.ones(len(F)) if small else np.linalg.det(F)
 
 
@@ -121,7 +121,7 @@ class Response:
     Attributes
     ----------
     amount : ndarray (n,)
-        What was prescribed: stretches, or shear strains, or volume ratios.
+        Prescribed amounts: stretches, or shear strains, or volume ratios.
     deformation : ndarray (n, 3, 3)
         Deformation gradients F.
     nominal : ndarray (n, 3, 3)
@@ -129,7 +129,7 @@ class Response:
     energy : ndarray (n,)
         Densities per undeformed volume, in J/m³.
     converged : ndarray of bool (n,)
-        Whether the free directions found a stress-free state; the rest is NaN where they did not.
+        True where the free directions reached a stress-free state; the rest is NaN elsewhere.
     stress : ndarray (n,)
         The nominal stress of the test in Pa: along the first axis, of the shear, or the mean one.
     """
@@ -179,7 +179,7 @@ def uniaxial(
 def equibiaxial(
     material: Material, stretch: ArrayLike, *, state: Mapping[str, Any] = NO_STATE, dt: Any = None
 ) -> Response:
-    """The same stretch λ along the first two axes, the third free; arguments as of `uniaxial`.
+    """Stretch λ along the first two axes alike, the third free; arguments as of `uniaxial`.
 
     Raises
     ------
@@ -247,18 +247,18 @@ def volumetric(
 def energy_of(
     material: Material, state: Mapping[str, Any] = NO_STATE, dt: Any = None
 ) -> Callable[[Tensor], Scalar]:
-    """The material's energy as a function of F alone; of an incompressible one, the distortion."""
+    """Return the material's energy as a function of F alone; of an incompressible one, the distortion."""
     whole = material.distortion if is_incompressible(material) else material.energy
     return lambda F: whole(F, state, dt)
 
 
 def is_incompressible(material: Material) -> bool:
-    """Whether only deformations at constant volume are possible."""
+    """Return whether only deformations at constant volume are possible."""
     return material.volumetric is not None and bool(np.isinf(material.volumetric.modulus))
 
 
 def _at_constant_volume(F: np.ndarray, small: bool) -> np.ndarray:
-    """F with the third diagonal component that keeps the volume.
+    """Return F with the third diagonal component that keeps the volume.
 
     The third axis bears no load, so that the slope of the energy along the constraint is the nominal stress, pressure
     included.
@@ -315,6 +315,6 @@ def _unit(amounts: np.ndarray) -> np.ndarray:
 
 
 def _side(material: Material, stretch: np.ndarray, loaded: int) -> np.ndarray:
-    """A first guess of the free stretch: that of the initial Poisson's ratio ν."""
+    """Return a first guess of the free stretch: that of the initial Poisson's ratio ν."""
     ratio = material.poisson if loaded == 1 else 2 * material.poisson / (1 - material.poisson)
     return 1 - ratio * (stretch - 1) if material.kinematics == "small" else stretch**-ratio

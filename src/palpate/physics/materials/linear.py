@@ -26,9 +26,9 @@ class LinearElastic(YoungAndPoisson):
     poisson : float
         Poisson's ratio ν, in (-1, 0.5].
     density : float
-        In kg/m³; matters only under self-weight.
+        Reference density in kg/m³; matters only under self-weight.
     name, source : str
-        What it is called and where its constants are from.
+        Name of the material, and source of its constants.
 
     Raises
     ------

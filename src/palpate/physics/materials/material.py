@@ -1,4 +1,4 @@
-"""What a finite-element model asks of a material, and what every elastic law shares."""
+"""Materials: the contract with a finite-element model, and the bases of the laws."""
 
 from __future__ import annotations
 
@@ -33,6 +33,7 @@ __all__ = [
     "Isochoric",
     "MadeFrom",
     "Material",
+    "ShearAndBulk",
     "StateVariable",
     "Volumetric",
     "YoungAndPoisson",
@@ -48,17 +49,17 @@ NO_STATE: Mapping[str, Any] = MappingProxyType({})
 
 
 def log_volume(F: Tensor) -> Scalar:
-    """ln J with J = det F."""
+    """Return ln J with J = det F."""
     return log(determinant(F))
 
 
 def volume_change(F: Tensor) -> Scalar:
-    """J − 1 with J = det F."""
+    """Return J − 1 with J = det F."""
     return determinant(F) - 1
 
 
 def small_volume(F: Tensor) -> Scalar:
-    """The trace of ε = sym(F − I), the change of volume at small strain."""
+    """Return the trace of ε = sym(F − I), the change of volume at small strain."""
     return trace(F) - 3
 
 
@@ -69,10 +70,10 @@ class Volumetric:
     Attributes
     ----------
     modulus : float
-        In Pa, positive; infinite for an incompressible material, which only a mixed formulation can solve.
+        Modulus in Pa, positive; infinite for an incompressible material, which only a mixed formulation can solve.
     measure : callable
-        From F to a pure number that vanishes at F = I with slope 1 in the volume: `log_volume`, `volume_change`,
-        `small_volume`, or another module-level function.
+        Function from F to a pure number that vanishes at F = I with slope 1 in the volume: `log_volume`,
+        `volume_change`, `small_volume`, or another module-level function.
     """
 
     modulus: float
@@ -90,7 +91,7 @@ class StateVariable:
     Attributes
     ----------
     name : str
-        Its key in the state.
+        Key of the variable in the state.
     shape : tuple
         () for a scalar, (3, 3) for a tensor.
     initial : tuple or float
@@ -111,11 +112,11 @@ class Material(Protocol):
 
     @property
     def name(self) -> str:
-        """What the material is called."""
+        """Name for messages and reports."""
 
     @property
     def source(self) -> str:
-        """Where its constants are from."""
+        """Source of its constants."""
 
     @property
     def density(self) -> float:
@@ -150,23 +151,23 @@ class Material(Protocol):
         """The volumetric part of the energy, if it is separate from the rest."""
 
     def energy(self, F: Tensor, state: Mapping[str, Any] = NO_STATE, dt: Any = None) -> Scalar:
-        """Energy density in J/m³; its gradient in F is the first Piola–Kirchhoff stress.
+        """Return the energy density in J/m³; its gradient in F is the first Piola–Kirchhoff stress.
 
         For a material with a history, the incremental energy of a step of `dt` seconds that starts from `state`.
         """
 
     def distortion(self, F: Tensor, state: Mapping[str, Any] = NO_STATE, dt: Any = None) -> Scalar:
-        """The energy without its volumetric part, in J/m³."""
+        """Return the energy without its volumetric part, in J/m³."""
 
     def advance(self, F: Tensor, state: Mapping[str, Any], dt: Any) -> dict[str, Any]:
-        """Internal variables at the end of the step; empty for an elastic material."""
+        """Return the internal variables at the end of the step; empty for an elastic material."""
 
     def describe(self) -> dict[str, Any]:
-        """Plain data for JSON: the law's name and its constants."""
+        """Return plain data for JSON: the law's name and its constants."""
 
 
 class Elastic:
-    """What elastic laws share: the sum of distortion and volumetric part, derived moduli, description.
+    """Base of all laws: the sum of distortion and volumetric part, and the description.
 
     A law is a frozen dataclass with `name`, `source` and `density`, that gives `law` (in words), the four moduli,
     `volumetric` and `distortion`; or `energy` where it has no separate volumetric part.
@@ -196,7 +197,7 @@ class Elastic:
         return None
 
     def energy(self, F: Tensor, state: Mapping[str, Any] = NO_STATE, dt: Any = None) -> Scalar:
-        """Energy density in J/m³ at the deformation gradient F.
+        """Return the energy density in J/m³ at the deformation gradient F.
 
         Raises
         ------
@@ -211,17 +212,17 @@ class Elastic:
         return self.distortion(F, state, dt) + volumetric.energy(F)
 
     def distortion(self, F: Tensor, state: Mapping[str, Any] = NO_STATE, dt: Any = None) -> Scalar:
-        """The energy density without its volumetric part, in J/m³."""
+        """Return the energy density without its volumetric part, in J/m³."""
         raise NotImplementedError
 
     def advance(self, F: Tensor, state: Mapping[str, Any], dt: Any) -> dict[str, Any]:
-        """Nothing: an elastic material has no history."""
+        """Return no variables: an elastic material has no history."""
         return {}
 
     def stability(
         self, strain: tuple[float, float] = (-0.5, 1.0), volume: tuple[float, float] = (-0.2, 0.2)
     ) -> Stability:
-        """Drucker's criterion over ranges of strain; see `palpate.physics.materials.material_stability.stability`.
+        """Test Drucker's criterion over ranges of strain; see `palpate.physics.materials.material_stability.stability`.
 
         Raises
         ------
@@ -233,13 +234,13 @@ class Elastic:
         return stability(self, strain, volume)
 
     def describe(self) -> dict[str, Any]:
-        """Plain data for JSON: the law's name and its constants."""
+        """Return plain data for JSON: the law's name and its constants."""
         fields = dataclasses.fields(self)  # type: ignore[arg-type]  # a law is a dataclass, this base is none
         constants = {f.name: _plain(getattr(self, f.name)) for f in fields}
         return {"law": type(self).__name__, **constants}
 
     def __str__(self) -> str:
-        """The law, the initial moduli and the source, in words."""
+        """Return the law, the initial moduli and the source, in words."""
         return in_words(self)
 
 
@@ -262,19 +263,33 @@ class YoungAndPoisson(Elastic):
         return lame_modulus(self.young, self.poisson)
 
 
-class Isochoric(Elastic):
-    """What the laws of C̄ = J^(−2/3) FᵀF share: ½ K (J − 1)² for the volume, with K their field `bulk`."""
+class ShearAndBulk(Elastic):
+    """Base of the laws whose E and ν follow from their shear and bulk moduli."""
+
+    @property
+    def young(self) -> float:
+        """Initial Young's modulus in Pa."""
+        return young_modulus(self.shear_modulus, self.bulk_modulus)
+
+    @property
+    def poisson(self) -> float:
+        """Initial Poisson's ratio."""
+        return poisson_ratio(self.shear_modulus, self.bulk_modulus)
+
+
+class Isochoric(ShearAndBulk):
+    """Base of the laws of C̄ = J^(−2/3) FᵀF, with ½ K (J − 1)² for the volume and K their field `bulk`."""
 
     bulk: float
 
     @classmethod
     def with_poisson(cls, poisson: float, **constants: Any) -> Self:
-        """The law with the bulk modulus that gives an initial Poisson's ratio.
+        """Return the law with the bulk modulus that gives an initial Poisson's ratio.
 
         Parameters
         ----------
         poisson : float
-            In (-1, 0.5]; 0.5 makes the material incompressible, for a mixed formulation only.
+            Initial Poisson's ratio in (-1, 0.5]; 0.5 makes the material incompressible, for a mixed formulation only.
         **constants
             The law's constants but `bulk`.
 
@@ -287,16 +302,6 @@ class Isochoric(Elastic):
         law = cls(**constants | {"bulk": 1.0})
         bulk = bulk_from_poisson(law.shear_modulus, poisson)
         return dataclasses.replace(law, bulk=bulk)  # type: ignore[type-var]  # every law is a dataclass
-
-    @property
-    def young(self) -> float:
-        """Initial Young's modulus in Pa."""
-        return young_modulus(self.shear_modulus, self.bulk)
-
-    @property
-    def poisson(self) -> float:
-        """Initial Poisson's ratio."""
-        return poisson_ratio(self.shear_modulus, self.bulk)
 
     @property
     def bulk_modulus(self) -> float:
@@ -315,44 +320,54 @@ class Isochoric(Elastic):
 
 
 class MadeFrom(Elastic):
-    """What laws share that are made from another one, and have its moduli: of what relaxes, those of an instant.
+    """Base of the laws that are made from another one, their `origin`, and have its moduli, kinematics and source.
 
-    A law gives `origin`.
+    The moduli of a law that relaxes are those of an instant.
     """
 
     @property
     def origin(self) -> Material:
-        """The law that it is made from."""
+        """Law from which it is made."""
         raise NotImplementedError
 
     @property
+    def source(self) -> str:  # type: ignore[override]  # a field in other laws
+        """Source of the constants of the origin."""
+        return self.origin.source
+
+    @property
     def density(self) -> float:  # type: ignore[override]  # a field in other laws
-        """In kg/m³."""
+        """Density of the origin in kg/m³."""
         return self.origin.density
 
     @property
+    def kinematics(self) -> Literal["large", "small"]:  # type: ignore[override]  # fixed in other laws
+        """Kinematics of the origin."""
+        return self.origin.kinematics
+
+    @property
     def young(self) -> float:
-        """E in Pa, that of the origin."""
+        """E of the origin in Pa."""
         return self.origin.young
 
     @property
     def poisson(self) -> float:
-        """ν, that of the origin."""
+        """ν of the origin."""
         return self.origin.poisson
 
     @property
     def shear_modulus(self) -> float:
-        """G in Pa, that of the origin."""
+        """G of the origin in Pa."""
         return self.origin.shear_modulus
 
     @property
     def bulk_modulus(self) -> float:
-        """K in Pa, that of the origin."""
+        """K of the origin in Pa."""
         return self.origin.bulk_modulus
 
 
 def in_words(material: Any, more: str = "", *, at_once: bool = False) -> str:
-    """A material's law, initial moduli, what `more` there is to say of it, and its source.
+    """Return a material's law, initial moduli, `more` and its source, in words.
 
     `at_once` says that the moduli are those of an instant, as they relax.
     """
@@ -366,7 +381,7 @@ def in_words(material: Any, more: str = "", *, at_once: bool = False) -> str:
 
 
 def initial_state(material: Material, like: Tensor) -> dict[str, Any]:
-    """The state of the undeformed body, of the kind of `like` and, in NumPy, one value for every F (..., 3, 3)."""
+    """State of the undeformed body, of the kind of `like` and, in NumPy, one value for every F (..., 3, 3)."""
     if is_symbolic(like):
         import ngsolve
 
@@ -381,7 +396,7 @@ def initial_state(material: Material, like: Tensor) -> dict[str, Any]:
 
 
 def incompressible(name: str) -> UsageError:
-    """The error for an energy that does not exist because the volume can't change."""
+    """Return the error for an energy that does not exist because the volume can't change."""
     return UsageError(
         f"{name} is incompressible: its energy density has no value away from det F = 1.",
         why="Its bulk modulus is infinite (Poisson's ratio 0.5).",

@@ -1,4 +1,4 @@
-"""Whether more strain always needs more stress: Drucker's criterion over a range of strains.
+"""Stability of a material: Drucker's criterion over a range of strains, by which more strain needs more stress.
 
 At each state the Kirchhoff stress must grow with every further stretch and shear: dτ : D > 0 for the Jaumann rate of τ
 and each rate of strain D (Drucker 1959, J. Appl. Mech. 26, 101-106; Hill 1968, J. Mech. Phys. Solids 16, 229-242). That
@@ -72,11 +72,11 @@ class ModeStability:
     at: float
 
     def __bool__(self) -> bool:
-        """Whether the material is stable over all of the range."""
+        """Return True where the material is stable over all of the range."""
         return self.least_modulus > 0
 
     def __str__(self) -> str:
-        """The verdict in words."""
+        """Return the verdict in words."""
         low, high = self.asked
         if self:
             return f"stable in {self.mode} strain {low:+.3g} to {high:+.3g}"
@@ -100,25 +100,25 @@ class Stability:
     Attributes
     ----------
     material : str
-        Its name.
+        Name of the material.
     modes : tuple of ModeStability
-        One verdict each.
+        One verdict for each mode.
     """
 
     material: str
     modes: tuple[ModeStability, ...]
 
     def __bool__(self) -> bool:
-        """Whether the material is stable over all of the ranges."""
+        """Return True where the material is stable over all of the ranges."""
         return all(self.modes)
 
     def __str__(self) -> str:
-        """The verdict in words, what is unstable first."""
+        """Return the verdict in words, what is unstable first."""
         verdicts = sorted(self.modes, key=bool)
         return f"{self.material}: " + "; ".join(str(mode) for mode in verdicts) + "."
 
     def describe(self) -> dict[str, Any]:
-        """Plain data for JSON."""
+        """Return plain data for JSON."""
         return {
             "material": self.material,
             "stable": bool(self),
@@ -166,10 +166,10 @@ def stability(
 
 
 def _least_moduli(material: Material, response: Response, state: Any, dt: Any) -> np.ndarray:
-    """Least eigenvalue of the incremental moduli at each state, in Pa; NaN where there is no state."""
+    """Return the least eigenvalue of the incremental moduli at each state, in Pa; NaN where there is no state."""
     energy = energy_of(material, state, dt)
-    known = response.converged
-    F = np.where(known[:, None, None], response.deformation, np.eye(3))
+    converged = response.converged
+    F = np.where(converged[:, None, None], response.deformation, np.eye(3))
     P = gradient(energy, F)
     H = _symmetric_basis()
     if is_incompressible(
@@ -185,7 +185,7 @@ def _least_moduli(material: Material, response: Response, state: Any, dt: Any) -
         twice = np.einsum("aij,bjk->abik", H, H)
         twice = (twice + np.swapaxes(twice, 0, 1)) / 2
         moduli = moduli + np.einsum("nij,abik,nkj->nab", P, twice, F)
-    return np.where(known, np.linalg.eigvalsh((moduli + np.swapaxes(moduli, 1, 2)) / 2)[:, 0], np.nan)
+    return np.where(converged, np.linalg.eigvalsh((moduli + np.swapaxes(moduli, 1, 2)) / 2)[:, 0], np.nan)
 
 
 def _verdict(mode: str, strains: np.ndarray, moduli: np.ndarray) -> ModeStability:
@@ -202,7 +202,7 @@ def _verdict(mode: str, strains: np.ndarray, moduli: np.ndarray) -> ModeStabilit
 
 
 def _symmetric_basis() -> np.ndarray:
-    """Six orthonormal symmetric tensors (6, 3, 3)."""
+    """Return six orthonormal symmetric tensors (6, 3, 3)."""
     basis = [np.diag(row) for row in np.eye(3)]
     for i, j in ((0, 1), (0, 2), (1, 2)):
         shear = np.zeros((3, 3))
@@ -212,7 +212,7 @@ def _symmetric_basis() -> np.ndarray:
 
 
 def _spaced(limits: tuple[float, float]) -> np.ndarray:
-    """Evenly spaced strains with 0 among them."""
+    """Return evenly spaced strains with 0 among them."""
     return np.unique(np.append(np.linspace(*limits, _STATES), 0.0))
 
 

@@ -25,11 +25,11 @@ class MooneyRivlin(Isochoric):
     c10, c01 : float
         C₁₀ and C₀₁ in Pa; their sum is half of the initial shear modulus and must be positive.
     bulk : float
-        K in Pa, positive; `with_poisson` finds it.
+        Bulk modulus K in Pa, positive; `with_poisson` gives it.
     density : float
-        In kg/m³.
+        Reference density in kg/m³.
     name, source : str
-        What it is called and where its constants are from.
+        Name of the material, and source of its constants.
 
     Raises
     ------

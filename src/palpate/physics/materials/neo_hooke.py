@@ -39,11 +39,11 @@ class NeoHookean(YoungAndPoisson):
     poisson : float
         Initial Poisson's ratio ν, in (-1, 0.5].
     density : float
-        In kg/m³.
+        Reference density in kg/m³.
     form : str
         ``"coupled"`` or ``"isochoric"``.
     name, source : str
-        What it is called and where its constants are from.
+        Name of the material, and source of its constants.
 
     Raises
     ------

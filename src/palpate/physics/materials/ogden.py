@@ -29,11 +29,11 @@ class Ogden(Isochoric):
     alpha : float or tuple of float
         αₚ, pure numbers other than zero, one per term.
     bulk : float
-        K in Pa, positive; `with_poisson` finds it.
+        Bulk modulus K in Pa, positive; `with_poisson` gives it.
     density : float
-        In kg/m³.
+        Reference density in kg/m³.
     name, source : str
-        What it is called and where its constants are from.
+        Name of the material, and source of its constants.
 
     Raises
     ------

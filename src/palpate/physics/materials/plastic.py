@@ -57,11 +57,11 @@ class Plastic(MadeFrom):
     Attributes
     ----------
     elastic : LinearElastic
-        Moduli and density.
+        Law that gives moduli and density.
     hardening : Hardening
         For example ``VoceHardening(yield_stress=125e6, saturation=67e6, rate=52)``.
     name, source : str
-        What it is called and where the hardening is from; by default those of the elastic part.
+        Name of the material, and source of the hardening; by default those of the elastic part.
 
     Raises
     ------
@@ -111,35 +111,35 @@ class Plastic(MadeFrom):
         return stored + self.hardening.work(state["accumulated"] + flow)
 
     def advance(self, F: Tensor, state: Mapping[str, Any], dt: Any = None) -> dict[str, Any]:
-        """Plastic strain (..., 3, 3) and accumulated plastic strain (...) after the step."""
+        """Return the plastic strain (..., 3, 3) and accumulated plastic strain (...) after the step."""
         shape, _, trial, flow = self._return(F, state)
         change = scale(3 * self.shear_modulus * flow / trial, shape)
         strain, accumulated = state["plastic_strain"] + change, state["accumulated"] + flow
         return compile_values({"plastic_strain": strain, "accumulated": accumulated})
 
     def stored(self, F: Tensor, state: Mapping[str, Any]) -> Scalar:
-        """Elastic energy in J/m³ at F, with the state after the step: what unloading gives back."""
+        """Return the elastic energy in J/m³ at F, with the state after the step: what unloading gives back."""
         return self.stored_distortion(F, state) + self.volumetric.energy(F)
 
     def stored_distortion(self, F: Tensor, state: Mapping[str, Any]) -> Scalar:
-        """The same without the volumetric part, which a mixed formulation writes in its own way."""
+        """Return `stored` without the volumetric part, which a mixed formulation writes in its own way."""
         shape = deviator(sym(F - identity(F)) - state["plastic_strain"])
         return self.shear_modulus * inner(shape, shape)
 
     def dissipated(self, F: Tensor, state: Mapping[str, Any], dt: Any = None) -> Scalar:
-        """Plastic work of a step from `state` to F in J/m³, never negative."""
+        """Return the plastic work of a step from `state` to F in J/m³, never negative."""
         *_, flow = self._return(F, state)
         work = self.hardening.work
         heat = work(state["accumulated"] + flow) - work(state["accumulated"])
         return compile_values({"heat": heat})["heat"]
 
     def describe(self) -> dict[str, Any]:
-        """Plain data for JSON: the law, its parts and their constants."""
+        """Return plain data for JSON: the law, its parts and their constants."""
         parts = {"elastic": self.elastic.describe(), "hardening": self.hardening.describe()}
         return {"law": type(self).__name__, **parts, "name": self.name, "source": self.source}
 
     def __str__(self) -> str:
-        """The elastic law, yield stress, hardening and source, in words."""
+        """Return the elastic law, yield stress, hardening and source, in words."""
         return in_words(self, f"{self.hardening}")
 
     def _return(self, F: Tensor, state: Mapping[str, Any]) -> tuple[Tensor, Scalar, Scalar, Scalar]:

@@ -32,7 +32,7 @@ __all__ = ["PreStretched"]
 class PreStretched(MadeFrom):
     """The law `base` under a stretch along x and y, with no stress along z.
 
-    Tension must be held: fix the sides of the body. The moduli that it tells are those of the base law at rest; the
+    Tension must be held: fix the sides of the body. Its moduli are those of the base law at rest; the
     mixed form is not made for it, so keep Poisson's ratio below 0.48.
 
     Attributes
@@ -40,9 +40,9 @@ class PreStretched(MadeFrom):
     base : Material
         An elastic law of large strain.
     stretch_x : float
-        λ_x, a pure number; 1 is no stretch.
+        Stretch λ_x, a pure number; 1 is no stretch.
     stretch_y : float, optional
-        λ_y; as λ_x by default.
+        Stretch λ_y; λ_x by default.
 
     Raises
     ------
@@ -95,21 +95,16 @@ class PreStretched(MadeFrom):
 
     @property
     def name(self) -> str:  # type: ignore[override]
-        """That of the base law and the stretches."""
+        """Name of the base law and the stretches."""
         return f"{self.base.name} stretched by {' and '.join(f'{s:.4g}' for s in self._along)}"
 
     @property
-    def source(self) -> str:  # type: ignore[override]
-        """That of the base law."""
-        return self.base.source
-
-    @property
     def density(self) -> float:  # type: ignore[override]
-        """Of the drawn shape, in kg/m³."""
+        """Density of the drawn shape in kg/m³."""
         return self.origin.density / float(np.prod(self.stretches))
 
     def distortion(self, F: Tensor, state: Mapping[str, Any] = NO_STATE, dt: Any = None) -> Scalar:
-        """Energy density beyond that of the stretch, per volume of the drawn shape, in J/m³."""
+        """Return the energy density beyond that of the stretch, per volume of the drawn shape, in J/m³."""
         before = np.diag(self.stretches)
         rest = float(self.base.energy(before[None])[0])
         return (self.base.energy(matmul(F, constant(before, F))) - rest) / float(np.prod(self.stretches))

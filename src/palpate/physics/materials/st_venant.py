@@ -30,9 +30,9 @@ class StVenantKirchhoff(YoungAndPoisson):
     poisson : float
         Initial Poisson's ratio ν, in (-1, 0.5): the trace of E is no volume that could be kept.
     density : float
-        In kg/m³.
+        Reference density in kg/m³.
     name, source : str
-        What it is called and where its constants are from.
+        Name of the material, and source of its constants.
 
     Raises
     ------

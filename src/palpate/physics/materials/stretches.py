@@ -42,7 +42,7 @@ _START = (0.86602985, 0.16642902, -0.04600526, 0.01764236, -0.00409941)
 
 
 def stretch_sums(C: Tensor, exponents: Sequence[float]) -> list[Scalar]:
-    """Σ λᵢ^a over the three principal stretches, for each exponent a; λᵢ² are the eigenvalues of C.
+    """Return Σ λᵢ^a over the three principal stretches, for each exponent a; λᵢ² are the eigenvalues of C.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def stretch_sums(C: Tensor, exponents: Sequence[float]) -> list[Scalar]:
 
 
 def _power_sums(J2: Scalar, J3: Scalar) -> list[Scalar]:
-    """Σ dᵏ for k = 2 … of the roots of d³ − J₂ d − J₃ = 0."""
+    """Return Σ dᵏ for k = 2 … of the roots of d³ − J₂ d − J₃ = 0."""
     sums = [3.0, 0.0, 2 * J2]
     for k in range(3, _TERMS + 1):
         sums.append(J2 * sums[k - 2] + J3 * sums[k - 3])
@@ -72,7 +72,7 @@ def _power_sums(J2: Scalar, J3: Scalar) -> list[Scalar]:
 
 
 def _series(s: float, sums: list[Scalar]) -> Scalar:
-    """Σ (1 + d)^s by the binomial series."""
+    """Return Σ (1 + d)^s by the binomial series."""
     total: Any = 3.0
     for k, value in enumerate(sums, start=2):
         total = total + _binomial(s, k) * value
@@ -80,7 +80,7 @@ def _series(s: float, sums: list[Scalar]) -> Scalar:
 
 
 def _roots(J2: Scalar, J3: Scalar) -> tuple[Scalar, ...]:
-    """What `_sum_of_roots` needs of the eigenvalues of C/m: see there."""
+    """Return the eigenvalues of C/m in the form that `_sum_of_roots` takes."""
     r = sqrt(J2 / 3)
     side = where(J3, 1.0, -1.0)
     w = side * J3 / (2 * r * r * r)

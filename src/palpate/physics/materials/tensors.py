@@ -64,13 +64,13 @@ _STEP = 1e-40  # of the complex step: its square vanishes beside 1 in double pre
 
 
 def is_symbolic(*values: Any) -> bool:
-    """Whether any of the values is a coefficient function of NGSolve."""
+    """Return whether any of the values is a coefficient function of NGSolve."""
     ngsolve = sys.modules.get("ngsolve")  # nothing can be one of its objects before it is imported
     return ngsolve is not None and any(isinstance(v, ngsolve.CoefficientFunction) for v in values)
 
 
 def identity(like: Tensor) -> Tensor:
-    """The unit tensor, of the kind of `like`."""
+    """Return the unit tensor, of the kind of `like`."""
     if is_symbolic(like):
         import ngsolve
 
@@ -79,7 +79,7 @@ def identity(like: Tensor) -> Tensor:
 
 
 def constant(values: Sequence[Any] | np.ndarray, like: Any) -> Any:
-    """A constant vector (3,) or tensor (3, 3), of the kind of `like`."""
+    """Return a constant vector (3,) or tensor (3, 3), of the kind of `like`."""
     array = np.asarray(values, dtype=float)
     if is_symbolic(like):
         import ngsolve
@@ -89,27 +89,27 @@ def constant(values: Sequence[Any] | np.ndarray, like: Any) -> Any:
 
 
 def trace(a: Tensor) -> Scalar:
-    """The sum A₁₁ + A₂₂ + A₃₃."""
+    """Return the sum A₁₁ + A₂₂ + A₃₃."""
     return a[0, 0] + a[1, 1] + a[2, 2] if is_symbolic(a) else a[..., 0, 0] + a[..., 1, 1] + a[..., 2, 2]
 
 
 def transpose(a: Tensor) -> Tensor:
-    """Aᵀ."""
+    """Return Aᵀ."""
     return a.trans if is_symbolic(a) else np.swapaxes(a, -1, -2)
 
 
 def matmul(a: Tensor, b: Tensor) -> Tensor:
-    """The product A B."""
+    """Return the product A B."""
     return a * b if is_symbolic(a, b) else a @ b
 
 
 def transform(a: Tensor, v: Any) -> Any:
-    """The vector A v; v has shape (..., 3)."""
+    """Return the vector A v; v has shape (..., 3)."""
     return a * v if is_symbolic(a, v) else np.einsum("...ij,...j->...i", a, v)
 
 
 def dot(v: Any, w: Any) -> Scalar:
-    """v · w of two vectors (..., 3)."""
+    """Return v · w of two vectors (..., 3)."""
     if is_symbolic(v, w):
         import ngsolve
 
@@ -118,7 +118,7 @@ def dot(v: Any, w: Any) -> Scalar:
 
 
 def outer(v: Any, w: Any) -> Tensor:
-    """v ⊗ w of two vectors (..., 3)."""
+    """Return v ⊗ w of two vectors (..., 3)."""
     if is_symbolic(v, w):
         import ngsolve
 
@@ -127,7 +127,7 @@ def outer(v: Any, w: Any) -> Tensor:
 
 
 def inner(a: Tensor, b: Tensor) -> Scalar:
-    """The full contraction A : B = Σ A_ij B_ij."""
+    """Return the full contraction A : B = Σ A_ij B_ij."""
     if is_symbolic(a, b):
         import ngsolve
 
@@ -136,22 +136,22 @@ def inner(a: Tensor, b: Tensor) -> Scalar:
 
 
 def scale(factor: Scalar, a: Tensor) -> Tensor:
-    """The tensor factor · A, where the factor has one value per tensor."""
+    """Return the tensor factor · A, where the factor has one value per tensor."""
     return factor * a if is_symbolic(factor, a) else np.asarray(factor)[..., None, None] * a
 
 
 def sym(a: Tensor) -> Tensor:
-    """The symmetric part ½(A + Aᵀ)."""
+    """Return the symmetric part ½(A + Aᵀ)."""
     return 0.5 * (a + transpose(a))
 
 
 def deviator(a: Tensor) -> Tensor:
-    """A − ⅓ tr(A) I."""
+    """Return A − ⅓ tr(A) I."""
     return a - scale(trace(a) / 3, identity(a))
 
 
 def determinant(a: Tensor) -> Scalar:
-    """The determinant of A."""
+    """Return the determinant of A."""
     if is_symbolic(a):
         import ngsolve
 
@@ -161,7 +161,7 @@ def determinant(a: Tensor) -> Scalar:
 
 
 def cofactor(a: Tensor) -> Tensor:
-    """The cofactor det(A) A⁻ᵀ, also of a singular A."""
+    """Return the cofactor det(A) A⁻ᵀ, also of a singular A."""
     if is_symbolic(a):
         import ngsolve
 
@@ -171,7 +171,7 @@ def cofactor(a: Tensor) -> Tensor:
 
 
 def inverse(a: Tensor) -> Tensor:
-    """A⁻¹."""
+    """Return A⁻¹."""
     if is_symbolic(a):
         import ngsolve
 
@@ -191,22 +191,22 @@ def isochoric_second(F: Tensor) -> Scalar:
 
 
 def log(x: Scalar) -> Scalar:
-    """Natural logarithm; NaN where a real x is negative."""
+    """Return the natural logarithm; NaN where a real x is negative."""
     return _function("log", x)
 
 
 def exp(x: Scalar) -> Scalar:
-    """Exponential."""
+    """Return the exponential."""
     return _function("exp", x)
 
 
 def sqrt(x: Scalar) -> Scalar:
-    """Square root; NaN where a real x is negative."""
+    """Return the square root; NaN where a real x is negative."""
     return _function("sqrt", x)
 
 
 def power(x: Scalar, exponent: float) -> Scalar:
-    """x raised to a constant power, for x > 0."""
+    """Return x raised to a constant power, for x > 0."""
     if is_symbolic(x):
         return x**exponent
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
@@ -214,7 +214,7 @@ def power(x: Scalar, exponent: float) -> Scalar:
 
 
 def where(condition: Scalar, positive: Scalar, otherwise: Scalar) -> Scalar:
-    """`positive` where condition > 0, else `otherwise`; a complex condition counts by its real part."""
+    """Return `positive` where condition > 0, else `otherwise`; a complex condition counts by its real part."""
     if is_symbolic(condition, positive, otherwise):
         import ngsolve
 
@@ -223,17 +223,17 @@ def where(condition: Scalar, positive: Scalar, otherwise: Scalar) -> Scalar:
 
 
 def positive_part(x: Scalar) -> Scalar:
-    """⟨x⟩: x where it is positive, else 0."""
+    """Return ⟨x⟩: x where it is positive, else 0."""
     return where(x, x, 0.0)
 
 
 def gradient(function: Callable[[Tensor], Scalar], at: Tensor) -> Tensor:
-    """∂function/∂A at `at`, a tensor (..., 3, 3) of the derivatives with respect to A_ij.
+    """Return ∂function/∂A at `at`, a tensor (..., 3, 3) of the derivatives with respect to A_ij.
 
     Parameters
     ----------
     function : callable
-        From a tensor to a scalar, written with the functions of this module.
+        Function from a tensor to a scalar, written with the functions of this module.
     at : Tensor
         A real NumPy array (..., 3, 3), or a 3 × 3 coefficient function.
     """

@@ -46,7 +46,7 @@ class UniaxialPlastic:
     Attributes
     ----------
     young : float
-        In Pa.
+        Young's modulus in Pa.
     hardening : Hardening
         For example ``LinearHardening(yield_stress=70e6, modulus=1e9)``.
     """
@@ -58,27 +58,27 @@ class UniaxialPlastic:
         checks.positive("Young's modulus", self.young, "Pa")
 
     def rest(self, shape: int | tuple[int, ...] = ()) -> PlasticFibres:
-        """Virgin fibres."""
+        """Return virgin fibres."""
         return PlasticFibres(np.zeros(shape), np.zeros(shape))
 
     def stress(
         self, strain: np.ndarray, state: PlasticFibres
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, PlasticFibres]:
-        """Answer of fibres to a strain.
+        """Return the answer of fibres to a strain.
 
         Parameters
         ----------
         strain : (...) array
             Total strain at the end of the step.
         state : PlasticFibres
-            At its beginning, of the same shape.
+            Internal variables at its beginning, of the same shape.
 
         Returns
         -------
         stress, tangent, energy : (...) arrays
             In Pa, Pa and J/m³: the energy is elastic energy plus all plastic work since the virgin state.
         state : PlasticFibres
-            At the end of the step.
+            Internal variables at the end of the step.
         """
         trial = self.young * (strain - state.strain)
         excess = np.abs(trial) - self.hardening.flow_stress(state.accumulated)
@@ -101,7 +101,7 @@ class UniaxialViscoelastic:
     young : float
         Instantaneous modulus in Pa.
     prony : PronySeries
-        How it relaxes.
+        Relaxation of the modulus.
     """
 
     young: float
@@ -112,25 +112,25 @@ class UniaxialViscoelastic:
 
     @property
     def equilibrium_young(self) -> float:
-        """What is left of the modulus in the end, in Pa."""
+        """Modulus in Pa that is left in the end."""
         return self.young * self.prony.equilibrium
 
     def rest(self, shape: int | tuple[int, ...] = ()) -> ViscousFibres:
-        """Relaxed, unstrained fibres."""
+        """Return relaxed, unstrained fibres."""
         fibres = (shape,) if isinstance(shape, int) else tuple(shape)
         return ViscousFibres(np.zeros(fibres), np.zeros((len(self.prony.terms), *fibres)))
 
     def stress(
         self, strain: np.ndarray, state: ViscousFibres, dt: float | None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, ViscousFibres]:
-        """Answer of fibres to a strain that grows evenly over a step.
+        """Return the answer of fibres to a strain that grows evenly over a step.
 
         Parameters
         ----------
         strain : (...) array
             Total strain at the end of the step.
         state : ViscousFibres
-            At its beginning.
+            Internal variables at its beginning.
         dt : float or None
             Length of the step in s; None is an instant, infinity is for ever.
 
@@ -139,7 +139,7 @@ class UniaxialViscoelastic:
         stress, tangent, energy : (...) arrays
             In Pa, Pa and J/m³; the energy is the potential of the step's stress and no stored energy.
         state : ViscousFibres
-            At the end of the step.
+            Internal variables at the end of the step.
         """
         decay = _column(self.prony.decay(dt), state.stress)
         weight = _column(self.prony.shares, state.stress) * _column(self.prony.gain(dt), state.stress)
@@ -158,5 +158,5 @@ class UniaxialViscoelastic:
 
 
 def _column(values: tuple[float, ...], like: np.ndarray) -> np.ndarray:
-    """Values (term,) as an array that broadcasts over fibres, (term, 1, ...)."""
+    """Return values (term,) as an array that broadcasts over fibres, (term, 1, ...)."""
     return np.reshape(values, (len(values),) + (1,) * np.ndim(like))

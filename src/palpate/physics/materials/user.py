@@ -16,13 +16,13 @@ from palpate import checks
 from palpate.errors import UsageError
 from palpate.physics.materials.material import (
     NO_STATE,
-    Elastic,
+    ShearAndBulk,
     StateVariable,
     Volumetric,
     initial_state,
     volume_change,
 )
-from palpate.physics.materials.moduli import poisson_ratio, require_density, young_modulus
+from palpate.physics.materials.moduli import require_density
 from palpate.physics.materials.tensors import Scalar, Tensor, gradient, second_gradient
 
 __all__ = ["UserMaterial", "material"]
@@ -31,7 +31,7 @@ _SHORT = 1e-9  # s: a step that leaves a history no time, for the instantaneous 
 
 
 @dataclass(frozen=True)
-class UserMaterial(Elastic):
+class UserMaterial(ShearAndBulk):
     """A material whose energy density is a function written with `palpate.physics.materials.tensors`.
 
     The function is tried at once in NumPy: it must be stress-free at F = I, stiff against every strain, and (for large
@@ -55,9 +55,9 @@ class UserMaterial(Elastic):
     evolution : callable, optional
         ``evolution(F, state, dt, **constants)``, a dict of the states at the end of the step; needed with `states`.
     density : float
-        In kg/m³.
+        Reference density in kg/m³.
     name, source : str
-        What it is called (by default as its function) and where its constants are from.
+        Name of the material, by default that of its function, and source of its constants.
 
     Raises
     ------
@@ -135,16 +135,6 @@ class UserMaterial(Elastic):
     def bulk_modulus(self) -> float:
         """Initial bulk modulus in Pa, by differences."""
         return self._moduli[1] + (self.bulk or 0.0)
-
-    @property
-    def young(self) -> float:
-        """Initial Young's modulus in Pa."""
-        return young_modulus(self.shear_modulus, self.bulk_modulus)
-
-    @property
-    def poisson(self) -> float:
-        """Initial Poisson's ratio."""
-        return poisson_ratio(self.shear_modulus, self.bulk_modulus)
 
     def describe(self) -> dict[str, Any]:
         """Plain data for JSON: the function by name and by a digest of its text, and the constants."""

@@ -28,14 +28,13 @@ from palpate import checks
 from palpate.errors import UsageError
 from palpate.physics.materials.material import (
     NO_STATE,
-    Elastic,
     MadeFrom,
     Material,
+    ShearAndBulk,
     StateVariable,
     Volumetric,
     in_words,
 )
-from palpate.physics.materials.moduli import poisson_ratio, young_modulus
 from palpate.physics.materials.prony import PronySeries, dashpot_loss, spring_energy
 from palpate.physics.materials.tensors import (
     Scalar,
@@ -61,19 +60,19 @@ Part: TypeAlias = Literal["distortion", "all"]
 
 
 @dataclass(frozen=True)
-class Scaled(Elastic):
+class Scaled(ShearAndBulk, MadeFrom):
     """The law `base` times `factor`; a separate volumetric part stays as it is unless `part` is "all".
 
-    What a viscoelastic material turns into once it has relaxed, or was before it did.
+    A viscoelastic material turns into such a law once it has relaxed.
 
     Attributes
     ----------
     base : Material
         An elastic law.
     factor : float
-        A pure number, positive.
+        Pure number, positive.
     part : "distortion" or "all"
-        What is multiplied.
+        Part of the law that is multiplied.
     """
 
     base: Material
@@ -86,43 +85,23 @@ class Scaled(Elastic):
         checks.positive("The factor of a scaled law", self.factor, "")
 
     @property
-    def name(self) -> str:  # type: ignore[override]
-        """That of the base law and the factor."""
+    def origin(self) -> Material:
+        """The base law."""
+        return self.base
+
+    @property
+    def name(self) -> str:  # type: ignore[override]  # a field in other laws
+        """Name of the base law and the factor."""
         return f"{self.base.name} × {self.factor:.4g}"
 
     @property
-    def source(self) -> str:  # type: ignore[override]
-        """That of the base law."""
-        return self.base.source
-
-    @property
-    def density(self) -> float:  # type: ignore[override]
-        """In kg/m³."""
-        return self.base.density
-
-    @property
-    def kinematics(self) -> Literal["large", "small"]:  # type: ignore[override]
-        """Those of the base law."""
-        return self.base.kinematics
-
-    @property
-    def young(self) -> float:
-        """In Pa."""
-        return young_modulus(self.shear_modulus, self.bulk_modulus)
-
-    @property
-    def poisson(self) -> float:
-        """A pure number."""
-        return poisson_ratio(self.shear_modulus, self.bulk_modulus)
-
-    @property
     def shear_modulus(self) -> float:
-        """In Pa."""
+        """Factor times G of the base law, in Pa."""
         return self.factor * self.base.shear_modulus
 
     @property
     def bulk_modulus(self) -> float:
-        """In Pa; the volumetric part's share of it is not scaled."""
+        """K in Pa; the volumetric part's share of it is not scaled."""
         kept = kept_bulk(self.base, self.part)
         # both may be infinite, and their difference then vanishes
         rest = 0.0 if kept == self.base.bulk_modulus else self.base.bulk_modulus - kept
@@ -130,7 +109,7 @@ class Scaled(Elastic):
 
     @property
     def volumetric(self) -> Volumetric | None:
-        """That of the base law, multiplied if it is meant too."""
+        """Volumetric part of the base law, multiplied if `part` is "all"."""
         volumetric = self.base.volumetric
         if volumetric is None or self.part == "distortion":
             return volumetric
@@ -142,12 +121,12 @@ class Scaled(Elastic):
 
 
 def part_of(base: Material, part: Part, F: Tensor) -> Scalar:
-    """Energy in J/m³ of all of an elastic law, or of all but a separate volumetric part."""
+    """Return the energy in J/m³ of all of an elastic law, or of all but a separate volumetric part."""
     return base.energy(F) if part == "all" or base.volumetric is None else base.distortion(F)
 
 
 def kept_bulk(base: Material, part: Part) -> float:
-    """Bulk modulus in Pa of what is not in that part: the separate volumetric energy, if any."""
+    """Return the bulk modulus in Pa that is not in that part: of a separate volumetric energy, if any."""
     return 0.0 if part == "all" or base.volumetric is None else base.volumetric.modulus
 
 
@@ -169,9 +148,9 @@ class Viscoelastic(MadeFrom):
         (γ_i, τ_i): share of the instantaneous law that relaxes, and relaxation time in s; a `PronySeries` is taken too.
         They are shares of the shear modulus, and of Young's modulus only where the volume can't change or relaxes too.
     part : "distortion" or "all"
-        What relaxes. If the volumetric part does, there is no mixed formulation.
+        Part of the law that relaxes. If the volumetric part does, there is no mixed formulation.
     name, source : str
-        By default those of the base law.
+        Name of the material and source of its constants; by default those of the base law.
 
     Raises
     ------
@@ -203,7 +182,7 @@ class Viscoelastic(MadeFrom):
     def from_relaxed(
         cls, law: Material, terms: PronySeries | tuple[tuple[float, float], ...]
     ) -> Viscoelastic:
-        """The material that relaxes to `law`, by the same shares of the instantaneous law.
+        """Return the material that relaxes to `law`, by the same shares of the instantaneous law.
 
         Raises
         ------
@@ -230,13 +209,8 @@ class Viscoelastic(MadeFrom):
         return PronySeries(self.terms)
 
     @property
-    def kinematics(self) -> Literal["large", "small"]:  # type: ignore[override]
-        """Those of the base law."""
-        return self.base.kinematics
-
-    @property
     def volumetric(self) -> Volumetric | None:
-        """That of the base law where it does not relax: then a mixed formulation works."""
+        """Volumetric part of the base law where it does not relax: then a mixed formulation works."""
         return self.base.volumetric if self.part == "distortion" else None
 
     @property
@@ -246,7 +220,7 @@ class Viscoelastic(MadeFrom):
         return tuple(StateVariable(name, (3, 3), _ZERO) for name in names)
 
     def relaxed(self) -> Scaled:
-        """The elastic law that is left in the end, with the equilibrium moduli.
+        """Return the elastic law that is left in the end, with the equilibrium moduli.
 
         Raises
         ------
@@ -256,15 +230,15 @@ class Viscoelastic(MadeFrom):
         return Scaled(self.base, self.prony.equilibrium, self.part)
 
     def storage_modulus(self, frequency: Any) -> Any:
-        """G'(ω) in Pa at small strain, for angular frequencies in rad/s."""
+        """Return G'(ω) in Pa at small strain, for angular frequencies in rad/s."""
         return self.shear_modulus * self.prony.storage(frequency)
 
     def loss_modulus(self, frequency: Any) -> Any:
-        """G''(ω) in Pa at small strain: a cycle of shear of amplitude γ loses π γ² G'' (J/m³)."""
+        """Return G''(ω) in Pa at small strain: a cycle of shear of amplitude γ loses π γ² G'' (J/m³)."""
         return self.shear_modulus * self.prony.loss(frequency)
 
     def distortion(self, F: Tensor, state: Mapping[str, Any] = NO_STATE, dt: Any = None) -> Scalar:
-        """Incremental energy without the elastic volumetric part, in J/m³.
+        """Return the incremental energy without the elastic volumetric part, in J/m³.
 
         Its gradient is the stress; its value is no stored energy. `dt` in s; None is an instant, infinity for ever.
         """
@@ -275,7 +249,7 @@ class Viscoelastic(MadeFrom):
         return energy + inner(memory, self._strain(F))
 
     def prepare(self, state: Mapping[str, Any], dt: Any) -> dict[str, Any]:
-        """What `energy` and `distortion` need of the state in a step of `dt` seconds: M (..., 3, 3) in Pa.
+        """Return M (..., 3, 3) in Pa, all that `energy` and `distortion` need of the state in a step of `dt` seconds.
 
         They take it in place of the state. A solver that keeps it at quadrature points saves its evaluation, once per
         pair of strain components and Newton iteration.
@@ -288,7 +262,7 @@ class Viscoelastic(MadeFrom):
         return {"memory": memory}
 
     def advance(self, F: Tensor, state: Mapping[str, Any], dt: Any) -> dict[str, Any]:
-        """S_0 and H_i (..., 3, 3) in Pa at the end of the step."""
+        """Return S_0 and H_i (..., 3, 3) in Pa at the end of the step."""
         stress = self._stress(F)
         series, change = self.prony, stress - state["stress"]
         after = {"stress": stress}
@@ -298,7 +272,7 @@ class Viscoelastic(MadeFrom):
         return compile_values(after)
 
     def stored(self, F: Tensor, state: Mapping[str, Any]) -> Scalar:
-        """Free energy in J/m³ at F, with the state after the step: relaxed law and springs of the terms.
+        """Return the free energy in J/m³ at F, with the state after the step: relaxed law and springs of the terms.
 
         Exact where the base law's stress is linear in its strain; elsewhere an estimate, see `spring_energy`.
         """
@@ -306,7 +280,7 @@ class Viscoelastic(MadeFrom):
         return relaxed if self.volumetric is None else relaxed + self.volumetric.energy(F)
 
     def stored_distortion(self, F: Tensor, state: Mapping[str, Any]) -> Scalar:
-        """The same without the elastic volumetric part, which a mixed formulation writes in its own way."""
+        """Return `stored` without the elastic volumetric part, which a mixed formulation writes in its own way."""
         series, bulk = self.prony, self._bulk
         springs = sum(
             spring_energy(state[name], share * self.shear_modulus, share * bulk)
@@ -315,7 +289,7 @@ class Viscoelastic(MadeFrom):
         return series.equilibrium * part_of(self.base, self.part, F) + springs
 
     def dissipated(self, F: Tensor, state: Mapping[str, Any], dt: float) -> Scalar:
-        """What the dashpots turn into heat in a step from `state` to F, in J/m³, never negative."""
+        """Return the heat of the dashpots in a step from `state` to F, in J/m³, never negative."""
         change, bulk = self._stress(F) - state["stress"], self._bulk
         return sum(
             dashpot_loss(
@@ -325,7 +299,7 @@ class Viscoelastic(MadeFrom):
         )
 
     def __str__(self) -> str:
-        """The law, its moduli at once and in the end, the Prony terms and the source, in words."""
+        """Return the law, its moduli at once and in the end, the Prony terms and the source, in words."""
         left = self.relaxed().young if self.prony.equilibrium > 0 else 0.0
         return in_words(self, f"{self.prony} to E = {left:.4g} Pa", at_once=True)
 
@@ -340,18 +314,18 @@ class Viscoelastic(MadeFrom):
         return 0.0 if kept == self.bulk_modulus else self.bulk_modulus - kept
 
     def _weight(self, dt: Any) -> Any:
-        """γ_∞ + Σ γ_i a_i."""
+        """Return γ_∞ + Σ γ_i a_i."""
         series = self.prony
         gains = zip(series.shares, series.gain(dt), strict=True)
         return series.equilibrium + sum(share * gain for share, gain in gains)
 
     def _strain(self, F: Tensor) -> Tensor:
-        """The strain that the law's stress works on: ε, or Green's strain."""
+        """Return the strain that the law's stress works on: ε, or Green's strain."""
         if self.kinematics == "small":
             return sym(F - identity(F))
         return 0.5 * (matmul(transpose(F), F) - identity(F))
 
     def _stress(self, F: Tensor) -> Tensor:
-        """S_0 of the part that relaxes (second Piola–Kirchhoff; Cauchy at small strain), in Pa."""
+        """Return S_0 of the part that relaxes (second Piola–Kirchhoff; Cauchy at small strain), in Pa."""
         first = gradient(lambda A: part_of(self.base, self.part, A), F)
         return sym(first) if self.kinematics == "small" else sym(matmul(inverse(F), first))

@@ -68,9 +68,9 @@ class Varied:
     low, high : float
         Ends of its range, in SI units.
     name : str
-        Of the input, by default the path.
+        Name of the input, by default the path.
     unit : str
-        By default that of the property, where it is known.
+        Unit of the input, by default that of the property, where it is known.
 
     Raises
     ------
@@ -108,7 +108,7 @@ class Varied:
 
     @property
     def is_material(self) -> bool:
-        """Whether it is a number of a material, whose slope of the energy is one of an integral."""
+        """True for a number of a material, whose slope of the energy is one of an integral."""
         return self.path != RADIUS and not self.path.endswith(f".{THICKNESS}")
 
     def apply(self, body: Body, value: float) -> Body:
@@ -123,7 +123,8 @@ class Varied:
             return body
         if not self.is_material:
             return replace(
-                body, geometry=_layered(body, self.path).with_thickness(self.path.partition(".")[0], value)
+                body,
+                geometry=_layered_block(body, self.path).with_thickness(self.path.partition(".")[0], value),
             )
         materials = body.materials
         region, _, rest = self.path.partition(".")
@@ -135,18 +136,18 @@ class Varied:
                 why=f"Its regions are {', '.join(materials)}.",
                 fix=f'Write region and property, for example "{next(iter(materials))}.young".',
             )
-        materials[region] = _replaced(materials[region], rest.split("."), value, self.path)
+        materials[region] = _with_property(materials[region], rest.split("."), value, self.path)
         return replace(body, material=materials)
 
 
 def with_values(body: Body, varied: tuple[Varied, ...], values: tuple[float, ...]) -> Body:
-    """The member of the family with these values."""
+    """Return the member of the family with these values."""
     for entry, value in zip(varied, values, strict=True):
         body = entry.apply(body, value)
     return body
 
 
-def _layered(body: Body, path: str) -> LayeredBlock:
+def _layered_block(body: Body, path: str) -> LayeredBlock:
     if isinstance(body.geometry, LayeredBlock):
         return body.geometry
     raise UsageError(
@@ -156,12 +157,12 @@ def _layered(body: Body, path: str) -> LayeredBlock:
     )
 
 
-def _replaced(material: Any, path: list[str], value: float, whole: str) -> Any:
+def _with_property(material: Any, path: list[str], value: float, whole: str) -> Any:
     name, rest = path[0], path[1:]
     known = [f.name for f in fields(material)] if is_dataclass(material) else []
     inner = getattr(material, name) if name in known else None
     if rest and is_dataclass(inner):
-        return replace(material, **{name: _replaced(inner, rest, value, whole)})
+        return replace(material, **{name: _with_property(inner, rest, value, whole)})
     if rest or name in BESIDE or isinstance(inner, bool) or not isinstance(inner, int | float):
         numbers = [n for n in known if isinstance(getattr(material, n), float) and n not in BESIDE]
         raise UsageError(
@@ -181,7 +182,7 @@ class BodyFamily:
     Attributes
     ----------
     body : Body
-        What all members have in common; its own values of what varies do not matter.
+        The common body; its own values of what varies do not matter.
     varied : tuple of Varied
         Numbers of materials, thicknesses of layers, the probe's radius.
 
@@ -219,11 +220,11 @@ class BodyFamily:
     def problem(
         self, *interactions: Interaction, element: float | None = None, stress: bool = False
     ) -> FamilyProblem:
-        """The family under interactions; see `Body.problem`."""
+        """Put the family under interactions; see `Body.problem`."""
         return FamilyProblem(self.body.problem(*interactions, element=element, stress=stress), self.varied)
 
     def member(self, values: Sequence[float]) -> Body:
-        """The body of these values."""
+        """Return the body of these values."""
         return with_values(self.body, self.varied, tuple(float(v) for v in values))
 
     def __str__(self) -> str:
@@ -240,7 +241,9 @@ class FamilyProblem:
     Attributes
     ----------
     base : SolidProblem
+        Problem of the common body.
     varied : tuple of Varied
+        The k numbers that vary.
     """
 
     base: SolidProblem
@@ -257,7 +260,7 @@ class FamilyProblem:
 
     @property
     def _radius(self) -> int | None:
-        """Which of what varies is the probe's radius."""
+        """Index of the probe's radius in `varied`, if it varies."""
         paths = [entry.path for entry in self.varied]
         return paths.index(RADIUS) if RADIUS in paths else None
 
@@ -294,12 +297,12 @@ class FamilyProblem:
 
     @property
     def layout(self) -> Layout:
-        """Of all members: their shape is the same."""
+        """Nodes and axes of all members: their shape is the same."""
         return self.base.layout
 
     @property
     def schema(self) -> tuple[Field, ...]:
-        """What each solve answers."""
+        """Fields of each answer."""
         return solid_fields(len(self.base.mesh.points), self.ranges, stress=self.base.stress)
 
     @property
@@ -309,7 +312,7 @@ class FamilyProblem:
 
     @property
     def symmetry(self) -> dict[str, Any] | None:
-        """Of every member."""
+        """Isometries of every member."""
         return self.base.symmetry
 
     @property
@@ -319,11 +322,11 @@ class FamilyProblem:
 
     @property
     def mesh(self) -> Any:
-        """Of all members at rest."""
+        """Mesh of all members at rest."""
         return self.base.mesh
 
     def member(self, values: Sequence[float]) -> SolidProblem:
-        """The problem of the body with these values."""
+        """Return the problem of the body with these values."""
         values = tuple(float(v) for v in values)
         body = with_values(self.base.body, self.varied, values)
         if self._radius is None:
@@ -332,7 +335,7 @@ class FamilyProblem:
         return replace(self.base, body=body, interactions=(probe,))
 
     def describe(self) -> dict[str, Any]:
-        """Everything that decides the answers, as plain data for a JSON file."""
+        """Return everything that decides the answers, as plain data for a JSON file."""
         varied = [{"path": entry.path, "range": [entry.low, entry.high]} for entry in self.varied]
         low = self.member([entry.low for entry in self.varied])
         return low.describe() | {"varied": varied}
@@ -346,7 +349,7 @@ class FamilyProblem:
         return self.open().solve(x)
 
     def design(self, samples: int, seed: int = 0, **options: Any) -> np.ndarray:
-        """Inputs (samples, n + k): chains of the interaction's own design, each of one member.
+        """Return inputs (samples, n + k): chains of the interaction's own design, each of one member.
 
         Members are a scrambled Sobol sequence (Owen 1998) of their own.
         """
@@ -368,14 +371,14 @@ class FamilyProblem:
         return np.hstack([points, values])
 
     def chains(self, points: Any) -> list[np.ndarray]:
-        """Rows of `points` (N, n + k) in chains, each of one member."""
+        """Return rows of `points` (N, n + k) in chains, each of one member."""
         points = np.asarray(points, dtype=float)
-        n, found = len(self.base.ranges), []
+        n, chains = len(self.base.ranges), []
         _, which = np.unique(points[:, n:], axis=0, return_inverse=True)
         for member in range(which.max() + 1 if len(points) else 0):
             rows = np.flatnonzero(which.ravel() == member)
-            found += [rows[chain] for chain in self.base.chains(points[rows, :n])]
-        return found
+            chains += [rows[chain] for chain in self.base.chains(points[rows, :n])]
+        return chains
 
     def check_points(self, points: np.ndarray) -> None:
         """Refuse positions far from the body, and properties that its materials do not allow."""
@@ -409,7 +412,7 @@ class FamilySolver:
             self._solver.reset()
 
     def solve(self, x: Any) -> SolidSolution:
-        """Equilibrium under inputs x (n + k,).
+        """Find the equilibrium under inputs x (n + k,).
 
         Raises
         ------
@@ -425,19 +428,20 @@ class FamilySolver:
                 fix=f"Give {n + k} finite numbers.",
             )
         solver = self._solver_for(tuple(x[n:].tolist()))
-        found = solver.solve(x[:n])
+        solution = solver.solve(x[:n])
         gradient = np.full((n + k, n + k), np.nan)
-        gradient[:n, :n] = found.response_gradient
+        gradient[:n, :n] = solution.response_gradient
         slopes = [
-            s.evaluate(found.state) if s is not None and found.converged else np.nan for s in self._slopes
+            s.evaluate(solution.state) if s is not None and solution.converged else np.nan
+            for s in self._slopes
         ]
         return replace(
-            found,
+            solution,
             ranges=self._problem.ranges,
             inputs=x,
-            response=np.concatenate([found.response, -np.asarray(slopes)]),
+            response=np.concatenate([solution.response, -np.asarray(slopes)]),
             response_gradient=gradient,
-            reached=np.concatenate([found.reached, x[n:]]),
+            reached=np.concatenate([solution.reached, x[n:]]),
         )
 
     def _solver_for(self, values: tuple[float, ...]) -> SolidSolver:
@@ -455,16 +459,16 @@ class FamilySolver:
 
 def _both(first: tuple[FineMesh, ...], second: tuple[FineMesh, ...]) -> tuple[FineMesh, ...]:
     """Return meshes that satisfy two wishes for each surface: the smaller elements, in a box around both."""
-    found = []
+    fine = []
     for a, b in zip(first, second, strict=True):
         if a == b:  # wanted by what holds the body
-            found.append(a)
+            fine.append(a)
             continue
         # a probe wants it in a box around its footprints
         lower = np.minimum(np.array(a.lower), np.array(b.lower)).tolist()
         upper = np.maximum(np.array(a.upper), np.array(b.upper)).tolist()
-        found.append(FineMesh(a.surface, min(a.element, b.element), tuple(lower), tuple(upper)))
-    return tuple(found)
+        fine.append(FineMesh(a.surface, min(a.element, b.element), tuple(lower), tuple(upper)))
+    return tuple(fine)
 
 
 class _EnergySlope:
@@ -481,7 +485,7 @@ class _EnergySlope:
         self._base = self._difference(model.base)
 
     def evaluate(self, z: np.ndarray) -> float:
-        """∂U/∂p at the unknowns z (dof,) of an equilibrium."""
+        """Return ∂U/∂p at the unknowns z (dof,) of an equilibrium."""
         return self._difference(z) - self._base
 
     def _difference(self, z: np.ndarray) -> float:

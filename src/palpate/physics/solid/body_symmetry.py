@@ -1,4 +1,4 @@
-"""Which rotations and reflections leave a body, its supports and a touched surface where they are.
+"""Symmetry of a body: rotations and reflections that leave it, its supports and a touched surface in place.
 
 A touch at a place then tells of the touches at all images of that place: U(c) = U(M c), F(M c) = M F(c).
 """
@@ -34,9 +34,9 @@ class Symmetry:
     Attributes
     ----------
     matrices : (k, 3, 3) array
-        The identity among them.
+        Rotations and reflections, the identity among them.
     about : (3,) array
-        In m.
+        Point in m that stays.
     """
 
     matrices: np.ndarray
@@ -46,19 +46,19 @@ class Symmetry:
         return len(self.matrices)
 
     def part(self, kept: Iterable[bool]) -> Symmetry:
-        """Those that are kept; they must be a group too."""
+        """Return the isometries that are kept; they must be a group too."""
         return Symmetry(self.matrices[list(kept)], self.about)
 
     def describe(self) -> dict[str, Any]:
-        """As plain data for a JSON file."""
+        """Return the group as plain data for a JSON file."""
         return {"about": self.about.tolist(), "isometries": self.matrices.tolist()}
 
 
 def symmetry_of(body: Body, touches: str) -> Symmetry:
-    """The isometries of a body that is touched on a surface; the identity alone where there is no symmetry.
+    """Return the isometries of a body that is touched on a surface; the identity alone where there is no symmetry.
 
     Fixed surfaces and the touched one must stay where they are as a whole, gravity must keep its direction, and no
-    material may have directions; of one that is stretched beforehand the stretches must stay. Bodies that are held by
+    material may have directions; of one that is stretched beforehand the stretches must stay. Bodies with constant
     interactions are not looked into.
     """
     shape = body.geometry
@@ -81,7 +81,7 @@ def symmetry_of(body: Body, touches: str) -> Symmetry:
 
 
 def _is_directed(material: Any) -> bool:
-    """Whether a material, or one that it is made from, has directions."""
+    """Return whether a material, or one that it is made from, has directions."""
     if isinstance(material, DIRECTED):
         return True
     if not is_dataclass(material):
@@ -91,7 +91,7 @@ def _is_directed(material: Any) -> bool:
 
 
 def fundamental_part(body: Body, probe: SphereProbe) -> SphereProbe:
-    """The probe, over a part of its footprint whose images are all of it.
+    """Return the probe, over a part of its contact points whose images are all of it.
 
     For groups about an upright axis in the middle of the footprint: with n mirror planes the box around a sector
     of the angle π/n. Any other probe comes back as it is. The mesh is then fine there only.
@@ -112,5 +112,5 @@ def fundamental_part(body: Body, probe: SphereProbe) -> SphereProbe:
 
 
 def _has_mirror_on_x(symmetry: Symmetry) -> bool:
-    """Whether y → −y is one of them: a sector begins at the x axis."""
+    """Return whether y → −y is one of them: a sector begins at the x axis."""
     return any(np.allclose(matrix, np.diag([1.0, -1.0, 1.0])) for matrix in symmetry.matrices)

@@ -1,4 +1,4 @@
-"""A solid body: its shape, what it is made of, where it is held and what always acts on it."""
+"""A solid body: its shape, materials, supports and constant loads."""
 
 from __future__ import annotations
 
@@ -45,14 +45,16 @@ class Body:
     Attributes
     ----------
     geometry : Geometry
+        Shape of the body at rest.
     material : Material or {region: Material}
-        Kept as a tuple of (region, material) in the order of the geometry's regions.
+        One material for all regions, or one for each; kept as a tuple of (region, material) in the order of the
+        geometry's regions.
     fixed : str or tuple of str
         Surfaces whose displacement is zero.
     gravity : (3,) tuple
         Acceleration in m/s² that acts on the material's density.
     held : tuple of Fixed
-        Interactions that always act, with their inputs: pre-stress, and supports that slide (`roller`).
+        Constant interactions, with their inputs: pre-stress, and supports that slide (`roller`).
     formulation : {"auto", "displacement", "mixed"}
         ``"auto"`` takes the mixed form in regions whose initial Poisson's ratio is 0.48 or more and whose
         material has a separate volumetric energy; `describe` and `formulation_of` tell which.
@@ -105,11 +107,11 @@ class Body:
 
     @property
     def has_history(self) -> bool:
-        """Whether the answer depends on what was before: some material has internal variables."""
+        """True where the answer depends on what was before: some material has internal variables."""
         return any(material.states for material in self.materials.values())
 
     def formulation_of(self, region: str) -> tuple[Literal["displacement", "mixed"], str]:
-        """Form of a region, and why.
+        """Return the form of a region, and why.
 
         Raises
         ------
@@ -138,7 +140,7 @@ class Body:
         return tuple(region for region in self.materials if self.formulation_of(region)[0] == "mixed")
 
     def describe(self) -> dict[str, Any]:
-        """Everything that decides the answers, as plain data for a JSON file."""
+        """Return everything that decides the answers, as plain data for a JSON file."""
         return {
             "type": "Body",
             "geometry": self.geometry.describe(),
@@ -166,7 +168,7 @@ class Body:
     def problem(
         self, *interactions: Interaction, element: float | None = None, stress: bool = False
     ) -> SolidProblem:
-        """The body under interactions whose inputs vary.
+        """Put the body under interactions whose inputs vary.
 
         Parameters
         ----------
@@ -175,7 +177,7 @@ class Body:
         element : float, optional
             Element size in m where the interactions need a fine mesh, in place of their own.
         stress : bool
-            Whether every answer, and so every row of a sweep, has von Mises stress at the nodes.
+            True for von Mises stress at the nodes in every answer, and so in every row of a sweep.
 
         Raises
         ------

@@ -59,7 +59,7 @@ def require_geometry(thing: Any) -> None:
 
 
 def surfaces_of(given: Any, geometry: Any) -> tuple[str, ...]:
-    """Names of fixed surfaces, ``"side"`` of a box written out.
+    """Return the names of fixed surfaces, ``"side"`` of a box written out.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def surfaces_of(given: Any, geometry: Any) -> tuple[str, ...]:
 def by_region(
     given: Any, regions: tuple[str, ...], needed: tuple[str, ...] = MATERIAL
 ) -> tuple[tuple[str, Any], ...]:
-    """(region, material) in the order of the regions, from one material for all or one for each.
+    """Return (region, material) in the order of the regions, from one material for all or one for each.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def by_region(
 
 
 def require_held_values(given: Any) -> tuple[Fixed, ...]:
-    """Interactions that always act, each with its inputs.
+    """Return constant interactions, each with its inputs.
 
     Raises
     ------
@@ -190,13 +190,13 @@ def _require_material(thing: Any, needed: tuple[str, ...]) -> None:
 
 
 def _lacks(thing: Any, names: tuple[str, ...]) -> bool:
-    """Whether a member is missing; none is evaluated, for a file would be read."""
+    """Return whether a member is missing; none is evaluated, for a file would be read."""
     nothing = object()
     return any(inspect.getattr_static(thing, name, nothing) is nothing for name in names)
 
 
 def longest_side(geometry: Any) -> float:
-    """The body's longest side in m."""
+    """Return the body's longest side in m."""
     size = getattr(geometry, "size", None)
     if size is None:
         low, high = geometry.rest().corners
@@ -275,7 +275,7 @@ def require_near(points: np.ndarray, ranges: Sequence[Range], longest: float) ->
 
 
 def _numbers(value: Any) -> Iterator[float]:
-    """The numbers in a value, a range or several of them."""
+    """Yield the numbers in a value, a range or several of them."""
     if isinstance(value, int | float):
         yield float(value)
     elif isinstance(value, tuple | list):

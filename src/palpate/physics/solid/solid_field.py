@@ -55,6 +55,7 @@ class SolidField:
     Parameters
     ----------
     mesh : ngsolve.Mesh
+        Mesh of the body.
     rest : BodyMesh
         The same mesh as plain arrays.
     order : int
@@ -74,8 +75,8 @@ class SolidField:
         self.mesh, self.rest, self.order = mesh, rest, order
         for name in fixed:
             require_known("surface", name, rest.surfaces)
-        held = [member for name in fixed for member in members(name, rest.surfaces)]
-        motion = ngsolve.VectorH1(mesh, order=order, dirichlet=pattern(held))
+        fixed_parts = [member for name in fixed for member in members(name, rest.surfaces)]
+        motion = ngsolve.VectorH1(mesh, order=order, dirichlet=pattern(fixed_parts))
         pressures = [
             ngsolve.Compress(ngsolve.H1(mesh, order=order - 1, definedon=mesh.Materials(pattern([region]))))
             for region in mixed
@@ -99,19 +100,19 @@ class SolidField:
 
     @property
     def moving(self) -> np.ndarray:
-        """Which unknowns are displacements, bool of shape (dof,)."""
+        """Mask of the displacements among the unknowns, bool of shape (dof,)."""
         return np.arange(self.size) < self.motion_size
 
     def show(self, z: np.ndarray) -> None:
         """Make unknowns (dof,) the state under inspection."""
         self.state.vec.FV().NumPy()[:] = z
 
-    def settle(self, z: np.ndarray) -> None:
+    def set_base(self, z: np.ndarray) -> None:
         """Make the displacement in unknowns (dof,) the body's base state."""
         self.base.vec.FV().NumPy()[:] = z[: self.motion_size]
 
     def surface(self, name: str) -> Any:
-        """NGSolve region of a named surface.
+        """Return the NGSolve region of a named surface.
 
         Raises
         ------
@@ -122,22 +123,22 @@ class SolidField:
         return self.mesh.Boundaries(pattern(members(name, self.rest.surfaces)))
 
     def region(self, name: str) -> Any:
-        """NGSolve region of a named part of the volume."""
+        """Return the NGSolve region of a named part of the volume."""
         return self.mesh.Materials(pattern([name]))
 
     def surface_dofs(self, name: str) -> np.ndarray:
-        """Which unknowns are displacements on a named surface, bool of shape (dof,)."""
+        """Return a mask of the displacements on a named surface, bool of shape (dof,)."""
         dofs = np.fromiter(self.space.GetDofs(self.surface(name)), dtype=bool, count=self.size)
         return np.asarray(dofs & self.moving)
 
     def at_nodes(self, field: Any = None) -> np.ndarray:
-        """Values (node, 3) in m of `displacement`, or of another such grid function, at the mesh's vertices."""
+        """Return values (node, 3) in m of `displacement`, or of another such grid function, at the mesh's vertices."""
         values = (self.displacement if field is None else field).vec.FV().NumPy()
         # the components one after the other, each beginning with the vertices
         return np.array(values.reshape(3, -1)[:, : len(self.rest.points)].T)
 
     def interpolate(self, displacement: Any) -> np.ndarray:
-        """Unknowns (dof,) of a displacement given as a coefficient function (3,), on the whole body."""
+        """Return unknowns (dof,) of a displacement given as a coefficient function (3,), on the whole body."""
         import ngsolve
 
         image = ngsolve.GridFunction(self.base.space)
@@ -145,7 +146,7 @@ class SolidField:
         return self._embedded(image.vec.FV().NumPy())
 
     def load(self, integrand: Callable[[Any], Any]) -> np.ndarray:
-        """Load vector l (dof,) of a linear form, from a test displacement v to its integral: ``t * v * ds(...)``."""
+        """Return the load vector l (dof,) of a linear form, given as a function of the test displacement v."""
         import ngsolve
 
         form = ngsolve.LinearForm(self.base.space)
@@ -179,5 +180,5 @@ class SolidField:
 
 
 def pattern(names: Sequence[str]) -> str:
-    """Regular expression that matches these names only, as NGSolve reads regions."""
+    """Return a regular expression that matches these names only, as NGSolve reads regions."""
     return "|".join(re.escape(name) for name in names)

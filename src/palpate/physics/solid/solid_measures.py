@@ -1,4 +1,4 @@
-"""What is measured of a state at the quadrature points and at the nodes."""
+"""Strains and stresses of a state at the quadrature points and at the nodes."""
 
 from __future__ import annotations
 
@@ -25,10 +25,11 @@ class Measures:
     Parameters
     ----------
     field : SolidField
+        Unknowns of the body.
     materials : mapping of str to Material
-        By region.
+        Materials by region.
     histories : mapping of str to History
-        By region, of materials with a history.
+        Internal variables by region, of materials with a history.
     """
 
     def __init__(
@@ -40,7 +41,7 @@ class Measures:
         self._gradient = deformation_gradient(field.displacement)
 
     def least_volume_ratio(self) -> float:
-        """Least det F at the quadrature points, corners and middles of edges of all elements."""
+        """Return the least det F at the quadrature points, corners and middles of edges of all elements."""
         gradients = [self._gradients(large=large) for large in (True, False)]
         # F varies linearly over an element of second order: its corners turn over first
         gradients.append(self._at(self._field.mesh.Materials(".*"), _corners_and_middles()))
@@ -59,7 +60,7 @@ class Measures:
         return float(np.abs(both).max())
 
     def stored_energy(self) -> float:
-        """Free energy in J, with the internal variables as they are; every history must tell its density."""
+        """Return the free energy in J, with the internal variables as they are; every history must know its density."""
         import ngsolve
 
         total = 0.0
@@ -75,14 +76,14 @@ class Measures:
         return float(total)
 
     def _density(self, region: str, material: Material) -> Any:
-        """Energy density in J/m³ of the state under inspection, of a material without a history."""
+        """Return the energy density in J/m³ of the state under inspection, of a material without a history."""
         pressure = self._field.pressure.get(region)
         if pressure is None:
             return material.energy(self._gradient)
         return mixed_density(material, self._gradient, pressure)
 
     def at_nodes(self) -> dict[str, np.ndarray]:
-        """All fields at the nodes, by their names in a solution."""
+        """Return all fields at the nodes, by their names in a solution."""
         return {
             "stress": self.stress(),
             "von_mises": self.von_mises(),
@@ -90,36 +91,38 @@ class Measures:
         }
 
     def von_mises(self) -> np.ndarray:
-        """von Mises' equivalent of the Cauchy stress in Pa at the nodes, shape (node,)."""
+        """Return von Mises' equivalent of the Cauchy stress in Pa at the nodes, shape (node,)."""
         import ngsolve
 
         def equivalent(stress: Any) -> Any:
             deviator = stress - ngsolve.Trace(stress) / 3 * ngsolve.Id(3)
             return ngsolve.sqrt(1.5 * ngsolve.InnerProduct(deviator, deviator))
 
-        known = self._stresses()
-        projected = self._at_nodes({region: equivalent(stress).Compile() for region, stress in known.items()})
+        stresses = self._stresses()
+        projected = self._at_nodes(
+            {region: equivalent(stress).Compile() for region, stress in stresses.items()}
+        )
         # a projection undershoots beside a steep peak; an equivalent stress is not negative
         return np.asarray(np.maximum(projected, 0.0))
 
     def stress(self) -> np.ndarray:
-        """Cauchy stress in Pa at the nodes, shape (node, 3, 3)."""
-        known = self._stresses()
+        """Return the Cauchy stress in Pa at the nodes, shape (node, 3, 3)."""
+        stresses = self._stresses()
         result = np.empty((len(self._field.rest.points), 3, 3))
         for i, j in itertools.combinations_with_replacement(range(3), 2):
-            component = {region: stress[i, j].Compile() for region, stress in known.items()}
+            component = {region: stress[i, j].Compile() for region, stress in stresses.items()}
             result[:, i, j] = result[:, j, i] = self._at_nodes(component)
         return result
 
     def _stresses(self) -> dict[str, Any]:
-        """Cauchy stress of each region, a coefficient function (3, 3)."""
+        """Return the Cauchy stress of each region, a coefficient function (3, 3)."""
         return {
             region: cauchy_stress(self._field, region, material, self._histories.get(region))
             for region, material in self._materials.items()
         }
 
     def largest_stretch(self) -> np.ndarray:
-        """Largest principal stretch at the nodes, shape (node,)."""
+        """Return the largest principal stretch at the nodes, shape (node,)."""
         gradients = np.stack(
             [
                 self._at_nodes(dict.fromkeys(self._materials, self._gradient[i, j]))
@@ -132,19 +135,19 @@ class Measures:
         return np.asarray(np.sqrt(squares[:, -1]))
 
     def _gradients(self, *, large: bool) -> np.ndarray:
-        """F at the quadrature points of all regions of large or of small strain, shape (N, 3, 3)."""
-        found = [np.empty((0, 3, 3))]
+        """Return F at the quadrature points of all regions of large or of small strain, shape (N, 3, 3)."""
+        gradients = [np.empty((0, 3, 3))]
         for region, material in self._materials.items():
             if (material.kinematics == "large") == large:
-                found.append(self._at(self._field.region(region), volume_rule(self._field, material)))
-        return np.concatenate(found)
+                gradients.append(self._at(self._field.region(region), volume_rule(self._field, material)))
+        return np.concatenate(gradients)
 
     def _at(self, region: Any, rule: Any) -> np.ndarray:
-        """F at the points of a rule in all elements of a region, shape (N, 3, 3)."""
+        """Return F at the points of a rule in all elements of a region, shape (N, 3, 3)."""
         return np.asarray(self._gradient(self._field.mesh.MapToAllElements(rule, region))).reshape(-1, 3, 3)
 
     def _at_nodes(self, values: Mapping[str, Any]) -> np.ndarray:
-        """A field given by region, averaged over the elements around each node, shape (node,)."""
+        """Return a field given by region, averaged over the elements around each node, shape (node,)."""
         import ngsolve
 
         image = ngsolve.GridFunction(ngsolve.H1(self._field.mesh, order=1))
@@ -153,7 +156,7 @@ class Measures:
 
 
 def _corners_and_middles() -> Any:
-    """The nodes of a tetrahedron of second order as points to look at."""
+    """Return the nodes of a tetrahedron of second order as points to look at."""
     import ngsolve
 
     points = [tuple(point) for point in np.vstack([CORNERS, MIDDLES]).tolist()]
@@ -161,5 +164,5 @@ def _corners_and_middles() -> Any:
 
 
 def _principal_strains(gradients: np.ndarray) -> np.ndarray:
-    """Eigenvalues (N, 3) of ε = sym(F - I) for F (N, 3, 3)."""
+    """Return eigenvalues (N, 3) of ε = sym(F - I) for F (N, 3, 3)."""
     return np.linalg.eigvalsh((gradients + np.swapaxes(gradients, 1, 2)) / 2) - 1

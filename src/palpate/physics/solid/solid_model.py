@@ -365,7 +365,7 @@ def open_problem(problem: SolidProblem, solver: str, tolerance: float) -> OpenPr
         require_held(field, [constant.attached for constant in constants])
         settled = _settle(model(constants=[], varied=[c.attached for c in constants], base=rest), constants)
         base = settled.last.z
-        field.settle(base)
+        field.set_base(base)
     varied = [interaction.attach(field) for interaction in problem.interactions]
     if not constants:
         require_held(field, varied)

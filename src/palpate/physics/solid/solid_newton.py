@@ -32,18 +32,18 @@ CHORDS = 12  # chord steps with one tangent
 
 @dataclass(frozen=True)
 class Scale:
-    """What energies are measured by: J from `reference`, at least `floor`."""
+    """The scale of energies: J from `reference`, at least `floor`."""
 
     reference: float
     floor: float
 
     def error(self, decrement: float, potential: float) -> float:
-        """Relative error in the energy norm of a state with this decrement rᵀK⁻¹r in J."""
+        """Return the relative error in the energy norm of a state with this decrement rᵀK⁻¹r in J."""
         return math.sqrt(decrement / max(abs(potential - self.reference), self.floor))
 
 
 def error_at(system: System, scale: Scale, z: np.ndarray) -> float:
-    """Relative error in the energy norm of a state (dof,), with the present tangent."""
+    """Return the relative error in the energy norm of a state (dof,), with the present tangent."""
     residual = system.residual(z)
     return _error(system, scale, residual, system.solve(residual), system.potential(z))
 
@@ -59,13 +59,14 @@ def _error(
 
 @dataclass(frozen=True)
 class NewtonResult:
-    """Where the iteration ended.
+    """The end of an iteration.
 
     Attributes
     ----------
     z : (dof,) array
         The last accepted state.
     stop : Stop
+        Why it ended.
     iterations : int
         Tangents assembled and factorised.
     error : float
@@ -106,15 +107,17 @@ def equilibrate(
     Parameters
     ----------
     system : System
+        The equations.
     start : (dof,) array
-        Its given unknowns stay as they are.
+        State to begin from; its given unknowns stay as they are.
     scale : Scale
+        Scale of energies.
     tolerance : float
         Relative error in the energy norm; the correction then at hand is still made.
     limit : int
-        Most factorisations.
+        Largest number of factorisations.
     fresh : bool
-        Whether to begin with a new tangent, or to try the present one first.
+        True to begin with a new tangent, False to try the present one first.
 
     Returns
     -------
@@ -142,7 +145,7 @@ class _Iteration:
             return self._end(start, Stop.CONVERGED, 0.0)
         point = _Point(start, potential, residual, np.zeros(0), math.inf)
         if not fresh:
-            point = self._chord_steps(self._measured(point))
+            point = self._chord_steps(self._with_correction(point))
         last = math.inf
         while point.error > self._tolerance and not 0.25 * last < point.error < ROUND_OFF:
             if self._iterations == limit:
@@ -155,10 +158,10 @@ class _Iteration:
         return self._end(point.z - point.correction, Stop.CONVERGED, point.error)
 
     def _newton_step(self, point: _Point) -> _Point | Stop:
-        """One step with a new tangent, or why there is none."""
+        """Take one step with a new tangent, or why there is none."""
         self._system.factorise(point.z)
         self._iterations += 1
-        point = self._measured(point)
+        point = self._with_correction(point)
         if not math.isfinite(point.error):
             return Stop.SINGULAR
         if not self._system.saddle and point.residual @ point.correction <= 0:
@@ -175,20 +178,20 @@ class _Iteration:
         return Stop.STEP_TOO_SMALL
 
     def _trial(self, point: _Point, length: float) -> _Point | None:
-        """The state after a step of this length, if it is good enough."""
+        """Return the state after a step of this length, if it is good enough."""
         z = point.z - length * point.correction
         potential = self._system.potential(z)
         if not self._falls(point, potential, length):
             self._rejected = z
             return None
-        trial = self._measured(_Point(z, potential, self._system.residual(z), point.correction, 0.0))
+        trial = self._with_correction(_Point(z, potential, self._system.residual(z), point.correction, 0.0))
         if self._system.saddle and not self._shortens(point, trial, length):
             self._rejected = None  # admissible: no earlier, longer step tells why the search fails
             return None
         return trial
 
     def _falls(self, point: _Point, potential: float, length: float) -> bool:
-        """Whether a trial state is admissible and, in displacement form, its energy low enough."""
+        """Return whether a trial state is admissible and, in displacement form, its energy low enough."""
         if not math.isfinite(potential):
             return False
         if self._system.saddle or point.error < ROUND_OFF:
@@ -197,7 +200,7 @@ class _Iteration:
         return potential <= point.potential - ARMIJO * length * slope
 
     def _shortens(self, point: _Point, trial: _Point, length: float) -> bool:
-        """The natural monotonicity test, in the displacements."""
+        """Apply the natural monotonicity test, in the displacements."""
         moving = self._system.field.moving
         before, after = (float(np.linalg.norm(p.correction[moving])) for p in (point, trial))
         return after <= (1 - length / 4) * before or trial.error < ROUND_OFF
@@ -212,7 +215,9 @@ class _Iteration:
             if not math.isfinite(potential):
                 break
             self._chords += 1
-            trial = self._measured(_Point(z, potential, self._system.residual(z), point.correction, 0.0))
+            trial = self._with_correction(
+                _Point(z, potential, self._system.residual(z), point.correction, 0.0)
+            )
             if not trial.error < point.error:
                 break
             slow = trial.error > CHORD * point.error
@@ -221,8 +226,8 @@ class _Iteration:
                 break
         return point
 
-    def _measured(self, point: _Point) -> _Point:
-        """The same state with the present tangent's correction and the error."""
+    def _with_correction(self, point: _Point) -> _Point:
+        """Return the state with the present tangent's correction and the error."""
         correction = self._system.solve(point.residual)
         error = _error(self._system, self._scale, point.residual, correction, point.potential)
         return _Point(point.z, point.potential, point.residual, correction, error)

@@ -161,7 +161,7 @@ class StepResult:
 
     @property
     def good(self) -> bool:
-        """Whether the step counts."""
+        """True where the step counts."""
         return self.verdict.stop is Stop.CONVERGED and self.error <= 1.0
 
 

@@ -47,13 +47,15 @@ class SolidProblem:
     Attributes
     ----------
     body : Body
+        The body.
     interactions : tuple of Interaction
+        The actions on it whose inputs vary.
     element : float or None
         Element size in m where the interactions need a fine mesh, in place of their own.
     stress : bool
-        Whether every answer, and so every row of a sweep, has von Mises stress at the nodes.
+        True for von Mises stress at the nodes in every answer, and so in every row of a sweep.
     fine : tuple of FineMesh, optional
-        Where the mesh is fine, in place of what the interactions want: so that several problems share one.
+        Fine parts of the mesh, in place of those that the interactions want, so that several problems share a mesh.
     """
 
     body: Body
@@ -98,17 +100,17 @@ class SolidProblem:
     @cached_property
     def ranges(self) -> tuple[Range, ...]:
         """Name, range and unit of each input; names that occur twice are numbered."""
-        found = [r for interaction in self.interactions for r in interaction.ranges(self.body.geometry)]
-        names = [r.name for r in found]
+        ranges = [r for interaction in self.interactions for r in interaction.ranges(self.body.geometry)]
+        names = [r.name for r in ranges]
         numbered = [
             f"{name}_{names[:i].count(name) + 1}" if names.count(name) > 1 else name
             for i, name in enumerate(names)
         ]
-        return tuple(replace(r, name=name) for r, name in zip(found, numbered, strict=True))
+        return tuple(replace(r, name=name) for r, name in zip(ranges, numbered, strict=True))
 
     @cached_property
     def refinements(self) -> tuple[FineMesh, ...]:
-        """Where the mesh is fine."""
+        """Parts of surfaces on which the mesh is fine."""
         if self.fine is not None:
             return self.fine
         parts = (*self.interactions, *(held.interaction for held in self.body.held))
@@ -132,7 +134,7 @@ class SolidProblem:
 
     @property
     def schema(self) -> tuple[Field, ...]:
-        """What each solve answers; a sweep asks for it."""
+        """Fields of each answer; a sweep asks for it."""
         return solid_fields(len(self.mesh.points), self.ranges, stress=self.stress)
 
     @property
@@ -141,7 +143,7 @@ class SolidProblem:
         return None if self._planned() is None else "columns"
 
     def describe(self) -> dict[str, Any]:
-        """Everything that decides the answers, as plain data for a JSON file."""
+        """Return everything that decides the answers, as plain data for a JSON file."""
         return {
             "type": "SolidProblem",
             "body": self.body.describe(),
@@ -157,10 +159,12 @@ class SolidProblem:
         acting = self.interactions[0]
         if len(self.interactions) > 1 or not isinstance(acting, SphereProbe | GluedPad):
             return None
-        found = symmetry_of(self.body, acting.touches)
+        symmetry = symmetry_of(self.body, acting.touches)
         if isinstance(acting, GluedPad):
-            found = found.part(acting.keeps(one, found.about, self.body.geometry) for one in found.matrices)
-        return found.describe()
+            symmetry = symmetry.part(
+                acting.keeps(matrix, symmetry.about, self.body.geometry) for matrix in symmetry.matrices
+            )
+        return symmetry.describe()
 
     @property
     def words(self) -> str:
@@ -210,10 +214,11 @@ class SolidProblem:
         Parameters
         ----------
         x : (n,) array
+            One number per input, in SI units.
         dt : float, optional
             Duration of the step in s, for materials with a history; by default an instant.
         fields : bool
-            Whether to give stress and stretch at the nodes.
+            True for stress and stretch at the nodes.
 
         Raises
         ------
@@ -223,7 +228,7 @@ class SolidProblem:
         return self.open().solve(x, dt=dt, fields=fields)
 
     def design(self, samples: int, seed: int = 0, **options: Any) -> np.ndarray:
-        """Inputs (samples, n) that this problem solves well, in the order of its chains.
+        """Return inputs (samples, n) that this problem solves well, in the order of its chains.
 
         `options` are those of the interaction's own design, such as a probe's `depths`.
 
@@ -242,7 +247,7 @@ class SolidProblem:
         return np.asarray(planned.design(self.body.geometry, samples, seed, **options))
 
     def chains(self, points: Any) -> list[np.ndarray]:
-        """Rows of `points` (N, n) to be solved one after the other by one solver, chain by chain."""
+        """Return rows of `points` (N, n) to be solved one after the other by one solver, chain by chain."""
         points = np.asarray(points, dtype=float)
         self.check_points(points)
         planned = self._planned()
@@ -261,7 +266,7 @@ class SolidProblem:
         require_near(np.asarray(points, dtype=float), self.ranges, self.longest)
 
     def probe_at(self, x: np.ndarray) -> tuple[SphereProbe | None, np.ndarray | None]:
-        """The first sphere among the interactions, and where inputs x (n,) put its centre, (3,) in m."""
+        """Return the first sphere among the interactions, and where inputs x (n,) put its centre, (3,) in m."""
         first = 0
         for interaction in self.interactions:
             if isinstance(interaction, SphereProbe):
@@ -278,7 +283,7 @@ class SolidProblem:
         return f"{self.body}\n  under    {acting}\n  inputs   {inputs}"
 
     def inputs(self, x: Any) -> np.ndarray:
-        """Inputs as an array (n,).
+        """Return inputs as an array (n,).
 
         Raises
         ------

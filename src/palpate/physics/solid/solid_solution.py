@@ -1,4 +1,4 @@
-"""What a solve of a solid returns: always a value, also where it failed."""
+"""Solution of a solid: a plain value that every solve returns, also where it failed."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class SolidSolution:
     ranges : tuple of Range
         Name and unit of each of the n inputs.
     inputs : (n,) array
-        What was asked.
+        Inputs that were asked for.
     displacement : (node, 3) array
         In m at the mesh's vertices. NaN unless converged, as are all the fields below but `state`.
     potential_energy : float
@@ -79,7 +79,7 @@ class SolidSolution:
         Of a failed solve, that equilibrium: displacement, strains and penetration, and for a body without a history
         the response. It has no energies and no stiffness.
     fixed : tuple of str
-        Surfaces that are held.
+        Names of the fixed surfaces.
     probe : SphereProbe or None
         The sphere among the interactions, if there is one.
     centre : (3,) array or None
@@ -118,22 +118,22 @@ class SolidSolution:
 
     @property
     def converged(self) -> bool:
-        """Whether this is a stable, admissible equilibrium."""
+        """True for a stable, admissible equilibrium."""
         return self.stop is Stop.CONVERGED
 
     @property
     def inside(self) -> bool:
-        """Whether all inputs are within their ranges; beyond them the mesh may be coarse where it is touched."""
+        """True where all inputs are within their ranges; beyond them the mesh may be coarse where it is touched."""
         return not self._beyond()
 
     def _beyond(self) -> list[str]:
-        """Inputs outside of their ranges, in words; roundings of an end don't count."""
-        found = []
+        """Return the inputs outside of their ranges, in words; roundings of an end don't count."""
+        beyond = []
         for r, x in zip(self.ranges, self.inputs, strict=True):
             slack = ROUNDING * max(abs(r.low), abs(r.high))
             if not r.low - slack <= x <= r.high + slack:
-                found.append(f"{r.name} = {number(x, 6)} is not in {span((r.low, r.high), r.unit)}")
-        return found
+                beyond.append(f"{r.name} = {number(x, 6)} is not in {span((r.low, r.high), r.unit)}")
+        return beyond
 
     @property
     def message(self) -> str:

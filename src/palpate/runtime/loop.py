@@ -54,15 +54,19 @@ class Loop:
     Parameters
     ----------
     model : Model
+        The learnt body that answers.
     device : Device
+        Where the hand is; the loop closes it at its end.
     shared : Shared
         State out, commands in.
     workspace : Workspace
+        How hand metres become body metres.
     limits : Limits
+        Largest force and its rate of change.
     rate : float
-        Hz.
+        Ticks per second, 10 to 10,000 Hz.
     orphaned : callable
-        Whether the process that wanted the loop has ended.
+        Returns whether the process that wanted the loop has ended; asked once a tick.
 
     Raises
     ------
@@ -110,7 +114,7 @@ class Loop:
         self.stages = (self.read, self.map, self.evaluate, self.limit, self.write)
 
     def run(self, rehearse: Callable[[], None] = lambda: None) -> None:
-        """Tick until told to quit, or until nobody is there to tell; leaves the device at zero force.
+        """Tick until a command ends the loop or its parent is gone; leave the device at zero force.
 
         Parameters
         ----------
@@ -131,7 +135,7 @@ class Loop:
             self.end()
 
     def tick(self, now: float, lateness: float = 0.0, *, jumped: bool = False) -> None:
-        """One pass through the stages.
+        """Pass through the stages once.
 
         Parameters
         ----------
@@ -159,7 +163,7 @@ class Loop:
             self.fault = fault
 
     def read(self) -> None:
-        """Device and commands: where the hand is, and whether that can be believed."""
+        """Read device and commands: where the hand is, and whether that can be believed."""
         self._commands.fetch()  # an unfinished write leaves the last commands standing
         try:
             sample = self.device.read(self.now)
@@ -180,7 +184,7 @@ class Loop:
             self.out.hand[:] = sample.position
 
     def map(self) -> None:
-        """Hand metres to body metres; parameters that were set to those the model takes."""
+        """Turn hand metres into body metres, and take over the parameters that were set."""
         self.workspace.to_body(self.out.hand, self.out.position)
         believed = self.fault is Fault.NONE
         self.evaluator.place(self.out.position, holding=self.holding, believed=believed)
@@ -209,7 +213,7 @@ class Loop:
             self.fail(Fault.OUTPUT_NOT_FINITE)
 
     def limit(self) -> None:
-        """Force, slew and ramp; zero after a fault and for a hand that doesn't hold."""
+        """Limit force, slew and ramp; zero after a fault and for a hand that doesn't hold."""
         self.safety.apply(self.evaluator.force, gate=self.holding and self.fault is Fault.NONE)
         self.out.clamped(self.safety.clamped)
 
@@ -223,7 +227,7 @@ class Loop:
             self.fail(Fault.DEVICE_ERROR)
 
     def end(self) -> None:
-        """Zero force, on the device and in the record, whatever happened before."""
+        """Send and publish zero force, whatever happened before, and close the device."""
         self.safety.stop()
         self.out.end()
         try:

@@ -1,4 +1,4 @@
-"""How well a loop kept time: a histogram of durations, and a report of rate, lateness, work and faults.
+"""Punctuality of a loop, measured: a histogram of durations, and a report of rate, lateness, work and faults.
 
 The histogram has logarithmic bins from 1 µs to 1 s, constant memory, and allocates nothing per sample. Bin 0 counts
 durations below 1 µs, the last bin those of 1 s or more; the 62 between are equal in log t, so that neighbouring edges
@@ -34,6 +34,7 @@ class Histogram:
     Parameters
     ----------
     counts : (64,) int64
+        One for each bin; counted up in place.
     """
 
     def __init__(self, counts: np.ndarray) -> None:
@@ -50,13 +51,14 @@ class Histogram:
 
 
 def percentile(counts: np.ndarray, share: float) -> float:
-    """The duration that `share` of the samples stay below.
+    """Return the duration that `share` of the samples stay below, s.
 
     Parameters
     ----------
     counts : (64,) int64
+        Of a `Histogram`.
     share : float
-        0 … 1.
+        0 … 1; 0.5 for the median.
 
     Returns
     -------
@@ -85,6 +87,7 @@ class LoopReport:
     Attributes
     ----------
     ticks : int
+        Since the start.
     rate : float
         Achieved over the last hundred ticks, Hz.
     lateness_p50, lateness_p99, lateness_p999, lateness_max : float
@@ -118,7 +121,17 @@ class LoopReport:
     def of(
         cls, state: State, obtained: Mapping[str, str] | None = None, foreign: tuple[str, ...] = ()
     ) -> LoopReport:
-        """Sum up a state block."""
+        """Sum up a published state.
+
+        Parameters
+        ----------
+        state : State
+            The newest tick, which carries the histograms.
+        obtained : mapping, optional
+            What the system granted, once that is known.
+        foreign : tuple of str
+            Packages that the loop's process should not have loaded.
+        """
         return cls(
             ticks=state.tick,
             rate=state.rate,
@@ -135,7 +148,7 @@ class LoopReport:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain numbers and texts, in SI units, for JSON."""
+        """Return plain numbers and texts, in SI units, for JSON."""
         return asdict(self) | {"foreign": list(self.foreign)}
 
     def __str__(self) -> str:

@@ -34,11 +34,11 @@ class LoopProcess:
     Parameters
     ----------
     model : path
-        A touch model's file.
+        File of a learnt body that can be touched.
     device : str
         ``page``, or ``stroke:amplitude=0.02``; see `palpate.runtime.devices`.
     rate : float
-        Hz.
+        Ticks per second, Hz.
     workspace : float, optional
         Radius, m; the device's own by default.
     max_force : float, optional
@@ -143,7 +143,7 @@ class LoopProcess:
 
     @property
     def pid(self) -> int:
-        """Of the real-time process."""
+        """Process id of the real-time process."""
         return self._running.pid
 
     @property
@@ -156,7 +156,7 @@ class LoopProcess:
 
     @property
     def alive(self) -> bool:
-        """Whether the process runs."""
+        """True while the process runs."""
         return self._process is not None and self._process.poll() is None
 
     @property
@@ -165,7 +165,7 @@ class LoopProcess:
         return self._state().scale
 
     def read(self) -> State:
-        """The newest tick.
+        """Return the newest tick.
 
         Raises
         ------
@@ -218,7 +218,7 @@ class LoopProcess:
             return State.of(self.shared.state.record, self.shared.prints.record)
 
     def report(self) -> LoopReport:
-        """How the loop did, so far or in all; what the system granted is known once it has stopped."""
+        """Return the report of the loop, so far or in all; what the system granted is known once it has stopped."""
         return LoopReport.of(self._state(), self._said.get("obtained"), tuple(self._said.get("foreign", ())))
 
     def _failure(self, what: str) -> DeviceError | UsageError:

@@ -36,13 +36,13 @@ class Publisher:
         self._counted, self._since = 1, math.inf  # when the rate was last taken
 
     def describe(self, workspace: Workspace, limits: Limits) -> None:
-        """What does not change while the loop runs."""
+        """Take over all that does not change while the loop runs: scale, radius and force limit."""
         self._record["scale"], self._record["radius"] = workspace.scale, workspace.radius
         self._record["max_force"] = limits.max_force
         self._inside[()] = True
 
     def input(self, *, holding: bool, late: bool) -> None:
-        """Whether a hand holds the body, and whether its input is too old."""
+        """Take over whether a hand holds the body, and whether its input is too old."""
         self._grabbed[()], self._stalled[()] = holding, late
 
     def answer(self, answer: HandEvaluator) -> None:
@@ -58,7 +58,7 @@ class Publisher:
             self._prints.publish(size_of(self._prints.record))
 
     def clamped(self, acted: bool) -> None:
-        """Whether the force limit acted."""
+        """Take over whether the force limit acted, and count it."""
         self._clamped[()] = acted
         if acted:
             self._record["clamped_ticks"] += 1
@@ -78,7 +78,7 @@ class Publisher:
         self._block.publish()
 
     def worked(self, duration: float) -> None:
-        """CPU time, s, of the tick just published; it appears with the next."""
+        """Count the CPU time, s, of the tick just published; it appears with the next."""
         self._work[()] = duration
         self._worked.add(duration)
 

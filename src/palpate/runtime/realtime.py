@@ -32,7 +32,7 @@ class Metronome:
     Parameters
     ----------
     period : float
-        s.
+        Time between two beats, s.
     spin : float
         The last stretch before a beat that is not slept through, s.
     jump : float
@@ -141,7 +141,7 @@ def _memory() -> str:
 
 
 def _granted(call: str, *arguments: int) -> bool:
-    """Whether a C library call with unsigned long arguments exists and returned 0."""
+    """Return whether a C library call with unsigned long arguments exists and returned 0."""
     try:
         function = getattr(ctypes.CDLL(None), call)
     except (OSError, AttributeError):
@@ -156,7 +156,9 @@ class Check:
     Attributes
     ----------
     name : str
+        What was looked at.
     ok : bool
+        Whether it is as a real-time loop wants it.
     detail : str
         What was found.
     remedy : str

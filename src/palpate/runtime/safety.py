@@ -41,7 +41,7 @@ class Fault(IntEnum):
 
     @property
     def meaning(self) -> str:
-        """One line for people."""
+        """The fault in words, one line for people."""
         return _MEANINGS[self]
 
 
@@ -64,16 +64,16 @@ _RISE = 0.020  # s from zero to full force where no slew is given: a tenth of a 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a device and its user may be asked to bear.
+    """Limits that protect a device and its user.
 
     Attributes
     ----------
     max_force : float
-        N.
+        Largest ‖F‖, N.
     slew : float
-        N/s; 0 chooses full force in 20 ms.
+        Largest rate of change of the force, N/s; 0 chooses full force in 20 ms.
     ramp : float
-        s, at least 0.05.
+        Time in which the force grows after a grab, s, at least 0.05.
 
     Raises
     ------
@@ -147,5 +147,5 @@ class Safety:
 
 
 def stalled(now: float, seen: float, patience: float) -> bool:
-    """Whether an input last heard of at `seen` (s) is older than `patience` (s); also if a time is NaN."""
+    """Return whether an input last heard of at `seen` (s) is older than `patience` (s); true if a time is NaN."""
     return not now - seen <= patience

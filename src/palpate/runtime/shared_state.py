@@ -176,7 +176,7 @@ class State:
 
 
 def size_of(prints: np.ndarray) -> int:
-    """Bytes of a record of dtype `PRINTS` that hold something."""
+    """Return the bytes of a record of dtype `PRINTS` that hold something."""
     return int(PRINTS.fields["amplitude"][1] + 4 * prints["count"])  # type: ignore[index]
 
 
@@ -261,7 +261,7 @@ class Shared:
         return cls("", mmap.mmap(-1, _SIZE))
 
     def read_state(self) -> State:
-        """The newest published tick.
+        """Return the newest published tick.
 
         Raises
         ------
@@ -301,6 +301,7 @@ class Shared:
         target : (3,) m, optional
             Hand in device coordinates; each one counts as a fresh sample.
         grabbed, hidden, quit : bool, optional
+            A hand holds the body; the page is in the background; the loop shall end.
         period : s, optional
             What the page promises between two heartbeats.
         parameters : (p,), optional

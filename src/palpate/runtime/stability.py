@@ -1,4 +1,4 @@
-"""How stiff a body may feel before the sampled loop itself starts to push.
+"""Bounds on how stiff a body may feel before the sampled loop itself starts to push.
 
 A force computed from a sample is held for a tick, and so trails the hand: the loop leaks energy in proportion
 to the stiffness K and the tick T, and the device's own damping b must absorb it. With a virtual damping B:
@@ -6,7 +6,7 @@ to the stiffness K and the tick T, and the device's own damping b must absorb it
 - passive, whatever holds the device:   K < 2 (b − |B|)/T          (Colgate & Schenkel 1997)
 - stable in a still hand, delay t_d:    K < (b + B)/(T/2 + t_d)    (Gil et al. 2009)
 
-K is the felt stiffness in hand coordinates: the model's largest eigenvalue of ∂F/∂x over the trained range,
+K is the felt stiffness in hand coordinates: the body's largest eigenvalue of ∂F/∂x over the trained range,
 times the workspace scale (positions are scaled, forces are not).
 
 References
@@ -25,7 +25,7 @@ __all__ = ["passive_stiffness", "stable_stiffness", "stiffness_warning"]
 
 
 def passive_stiffness(damping: float, rate: float, *, virtual_damping: float = 0.0) -> float:
-    """Stiffness (N/m) below which the loop is passive; Colgate & Schenkel 1997.
+    """Return the stiffness (N/m) below which the loop is passive; Colgate & Schenkel 1997.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def passive_stiffness(damping: float, rate: float, *, virtual_damping: float = 0
 def stable_stiffness(
     damping: float, rate: float, *, delay: float = 0.0, virtual_damping: float = 0.0
 ) -> float:
-    """Stiffness (N/m) below which a loop with a transport delay (s) is stable; Gil et al. 2009.
+    """Return the stiffness (N/m) below which a loop with a transport delay (s) is stable; Gil et al. 2009.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def stable_stiffness(
 def stiffness_warning(
     stiffness: float, damping: float | None, rate: float, *, delay: float = 0.0
 ) -> str | None:
-    """What to tell a user whose body is too stiff for the device, or None.
+    """Return a warning for a body that is too stiff for the device, or None.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def stiffness_warning(
     damping : float or None
         The device's own, N·s/m; None for one without motors, which can't become unstable.
     rate : float
-        Hz.
+        Ticks per second, Hz.
     delay : float
         From the device's sample to its force, beyond the hold of one tick, s.
     """

@@ -1,9 +1,9 @@
-"""From the hand's few centimetres to the body's travel and back.
+"""A scaling from the hand's few centimetres to the body's travel and back.
 
-Of a body held at a node or a patch the device's centre is the rest position of what is held. Of a body
-pressed anywhere it is a place of first contact, and the body stands upright: devices have y up and z towards the
-user, solids z up. Positions are scaled, forces are not: the hand feels the body's own newtons, at a stiffness that
-is `scale` times the body's.
+Of a body held at a node or a patch the device's centre is the rest position of what is held; of a body pressed
+anywhere it is a place of first contact. Solids stand upright: devices have y up and z towards the user, solids z up.
+Positions are scaled, forces are not: the hand feels the body's own newtons, at a stiffness that is `scale` times the
+body's.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Workspace:
         centre: tuple[float, float, float] = (0.0, 0.0, 0.0),
         upright: bool = False,
     ) -> Workspace:
-        """Workspace of `radius` (m) whose 80 % is the model's `reach` (m)."""
+        """Return the workspace of `radius` (m) whose 80 % is the body's `reach` (m)."""
         scale = reach / (_USED * radius) if radius > 0.0 else math.nan
         return cls(radius, scale, centre, upright)
 
@@ -79,7 +79,7 @@ class Workspace:
         position[2] = centre[2] + scale * y
 
     def to_hand(self, position: np.ndarray) -> np.ndarray:
-        """Hand position (3,) of a body position (3,), both m."""
+        """Return the hand position (3,) of a body position (3,), both m."""
         offset = (np.asarray(position) - self.centre) / self.scale
         return np.array([offset[0], offset[2], -offset[1]]) if self.upright else offset
 
@@ -91,5 +91,5 @@ class Workspace:
         sent[0], sent[1], sent[2] = force[0], force[2], -force[1]
 
     def felt(self, stiffness: float) -> float:
-        """Stiffness (N/m) that the hand feels of a body's `stiffness` (N/m)."""
+        """Return the stiffness (N/m) that the hand feels of a body's `stiffness` (N/m)."""
         return stiffness * self.scale

@@ -126,6 +126,8 @@ def show(
         Called once with the running `BodyViewer`; by default its address is written to stderr, because a script
         that waits here must say where to look.
 
+    Notes
+    -----
     The other parameters and the errors are those of `BodyViewer`, which does the same without waiting.
     """
     viewer = BodyViewer(source, name=name, port=port, host=host, strict_port=strict_port)

@@ -21,7 +21,7 @@ SHORTEST_PERIOD = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Command:
-    """What the loop is told: `palpate.runtime.shared_state.COMMAND` in Python values."""
+    """A command to the loop: `palpate.runtime.shared_state.COMMAND` in Python values."""
 
     beat: float
     target: tuple[float, float, float]
@@ -53,13 +53,13 @@ class HandLock:
         self._holder: int | None = None
 
     def hold(self, page: int) -> Hold:
-        """Where a page stands."""
+        """Return who holds the hand, from a page's point of view."""
         if self._holder is None:
             return Hold.FREE
         return Hold.YOURS if self._holder == page else Hold.ANOTHER
 
     def hear(self, page: int, hand: Hand, at: float) -> Command | None:
-        """Take a page's message at time `at` (s); None where another page holds the hand."""
+        """Take a page's message at time `at` (s); return the command, or None where another page holds the hand."""
         before = self._heard.get(page)
         self._heard[page] = _Heard(at, hand.hidden, hand.parameters)
         if self._silent(at) or self._holder is None:

@@ -136,7 +136,7 @@ class Frame(Binary):
 
 @dataclass(frozen=True, eq=False)
 class Hand(Binary):
-    """What the hand does, page to server; also the heartbeat."""
+    """The hand's place and grip, page to server; also the heartbeat."""
 
     KIND: ClassVar[int] = 2
 
@@ -235,7 +235,8 @@ class Line:
         Rest positions of the nodes along the body's axis, m.
     touch_node : int
         The node that a hand holds.
-    nodes_of_interest : indices into rest
+    nodes_of_interest : tuple of int
+        Nodes that the page marks.
     travel : (2, 3)
         Lower and upper corner of the box of the held node's offsets under all trained loads, m.
     """
@@ -253,7 +254,9 @@ class Hello(Json):
     Attributes
     ----------
     protocol : int
+        `PROTOCOL`: a page of another one reloads itself.
     name : str
+        Of the body.
     inputs, parameters : ranges
         All inputs; those that the hand does not drive.
     holds : bool
@@ -284,7 +287,8 @@ class Hello(Json):
         The force limit, N.
     rate : float
         Hz, what the loop aims at.
-    faults : words for fault codes, by code
+    faults : tuple of str
+        Words for fault codes, by code.
     meta : mapping
         What the model's file says of its making.
     """
@@ -313,7 +317,7 @@ class Hello(Json):
 
 @dataclass(frozen=True)
 class StepInfo:
-    """What is known of a state in words and figures."""
+    """A state in words and figures."""
 
     label: str
     figures: Mapping[str, str]
@@ -326,9 +330,13 @@ class Shown(Json):
     Attributes
     ----------
     protocol : int
+        `PROTOCOL`: a page of another one reloads itself.
     name : str
-    fields : quantities to colour by; the first is the displacement
-    steps : its states, in order
+        Title of the page.
+    fields : tuple of FieldInfo
+        Quantities to colour by; the first is the displacement.
+    steps : tuple of StepInfo
+        Its states, in order.
     reach : float
         Largest displacement of all states, m.
     """

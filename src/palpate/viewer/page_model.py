@@ -43,6 +43,7 @@ class PageModel:
     Attributes
     ----------
     body : Touchable
+        The learnt body as a hand finds it.
     surface : Surface, optional
         At rest; None for a body drawn as a line.
     """
@@ -81,7 +82,7 @@ class PageModel:
             inputs=_ranges(body.inputs),
             parameters=_ranges(body.parameters),
             holds=body.holds,
-            radius=body.radius,
+            radius=body.radius if math.isfinite(body.radius) else body.deepest,
             radius_parameter=-1 if body.radius_parameter is None else body.radius_parameter,
             deepest=body.deepest,
             force_max=body.force_max,

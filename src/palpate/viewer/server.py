@@ -155,6 +155,8 @@ def serve(
         Called once with the running `Viewer`; by default its address is written to stderr, because a script
         that waits here must say where to look.
 
+    Notes
+    -----
     The other parameters and the errors are those of `Viewer`.
     """
     viewer = Viewer(

@@ -45,7 +45,7 @@ ENDED = Notice(
 
 
 class LoopLike(Protocol):
-    """What a session needs of `palpate.runtime.LoopProcess`."""
+    """A running loop as a session needs it; `palpate.runtime.LoopProcess` is one."""
 
     @property
     def shared(self) -> Shared:
@@ -53,7 +53,7 @@ class LoopLike(Protocol):
 
     @property
     def alive(self) -> bool:
-        """Whether the process runs."""
+        """True while the process runs."""
 
     @property
     def rate(self) -> float:
@@ -97,7 +97,7 @@ class Session:
         self._state = loop.shared.read_state()
 
     async def talk(self, socket: WebSocket) -> None:
-        """One page's whole conversation."""
+        """Hold one page's whole conversation."""
         await socket.accept()
         page = Page(next(self._numbers), socket)
         self._pages[page.number] = page
@@ -125,11 +125,11 @@ class Session:
                 await page.socket.send_text(ENDED.to_json())
 
     def hello(self) -> Hello:
-        """The first message to every page."""
+        """Return the first message to every page."""
         return self.model.hello(self._read()[0], self.loop.rate)
 
     def frame(self, page: Page) -> Frame:
-        """The newest state as one page sees it."""
+        """Return the newest state as one page sees it."""
         state, loop = self._read()
         held = state.grabbed and not state.stalled and loop is Loop.RUNNING
         return self.model.frame(self._facts(page, state, loop, held), state, held, self._lock.parameters)

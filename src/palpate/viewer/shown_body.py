@@ -31,13 +31,15 @@ class ShownStep:
     Attributes
     ----------
     displacement : (node, 3) array
-        m.
+        Of every node, m.
     values : {name: (node,) array}
         Quantities to colour by, besides the displacement.
     ball : (centre, radius), optional
         The probe, m.
     label : str
+        Name of the state beside its slider; its number where there is none.
     figures : {name: words}
+        What is known of the state, in words.
     """
 
     displacement: np.ndarray
@@ -54,11 +56,13 @@ class ShownBody:
     Attributes
     ----------
     name : str
+        Title of the page.
     rest : (node, 3) array
         Positions at rest, m, z up.
     triangles : (t, 3) int array
         Outer surface, counter-clockwise as seen from outside.
     steps : sequence of ShownStep
+        Its states, in order; at least one.
     units : {name: unit}
         Of the steps' values.
     fixed : (t,) bool array
@@ -92,12 +96,12 @@ class ShownBody:
                 )
 
     def split(self) -> Split:
-        """Its surface, split along sharp edges."""
+        """Return its surface, split along sharp edges."""
         fixed = np.zeros(len(self.triangles), bool) if self.fixed is None else self.fixed
         return split(np.asarray(self.rest, dtype=float), np.asarray(self.triangles), fixed)
 
     def shown(self, parts: Split) -> Shown:
-        """What the page is told first."""
+        """Return what the page asks for first: name, quantities and states."""
         reach = max(float(np.linalg.norm(s.displacement[parts.nodes], axis=1).max()) for s in self.steps)
         fields = [FieldInfo("displacement", "m", 0.0, reach or 1e-3, 3, 0)]
         for name in self.names:
@@ -116,7 +120,7 @@ class ShownBody:
         return tuple(name for name in self.steps[0].values if all(name in step.values for step in self.steps))
 
     def surface(self, parts: Split) -> Surface:
-        """Its surface at rest as a message."""
+        """Return its surface at rest as a message."""
         return Surface(
             rest=np.asarray(self.rest)[parts.nodes].ravel(),
             triangles=parts.triangles.ravel(),
@@ -128,7 +132,7 @@ class ShownBody:
         )
 
     def step(self, index: int, parts: Split) -> Step:
-        """One state as a message."""
+        """Return one state as a message."""
         step = self.steps[index]
         centre, radius = (np.zeros(3), 0.0) if step.ball is None else step.ball
         values = [np.asarray(step.values[name], dtype=float)[parts.nodes] for name in self.names]
@@ -143,7 +147,7 @@ class ShownBody:
 
 
 def body_of(source: Any, name: str = "") -> ShownBody:
-    """A body to look at.
+    """Return a body to look at.
 
     Parameters
     ----------
@@ -210,7 +214,7 @@ def _step_of(solution: Any) -> ShownStep:
 
 
 def figures(response: Any, energy: Any, ball: tuple[np.ndarray, float] | None) -> dict[str, str]:
-    """Figures of a state in words, as far as they are known."""
+    """Return the figures of a state in words, as far as they are known."""
     found: dict[str, str] = {}
     if ball is not None:
         places = ", ".join(f"{1e3 * c + 0.0:.1f}" for c in ball[0].round(6))
@@ -224,7 +228,7 @@ def figures(response: Any, energy: Any, ball: tuple[np.ndarray, float] | None) -
 
 
 def unreadable(path: Path, why: str) -> FileFormatError:
-    """The error of a file that can't be shown."""
+    """Return the error of a file that can't be shown."""
     return FileFormatError(
         f"{path} can't be shown.",
         why=why,
@@ -236,7 +240,7 @@ MOST_STEPS = 400  # of a dataset: a longer slider can't be moved by one
 
 
 def body_of_file(path: Path, name: str = "") -> ShownBody:
-    """A body from a .vtu, a .pvd or a dataset's folder.
+    """Read a body from a .vtu, a .pvd or a dataset's folder.
 
     Raises
     ------
@@ -255,7 +259,7 @@ def body_of_file(path: Path, name: str = "") -> ShownBody:
 
 
 def body_of_dataset(dataset: Any, name: str) -> ShownBody:
-    """The converged samples of a solid's dataset, at most 400 of them.
+    """Return the converged samples of a solid's dataset as a body, at most 400 of them.
 
     Raises
     ------

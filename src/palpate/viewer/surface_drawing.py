@@ -39,6 +39,7 @@ class SurfaceDrawing:
     fields : tuple of FieldSurrogate
         Those shown: all on the nodes of the first, which is the displacement where there is one.
     infos : tuple of FieldInfo
+        Names, units and ranges of the fields.
     """
 
     def __init__(self, body: Touchable) -> None:
@@ -76,7 +77,7 @@ class SurfaceDrawing:
 
     @property
     def _keeps_prints(self) -> bool:
-        """Whether prints stand at places; one that travels with the probe is nowhere when that is gone."""
+        """True where prints stand at places; one that moves with the probe is nowhere when that is gone."""
         return self.body.dents is not None and len(self.body.dents.points) > 1
 
     def modes(self, index: int) -> Modes:

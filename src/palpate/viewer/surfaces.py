@@ -51,7 +51,9 @@ def split(rest: np.ndarray, triangles: np.ndarray, fixed: np.ndarray) -> Split:
     Parameters
     ----------
     rest : (node, 3) array
+        Positions at rest, m.
     triangles : (t, 3) int array
+        Nodes, counter-clockwise as seen from outside.
     fixed : (t,) bool array
         Triangles whose border is wanted.
     """
@@ -71,7 +73,7 @@ def split(rest: np.ndarray, triangles: np.ndarray, fixed: np.ndarray) -> Split:
 
 
 def outer_triangles(tetrahedra: np.ndarray) -> np.ndarray:
-    """Faces (t, 3) that belong to one tetrahedron (e, 4) only."""
+    """Return the faces (t, 3) that belong to one tetrahedron (e, 4) only."""
     faces = tetrahedra[:, FACES].reshape(-1, 3)
     _, inverse, count = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True, return_counts=True)
     return np.asarray(faces[count[inverse.ravel()] == 1])
@@ -105,7 +107,7 @@ def _components(count: int, pairs: np.ndarray) -> np.ndarray:
 
 
 def touchable_triangles(body: Touchable, field: FieldSurrogate) -> np.ndarray:
-    """Whether each triangle (t,) of a field's surface belongs to the touched surface."""
+    """Return for each triangle (t,) of a field's surface whether it belongs to the touched surface."""
     corners = field.points[field.triangles]
     if field.dimple is not None:
         return np.asarray(field.touched[field.triangles].all(axis=1) & _near(body, corners))
@@ -113,7 +115,7 @@ def touchable_triangles(body: Touchable, field: FieldSurrogate) -> np.ndarray:
 
 
 def _near(body: Touchable, corners: np.ndarray) -> np.ndarray:
-    """Whether triangles (t, 3, 3) lie on the touched surface and look the way it does."""
+    """Return whether triangles (t, 3, 3) lie on the touched surface and look the way it does."""
     distance, slope, _ = body.surface.at(corners.mean(axis=1))
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     along = np.einsum("ti,ti->t", normal, slope) > 0.5 * np.linalg.norm(normal, axis=1)
@@ -124,21 +126,20 @@ def relief(body: Touchable) -> tuple[np.ndarray, np.ndarray]:
     """Return the touched surface at rest where the body was trained, points (n, 3) in m and triangles (t, 3).
 
     A grid across the normal in the middle is lowered on the zero of the surface's distance; where it does not
-    arrive, there is a hole. Around what is held, of which no surface is known, the grid is flat.
+    arrive, there is a hole. Where no surface is known the grid is flat.
     """
     across, X = _across(body.normal), body.trained_inputs
-    places = np.array([body.held_place(x) for x in X[:, 3:]]) if body.holds else X[:, :3] - body.home
-    feet = places @ across.T
-    low, high = feet.min(axis=0), feet.max(axis=0)
-    if body.holds:  # the face around the patch, which is drawn flat
-        low, high = low - 2.0 * body.radius, high + 2.0 * body.radius
+    places = np.array([body.held_place(x) for x in X[:, 3:]]) if body.holds else X[:, :3]
+    middle = places.mean(axis=0) if body.holds else body.home
+    feet = (places - middle) @ across.T
+    margin = 2.0 * body.radius if body.holds else 0.0  # around the patch
+    low, high = feet.min(axis=0) - margin, feet.max(axis=0) + margin
     u, v = (np.linspace(low[k], high[k], ALONG + 1) for k in (0, 1))
-    flat = np.stack(np.meshgrid(u, v, indexing="ij"), axis=2).reshape(-1, 2)
-    if body.holds:
-        points, arrived = flat @ across, np.ones(len(flat), bool)
-        points += (places.mean(axis=0) @ body.normal) * body.normal
+    flat = middle + np.stack(np.meshgrid(u, v, indexing="ij"), axis=2).reshape(-1, 2) @ across
+    if body.surface is None:
+        points, arrived = flat, np.ones(len(flat), bool)
     else:
-        points, arrived = _lowered(body, body.home + flat @ across)
+        points, arrived = _lowered(body, flat)
     k = (np.arange(ALONG)[:, None] * (ALONG + 1) + np.arange(ALONG)).ravel()
     lower = np.stack([k, k + ALONG + 1, k + ALONG + 2], axis=1)
     upper = np.stack([k, k + ALONG + 2, k + 1], axis=1)

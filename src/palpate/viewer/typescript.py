@@ -1,4 +1,4 @@
-"""How the message dataclasses become TypeScript: interfaces, encoders and decoders, from one source."""
+"""TypeScript of the message dataclasses: interfaces, encoders and decoders, from one source."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ export type Vec3 = [number, number, number];
 
 
 def generate() -> str:
-    """The whole of ``messages.ts``."""
+    """Return the whole of ``messages.ts``."""
     parts = [HEAD, f"export const PROTOCOL = {messages.PROTOCOL};\n"]
     parts += [_enum(e) for e in ENUMS]
     parts += [_interface(r) for r in (*RECORDS, *JSON)]

@@ -53,7 +53,7 @@ TRIES = 50  # a machine with that many servers side by side wants to be told
 
 
 def listen(port: int, host: str = "127.0.0.1", *, strict: bool = False) -> socket.socket:
-    """A socket that listens on this machine only.
+    """Open a socket that listens on this machine only.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def listen(port: int, host: str = "127.0.0.1", *, strict: bool = False) -> socke
 
 
 def free_port(preferred: int, host: str = "127.0.0.1", *, strict: bool = False) -> int:
-    """The port that `listen` would take now."""
+    """Return the port that `listen` would take now."""
     with listen(preferred, host, strict=strict) as server:
         return int(server.getsockname()[1])
 
@@ -125,7 +125,7 @@ HEADERS = {
 
 
 def refusal(kind: str, headers: Headers) -> str:
-    """Why a request is refused, or "" where it is not.
+    """Return why a request is refused, or "" where it is not.
 
     Parameters
     ----------
@@ -209,6 +209,7 @@ class Running:
     Parameters
     ----------
     page : Starlette
+        The application that answers.
     listener : socket.socket
         Listening already.
 
@@ -361,6 +362,7 @@ def wait_until_interrupted(
     Parameters
     ----------
     server : LocalServer
+        Not started yet.
     open_browser : bool
         Whether to open the page in the user's browser.
     on_ready : callable, optional

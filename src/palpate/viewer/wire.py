@@ -1,4 +1,4 @@
-"""How a message dataclass becomes bytes, or JSON, and back.
+"""The wire format: message dataclasses as bytes, or as JSON, and back.
 
 A binary message is, little-endian and without padding,
 
@@ -95,7 +95,7 @@ class Binary:
     KIND: ClassVar[int]
 
     def pack(self) -> bytes:
-        """The message as bytes."""
+        """Return the message as bytes."""
         layout = Layout.of(type(self))
         numbers: list[Any] = []
         for name, count in layout.fixed:
@@ -109,7 +109,7 @@ class Binary:
 
     @classmethod
     def unpack(cls, data: bytes) -> Self:
-        """The message from bytes.
+        """Read the message from bytes.
 
         Raises
         ------
@@ -153,13 +153,13 @@ class Json:
     """Base of the JSON messages."""
 
     def to_json(self) -> str:
-        """The message as JSON; numbers that are not finite become null, which JSON can say."""
+        """Return the message as JSON; numbers that are not finite become null, which JSON can say."""
         values = dataclasses.asdict(typing.cast(Any, self))
         return json.dumps({"kind": type(self).__name__} | _finite(values), allow_nan=False)
 
     @classmethod
     def from_json(cls, text: str) -> Self:
-        """The message from JSON.
+        """Read the message from JSON.
 
         Raises
         ------

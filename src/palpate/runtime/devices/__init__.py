@@ -24,12 +24,12 @@ _KINDS: dict[str, _Kind] = {"page": PageDevice, "stroke": StrokeDevice}
 
 
 def device_names() -> tuple[str, ...]:
-    """The kinds of device there are."""
+    """Return the names of all kinds of device."""
     return tuple(_KINDS)
 
 
 def device_traits(device: str) -> Traits:
-    """What is known of a device before it is opened, by ``name`` or ``name:options``.
+    """Return the traits of a device before it is opened, by ``name`` or ``name:options``.
 
     Raises
     ------
@@ -45,6 +45,7 @@ def device_named(device: str, commands: Block) -> Device:
     Parameters
     ----------
     device : str
+        Its kind, and after a colon its options, such as ``stroke:frequency=1``; those not given keep their defaults.
     commands : Block
         The loop's command block, which the page steers.
 

@@ -1,4 +1,4 @@
-"""What a haptic device is to the loop: `read`, `write`, `close`.
+"""The contract of a haptic device in the loop: `read`, `write`, `close`.
 
 To add one, copy the nearest file of this folder and enter it in the table of ``devices/__init__.py``; the
 checklist in ``tests/runtime/test_device_checklist.py`` then holds it to this contract.
@@ -20,7 +20,7 @@ __all__ = ["Device", "Sample", "Traits", "settings_from"]
 
 @dataclass(frozen=True)
 class Traits:
-    """What is known of a kind of device before one is opened.
+    """Traits of a kind of device, known before one is opened.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class Traits:
     max_force : float
         N.
     damping : float or None
-        Its own, b, N·s/m, for the stability bounds; None where no motor pushes.
+        The device's own damping b, N·s/m, for the stability bounds; None where no motor pushes.
     source : str
         Where the figures come from.
     """
@@ -77,11 +77,11 @@ class Device(Protocol):
 
     @property
     def traits(self) -> Traits:
-        """What this kind of device can do."""
+        """Workspace, force and damping of this kind of device."""
         ...
 
     def read(self, now: float) -> Sample:
-        """The latest reading at the tick that began at `now`, s."""
+        """Return the latest reading at the tick that began at `now`, s."""
         ...
 
     def write(self, force: np.ndarray) -> None:

@@ -30,7 +30,7 @@ _FREE = 0.040  # s, time constant of the drawn body's return after the hand lets
 
 
 def page_patience(period: float) -> float:
-    """Silence, s, from which on a page with heartbeats every `period` s counts as stalled."""
+    """Return the silence, s, from which on a page with heartbeats every `period` s counts as stalled."""
     return max(0.100, 3.0 * period) if math.isfinite(period) else 0.100
 
 
@@ -49,7 +49,7 @@ class FrameInterpolator:
         self._arrived, self._frame = -math.inf, _FRAME
 
     def aim(self, target: np.ndarray, now: float) -> None:
-        """A new frame arrived at `now`, s: head for `target` (3,), m."""
+        """Head for `target` (3,), m, of a new frame that arrived at `now`, s."""
         gap = now - self._arrived
         if gap <= _LONGEST:
             self._frame += 0.25 * (max(gap, _SHORTEST) - self._frame)  # the network's jitter, smoothed
@@ -60,7 +60,7 @@ class FrameInterpolator:
         np.subtract(target, self._from, out=self._step)
 
     def start(self, target: np.ndarray, now: float) -> None:
-        """The input takes hold at `target` (3,), m, at `now`, s: nothing leads there."""
+        """Take hold at `target` (3,), m, at `now`, s: nothing leads there."""
         self._arrived = now
         self._from[:] = self.position[:] = target
         self._step[:] = 0.0
@@ -72,7 +72,7 @@ class FrameInterpolator:
         self.position += self._from
 
     def relax(self, elapsed: float) -> None:
-        """Nobody holds: return towards the centre, for the eye, `elapsed` s after the last call."""
+        """Return towards the centre, for the eye, where nobody holds, `elapsed` s after the last call."""
         self.position *= math.exp(-max(0.0, elapsed) / _FREE)
         if not math.isfinite(self.position.sum()):
             self.position[:] = 0.0
@@ -108,7 +108,7 @@ class PageDevice:
         return cls(commands)
 
     def read(self, now: float) -> Sample:
-        """The interpolated hand at `now`, s. The loop has fetched the command block before."""
+        """Return the interpolated hand at `now`, s. The loop has fetched the command block before."""
         sample, path = self.sample, self._path
         sample.time = float(self._beat)
         sample.patience = page_patience(float(self._period))
@@ -129,7 +129,7 @@ class PageDevice:
         return sample
 
     def write(self, force: np.ndarray) -> None:
-        """Nothing to push with: the page draws the published force."""
+        """Do nothing: the page draws the published force."""
 
     def close(self) -> None:
-        """Nothing to let go of."""
+        """Do nothing: there is nothing to let go of."""

@@ -1,7 +1,7 @@
 """A scripted hand: strokes of a sine or a triangle, the same on every run.
 
-For `palpate run` without hardware, for measuring the loop, and, since it can be told to stall, to lose its
-mind or to fail at a given second, for testing what the loop makes of a bad device.
+It serves `palpate run` without hardware and measurements of the loop. Since it can be made to stall, to send no
+numbers or to fail at a given second, it also tests how the loop answers a bad device.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ __all__ = ["StrokeDevice", "StrokeSettings"]
 
 @dataclass(frozen=True)
 class StrokeSettings:
-    """The script.
+    """Settings of the script.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class StrokeSettings:
     stall_at, nan_at, fail_at : float
         Seconds after the first reading at which the samples stop, turn into NaN, or reading raises.
     lasting : float
-        Seconds that each of these lasts.
+        Duration of each of these, s.
     """
 
     amplitude: float = 0.03
@@ -82,13 +82,13 @@ class StrokeDevice:
         return cls(settings_from(StrokeSettings, options))
 
     def read(self, now: float) -> Sample:
-        """The script's position, m, at `now`, s."""
+        """Return the script's position, m, at `now`, s."""
         if self._began is None:
             self._began = now
         t = now - self._began
         s, sample = self._settings, self.sample
         if s.fail_at <= t < s.fail_at + s.lasting:
-            raise DeviceError("The scripted device failed, as it was told to.")
+            raise DeviceError("The scripted device failed, as its settings say.")
         if s.stall_at <= t < s.stall_at + s.lasting:
             return sample
         sample.time = now

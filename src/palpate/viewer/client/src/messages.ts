@@ -45,7 +45,7 @@ export interface Line {
   travel: Vec3[];
 }
 
-/** What is known of a state in words and figures. */
+/** A state in words and figures. */
 export interface StepInfo {
   label: string;
   figures: Record<string, unknown>;
@@ -280,7 +280,7 @@ export function decodeFrame(buffer: ArrayBuffer): Frame {
 
 export const HAND = 2;
 
-/** What the hand does, page to server; also the heartbeat. */
+/** The hand's place and grip, page to server; also the heartbeat. */
 export interface Hand {
   /** ms, page clock when this was sent */
   sent: number;

@@ -16,8 +16,9 @@ from benchmarks.surrogate_springs import counts, identified, some
 from palpate.learning.energy import learn_surrogate
 from palpate.surrogates import TouchSurrogate
 from palpate.validation import TouchFunction, TouchSolves
-from palpate.validation.force import ForceSamples, angles
-from palpate.validation.loops import function_work
+from palpate.validation.figures.force import angles
+from palpate.validation.figures.loop_work import function_work
+from palpate.validation.unseen_solves import ForceSamples
 
 __all__ = ["OURS", "SIZES", "SPRINGS", "Measured", "measured", "sprung"]
 

@@ -10,9 +10,19 @@ from typing import Any, get_args
 from pydantic import BaseModel
 
 from palpate.learning import Settings, default, founding
-from palpate.study.models import MaterialRecord, SectionRecord, Study
-from palpate.study.record import Unit
-from palpate.study.touching import TouchStudy, records, shapes
+from palpate.study import Study
+from palpate.study.body_records import (
+    BodyRecord,
+    InclusionRecord,
+    LayerRecord,
+    MaterialRecord,
+    SectionRecord,
+    SkinRecord,
+    SoftRecord,
+)
+from palpate.study.interaction_records import InteractionRecord, LoadRecord, MemoryRecord, VariedRecord
+from palpate.study.quantities import Unit
+from palpate.study.stage_records import SECTIONS, RuntimeRecord
 
 PAGE = Path(__file__).parent / "guide" / "study-file.md"
 BEGIN, END = "<!-- generated: begin -->", "<!-- generated: end -->"
@@ -26,44 +36,38 @@ def renewed(text: str) -> str:
 
 def _tables() -> Iterator[str]:
     yield from _table("Top level", Study, "")
-    for name, field in Study.model_fields.items():
-        annotation = get_args(field.annotation)[0] if name == "loads" else field.annotation
-        if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-            title = "`[[loads]]`, once per load" if name == "loads" else f"`[{name}]`"
-            yield from _table(title, annotation, (annotation.__doc__ or "").splitlines()[0])
-            if name == "body":
-                yield from _table(
-                    "`[body.section]`", SectionRecord, (SectionRecord.__doc__ or "").splitlines()[0]
-                )
-                about = "In place of a name: " + (MaterialRecord.__doc__ or "").splitlines()[0][0].lower()
-                about += (MaterialRecord.__doc__ or "").splitlines()[0][1:]
-                yield from _table("`[body.material]`", MaterialRecord, about)
+    for body in get_args(BodyRecord):
+        yield from _kind_of("body", body)
+    for title, record in (
+        ("`[body.section]`, of a cantilever", SectionRecord),
+        ("`[body.material]` of a cantilever, in place of a name", MaterialRecord),
+        ("`[body.material]` and other materials of a solid body, in place of a name", SoftRecord),
+        ("`[[body.layers]]`, once per layer", LayerRecord),
+        ("`[body.skin]`, of a dome", SkinRecord),
+        ("`[body.inclusion]`, of a dome", InclusionRecord),
+    ):
+        yield from _table(title, record, _purpose(record))
+    for acting in get_args(InteractionRecord):
+        yield from _kind_of("interaction", acting)
+    yield from _table("`[[interaction.loads]]`, once per load", LoadRecord, _purpose(LoadRecord))
+    yield from _table("`[memory]`, of a body that yields or creeps", MemoryRecord, _purpose(MemoryRecord))
+    yield from _table("`[[varied]]`, once per number", VariedRecord, _purpose(VariedRecord))
+    for kind, sections in SECTIONS.items():
+        where = "of a body with memory" if kind == "memory" else f"with the interaction `{kind}`"
+        for name, record in sections.items():
+            yield from _table(f"`[{name}]` {where}", record, _purpose(record))
             if name == "filter":
                 yield from _settings()
-    yield from _touched()
+    yield from _table("`[runtime]`", RuntimeRecord, _purpose(RuntimeRecord))
 
 
-def _touched() -> Iterator[str]:
-    yield "## Reference of a pressed body"
-    yield ""
-    for kind in shapes.KINDS:
-        record = next(r for r in get_args(shapes.ShapeRecord) if r.model_fields["kind"].default == kind)
-        yield from _table(f'`[body]`, `kind = "{kind}"`', record, (record.__doc__ or "").splitlines()[0])
-    for title, record in (
-        ("`[body.material]` and other materials, in place of a name", shapes.SoftRecord),
-        ("`[[body.layers]]`, once per layer", shapes.LayerRecord),
-        ("`[body.skin]`, of a dome", shapes.SkinRecord),
-        ("`[body.inclusion]`, of a dome", shapes.InclusionRecord),
-    ):
-        yield from _table(title, record, (record.__doc__ or "").splitlines()[0])
-    for name, field in TouchStudy.model_fields.items():
-        annotation = field.annotation
-        # the runtime's part is that of a beam
-        if name != "runtime" and isinstance(annotation, type) and issubclass(annotation, BaseModel):
-            yield from _table(f"`[{name}]`", annotation, (annotation.__doc__ or "").splitlines()[0])
-            if name == "probe":
-                about = (records.VariedRecord.__doc__ or "").splitlines()[0]
-                yield from _table("`[[varied]]`, once per number", records.VariedRecord, about)
+def _kind_of(table: str, record: type[BaseModel]) -> Iterator[str]:
+    kind = record.model_fields["kind"].default
+    yield from _table(f'`[{table}]`, `kind = "{kind}"`', record, _purpose(record))
+
+
+def _purpose(record: type[BaseModel]) -> str:
+    return (record.__doc__ or "").strip().splitlines()[0]
 
 
 def _table(title: str, record: type[BaseModel], about: str) -> Iterator[str]:
@@ -87,7 +91,7 @@ def _table(title: str, record: type[BaseModel], about: str) -> Iterator[str]:
 def _is_table(name: str, annotation: Any) -> bool:
     parts = (annotation, *get_args(annotation))
     own = name != "material" and any(isinstance(p, type) and issubclass(p, BaseModel) for p in parts)
-    return own or name in {"loads", "layers"}
+    return own or name in {"loads", "layers", "varied", "body", "interaction"}
 
 
 def _unit(parts: Any) -> str:
@@ -136,8 +140,8 @@ def _shown(value: Any) -> str:
     if value is None or value in ((), {}):
         return "–"
     if isinstance(value, BaseModel):
-        told = value.model_dump(exclude_unset=True)
-        return "`{ " + ", ".join(f"{k} = {v:g}" for k, v in told.items()) + " }`"
+        content = value.model_dump(exclude_unset=True)
+        return "`{ " + ", ".join(f"{k} = {v:g}" for k, v in content.items()) + " }`"
     if isinstance(value, tuple):
         return "`[" + ", ".join(map(repr, value)) + "]`"
     if isinstance(value, float):

@@ -37,7 +37,6 @@ from .physics import named_material as named_material
 from .physics import roller as roller
 from .physics import shapes as shapes
 from .study import Study as Study
-from .study import TouchStudy as TouchStudy
 from .study import preset_study as preset_study
 from .study import read_study as read_study
 from .surrogates import TouchedBody as TouchedBody

@@ -18,7 +18,7 @@ name = "small"
 material = "nylon"
 elements = 10
 
-[[loads]]
+[[interaction.loads]]
 name = "P"
 low = "0 N"
 high = "2 N"

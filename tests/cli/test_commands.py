@@ -93,7 +93,7 @@ def test_results_go_to_stdout_and_progress_to_stderr(palpate, carried_out, tmp_p
     shutil.copytree(carried_out, tmp_path / "s")
     answer = palpate("learn", tmp_path / "s" / "study.toml", "--json")
     assert answer.err == ""
-    assert set(json.loads(answer.out)) == {"model", "units", "rmse"}
+    assert set(json.loads(answer.out)) == {"model", "passed", "measured"}
     answer = palpate("learn", tmp_path / "s" / "study.toml")
     assert "Learning from" in answer.err
     assert "Learning from" not in answer.out
@@ -149,7 +149,7 @@ def test_ctrl_c_says_what_is_kept(palpate, carried_out, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("palpate.study.workers.with_workers", interrupted)
+    monkeypatch.setattr("palpate.study.Study.with_workers", interrupted)
     answer = palpate("sweep", carried_out / "study.toml")
     assert answer.code == 130
     assert "Interrupted. What is solved is kept: the same command goes on." in answer.err
@@ -161,7 +161,7 @@ def test_advice_is_told_once_and_without_the_line_of_code(palpate, carried_out, 
             advise("The pad is soft.", why="It takes most of the depth.", fix="Take a stiffer one.")
         return study
 
-    monkeypatch.setattr("palpate.study.workers.with_workers", advising)
+    monkeypatch.setattr("palpate.study.Study.with_workers", advising)
     with warnings.catch_warnings():
         warnings.simplefilter("always")
         answer = palpate("sweep", carried_out / "study.toml")

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from palpate.study import TouchStudy, preset_study
-from palpate.study.pipeline import Paths, carry_out, report_study
+from palpate.study import Study, preset_study
+from palpate.study.run import Paths, carry_out, report_study
 from palpate.surrogates import TouchedBody
 from palpate.sweeps import LocalCluster, local_cluster
 
@@ -22,15 +22,14 @@ def workers() -> Iterator[LocalCluster]:
         yield cluster
 
 
-def small(name: str) -> TouchStudy:
+def small(name: str) -> Study:
     """As few solves as can be learnt from, not deep and on coarse elements."""
     study = preset_study(name, quick=True)
-    assert isinstance(study, TouchStudy)
     assert study.body.element is not None
     assert study.sweep.element is not None
     changes: dict[str, dict[str, object]] = {
         "body": {"element": 1.5 * study.body.element},
-        "probe": {"depth": (3e-4, 0.0015)},
+        "interaction": {"depth": (3e-4, 0.0015)},
         "sweep": {"samples": 6, "element": 1.7 * study.sweep.element},
         "test": {"samples": 1, "depths": 2},
         "learning": {"seconds": 2.0},

@@ -11,8 +11,7 @@ from palpate.errors import UsageError
 from palpate.learning import Refinement, hand_coordinates, learn_touch
 from palpate.physics import Circle, Rectangle, Section
 from palpate.study import Study, preset_names, preset_study, read_study, to_toml
-from palpate.study.build import body_of, loads_of, settings_of
-from palpate.study.rows import train_and_test
+from palpate.study.run import split_rows
 from palpate.sweeps import sweep
 
 
@@ -35,9 +34,9 @@ def test_a_study_is_frozen():
 @pytest.mark.parametrize("name", [name for name in preset_names() if name.startswith("beam")])
 def test_every_preset_builds_its_body(name):
     s = preset_study(name)
-    problem = body_of(s).problem(loads_of(s))
-    assert len(problem.ranges) == len(s.loads)
-    assert settings_of(s).units_max > 0
+    assert len(s.problem().ranges) == len(s.interaction.loads)
+    if s.filter:
+        assert s.filter.build(1).units_max > 0
 
 
 @pytest.mark.parametrize(
@@ -49,11 +48,11 @@ def test_every_preset_builds_its_body(name):
     ],
 )
 def test_sections(section, kind):
-    assert isinstance(body_of(study(body={"section": section})).section, kind)
+    assert isinstance(study(body={"section": section}).body.build().section, kind)
 
 
 def test_single_settings_change_a_named_form():
-    s = settings_of(study(filter={"form": "founding", "settings": {"noise": 0.5}}))
+    s = study(filter={"form": "founding", "settings": {"noise": 0.5}}).filter.build(1)
     assert (s.noise, s.widths) == (0.5, "plain")
 
 
@@ -69,21 +68,21 @@ def solved():
     """64 Sobol points of two loads, and 9 grid points of one, solved in one worker."""
     s = study(body={"elements": 6}, sweep={"design": "grid", "samples": 9, "workers": 1})
     two = preset_study("beam-plane")
-    grid = sweep(body_of(s), loads_of(s), samples=9, design="grid", workers=1, progress=False)
-    sobol = sweep(body_of(two), loads_of(two), samples=64, design="sobol", workers=1, progress=False)
+    grid = sweep(s.problem(), samples=9, design="grid", workers=1, progress=False)
+    sobol = sweep(two.problem(), samples=64, design="sobol", workers=1, progress=False)
     return s, grid, two, sobol
 
 
-def test_a_grid_is_parted_row_by_row_and_keeps_its_ends_for_training(solved):
+def test_a_grid_is_split_row_by_row_and_keeps_its_ends_for_training(solved):
     s, grid, _, _ = solved
-    train, test = train_and_test(s, grid, None)
+    train, test = split_rows(s, grid, None)
     np.testing.assert_allclose(train.X[:, 0], grid.X[::2, 0])
     np.testing.assert_allclose(test.X[:, 0], grid.X[1::2, 0])
 
 
-def test_a_sobol_design_is_parted_at_random_so_that_no_corner_is_left_out(solved):
+def test_a_sobol_design_is_split_at_random_so_that_no_corner_is_left_out(solved):
     _, _, two, sobol = solved
-    train, test = train_and_test(two, sobol, None)
+    train, test = split_rows(two, sobol, None)
     assert len(train) + len(test) == len(sobol) == 64
     assert len(test) == 16
     corners = {(x > 0, y > 0) for x, y in train.X}
@@ -94,7 +93,7 @@ def test_a_sobol_design_is_parted_at_random_so_that_no_corner_is_left_out(solved
 
 def test_random_loads_test_and_never_train(solved):
     s, grid, _, _ = solved
-    train, test = train_and_test(s, grid, grid.take([0, 1]))
+    train, test = split_rows(s, grid, grid.take([0, 1]))
     assert len(test) == 4 + 2
     assert len(train) == 5
 
@@ -102,7 +101,7 @@ def test_random_loads_test_and_never_train(solved):
 def test_something_must_be_kept_for_testing(solved):
     s, grid, _, _ = solved
     with pytest.raises(UsageError, match="nothing for testing"):
-        train_and_test(
+        split_rows(
             s.model_copy(update={"test": s.test.model_copy(update={"every": 0, "random": 0})}), grid, None
         )
 

@@ -5,13 +5,10 @@ from __future__ import annotations
 import pytest
 
 from palpate.errors import StudyError, UsageError
-from palpate.study import Study, TouchStudy, named, preset_study, read_study, to_toml
-from palpate.study.presets import preset_names
-from palpate.study.touching.build import limits_of, points_of, probe_of, problem_of, solid_of
-from palpate.study.touching.presets import TOUCHED
-from palpate.study.workers import with_workers
+from palpate.study import Study, preset_names, preset_study, read_study, to_toml
 
-ALL = [(name, quick) for name in TOUCHED for quick in (False, True)]
+SOLIDS = [name for name in preset_names() if not name.startswith("beam")]
+ALL = [(name, quick) for name in SOLIDS for quick in (False, True)]
 
 
 @pytest.mark.parametrize(("name", "quick"), ALL)
@@ -21,17 +18,18 @@ def test_every_preset_reads_back_and_builds_its_body(name, quick, tmp_path):
     path.write_text(to_toml(study), encoding="utf-8")
     assert read_study(path) == study
     assert study.name == name + ("-quick" if quick else "")
-    body = solid_of(study)
+    body = study.body.build()
     assert set(body.materials) == set(body.geometry.regions)
-    assert probe_of(study).touches in body.geometry.surfaces
+    assert study.interaction.build(body).touches in body.geometry.surfaces
 
 
 def test_a_quick_study_solves_less_and_asks_less():
-    for name in TOUCHED:
+    for name in SOLIDS:
         whole, quick = preset_study(name), preset_study(name, quick=True)
         assert quick.sweep.samples < whole.sweep.samples
-        assert quick.sweep.element > whole.probe.radius / 2
-        assert quick.probe.depth[1] < whole.probe.depth[1]
+        assert quick.sweep.element > whole.interaction.radius / 2
+        if whole.interaction.kind == "probe":
+            assert quick.interaction.depth[1] < whole.interaction.depth[1]
         for key, value in quick.target:
             if key not in {"smoothness", "coverage", "loop_work"}:
                 assert value >= getattr(whole.target, key), key
@@ -53,7 +51,8 @@ def test_units_are_allowed_and_kept_in_si(tmp_path):
             kind = "block"
             size = ["4 cm", "40 mm", 0.04]
             material = { young = "12 kPa", poisson = 0.4 }
-            [probe]
+            [interaction]
+            kind = "probe"
             radius = "6 mm"
             pad = "3 N/mm^3"
             over = [["1 cm", "1 cm"], ["3 cm", "3 cm"]]
@@ -62,19 +61,21 @@ def test_units_are_allowed_and_kept_in_si(tmp_path):
             """,
         )
     )
-    assert isinstance(study, TouchStudy)
     assert study.body.size == pytest.approx((0.04, 0.04, 0.04))
-    assert study.probe.pad == pytest.approx(3e9)
-    assert solid_of(study).materials["body"].young == pytest.approx(12e3)
+    assert study.interaction.pad == pytest.approx(3e9)
+    assert study.body.build().materials["body"].young == pytest.approx(12e3)
     # a quarter is solved, the whole is shown
-    assert problem_of(study).interactions[0].over == ((0.02, 0.02), (0.03, 0.03))
-    assert problem_of(study, whole=True).interactions[0].over == ((0.01, 0.01), (0.03, 0.03))
+    assert study.problem().interactions[0].over == ((0.02, 0.02), (0.03, 0.03))
+    assert study.problem(whole=True).interactions[0].over == ((0.01, 0.01), (0.03, 0.03))
 
 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ('[body]\nkind = "blok"', "no kind of body 'blok'"),
+        (
+            '[body]\nkind = "blok"',
+            "no kind of body 'blok'; there are cantilever, block, layered, dome, cylinder, organ; did you mean 'block'",
+        ),
         ('[body]\nkind = "block"\nsiez = [1, 1, 1]', "did you mean 'size'"),
         # of the keys of that table, though another has a nearer one
         (
@@ -82,8 +83,8 @@ def test_units_are_allowed_and_kept_in_si(tmp_path):
             "sweep.depht: there is no such key; did you mean 'depths'",
         ),
         (
-            '[body]\nkind = "block"\n[probe]\ndepht = 3',
-            "probe.depht: there is no such key; did you mean 'depth'",
+            '[body]\nkind = "block"\n[interaction]\ndepht = 3',
+            "interaction.depht: there is no such key; did you mean 'depth'",
         ),
         (
             '[body]\nkind = "layered"\nlayers = [{name = "skin", thicknes = 0.01}]',
@@ -91,8 +92,11 @@ def test_units_are_allowed_and_kept_in_si(tmp_path):
         ),
         ('[body]\nkind = "block"\nfixed = "botom"', "no surface 'botom'"),
         ('[body]\nkind = "dome"\nmaterial = "ecoflex"', "There is no material called 'ecoflex'"),
-        ('[body]\nkind = "block"\n[probe]\nradius = "1 kg"', "probe.radius: '1 kg' is not a quantity in m"),
-        ('[body]\nkind = "block"\n[probe]\ndepth = [0.01, 0.002]', "is no range"),
+        (
+            '[body]\nkind = "block"\n[interaction]\nradius = "1 kg"',
+            "interaction.radius: '1 kg' is not a quantity in m",
+        ),
+        ('[body]\nkind = "block"\n[interaction]\ndepth = [0.01, 0.002]', "is no range"),
         ('[body]\nkind = "block"\n[sweep]\nsamples = 8\ndepths = 9', "no column"),
         ('[body]\nkind = "block"\n[learning]\nsecond = 3', "learning.second: there is no such key"),
         ('[body]\nkind = "layered"', "body.layers"),
@@ -110,21 +114,21 @@ def test_mistakes_are_told_by_their_place(tmp_path, text, words):
     assert words in str(caught.value)
 
 
-def test_a_file_without_a_kind_is_a_beam_unless_it_has_a_probe(tmp_path):
-    assert isinstance(read_study(study_file(tmp_path, 'name = "b"')), Study)
+def test_a_file_without_a_kind_is_of_a_beam(tmp_path):
+    assert read_study(study_file(tmp_path, 'name = "b"')).body.kind == "cantilever"
 
 
 def test_a_target_of_zero_asks_nothing():
-    limits = limits_of(preset_study("block", quick=True))
+    limits = preset_study("block", quick=True).target.limits()
     assert limits.smoothness is None
     assert limits.interval_coverage is None
-    assert limits_of(preset_study("block")).interval_coverage == (0.80, 0.97)
+    assert preset_study("block").target.limits().interval_coverage == (0.80, 0.97)
 
 
 def test_columns_have_their_depths_and_tests_have_other_places():
     study = preset_study("block", quick=True)
-    problem = problem_of(study)
-    train, test = points_of(study, problem), points_of(study, problem, test=True)
+    problem = study.problem()
+    train, test = (part.arguments(problem)["points"] for part in (study.sweep, study.test))
     assert (len(train), len(test)) == (study.sweep.samples, study.test.samples)
     columns = study.sweep.samples // study.sweep.depths
     assert [len(rows) for rows in problem.chains(train)] == [study.sweep.depths] * columns
@@ -138,7 +142,7 @@ layers = [
     { name = "fat", thickness = "9 mm", material = { young = "4 kPa" } },
     { name = "muscle", thickness = "31 mm", material = { young = "15 kPa" } },
 ]
-[probe]
+[interaction]
 over = [["20 mm", "20 mm"], ["80 mm", "80 mm"]]
 [[varied]]
 path = "fat.thickness"
@@ -160,12 +164,12 @@ depths = 2
 def test_a_family_of_bodies_has_its_numbers_as_inputs(tmp_path):
     study = read_study(study_file(tmp_path, FAMILY))
     assert read_study(study_file(tmp_path, to_toml(study))) == study
-    problem = problem_of(study)
+    problem = study.problem()
     assert [(r.name, r.low, r.high, r.unit) for r in problem.ranges[3:]] == [
         ("fat.thickness", 0.007, 0.011, "m"),
         ("muscle.young", 8e3, 30e3, "Pa"),
     ]
-    train, test = points_of(study, problem), points_of(study, problem, test=True)
+    train, test = (part.arguments(problem)["points"] for part in (study.sweep, study.test))
     assert (train.shape, test.shape) == ((12, 5), (8, 5))
     # each column is of a body of its own, and those of the test are others
     assert len({tuple(x) for x in train[:, 3:]}) == 4
@@ -176,23 +180,66 @@ def test_a_family_of_bodies_has_its_numbers_as_inputs(tmp_path):
 def test_what_can_vary_is_told_where_a_path_names_nothing(tmp_path):
     study = read_study(study_file(tmp_path, FAMILY.replace("muscle.young", "bone.young")))
     with pytest.raises(UsageError, match="Its regions are fat, muscle"):
-        problem_of(study)
+        study.problem()
 
 
 def test_a_touch_study_takes_another_name():
-    assert named(preset_study("block"), "mine").name == "mine"
+    assert preset_study("block").renamed("mine").name == "mine"
 
 
 def test_workers_solve_and_learn():
-    fewer = with_workers(preset_study("block"), 3)
+    fewer = preset_study("block").with_workers(3)
     assert (fewer.sweep.workers, fewer.learning.workers) == (3, 3)
-    beam = with_workers(preset_study("beam-copper"), 3)  # is learnt in one process
+    beam = preset_study("beam-copper").with_workers(3)  # is learnt in one process
     assert beam.sweep.workers == 3
     assert beam.learning == preset_study("beam-copper").learning
-    assert with_workers(beam, None) == beam
+    assert beam.with_workers(None) == beam
 
 
 @pytest.mark.parametrize("name", preset_names())
 def test_every_study_takes_a_number_of_workers(name):
     study = preset_study(name)
-    assert with_workers(study, 2).name == study.name
+    assert study.with_workers(2).name == study.name
+
+
+FIRST_VERSION = {
+    'name = "old"\n[[loads]]\nname = "P"\nlow = 0\nhigh = "2 N"': {
+        "loads": [{"name": "P", "low": 0, "high": 2}]
+    },
+    'name = "old"\n[body]\nkind = "block"\n[probe]\nradius = "8 mm"': {"kind": "probe", "radius": 0.008},
+}
+
+
+@pytest.mark.parametrize("text", FIRST_VERSION)
+def test_files_of_the_first_version_are_read(text, tmp_path):
+    study = read_study(study_file(tmp_path, text))
+    assert study == Study.model_validate(
+        {"name": "old", "body": {"kind": study.body.kind}, "interaction": FIRST_VERSION[text]}
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('[interaction]\nkind = "probe"', "a cantilever takes the interaction loads, not probe"),
+        (
+            '[interaction]\nkind = "prob"',
+            "no kind of interaction 'prob'; there are loads, probe, pad; did you mean",
+        ),
+        ('[body]\nmaterial = "annealed copper"', "remembers its history: give a table [memory]"),
+        ("[memory]\nhistories = 3", "which 'nylon' does not"),
+        (
+            '[body]\nmaterial = "annealed copper"\n[memory]\n[sweep]\nsamples = 3',
+            "sweep: a study of a body with memory has no table [sweep]",
+        ),
+        ('[[varied]]\npath = "young"\nlow = 1\nhigh = 2', "nothing of a cantilever can vary"),
+        (
+            '[body]\nkind = "block"\n[filter]\npasses = 3',
+            "filter: a study with the interaction probe has no table [filter]",
+        ),
+    ],
+)
+def test_parts_that_do_not_fit_together_are_refused(text, words, tmp_path):
+    with pytest.raises(StudyError) as caught:
+        read_study(study_file(tmp_path, text))
+    assert words in str(caught.value)

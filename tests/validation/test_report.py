@@ -18,28 +18,34 @@ from palpate.validation import Chapter, Limits, validate, write_report
 from palpate.validation.report.style import INK
 
 HOSTILE = '<script>window.hacked = 1</script> $\\frac{1}$ "&amp;'
-FIGURES = ("shapes", "errors", "growth", "force", "felt", "outer")
+FIGURES = ("shapes", "errors", "growth", "force", "outer", "felt")
 
 
 def chapter(name: str = "beam", *, limits: Limits | None = None, **changes: Any) -> Chapter:
     touch, data = tip_model(shift=1e-6, slope=1e-7, force=0.999), tip_data()
     validation = validate(touch, data, history=history(), limits=limits)
     made = Chapter(
-        name, touch, data, data.every(3), validation, history(), timings={"sweep": 1.5, "learn": 0.25}
+        name,
+        touch,
+        data.every(3),
+        validation,
+        train=data,
+        history=history(),
+        timings={"sweep": 1.5, "learn": 0.25},
     )
     return dataclasses.replace(made, **changes)
 
 
 def plane_chapter() -> Chapter:
     touch, data = plane_model(), plane_data()
-    return Chapter("plane", touch, data, data, validate(touch, data), history(heldout=()))
+    return Chapter("plane", touch, data, validate(touch, data), train=data, history=history(heldout=()))
 
 
 def hostile_chapter() -> Chapter:
     touch, data = tip_model(name=HOSTILE), tip_data(name=HOSTILE)
     return chapter(
         HOSTILE,
-        touch=touch,
+        model=touch,
         train=data,
         test=data,
         validation=validate(touch, data, limits=Limits(rmse=1e-30)),
@@ -178,7 +184,7 @@ def test_a_network_that_answers_nonsense_can_be_reported(tmp_path: Path) -> None
     broken = {**touch.networks, "nodes": nonsense(touch.networks["nodes"])}
     touch = dataclasses.replace(touch, networks=broken)
     validation = validate(touch, data, limits=Limits())
-    page = write_report(tmp_path / "nan.html", [chapter(touch=touch, validation=validation)])
+    page = write_report(tmp_path / "nan.html", [chapter(model=touch, validation=validation)])
     assert "not a number" in page.read_text(encoding="utf-8")
     assert not validation.passed
 

@@ -16,13 +16,12 @@ from palpate.learning import Settings
 from palpate.surrogates import TouchModel
 from palpate.units import Range
 from palpate.validation import Chapter, Limits, validate
-from palpate.validation.force import force_samples
 from palpate.validation.limits import CRITERIA
-from palpate.validation.report.body import body_words, strain_words
-from palpate.validation.report.forces import heading, plot_force
-from palpate.validation.report.networks import network_rows
-from palpate.validation.report.pictures import pictures
+from palpate.validation.report.body_words import body_words, strain_words
+from palpate.validation.report.load_pictures import heading, network_rows, plot_force
 from palpate.validation.report.summary import story
+from palpate.validation.report.write import pictures
+from palpate.validation.subject import Subject
 
 CIRCLE = {"type": "Circle", "radius": 0.005}
 
@@ -33,7 +32,7 @@ def provenance(**body: Any) -> dict[str, Any]:
 
 def told(touch: TouchModel, data: Dataset, **limits: Any) -> Chapter:
     validation = validate(touch, data, limits=Limits(**limits))
-    return Chapter("beam", touch, data, data, validation, history())
+    return Chapter("beam", touch, data, validation, train=data, history=history())
 
 
 def with_units(touch: TouchModel, **units: int) -> TouchModel:
@@ -115,7 +114,7 @@ def test_a_two_sided_force_keeps_its_sign() -> None:
     loads = [Range("P", -5.0, 5.0, "N")]
     data = dataset(np.linspace(-5.0, 5.0, 41)[:, None], loads, [(0.0, -1.0)], [5])
     touch = two_sided()
-    figure = plot_force(touch, data, force_samples(touch, data))
+    figure = plot_force(touch, data, Subject.of(touch, data).samples)
     for line in figure.axes[0].lines:
         x, y = np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
         assert y.min() == pytest.approx(-5.0)
@@ -164,7 +163,10 @@ def test_positions_that_count_as_outside_are_explained() -> None:
     assert far == "4 of 4 hand positions count as outside the trained range."
 
 
-TOUCHED = {  # judged of touched bodies only, which have no study file yet
+TOUCHED = {  # judged of an energy or a memory only
+    "history_force_median",
+    "history_force_p95",
+    "history_energy",
     "border_loop_work",
     "smoothness",
     "interval_coverage",

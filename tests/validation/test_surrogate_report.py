@@ -13,9 +13,8 @@ from models import linear_network
 from palpate.format import bind_units, interval
 from palpate.surrogates import ContactLaw, Continuation, TouchSurrogate
 from palpate.units import Quantity, Range
-from palpate.validation import Chapter, SurrogateChapter, TouchSolves, validate, write_report
-from palpate.validation.report.surrogates.curves import curves, plot_curves
-from palpate.validation.report.surrogates.view import View, at_depth, feet
+from palpate.validation import Chapter, TouchSolves, validate, write_report
+from palpate.validation.report.touch_pictures import View, at_depth, contact_points, curves, plot_curves
 from pressed import DEEPEST, INPUTS, RADIUS, A, B, face, force, places, solves, steady, surrogate
 
 HOSTILE = '<script>window.hacked = 1</script> $\\frac{1}$ "&amp;'
@@ -51,7 +50,7 @@ def test_a_flat_face_is_seen_from_above() -> None:
     S, X = surrogate(), places(50)
     view = View.of(S, X)
     np.testing.assert_allclose(view.out, [0, 0, 1], atol=1e-12)
-    np.testing.assert_allclose(view.flat(feet(S, X)), X[:, :2], atol=1e-12)
+    np.testing.assert_allclose(view.flat(contact_points(S, X)), X[:, :2], atol=1e-12)
     assert view.labels() == ("x / mm", "y / mm")
     there = at_depth(S, view, X[:, :2], X[0], 0.004)
     np.testing.assert_allclose(there, np.column_stack([X[:, :2], np.full(50, RADIUS - 0.004)]), atol=1e-6)
@@ -70,9 +69,7 @@ def test_of_a_family_it_is_told_which_body_is_shown(tmp_path: Path) -> None:
     legend = plot_curves(S, test).axes[0].get_legend()
     told = [text.get_text().partition("; ")[2] for text in legend.get_texts()]
     assert sorted(told) == ["young = 1.2e+04 Pa", "young = 1e+04 Pa", "young = 6000 Pa", "young = 8000 Pa"]
-    text = write_report(tmp_path / "f.html", [SurrogateChapter("f", S, test, validate(S, test))]).read_text(
-        "utf-8"
-    )
+    text = write_report(tmp_path / "f.html", [Chapter("f", S, test, validate(S, test))]).read_text("utf-8")
     assert "The surrogate states no deviation. Shown for young = 6000 Pa." in text
 
 
@@ -81,17 +78,17 @@ def test_a_picture_of_a_part_says_that_it_is_one(tmp_path: Path, images: int) ->
     S, test = surrogate(meta={"solves": 12, "samples": 12 * images}), solves()
     v = validate(S, test)
     assert v.smoothness is not None
-    text = write_report(tmp_path / "part.html", [SurrogateChapter("part", S, test, v)]).read_text("utf-8")
+    text = write_report(tmp_path / "part.html", [Chapter("part", S, test, v)]).read_text("utf-8")
     assert text.count("a part of the body of which the rest is mirror images") == (0 if images == 1 else 2)
     assert f"{v.smoothness.p95:.2f} times as much as its reference (the model" in " ".join(text.split())
 
 
 def test_both_kinds_of_bodies_stand_in_one_report(tmp_path: Path) -> None:
     S, test = surrogate(root=steady(0.01), meta={"name": HOSTILE, "solves": 12}), solves()
-    touched = SurrogateChapter(HOSTILE, S, test, validate(S, test), settings={HOSTILE: 1.0})
-    unsure = dataclasses.replace(touched, name="no posterior", surrogate=surrogate())
+    touched = Chapter(HOSTILE, S, test, validate(S, test), settings={HOSTILE: 1.0})
+    unsure = dataclasses.replace(touched, name="no posterior", model=surrogate())
     touch, data = tip_model(), tip_data()
-    held = Chapter("beam", touch, data, data, validate(touch, data), history())
+    held = Chapter("beam", touch, data, validate(touch, data), train=data, history=history())
     text = write_report(tmp_path / "both.html", [held, touched, unsure]).read_text(encoding="utf-8")
     assert "<script" not in text
     assert text.count('id="c2-trust"') == text.count('id="c3-curves"') == text.count('id="c1-shapes"') == 1

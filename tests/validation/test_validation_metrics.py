@@ -12,10 +12,10 @@ from linear_bodies import COMPLIANCE, plane_data, plane_model, tip_data, tip_mod
 
 from palpate.units import Range
 from palpate.validation import validate
+from palpate.validation.figures.by_load import loop_work, work_around
+from palpate.validation.figures.stiffness import curve_slope
 from palpate.validation.limits import FORCE_JND
-from palpate.validation.loops import loop_work, work_around
-from palpate.validation.region import outer_part
-from palpate.validation.stiffness import curve_slope
+from palpate.validation.worst import outer_part
 
 FULL = 5.0 * COMPLIANCE  # tip deflection at 5 N
 
@@ -30,8 +30,8 @@ def test_outer_part_of_one_and_of_two_inputs() -> None:
 
 def test_an_exact_model_has_no_error() -> None:
     v = validate(tip_model(), tip_data())
-    assert v.networks["refined"].max < 1e-15
-    assert v.field.max < 1e-15
+    assert v.networks.refined.max < 1e-15
+    assert v.shape.max < 1e-15
     assert v.force.max is not None
     assert v.force.max < 1e-12
     assert v.stiffness is not None
@@ -42,7 +42,7 @@ def test_an_exact_model_has_no_error() -> None:
 @settings(max_examples=25, deadline=None)
 @given(shift=st.floats(1e-9, 1.0))
 def test_a_network_off_by_a_constant_has_that_error_everywhere(shift: float) -> None:
-    found = validate(tip_model(shift=-shift), tip_data()).networks["refined"]
+    found = validate(tip_model(shift=-shift), tip_data()).networks.refined
     for value in (found.rmse, found.max, found.outer, found.rest, *(o.rmse for o in found.per_output)):
         assert value == pytest.approx(shift, rel=1e-6)
     assert found.full_scale == pytest.approx(FULL)
@@ -56,7 +56,7 @@ def test_relative_errors_do_not_depend_on_the_body_s_size(scale: float) -> None:
     one = validate(tip_model(shift=1e-3), tip_data())
     other = validate(tip_model(shift=1e-3 * scale, scale=scale), tip_data(scale=scale))
     for label in ("refined", "filter"):
-        a, b = one.networks[label], other.networks[label]
+        a, b = getattr(one.networks, label), getattr(other.networks, label)
         assert b.rmse == pytest.approx(scale * a.rmse, rel=1e-6)
         assert b.relative == pytest.approx(a.relative, rel=1e-6)
 
@@ -64,7 +64,7 @@ def test_relative_errors_do_not_depend_on_the_body_s_size(scale: float) -> None:
 def test_ends_of_the_range_are_told_from_the_rest() -> None:
     """The error is slope · ξ; the samples lie at ξ = −1 and 1 (outer), −0.5 and 0.5 (rest)."""
     data = tip_data(np.array([[0.0], [1.25], [3.75], [5.0]]))
-    found = validate(tip_model(slope=1e-3), data).networks["filter"]
+    found = validate(tip_model(slope=1e-3), data).networks.filter
     assert found.outer_count == 2
     assert found.outer == pytest.approx(1e-3)
     assert found.rest == pytest.approx(0.5e-3)
@@ -73,13 +73,13 @@ def test_ends_of_the_range_are_told_from_the_rest() -> None:
 
 
 def test_without_samples_at_the_ends_there_is_no_ratio() -> None:
-    found = validate(tip_model(slope=1e-3), tip_data(np.array([[1.0], [2.5], [4.0]]))).networks["refined"]
+    found = validate(tip_model(slope=1e-3), tip_data(np.array([[1.0], [2.5], [4.0]]))).networks.refined
     assert found.outer is None
     assert found.outer_ratio is None
 
 
 def test_the_worst_case_is_named() -> None:
-    found = validate(tip_model(slope=1e-3), tip_data(np.array([[1.25], [2.5], [4.5]]))).networks["refined"]
+    found = validate(tip_model(slope=1e-3), tip_data(np.array([[1.25], [2.5], [4.5]]))).networks.refined
     assert found.worst.value == pytest.approx(0.8e-3)
     assert str(found.worst).endswith("under P = 4.5 N")
 
@@ -102,7 +102,7 @@ def test_half_a_newton_is_the_most_that_counts_as_light() -> None:
     heavy = tip_data(np.array([[5.0]]))
     assert validate(tip_model(), heavy).force.light == pytest.approx(0.25)
     sizes = np.array([[0.0, 0.0, -20.0], [0.0, 0.0, -1.0]])
-    from palpate.validation.force import ForceSamples
+    from palpate.validation.unseen_solves import ForceSamples
 
     assert ForceSamples(sizes, sizes, sizes, np.ones(2, dtype=bool)).light == 0.5
 
@@ -187,7 +187,7 @@ def test_one_touched_load_needs_no_loops() -> None:
 def test_the_field_is_judged_by_distance() -> None:
     """The field of a body twice as soft is off by the displacement itself: COMPLIANCE · P · x²."""
     v = validate(tip_model(), tip_data(np.array([[2.0], [4.0]]), scale=2.0))
-    assert v.field.max == pytest.approx(4.0 * COMPLIANCE)
-    assert v.field.mean == pytest.approx(3.0 * COMPLIANCE * np.mean(np.linspace(0, 1, 6) ** 2))
-    assert v.field.relative_max == pytest.approx(4.0 / 5.0)
-    assert str(v.field.worst) == "the node at 1 m under P = 4 N"
+    assert v.shape.max == pytest.approx(4.0 * COMPLIANCE)
+    assert v.shape.mean == pytest.approx(3.0 * COMPLIANCE * np.mean(np.linspace(0, 1, 6) ** 2))
+    assert v.shape.largest == pytest.approx(8.0 * COMPLIANCE)
+    assert str(v.shape.worst) == "the node at 1 m under P = 4 N"

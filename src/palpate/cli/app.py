@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -66,7 +66,7 @@ def demo(
     as_json: Json = False,
 ) -> None:
     """Run studies with a name from finite elements to the fingertip; the founding beams take under a minute."""
-    from palpate.cli.demo import run_demo
+    from palpate.cli.demo_command import run_demo
 
     console = Console(as_json)
     models = run_demo(names or ["beam-copper", "beam-nylon"], folder, workers, console, quick=quick)
@@ -88,7 +88,7 @@ def init(
     show: Annotated[bool, typer.Option("--print", help="Print it instead of writing a file.")] = False,
 ) -> None:
     """Write a commented study file."""
-    from palpate.study import named, preset_study, to_toml
+    from palpate.study import preset_study, to_toml
 
     if path.is_dir():
         raise UsageError(f"{path} is a folder.", fix=f"Name a file, such as {path / STUDY}.")
@@ -96,7 +96,7 @@ def init(
     if (
         path != STUDY and not show
     ):  # a file with a name of its own gives the study, and so its files, that name
-        record = named(record, path.stem)
+        record = record.renamed(path.stem)
     text = to_toml(record)
     if show:
         typer.echo(text, nl=False)
@@ -111,61 +111,27 @@ def init(
 
 
 @app.command()
-def schema(
-    kind: Annotated[str, typer.Argument(help="beam, or touch for studies of pressed bodies.")] = "beam",
-) -> None:
-    """Print the JSON schema of study files."""
+def schema() -> None:
+    """Print the JSON schema of study files, with which an editor checks them."""
     from palpate.study import study_schema
 
-    typer.echo(study_schema(kind))
+    typer.echo(study_schema())
 
 
 @app.command()
 def sweep(study: StudyFile = STUDY, workers: Workers = None, as_json: Json = False) -> None:
     """Solve the study's model over its ranges; an interrupted sweep goes on where it stopped."""
-    from palpate.study import read_study
-    from palpate.study.pipeline import sweep_study
-    from palpate.study.workers import with_workers
+    from palpate.cli.study_commands import sweep_file
 
-    console = Console(as_json)
-    record = with_workers(read_study(study), workers)
-    paths = _paths(study, record.name)
-    if paths.data.with_name(paths.data.name + ".parts").exists():
-        console.say(f"Going on with the interrupted sweep in {paths.data} …")
-    data, random = sweep_study(record, paths, progress=not as_json)
-    rows = len(data) + (len(random) if random else 0)
-    failed = rows - len(data.ok) - (len(random.ok) if random else 0)
-    console.result(
-        f"{data}\n{paths.data}"
-        + (f"\n{paths.random}: {len(random)} further solves for testing" if random else ""),
-        {
-            "data": str(paths.data),
-            "random": str(paths.random) if random else None,
-            "rows": rows,
-            "failed": failed,
-        },
-    )
+    sweep_file(study, workers, Console(as_json))
 
 
 @app.command()
 def learn(study: StudyFile = STUDY, as_json: Json = False) -> None:
     """Learn the study's dataset: networks that grow and prune themselves, then refinement."""
-    from palpate.study import read_study
-    from palpate.study.stages import stages_of
+    from palpate.cli.study_commands import learn_file
 
-    console = Console(as_json)
-    record = read_study(study)
-    paths = _paths(study, record.name)
-    stages = stages_of(record)
-    train, test = stages.parted(record, paths)
-    console.say(f"Learning from {len(train)} solves …")
-    touch, history = stages.learnt(record, train, test, None, lambda stage: console.say(f"{stage} …"))
-    validation = stages.validated(record, touch, test, history)
-    touch = stages.judged(touch, validation)
-    stages.save(paths, touch, history)
-    said, figures = stages.told(touch, validation)
-    console.result(f"{touch}\n{history}\n{said}\n{paths.model}", {"model": str(paths.model), **figures})
-    console.say(f"Next: palpate validate {study}, palpate view {paths.model}")
+    learn_file(study, Console(as_json))
 
 
 @app.command()
@@ -181,34 +147,17 @@ def validate(
     as_json: Json = False,
 ) -> None:
     """Judge what was learnt on solves it has never seen; exit code 1 where it misses a limit."""
-    from palpate.cli.surrogate import is_archive, validate_file
+    from palpate.cli.study_commands import is_archive, validate_model, validate_study_file
 
+    console = Console(as_json)
     if is_archive(study):
-        validate_file(study, test, refined, report, Console(as_json))
+        validate_model(study, test, refined, report, console)
         return
     if test is not None or refined is not None:
         raise UsageError(
             "A study file says by itself what it is tested with.", fix="Leave out --test and --refined."
         )
-    _validate_study(study, report, Console(as_json))
-
-
-def _validate_study(study: Path, report: bool, console: Console) -> None:
-    from palpate.study import read_study
-    from palpate.study.pipeline import Outcome, report_study
-    from palpate.study.stages import stages_of
-
-    record = read_study(study)
-    paths, stages = _paths(study, record.name), stages_of(record)
-    train, test = stages.parted(record, paths)
-    touch, history = stages.load(paths, train)
-    validation = stages.validated(record, touch, test, history)
-    text = str(validation)
-    if report:
-        report_study(paths.report, [Outcome(record, touch, train, test, validation, history)])
-        text += f"\nreport: {paths.report}"
-    console.result(text, validation.as_dict() | {"report": str(paths.report) if report else None})
-    validation.raise_if_failed()
+    validate_study_file(study, report, console)
 
 
 @app.command()
@@ -247,7 +196,7 @@ def ask(
     as_json: Json = False,
 ) -> None:
     """Say what a learnt body's file holds, or the force, stiffness and trust at a place."""
-    from palpate.cli.ask import ask as ask_model
+    from palpate.cli.ask_command import ask as ask_model
 
     ask_model(model, at or [], Console(as_json))
 
@@ -261,7 +210,7 @@ def run(
     as_json: Json = False,
 ) -> None:
     """Run the real-time loop without a page, and print how late it was."""
-    from palpate.cli.loop import run_loop
+    from palpate.cli.run_command import run_loop
 
     run_loop(model, seconds, device, rate, Console(as_json))
 
@@ -292,7 +241,7 @@ def correct(
     as_json: Json = False,
 ) -> None:
     """Correct a touch surrogate by forces measured on a specimen; prints the error before and after."""
-    from palpate.cli.correct import Source, correct_model
+    from palpate.cli.correct_command import Source, correct_model
     from palpate.learning.correction import Discrepancy, Noise
 
     source = Source(file, stdin, port, stall, wait)
@@ -323,12 +272,6 @@ def _serve(model: Path, *, port: int | None, browser: bool, strict_port: bool = 
         open_browser=browser and sys.stdout.isatty(),
         strict_port=strict_port,
     )
-
-
-def _paths(study: Path, name: str) -> Any:
-    from palpate.study.paths import Paths
-
-    return Paths(study.parent, name)
 
 
 def main(arguments: list[str] | None = None) -> None:

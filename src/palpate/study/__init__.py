@@ -1,29 +1,16 @@
-"""Study: the whole pipeline, from body to touch, as one declared, frozen record.
+"""Study: the whole way, from the body to the touch, as one declared, frozen record.
 
-record     what the records of all studies are made of (pydantic)
-models     what a study of a beam says, checked when it is read
-touching   studies of solid bodies that a probe presses
-held       studies of beams that remember
-text       the record as TOML, with comments, and back
-presets    studies that have a name
-stages     what each kind of study does at each stage (beams, touching.stages, held.stages)
-pipeline   a study carried out: sweep, learn, validate, report
+study                the record: a body, what acts on it, and the tables of its stages
+body_records         `[body]`          interaction_records   `[interaction]`, `[memory]`, `[[varied]]`
+stage_records        `[sweep]`, `[test]`, `[filter]`, `[learning]`, `[target]`, `[runtime]`
+quantities           frozen tables with quantities that may carry units
+toml                 the record as a TOML file with comments, and back
+named_studies        studies that have a name
+run                  the stages: sweep, load the data, learn, validate, report
 """
 
-from palpate.study.held import HeldStudy
-from palpate.study.models import Study
-from palpate.study.presets import named, preset_names, preset_study
-from palpate.study.text import read_study, study_schema, to_toml
-from palpate.study.touching import TouchStudy
+from palpate.study.named_studies import preset_names, preset_study
+from palpate.study.study import Study
+from palpate.study.toml import read_study, study_schema, to_toml
 
-__all__ = [
-    "HeldStudy",
-    "Study",
-    "TouchStudy",
-    "named",
-    "preset_names",
-    "preset_study",
-    "read_study",
-    "study_schema",
-    "to_toml",
-]
+__all__ = ["Study", "preset_names", "preset_study", "read_study", "study_schema", "to_toml"]

@@ -1,4 +1,4 @@
-"""What is asked of a model, and why: thresholds from what a hand and an eye can tell apart.
+"""Limits that a model is asked to keep, and why: thresholds from what a hand and an eye can tell apart.
 
 Just noticeable differences: force about 7 % from 2.5 to 10 N and 10 to 15 % below 1 N (Jones 1989; Pang, Tan &
 Durlach 1991), stiffness 8 to 23 % (Jones & Hunter 1990; Tan, Durlach, Beauregard & Srinivasan 1995), direction
@@ -79,6 +79,11 @@ class Limits:
         Smallest and largest share of the errors that the 90 % interval holds.
     refined_force_median, refined_force_p95 : float
         ‖ΔF‖/‖F‖ against solves on a refined mesh: the model's error and the mesh's together.
+    history_force_median, history_force_p95 : float
+        |ΔF| along histories of a body with memory, over the largest |F| of the test: along unloading the force passes
+        through zero.
+    history_energy : float
+        Share of the steps of these histories that give lost energy back.
 
     Raises
     ------
@@ -103,6 +108,9 @@ class Limits:
     interval_coverage: tuple[float, float] | None = (0.80, 0.97)
     refined_force_median: float | None = 0.035
     refined_force_p95: float | None = 0.07
+    history_force_median: float | None = 0.01
+    history_force_p95: float | None = 0.035
+    history_energy: float | None = 1e-9
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -212,6 +220,10 @@ _TARGET = "the study's own target"
 _MESH = "Refine the mesh where the probe touches, or sweep more solves: the two errors stand apart below the table."
 _ROUGH = "palpate's own: at 0.1 m/s and 1 kHz, three times the roughness of the body itself"
 _COVER = "calibration: an interval should hold what it says (Gneiting, Balabdaoui & Raftery 2007)"
+_HISTORIES = "Learn from more histories, or from a finer mesh and smaller steps."
+_JONES = (
+    "half of half a just noticeable difference, over the largest force (Jones 1989; Pang, Tan & Durlach 1991)"
+)
 _EYE = "palpate's own: about a pixel where a body of 1 m fills a screen"
 
 CRITERIA = (
@@ -312,6 +324,25 @@ CRITERIA = (
         0.035,
         _FORCE,
         _MESH,
+    ),
+    Criterion(
+        "history_force_median", "Force error, median, of the largest force", "share", 0.01, _JONES, _HISTORIES
+    ),
+    Criterion(
+        "history_force_p95",
+        "Force error, 95th percentile, of the largest force",
+        "share",
+        0.035,
+        _JONES,
+        _HISTORIES,
+    ),
+    Criterion(
+        "history_energy",
+        "Steps that give back lost energy, or store less than none",
+        "share",
+        0.0,
+        "second law of thermodynamics",
+        "A stiffness or a time of its elements is negative: learn the body anew.",
     ),
 )
 """Everything that is judged, in the order in which it is told."""

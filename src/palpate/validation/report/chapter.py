@@ -1,15 +1,15 @@
-"""What a report tells of one body."""
+"""Content of a report on one body."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
-from palpate.dataset import Dataset
-from palpate.learning import History
-from palpate.surrogates import TouchModel
-from palpate.validation.result import Validation
+from palpate.validation.figures.history_following import Followed, follow_unseen
+from palpate.validation.subject import Subject
+from palpate.validation.validate import Validation
 
 __all__ = ["Chapter"]
 
@@ -22,13 +22,16 @@ class Chapter:
     ----------
     name : str
         Its heading.
-    touch : TouchModel
-    train, test : Dataset
-        Solves that were learnt from, and solves that were not.
+    model : Surrogate
+        What was learnt.
+    test : Dataset, TouchSolves or load histories
+        Solves that were not learnt from.
     validation : Validation
-        Of `touch` on `test`.
-    history : History
-        Of the sequential filter.
+        Of `model` on `test`.
+    train : Dataset or load histories, optional
+        Solves that were learnt from.
+    history : optional
+        Record of the sequential filter, where there was one, or of another search.
     rivals : mapping of str to History, optional
         Other runs to draw beside it, for example the founding form with tightened thresholds.
     settings : mapping, optional
@@ -36,16 +39,45 @@ class Chapter:
     timings : mapping of str to float, optional
         Seconds of each stage.
     provenance : mapping, optional
-        By default the training set's own.
+        By default the training set's own, else that of the model.
     """
 
     name: str
-    touch: TouchModel
-    train: Dataset
-    test: Dataset
+    model: Any
+    test: Any
     validation: Validation
-    history: History
-    rivals: Mapping[str, History] = field(default_factory=dict)
+    train: Any = None
+    history: Any = None
+    rivals: Mapping[str, Any] = field(default_factory=dict)
     settings: Mapping[str, Any] = field(default_factory=dict)
     timings: Mapping[str, float] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def subject(self) -> Subject:
+        """The model with the solves of the test that it has not seen."""
+        return Subject.of(self.model, self.test)
+
+    @cached_property
+    def followed(self) -> list[Followed]:
+        """The unseen histories, followed by a body with memory; empty for others."""
+        if self.subject.body is None or self.subject.histories is None:
+            return []
+        return follow_unseen(self.subject.body, self.subject.histories)
+
+    @property
+    def energy(self) -> Any:
+        """The energy that answers the force of the model."""
+        return getattr(self.model, "touch", self.model)
+
+    @property
+    def meta(self) -> Mapping[str, Any]:
+        """What the model says of its making."""
+        meta: Mapping[str, Any] = getattr(self.energy, "meta", {})
+        return meta
+
+    @property
+    def origin(self) -> Mapping[str, Any]:
+        """Where the solves come from: given, or said by the training set."""
+        origin: Mapping[str, Any] = self.provenance or getattr(self.train, "provenance", None) or {}
+        return origin

@@ -1,14 +1,18 @@
-"""How figures look: one Matplotlib style, colours that colour-blind readers can tell apart, light and dark.
+"""Look of the pictures: one Matplotlib style, colours that colour-blind readers can tell apart, light and dark.
 
-Ink is a placeholder colour that `svg` turns into the page's text colour, and nothing is painted behind, so that
+Ink is a placeholder colour that `inline_svg` turns into the page's text colour, and nothing is painted behind, so that
 a figure follows the page from light to dark. Data colours have a lightness between the two, chosen from Okabe &
 Ito 2008 ("Color universal design").
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import io
+import re
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
+from html import escape
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -25,9 +29,12 @@ __all__ = [
     "INK",
     "ORANGE",
     "SERIES",
+    "Picture",
     "figure",
+    "inline_svg",
     "loads_map",
     "logarithmic",
+    "picture",
     "series",
     "styled",
     "tidy_log",
@@ -88,7 +95,7 @@ def styled(key: str) -> Iterator[None]:
 def figure(
     rows: int = 1, columns: int = 1, *, size: tuple[float, float], **options: Any
 ) -> tuple[Figure, Any]:
-    """A figure of its own, of no global state, and its axes as an array of shape (rows, columns)."""
+    """Return a figure of no global state, and its axes as an array of shape (rows, columns)."""
     from matplotlib.figure import Figure
 
     made = Figure(figsize=size)
@@ -96,7 +103,7 @@ def figure(
 
 
 def loads_map() -> Colormap:
-    """From small loads to large: blue to amber, lightness rising, readable on white and on near-black."""
+    """Return the colours from small loads to large: blue to amber, readable on white and on near-black."""
     from matplotlib.colors import LinearSegmentedColormap
 
     stops = ["#3f63d6", "#8a5fcf", "#c85aa6", "#e36a6a", "#ec8f3c", "#e2b13a"]
@@ -104,12 +111,12 @@ def loads_map() -> Colormap:
 
 
 def series(count: int) -> list[dict[str, Any]]:
-    """Colour and dash of each of `count` lines; dashes too, so that colour is never the only difference."""
+    """Return colour and dash of each of `count` lines; dashes too, so that colour is never the only difference."""
     return [{"color": SERIES[i % 6], "linestyle": DASHES[(i + i // 6) % 6]} for i in range(count)]
 
 
 def logarithmic(axes: Axes, which: Literal["x", "y"], low: float, high: float) -> None:
-    """A logarithmic axis labelled by powers of ten in plain text, which stays readable where no formula is set."""
+    """Make an axis logarithmic, labelled by powers of ten in plain text: no formula is set in an SVG."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
 
     # limits first: data that are all zero leave a logarithmic axis nothing to choose them by
@@ -123,7 +130,7 @@ def logarithmic(axes: Axes, which: Literal["x", "y"], low: float, high: float) -
 
 
 def tidy_log(axes: Axes, values: Sequence[np.ndarray], decades: float = 9.0) -> None:
-    """A logarithmic y axis around the values, at most `decades` deep: rounding noise below tells nothing."""
+    """Make the y axis logarithmic around the values, at most `decades` deep: rounding noise below tells nothing."""
     positive = np.concatenate([np.ravel(v)[np.ravel(v) > 0] for v in values] or [np.empty(0)])
     positive = positive[np.isfinite(positive)]
     top, bottom = 1e-9, 1e-16  # errors of exactly zero lie below any such axis
@@ -131,3 +138,55 @@ def tidy_log(axes: Axes, values: Sequence[np.ndarray], decades: float = 9.0) -> 
         top = 10 ** np.ceil(np.log10(positive.max()) + 0.05)
         bottom = max(10 ** np.floor(np.log10(np.quantile(positive, 0.01))), top / 10**decades)
     logarithmic(axes, "y", bottom, top)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture of the page: a key unique in it, a heading, what it shows for who cannot see it, and a caption."""
+
+    key: str
+    title: str
+    alt: str
+    caption: str
+    svg: str
+
+
+def inline_svg(figure: Figure, key: str, alt: str) -> str:
+    """Return the figure as an ``<svg>`` element for a page that holds many.
+
+    Parameters
+    ----------
+    figure : Figure
+    key : str
+        Prefix of every id; letters, digits and hyphens.
+    alt : str
+        Text in its place for who cannot see it.
+    """
+    buffer = io.StringIO()
+    figure.savefig(buffer, format="svg", dpi=140, metadata={"Date": None, "Creator": None})
+    text = buffer.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    text = re.sub(r' id="', f' id="{key}-', text)
+    text = re.sub(r"url\(#", f"url(#{key}-", text)
+    text = re.sub(r'(?:xlink:)?href="#', f'href="#{key}-', text)
+    text = text.replace("xlink:href=", "href=").replace(INK, "currentColor")
+    text = re.sub(r"'DejaVu Sans'(?:, sans-serif)?", "var(--sans)", text)
+    return re.sub(r"<svg [^>]*>", lambda found: _opening(found.group(), alt), text, count=1)
+
+
+def _opening(tag: str, alt: str) -> str:
+    box = re.search(r'viewBox="([^"]*)"', tag)
+    width = re.search(r'width="([\d.]+)', tag)
+    assert box is not None, "Matplotlib always writes a view box"
+    assert width is not None, "Matplotlib always writes a width"
+    natural = f"--natural: {float(width.group(1)) / 0.75:.0f}px"
+    return (
+        f'<svg viewBox="{box.group(1)}" style="{natural}" role="img" aria-label="{escape(alt, quote=True)}">'
+    )
+
+
+def picture(key: str, title: str, alt: str, caption: str, draw: Callable[[], Figure]) -> Picture:
+    """Draw one picture in the page's style; `alt` is what it shows for who cannot see it."""
+    with styled(key):
+        return Picture(key, title, alt, caption, inline_svg(draw(), key, alt))

@@ -1,13 +1,16 @@
-"""The plain words on top: what was solved, what was learnt, how good it is."""
+"""Plain words on top of a chapter: what was solved, what was learnt, how good it is."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-from palpate.format import count, length, plain, scientific, share
-from palpate.validation.report.body import body_words, strain_words
+from palpate.format import count, interval, length, plain, scientific, share
+from palpate.validation.figures.by_load import worse_than_filter
+from palpate.validation.figures.history_following import HistoryErrors
+from palpate.validation.report.body_words import body_words, strain_words
 from palpate.validation.report.chapter import Chapter
-from palpate.validation.result import Validation, worse_than_filter
+from palpate.validation.validate import Validation
 
 __all__ = ["Fact", "Story", "felt", "story"]
 
@@ -45,48 +48,76 @@ def story(chapter: Chapter) -> Story:
     """Tell a chapter's results to a person."""
     v = chapter.validation
     verdict = "Every limit kept" if v.passed else f"{len(v.failures)} of {len(v.checks)} limits missed"
-    return Story(verdict, v.passed, _facts(chapter), _solved(chapter), _learnt(chapter), _good(v))
+    return Story(verdict, v.passed, tuple(_facts(chapter)), _solved(chapter), _learnt(chapter), _good(v))
 
 
-def _facts(chapter: Chapter) -> tuple[Fact, ...]:
-    v = chapter.validation
-    refined = v.networks["refined"]
-    facts = [
-        Fact(length(v.field.reach), "travel of the held node, at most"),
-        Fact(f"{plain(v.force.largest, 3)} N", "largest force on the hand in the test"),
-        Fact(
-            count(refined.units, "unit"),
-            f"of network “nodes” answer for {len(refined.per_output)} displacements",
-        ),
-        Fact(length(refined.rmse), f"RMSE at the nodes, {scientific(refined.relative)} of full scale"),
-    ]
-    if v.force.p95 is not None and v.force.p95_jnd is not None:
-        facts.append(
-            Fact(share(v.force.p95), f"force error at most, for 95 of 100 loads: {felt(v.force.p95_jnd)}")
-        )
-    return tuple(facts)
+def _facts(chapter: Chapter) -> Iterator[Fact]:
+    v, subject = chapter.validation, chapter.subject
+    if reach := getattr(chapter.model, "reach", None):
+        yield Fact(length(reach), "farthest trained displacement of the held node")
+    if subject.function is not None and subject.function.depth is not None:
+        depth = float(subject.function.depth(subject.X).max())
+        yield Fact(f"{plain(1e3 * depth, 3)} mm", "deepest touch in the test")
+    errors = v.histories or v.force
+    if errors is not None:
+        largest = errors.largest_force if v.histories else errors.largest
+        yield Fact(f"{plain(largest, 3)} N", "largest force on the hand in the test")
+    if v.networks is not None:
+        refined = v.networks.refined
+        outputs = len(refined.per_output)
+        yield Fact(count(refined.units, "unit"), f"of network “nodes” answer for {outputs} displacements")
+        yield Fact(length(refined.rmse), f"RMSE at the nodes, {scientific(refined.relative)} of full scale")
+    if "solves" in chapter.meta:
+        yield Fact(count(int(chapter.meta["solves"]), "solve"), "to learn from")
+    if v.force is not None and v.force.p95 is not None:
+        yield Fact(share(v.force.median), "force error at the median")
+        yield Fact(share(v.force.p95), f"force error at most, for 95 of 100 solves: {felt(v.force.p95_jnd)}")
+    if v.histories is not None:
+        yield Fact(share(v.histories.median), "force error at the median, of the largest force")
+        yield Fact(share(v.histories.p95), "force error at most, for 95 of 100 samples")
+        more = v.histories.elastic_p95 / v.histories.p95
+        yield Fact(f"{plain(more, 3)} ×", "as much error without a memory")
 
 
 def _solved(chapter: Chapter) -> str:
+    v, subject = chapter.validation, chapter.subject
+    if v.histories is not None:
+        text = f"{v.histories.count} histories by finite elements that the body never saw, {v.samples} samples in all."
+    elif subject.loads is not None:
+        text = _solved_by_load(chapter)
+    else:
+        within = ", ".join(interval(r) for r in subject.ranges)
+        text = (
+            f"{count(v.samples, 'solve')} by finite elements that the surrogate never saw, within {within}; "
+            f"{v.force.light_count} of them are light, up to f₀ = {plain(v.force.light)} N."
+        )
+    return text
+
+
+def _solved_by_load(chapter: Chapter) -> str:
+    test = chapter.test
+    train = test if chapter.train is None else chapter.train
     loads = ", ".join(
-        f"{r.name} from {r.low:g} to {r.high:g} {r.unit}".rstrip() for r in chapter.touch.inputs
+        f"{r.name} from {r.low:g} to {r.high:g} {r.unit}".rstrip() for r in chapter.subject.ranges
     )
-    failed = len(chapter.train) + len(chapter.test) - len(chapter.train.ok) - len(chapter.test.ok)
+    failed = len(train) + len(test) - len(train.ok) - len(test.ok)
     text = (
-        f"{body_words(chapter.train.provenance)} was solved by finite elements under loads {loads}: "
-        f"{len(chapter.train.ok)} solves to learn from and {len(chapter.test.ok)} that the networks never saw."
+        f"{body_words(train.provenance)} was solved by finite elements under loads {loads}: "
+        f"{len(train.ok)} solves to learn from and {len(test.ok)} that the networks never saw."
     )
     if failed:
         text += f" {count(failed, 'solve')} did not converge and were left out."
-    return f"{text} {strain_words(chapter.train, chapter.test)}".rstrip()
+    return f"{text} {strain_words(train, test)}".rstrip()
 
 
 def _learnt(chapter: Chapter) -> str:
-    v, meta = chapter.validation, chapter.touch.meta
-    used = meta.get("refinement", {}).get("used")
-    own, refined = v.networks.get("filter"), v.networks["refined"]
+    v = chapter.validation
+    if v.networks is None:
+        return f"{chapter.energy}.".replace("\n", "; ").replace("..", ".")
+    used = chapter.meta.get("refinement", {}).get("used")
+    own, refined = v.networks.filter, v.networks.refined
     text = ""
-    if own is not None:
+    if own is not None and chapter.history is not None:
         text = (
             f"A sequential filter met the solves one at a time, {count(chapter.history.units.size, 'observation')} in "
             f"{count(chapter.history.passes, 'pass', 'passes')}, ended with {count(own.units, 'unit')} and came within "
@@ -101,7 +132,7 @@ def _learnt(chapter: Chapter) -> str:
 
 
 def _shortfall(v: Validation) -> str:
-    """Where refinement did no good, or not enough."""
+    """Return where refinement did no good, or not enough."""
     text = "" if (worse := worse_than_filter(v.networks)) is None else f" {worse}"
     missed = next((c for c in v.failures if c.criterion.key == "rmse"), None)
     if missed is not None:
@@ -113,26 +144,49 @@ def _shortfall(v: Validation) -> str:
 
 
 def _good(v: Validation) -> str:
-    force = v.force
-    seen = f"The shape on the screen is off by {length(v.field.mean)} on average and {length(v.field.max)} at worst."
-    if force.median is None or force.p95 is None or force.p95_jnd is None:
-        return f"{seen} No touch in the test was strong enough to judge its force in relative terms."
-    text = (
-        f"{seen} The force that a hand feels is off by {share(force.median)} at the median and by at most "
-        f"{share(force.p95)} for 95 of 100 loads: {felt(force.p95_jnd)}."
-    )
-    if force.direction_p95 is not None:
-        text += f" Its direction is within {plain(force.direction_p95)}° for 95 of 100; a person notices 25° to 35°."
-    if v.loops is not None:
-        text += (
-            f" The force network is not the gradient of an energy, so closed paths are watched: of "
-            f"{v.loops.loops}, the worst returned {share(v.loops.max)} of the energy given on the way."
+    parts = []
+    if v.shape is not None:
+        parts.append(
+            f"The shape on the screen is off by {length(v.shape.mean)} on average and {length(v.shape.max)} at worst."
         )
-    return text
+    if v.histories is not None:
+        parts.append(_good_histories(v.histories))
+    elif v.force is None or v.force.p95 is None:
+        parts.append("No touch in the test was strong enough to judge its force in relative terms.")
+    else:
+        parts.append(
+            f"The force that a hand feels is off by {share(v.force.median)} at the median and by at most "
+            f"{share(v.force.p95)} for 95 of 100 solves: {felt(v.force.p95_jnd)}."
+        )
+        if v.stiffness is not None:
+            parts.append(f"The stiffness is off by at most {share(v.stiffness.p95)} for 95 of 100.")
+        if v.force.direction_p95 is not None:
+            direction = plain(v.force.direction_p95)
+            parts.append(f"Its direction is within {direction}° for 95 of 100; a person notices 25° to 35°.")
+        if v.coverage is not None:
+            inside = share(v.coverage.share)
+            parts.append(f"Of {v.coverage.count} errors {inside} lie within the 90 % interval.")
+        works = [w.max for w in (v.loops, v.border_loops) if w is not None]
+        if works:
+            parts.append(f"Closed paths return at most {share(max(works))} of the energy given on the way.")
+    return " ".join(parts)
+
+
+def _good_histories(errors: HistoryErrors) -> str:
+    text = (
+        f"The force is off by {share(errors.median)} of the largest at the median and by at most {share(errors.p95)} "
+        f"for 95 of 100 samples; without a memory by {share(errors.elastic_median)} and {share(errors.elastic_p95)}."
+    )
+    if errors.residual_median is not None and errors.residual_largest is not None:
+        text += (
+            f" Let go, it stays up to {length(errors.residual_largest)} away; this place is off by "
+            f"{length(errors.residual_median)} at the median."
+        )
+    return text + " No step gave lost energy back." if errors.gives == 0 else text
 
 
 def felt(jnd: float) -> str:
-    """An error in just noticeable differences, in words."""
+    """Return an error in just noticeable differences, in words."""
     if jnd >= 1:
         return f"{plain(jnd)} times what a person notices"
     if jnd == 0:

@@ -1,39 +1,44 @@
-"""The page itself."""
+"""Page of a report: one self-contained HTML file."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 from palpate.errors import UsageError
 from palpate.format import bind_units
 from palpate.validation.report.chapter import Chapter
-from palpate.validation.report.held import HeldChapter
-from palpate.validation.report.held.told import held_told
-from palpate.validation.report.networks import network_rows
-from palpate.validation.report.pictures import pictures
+from palpate.validation.report.hand_pictures import hand_pictures
+from palpate.validation.report.history_pictures import history_pictures
+from palpate.validation.report.load_pictures import load_pictures, network_rows
+from palpate.validation.report.style import Picture
 from palpate.validation.report.summary import story
-from palpate.validation.report.surrogates import SurrogateChapter
-from palpate.validation.report.surrogates.told import surrogate_told
-from palpate.validation.report.tables import flat, judged_rows, node_rows, sources, timing_rows
+from palpate.validation.report.tables import flat, judged_rows, sources, tables, timing_rows
+from palpate.validation.report.touch_pictures import touch_pictures
 
 if TYPE_CHECKING:
     from markupsafe import Markup
 
-__all__ = ["render", "write_report"]
+__all__ = ["pictures", "render", "report_context", "write_report"]
 
 TITLE = "What the hand will feel"
 
-AnyChapter: TypeAlias = Chapter | SurrogateChapter | HeldChapter
+PICTURES: tuple[Callable[[Chapter, str], list[Picture]], ...] = (
+    load_pictures,
+    touch_pictures,
+    history_pictures,
+    hand_pictures,
+)
+"""Groups of pictures in the order of the page; each draws what it can of a chapter."""
 
 
 def write_report(
     path: str | os.PathLike[str],
-    chapters: Sequence[AnyChapter],
+    chapters: Sequence[Chapter],
     *,
     title: str = TITLE,
     machine: Mapping[str, Any] | None = None,
@@ -44,11 +49,11 @@ def write_report(
     ----------
     path : path
         Of the file; its folder is made if need be.
-    chapters : sequence of Chapter, SurrogateChapter or HeldChapter
+    chapters : sequence of Chapter
         One per body.
     title : str
     machine : mapping, optional
-        What the figures were made on: processor, system, versions.
+        Where the figures were made: processor, system, versions.
 
     Raises
     ------
@@ -78,12 +83,12 @@ def write_report(
 
 
 def render(
-    chapters: Sequence[AnyChapter],
+    chapters: Sequence[Chapter],
     *,
     title: str = TITLE,
     machine: Mapping[str, Any] | None = None,
 ) -> str:
-    """The page as text; the same chapters give the same text.
+    """Return the page as text; the same chapters give the same text.
 
     Raises
     ------
@@ -105,11 +110,11 @@ def render(
     environment.filters |= {"bound": bind_units, "prose": _prose}
     # figures are made here, with every name in them escaped by Matplotlib; the style sheet is palpate's own
     style = Markup(environment.get_template("report.css").render())
-    told = [_told(chapter, f"c{i}") for i, chapter in enumerate(chapters, 1)]
+    contexts = [report_context(chapter, f"c{i}") for i, chapter in enumerate(chapters, 1)]
     return environment.get_template("report.html").render(
         title=title,
         style=style,
-        chapters=told,
+        chapters=contexts,
         sources=sources([c.validation for c in chapters]),
         machine=list(flat(machine or {})),
         svg=Markup,
@@ -117,29 +122,40 @@ def render(
 
 
 def _prose(text: str) -> Markup:
-    """Text as HTML: escaped, numbers bound to their units, what stands between backticks as code."""
+    """Return text as HTML: escaped, numbers bound to their units, what stands between backticks as code."""
     from markupsafe import Markup, escape
 
     return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(bind_units(text)))))
 
 
-def _told(chapter: AnyChapter, key: str) -> dict[str, Any]:
-    if isinstance(chapter, SurrogateChapter):
-        return surrogate_told(chapter, key)
-    if isinstance(chapter, HeldChapter):
-        return held_told(chapter, key)
-    head, rows = node_rows(chapter.validation)
+def report_context(chapter: Chapter, key: str) -> dict[str, Any]:
+    """Return a chapter as the template takes it; `key` starts the name of each picture."""
+    v, loads = chapter.validation, chapter.subject.loads
+    remarks = v.histories.lines() if v.histories else ()
     return {
         "key": key,
         "name": chapter.name,
         "story": story(chapter),
         "pictures": pictures(chapter, key),
-        "judged": judged_rows(chapter.validation),
-        "failures": [str(c) for c in chapter.validation.failures],
-        "notes": chapter.validation.notes,
-        "networks": network_rows(chapter.touch),
-        "tables": [("Error of each displacement", head, rows)],
+        "judged": judged_rows(v),
+        "failures": [str(c) for c in v.failures],
+        "notes": (*remarks, *v.notes),
+        "networks": [] if loads is None else network_rows(loads),
+        "tables": tables(chapter),
         "timings": timing_rows(chapter.timings),
-        "settings": list(flat(chapter.settings or chapter.touch.meta.get("settings", {}))),
-        "provenance": list(flat(chapter.provenance or chapter.train.provenance)),
+        "settings": list(flat(chapter.settings or chapter.meta.get("settings", {}))),
+        "provenance": list(flat(_brief(chapter.origin or chapter.meta))),
     }
+
+
+def pictures(chapter: Chapter, key: str) -> list[Picture]:
+    """Draw all pictures of a chapter."""
+    return [made for group in PICTURES for made in group(chapter, key)]
+
+
+def _brief(origin: Mapping[str, Any]) -> dict[str, Any]:
+    """Return provenance for a table: isometries as their number."""
+    brief = dict(origin)
+    if isinstance(symmetry := brief.get("symmetry"), Mapping):
+        brief["symmetry"] = f"{len(symmetry.get('isometries', [1]))} images"
+    return brief

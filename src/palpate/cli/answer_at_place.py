@@ -1,0 +1,220 @@
+"""Answer of a model at one place, for a person and for a program: of an energy, or of networks of arrays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from palpate.format import share
+from palpate.learning import Fitted
+from palpate.network import Network
+from palpate.units import Quantity, Range, bounds
+
+__all__ = ["Answer", "Prediction", "outside", "predictions"]
+
+_NOTHING = 1e-9  # N: first touch, but for round-off
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Answer of an energy at one place.
+
+    Attributes
+    ----------
+    inputs : (n,)
+        In the inputs' units.
+    energy : float
+        J.
+    force : (3,)
+        N.
+    stiffness : (3, 3)
+        ∂F/∂c by the first three inputs c, N/m.
+    deviation : float
+        Of the force, relative to its size; not-a-number where it is not known, as beyond the ranges.
+    inside : bool
+        True if the place lies in what was trained.
+    deepest : float, optional
+        How far inside the touched surface (m) the probe's centre could go; given where the loop lets go of it. Energy,
+        force and stiffness are not-a-number there.
+    """
+
+    inputs: np.ndarray
+    energy: float
+    force: np.ndarray
+    stiffness: np.ndarray
+    deviation: float
+    inside: bool
+    deepest: float | None = None
+
+    def words(self, names: Sequence[Range]) -> str:
+        """Return the answer as lines for a person."""
+        place, beyond = _place_in_words(self.inputs, names), _beyond_in_words(self.inputs, names)
+        beyond = f"\n  {beyond}" if beyond else ""
+        if self.deepest is not None:
+            return f"{place}\n  {_unknown(self.deepest)}{beyond}"
+        size = float(np.linalg.norm(self.force))
+        if size < _NOTHING:
+            return f"{place}\n  no contact: force, stiffness and energy are zero{beyond}"
+        largest = float(np.abs(self.stiffness).max())
+        lines = [
+            place,
+            f"  force      {_row(self.force, size)} N, in all {size:.4g} N",
+            f"  stiffness  {self.along():.4g} N/m along the force",
+            f"  ∂F/∂c      {'; '.join(_row(row, largest) for row in self.stiffness)} N/m",
+            f"  energy     {self.energy:.4g} J",
+            f"  trust      {self._trust(names)}",
+        ]
+        return "\n".join(lines)
+
+    def along(self) -> float:
+        """Return −F·(∂F/∂c)F/‖F‖², N/m: the stiffness that a hand feels when it pushes on."""
+        return float(-self.force @ self.stiffness @ self.force / (self.force @ self.force))
+
+    def _trust(self, names: Sequence[Range]) -> str:
+        where = _trust_in_words(self.inputs, names, inside=self.inside)
+        sure = (
+            "" if math.isnan(self.deviation) else f"± {share(self.deviation)} of the force, one deviation; "
+        )
+        return sure + where
+
+    def ended(self, deepest: float) -> Answer:
+        """Return the answer at this place where the body has let go of the probe."""
+        none = math.nan
+        return replace(
+            self,
+            energy=none,
+            force=np.full(3, none),
+            stiffness=np.full((3, 3), none),
+            deviation=none,
+            inside=False,
+            deepest=deepest,
+        )
+
+    def as_dict(self, names: Sequence[Range]) -> dict[str, Any]:
+        """Return the answer as data for a program.
+
+        `contact` is None where the body lets go, `beyond` has the names of the inputs out of range.
+        """
+        return {
+            "inputs": self.inputs.tolist(),
+            "force": self.force.tolist(),
+            "stiffness": self.stiffness.tolist(),
+            "energy": self.energy,
+            "deviation": self.deviation,
+            "inside": self.inside,
+            "contact": None if self.deepest is not None else float(np.linalg.norm(self.force)) >= _NOTHING,
+            "beyond": _names_beyond(self.inputs, names),
+        }
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Outputs at one place.
+
+    Attributes
+    ----------
+    inputs : (n,)
+        In the inputs' units.
+    outputs : m quantities
+    values : (m,)
+    deviations : (m,), optional
+        Standard deviation of what would be measured; None where the file has none. Beyond the ranges it says nothing
+        and is not-a-number.
+    inside : bool, optional
+        True if a training sample is near; None where the file does not tell.
+    """
+
+    inputs: np.ndarray
+    outputs: tuple[Quantity, ...]
+    values: np.ndarray
+    deviations: np.ndarray | None
+    inside: bool | None
+
+    def words(self, names: Sequence[Range]) -> str:
+        """Return the answer as lines for a person."""
+        lines = [_place_in_words(self.inputs, names)]
+        width = max(len(output.name) for output in self.outputs)
+        sure = [None] * len(self.values) if self.deviations is None else self.deviations
+        for output, value, deviation in zip(self.outputs, self.values, sure, strict=True):
+            spread = "" if deviation is None or math.isnan(deviation) else f" ± {deviation:.2g}"
+            lines.append(f"  {output.name:{width}}  {value:.6g}{spread} {output.unit}".rstrip())
+        return "\n".join([*lines, f"  trust: {_trust_in_words(self.inputs, names, inside=self.inside)}"])
+
+    def as_dict(self, names: Sequence[Range]) -> dict[str, Any]:
+        """Return the outputs as data for a program; `beyond` are the inputs out of range."""
+        return {
+            "inputs": self.inputs.tolist(),
+            "outputs": {output.name: float(v) for output, v in zip(self.outputs, self.values, strict=True)},
+            "deviations": None if self.deviations is None else self.deviations.tolist(),
+            "inside": self.inside,
+            "beyond": _names_beyond(self.inputs, names),
+        }
+
+
+def predictions(network: Network | Fitted, X: np.ndarray) -> list[Prediction]:
+    """Return the outputs at places (N, n)."""
+    if isinstance(network, Network):
+        return [
+            Prediction(x, network.outputs, y, None, None) for x, y in zip(X, network.predict(X), strict=True)
+        ]
+    outputs = network.network.outputs
+    Y, spread = (np.reshape(a, (len(X), -1)) for a in (network.predict(X), network.deviation(X)))
+    trusted = network.trusted(X)
+    spread = np.where(outside(X, network.network.inputs).any(axis=1, keepdims=True), math.nan, spread)
+    return [Prediction(x, outputs, y, d, bool(i)) for x, y, d, i in zip(X, Y, spread, trusted, strict=True)]
+
+
+def outside(values: np.ndarray, inputs: Sequence[Range]) -> np.ndarray:
+    """Return which of the values (..., n) lie outside of their ranges."""
+    low, high = bounds(inputs)
+    return np.asarray((values < low) | (values > high))
+
+
+def _names_beyond(values: np.ndarray, inputs: Sequence[Range]) -> list[str]:
+    """Return the names of the inputs whose values (n,) lie outside of their ranges."""
+    return [r.name for r, out in zip(inputs, outside(values, inputs), strict=True) if out]
+
+
+def _place_in_words(values: np.ndarray, inputs: Sequence[Range]) -> str:
+    """Return names, values and units."""
+    return "at " + ", ".join(_quantity(r, x) for r, x in zip(inputs, values, strict=True))
+
+
+def _beyond_in_words(values: np.ndarray, inputs: Sequence[Range]) -> str:
+    """Return values outside of their ranges, in words; "" if there are none."""
+    return ", ".join(
+        f"{_quantity(r, x)} is not in {r.low:.4g} … {r.high:.4g} {r.unit}".rstrip()
+        for r, x, out in zip(inputs, values, outside(values, inputs), strict=True)
+        if out
+    )
+
+
+def _trust_in_words(values: np.ndarray, inputs: Sequence[Range], *, inside: bool | None) -> str:
+    """Return in words whether values lie in what was trained; `inside` is None where no sample is known to be near."""
+    if beyond := _beyond_in_words(values, inputs):
+        return f"not known, OUTSIDE what it was trained on: {beyond}"
+    if inside is None:
+        return "within the ranges it was trained on"
+    if not inside:
+        return "OUTSIDE what it was trained on: within the ranges, but no training sample is near"
+    return "inside what it was trained on"
+
+
+def _unknown(deepest: float) -> str:
+    return (
+        f"no force is known here: a probe is followed to where its centre is {1e3 * deepest:.3g} mm beneath the "
+        "touched\n  surface, not deeper and not behind the body: there the loop and the page let go of the hand"
+    )
+
+
+def _quantity(quantity: Range, value: float) -> str:
+    return f"{quantity.name} {value:g} {quantity.unit}".rstrip()
+
+
+def _row(values: np.ndarray, size: float) -> str:
+    """Return numbers as text; what is round-off beside `size` as zero."""
+    return " ".join("0" if abs(value) < 1e-9 * size else f"{value:.4g}" for value in values)

@@ -1,0 +1,155 @@
+"""`palpate ask`: what a learnt file holds, and what that answers at a place."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate.cli.answer_at_place import Answer, outside, predictions
+from palpate.cli.console import Console
+from palpate.errors import FileFormatError, UsageError
+from palpate.learning import Fitted
+from palpate.learning.plastic.paths import KIND, HeldPaths
+from palpate.network import Archive, Network, load_archive
+from palpate.runtime.touchable import touchable
+from palpate.surrogates import TouchedBody, TouchSurrogate
+from palpate.surrogates.learnt_energy import LearntEnergy, warning_of
+from palpate.surrogates.loading import load
+from palpate.units import Range
+
+__all__ = ["ask"]
+
+_STEPS = 16  # in a radius
+
+
+def ask(model: Path, at: Sequence[str], console: Console) -> None:
+    """Print what a file holds; with places, what it answers there instead.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is missing or damaged.
+    UsageError
+        If a place is not as many numbers as there are inputs, or what the file holds has no answer to a place.
+    """
+    found = _read(model)
+    asked = found.touch if isinstance(found, TouchedBody) else found
+    what, inputs = type(found).__name__, _inputs(asked)
+    if not at:
+        ranges = [{"name": r.name, "low": r.low, "high": r.high, "unit": r.unit} for r in inputs]
+        content = {"model": str(model), "kind": what, "inputs": ranges, "text": str(found)}
+        warning = _warning(asked)
+        console.result("\n".join([f"{what} in {model}\n{found}", *warning]), content | _as_field(warning))
+        return
+    if isinstance(asked, LearntEnergy):
+        X = _places(at, inputs)
+        answers: Sequence[Any] = _answered(asked, X)
+        words = [one.words(inputs) for one in answers] + _reservations(asked)
+    elif isinstance(asked, Fitted | Network):
+        answers = predictions(asked, _places(at, inputs))
+        words = [one.words(inputs) for one in answers]
+    else:
+        raise UsageError(
+            f"{model} holds a {what}, which does not answer at a place.",
+            why="Bodies that are pressed or gripped have an energy of place, networks of arrays outputs; others "
+            "answer to a hand that moves.",
+            fix="Try `palpate run` or `palpate view`, or the value that `pp.load` reads.",
+        )
+    content = {"model": str(model), "answers": [one.as_dict(inputs) for one in answers]}
+    console.result("\n".join(words), content | _as_field(_warning(asked)))
+
+
+def _read(path: Path) -> Any:
+    """What a file of any kind holds."""
+    kind = load_archive(path).kind
+    if kind == KIND:
+        return HeldPaths.load(path)
+    if kind != Archive.kind:
+        return load(path)
+    try:
+        return Fitted.load(path)
+    except FileFormatError:
+        return Network.load(path)
+
+
+def _inputs(asked: Any) -> tuple[Range, ...]:
+    """Ranges of the n inputs; none of histories."""
+    if isinstance(asked, HeldPaths):
+        return ()
+    return tuple(asked.network.inputs if isinstance(asked, Fitted) else asked.inputs)
+
+
+def _answered(energy: LearntEnergy, X: np.ndarray) -> list[Answer]:
+    known = energy.deviation(X) if energy.root is not None else np.full(len(X), math.nan)
+    forces = energy.force(X)
+    # a deviation is of what is like the training, and says nothing beyond it; that nothing is touched is exact
+    known[outside(X, energy.inputs).any(axis=1) & forces.any(axis=1)] = math.nan
+    columns = energy.energy(X), forces, energy.stiffness(X), known, energy.inside(X)
+    answers = [
+        Answer(x, float(U), F, K, float(d), bool(i)) for x, U, F, K, d, i in zip(X, *columns, strict=True)
+    ]
+    if not isinstance(energy, TouchSurrogate):
+        return answers
+    let_go, end = _let_go(energy, X), energy.surface.inner
+    return [one.ended(end) if gone else one for one, gone in zip(answers, let_go, strict=True)]
+
+
+def _let_go(touch: TouchSurrogate, X: np.ndarray) -> list[bool]:
+    """Whether the loop would let go of a probe (N,) at inputs X (N, n), so that no force is known there.
+
+    One that feels nothing is led out along the body's normal: from beneath the touched surface it meets that from
+    behind, and the body lets go of it; from the air it meets nothing, or a front.
+    """
+    body = touchable(touch)
+    loop, (low, high) = body.evaluator(), touch.surface.box
+    far = float(np.linalg.norm(high - low))
+    ways = np.linspace(0.0, far, max(2, int(_STEPS * far / touch.surface.radius)))
+    found = []
+    for x in X:
+        loop(body.away, x[3:])  # every probe begins in the air
+        for way in ways:
+            loop(x[:3] + way * body.normal, x[3:])
+            if loop.depth > 0.0 or loop.let_go:
+                break
+        found.append(loop.let_go)
+    return found
+
+
+def _reservations(energy: LearntEnergy) -> list[str]:
+    memory = {"relaxation", "yielding"} & set(energy.meta)
+    instant = "This is the elastic answer, that of an instant: the body remembers, which `palpate run` shows."
+    return [instant] * bool(memory) + _warning(energy)
+
+
+def _warning(asked: Any) -> list[str]:
+    told = warning_of(asked.meta) if isinstance(asked, LearntEnergy) else ""
+    return [f"Its correction was warned of: {told}"] if told else []
+
+
+def _as_field(warning: list[str]) -> dict[str, str]:
+    return {"warning": warning[0]} if warning else {}
+
+
+def _places(texts: Sequence[str], inputs: Sequence[Range]) -> np.ndarray:
+    return np.array([_place(text, inputs) for text in texts])
+
+
+def _place(text: str, inputs: Sequence[Range]) -> list[float]:
+    """Numbers with commas or blanks between them, as many as there are inputs."""
+    try:
+        found = [float(word) for word in text.replace(",", " ").split()]
+    except ValueError:
+        found = []
+    if len(found) != len(inputs) or not all(map(math.isfinite, found)):
+        names = ", ".join(f"{r.name} ({r.unit})" if r.unit else r.name for r in inputs)
+        example = ",".join(f"{(r.low + r.high) / 2:.4g}" for r in inputs)
+        raise UsageError(
+            f"{text!r} is no place of this model.",
+            why=f"It has {len(inputs)} inputs: {names}.",
+            fix=f"Give as many numbers with commas between, for example --at {example}.",
+        )
+    return found

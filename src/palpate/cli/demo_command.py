@@ -1,0 +1,84 @@
+"""`palpate demo`: studies with a name, from finite elements to a report and a model that can be touched."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from palpate.cli.console import Console
+from palpate.errors import AccuracyError, UsageError
+from palpate.study import Study, preset_study
+from palpate.study.run import Outcome, Paths, carry_out, report_study
+from palpate.sweeps import LocalCluster, local_cluster
+
+__all__ = ["run_demo"]
+
+
+def run_demo(
+    names: Sequence[str], folder: Path, workers: int | None, console: Console, *, quick: bool = False
+) -> list[Path]:
+    """Carry out studies one after the other on one cluster, and report on all of them together.
+
+    Returns
+    -------
+    list of Path
+        The models' files.
+
+    Raises
+    ------
+    AccuracyError
+        After everything is written, if a study missed its target.
+    """
+    studies = [preset_study(name, quick=quick).with_workers(workers) for name in names]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"Could not make the folder {folder}.", why=str(error)) from error
+    began = time.perf_counter()
+    console.say("Starting workers …")
+    with local_cluster(workers) as cluster:
+        outcomes = [_carry_out(study, folder, cluster, console) for study in studies]
+    console.say("report …")
+    # one study's has its name, as `palpate validate` writes it, so that the next demo leaves it alone
+    name = studies[0].name if len(studies) == 1 else "report"
+    report = report_study(folder / f"{name}.html", outcomes)
+    seconds = time.perf_counter() - began
+    console.result(_summary(outcomes, report, seconds), _content(outcomes, report, seconds))
+    _judge(outcomes)
+    return [Paths(folder, study.name).model for study in studies]
+
+
+def _carry_out(study: Study, folder: Path, cluster: LocalCluster, console: Console) -> Outcome:
+    return carry_out(
+        study,
+        Paths(folder, study.name),
+        cluster=cluster,
+        progress=not console.as_json,
+        log=lambda stage: console.say(f"{study.name}: {stage} …"),
+    )
+
+
+def _summary(outcomes: Sequence[Outcome], report: Path, seconds: float) -> str:
+    parts = [f"\n{o.validation}" for o in outcomes]
+    last = outcomes[-1].study
+    model = Paths(report.parent, last.name).model
+    return "\n".join(
+        [*parts, "", f"report  {report}", f"model   {model}   (palpate view {model})", f"{seconds:.0f} s"]
+    )
+
+
+def _content(outcomes: Sequence[Outcome], report: Path, seconds: float) -> dict[str, object]:
+    return {
+        "studies": {o.study.name: o.validation.as_dict() for o in outcomes},
+        "report": str(report),
+        "seconds": seconds,
+    }
+
+
+def _judge(outcomes: Sequence[Outcome]) -> None:
+    for o in outcomes:
+        try:
+            o.validation.raise_if_failed()
+        except AccuracyError as error:
+            raise AccuracyError(f"{o.study.name}: {error.what}", why=error.why, fix=error.fix) from error

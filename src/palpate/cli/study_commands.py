@@ -1,0 +1,181 @@
+"""`palpate sweep`, `learn` and `validate`: the stages of a study, and the judgement of a file that was learnt."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from palpate.cli.console import Console
+from palpate.errors import AccuracyError, UsageError
+
+if TYPE_CHECKING:
+    from palpate.dataset import Dataset
+
+__all__ = ["is_archive", "learn_file", "sweep_file", "validate_model", "validate_study_file"]
+
+_CORRECTED = (
+    "Corrected by {} measured touches: it is of the specimen, and differs from solves of the model on purpose. "
+    "`palpate correct` says how well it follows the specimen, on measurements that it left out."
+)
+FOLDERS = ("-test.zarr", "-random.zarr")
+
+
+def sweep_file(study: Path, workers: int | None, console: Console) -> None:
+    """Solve what a study file describes, and print where the solves are."""
+    from palpate.study import read_study
+    from palpate.study.run import Paths, sweep_study
+
+    record = read_study(study).with_workers(workers)
+    paths = Paths(study.parent, record.name)
+    if paths.data.with_name(paths.data.name + ".parts").exists():
+        console.say(f"Going on with the interrupted sweep in {paths.data} …")
+    data, further = sweep_study(record, paths, progress=not console.as_json)
+    target, other = (
+        (paths.data, paths.random) if record.memory is None else (paths.histories, paths.unseen_histories)
+    )
+    parts = [data] if further is None else [data, further]
+    failed = sum(len(part) - len(part.ok) for part in parts if hasattr(part, "ok"))
+    text = f"{data}\n{target}"
+    if further is not None:
+        what = "solves" if record.memory is None else "histories"
+        text += f"\n{other}: {len(further)} further {what} for testing"
+    content = {"data": str(target), "random": None if further is None else str(other)}
+    console.result(text, content | {"rows": sum(map(len, parts)), "failed": failed})
+
+
+def learn_file(study: Path, console: Console) -> None:
+    """Learn the dataset of a study file, judge the result, write it and print how good it is."""
+    from palpate.study import read_study
+    from palpate.study.run import (
+        Paths,
+        learn_study,
+        load_data,
+        save_model,
+        validate_study,
+        with_validation,
+    )
+
+    record = read_study(study)
+    paths = Paths(study.parent, record.name)
+    train, test = load_data(record, paths)
+    console.say(f"Learning from {len(train)} {'solves' if record.memory is None else 'histories'} …")
+    model, history = learn_study(record, train, test, log=lambda stage: console.say(f"{stage} …"))
+    validation = validate_study(record, model, test, history)
+    model = with_validation(model, validation)
+    save_model(paths, model, history)
+    lines = [f"  {check}" for check in validation.checks if check.criterion.key in _HEADLINES]
+    values = {check.criterion.key: check.measured for check in validation.checks}
+    console.result(
+        "\n".join([str(model), str(history), *lines, str(paths.model)]),
+        {"model": str(paths.model), "passed": validation.passed, "measured": values},
+    )
+    console.say(f"Next: palpate validate {study}, palpate view {paths.model}")
+
+
+_HEADLINES = {"rmse", "filter_rmse", "force_median", "force_p95", "history_force_median", "history_force_p95"}
+"""Values of a validation that `palpate learn` prints."""
+
+
+def validate_study_file(study: Path, report: bool, console: Console) -> None:
+    """Judge the model of a study file by its unseen solves, print, and write the report.
+
+    Raises
+    ------
+    AccuracyError
+        If a limit is missed; everything has been printed and written then.
+    """
+    from palpate.study import read_study
+    from palpate.study.run import Outcome, Paths, load_data, load_model, report_study, validate_study
+
+    record = read_study(study)
+    paths = Paths(study.parent, record.name)
+    train, test = load_data(record, paths)
+    model, history = load_model(paths, train)
+    validation = validate_study(record, model, test, history)
+    text = str(validation)
+    if report:
+        report_study(paths.report, [Outcome(record, model, train, test, validation, history)])
+        text += f"\nreport: {paths.report}"
+    console.result(text, validation.as_dict() | {"report": str(paths.report) if report else None})
+    validation.raise_if_failed()
+
+
+def is_archive(path: Path) -> bool:
+    """Return whether a file is something learnt and not a study, by its first bytes, or by its name if it is missing.
+
+    A study is text; an archive begins with eight bytes of a length, the last of them zero (safetensors).
+    """
+    if not path.is_file():
+        return path.suffix == ".palpate"
+    with path.open("rb") as file:
+        return b"\0" in file.read(8)
+
+
+def validate_model(
+    path: Path, test: Path | None, refined: Path | None, report: bool, console: Console
+) -> None:
+    """Judge a learnt file by unseen solves, print, and write the report beside the file.
+
+    Parameters
+    ----------
+    path : Path
+        Of the model.
+    test, refined : Path, optional
+        Datasets of unseen solves, and of solves on a finer mesh; by default the test set beside the file.
+    report : bool
+        Whether to write the report.
+    console : Console
+
+    Raises
+    ------
+    UsageError
+        If the file can't be judged, or there is no test set.
+    AccuracyError
+        If a limit is missed; everything has been printed and written then.
+    """
+    from palpate.dataset import Dataset
+    from palpate.surrogates.learnt_energy import corrected_by
+    from palpate.surrogates.loading import load
+    from palpate.validation import Chapter, validate, write_report
+
+    model: Any = load(path)
+    energy = getattr(model, "touch", model)
+    if not hasattr(energy, "stiffness"):
+        raise UsageError(
+            f"{path} holds a {type(model).__name__}, which is not judged by itself.",
+            why="A model whose networks answer by load, or that has a memory, is judged together with its study.",
+            fix="Give the study file: palpate validate study.toml. `palpate demo NAME` does all of a ready-made study.",
+        )
+    data, fine = _test_set(path, test), None if refined is None else Dataset.open(refined)
+    validation = replace(validate(model, data, refined=fine), name=path.stem)
+    if touches := corrected_by(energy.meta):
+        validation = replace(validation, notes=(*validation.notes, _CORRECTED.format(touches)))
+    text, target = str(validation), path.with_suffix(".html") if report else None
+    if target is not None:
+        origin: dict[str, Any] = {"settings": energy.meta, "provenance": data.provenance}
+        write_report(target, [Chapter(path.stem, model, data, validation, **origin)])
+        text += f"\nreport: {target}"
+    console.result(text, validation.as_dict() | {"report": str(target) if target else None})
+    try:
+        validation.raise_if_failed()
+    except AccuracyError as error:
+        if not touches:
+            raise
+        raise AccuracyError(error.what, why=error.why, fix=_CORRECTED.format(touches)) from None
+
+
+def _test_set(path: Path, test: Path | None) -> Dataset:
+    from palpate.dataset import Dataset
+
+    if test is not None:
+        return Dataset.open(test)
+    beside = [path.with_name(path.stem + end) for end in FOLDERS]
+    for folder in beside:
+        if folder.exists():
+            return Dataset.open(folder)
+    raise UsageError(
+        f"There are no solves to judge {path} by.",
+        why=f"Neither {beside[0].name} nor {beside[1].name} lies beside it.",
+        fix="Name a dataset of solves that it was not learnt from: --test DATA.zarr",
+    )

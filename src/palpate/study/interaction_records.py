@@ -1,0 +1,200 @@
+"""What acts on the body of a study: the table `[interaction]` with a kind, what varies beside it, and memory."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, TypeAlias
+
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+
+from palpate.physics import GluedPad, PointLoad, SphereProbe
+from palpate.physics.shapes.naming import members
+from palpate.physics.solid.body_family import BESIDE, UNITS
+from palpate.physics.solid.body_symmetry import fundamental_part
+from palpate.study.body_records import BodyRecord
+from palpate.study.quantities import Metres, Newtons, PadStiffness, Pair, Record, in_si
+
+__all__ = [
+    "INTERACTIONS",
+    "InteractionRecord",
+    "LoadRecord",
+    "LoadsRecord",
+    "MemoryRecord",
+    "PadRecord",
+    "ProbeRecord",
+    "VariedRecord",
+]
+
+
+class LoadRecord(Record):
+    """A point load: one input of the study."""
+
+    name: str = Field(min_length=1, description="name of the input")
+    at: Metres | None = Field(
+        None, description="position along the beam; left out: the tip", examples=["0.4 m"]
+    )
+    low: Newtons = Field(description="smallest load")
+    high: Newtons = Field(description="largest load")
+    direction: tuple[float, float] = Field((0.0, -1.0), description="(x, y); (0, -1) pushes down")
+
+    @model_validator(mode="after")
+    def _a_range_and_a_direction(self) -> LoadRecord:
+        if not self.low < self.high:
+            raise ValueError(f"its range is empty: low {self.low:g} N is not below high {self.high:g} N")
+        if not any(self.direction):
+            raise ValueError("its direction (0, 0) points nowhere")
+        return self
+
+
+class LoadsRecord(Record):
+    """Point loads on a beam."""
+
+    kind: Literal["loads"] = "loads"
+    loads: tuple[LoadRecord, ...] = Field((LoadRecord(name="P", low=0.0, high=5.0),), min_length=1)
+
+    @model_validator(mode="after")
+    def _names_differ(self) -> LoadsRecord:
+        if len({load.name for load in self.loads}) < len(self.loads):
+            raise ValueError("two loads share a name")
+        return self
+
+    def fault(self, body: BodyRecord) -> str:
+        """Return what does not fit between the loads and the body; empty if all fits."""
+        length = getattr(body, "length", 0.0)
+        for load in self.loads:
+            if load.at is not None and not 0.0 < load.at <= length:
+                return f"the load {load.name!r} at {load.at:g} m is not on the beam, 0 … {length:g} m"
+        return ""
+
+    def build(self, body: Any, *, whole: bool = True) -> tuple[PointLoad, ...]:
+        """Return the loads."""
+        return tuple(PointLoad(p.name, p.at, p.low, p.high, p.direction) for p in self.loads)
+
+
+class _OnSurface(Record):
+    """Base of the interactions with a surface of a solid body."""
+
+    touches: str = Field("top", description="surface that it acts on")
+
+    def fault(self, body: BodyRecord) -> str:
+        """Return what does not fit between the interaction and the body; empty if all fits."""
+        known = body.surface_names()
+        for name in (self.touches, *body.fixed_names()):
+            if not members(name, known):
+                return f"a {body.kind} has no surface {name!r}; it has {', '.join(known)}"
+        return ""
+
+
+class ProbeRecord(_OnSurface):
+    """A rigid ball with a soft pad as its skin that presses a surface; the position of its centre is the input."""
+
+    kind: Literal["probe"] = "probe"
+    radius: Metres = Field(0.010, gt=0, description="of the ball")
+    pad: PadStiffness = Field(2e6, gt=0, description="stiffness of the pad")
+    stop: Metres = Field(0.004, gt=0, description="penetration at which the pad is fully pressed")
+    depth: Pair = Field((2e-4, 0.012), description="least and largest depth of the ball's tip, m")
+    over: tuple[Pair, Pair] | None = Field(
+        None,
+        description="lower and upper corner of the touched part, m; left out: the surface less a margin of 3 radii",
+        examples=[((0.03, 0.03), (0.07, 0.07))],
+    )
+
+    @model_validator(mode="after")
+    def _in_order(self) -> ProbeRecord:
+        if not 0 <= self.depth[0] < self.depth[1]:
+            raise ValueError(f"the depth {self.depth[0]:g} … {self.depth[1]:g} m is no range from 0 on")
+        _require_corners(self.over)
+        return self
+
+    def build(self, body: Any, *, whole: bool = True) -> SphereProbe:
+        """Return the probe: over all that it shall touch, or over the part that symmetry leaves to be solved."""
+        probe = SphereProbe(
+            self.radius, touches=self.touches, pad=self.pad, stop=self.stop, depth=self.depth, over=self.over
+        )
+        return probe if whole else fundamental_part(body, probe)
+
+
+class PadRecord(_OnSurface):
+    """A soft pad that is glued to a surface and displaced; its displacement and its place are the inputs."""
+
+    kind: Literal["pad"] = "pad"
+    radius: Metres = Field(0.012, gt=0, description="of the pad")
+    pad: PadStiffness = Field(2e6, gt=0, description="stiffness of the pad")
+    over: tuple[Pair, Pair] = Field(
+        ((0.03, 0.03), (0.07, 0.07)),
+        description="lower and upper corner of the places of the pad's middle, m",
+    )
+    displacement: tuple[Pair, Pair, Pair] = Field(
+        ((-0.004, 0.004), (-0.004, 0.004), (-0.004, 0.004)), description="ranges along x, y and z, m"
+    )
+
+    @model_validator(mode="after")
+    def _in_order(self) -> PadRecord:
+        _require_corners(self.over)
+        for low, high in self.displacement:
+            if not low < high:
+                raise ValueError(f"the displacement {low:g} … {high:g} m is no range: low is less than high")
+        return self
+
+    def build(self, body: Any, *, whole: bool = True) -> GluedPad:
+        """Return the pad, over all of its places."""
+        return GluedPad(
+            touches=self.touches,
+            radius=self.radius,
+            over=self.over,
+            pad=self.pad,
+            displacement=self.displacement,
+        )
+
+
+def _require_corners(over: tuple[Any, Any] | None) -> None:
+    if over and not all(a < b for a, b in zip(*over, strict=True)):
+        raise ValueError("the corners of `over` are not in order: the lower one comes first")
+
+
+class VariedRecord(Record):
+    """A number of the body or of the ball that is an input beside the position: one model of a family of bodies."""
+
+    path: str = Field(
+        min_length=1,
+        description="REGION.young or another number of its material, LAYER.thickness, or probe.radius",
+        examples=["fat.young"],
+    )
+    low: float = Field(description='its least value, in SI units or such as "2 kPa"', examples=["2 kPa"])
+    high: float = Field(description="its largest value, likewise", examples=["8 kPa"])
+
+    @field_validator("path")
+    @classmethod
+    def _can_vary(cls, path: str) -> str:
+        if path.rpartition(".")[2] in BESIDE:
+            raise ValueError(
+                "a density can't vary: it acts through the body's weight, not through its strain energy"
+            )
+        return path
+
+    @field_validator("low", "high", mode="before")
+    @classmethod
+    def _in_si(cls, value: Any, info: ValidationInfo) -> Any:
+        """Return a quantity in the unit of what varies."""
+        if "path" not in info.data:  # the path has its own complaint already
+            return 0.0
+        return in_si(value, UNITS.get(str(info.data.get("path", "")).rpartition(".")[2], ""))
+
+    @model_validator(mode="after")
+    def _in_order(self) -> VariedRecord:
+        if not self.low < self.high:
+            raise ValueError(f"{self.low:g} … {self.high:g} is no range: low is less than high")
+        return self
+
+
+class MemoryRecord(Record):
+    """Histories of the load from which the memory of a body that yields or creeps is learnt."""
+
+    histories: int = Field(10, ge=1, description="histories to learn from")
+    unseen: int = Field(14, ge=1, description="further histories, for testing only")
+    seed: int = Field(1, ge=0, description="decides the histories; those for testing have another seed")
+    step: float = Field(0.05, gt=0, description="time between two samples in s, where time counts")
+
+
+InteractionRecord: TypeAlias = LoadsRecord | ProbeRecord | PadRecord
+INTERACTIONS = ("loads", "probe", "pad")
+"""Kinds of interactions that a study file can describe."""

@@ -1,0 +1,442 @@
+"""The stages of a study: sweep, load the data, learn, validate, report.
+
+Each stage takes values and returns values, and is the same for every body: `Study` says what differs. Files are
+written by `carry_out` and by the command line.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import os
+import platform
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from palpate.dataset import Dataset
+from palpate.errors import UsageError
+from palpate.learning import History, Settings, founding, node_outputs
+from palpate.learning import learn as learn_samples
+from palpate.learning.dispatch import learn as learn_dataset
+from palpate.learning.plastic import HeldPaths
+from palpate.study.memory_stages import learn_histories, sweep_histories
+from palpate.study.study import Study
+from palpate.surrogates.loading import load
+from palpate.sweeps import sweep
+from palpate.validation import Chapter, Validation, validate, write_report
+
+__all__ = [
+    "Outcome",
+    "Paths",
+    "carry_out",
+    "learn_study",
+    "load_data",
+    "load_model",
+    "report_study",
+    "save_model",
+    "split_rows",
+    "sweep_study",
+    "validate_study",
+    "with_validation",
+]
+
+Log = Callable[[str], None]
+Rows: TypeAlias = Dataset | HeldPaths
+"""What was solved: a dataset, or the histories of a body with memory."""
+
+
+@dataclass(frozen=True)
+class Paths:
+    """Where a study's files are: all named after the study, in one folder."""
+
+    folder: Path
+    name: str
+
+    @property
+    def data(self) -> Path:
+        """Dataset of the sweep."""
+        return self.folder / f"{self.name}.zarr"
+
+    @property
+    def random(self) -> Path:
+        """Dataset of further solves, for testing only."""
+        return self.folder / f"{self.name}-random.zarr"
+
+    @property
+    def histories(self) -> Path:
+        """Histories from which a body with memory is learnt."""
+        return self.folder / f"{self.name}-histories.palpate"
+
+    @property
+    def unseen_histories(self) -> Path:
+        """Histories of a body with memory for testing only."""
+        return self.folder / f"{self.name}-unseen.palpate"
+
+    @property
+    def model(self) -> Path:
+        """What was learnt."""
+        return self.folder / f"{self.name}.palpate"
+
+    @property
+    def history(self) -> Path:
+        """Record of the sequential filter, where one ran."""
+        return self.folder / f"{self.name}.history.npz"
+
+    @property
+    def report(self) -> Path:
+        """Page of the report."""
+        return self.folder / f"{self.name}.html"
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """Result of a study that was carried out.
+
+    Attributes
+    ----------
+    study : Study
+    model : Surrogate
+        What was learnt.
+    train, test : Dataset or load histories
+        Solves that were learnt from, and solves that were not.
+    validation : Validation
+    history : optional
+        What happened while it was learnt.
+    rivals : mapping of name to History
+        The founding form of the filter beside ours, for studies with one input.
+    timings : mapping of stage to seconds
+    """
+
+    study: Study
+    model: Any
+    train: Rows
+    test: Rows
+    validation: Validation
+    history: Any = None
+    rivals: Mapping[str, Any] = field(default_factory=dict)
+    timings: Mapping[str, float] = field(default_factory=dict)
+
+    def chapter(self) -> Chapter:
+        """Return the outcome as a chapter of a report."""
+        return Chapter(
+            name=self.study.name,
+            model=self.model,
+            test=self.test,
+            validation=self.validation,
+            train=self.train,
+            history=self.history,
+            rivals=self.rivals,
+            settings=self.study.model_dump(mode="json", exclude_none=True),
+            timings=self.timings,
+        )
+
+
+def sweep_study(
+    study: Study, paths: Paths | None = None, *, cluster: Any = None, progress: Any = True
+) -> tuple[Rows, Rows | None]:
+    """Solve the study's design, and what is solved for testing only.
+
+    Parameters
+    ----------
+    study : Study
+    paths : Paths, optional
+        Where datasets are written as they grow; an interrupted sweep goes on where it stopped.
+    cluster : optional
+        A running `local_cluster`, to share between studies; by default processes of the sweep's own.
+    progress : bool or callable
+        A bar on standard error; or a function (done, total).
+
+    Returns
+    -------
+    data, further : Dataset or load histories
+        `further` is None where nothing more is solved for testing.
+
+    Raises
+    ------
+    SolverError
+        If more than half of the solves fail.
+    UsageError
+        If another study's dataset is in the way.
+    """
+    problem = study.problem()
+    if study.sweep is None or study.test is None:
+        train, test = sweep_histories(study, problem)
+        if paths is not None:
+            train.save(paths.histories)
+            test.save(paths.unseen_histories)
+        return train, test
+    common: dict[str, Any] = {
+        "cluster": cluster if cluster is not None else study.sweep.scheduler,
+        "workers": study.sweep.workers,
+        "progress": progress,
+    }
+    data = sweep(problem, path=paths.data if paths else None, **study.sweep.arguments(problem), **common)
+    further = study.test.arguments(problem)
+    if further is None:
+        return data, None
+    return data, sweep(problem, path=paths.random if paths else None, **further, **common)
+
+
+def load_data(study: Study, paths: Paths) -> tuple[Rows, Rows]:
+    """Read the training and the unseen rows of a study from its files.
+
+    Raises
+    ------
+    UsageError
+        If the files are of another body or of other loads: the study was changed since they were solved.
+    """
+    if study.sweep is None or study.test is None:
+        return HeldPaths.load(paths.histories), HeldPaths.load(paths.unseen_histories)
+    problem = study.problem()
+    # compared as the file has it: tuples are lists there
+    wanted = json.loads(json.dumps(problem.describe()))
+    further = paths.random if study.test.arguments(problem) is not None else None
+    parts = []
+    for path in filter(None, (paths.data, further)):
+        parts.append(Dataset.open(path))
+        if parts[-1].provenance["problem"] != wanted:
+            raise UsageError(
+                f"{path} is not of this study's body and loads.",
+                why="The study was changed after the sweep.",
+                fix="Delete it and run `palpate sweep`, or give the changed study another name.",
+            )
+    return split_rows(study, parts[0], parts[1] if further else None)
+
+
+def split_rows(study: Study, data: Rows, further: Rows | None) -> tuple[Rows, Rows]:
+    """Split what was solved into training rows and rows that the network never sees.
+
+    Raises
+    ------
+    UsageError
+        If nothing is kept for testing.
+    """
+    if not isinstance(data, Dataset) or study.test is None:
+        assert further is not None  # histories for testing are always made
+        return data, further
+    good = data.ok
+    parts = [further.ok] if isinstance(further, Dataset) else []
+    if study.test.every:
+        unseen = _unseen_rows(study, len(good), study.test.every)
+        parts.insert(0, good.take(np.flatnonzero(unseen)))
+        good = good.take(np.flatnonzero(~unseen))
+    if not parts:
+        raise UsageError(
+            f"The study {study.name!r} keeps nothing for testing.",
+            why="Both test.every and test.random are 0.",
+            fix="Set one of them: a network is judged on solves that it has never seen.",
+        )
+    return good, Dataset.concat(parts)
+
+
+def _unseen_rows(study: Study, count: int, every: int) -> np.ndarray:
+    """Return which of the sweep's rows (count,) are kept for testing: one in `every`.
+
+    Of a grid every n-th; of other designs random ones. A Sobol sequence fills space in turns, so that every n-th
+    of its points lie in one corner, and the network would never see that corner.
+    """
+    if getattr(study.sweep, "design", None) == "grid":
+        return np.asarray(np.arange(count) % every == every - 1)
+    unseen = np.zeros(count, dtype=bool)
+    rng = np.random.default_rng((study.test.seed if study.test else 0, count))
+    unseen[rng.choice(count, count // every, replace=False)] = True
+    return unseen
+
+
+def learn_study(
+    study: Study,
+    train: Rows,
+    test: Rows | None = None,
+    *,
+    progress: Callable[[int, int], None] | None = None,
+    log: Log = lambda _: None,
+) -> tuple[Any, Any]:
+    """Learn the study's surrogate, which keeps the study's runtime settings.
+
+    Parameters
+    ----------
+    study : Study
+    train : Dataset or load histories
+    test : Dataset or load histories, optional
+        Unseen rows, which are only watched while a filter learns.
+    progress : callable, optional
+        A function (done, total) of the filter's observations.
+    log : callable
+        Gets one line when a part of the work begins.
+
+    Returns
+    -------
+    surrogate, history
+    """
+    if not isinstance(train, Dataset):
+        model, history = learn_histories(study, train)
+    else:
+        model, history = learn_dataset(train, **_options(study, train, test, progress, log))
+    more: dict[str, Any] = {"name": study.name, "runtime": study.runtime.model_dump()}
+    if isinstance(train, Dataset):
+        more["dataset"] = {**_meta(model).get("dataset", {}), "hash": train.hash}
+    return _with_meta(model, more), history
+
+
+def _options(study: Study, train: Dataset, test: Any, progress: Any, log: Log) -> dict[str, Any]:
+    """Return the options of `palpate.learn` for a study."""
+    options: dict[str, Any] = study.learning.options() if study.learning else {}
+    if study.filter:
+        watched = {"heldout": test, "progress": progress}
+        form = {"settings": study.filter.build(len(train.ranges)), "passes": study.filter.passes}
+        return {**options, **form, **watched, "seed": study.filter.seed, "name": study.name}
+    if "shape" in options:
+        # shown on a mesh that is fine wherever the body is touched
+        options |= {"layout": study.problem(whole=True).layout, "say": log, "name": study.name}
+    return options
+
+
+def _meta(model: Any) -> Mapping[str, Any]:
+    meta: Mapping[str, Any] = model.meta if hasattr(model, "meta") else model.touch.meta
+    return meta
+
+
+def _with_meta(model: Any, more: Mapping[str, Any]) -> Any:
+    """Return what was learnt with more said of it, for whoever opens the file later."""
+    if hasattr(model, "touch"):
+        return replace(model, touch=_with_meta(model.touch, more))
+    return replace(model, meta={**model.meta, **more})
+
+
+def validate_study(study: Study, model: Any, test: Rows, history: Any = None) -> Validation:
+    """Judge what was learnt by solves that it has never seen, by the study's targets."""
+    assert study.target is not None  # every kind of study has one
+    watched = history if isinstance(history, History) else None
+    return validate(model, test, history=watched, limits=study.target.limits())
+
+
+def with_validation(model: Any, validation: Validation) -> Any:
+    """Return what was learnt with its errors on unseen solves written into it."""
+    return _with_meta(model, {"validation": validation.summary()})
+
+
+def save_model(paths: Paths, model: Any, history: Any) -> None:
+    """Write what was learnt, and the record of its filter where there is one."""
+    model.save(paths.model)
+    if isinstance(history, History):
+        history.save(paths.history)
+
+
+def load_model(paths: Paths, train: Rows) -> tuple[Any, Any]:
+    """Read what was learnt, and the record of its filter where there is one.
+
+    Raises
+    ------
+    UsageError
+        If it was learnt from other rows than these: rows that it has seen might be taken for unseen ones.
+    """
+    model = load(paths.model)
+    if isinstance(train, Dataset) and _meta(model).get("dataset", {}).get("hash") != train.hash:
+        raise UsageError(
+            f"{paths.model} was learnt from other solves than this study trains with.",
+            why="The sweep or its split was changed since, and what is unseen here may have been seen there.",
+            fix="Run `palpate learn` again.",
+        )
+    return model, History.load(paths.history) if paths.history.exists() else None
+
+
+def report_study(path: Path, outcomes: Sequence[Outcome], **options: Any) -> Path:
+    """Write one report on several outcomes; `options` are those of `palpate.write_report`."""
+    return write_report(path, [o.chapter() for o in outcomes], machine=_machine(), **options)
+
+
+def _machine() -> dict[str, str]:
+    """Return what the report says of where it was made."""
+    return {
+        "system": f"{platform.system()} {platform.release()}",
+        "processor": f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores",
+        "Python": platform.python_version(),
+        "palpate": importlib.metadata.version("palpate"),
+    }
+
+
+def carry_out(
+    study: Study,
+    paths: Paths,
+    *,
+    cluster: Any = None,
+    progress: Any = True,
+    log: Log = lambda _: None,
+    rivals: bool = True,
+) -> Outcome:
+    """Carry out a study up to its validation and write its datasets, model and history.
+
+    Parameters
+    ----------
+    study : Study
+    paths : Paths
+        Where files are written.
+    cluster : optional
+        A running `local_cluster`, to share between studies.
+    progress : bool or callable
+        Of the sweep: a bar on standard error, or a function (done, total).
+    log : callable
+        Gets one line when a stage begins.
+    rivals : bool
+        Whether to run the founding form of the filter beside ours, where there is a filter.
+    """
+    timings: dict[str, float] = {}
+
+    def timed(stage: str, work: Callable[[], Any]) -> Any:
+        log(stage)
+        began = time.perf_counter()
+        result = work()
+        timings[stage] = time.perf_counter() - began
+        return result
+
+    data, further = timed("sweep", lambda: sweep_study(study, paths, cluster=cluster, progress=progress))
+    train, test = split_rows(study, data, further)
+    model, history = timed("learn and refine", lambda: learn_study(study, train, test))
+    validation = timed("validate", lambda: validate_study(study, model, test, history))
+    model = with_validation(model, validation)
+    save_model(paths, model, history)
+    others: dict[str, Any] = {}
+    if rivals and study.filter:
+        others = timed("founding form", lambda: _rivals(study, train, test, history.passes))
+    return Outcome(study, model, train, test, validation, history, others, timings)
+
+
+def _rivals(study: Study, train: Any, test: Any, passes: int) -> dict[str, History]:
+    """Return runs of the founding form and ours, as they are and ten times tighter, for studies of one input."""
+    if len(train.ranges) != 1 or study.filter is None:
+        return {}
+    forms = {
+        "founding form": founding(),
+        "founding form, thresholds ÷ 10": _tightened(founding()),
+        "our form, thresholds ÷ 10": _tightened(study.filter.build(1)),
+    }
+    outputs, columns = node_outputs(train)
+    answers = [d.displacement[:, [i for i, _ in columns], [c for _, c in columns]] for d in (train, test)]
+    return {
+        name: learn_samples(
+            train.X,
+            answers[0],
+            train.ranges,
+            outputs,
+            settings=settings,
+            passes=passes,
+            seed=study.filter.seed,
+            heldout=(test.X, answers[1]),
+        ).history
+        for name, settings in forms.items()
+    }
+
+
+def _tightened(settings: Settings) -> Settings:
+    """Return settings with growth thresholds divided by ten: what a user does who wants more accuracy."""
+    return replace(
+        settings,
+        error_min=settings.error_min / 10,
+        error_rms_min=settings.error_rms_min / 10,
+        distance_min=settings.distance_min / 10,
+    )

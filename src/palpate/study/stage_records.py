@@ -1,0 +1,317 @@
+"""Tables of the stages of a study: what is solved, what is kept for testing, how it is learnt and what is asked.
+
+The keys of a table depend on what acts on the body (`SECTIONS`). A table says by itself how its stage is called.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+from pydantic import Field, model_validator
+
+from palpate.errors import UsageError
+from palpate.learning import PRESETS, Refinement, Settings, recommended
+from palpate.learning.bodies.touches import FEWEST
+from palpate.study.quantities import Metres, Newtons, Record, Stiffness
+
+if TYPE_CHECKING:
+    from palpate.validation import Limits
+
+__all__ = [
+    "SECTIONS",
+    "FilterRecord",
+    "HistoryTargetRecord",
+    "LoadLearningRecord",
+    "LoadSweepRecord",
+    "LoadTargetRecord",
+    "LoadTestRecord",
+    "PadLearningRecord",
+    "PadSweepRecord",
+    "PadTestRecord",
+    "ProbeLearningRecord",
+    "ProbeSweepRecord",
+    "ProbeTestRecord",
+    "RuntimeRecord",
+    "TouchTargetRecord",
+]
+
+
+class _SweepRecord(Record):
+    """Base of the tables `[sweep]`."""
+
+    samples: int = Field(40, ge=4, description="number of solves")
+    seed: int = Field(0, ge=0, description="decides the design")
+    workers: int | None = Field(None, ge=1, description="processes; left out: one per core", examples=[2])
+    scheduler: str | None = Field(
+        None, description="a running Dask scheduler", examples=["tcp://127.0.0.1:8786"]
+    )
+
+    def arguments(self, problem: Any) -> dict[str, Any]:
+        """Return the arguments of `palpate.sweep` that say where to solve."""
+        return {"samples": self.samples, "seed": self.seed}
+
+
+class LoadSweepRecord(_SweepRecord):
+    """Which loads are solved."""
+
+    element: ClassVar[float | None] = None
+    symmetric: ClassVar[bool] = False
+
+    design: Literal["grid", "sobol", "random"] = Field("grid", description="how the ranges are sampled")
+    samples: int = Field(501, ge=4, description="number of solves")
+
+    def arguments(self, problem: Any) -> dict[str, Any]:
+        """Return the arguments of `palpate.sweep` that say where to solve."""
+        return {"samples": self.samples, "seed": self.seed, "design": self.design}
+
+
+class PadSweepRecord(_SweepRecord):
+    """Which displacements and places of the pad are solved."""
+
+    symmetric: ClassVar[bool] = False
+    element: Metres | None = Field(
+        None,
+        gt=0,
+        description="size of elements under the pad; left out: a third of its radius",
+        examples=["4 mm"],
+    )
+
+
+class ProbeSweepRecord(_SweepRecord):
+    """Which touches are solved: columns into the body, each from shallow to deep."""
+
+    samples: int = Field(40, ge=FEWEST, description="number of solves")
+    depths: int = Field(5, ge=1, description="solves in a column")
+    symmetric: bool = Field(True, description="solve a part only, where mirror images give the rest")
+    element: Metres | None = Field(
+        None,
+        gt=0,
+        description="size of elements under the ball; left out: half its radius, less on round and layered bodies",
+        examples=["4 mm"],
+    )
+
+    @model_validator(mode="after")
+    def _whole_columns(self) -> ProbeSweepRecord:
+        if self.depths > self.samples:
+            raise ValueError(f"{self.samples} solves make no column of {self.depths}")
+        return self
+
+    def arguments(self, problem: Any) -> dict[str, Any]:
+        """Return the arguments of `palpate.sweep` that say where to solve."""
+        return {"points": problem.design(self.samples, self.seed, depths=self.depths), "seed": self.seed}
+
+
+class LoadTestRecord(Record):
+    """Which solves the network never sees."""
+
+    every: int = Field(2, ge=0, description="one row in so many of the sweep is kept for testing; 0: none")
+    random: int = Field(100, ge=0, description="further solves at random loads")
+    seed: int = Field(7, ge=0, description="decides what is random here")
+
+    def arguments(self, problem: Any) -> dict[str, Any] | None:
+        """Return the arguments of `palpate.sweep` that say where to test; None where nothing more is solved."""
+        return {"samples": self.random, "seed": self.seed, "design": "random"} if self.random else None
+
+
+class PadTestRecord(Record):
+    """Displacements and places of the pad that the network never sees."""
+
+    every: ClassVar[int] = 0
+    samples: int = Field(40, ge=1, description="number of solves")
+    seed: int = Field(7, ge=0, description="decides the design")
+
+    def arguments(self, problem: Any) -> dict[str, Any] | None:
+        """Return the arguments of `palpate.sweep` that say where to test."""
+        return {"samples": self.samples, "seed": self.seed}
+
+
+class ProbeTestRecord(Record):
+    """Touches that the network never sees, in columns of their own."""
+
+    every: ClassVar[int] = 0
+    samples: int = Field(200, ge=1, description="number of solves")
+    depths: int = Field(4, ge=1, description="solves in a column")
+    seed: int = Field(7, ge=0, description="decides where the columns are")
+
+    def arguments(self, problem: Any) -> dict[str, Any] | None:
+        """Return the arguments of `palpate.sweep` that say where to test."""
+        return {"points": problem.design(self.samples, self.seed, depths=self.depths), "seed": self.seed}
+
+
+class FilterRecord(Record):
+    """The sequential filter (MRAN with an extended Kalman filter)."""
+
+    passes: int | None = Field(
+        None,
+        ge=1,
+        description="shuffled presentations of the data; left out: 5, or enough for 1,250 observations",
+    )
+    seed: int = Field(0, ge=0, description="decides the order")
+    form: str | None = Field(
+        None,
+        description="a named form, such as 'founding', which repeats the papers'; left out: 'default' for one load, "
+        "'shared' for several",
+    )
+    settings: dict[str, float | int | str | bool] = Field(
+        default_factory=dict, description="single settings of the filter, by name"
+    )
+
+    @model_validator(mode="after")
+    def _known_settings(self) -> FilterRecord:
+        if self.form is not None and self.form not in PRESETS:
+            raise ValueError(f"there is no form {self.form!r} of the filter; there are {', '.join(PRESETS)}")
+        unknown = sorted(set(self.settings) - set(Settings.__dataclass_fields__))
+        if unknown:
+            known = ", ".join(Settings.__dataclass_fields__)
+            raise ValueError(f"the filter has no setting {unknown[0]!r}; it has {known}")
+        try:
+            replace(Settings(), **self.settings)  # type: ignore[arg-type]
+        except UsageError as error:
+            raise ValueError(str(error)) from error
+        return self
+
+    def build(self, inputs: int) -> Settings:
+        """Return the filter's settings for a number of inputs: a named form with single settings changed."""
+        form = PRESETS[self.form]() if self.form else recommended(inputs)
+        return replace(form, **self.settings)  # type: ignore[arg-type]
+
+
+class LoadLearningRecord(Record):
+    """The refinement, and the coupling at the held node."""
+
+    samples: int = Field(26, ge=0, description="solves used for refinement; 0: all training solves")
+    units_max: int = Field(6, ge=0, description="most units per network")
+    target: float = Field(5e-7, ge=0.0, description="leave-one-out error at which growth stops")
+    starts: int = Field(4, ge=1, description="starts per number of units")
+    coupling: Stiffness | None = Field(
+        None, description="between hand and node; left out: chosen from the data"
+    )
+
+    def options(self) -> dict[str, Any]:
+        """Return the options of `palpate.learn`."""
+        refinement = Refinement(self.samples, self.units_max, self.target, self.starts)
+        return {"refinement": refinement, "coupling": self.coupling}
+
+
+class PadLearningRecord(Record):
+    """The search for the network of the energy."""
+
+    seconds: float | None = Field(
+        None,
+        gt=0,
+        description="cap on the time of the search; left out: one for each solve, at least 60",
+        examples=[60.0],
+    )
+    workers: int | None = Field(
+        None,
+        ge=1,
+        description="processes that search the energy; left out: one per core, eight at most",
+        examples=[2],
+    )
+    units_max: int = Field(160, ge=0, description="most units of the energy, mirror images among them")
+    target: float = Field(1e-3, ge=0.0, description="leave-one-out error at which growth stops")
+    seed: int = Field(0, ge=0, description="decides the starts")
+
+    def options(self) -> dict[str, Any]:
+        """Return the options of `palpate.learn`."""
+        return self.model_dump()
+
+
+class ProbeLearningRecord(PadLearningRecord):
+    """The search for the networks of the energy and of the shape; the shape gets a quarter of the time."""
+
+    shape: bool = Field(True, description="whether to learn the displacement for the eye")
+
+
+class LoadTargetRecord(Record):
+    """What `palpate validate` asks of the networks on unseen loads."""
+
+    rmse: float = Field(5e-6, gt=0, description="refined network, relative to full scale")
+    filter_rmse: float = Field(1e-3, ge=0, description="sequential filter alone; 0: not asked")
+    filter_outer_ratio: float = Field(
+        2.0, ge=0, description="its error at the ends over the rest; 0: not asked"
+    )
+    filter_relapse: float = Field(2.0, ge=0, description="its error over its best so far; 0: not asked")
+    force_median: float = Field(0.01, gt=0, description="relative force error, median")
+    force_p95: float = Field(0.035, gt=0, description="relative force error, 95th percentile")
+
+    def limits(self) -> Limits:
+        """Return the limits; a key that is 0 asks nothing."""
+        from palpate.validation import Limits
+
+        return Limits(**{name: value or None for name, value in self.model_dump().items()})
+
+
+class TouchTargetRecord(Record):
+    """What `palpate validate` asks on unseen solves; 0: not asked."""
+
+    force_median: float = Field(0.01, ge=0, description="relative force error, median")
+    force_p95: float = Field(0.035, ge=0, description="relative force error, 95th percentile")
+    light_force_p95: float = Field(0.035, ge=0, description="of light touches, over f₀")
+    stiffness_p95: float = Field(0.08, ge=0, description="relative stiffness error, 95th percentile")
+    direction_p95: float = Field(5.0, ge=0, description="angle between the forces, degrees")
+    displacement_mean: Metres = Field(1e-4, ge=0, description="mean distance of the shown shape's nodes")
+    displacement_max: Metres = Field(3e-4, ge=0, description="largest distance of a node")
+    smoothness: float = Field(1.5, ge=0, description="second difference of the force over the reference's")
+    loop_work: float = Field(1e-9, ge=0, description="work around closed paths over the stroke's energy")
+    coverage: tuple[float, float] = Field(
+        (0.80, 0.97),
+        description="share of the errors that the 90 % interval holds, least and most; [0, 1]: not asked",
+    )
+
+    def limits(self) -> Limits:
+        """Return the limits; a key that is 0 asks nothing."""
+        from palpate.validation import Limits
+
+        asked = self.model_dump()
+        band = asked.pop("coverage")
+        values: dict[str, Any] = {name: value or None for name, value in asked.items()}
+        values["border_loop_work"] = values["loop_work"]
+        return Limits(**values, interval_coverage=None if band == (0.0, 1.0) else band)
+
+
+class HistoryTargetRecord(Record):
+    """What `palpate validate` asks on unseen histories, over the largest force."""
+
+    force_median: float = Field(0.01, gt=0, description="force error, median")
+    force_p95: float = Field(0.035, gt=0, description="force error, 95th percentile")
+
+    def limits(self) -> Limits:
+        """Return the limits."""
+        from palpate.validation import Limits
+
+        return Limits(history_force_median=self.force_median, history_force_p95=self.force_p95)
+
+
+class RuntimeRecord(Record):
+    """The 1 kHz loop and the page: what `palpate view` and `palpate run` do unless they are given options."""
+
+    rate: float = Field(1000.0, ge=10, le=10000, description="Hz")
+    max_force: Newtons = Field(12.0, gt=0, description="largest force; the force is limited to this")
+    port: int = Field(8080, ge=0, le=65535, description="of the page; a busy port moves on to the next")
+
+
+SECTIONS: dict[str, dict[str, type[Any]]] = {
+    "loads": {
+        "sweep": LoadSweepRecord,
+        "test": LoadTestRecord,
+        "filter": FilterRecord,
+        "learning": LoadLearningRecord,
+        "target": LoadTargetRecord,
+    },
+    "probe": {
+        "sweep": ProbeSweepRecord,
+        "test": ProbeTestRecord,
+        "learning": ProbeLearningRecord,
+        "target": TouchTargetRecord,
+    },
+    "pad": {
+        "sweep": PadSweepRecord,
+        "test": PadTestRecord,
+        "learning": PadLearningRecord,
+        "target": TouchTargetRecord,
+    },
+    "memory": {"target": HistoryTargetRecord},
+}
+"""Records of the tables of each kind of interaction, and of studies of bodies with memory."""

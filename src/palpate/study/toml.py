@@ -1,0 +1,266 @@
+"""A study as a TOML file with comments, and back, with errors that name the line or the key."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import os
+import re
+import tomllib
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any, get_args
+
+import tomlkit
+from pydantic import BaseModel, ValidationError
+from tomlkit.items import AoT
+
+from palpate.errors import StudyError
+from palpate.study.body_records import BODIES
+from palpate.study.interaction_records import INTERACTIONS
+from palpate.study.quantities import Unit
+from palpate.study.study import Study
+
+__all__ = ["read_study", "study_schema", "to_toml"]
+
+_EXAMPLES = {"cantilever": "beam-nylon", "layered": "layered", "dome": "breast-dome", "organ": "liver"}
+"""Presets that show every key of a kind of body; the block shows those of the others."""
+
+
+def read_study(path: str | os.PathLike[str]) -> Study:
+    """Read a study file.
+
+    Files of version 0.1.0, with `[[loads]]` or `[probe]` in place of `[interaction]`, are read too.
+
+    Parameters
+    ----------
+    path : path
+        Of a TOML file such as `palpate init` writes.
+
+    Raises
+    ------
+    StudyError
+        If the file is missing, is no TOML, or says something that a study can't mean: all such places are listed.
+    """
+    path = Path(path)
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise StudyError(f"{path} does not exist.", fix="Write one with `palpate init`.") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise StudyError(
+            f"{path} can't be read as a study.",
+            why=f"{error}.",
+            fix="A study is a text file: write one with `palpate init`.",
+        ) from error
+    except tomllib.TOMLDecodeError as error:
+        twice = "overwrite" in str(error)
+        fix = "A key or a table stands there twice: keep one." if twice else "Correct that line."
+        raise StudyError(f"{path} is not valid TOML.", why=f"{error}.", fix=fix) from error
+    try:
+        return Study.model_validate(_from_first_version(content))
+    except ValidationError as error:
+        raise StudyError(
+            f"{path} does not describe a study:",
+            why="\n".join(f"  {line}" for line in _complaints(error)),
+            fix=f"`palpate init --preset {_example_of(content)} --print` shows every key with its meaning; "
+            "`palpate schema` is for editors.",
+        ) from error
+
+
+def _from_first_version(content: dict[str, Any]) -> dict[str, Any]:
+    """Return the content of a file, with what acts on the body where it stands today."""
+    if "interaction" in content:
+        return content
+    content = dict(content)
+    if "loads" in content:
+        content["interaction"] = {"kind": "loads", "loads": content.pop("loads")}
+    elif isinstance(content.get("probe"), dict):
+        content["interaction"] = {"kind": "probe", **content.pop("probe")}
+    return content
+
+
+def _example_of(content: dict[str, Any]) -> str:
+    """Return the preset that shows the keys of a file's body."""
+    body, acting = content.get("body"), content.get("interaction")
+    if isinstance(acting, dict) and acting.get("kind") == "pad":
+        return "grasp"
+    kind = body.get("kind", "cantilever") if isinstance(body, dict) else "cantilever"
+    return _EXAMPLES.get(str(kind), "block")
+
+
+def study_schema() -> str:
+    """Return the JSON schema of study files, for editors."""
+    return json.dumps(Study.model_json_schema(), indent=2)
+
+
+def to_toml(study: Study) -> str:
+    """Return the study as a TOML file with a comment for each key, which `read_study` reads back as the same study."""
+    document = tomlkit.document()
+    document.add(tomlkit.comment("A palpate study: what is solved, learnt, checked and touched."))
+    document.add(tomlkit.comment('Quantities are numbers in SI units, or text with a unit: "5 mm", "2 GPa".'))
+    document.add(tomlkit.nl())
+    _fill(document, study)
+    # tomlkit parts a table from the comment above it
+    return re.sub(r"(\n# [^\n]*)\n\n\[", r"\1\n[", tomlkit.dumps(document))
+
+
+def _fill(table: Any, record: BaseModel) -> None:
+    """Write a record's keys, and then its tables, into a table."""
+    # the kind of a table comes first
+    for name, field in sorted(type(record).model_fields.items(), key=lambda item: item[0] != "kind"):
+        value = getattr(record, name)
+        if not isinstance(value, BaseModel) and not _record_of(type(record), name, value):
+            _add_key(table, name, field, value)
+    for name in type(record).model_fields:
+        value = getattr(record, name)
+        if isinstance(value, BaseModel):
+            _add_comment(table, value)
+            inner = tomlkit.table()
+            _fill(inner, value)
+            table.add(name, inner)
+        elif (item := _record_of(type(record), name, value)) and (value or _can_vary(record)):
+            _add_tables(table, name, item, value)
+
+
+def _can_vary(record: BaseModel) -> bool:
+    """Return whether numbers of a study's body can be inputs."""
+    return isinstance(record, Study) and bool(record.body.surface_names())
+
+
+def _add_tables(table: Any, name: str, item: type[BaseModel], values: Iterable[BaseModel] | None) -> None:
+    """Write a list of tables; where it is empty, a commented example of one."""
+    if not values:
+        if values == ():
+            _add_comment(table, item)
+            table.add(tomlkit.comment(f"[[{name}]]"))
+            for key, field in item.model_fields.items():
+                example = json.dumps((field.examples or [""])[0], ensure_ascii=False)
+                table.add(tomlkit.comment(f"{key} = {example}  # {field.description}"))
+        return
+    _add_comment(table, item)
+    tables: AoT = tomlkit.aot()
+    for value in values:
+        inner = tomlkit.table()
+        _fill(inner, value)
+        tables.append(inner)
+    table.add(name, tables)
+
+
+def _add_comment(table: Any, record: BaseModel | type[BaseModel]) -> None:
+    table.add(tomlkit.nl())
+    table.add(tomlkit.comment((record.__doc__ or "").strip().splitlines()[0]))
+
+
+def _add_key(table: Any, name: str, field: Any, value: Any) -> None:
+    """Write one key with its meaning as a comment."""
+    comment = field.description or ""
+    if value is None:  # TOML has no such value: an example stands there as a comment
+        if field.examples:
+            example = tomlkit.item(_plain(field.examples[0])).as_string()
+            table.add(tomlkit.comment(f"{name} = {example}" + (f"  # {comment}" if comment else "")))
+        return
+    if isinstance(value, dict):
+        if not value:
+            return
+        item: Any = tomlkit.inline_table()
+        item.update(value)
+    else:
+        unit = None if isinstance(value, (str, tuple)) else _unit((*field.metadata, field.annotation))
+        item = tomlkit.item(_plain(value) if unit is None else f"{value!r} {unit}")
+    if comment:
+        item.comment(comment)
+    table.add(name, item)
+
+
+def _plain(value: Any) -> Any:
+    return [_plain(v) for v in value] if isinstance(value, (list, tuple)) else value
+
+
+def _record_of(record: type[BaseModel], name: str, value: Any) -> type[BaseModel] | None:
+    """Return the record of which a key holds a list of tables; None for other keys."""
+    if isinstance(value, tuple) and value:
+        return type(value[0]) if isinstance(value[0], BaseModel) else None
+    if value != ():
+        return None
+    kinds = get_args(record.model_fields[name].annotation)
+    return next((k for k in kinds if isinstance(k, type) and issubclass(k, BaseModel)), None)
+
+
+def _unit(parts: Iterable[Any]) -> str | None:
+    """Return the unit among a field's annotations, however deep."""
+    for part in parts:
+        if isinstance(part, Unit):
+            return part.name
+        if name := _unit((*get_args(part), *getattr(part, "__metadata__", ()))):
+            return name
+    return None
+
+
+def _complaints(error: ValidationError) -> Iterator[str]:
+    """Yield one line per mistake: where, what, and the nearest key that exists."""
+    items = [(_place(item["loc"]), item) for item in error.errors(include_url=False)]
+    for place, item in items:
+        # what is wrong with a whole because of one of its parts, or of another form it might have had, is no news
+        if any(other != place and other[: len(place)] == place for other, _ in items):
+            continue
+        yield f"{'.'.join(place) or 'study'}: {_message(item)}"
+
+
+def _place(location: tuple[int | str, ...]) -> tuple[str, ...]:
+    """Return the keys that lead to a mistake; the tag of a union is no key of the file."""
+    tags = {"body": BODIES, "interaction": INTERACTIONS}
+    parts = [str(p) for i, p in enumerate(location) if not (i == 1 and p in tags.get(str(location[0]), ()))]
+    return tuple(p for p in parts if not _is_tag(p))
+
+
+def _is_tag(part: str) -> bool:
+    return part.endswith("Record") or part in {"str", "float"} or part.startswith("function-")
+
+
+def _message(item: Any) -> str:
+    kind, place, value = item["type"], item["loc"], item["input"]
+    if kind == "extra_forbidden":
+        close = difflib.get_close_matches(str(place[-1]), _keys_at(place[:-1]), n=1)
+        return "there is no such key" + (f"; did you mean {close[0]!r}?" if close else "")
+    if kind == "string_pattern_mismatch":
+        return f"{value!r} can't name files: letters, digits, dots, dashes and underscores can"
+    if kind == "union_tag_invalid":
+        known, tag = BODIES if place[0] == "body" else INTERACTIONS, str(item["ctx"]["tag"])
+        close = difflib.get_close_matches(tag, known, n=1)
+        hint = f"; did you mean {close[0]!r}?" if close else ""
+        return f"there is no kind of {place[0]} {tag!r}; there are {', '.join(known)}{hint}"
+    return str(item["msg"]).removeprefix("Value error, ")
+
+
+def _keys_at(place: tuple[int | str, ...]) -> set[str]:
+    """Return the keys of a study's table at a place."""
+    schema = Study.model_json_schema()
+    tables = list(_forms(schema, schema))
+    for key in place:
+        tables = [
+            form for table in tables for part in _parts(table, key, schema) for form in _forms(part, schema)
+        ]
+    return {key for table in tables for key in table.get("properties", {})}
+
+
+def _forms(part: dict[str, Any], schema: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """Yield what a part of a schema stands for: of a union, each of its forms."""
+    if "$ref" in part:
+        yield from _forms(schema["$defs"][str(part["$ref"]).rpartition("/")[2]], schema)
+    elif forms := part.get("anyOf", part.get("oneOf")):
+        for form in forms:
+            yield from _forms(form, schema)
+    else:
+        yield part
+
+
+def _parts(table: dict[str, Any], key: int | str, schema: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """Yield what lies below a table by a key, or below a list by a number; the tag of a union chooses its form."""
+    if key in table.get("properties", {}):
+        yield table["properties"][key]
+    elif not isinstance(key, int):
+        if table.get("properties", {}).get("kind", {}).get("const", key) == key:
+            yield table
+    elif "items" in table:
+        yield table["items"]

@@ -1,0 +1,374 @@
+"""Figures of a body whose networks answer by load: a beam that the hand holds at a node.
+
+Its shape, its nodes and its force are networks of their own, so that each is judged by itself, and closed paths of the
+hand are watched, since the force is not the gradient of an energy.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.dataset import Dataset
+from palpate.errors import UsageError
+from palpate.format import count, length, plain, scientific
+from palpate.learning.touch import node_outputs
+from palpate.network import Network
+from palpate.surrogates import TouchEvaluator, TouchModel
+from palpate.validation.figures.displayed_shape import ShapeErrors
+from palpate.validation.figures.figure import Figure, Judged
+from palpate.validation.figures.loop_work import LoopWork
+from palpate.validation.figures.stiffness import StiffnessErrors, curve_slope
+from palpate.validation.subject import Subject, hand_positions
+from palpate.validation.worst import Worst, outer_part
+
+__all__ = [
+    "NETWORKS",
+    "NetworkErrors",
+    "OutputError",
+    "OutputErrors",
+    "loop_work",
+    "network_outputs",
+    "node_truth",
+    "output_errors",
+    "predicted_field",
+    "shape_by_load",
+    "stiffness_by_load",
+    "stiffness_errors",
+    "work_around",
+    "work_by_load",
+    "worse_than_filter",
+]
+
+NETWORKS = {"refined": "nodes", "filter": "filter"}
+"""Networks for the nodes' displacements: what they are called here and in a `TouchModel`."""
+
+LOOPS = 100
+PANELS, ORDER = 6, 8  # panels per edge; Gauss–Legendre points per panel
+
+
+@dataclass(frozen=True)
+class OutputError:
+    """One output: its name, root mean square error and largest error, in the output's unit."""
+
+    name: str
+    rmse: float
+    max: float
+
+
+@dataclass(frozen=True)
+class OutputErrors:
+    """Errors over N samples of m outputs that share a unit.
+
+    Attributes
+    ----------
+    units : int
+        Units of the network.
+    full_scale : float
+        Largest magnitude of any output in the test set: for a beam the largest tip deflection, m.
+    rmse, max : float
+        Over all outputs, in their unit.
+    relative, relative_max : float
+        The same over full scale.
+    per_output : tuple of OutputError
+    outer_count : int
+        Samples with any input within 5 % of an end of its range.
+    outer, rest : float or None
+        RMSE there and elsewhere; None without samples.
+    outer_ratio : float or None
+        outer / rest.
+    worst : Worst
+        Where the largest error is.
+    """
+
+    units: int
+    full_scale: float
+    rmse: float
+    max: float
+    relative: float
+    relative_max: float
+    per_output: tuple[OutputError, ...]
+    outer_count: int
+    outer: float | None
+    rest: float | None
+    outer_ratio: float | None
+    worst: Worst
+
+
+def output_errors(network: Network, X: np.ndarray, truth: np.ndarray) -> OutputErrors:
+    """Return the errors of a network at X (N, n) against truth (N, m).
+
+    Raises
+    ------
+    UsageError
+        If every output is zero, so that there is no scale to judge by.
+    """
+    full = float(np.abs(truth).max())
+    if not full > 0:
+        raise UsageError(
+            "In the test set nothing moves, so errors have no scale.",
+            fix="Test under loads that bend the body.",
+        )
+    error = network.predict(X) - truth
+    sample, output = (int(i) for i in np.unravel_index(np.argmax(np.abs(error)), error.shape))
+    outside = outer_part(X, network.inputs)
+    outer, rest = _rms(error[outside]), _rms(error[~outside])
+    rmse, largest = float(_rms(error) or 0.0), float(np.abs(error).max())
+    return OutputErrors(
+        units=network.units,
+        full_scale=full,
+        rmse=rmse,
+        max=largest,
+        relative=rmse / full,
+        relative_max=largest / full,
+        per_output=tuple(
+            OutputError(q.name, float(_rms(e) or 0.0), float(np.abs(e).max()))
+            for q, e in zip(network.outputs, error.T, strict=True)
+        ),
+        outer_count=int(outside.sum()),
+        outer=outer,
+        rest=rest,
+        outer_ratio=outer / rest if outer is not None and rest else None,
+        worst=Worst.of(error[sample, output], X[sample], network.inputs, network.outputs[output].name),
+    )
+
+
+def _rms(error: np.ndarray) -> float | None:
+    return float(np.sqrt(np.mean(error**2))) if error.size else None
+
+
+@dataclass(frozen=True)
+class NetworkErrors(Figure):
+    """Errors of the networks for the displacements of the nodes.
+
+    Attributes
+    ----------
+    refined : OutputErrors
+        Of the refined network.
+    filter : OutputErrors or None
+        Of the sequential filter's own network, if the model holds it.
+    relapse : float or None
+        Largest ratio of the filter's held-out error to its best so far.
+    """
+
+    refined: OutputErrors
+    filter: OutputErrors | None
+    relapse: float | None
+
+    def judged(self) -> Judged:
+        """Return the values that are compared with limits."""
+        values: dict[str, tuple[float | None, Worst | str | None]] = {
+            "rmse": (self.refined.relative, self.refined.worst),
+            "filter_relapse": (self.relapse, None),
+        }
+        if self.filter is not None:
+            values["filter_rmse"] = (self.filter.relative, self.filter.worst)
+            values["filter_outer_ratio"] = (self.filter.outer_ratio, self.filter.worst)
+        return values
+
+    def lines(self) -> list[str]:
+        """Return one line per network."""
+        return [_line(label, errors) for label, errors in self.named().items()]
+
+    def notes(self) -> list[str]:
+        """Return a sentence where refinement did no good."""
+        worse = worse_than_filter(self)
+        return [] if worse is None else [worse]
+
+    def named(self) -> dict[str, OutputErrors]:
+        """Return the errors of the networks by their names."""
+        both = {"refined": self.refined, "filter": self.filter}
+        return {name: errors for name, errors in both.items() if errors is not None}
+
+
+def network_outputs(subject: Subject) -> NetworkErrors | None:
+    """Return the errors of the networks for the nodes' displacements, where the model has them."""
+    touch, test = subject.loads, subject.data
+    if touch is None or test is None:
+        return None
+    truth = node_truth(touch, test)
+    errors = {
+        label: output_errors(touch.networks[key], test.X, truth)
+        for label, key in NETWORKS.items()
+        if key in touch.networks
+    }
+    watched = subject.history
+    relapse = watched.relapse if watched is not None and math.isfinite(watched.relapse) else None
+    return NetworkErrors(errors["refined"], errors.get("filter"), relapse)
+
+
+def shape_by_load(subject: Subject) -> ShapeErrors | None:
+    """Return the errors of the shape, where a network answers it by load."""
+    touch, test = subject.loads, subject.data
+    if touch is None or test is None:
+        return None
+    solved = test.displacement[:, :, :2]
+    error = np.linalg.norm(predicted_field(touch, test.X) - solved, axis=2)
+    sample, node = (int(i) for i in np.unravel_index(np.argmax(error), error.shape))
+    place = f"the node at {test.rest[node, 0]:g} m"
+    return ShapeErrors(
+        mean=float(error.mean()),
+        max=float(error.max()),
+        largest=float(np.linalg.norm(solved, axis=2).max()),
+        worst=Worst.of(float(error.max()), test.X[sample], test.ranges, place),
+    )
+
+
+def stiffness_by_load(subject: Subject) -> StiffnessErrors | str | None:
+    """Return the errors of the stiffness along a curve of loads, or the reason why there are none."""
+    if subject.loads is None or subject.data is None or subject.samples is None:
+        return None
+    return stiffness_errors(subject.loads, subject.data, subject.samples.hand)
+
+
+def work_by_load(subject: Subject) -> LoopWork | str | None:
+    """Return the work around closed paths inside the trained region, or the reason why there is none."""
+    if subject.loads is None or subject.data is None or subject.samples is None:
+        return None
+    return loop_work(subject.loads, subject.data, subject.samples.hand, seed=subject.seed)
+
+
+def worse_than_filter(networks: NetworkErrors) -> str | None:
+    """Return a sentence for a refined network that is worse than the filter it should improve; else None."""
+    refined, own = networks.refined, networks.filter
+    if own is None or not refined.rmse > own.rmse:
+        return None
+    return (
+        f"The refined network is worse than the sequential filter: RMSE {length(refined.rmse)} against "
+        f"{length(own.rmse)}. Allow it more units (`units_max` in [learning]) or more solves (`samples` there)."
+    )
+
+
+def node_truth(touch: TouchModel, data: Dataset) -> np.ndarray:
+    """Return what the network of the nodes should answer for a dataset, (N, m) in m.
+
+    Raises
+    ------
+    UsageError
+        If the dataset does not fit the model, or is empty.
+    """
+    quantities, columns = node_outputs(data)
+    found, wanted = [q.name for q in quantities], [q.name for q in touch.networks["nodes"].outputs]
+    if found != wanted:
+        raise UsageError(
+            f"The dataset moves {', '.join(found) or 'nothing'}; {touch.name} answers {', '.join(wanted)}.",
+            why="Its nodes of interest or the directions of its loads are others.",
+            fix="Test with solves of the study that the model was learnt from.",
+        )
+    return np.stack([data.displacement[:, node, axis] for node, axis in columns], axis=1)
+
+
+def predicted_field(touch: TouchModel, X: np.ndarray) -> np.ndarray:
+    """Return the displacement (N, nodes, 2) of the mesh nodes under loads X (N, n), m."""
+    return touch.networks["field"].predict(X).reshape(len(X), -1, 2)
+
+
+def stiffness_errors(touch: TouchModel, test: Dataset, hand: np.ndarray) -> StiffnessErrors | str:
+    """Return the errors of the stiffness, or the reason why none can be derived.
+
+    Parameters
+    ----------
+    touch : TouchModel
+    test : Dataset
+    hand : (N, k)
+        Coordinates of the hand, m.
+    """
+    if len(test.ranges) > 1:
+        return (
+            "Stiffness is not judged: solves scattered over several loads have no curve to take a slope of."
+        )
+    curve = curve_slope(test.X[:, 0], hand[:, 0])
+    if curve is None:
+        return "Stiffness is not judged: the test loads lie too far apart to take a slope from."
+    rows, slope = curve
+    truth = 1.0 / slope
+    force = touch.networks["force"]
+    answer = np.array([force.jacobian(hand[i])[0, 0] for i in rows])
+    error = np.abs(answer - truth) / np.abs(truth)
+    i = int(np.argmax(error))
+    worst = Worst.of(error[i], test.X[rows[i]], test.ranges)
+    return StiffnessErrors(float(np.median(error)), float(np.quantile(error, 0.95)), worst)
+
+
+def loop_work(
+    touch: TouchModel, test: Dataset, hand: np.ndarray, *, loops: int = LOOPS, seed: int = 0
+) -> LoopWork | str:
+    """Return the work around random triangles to pentagons between places where test solves have the hand.
+
+    Loops that leave the trained region are left out: there the force is held at its limits on purpose.
+
+    Parameters
+    ----------
+    touch : TouchModel
+    test : Dataset
+    hand : (N, k)
+        Coordinates of the hand, m.
+    loops, seed : int
+
+    Returns
+    -------
+    LoopWork, or the reason why there is none
+    """
+    if len(touch.touched) == 1:
+        return "Work around closed paths is zero by construction: the hand moves along one coordinate."
+    others = [i for i in range(len(test.ranges)) if i not in touch.touched]
+    evaluate, rng = touch.evaluator(), np.random.default_rng(seed)
+    places, found = hand_positions(touch, hand), []
+    for _ in range(50 * loops):
+        rows = rng.choice(len(hand), min(len(hand), int(rng.integers(3, 6))), replace=False)
+        work = work_around(evaluate, places[rows], np.ascontiguousarray(test.X[rows[0], others]))
+        if work is not None:
+            found.append(work)
+        if len(found) == loops:
+            break
+    if len(found) < 10:
+        return "Work around closed paths is not judged: too few loops stay inside the trained region."
+    net, energy = np.abs([f[0] for f in found]), np.array([f[1] for f in found])
+    ratio = np.divide(net, energy, out=np.zeros_like(net), where=energy > 0)  # no force, no work
+    p95 = float(np.quantile(ratio, 0.95))
+    return LoopWork(len(found), float(np.median(ratio)), p95, float(ratio.max()), float(np.median(energy)))
+
+
+def work_around(
+    evaluate: TouchEvaluator, corners: np.ndarray, parameters: np.ndarray, panels: int = PANELS
+) -> tuple[float, float] | None:
+    """Return the net work ∮F·dx and energy ½∮|F·dx| around a polygon in J; None where it leaves the trained region.
+
+    Parameters
+    ----------
+    evaluate : TouchEvaluator
+    corners : (c, 3)
+        Hand positions, m; the last one leads back to the first.
+    parameters : (p,)
+        Loads that the hand does not supply, N.
+    panels : int
+        Pieces of each edge, with an 8-point Gauss–Legendre rule on each.
+    """
+    at, weight = _rule(panels)
+    net = energy = 0.0
+    for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        for t, w in zip(at, weight, strict=True):
+            evaluate(a + t * (b - a), parameters)
+            if not evaluate.inside:
+                return None
+            power = w * float(evaluate.force @ (b - a))
+            net, energy = net + power, energy + abs(power) / 2
+    return net, energy
+
+
+def _rule(panels: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return points in [0, 1] and weights of the composite rule."""
+    x, w = np.polynomial.legendre.leggauss(ORDER)
+    at = (np.arange(panels)[:, None] + (x + 1) / 2).ravel() / panels
+    return at, np.tile(w / 2, panels) / panels
+
+
+def _line(label: str, e: OutputErrors) -> str:
+    """Return one network in a line."""
+    text = (
+        f"{label}: {count(e.units, 'unit')}, RMSE {length(e.rmse)} ({scientific(e.relative)} of full scale)"
+    )
+    text += f", largest {length(e.max)}"
+    return text if e.outer_ratio is None else f"{text}, ends of the range {plain(e.outer_ratio)} × the rest"

@@ -1,0 +1,126 @@
+"""The mesh's own error apart from the model's: the same touches solved with half the element size."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.format import count, share
+from palpate.validation.figures.figure import Figure, Judged
+from palpate.validation.figures.force import quantile
+from palpate.validation.subject import Subject
+from palpate.validation.unseen_solves import TouchFunction, TouchSolves
+from palpate.validation.worst import Worst
+
+__all__ = ["MeshErrors", "mesh_error", "mesh_errors"]
+
+ASKED = 20
+"""Positions from which the mesh's error may be told (the figures above are claimed for both errors together)."""
+
+SAME = 1e-9  # of a range: inputs of the same solve
+
+
+@dataclass(frozen=True)
+class MeshErrors(Figure):
+    """Relative errors of the force above f₀ against refined solves.
+
+    Attributes
+    ----------
+    count : int
+        Refined solves above f₀.
+    together_median, together_p95 : float
+        Of the model: its own error and the mesh's.
+    paired : int
+        How many of them were also solved on the ordinary mesh.
+    mesh_median, mesh_p95 : float or None
+        Of the ordinary mesh alone.
+    worst : Worst
+        Of both together.
+    """
+
+    count: int
+    together_median: float
+    together_p95: float
+    paired: int
+    mesh_median: float | None
+    mesh_p95: float | None
+    worst: Worst
+
+    def judged(self) -> Judged:
+        """Return the values that are compared with limits."""
+        return {
+            "refined_force_median": (self.together_median, self.worst),
+            "refined_force_p95": (self.together_p95, self.worst),
+        }
+
+    def lines(self) -> list[str]:
+        """Return the error of the mesh alone."""
+        text = f"refined solves: {self.count} above f₀"
+        if self.mesh_median is None or self.mesh_p95 is None:
+            return [f"{text}, none of them solved on the ordinary mesh too"]
+        alone = (
+            f"{share(self.mesh_median)} median, {share(self.mesh_p95)} p95 ({count(self.paired, 'place')})"
+        )
+        return [f"{text}; the mesh alone is off by {alone}"]
+
+    def notes(self) -> list[str]:
+        """Return a sentence where refined solves are few."""
+        if self.count >= ASKED:
+            return []
+        return [f"Refined solves are few: {self.count} above f₀, where {ASKED} are asked."]
+
+
+def mesh_error(subject: Subject) -> MeshErrors | str | None:
+    """Return the error of the mesh, where refined solves were given."""
+    if subject.function is None or subject.solves is None or subject.samples is None:
+        return None
+    if subject.refined is None:
+        return "The mesh's own error is not in these figures: no refined solves were given."
+    return mesh_errors(subject.function, subject.solves, subject.refined, subject.samples.light)
+
+
+def mesh_errors(model: TouchFunction, test: TouchSolves, refined: TouchSolves, light: float) -> MeshErrors:
+    """Compare with refined solves.
+
+    Parameters
+    ----------
+    model : TouchFunction
+    test, refined : TouchSolves
+        Of the ordinary and of the refined mesh; rows of both with the same inputs give the mesh's own error.
+    light : float
+        f₀, N.
+
+    Raises
+    ------
+    UsageError
+        If no refined solve is above f₀.
+    """
+    felt = np.linalg.norm(refined.force, axis=1) > light
+    if not felt.any():
+        raise UsageError(
+            f"No refined solve has a force above f₀ = {light:.3g} N.", fix="Refine solves that press harder."
+        )
+    refined = refined.take(felt)
+    size = np.linalg.norm(refined.force, axis=1)
+    together = np.linalg.norm(model.force(refined.X) - refined.force, axis=1) / size
+    own, other = _pairs(test, refined, np.array([r.high - r.low for r in model.inputs]))
+    mesh = np.linalg.norm(test.force[own] - refined.force[other], axis=1) / size[other]
+    i = int(np.argmax(together))
+    return MeshErrors(
+        len(refined),
+        float(np.median(together)),
+        float(np.quantile(together, 0.95)),
+        len(own),
+        quantile(mesh, 0.5),
+        quantile(mesh, 0.95),
+        Worst.of(together[i], refined.X[i], model.inputs),
+    )
+
+
+def _pairs(test: TouchSolves, refined: TouchSolves, spans: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of either that have the same inputs."""
+    apart = np.abs(refined.X[:, None] - test.X[None]) / spans
+    other, own = np.nonzero((apart <= SAME).all(axis=2))
+    return own, other

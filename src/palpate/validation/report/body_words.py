@@ -1,0 +1,76 @@
+"""The body in words, from what a sweep wrote down about it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from palpate.dataset import Dataset
+from palpate.format import length, plain, pressure, share
+
+__all__ = ["LINEAR", "body_words", "strain_words"]
+
+LINEAR = 0.05
+"""Fibre strain above which hardly any material still follows a linear law."""
+
+_UNNAMED = ("", "linear elastic", "own material")  # names that stand where none was given
+
+
+def body_words(provenance: Mapping[str, Any]) -> str:
+    """Return a body as the start of a sentence: what it is, of what, how long, of what section, with or without weight.
+
+    Parameters
+    ----------
+    provenance : mapping
+        Of a dataset; whatever it does not tell is left out.
+    """
+    body = provenance.get("problem", {}).get("body", {})
+    traits = [f"A {str(body.get('type', 'body')).lower()}{_material(body.get('material'))}"]
+    if isinstance(body.get("length"), (int, float)):
+        traits.append(f"{length(body['length'])} long")
+    if section := _section(body.get("section")):
+        traits.append(section)
+    if "self_weight" in body:
+        traits.append("bending under its own weight" if body["self_weight"] else "without self-weight")
+    return ", ".join(traits) + ("," if len(traits) > 1 else "")
+
+
+def strain_words(*datasets: Dataset) -> str:
+    """Return the largest fibre strain of the solves, with a warning where it is large; empty where it is not known."""
+    known = [d.ok.data["largest_strain"].values for d in datasets if "largest_strain" in d.data]
+    finite = np.abs(np.concatenate([np.ravel(k) for k in known])) if known else np.empty(0)
+    finite = finite[np.isfinite(finite)]
+    if not finite.size:
+        return ""
+    largest = float(finite.max())
+    text = f"The largest fibre strain is {share(largest)}."
+    if largest <= LINEAR:
+        return text
+    return (
+        f"{text} Warning: that is above {share(LINEAR)}, where hardly any material is still linearly elastic; the "
+        "network learns what the linear law says there, not what a real body does."
+    )
+
+
+def _material(material: Any) -> str:
+    if not isinstance(material, Mapping):
+        return ""
+    name, young = str(material.get("name", "")), material.get("young")
+    stiff = f"E = {pressure(float(young))}" if isinstance(young, (int, float)) else ""
+    if name in _UNNAMED:
+        return f" of a material of {stiff}" if stiff else ""
+    return f" of {name} ({stiff})" if stiff else f" of {name}"
+
+
+def _section(section: Any) -> str:
+    kind = section.get("type") if isinstance(section, Mapping) else None
+    if kind == "Circle":
+        return f"of circular section with a radius of {length(section['radius'])}"
+    if kind == "Rectangle":
+        return f"of rectangular section, {length(section['width'])} wide and {length(section['height'])} high"
+    if kind == "Section":
+        area, moment = plain(section["area"], 3), plain(section["second_moment"], 3)
+        return f"of a section with A = {area} m² and I = {moment} m⁴"
+    return ""

@@ -1,0 +1,500 @@
+"""Pictures of a body whose networks answer by load: shapes, errors at the nodes, growth, and the force on the hand."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.dataset import Dataset
+from palpate.format import count, length, plain, scientific
+from palpate.learning import History
+from palpate.learning.drawing import draw_passes, draw_units
+from palpate.surrogates import TouchModel
+from palpate.units import bounds
+from palpate.validation.figures.by_load import NETWORKS, NetworkErrors, node_truth, predicted_field
+from palpate.validation.report.chapter import Chapter
+from palpate.validation.report.style import (
+    BLUE,
+    INK,
+    ORANGE,
+    SERIES,
+    Picture,
+    figure,
+    loads_map,
+    logarithmic,
+    picture,
+    series,
+    tidy_log,
+)
+from palpate.validation.subject import hand_positions
+from palpate.validation.unseen_solves import ForceSamples
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = [
+    "ROLES",
+    "colour_of_load",
+    "heading",
+    "load_pictures",
+    "network_rows",
+    "node_errors",
+    "plot_force",
+    "plot_history",
+    "plot_node_errors",
+    "plot_outer",
+    "plot_shapes",
+    "units_of",
+]
+
+ROLES = {
+    "nodes": "loads → the displacements asked for",
+    "field": "loads → the whole shape, for the eye",
+    "force": "where the hand is → the force, for the hand",
+    "filter": "the sequential network before refinement, kept to be compared with nodes",
+}
+"""Purpose of each network."""
+
+TITLES = {"filter": "Sequential filter", "refined": "Refined network"}
+HEADINGS = {
+    "down": (0.0, -1.0, 0.0),
+    "up": (0.0, 1.0, 0.0),
+    "away from the clamp": (1.0, 0.0, 0.0),
+    "towards the clamp": (-1.0, 0.0, 0.0),
+}
+FLAT = 0.2  # shapes flatter than this are drawn with exaggerated heights
+OWN = "this filter"
+
+
+def load_pictures(chapter: Chapter, key: str) -> list[Picture]:
+    """Draw the pictures of networks that answer by load; none of other models."""
+    v, touch, data = chapter.validation, chapter.subject.loads, chapter.subject.data
+    if touch is None or data is None or v.networks is None:
+        return []
+    made = [_shapes(chapter, touch, data, key), _errors(chapter, touch, data, key)]
+    if chapter.history is not None:
+        made.append(_growth(chapter, key))
+    return [*made, _force(chapter, touch, data, key), _outer(chapter, key)]
+
+
+def _shapes(chapter: Chapter, touch: TouchModel, data: Dataset, key: str) -> Picture:
+    field = chapter.validation.shape
+    _, colour = colour_of_load(data)
+    alike = f"Left and right differ by {length(field.mean)} on average and {length(field.max)} at most."
+    return picture(
+        f"{key}-shapes",
+        "Deflected shapes",
+        f"Two panels with the deflected shapes of {chapter.name} under {count(len(data), 'load')}: finite elements on "
+        f"the left, the network on the right. {alike}",
+        f"All {len(data)} unseen loads, coloured by {colour.split(' / ')[0]}; on the right the "
+        f"{units_of(touch, 'field')}. Dots mark the nodes of interest, the "
+        f"dashed line the body at rest. {alike}",
+        lambda: plot_shapes(touch, data),
+    )
+
+
+def _errors(chapter: Chapter, touch: TouchModel, data: Dataset, key: str) -> Picture:
+    v = chapter.validation
+    refined, own = v.networks.refined, v.networks.filter
+    limit = next((c.most * refined.full_scale for c in v.checks if c.criterion.key == "rmse"), None)
+    text = f"Refinement (network “nodes”) leaves at most {length(refined.max)} ({refined.worst})."
+    if own:
+        text = (
+            f"The filter alone (network “filter”) is off by at most {length(own.max)} ({own.worst}). {text}"
+        )
+    dips = " Dips are loads at which an error changes sign." if len(refined.worst.inputs) == 1 else ""
+    return picture(
+        f"{key}-errors",
+        "Error at each node against load",
+        f"Error at each node of {chapter.name} against load, on a logarithmic axis. {text}",
+        text + dips,
+        lambda: plot_node_errors(touch, data, limit),
+    )
+
+
+def _growth(chapter: Chapter, key: str) -> Picture:
+    h: History = chapter.history
+    text = _grown(h) + _compared(chapter.rivals)
+    return picture(
+        f"{key}-growth",
+        "Growth and pruning while learning",
+        f"Units of the sequential filter over observations of {chapter.name}, with the error beside them. {text}",
+        f"Network “filter”: {text} Dotted lines part the passes over the data.",
+        lambda: plot_history(h, chapter.rivals),
+    )
+
+
+def _grown(h: History) -> str:
+    left = int(h.units[-1]) if h.units.size else 0
+    text = (
+        f"{count(int(h.grew.sum()), 'unit')} grown and {int(h.pruned.sum())} pruned over "
+        f"{count(h.units.size, 'observation')}; {count(left, 'unit')} left."
+    )
+    if h.heldout.size:
+        text += (
+            f" The error on unseen solves ends at {scientific(float(h.heldout[-1]))} of full scale and was never above "
+            f"{plain(h.relapse, 3)} times its best so far."
+        )
+    return text
+
+
+def _compared(rivals: Mapping[str, History]) -> str:
+    told = [
+        f"{name} ends at {scientific(float(r.heldout[-1]))} with {count(int(r.units[-1]), 'unit')} and rose to "
+        f"{plain(r.relapse, 3)} times its best"
+        for name, r in rivals.items()
+        if r.heldout.size
+    ]
+    return f" For comparison: {'; '.join(told)}." if told else ""
+
+
+def _force(chapter: Chapter, touch: TouchModel, data: Dataset, key: str) -> Picture:
+    samples, force = chapter.subject.samples, chapter.validation.force
+    assert samples is not None  # a model whose networks answer by load answers a force
+    what = "against the hand's displacement"
+    if len(data.ranges) > 1:
+        what = "of the network against that of finite elements"
+    return picture(
+        f"{key}-force",
+        "Force on the hand",
+        f"Force on the hand {what}, for {chapter.name}, up to {plain(force.largest, 3)} N.",
+        f"The force {what}: {units_of(touch, 'force')}, asked through the evaluator that runs at 1 kHz."
+        f"{_signs(chapter)}",
+        lambda: plot_force(touch, data, samples),
+    )
+
+
+def _signs(chapter: Chapter) -> str:
+    """Return what a sign means on the axes of the force against the displacement."""
+    if len(chapter.subject.ranges) > 1:
+        return ""
+    text = " Displacement counts along the load, force against it: a body that resists has both of one sign."
+    weight = chapter.origin.get("problem", {}).get("body", {}).get("self_weight")
+    return f"{text} At no force the body hangs under its own weight." if weight else text
+
+
+def _outer(chapter: Chapter, key: str) -> Picture:
+    v = chapter.validation
+    parts = [
+        f"{'refined network' if k == 'refined' else k} {plain(e.outer_ratio)} times the rest"
+        for k, e in v.networks.named().items()
+        if e.outer_ratio is not None
+    ]
+    place = "in the outer 5 % at either end of the range"
+    if len(chapter.subject.ranges) > 1:
+        place = "with any load in the outer 5 % of its range"
+    lie = f"{v.networks.refined.outer_count} of {v.samples} unseen solves lie {place}."
+    text = f"{lie} RMSE there: {', '.join(parts) or 'not known'}."
+    return picture(
+        f"{key}-outer",
+        "Ends of the range against the rest",
+        f"Errors of {chapter.name} at the ends of the range beside the rest. {text}",
+        text,
+        lambda: plot_outer(v.networks),
+    )
+
+
+def network_rows(touch: TouchModel) -> list[tuple[str, str, str]]:
+    """Return name, purpose and number of units of each network, in the order of `ROLES`."""
+    return [(k, role, str(touch.networks[k].units)) for k, role in ROLES.items() if k in touch.networks]
+
+
+def units_of(touch: TouchModel, key: str) -> str:
+    """Return one network by its name with its number of units, for titles and captions."""
+    return f"network “{key}”, {count(touch.networks[key].units, 'unit')}"
+
+
+def plot_shapes(touch: TouchModel, data: Dataset) -> Figure:
+    """Draw the shapes of every solve in `data`, finite elements on the left and the field network on the right.
+
+    Parameters
+    ----------
+    touch : TouchModel
+    data : Dataset
+        Converged solves.
+    """
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    shade, label = colour_of_load(data)
+    order = np.argsort(shade)[::-1]
+    colour = ScalarMappable(Normalize(0.0 if shade.min() >= 0 else shade.min(), shade.max()), loads_map())
+    shapes = (data.displacement[:, :, :2], predicted_field(touch, data.X))
+    fig, axes = figure(1, 2, size=_size(data), sharex=True, sharey=True)
+    names = (
+        f"Finite elements, {len(data)} solves",
+        units_of(touch, "field").capitalize(),
+    )
+    for axis, shape, name in zip(axes[0], shapes, names, strict=True):
+        _draw_shapes(axis, data, shape, order, colour.to_rgba(shade), name)
+    fig.colorbar(colour, ax=axes, label=label, shrink=0.9, aspect=30, pad=0.02)
+    return fig
+
+
+def colour_of_load(data: Dataset) -> tuple[np.ndarray, str]:
+    """Return what the colour of a solve means (N,) and its label: the load, or the length of several loads' vector."""
+    if len(data.ranges) == 1:
+        return data.X[:, 0], _with_unit(data.ranges[0])
+    if len({r.unit for r in data.ranges}) == 1:
+        return np.linalg.norm(data.X, axis=1), f"‖load‖ / {data.ranges[0].unit}"
+    low, high = bounds(data.ranges)
+    return np.linalg.norm(data.X / np.maximum(np.abs(low), np.abs(high)), axis=1), "‖load‖ over its limits"
+
+
+def _size(data: Dataset) -> tuple[float, float]:
+    """Return the size of panels as wide as fits, as high as equal axes need."""
+    return 9.4, float(np.clip(4.1 * _slenderness(data) + 0.95, 2.6, 5.4))
+
+
+def _slenderness(data: Dataset) -> float:
+    """Return the height over width of all deflected shapes together."""
+    placed = data.rest + data.displacement[:, :, :2]
+    return float(np.ptp(placed[:, :, 1]) / np.ptp(placed[:, :, 0]))
+
+
+def _draw_shapes(axis, data, shape, order, colours, name) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    from matplotlib.collections import LineCollection
+
+    # a stiff beam drawn to scale is a line: its heights are then in mm, on their own scale
+    to_scale = _slenderness(data) > FLAT
+    unit = np.array([1.0, 1.0 if to_scale else 1e3])
+    placed, rest = (data.rest + shape) * unit, data.rest * unit
+    # hundreds of lines would weigh more than their picture; axes and text stay vectors
+    lines = LineCollection(
+        list(placed[order]),
+        colors=colours[order],
+        linewidths=0.9,
+        alpha=0.9,
+        rasterized=True,
+        capstyle="round",
+    )
+    axis.add_collection(lines)
+    axis.plot(*rest.T, color=INK, linewidth=1.0, alpha=0.5, linestyle=(0, (4, 2)))
+    axis.plot(*rest[data.nodes_of_interest].T, "o", color=INK, markersize=3.2, alpha=0.7)
+    if to_scale:
+        axis.set_aspect("equal", adjustable="box")
+    axis.autoscale_view()
+    axis.set_title(name)
+    axis.set_xlabel("x / m")
+    axis.set_ylabel("y / m" if to_scale else "y / mm, exaggerated")
+    axis.label_outer()
+
+
+def node_errors(touch: TouchModel, data: Dataset, label: str) -> tuple[list[str], np.ndarray]:
+    """Return the names of the nodes, and the length of each one's error (N, nodes) in m.
+
+    Parameters
+    ----------
+    touch : TouchModel
+    data : Dataset
+    label : "refined" or "filter"
+    """
+    network = touch.networks[NETWORKS[label]]
+    error = network.predict(data.X) - node_truth(touch, data)
+    places = [q.name.partition(" at ")[2] or q.name for q in network.outputs]
+    names = list(dict.fromkeys(places))
+    columns = [[i for i, place in enumerate(places) if place == name] for name in names]
+    return names, np.stack([np.linalg.norm(error[:, c], axis=1) for c in columns], axis=1)
+
+
+def plot_node_errors(touch: TouchModel, data: Dataset, limit: float | None = None) -> Figure:
+    """Draw one column of panels per network, one row per input; error on a logarithmic axis.
+
+    Parameters
+    ----------
+    touch : TouchModel
+    data : Dataset
+        Converged solves that the networks have never seen.
+    limit : float, optional
+        RMSE asked of the refined network in m, drawn across its panels.
+    """
+    labels = [k for k in TITLES if NETWORKS[k] in touch.networks]
+    rows = len(data.ranges)
+    height = 3.3 if rows == 1 else 0.7 + 2.1 * rows
+    fig, axes = figure(rows, len(labels), size=(9.4, height), sharey=True, sharex="row")
+    values = []
+    for column, label in enumerate(labels):
+        names, error = node_errors(touch, data, label)
+        values.append(error)
+        for row, axis in enumerate(axes[:, column]):
+            _draw_errors(axis, data.X[:, row], names, error, lines=rows == 1)
+            axis.set_xlabel(_with_unit(data.ranges[row]))
+            if limit is not None and label == "refined":
+                axis.axhline(limit, color=INK, linewidth=0.9, linestyle=(0, (2, 2)))
+                _note(axis, "RMSE asked", limit)
+        axes[0, column].set_title(f"{TITLES[label]}: {units_of(touch, NETWORKS[label])}")
+    for axis in axes[:, 0]:
+        axis.set_ylabel("|error| / m")
+    tidy_log(axes[0, 0], [*values, np.array([limit or 0.0])])
+    handles, names = axes[0, 0].get_legend_handles_labels()
+    fig.legend(
+        handles, names, loc="outside upper right", ncols=len(names), title="node at", title_fontsize=8.5
+    )
+    return fig
+
+
+def plot_outer(networks: NetworkErrors) -> Figure:
+    """Draw the RMSE in the outer part of the range beside the rest, one row per network."""
+    errors = networks.named()
+    labels = [k for k in TITLES if k in errors]
+    fig, axes = figure(1, 1, size=(9.4, 0.9 + 0.42 * len(labels)))
+    axis, points = axes[0, 0], []
+    for row, label in enumerate(labels):
+        error = errors[label]
+        rest = (error.rest or 0.0) / error.full_scale
+        outer = (error.outer or 0.0) / error.full_scale
+        points += [rest, outer]
+        axis.plot([rest, outer], [row, row], color=INK, alpha=0.35, linewidth=2, zorder=1)
+        axis.plot(rest, row, "o", color=BLUE, markersize=8, label="the rest" if row == 0 else None)
+        axis.plot(outer, row, "D", color=ORANGE, markersize=7, label="outer part" if row == 0 else None)
+        if error.outer_ratio:
+            axis.annotate(
+                f"{error.outer_ratio:.2g} ×",
+                (max(rest, outer), row),
+                (9, -3),
+                textcoords="offset points",
+                fontsize=8.5,
+            )
+    positive = [p for p in points if p > 0]
+    low, high = (min(positive), max(positive)) if positive else (1e-15, 1e-10)
+    logarithmic(axis, "x", 10 ** np.floor(np.log10(low) - 0.1), 10 ** np.ceil(np.log10(high) + 0.2))
+    axis.set_yticks(range(len(labels)), [TITLES[k] for k in labels])
+    axis.set_ylim(len(labels) - 0.5, -0.5)
+    axis.set_xlabel("RMSE over full scale")
+    axis.grid(visible=False, axis="y")
+    axis.figure.legend(loc="outside upper right", ncols=2)
+    return fig
+
+
+def _draw_errors(axis: Any, x: np.ndarray, names: list[str], error: np.ndarray, *, lines: bool) -> None:
+    order = np.argsort(x)
+    marks = "osD^vP"
+    for i, (name, style) in enumerate(zip(names, series(len(names)), strict=True)):
+        if lines:
+            axis.plot(x[order], error[order, i], label=name, linewidth=1.1, **style)
+        else:
+            axis.plot(
+                x,
+                error[:, i],
+                marks[i % 6],
+                color=style["color"],
+                markersize=3,
+                alpha=0.8,
+                rasterized=True,  # thousands of marks weigh more than their picture
+                markeredgewidth=0,
+                label=name,
+            )
+
+
+def _note(axis: Any, text: str, height: float) -> None:
+    note = axis.annotate(
+        text,
+        (0.995, height),
+        (0, 3),
+        xycoords=("axes fraction", "data"),
+        textcoords="offset points",
+        ha="right",
+        fontsize=8,
+        annotation_clip=True,
+    )
+    note.set_in_layout(False)  # a limit far below the axis must not squeeze the panels
+
+
+def _with_unit(quantity: Any) -> str:
+    return f"{quantity.name} / {quantity.unit}" if quantity.unit else str(quantity.name)
+
+
+def plot_history(history: History, rivals: Mapping[str, History] | None = None) -> Figure:
+    """Draw units on the left, held-out error on the right (the error before each update where nothing was held out).
+
+    Parameters
+    ----------
+    history : History
+    rivals : mapping of str to History, optional
+        Other runs to draw in other colours and dashes.
+    """
+    runs = {OWN: history, **(rivals or {})}
+    fig, axes = figure(1, 2, size=(9.4, 3.1))
+    units, errors = axes[0]
+    drawn = []
+    for (name, run), style in zip(runs.items(), series(len(runs)), strict=True):
+        draw_units(units, run, style, label=name, zorder=3 if name == OWN else 2)
+        shown = run.heldout if run.heldout.size else run.error
+        drawn.append(shown)
+        errors.plot(np.arange(1, shown.size + 1), shown, label=name, zorder=3 if name == OWN else 2, **style)
+    for axis in (units, errors):
+        draw_passes(axis, history, INK)
+        axis.set_xlabel("observation")
+    units.set_title("Units: grown ▲, pruned ▼")
+    errors.set_title(
+        "Error on unseen solves, of full scale" if history.heldout.size else "Error before each update"
+    )
+    tidy_log(errors, drawn)
+    if len(runs) > 1:
+        fig.legend(*errors.get_legend_handles_labels(), loc="outside upper right", ncols=min(len(runs), 4))
+    return fig
+
+
+def plot_force(touch: TouchModel, data: Dataset, samples: ForceSamples) -> Figure:
+    """Draw the force against the hand's displacement, both with their sign, for one load; a parity plot for several."""
+    fig, axes = figure(1, 1, size=(4.6, 3.4))
+    if len(data.ranges) == 1:
+        _draw_curve(axes[0, 0], touch, samples)
+    else:
+        _draw_parity(axes[0, 0], touch, samples)
+    return fig
+
+
+def _draw_curve(axis: Any, touch: TouchModel, samples: ForceSamples) -> None:
+    reach = touch.networks["force"].inputs[0]
+    along = np.linspace(reach.low, reach.high, 200)
+    evaluate, force = touch.evaluator(), []
+    for place in hand_positions(touch, along[:, None]):
+        evaluate(place, np.empty(0))
+        force.append(-float(touch.directions[0] @ evaluate.force))
+    order = np.argsort(samples.hand[:, 0])
+    some = order[np.unique(np.linspace(0, order.size - 1, 28).astype(int))]
+    axis.plot(1e3 * along, force, color=BLUE, label="network", zorder=1)
+    axis.plot(
+        1e3 * samples.hand[some, 0],
+        -samples.truth[some] @ touch.directions[0],
+        "o",
+        color=ORANGE,
+        markersize=4,
+        label="finite elements, unseen",
+        zorder=2,
+    )
+    name, along_load = touch.inputs[touch.touched[0]].name, touch.directions[0]
+    axis.set_xlabel(f"displacement along {name} ({heading(along_load)}) / mm")
+    axis.set_ylabel(f"force on the hand against {name} ({heading(-along_load)}) / N")
+    axis.legend(loc="best")
+
+
+def heading(direction: np.ndarray) -> str:
+    """Return a unit vector (3,) as a person says it: down, up, outwards, inwards, or its components."""
+    for word, axis in HEADINGS.items():
+        if np.allclose(direction, axis, atol=1e-9):
+            return word
+    return f"direction {direction[0]:.2g}, {direction[1]:.2g}".replace("-", "−")
+
+
+def _draw_parity(axis: Any, touch: TouchModel, samples: ForceSamples) -> None:
+    truth, answer = -samples.truth @ touch.directions.T, -samples.answer @ touch.directions.T
+    ends = np.array([min(truth.min(), answer.min()), max(truth.max(), answer.max())])
+    axis.plot(ends, ends, color=INK, alpha=0.5, linewidth=1.0, label="the same")
+    for i, load in enumerate(touch.touched):
+        axis.plot(
+            truth[:, i],
+            answer[:, i],
+            "oD^s"[i % 4],
+            color=SERIES[(0, 1, 2, 3)[i % 4]],
+            markersize=3.6,
+            markeredgewidth=0,
+            alpha=0.85,
+            label=touch.inputs[load].name,
+        )
+    axis.set_xlabel("finite elements, unseen / N")
+    axis.set_ylabel("network / N")
+    axis.legend(loc="best")

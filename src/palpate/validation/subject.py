@@ -1,0 +1,301 @@
+"""What is judged, and by what: a model as functions that can be asked, and solves that it has never seen.
+
+`Subject.of` is the one place that knows how each kind of model is asked; figures see only what a subject can answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palpate.dataset import Dataset
+from palpate.errors import UsageError
+from palpate.format import count, share
+from palpate.learning import History
+from palpate.learning.energy.columns import columns_of
+from palpate.learning.plastic import HeldPaths
+from palpate.learning.touch import hand_coordinates
+from palpate.surrogates import TouchedBody, TouchModel, TouchSurrogate
+from palpate.surrogates.field.field import FieldSurrogate
+from palpate.surrogates.plastic import HeldBody
+from palpate.surrogates.touch import SLACK
+from palpate.units import Range, bounds
+from palpate.validation.unseen_solves import ForceSamples, TouchFunction, TouchSolves
+
+__all__ = ["Subject", "hand_positions"]
+
+SEEN = 1e-9  # in scaled inputs: a solve this near to one that was trained on is no test
+RADIUS = 1e-9  # relative: radii that are the same
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """A model and the solves that it has never seen; what is missing is None and can't be judged.
+
+    Attributes
+    ----------
+    name : str
+        Of the model.
+    count : int
+        Unseen solves, or samples of unseen histories.
+    X, ranges : (N, n), n ranges
+        Inputs of the solves.
+    samples : ForceSamples, optional
+        Forces of the model and of finite elements at each solve.
+    units : int
+        Units of the network that answers the force.
+    turning : bool
+        Whether the force can point in more than one direction.
+    function, solves : TouchFunction and TouchSolves, optional
+        The force as a function of place.
+    data : Dataset, optional
+        The unseen rows of a dataset, with displacements.
+    field : FieldSurrogate, optional
+        The displacement that is shown.
+    loads : TouchModel, optional
+        Networks that answer by load.
+    body, histories : optional
+        A body with memory and unseen histories of it.
+    history : History, optional
+        Record of the sequential filter.
+    refined, strokes : optional
+        Solves on a refined mesh, and along strokes.
+    seed : int
+        Of random strokes and loops.
+    notes : tuple of str
+        What must be known of the test.
+    """
+
+    name: str
+    count: int
+    X: np.ndarray
+    ranges: tuple[Range, ...]
+    samples: ForceSamples | None = None
+    units: int = 0
+    turning: bool = True
+    function: TouchFunction | None = None
+    solves: TouchSolves | None = None
+    data: Dataset | None = None
+    field: FieldSurrogate | None = None
+    loads: TouchModel | None = None
+    body: HeldBody | None = None
+    histories: HeldPaths | None = None
+    history: History | None = None
+    refined: TouchSolves | None = None
+    strokes: Sequence[TouchSolves] = ()
+    seed: int = 0
+    notes: tuple[str, ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        model: Any,
+        test: Any,
+        *,
+        history: History | None = None,
+        refined: Dataset | TouchSolves | None = None,
+        strokes: Sequence[TouchSolves] = (),
+        seed: int = 0,
+    ) -> Subject:
+        """Return a model with the rows of a test that it has not seen; for the parameters see `validate`.
+
+        Raises
+        ------
+        UsageError
+            If the solves are of another body, or of no use as a test.
+        """
+        if isinstance(model, HeldBody):
+            if not isinstance(test, HeldPaths):
+                raise UsageError(
+                    f"A body with memory is judged by load histories, not by {type(test).__name__} {test!r:.60}.",
+                    fix="Give load histories that it was not learnt from: HeldPaths.load(path).",
+                )
+            return cls(model.name, 0, np.empty((0, 1)), (), body=model, histories=test)
+        if not isinstance(test, Dataset | TouchSolves):
+            raise UsageError(
+                f"A model is judged by solves, not by {type(test).__name__} {test!r:.60}.",
+                fix="Give what `palpate.sweep` returned, `Dataset.open(path)`, or TouchSolves of arrays.",
+            )
+        if isinstance(model, TouchModel):
+            if not isinstance(test, Dataset) or refined is not None or strokes:
+                raise UsageError(
+                    "A model whose networks answer by load is judged by a dataset of its study alone.",
+                    fix="Give a Dataset, without `refined` and `strokes`.",
+                )
+            return _by_load(model, test.ok, history, seed)
+        if history is not None:
+            raise UsageError("The model of an energy has no history of a filter.", fix="Leave `history` out.")
+        return _by_place(model, test, refined, strokes, seed)
+
+
+def _by_place(
+    model: Any, test: Dataset | TouchSolves, refined: Any, strokes: Sequence[TouchSolves], seed: int
+) -> Subject:
+    """Return a model whose force is a function of place."""
+    field = model.fields.get("displacement") if isinstance(model, TouchedBody) else None
+    energy = model.touch if isinstance(model, TouchedBody) else model
+    function = TouchFunction.of(energy)
+    _refuse_radius(energy, test)
+    solves = TouchSolves.of(test, function.inputs)
+    seen = _seen(energy, solves.X)
+    if seen.all():
+        raise UsageError(
+            f"The surrogate was trained on all {len(solves)} solves, or on mirror images of them.",
+            fix="Test with solves that training left out.",
+        )
+    if seen.any():
+        solves = solves.take(~seen)
+    samples = ForceSamples(solves.X[:, :3], solves.force, function.force(solves.X), function.within(solves.X))
+    if refined is not None:
+        _refuse_radius(energy, refined)
+        refined = TouchSolves.of(refined, function.inputs)
+    return Subject(
+        function.name,
+        len(solves),
+        solves.X,
+        function.inputs,
+        samples=samples,
+        units=function.units,
+        function=function,
+        solves=solves,
+        data=test.ok.take(np.flatnonzero(~seen)) if isinstance(test, Dataset) else None,
+        field=field,
+        refined=refined,
+        strokes=strokes,
+        seed=seed,
+        notes=(*_places(energy, solves), *_notes(samples, int(seen.sum()))),
+    )
+
+
+def _seen(model: Any, X: np.ndarray) -> np.ndarray:
+    """Return which of the inputs (N, n) a model was trained on.
+
+    A surrogate remembers its training inputs and their images under the body's symmetry, up to 512 of them.
+    """
+    if isinstance(model, TouchFunction) or model.region is None:
+        return np.zeros(len(X), dtype=bool)
+    low, high = bounds(model.inputs)
+    return np.asarray(model.region.distances(2 * (X - low) / (high - low) - 1) < SEEN)
+
+
+def _refuse_radius(model: Any, data: Dataset | TouchSolves) -> None:
+    """Refuse solves with another probe than the surrogate's."""
+    if (
+        not isinstance(model, TouchSurrogate)
+        or not isinstance(data, Dataset)
+        or model.radius_input is not None
+    ):
+        return
+    acting = data.provenance.get("problem", {}).get("interactions", [])
+    radii = [a["radius"] for a in acting if isinstance(a, dict) and "radius" in a]
+    if any(abs(r - model.radius) > RADIUS * model.radius for r in radii):
+        raise UsageError(
+            f"The solves' probe has a radius of {1e3 * radii[0]:g} mm, the surrogate's {1e3 * model.radius:g} mm.",
+            fix="Test with solves of the probe that the surrogate was learnt with.",
+        )
+
+
+def _places(model: Any, solves: TouchSolves) -> list[str]:
+    """Return a sentence where several depths over one place were solved: these tell less than as many places."""
+    if not isinstance(model, TouchSurrogate):
+        return []
+    own = model.radius_input
+    radius = model.radius if own is None else float(solves.X[:, own].mean())
+    places = int(columns_of(solves.X, model.surface, radius).max()) + 1
+    if places == len(solves):
+        return []
+    return [
+        f"The {count(len(solves), 'solve')} lie over {count(places, 'place')}, at several depths of each."
+    ]
+
+
+def _notes(samples: ForceSamples, seen: int) -> list[str]:
+    found = [
+        f"f₀ = {samples.light:.3g} N, the smaller of 0.5 N and 5 % of the largest force: errors of fainter ones are "
+        "shares of it."
+    ]
+    if seen:
+        found.append(f"{count(seen, 'solve')} left out: trained on, or the mirror image of one that was.")
+    if outside := int((~samples.inside).sum()):
+        found.append(
+            f"{outside} of {len(samples.inside)} count as outside what was trained, in no training "
+            "solve's neighbourhood; more solves bring them nearer."
+        )
+    return found
+
+
+def _by_load(touch: TouchModel, test: Dataset, history: History | None, seed: int) -> Subject:
+    """Return a model whose networks answer by load: the hand is put where each solve has it."""
+    _refuse_other_body(touch, test)
+    touched = list(touch.touched)
+    others = [i for i in range(len(test.ranges)) if i not in touch.touched]
+    hand = hand_coordinates(test, touch.touch_node, touch.touched, touch.compliance)
+    evaluate = touch.evaluator()
+    answer, inside = np.empty((len(test), 3)), np.empty(len(test), dtype=bool)
+    places = hand_positions(touch, hand)
+    for i, (place, x) in enumerate(zip(places, test.X, strict=True)):
+        evaluate(place, np.ascontiguousarray(x[others]))
+        answer[i], inside[i] = evaluate.force, evaluate.inside
+    samples = ForceSamples(hand, -test.X[:, touched] @ touch.directions, answer, inside)
+    turning = len(touch.touched) > 1
+    notes = [] if turning else ["Direction is not judged: the hand feels one direction only."]
+    if outside := int((~inside).sum()):
+        notes.append(_outside(touch, test, outside))
+    return Subject(
+        touch.name,
+        len(test),
+        test.X,
+        test.ranges,
+        samples=samples,
+        units=touch.networks["force"].units,
+        turning=turning,
+        data=test,
+        loads=touch,
+        history=history,
+        seed=seed,
+        notes=tuple(notes),
+    )
+
+
+def hand_positions(touch: TouchModel, hand: np.ndarray) -> np.ndarray:
+    """Return positions (N, 3) whose components along the touched loads are `hand` (N, k), m."""
+    return np.ascontiguousarray(hand @ np.linalg.pinv(touch.directions).T)
+
+
+def _outside(touch: TouchModel, test: Dataset, number: int) -> str:
+    """Return how many hand positions count as outside, and why they do where their loads are inside."""
+    text = f"{number} of {len(test)} hand positions count as outside the trained range"
+    low, high = bounds(touch.inputs)
+    if not np.array_equal(np.clip(test.X, low, high), test.X):
+        return f"{text}."
+    slack = f"{share(SLACK)} of a load's range"
+    if touch.compliance > 0:
+        slack += ", or the hand by more than 1 % of the reach"
+    return (
+        f"{text} although their loads are inside: at the border of the trained travel, or where the answer misses "
+        f"the load by more than {slack}."
+    )
+
+
+def _refuse_other_body(touch: TouchModel, data: Dataset) -> None:
+    if not len(data):
+        raise UsageError(
+            "There is no converged solve to test with.",
+            why="The test set is empty, or each of its solves failed.",
+            fix="Sweep some samples that training leaves out.",
+        )
+    theirs, own = [(r.name, r.unit) for r in data.ranges], [(r.name, r.unit) for r in touch.inputs]
+    if theirs != own:
+        raise UsageError(
+            f"The dataset's inputs are {', '.join(n for n, _ in theirs)}; "
+            f"{touch.name} takes {', '.join(n for n, _ in own)}.",
+            fix="Test with solves of the study that the model was learnt from.",
+        )
+    if data.rest.shape != touch.rest[:, :2].shape or not np.allclose(data.rest, touch.rest[:, :2]):
+        raise UsageError(
+            f"The dataset's {len(data.rest)} nodes are not the {len(touch.rest)} nodes of {touch.name}.",
+            fix="Test with solves of the study that the model was learnt from.",
+        )

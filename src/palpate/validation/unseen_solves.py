@@ -1,0 +1,236 @@
+"""Unseen solves and the function of place that is asked beside them: both as values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.dataset import Dataset
+from palpate.errors import UsageError
+from palpate.learning.grasp.solves import HeldSolves
+from palpate.surrogates import TouchSurrogate
+from palpate.surrogates.grasp import GraspSurrogate
+from palpate.units import Range
+from palpate.validation.limits import FAINT, FAINT_JND, FORCE_JND
+
+__all__ = ["ForceSamples", "TouchFunction", "TouchSolves", "force_jnd"]
+
+Answer = Callable[[np.ndarray], np.ndarray]
+
+
+def force_jnd(size: np.ndarray) -> np.ndarray:
+    """Return the just noticeable relative difference of forces of these sizes (N,), N."""
+    return np.where(np.asarray(size) < FAINT, FAINT_JND, FORCE_JND)
+
+
+@dataclass(frozen=True, eq=False)
+class ForceSamples:
+    """Forces on the hand or probe, asked for where each finite-element solve has it.
+
+    Attributes
+    ----------
+    hand : (N, k)
+        Where it is, m: the centre of a probe; or coordinates along the touched loads, the held node's displacement
+        plus the stretch of the virtual coupling.
+    truth, answer : (N, 3)
+        Force of the finite-element solve and of the model, N.
+    inside : (N,) bool
+        Whether the model called the place inside its trained range.
+    """
+
+    hand: np.ndarray
+    truth: np.ndarray
+    answer: np.ndarray
+    inside: np.ndarray
+
+    @property
+    def size(self) -> np.ndarray:
+        """Size ‖F‖ of the finite-element solves (N,), N."""
+        return np.asarray(np.linalg.norm(self.truth, axis=1))
+
+    @property
+    def error(self) -> np.ndarray:
+        """Error ‖ΔF‖ (N,), N."""
+        return np.asarray(np.linalg.norm(self.answer - self.truth, axis=1))
+
+    @property
+    def light(self) -> float:
+        """Force f₀ = min(0.5 N, 5 % of the largest ‖F‖): below it relative errors say little."""
+        return float(min(0.5, 0.05 * self.size.max()))
+
+    @property
+    def heavy(self) -> np.ndarray:
+        """Mask (N,) of the touches that are stronger than f₀."""
+        return np.asarray(self.size > self.light)
+
+    @property
+    def relative(self) -> np.ndarray:
+        """Relative error ‖ΔF‖/‖F‖ (N,); not-a-number without force, infinite where there should be none."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(self.error / self.size)
+
+    @property
+    def jnd(self) -> np.ndarray:
+        """Error (N,) in just noticeable differences of a force of that size."""
+        return np.asarray(self.relative / force_jnd(self.size))
+
+
+@dataclass(frozen=True, eq=False)
+class TouchSolves:
+    """Solves of a body under a probe.
+
+    Attributes
+    ----------
+    X : (N, n)
+        Centre of the probe (m), then further inputs.
+    force : (N, 3)
+        F on the probe, N.
+    energy : (N,), optional
+        U, J; zero without contact.
+    stiffness : (N, 3, 3), optional
+        ∂F/∂c, N/m; not-a-number where unknown.
+
+    Raises
+    ------
+    UsageError
+        If shapes do not fit, there is no solve, or no solve has a force.
+    """
+
+    X: np.ndarray
+    force: np.ndarray
+    energy: np.ndarray | None = None
+    stiffness: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("X", "force", "energy", "stiffness"):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, np.ascontiguousarray(value, dtype=np.float64))
+        if fault := self._fault():
+            raise UsageError(
+                f"These solves can't judge a touch: {fault}.",
+                why="Each needs where the probe was and what force it met.",
+                fix="Give inputs (N, n), forces (N, 3), and if known energies (N,) and ∂F/∂c (N, 3, 3).",
+            )
+
+    def _fault(self) -> str:
+        if self.X.ndim != 2 or self.X.shape[1] < 3 or not len(self.X):
+            return f"their inputs have shape {self.X.shape}"
+        wanted = {"force": (3,), "energy": (), "stiffness": (3, 3)}
+        for name, rest in wanted.items():
+            value = getattr(self, name)
+            if value is not None and value.shape != (len(self.X), *rest):
+                return f"their {name} has shape {value.shape} for {len(self.X)} inputs"
+        if not (np.isfinite(self.X).all() and np.isfinite(self.force).all()):
+            return "inputs or forces are not finite"
+        return "" if self.force.any() else "none has a force"
+
+    def __len__(self) -> int:
+        return len(self.X)
+
+    @property
+    def touching(self) -> np.ndarray:
+        """Mask (N,) of the solves that have a force."""
+        return np.asarray(self.force.any(axis=1))
+
+    def take(self, rows: np.ndarray) -> TouchSolves:
+        """Return some of the solves, by a mask or indices."""
+        energy = None if self.energy is None else self.energy[rows]
+        return TouchSolves(
+            self.X[rows], self.force[rows], energy, None if self.stiffness is None else self.stiffness[rows]
+        )
+
+    @classmethod
+    def of(cls, test: Dataset | TouchSolves, inputs: Sequence[Range]) -> TouchSolves:
+        """Return the converged rows of a dataset, or solves as they are, for a model with these inputs.
+
+        Raises
+        ------
+        UsageError
+            If their inputs are others.
+        """
+        if isinstance(test, TouchSolves):
+            _refuse_inputs([f"input {i}" for i in range(test.X.shape[1])], inputs, len(inputs))
+            return test
+        if [r.name for r in test.ranges] != (names := [r.name for r in inputs]) and {"d_x", "d_y", "d_z"} <= {
+            name.split()[-1] for name in names
+        }:
+            held = HeldSolves.of(test)
+            _refuse_inputs([r.name for r in held.inputs], inputs, names)
+            return cls(held.X, held.force[:, :3], held.energy, held.stiffness[:, :3, :3])
+        test = test.ok
+        _refuse_inputs([r.name for r in test.ranges], inputs, [r.name for r in inputs])
+        if not len(test):
+            raise UsageError(
+                "There is no converged solve to test with.", fix="Sweep some samples for testing."
+            )
+        known = "response_gradient" in test
+        return cls(
+            test.X,
+            test.response[:, :3],
+            test.potential_energy if "potential_energy" in test else None,
+            test.response_gradient[:, :3, :3] if known else None,
+        )
+
+
+def _refuse_inputs(found: list[str], inputs: Sequence[Range], wanted: list[str] | int) -> None:
+    if found == wanted or len(found) == wanted:
+        return
+    raise UsageError(
+        f"The solves' inputs are {', '.join(found)}; the model takes {', '.join(r.name for r in inputs)}.",
+        fix="Test with solves of the body that the model was learnt from.",
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class TouchFunction:
+    """Function of place that answers the force: that of a surrogate, or any other beside which it is judged.
+
+    Attributes
+    ----------
+    name : str
+    inputs : n ranges
+    force : callable (N, n) → (N, 3)
+        N.
+    energy, stiffness, depth, inside, deviation : callable, optional
+        (N, n) → (N,) in J, (N, 3, 3) in N/m, (N,) in m, (N,) bool, (N,) relative to the force. What is missing is
+        not judged, and said not to be.
+    units : int
+    """
+
+    name: str
+    inputs: tuple[Range, ...]
+    force: Answer
+    energy: Answer | None = None
+    stiffness: Answer | None = None
+    depth: Answer | None = None
+    inside: Answer | None = None
+    deviation: Answer | None = None
+    units: int = 0
+
+    @classmethod
+    def of(cls, model: TouchSurrogate | GraspSurrogate | TouchFunction) -> TouchFunction:
+        """Return the function that a surrogate answers; a function as it is."""
+        if isinstance(model, TouchFunction):
+            return model
+        touched = isinstance(model, TouchSurrogate)
+        return cls(
+            str(model.meta.get("name", "touch surrogate" if touched else "grasp surrogate")),
+            model.inputs,
+            model.force,
+            model.energy,
+            model.stiffness,
+            model.depth if isinstance(model, TouchSurrogate) else None,
+            model.inside,
+            None if model.root is None else model.deviation,
+            model.network.units,
+        )
+
+    def within(self, X: np.ndarray) -> np.ndarray:
+        """Return whether inputs X (N, n) are trained: as the model says, else whether they lie in the ranges."""
+        if self.inside is not None:
+            return np.asarray(self.inside(X), dtype=bool)
+        low, high = np.array([[r.low for r in self.inputs], [r.high for r in self.inputs]])
+        return np.asarray(((low <= X) & (high >= X)).all(axis=1))

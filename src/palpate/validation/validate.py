@@ -1,0 +1,260 @@
+"""`validate`: a model against solves that it has never seen, one result for every kind of model."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from palpate.dataset import Dataset
+from palpate.errors import AccuracyError
+from palpate.format import criterion_figure
+from palpate.learning import History
+from palpate.validation.figures import FIGURES
+from palpate.validation.figures.figure import Figure
+from palpate.validation.limits import CRITERIA, Check, Limits
+from palpate.validation.subject import Subject
+from palpate.validation.unseen_solves import TouchSolves
+
+__all__ = ["Validation", "checks", "measure", "validate"]
+
+_NAMES = frozenset(name for name, _ in FIGURES)
+_MORE = (
+    "Learn from more solves, placed where the worst cases are, or let learning take longer: `samples` in [sweep], "
+    "`seconds` and `units_max` in [learning], or options of palpate.learn."
+)
+_LEARNT = ("force_median", "force_p95", "light_force_p95", "stiffness_p95", "direction_p95")
+_ENERGY_FIXES = dict.fromkeys((*_LEARNT, "displacement_mean", "displacement_max"), _MORE) | {
+    "loop_work": "The force is not the gradient of an energy: learn the energy and take its gradient, as palpate.learn "
+    "does."
+}
+"""Advice after a miss of a model whose force is a function of place, with a study file or without."""
+
+
+@dataclass(frozen=True)
+class Validation:
+    """Figures of a model on solves that it has never seen, and how they compare with limits.
+
+    Each figure is an attribute too, None where it does not apply or could not be measured: `validation.force.p95`.
+
+    Attributes
+    ----------
+    name : str
+        Of the model.
+    samples : int
+        Unseen solves.
+    checks : tuple of Check
+        Figures compared with limits.
+    notes : tuple of str
+        What was not judged, and why.
+    figures : mapping of name to Figure
+        ``force``, ``energy``, ``stiffness``, ``smoothness``, ``coverage``, ``loops``, ``border_loops``, ``shape``,
+        ``mesh``, ``networks``, ``histories``, ``parts``, ``worst``: see `palpate.validation.figures`.
+    """
+
+    name: str
+    samples: int
+    checks: tuple[Check, ...]
+    notes: tuple[str, ...]
+    figures: Mapping[str, Figure] = field(default_factory=dict)
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a figure by its name, None where there is none."""
+        if name in _NAMES:
+            return self.figures.get(name)
+        raise AttributeError(f"a Validation has no attribute {name!r}")
+
+    @property
+    def passed(self) -> bool:
+        """True if every limit is kept."""
+        return not self.failures
+
+    @property
+    def failures(self) -> tuple[Check, ...]:
+        """Checks that failed."""
+        return tuple(c for c in self.checks if not c.passed)
+
+    def raise_if_failed(self) -> None:
+        """Do nothing if every limit is kept.
+
+        Raises
+        ------
+        AccuracyError
+            What was measured, what was asked and where the worst case is, for every limit missed.
+        """
+        if self.passed:
+            return
+        count = f"{len(self.failures)} of {len(self.checks)} limits"
+        raise AccuracyError(
+            f"{self.name} misses {count} on {self.samples} solves that it has never seen.",
+            why="\n".join(_without_fix(c) for c in self.failures),
+            fix=" ".join(dict.fromkeys(c.criterion.fix for c in self.failures)),
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return everything as plain data for a JSON file; values that are not finite become null."""
+        judged = [
+            {
+                "name": c.criterion.key,
+                "measured": c.measured,
+                "limit": c.limit,
+                "good": c.criterion.good,
+                "grade": c.grade,
+                "passed": c.passed,
+                "where": c.where,
+            }
+            for c in self.checks
+        ]
+        data = {"passed": self.passed, "name": self.name, "samples": self.samples, "notes": self.notes}
+        plain: dict[str, Any] = _plain({**data, **self.figures, "checks": judged})
+        return plain
+
+    def summary(self) -> dict[str, Any]:
+        """Return the few values that a file of the model keeps, for whoever opens it later."""
+        found: dict[str, Any] = {"unseen solves": self.samples}
+        if self.networks is not None:
+            found["displacement RMSE / full scale"] = self.networks.refined.relative
+        force = self.histories if self.force is None else self.force
+        if self.histories is not None:
+            found["unseen histories"] = self.histories.count
+        found["force error, median"] = force.median
+        found["force error, 95th percentile"] = force.p95
+        return {**found, "limits kept": self.passed}
+
+    def details(self) -> list[str]:
+        """Return the lines below the table of limits."""
+        return [line for figure in self.figures.values() for line in figure.lines()]
+
+    def __str__(self) -> str:
+        rows = [("", "measured", "asked", "good", "")]
+        for c in self.checks:
+            kind, good = c.criterion.kind, c.criterion.good
+            rows.append(
+                (
+                    c.criterion.label,
+                    criterion_figure(c.measured, kind),
+                    criterion_figure(c.limit, kind),
+                    "" if good is None else criterion_figure(good, kind),
+                    c.grade.upper() if c.grade == "fail" else c.grade,
+                )
+            )
+        widths = [max(len(r[i]) for r in rows) for i in range(5)]
+        table = [
+            "  " + "  ".join(cell.ljust(w) for cell, w in zip(r, widths, strict=True)).rstrip() for r in rows
+        ]
+        verdict = (
+            "every limit kept" if self.passed else f"{len(self.failures)} of {len(self.checks)} limits missed"
+        )
+        head = f"{self.name} on {self.samples} unseen solves: {verdict}"
+        return "\n".join([head, *table, *(f"  {line}" for line in (*self.details(), *self.notes))])
+
+
+def validate(
+    model: Any,
+    test: Any,
+    *,
+    history: History | None = None,
+    refined: Dataset | TouchSolves | None = None,
+    strokes: Sequence[TouchSolves] = (),
+    limits: Limits | None = None,
+    seed: int = 0,
+) -> Validation:
+    """Judge a model by solves that it has never seen, in units that a person feels.
+
+    Parameters
+    ----------
+    model : Surrogate or TouchFunction
+        What `palpate.learn` made; or any force as a function of place.
+    test : Dataset, TouchSolves or load histories
+        Rows that did not converge, or that the model was trained on, are left out. `TouchSolves` holds arrays. A body
+        with memory is judged by load histories.
+    history : History, optional
+        Record of the sequential filter, where there was one; its held-out error tells whether it was stable.
+    refined : Dataset or TouchSolves, optional
+        Some of the places solved with half the element size, at least 20: they give the mesh's own error.
+    strokes : sequence of TouchSolves, optional
+        Solves along strokes, beside which smoothness is judged; by default random strokes beside the model itself.
+    limits : Limits, optional
+        By default what a person can notice.
+    seed : int
+        Of the random strokes and loops.
+
+    Returns
+    -------
+    Validation
+        Printed a table; `passed`, `checks`, `raise_if_failed()`, `as_dict()`.
+
+    Raises
+    ------
+    UsageError
+        If the solves are of another body, or of no use as a test.
+    """
+    return measure(
+        Subject.of(model, test, history=history, refined=refined, strokes=strokes, seed=seed), limits
+    )
+
+
+def measure(subject: Subject, limits: Limits | None = None) -> Validation:
+    """Return all figures that can be measured of a subject, compared with limits."""
+    figures: dict[str, Figure] = {}
+    reasons: list[str] = []
+    for name, function in FIGURES:
+        result = function(subject)
+        if isinstance(result, str):
+            reasons.append(result)
+        elif result is not None:
+            figures[name] = result
+    fixes = {} if subject.function is None else _ENERGY_FIXES
+    own = [note for figure in figures.values() for note in figure.notes()]
+    return Validation(
+        name=subject.name,
+        samples=subject.count or sum(len(getattr(f, "off", ())) for f in figures.values()),
+        checks=checks(figures.values(), limits or Limits(), fixes),
+        notes=(*reasons, *subject.notes, *own),
+        figures=figures,
+    )
+
+
+def checks(figures: Any, limits: Limits, fixes: Mapping[str, str]) -> tuple[Check, ...]:
+    """Compare the values of figures with limits, in the order of `CRITERIA`.
+
+    Parameters
+    ----------
+    figures : iterable of Figure
+    limits : Limits
+        A limit of None asks nothing.
+    fixes : mapping of names of limits to advice after a miss
+        Where it differs from the advice of the criterion.
+    """
+    measured = {key: value for figure in figures for key, value in figure.judged().items()}
+    found = []
+    for criterion in CRITERIA:
+        limit = getattr(limits, criterion.key)
+        value, worst = measured.get(criterion.key, (None, None))
+        if limit is not None and value is not None:
+            told = replace(criterion, fix=fixes.get(criterion.key, criterion.fix))
+            found.append(Check(told, value, limit, str(worst) if worst else ""))
+    return tuple(found)
+
+
+def _without_fix(check: Check) -> str:
+    return str(check).removesuffix(check.criterion.fix).rstrip()
+
+
+def _plain(value: Any) -> Any:
+    """Dataclasses, arrays and mappings as JSON-able data."""
+    if dataclasses.is_dataclass(value):
+        return {f.name: _plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    return value

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import hashlib
 import json
 import os
 from collections.abc import Iterable, Sequence
@@ -13,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.dataset.schema import BOOKKEEPING
+from palpate.dataset import store
+from palpate.dataset.schema import BOOKKEEPING, TIMINGS
 from palpate.errors import UsageError
 from palpate.format import share
 from palpate.units import Range
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Dataset"]
 
-_TIMINGS = frozenset({"solve_seconds"})  # differ from run to run: no part of a dataset's identity
 _LEFT_OUT = {"inputs", "displacement", "largest_strain"} | {field.name for field in BOOKKEEPING}
 
 
@@ -56,9 +55,7 @@ class Dataset:
         FileFormatError
             If there is none at `path`, or it is corrupt, foreign or from a later version of palpate.
         """
-        from palpate.dataset.store import read
-
-        return read(Path(path))
+        return cls(store.read(Path(path)))
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write a Zarr store (a folder, by custom ``NAME.zarr``) and return its path.
@@ -70,9 +67,7 @@ class Dataset:
         UsageError
             If something else is at `path` and `overwrite` is false.
         """
-        from palpate.dataset.store import write
-
-        return write(self, Path(path), overwrite=overwrite)
+        return store.write(self.data, Path(path), overwrite=overwrite)
 
     @classmethod
     def concat(cls, parts: Sequence[Dataset]) -> Dataset:
@@ -114,19 +109,11 @@ class Dataset:
     @functools.cached_property
     def hash(self) -> str:
         """SHA-256 of inputs and answers without the timings, as hexadecimal digits."""
-        return self.fingerprint(exclude=_TIMINGS)
+        return self.fingerprint(exclude=TIMINGS)
 
     def fingerprint(self, exclude: Iterable[str] = ()) -> str:
         """Return the SHA-256 of all variables and coordinates but `exclude`, as hexadecimal digits."""
-        digest = hashlib.sha256()
-        for name in sorted(set(map(str, self.data.variables)) - set(exclude)):
-            values = self.data[name].values
-            digest.update(f"{name} {self.data[name].dims} {values.shape}".encode())
-            if values.dtype.kind in "TOU":
-                digest.update("\0".join(map(str, values.ravel())).encode())
-            else:
-                digest.update(np.ascontiguousarray(values).tobytes())
-        return digest.hexdigest()
+        return store.fingerprint(self.data, exclude)
 
     # ---- rows ----
 

@@ -15,6 +15,7 @@ __all__ = [
     "BOOKKEEPING",
     "FORMAT",
     "FORMAT_VERSION",
+    "TIMINGS",
     "Field",
     "Layout",
     "beam_fields",
@@ -26,6 +27,7 @@ __all__ = [
 
 FORMAT = "palpate dataset"
 FORMAT_VERSION = 2  # 1: plane beams only, otherwise the same
+TIMINGS = frozenset({"solve_seconds"})  # differ from run to run: no part of a dataset's identity
 
 RESERVED = frozenset({"inputs", "sample", "rest", "triangles"})  # variables that every dataset has of itself
 

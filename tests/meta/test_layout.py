@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import ast
 import collections
+import graphlib
 import importlib
 import pkgutil
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 
 import pytest
 from sources import FUNCTIONS, PACKAGE, ROOT, body_without_docstring, files, package_of, text, tree
@@ -130,6 +132,28 @@ def test_public_functions_and_classes_are_listed():
         if not public <= listed and not file.name.startswith("__") and package_of(file) not in UNFINISHED:
             unlisted[str(file)] = sorted(public - listed)
     assert unlisted == {}
+
+
+def imported(statements: list[ast.stmt]) -> Iterator[str]:
+    """Modules that a module imports when it is loaded: not those for types alone, nor those inside functions."""
+    for node in statements:
+        if isinstance(node, ast.ImportFrom) and node.module:
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, (ast.Try, ast.With)):
+            yield from imported(node.body)
+
+
+def test_no_circle_of_imports():
+    known = {
+        ".".join(("palpate", *file.with_suffix("").parts)).removesuffix(".__init__"): file for file in files()
+    }
+    graph = {}
+    for module, file in known.items():
+        names = set(imported(tree(file).body))
+        graph[module] = {name if name in known else name.rpartition(".")[0] for name in names} & known.keys()
+    list(graphlib.TopologicalSorter(graph).static_order())  # raises CycleError, which names the circle
 
 
 def test_the_package_is_typed_and_its_version_is_one():

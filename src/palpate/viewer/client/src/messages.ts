@@ -1,6 +1,9 @@
 // Generated from palpate/viewer/messages.py; change it there, then
 //   python -m palpate.viewer.messages > src/palpate/viewer/client/src/messages.ts
 
+import { decode, encode } from "./wire";
+import type { Layout } from "./wire";
+
 export type Vec3 = [number, number, number];
 
 export const PROTOCOL = 3;
@@ -169,114 +172,41 @@ export interface Frame {
   prints: Float32Array;
 }
 
-export function encodeFrame(m: Frame): ArrayBuffer {
-  const view = new DataView(new ArrayBuffer(125 + 4 + 4 * m.parameters.length + 4 + 4 * m.displacement.length + 4 + 4 * m.coefficients.length + 4 + 4 * m.prints.length));
-  view.setUint8(0, 1);
-  view.setFloat64(1, m.tick, true);
-  view.setFloat64(9, m.time, true);
-  view.setFloat64(17, m.echo, true);
-  view.setFloat32(25, m.position[0], true);
-  view.setFloat32(29, m.position[1], true);
-  view.setFloat32(33, m.position[2], true);
-  view.setFloat32(37, m.force[0], true);
-  view.setFloat32(41, m.force[1], true);
-  view.setFloat32(45, m.force[2], true);
-  view.setFloat32(49, m.rate, true);
-  view.setFloat32(53, m.lateness, true);
-  view.setFloat32(57, m.lateness_p50, true);
-  view.setFloat32(61, m.lateness_p99, true);
-  view.setFloat32(65, m.lateness_max, true);
-  view.setFloat32(69, m.work_p50, true);
-  view.setUint32(73, m.faults, true);
-  view.setUint8(77, m.fault);
-  view.setUint8(78, m.last_fault);
-  view.setUint8(79, m.loop);
-  view.setUint8(80, m.hold);
-  view.setUint8(81, m.inside ? 1 : 0);
-  view.setUint8(82, m.clamped ? 1 : 0);
-  view.setUint8(83, m.grabbed ? 1 : 0);
-  view.setUint8(84, m.stalled ? 1 : 0);
-  view.setFloat32(85, m.contact[0], true);
-  view.setFloat32(89, m.contact[1], true);
-  view.setFloat32(93, m.contact[2], true);
-  view.setFloat32(97, m.normal[0], true);
-  view.setFloat32(101, m.normal[1], true);
-  view.setFloat32(105, m.normal[2], true);
-  view.setFloat32(109, m.depth, true);
-  view.setFloat32(113, m.stiffness, true);
-  view.setFloat32(117, m.deviation, true);
-  view.setFloat32(121, m.drawn, true);
-  let at = 125;
-  view.setUint32(at, m.parameters.length, true);
-  at += 4;
-  for (const value of m.parameters) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  view.setUint32(at, m.displacement.length, true);
-  at += 4;
-  for (const value of m.displacement) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  view.setUint32(at, m.coefficients.length, true);
-  at += 4;
-  for (const value of m.coefficients) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  view.setUint32(at, m.prints.length, true);
-  at += 4;
-  for (const value of m.prints) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  return view.buffer;
-}
+const FRAME_LAYOUT: Layout = [
+  ["tick", "f64"],
+  ["time", "f64"],
+  ["echo", "f64"],
+  ["position", "vec3"],
+  ["force", "vec3"],
+  ["rate", "f32"],
+  ["lateness", "f32"],
+  ["lateness_p50", "f32"],
+  ["lateness_p99", "f32"],
+  ["lateness_max", "f32"],
+  ["work_p50", "f32"],
+  ["faults", "u32"],
+  ["fault", "u8"],
+  ["last_fault", "u8"],
+  ["loop", "u8"],
+  ["hold", "u8"],
+  ["inside", "flag"],
+  ["clamped", "flag"],
+  ["grabbed", "flag"],
+  ["stalled", "flag"],
+  ["contact", "vec3"],
+  ["normal", "vec3"],
+  ["depth", "f32"],
+  ["stiffness", "f32"],
+  ["deviation", "f32"],
+  ["drawn", "f32"],
+  ["parameters", "floats"],
+  ["displacement", "floats"],
+  ["coefficients", "floats"],
+  ["prints", "floats"],
+];
 
-export function decodeFrame(buffer: ArrayBuffer): Frame {
-  const view = new DataView(buffer);
-  const parametersAt = 125;
-  const parametersEnd = parametersAt + 4 + 4 * view.getUint32(parametersAt, true);
-  const displacementAt = parametersEnd;
-  const displacementEnd = displacementAt + 4 + 4 * view.getUint32(displacementAt, true);
-  const coefficientsAt = displacementEnd;
-  const coefficientsEnd = coefficientsAt + 4 + 4 * view.getUint32(coefficientsAt, true);
-  const printsAt = coefficientsEnd;
-  const printsEnd = printsAt + 4 + 4 * view.getUint32(printsAt, true);
-  return {
-    tick: view.getFloat64(1, true),
-    time: view.getFloat64(9, true),
-    echo: view.getFloat64(17, true),
-    position: [view.getFloat32(25, true), view.getFloat32(29, true), view.getFloat32(33, true)],
-    force: [view.getFloat32(37, true), view.getFloat32(41, true), view.getFloat32(45, true)],
-    rate: view.getFloat32(49, true),
-    lateness: view.getFloat32(53, true),
-    lateness_p50: view.getFloat32(57, true),
-    lateness_p99: view.getFloat32(61, true),
-    lateness_max: view.getFloat32(65, true),
-    work_p50: view.getFloat32(69, true),
-    faults: view.getUint32(73, true),
-    fault: view.getUint8(77),
-    last_fault: view.getUint8(78),
-    loop: view.getUint8(79),
-    hold: view.getUint8(80),
-    inside: view.getUint8(81) !== 0,
-    clamped: view.getUint8(82) !== 0,
-    grabbed: view.getUint8(83) !== 0,
-    stalled: view.getUint8(84) !== 0,
-    contact: [view.getFloat32(85, true), view.getFloat32(89, true), view.getFloat32(93, true)],
-    normal: [view.getFloat32(97, true), view.getFloat32(101, true), view.getFloat32(105, true)],
-    depth: view.getFloat32(109, true),
-    stiffness: view.getFloat32(113, true),
-    deviation: view.getFloat32(117, true),
-    drawn: view.getFloat32(121, true),
-    parameters: new Float32Array(buffer.slice(parametersAt + 4, parametersEnd)),
-    displacement: new Float32Array(buffer.slice(displacementAt + 4, displacementEnd)),
-    coefficients: new Float32Array(buffer.slice(coefficientsAt + 4, coefficientsEnd)),
-    prints: new Float32Array(buffer.slice(printsAt + 4, printsEnd)),
-  };
-}
+export const encodeFrame = (m: Frame): ArrayBuffer => encode(FRAME, FRAME_LAYOUT, m);
+export const decodeFrame = (buffer: ArrayBuffer): Frame => decode<Frame>(FRAME_LAYOUT, buffer);
 
 export const HAND = 2;
 
@@ -296,39 +226,17 @@ export interface Hand {
   parameters: Float32Array;
 }
 
-export function encodeHand(m: Hand): ArrayBuffer {
-  const view = new DataView(new ArrayBuffer(43 + 4 + 4 * m.parameters.length));
-  view.setUint8(0, 2);
-  view.setFloat64(1, m.sent, true);
-  view.setFloat64(9, m.period, true);
-  view.setFloat64(17, m.target[0], true);
-  view.setFloat64(25, m.target[1], true);
-  view.setFloat64(33, m.target[2], true);
-  view.setUint8(41, m.grabbed ? 1 : 0);
-  view.setUint8(42, m.hidden ? 1 : 0);
-  let at = 43;
-  view.setUint32(at, m.parameters.length, true);
-  at += 4;
-  for (const value of m.parameters) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  return view.buffer;
-}
+const HAND_LAYOUT: Layout = [
+  ["sent", "f64"],
+  ["period", "f64"],
+  ["target", "vec3d"],
+  ["grabbed", "flag"],
+  ["hidden", "flag"],
+  ["parameters", "floats"],
+];
 
-export function decodeHand(buffer: ArrayBuffer): Hand {
-  const view = new DataView(buffer);
-  const parametersAt = 43;
-  const parametersEnd = parametersAt + 4 + 4 * view.getUint32(parametersAt, true);
-  return {
-    sent: view.getFloat64(1, true),
-    period: view.getFloat64(9, true),
-    target: [view.getFloat64(17, true), view.getFloat64(25, true), view.getFloat64(33, true)],
-    grabbed: view.getUint8(41) !== 0,
-    hidden: view.getUint8(42) !== 0,
-    parameters: new Float32Array(buffer.slice(parametersAt + 4, parametersEnd)),
-  };
-}
+export const encodeHand = (m: Hand): ArrayBuffer => encode(HAND, HAND_LAYOUT, m);
+export const decodeHand = (buffer: ArrayBuffer): Hand => decode<Hand>(HAND_LAYOUT, buffer);
 
 export const CREDIT = 3;
 
@@ -338,19 +246,12 @@ export interface Credit {
   frames: number;
 }
 
-export function encodeCredit(m: Credit): ArrayBuffer {
-  const view = new DataView(new ArrayBuffer(3));
-  view.setUint8(0, 3);
-  view.setUint16(1, m.frames, true);
-  return view.buffer;
-}
+const CREDIT_LAYOUT: Layout = [
+  ["frames", "u16"],
+];
 
-export function decodeCredit(buffer: ArrayBuffer): Credit {
-  const view = new DataView(buffer);
-  return {
-    frames: view.getUint16(1, true),
-  };
-}
+export const encodeCredit = (m: Credit): ArrayBuffer => encode(CREDIT, CREDIT_LAYOUT, m);
+export const decodeCredit = (buffer: ArrayBuffer): Credit => decode<Credit>(CREDIT_LAYOUT, buffer);
 
 export const SURFACE = 4;
 
@@ -372,81 +273,18 @@ export interface Surface {
   normals: Float32Array;
 }
 
-export function encodeSurface(m: Surface): ArrayBuffer {
-  const view = new DataView(new ArrayBuffer(1 + 4 + 4 * m.rest.length + 4 + 4 * m.triangles.length + 4 + 4 * m.creases.length + 4 + 4 * m.fixed.length + 4 + 4 * m.touchable.length + 4 + 4 * m.printable.length + 4 + 4 * m.normals.length));
-  view.setUint8(0, 4);
-  let at = 1;
-  view.setUint32(at, m.rest.length, true);
-  at += 4;
-  for (const value of m.rest) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  view.setUint32(at, m.triangles.length, true);
-  at += 4;
-  for (const value of m.triangles) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  view.setUint32(at, m.creases.length, true);
-  at += 4;
-  for (const value of m.creases) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  view.setUint32(at, m.fixed.length, true);
-  at += 4;
-  for (const value of m.fixed) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  view.setUint32(at, m.touchable.length, true);
-  at += 4;
-  for (const value of m.touchable) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  view.setUint32(at, m.printable.length, true);
-  at += 4;
-  for (const value of m.printable) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  view.setUint32(at, m.normals.length, true);
-  at += 4;
-  for (const value of m.normals) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  return view.buffer;
-}
+const SURFACE_LAYOUT: Layout = [
+  ["rest", "floats"],
+  ["triangles", "floats"],
+  ["creases", "floats"],
+  ["fixed", "floats"],
+  ["touchable", "floats"],
+  ["printable", "floats"],
+  ["normals", "floats"],
+];
 
-export function decodeSurface(buffer: ArrayBuffer): Surface {
-  const view = new DataView(buffer);
-  const restAt = 1;
-  const restEnd = restAt + 4 + 4 * view.getUint32(restAt, true);
-  const trianglesAt = restEnd;
-  const trianglesEnd = trianglesAt + 4 + 4 * view.getUint32(trianglesAt, true);
-  const creasesAt = trianglesEnd;
-  const creasesEnd = creasesAt + 4 + 4 * view.getUint32(creasesAt, true);
-  const fixedAt = creasesEnd;
-  const fixedEnd = fixedAt + 4 + 4 * view.getUint32(fixedAt, true);
-  const touchableAt = fixedEnd;
-  const touchableEnd = touchableAt + 4 + 4 * view.getUint32(touchableAt, true);
-  const printableAt = touchableEnd;
-  const printableEnd = printableAt + 4 + 4 * view.getUint32(printableAt, true);
-  const normalsAt = printableEnd;
-  const normalsEnd = normalsAt + 4 + 4 * view.getUint32(normalsAt, true);
-  return {
-    rest: new Float32Array(buffer.slice(restAt + 4, restEnd)),
-    triangles: new Float32Array(buffer.slice(trianglesAt + 4, trianglesEnd)),
-    creases: new Float32Array(buffer.slice(creasesAt + 4, creasesEnd)),
-    fixed: new Float32Array(buffer.slice(fixedAt + 4, fixedEnd)),
-    touchable: new Float32Array(buffer.slice(touchableAt + 4, touchableEnd)),
-    printable: new Float32Array(buffer.slice(printableAt + 4, printableEnd)),
-    normals: new Float32Array(buffer.slice(normalsAt + 4, normalsEnd)),
-  };
-}
+export const encodeSurface = (m: Surface): ArrayBuffer => encode(SURFACE, SURFACE_LAYOUT, m);
+export const decodeSurface = (buffer: ArrayBuffer): Surface => decode<Surface>(SURFACE_LAYOUT, buffer);
 
 export const STEP = 5;
 
@@ -466,46 +304,17 @@ export interface Step {
   values: Float32Array;
 }
 
-export function encodeStep(m: Step): ArrayBuffer {
-  const view = new DataView(new ArrayBuffer(22 + 4 + 4 * m.displacement.length + 4 + 4 * m.values.length));
-  view.setUint8(0, 5);
-  view.setUint32(1, m.index, true);
-  view.setUint8(5, m.probed ? 1 : 0);
-  view.setFloat32(6, m.centre[0], true);
-  view.setFloat32(10, m.centre[1], true);
-  view.setFloat32(14, m.centre[2], true);
-  view.setFloat32(18, m.radius, true);
-  let at = 22;
-  view.setUint32(at, m.displacement.length, true);
-  at += 4;
-  for (const value of m.displacement) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  view.setUint32(at, m.values.length, true);
-  at += 4;
-  for (const value of m.values) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  return view.buffer;
-}
+const STEP_LAYOUT: Layout = [
+  ["index", "u32"],
+  ["probed", "flag"],
+  ["centre", "vec3"],
+  ["radius", "f32"],
+  ["displacement", "floats"],
+  ["values", "floats"],
+];
 
-export function decodeStep(buffer: ArrayBuffer): Step {
-  const view = new DataView(buffer);
-  const displacementAt = 22;
-  const displacementEnd = displacementAt + 4 + 4 * view.getUint32(displacementAt, true);
-  const valuesAt = displacementEnd;
-  const valuesEnd = valuesAt + 4 + 4 * view.getUint32(valuesAt, true);
-  return {
-    index: view.getUint32(1, true),
-    probed: view.getUint8(5) !== 0,
-    centre: [view.getFloat32(6, true), view.getFloat32(10, true), view.getFloat32(14, true)],
-    radius: view.getFloat32(18, true),
-    displacement: new Float32Array(buffer.slice(displacementAt + 4, displacementEnd)),
-    values: new Float32Array(buffer.slice(valuesAt + 4, valuesEnd)),
-  };
-}
+export const encodeStep = (m: Step): ArrayBuffer => encode(STEP, STEP_LAYOUT, m);
+export const decodeStep = (buffer: ArrayBuffer): Step => decode<Step>(STEP_LAYOUT, buffer);
 
 export const MODES = 6;
 
@@ -523,46 +332,13 @@ export interface Modes {
   touched: Float32Array;
 }
 
-export function encodeModes(m: Modes): ArrayBuffer {
-  const view = new DataView(new ArrayBuffer(7 + 4 + 4 * m.rest.length + 4 + 4 * m.modes.length + 4 + 4 * m.touched.length));
-  view.setUint8(0, 6);
-  view.setFloat32(1, m.reach, true);
-  view.setUint16(5, m.rows, true);
-  let at = 7;
-  view.setUint32(at, m.rest.length, true);
-  at += 4;
-  for (const value of m.rest) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  view.setUint32(at, m.modes.length, true);
-  at += 4;
-  for (const value of m.modes) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  view.setUint32(at, m.touched.length, true);
-  at += 4;
-  for (const value of m.touched) {
-    view.setFloat32(at, value, true);
-    at += 4;
-  }
-  return view.buffer;
-}
+const MODES_LAYOUT: Layout = [
+  ["reach", "f32"],
+  ["rows", "u16"],
+  ["rest", "floats"],
+  ["modes", "floats"],
+  ["touched", "floats"],
+];
 
-export function decodeModes(buffer: ArrayBuffer): Modes {
-  const view = new DataView(buffer);
-  const restAt = 7;
-  const restEnd = restAt + 4 + 4 * view.getUint32(restAt, true);
-  const modesAt = restEnd;
-  const modesEnd = modesAt + 4 + 4 * view.getUint32(modesAt, true);
-  const touchedAt = modesEnd;
-  const touchedEnd = touchedAt + 4 + 4 * view.getUint32(touchedAt, true);
-  return {
-    reach: view.getFloat32(1, true),
-    rows: view.getUint16(5, true),
-    rest: new Float32Array(buffer.slice(restAt + 4, restEnd)),
-    modes: new Float32Array(buffer.slice(modesAt + 4, modesEnd)),
-    touched: new Float32Array(buffer.slice(touchedAt + 4, touchedEnd)),
-  };
-}
+export const encodeModes = (m: Modes): ArrayBuffer => encode(MODES, MODES_LAYOUT, m);
+export const decodeModes = (buffer: ArrayBuffer): Modes => decode<Modes>(MODES_LAYOUT, buffer);

@@ -26,10 +26,10 @@ def march(material, F, dt):
     for i, now in enumerate(F):
         step = None if i == 0 else dt
         stresses.append(gradient(lambda A, s=state, d=step: material.energy(A, s, d), now))
-        heats.append(0.0 if i == 0 else float(material.dissipated(now, state, dt)))
+        heats.append(0.0 if i == 0 else float(material.dissipated_energy(now, state, dt)))
         state = material.advance(now, state, step)
         states.append(state)
-        stored.append(float(material.stored(now, state)))
+        stored.append(float(material.stored_energy(now, state)))
     columns = {name: np.stack([s[name] for s in states]) for name in state}
     return columns, np.stack(stresses), np.array(heats), np.array(stored)
 

@@ -80,8 +80,8 @@ def test_a_sections_energies_balance(dt):
     forces = [law.answer(before + s * (after - before), internal, s * dt).force[0] for s in shares]
     work = sum(w / 2 * force @ (after - before)[0] for w, force in zip(weights, forces, strict=True))
     end = law.answer(after, internal, dt).internal
-    stored = law.stored(after, end)[0] - law.stored(before, internal)[0]
-    lost = law.dissipated(internal, end, dt)[0]
+    stored = law.stored_energy(after, end)[0] - law.stored_energy(before, internal)[0]
+    lost = law.dissipated_energy(internal, end, dt)[0]
     assert lost >= 0
     if dt <= 4.0:  # beyond, the force falls too fast for the Gauss points
         assert stored + lost == pytest.approx(work, rel=1e-6)
@@ -94,8 +94,8 @@ def test_forever_is_the_limit_of_long():
     np.testing.assert_allclose(ever.force, strain * (3.0, 5.0, 7.0), rtol=1e-14)  # half of twice
     long = law.answer(2 * strain, internal, 1e9)
     np.testing.assert_allclose(long.force, ever.force, rtol=1e-8)
-    assert law.dissipated(internal, ever.internal, np.inf)[0] == pytest.approx(
-        law.dissipated(internal, long.internal, 1e9)[0], rel=1e-7
+    assert law.dissipated_energy(internal, ever.internal, np.inf)[0] == pytest.approx(
+        law.dissipated_energy(internal, long.internal, 1e9)[0], rel=1e-7
     )
 
 

@@ -17,7 +17,7 @@ from palpate.physics.interactions import (
     Pressure,
     SurfaceTraction,
     free_motions,
-    require_held,
+    require_support,
 )
 from palpate.physics.materials import NeoHookean
 from palpate.physics.shapes import Block
@@ -138,6 +138,6 @@ def test_motions_that_nothing_resists_are_counted(interaction, fixed, free):
     assert len(free_motions(field, attached)) == free
     if free:
         with pytest.raises(UsageError, match="is not held"):
-            require_held(field, attached)
+            require_support(field, attached)
     else:
-        require_held(field, attached)
+        require_support(field, attached)

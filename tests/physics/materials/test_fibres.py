@@ -50,5 +50,5 @@ def test_any_large_strain_law_is_a_matrix(matrix):
     assert law.energy(F) == pytest.approx(matrix.energy(F) + added)
     assert law.young == pytest.approx(matrix.young)
     assert law.density == matrix.density
-    assert law.stored(F, {}) == pytest.approx(law.energy(F))
-    assert law.dissipated(F, {}, 1.0) == 0.0
+    assert law.stored_energy(F, {}) == pytest.approx(law.energy(F))
+    assert law.dissipated_energy(F, {}, 1.0) == 0.0

@@ -79,7 +79,7 @@ def test_a_held_deformation_relaxes_as_the_series_whatever_the_steps(material):
 @pytest.mark.parametrize("material", MATERIALS, ids=named)
 def test_in_the_end_the_relaxed_law_is_left(material):
     state = material.advance(TURNED, initial_state(material, TURNED), None)
-    relaxed = material.relaxed()
+    relaxed = material.relaxed_law()
     wanted = gradient(relaxed.energy, PULLED)
     np.testing.assert_allclose(stress(material, PULLED, state, math.inf), wanted, rtol=1e-11, atol=1e-9)
     assert relaxed.shear_modulus == pytest.approx(0.5 * material.shear_modulus)
@@ -165,7 +165,7 @@ def test_work_is_stored_or_lost_where_stress_is_linear_in_strain(base, size):
     work = np.sum((stresses[1:] + stresses[:-1]) / 2 * np.diff(F, axis=0))
     end = {name: value[-1] for name, value in states.items()}
     # Δ/τ = 0.014 and a step is 1/150 of a leg
-    assert work == pytest.approx(float(material.stored(F[-1], end)) + np.sum(losses), rel=0.014**2)
+    assert work == pytest.approx(float(material.stored_energy(F[-1], end)) + np.sum(losses), rel=0.014**2)
     assert np.all(losses >= 0)
 
 
@@ -175,9 +175,9 @@ def test_heat_of_a_step_is_that_of_many_short_ones():
     parts = TURNED + np.linspace(0, 1, 65)[1:, None, None] * (PULLED - TURNED)
     total, now = 0.0, state
     for F in parts:
-        total += float(material.dissipated(F, now, 0.9 / 64))
+        total += float(material.dissipated_energy(F, now, 0.9 / 64))
         now = material.advance(F, now, 0.9 / 64)
-    assert total == pytest.approx(float(material.dissipated(PULLED, state, 0.9)), rel=1e-11)
+    assert total == pytest.approx(float(material.dissipated_energy(PULLED, state, 0.9)), rel=1e-11)
     np.testing.assert_allclose(
         now["overstress_2"], material.advance(PULLED, state, 0.9)["overstress_2"], rtol=1e-11
     )
@@ -216,7 +216,7 @@ def test_from_the_relaxed_law():
     assert material.shear_modulus == pytest.approx(2 * law.shear_modulus)
     F = PULLED
     np.testing.assert_allclose(
-        gradient(material.relaxed().energy, F), gradient(law.energy, F), rtol=1e-12, atol=1e-10
+        gradient(material.relaxed_law().energy, F), gradient(law.energy, F), rtol=1e-12, atol=1e-10
     )
     with pytest.raises(UsageError, match="relaxes to nothing"):
         Viscoelastic.from_relaxed(law, ((1.0, 2.0),))

@@ -178,7 +178,7 @@ def test_materials_with_a_history_say_what_makes_it():
     assert "hardens by 6.7e+07 Pa (Voce, rate 52)" in str(Plastic(metal, VoceHardening(125e6, 67e6, 52)))
     gel = Viscoelastic(TISSUE, ((0.3, 2.0), (0.1, 40.0)))
     assert "E = 9000 Pa at once" in str(gel)
-    assert f"relaxes by 0.3 in 2 s and 0.1 in 40 s to E = {gel.relaxed().young:.4g} Pa" in str(gel)
+    assert f"relaxes by 0.3 in 2 s and 0.1 in 40 s to E = {gel.relaxed_law().young:.4g} Pa" in str(gel)
     assert "to E = 0 Pa" in str(Viscoelastic(TISSUE, ((1.0, 2.0),)))
 
 

@@ -46,7 +46,7 @@ def test_a_held_probe_feels_the_force_relax_to_the_slow_limit(solver, elastic):
     solver.reset()
     times = np.array([1e-6, 0.5, 1.0, 2.0, 4.0, 80.0])
     forces = np.array([one.response[2] for one in solver.march(times, np.tile(PLACE, (6, 1)))])
-    relaxed = problem(Viscoelastic(gel(), ((SHARE, TIME),)).relaxed()).solve(PLACE).response[2]
+    relaxed = problem(Viscoelastic(gel(), ((SHARE, TIME),)).relaxed_law()).solve(PLACE).response[2]
     assert (np.diff(forces) < 0).all()
     assert forces[0] == pytest.approx(elastic.response[2], rel=1e-5)
     assert forces[-1] == pytest.approx(relaxed, rel=1e-3)

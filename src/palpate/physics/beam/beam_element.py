@@ -159,7 +159,7 @@ class LineElements:
         )
         return summed[FIELDS:], summed[:FIELDS]
 
-    def banded(self, density: np.ndarray) -> np.ndarray:
+    def banded_matrix(self, density: np.ndarray) -> np.ndarray:
         """Return the stiffness in upper banded storage of second derivatives `density` (element, point, 4, 4)."""
         weighted = density * self.weights[..., None, None]
         rows = self._gradients.reshape(*density.shape[:-1], -1)

@@ -86,13 +86,13 @@ class BeamEnergy:
         """Return the strains at five points from end to end of each element, shape (element, 5, 3)."""
         return Strains(self.elements.end_to_end(z), large=self.large).values
 
-    def stored(self, z: np.ndarray, internal: Any) -> float:
+    def stored_energy(self, z: np.ndarray, internal: Any) -> float:
         """Return the energy in J that can be had back."""
-        return self._integral(self.law.stored(self.strains(z), internal))
+        return self._integral(self.law.stored_energy(self.strains(z), internal))
 
-    def dissipated(self, before: Any, after: Any, dt: float | None) -> float:
+    def dissipated_energy(self, before: Any, after: Any, dt: float | None) -> float:
         """Return the energy in J that a step took for good."""
-        return self._integral(self.law.dissipated(before, after, dt))
+        return self._integral(self.law.dissipated_energy(before, after, dt))
 
     def _integral(self, density: np.ndarray) -> float:
         return float((density * self.elements.weights).sum())
@@ -139,7 +139,7 @@ class BeamStep:
 
     def tangent(self, z: np.ndarray) -> BandedTangent:
         """Return the second derivative of the energy."""
-        return BandedTangent(self._banded(z), lambda: self._shifter(z))
+        return BandedTangent(self._banded_tangent(z), lambda: self._shifter(z))
 
     def relax(self, z: np.ndarray, load: np.ndarray) -> np.ndarray:
         """Minimise energy - load·z over the displacements, the rotations fixed.
@@ -162,9 +162,9 @@ class BeamStep:
         """Return the internal variables at the end of the step."""
         return self._at(z).answer.internal
 
-    def dissipated(self, z: np.ndarray) -> float:
+    def dissipated_energy(self, z: np.ndarray) -> float:
         """Return the energy in J that the step took for good."""
-        return self._beam.dissipated(self._internal, self.outcome(z), self._dt)
+        return self._beam.dissipated_energy(self._internal, self.outcome(z), self._dt)
 
     def resultants(self, z: np.ndarray) -> np.ndarray:
         """Return N, Q in N and M in N·m at the Gauss points, shape (element, point, 3)."""
@@ -172,7 +172,7 @@ class BeamStep:
 
     def _relaxation(self, z: np.ndarray, load: np.ndarray) -> tuple[np.ndarray, float]:
         """Return z after a Newton step in the displacements alone, and its decrement."""
-        banded = np.where(self._beam.between_translations, self._banded(z), 0.0)
+        banded = np.where(self._beam.between_translations, self._banded_tangent(z), 0.0)
         banded[-1] += ~self._beam.is_translation
         residual = (self.force(z) - load) * self._beam.is_translation
         step = BandedTangent(banded).solve(residual)
@@ -193,11 +193,13 @@ class BeamStep:
     def _shifter(self, z: np.ndarray) -> np.ndarray:
         """Return the stiffness that an indefinite tangent is shifted by, without what the turning of forces adds."""
         stiffness = np.diag(self._beam.law.shift)
-        return self._beam.elements.banded(self._at(z).strains.stiffness(np.zeros(3), stiffness))
+        return self._beam.elements.banded_matrix(self._at(z).strains.stiffness(np.zeros(3), stiffness))
 
-    def _banded(self, z: np.ndarray) -> np.ndarray:
+    def _banded_tangent(self, z: np.ndarray) -> np.ndarray:
         state = self._at(z)
-        return self._beam.elements.banded(state.strains.stiffness(state.answer.force, state.answer.tangent))
+        return self._beam.elements.banded_matrix(
+            state.strains.stiffness(state.answer.force, state.answer.tangent)
+        )
 
 
 class BandedTangent:

@@ -109,7 +109,7 @@ class BeamProblem:
             body["material"] = self.body.material.describe()  # type: ignore[attr-defined]
         # what a viewer needs to draw the body, whatever its section is called
         body["half_height"] = self.body.section.half_height
-        return {"body": body, "loads": [_described(load) for load in self.loads]}
+        return {"body": body, "loads": [_description(load) for load in self.loads]}
 
     def open(self) -> BeamSolver | HistorySolver:
         """Build the finite elements; the solver that comes back is good for many solves."""
@@ -187,7 +187,7 @@ class BeamProblem:
         return [int(np.argmin(np.abs(x - position))) for position in positions]
 
 
-def _described(load: Load) -> dict[str, Any]:
+def _description(load: Load) -> dict[str, Any]:
     plain = asdict(load)  # type: ignore[call-overload]
     return plain if isinstance(load, PointLoad) else {"type": type(load).__name__, **plain}
 

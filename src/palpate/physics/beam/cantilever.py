@@ -125,9 +125,9 @@ class Cantilever:
 
     def vertices(self, loads: Sequence[Load] = ()) -> np.ndarray:
         """Positions of the mesh's vertices in m, shape (node,), those of loads and of interest among them."""
-        wanted = np.array([0.0, self.length, *self.nodes, *(self.position(load) for load in loads)])
+        places = np.array([0.0, self.length, *self.nodes, *(self.position(load) for load in loads)])
         # positions closer than a billionth of the length are one
-        fixed = np.unique(np.round(wanted / self.length, 9)) * self.length
+        fixed = np.unique(np.round(places / self.length, 9)) * self.length
         pieces = [
             np.linspace(left, right, self._cuts(right - left), endpoint=False)
             for left, right in itertools.pairwise(fixed)
@@ -180,11 +180,11 @@ def _check_material(material: object) -> None:
 
 
 def _check_histories(kind: Kind, loads: Sequence[Load]) -> None:
-    for load, wanted in ((load, _memory_of(load)) for load in loads):
-        if wanted not in {"", kind}:
+    for load, memory in ((load, _memory_of(load)) for load in loads):
+        if memory not in {"", kind}:
             raise UsageError(
                 f"The load {load.name!r} is a {type(load).__name__}, and the beam is {kind}.",
-                why=f"Only a {wanted} beam answers to such a history.",
+                why=f"Only a {memory} beam answers to such a history.",
                 fix="Take a load without a history, such as TipLoad(0, 5), or another material.",
             )
     if sum(isinstance(load, StepAndHold) for load in loads) > 1:

@@ -99,7 +99,7 @@ class HistorySolver:
             reached = self._next(moment, float(time), row)
             if isinstance(reached, Failure):
                 later = self._beam.failure(reached.stop, 0, "an earlier load of the history failed")
-                return [*solutions, self._failed(reached), *[later] * (len(sizes) - len(solutions) - 1)]
+                return [*solutions, self._failure(reached), *[later] * (len(sizes) - len(solutions) - 1)]
             solutions.append(self._answer(reached))
             moment = reached
         return solutions
@@ -164,7 +164,7 @@ class HistorySolver:
 
     def _answer(self, moment: Moment) -> Solution:
         beam = self._beam
-        stored = beam.energy.stored(moment.z, moment.internal)
+        stored = beam.energy.stored_energy(moment.z, moment.internal)
         at_once = beam.energy.step(moment.internal, None)  # after an instant: the forces of this very moment
         return Solution(
             stop=Stop.CONVERGED,
@@ -181,7 +181,7 @@ class HistorySolver:
             history=moment,
         )
 
-    def _failed(self, failure: Failure) -> Solution:
+    def _failure(self, failure: Failure) -> Solution:
         return self._beam.failure(failure.stop, failure.iterations, self._steps.detail(failure))
 
 
@@ -207,7 +207,7 @@ class _BeamSteps:
             load=load,
             z=end.z,
             internal=step.outcome(end.z),
-            dissipated=start.dissipated + step.dissipated(end.z),
+            dissipated=start.dissipated + step.dissipated_energy(end.z),
             reach=max(start.reach, float(np.abs(end.z[self._beam.energy.is_translation]).max())),
             iterations=end.iterations,
             residual=end.residual,
@@ -219,7 +219,7 @@ class _BeamSteps:
         offset = float(np.abs((whole.z - halves.z)[energy.is_translation]).max())
         reach = max(halves.reach, 1e-9 * body.length)
         lost = abs(whole.dissipated - halves.dissipated)
-        total = energy.stored(halves.z, halves.internal) + halves.dissipated
+        total = energy.stored_energy(halves.z, halves.internal) + halves.dissipated
         relative = max(offset / reach, lost / max(total, energy.energy_floor))
         return float(self._share * relative / body.step_tolerance)
 

@@ -118,10 +118,10 @@ class SectionLaw(Protocol):
     def answer(self, strain: np.ndarray, internal: Any, dt: float | None) -> SectionAnswer:
         """Return the answer to strains (..., 3) after a step of dt seconds from `internal`; None is an instant."""
 
-    def stored(self, strain: np.ndarray, internal: Any) -> np.ndarray:
+    def stored_energy(self, strain: np.ndarray, internal: Any) -> np.ndarray:
         """Return the energy in J/m that can be had back."""
 
-    def dissipated(self, before: Any, after: Any, dt: float | None) -> np.ndarray:
+    def dissipated_energy(self, before: Any, after: Any, dt: float | None) -> np.ndarray:
         """Return the energy in J/m that a step took for good, not negative."""
 
 
@@ -147,14 +147,14 @@ class ElasticSection:
 
     def answer(self, strain: np.ndarray, internal: None, dt: float | None) -> SectionAnswer:
         """Return the answer to strains (..., 3), whatever came before."""
-        return SectionAnswer(self.stored(strain, internal), strain * self.elastic, self._tangent, None)
+        return SectionAnswer(self.stored_energy(strain, internal), strain * self.elastic, self._tangent, None)
 
-    def stored(self, strain: np.ndarray, internal: None) -> np.ndarray:
+    def stored_energy(self, strain: np.ndarray, internal: None) -> np.ndarray:
         """Return the elastic energy in J/m."""
         energy: np.ndarray = strain**2 @ self.elastic / 2
         return energy
 
-    def dissipated(self, before: None, after: None, dt: float | None) -> np.ndarray:
+    def dissipated_energy(self, before: None, after: None, dt: float | None) -> np.ndarray:
         """Return zero: nothing is lost."""
         return np.zeros(())
 
@@ -212,14 +212,14 @@ class PlasticSection:
         tangent[..., 0, 2] = tangent[..., 2, 0] = coupling
         return SectionAnswer(energy @ self._areas + self._shear * shear**2 / 2, force, tangent, after)
 
-    def stored(self, strain: np.ndarray, internal: PlasticFibres) -> np.ndarray:
+    def stored_energy(self, strain: np.ndarray, internal: PlasticFibres) -> np.ndarray:
         """Return the elastic energy in J/m."""
         axial, shear, curvature = np.moveaxis(strain, -1, 0)
         fibre = axial[..., None] - curvature[..., None] * self._heights - internal.strain
         stored: np.ndarray = (self._law.young * fibre**2 @ self._areas + self._shear * shear**2) / 2
         return stored
 
-    def dissipated(self, before: PlasticFibres, after: PlasticFibres, dt: float | None) -> np.ndarray:
+    def dissipated_energy(self, before: PlasticFibres, after: PlasticFibres, dt: float | None) -> np.ndarray:
         """Return the plastic work of the step in J/m."""
         work = self._law.hardening.work
         spent: np.ndarray = (work(after.accumulated) - work(before.accumulated)) @ self._areas
@@ -256,17 +256,17 @@ class ViscousSection:
         diagonal = np.arange(3)
         tangent[..., diagonal, diagonal] = modulus * self.elastic
         # a constant: the scale by which the search judges what is small must not vanish where the load does
-        begun = self.stored(internal.stress, internal)
+        begun = self.stored_energy(internal.stress, internal)
         return SectionAnswer(energy @ self.elastic + begun, share * self.elastic, tangent, after)
 
-    def stored(self, strain: np.ndarray, internal: ViscousFibres) -> np.ndarray:
+    def stored_energy(self, strain: np.ndarray, internal: ViscousFibres) -> np.ndarray:
         """Return the energy of the springs in J/m."""
         shares = np.array(self._prony.shares).reshape(-1, *[1] * strain.ndim)
         springs = self._prony.equilibrium * strain**2 + (internal.overstress**2 / shares).sum(axis=0)
         result: np.ndarray = springs @ self.elastic / 2
         return result
 
-    def dissipated(self, before: ViscousFibres, after: ViscousFibres, dt: float | None) -> np.ndarray:
+    def dissipated_energy(self, before: ViscousFibres, after: ViscousFibres, dt: float | None) -> np.ndarray:
         """Return the loss of the dashpots in a step of dt seconds, in J/m: ∫ q²/(γ τ) dt for each term."""
         spent = np.zeros(before.stress.shape)
         grown = after.stress - before.stress

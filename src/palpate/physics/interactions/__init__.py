@@ -16,7 +16,7 @@ interaction_checks  directions, ranges, and whether a body can float away
 
 from palpate.physics.interactions.glued import GluedPad
 from palpate.physics.interactions.interaction import Attached, Energy, Field, Fixed, Interaction, Planned
-from palpate.physics.interactions.interaction_checks import free_motions, require_held
+from palpate.physics.interactions.interaction_checks import free_motions, require_support
 from palpate.physics.interactions.loads import BodyForce, PointForce, Pressure, SurfaceTraction
 from palpate.physics.interactions.pads import PadShare, pad_share
 from palpate.physics.interactions.prescribed import PrescribedDisplacement, roller
@@ -39,6 +39,6 @@ __all__ = [
     "SurfaceTraction",
     "free_motions",
     "pad_share",
-    "require_held",
+    "require_support",
     "roller",
 ]

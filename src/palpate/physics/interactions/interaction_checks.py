@@ -22,7 +22,7 @@ __all__ = [
     "free_motions",
     "interval",
     "range_of",
-    "require_held",
+    "require_support",
     "tag",
 ]
 
@@ -179,7 +179,7 @@ def free_motions(field: Any, attached: Iterable[Attached]) -> np.ndarray:
     return np.asarray(_null_space(stiffness) @ loose)
 
 
-def require_held(field: Any, attached: Iterable[Attached]) -> None:
+def require_support(field: Any, attached: Iterable[Attached]) -> None:
     """Refuse a body that could float away.
 
     Raises

@@ -345,15 +345,15 @@ class Pressure(PlainInteraction):
         size = float(np.linalg.norm(field.rest.corners[1] - field.rest.corners[0]))
         image.vec.FV().NumPy()[:] = 0.01 * size * np.random.default_rng(0).standard_normal(space.ndof) * free
         surface = ng.ds(definedon=field.surface(self.surface))
-        form, found = ng.BilinearForm(space), image.vec.CreateVector()
+        form, derivative = ng.BilinearForm(space), image.vec.CreateVector()
         form += ng.Variation(volume_density(space.TrialFunction(), (0.0, 0.0, 0.0)) * surface)
-        form.Apply(image.vec, found)
+        form.Apply(image.vec, derivative)
         normal = ng.Cof(ng.Id(3) + ng.Grad(image).Trace()) * ng.specialcf.normal(3)
         force = ng.LinearForm(space)
         force += ng.InnerProduct(normal, space.TestFunction()) * surface
         force.Assemble()
-        wanted = force.vec.FV().NumPy()
-        if np.abs((found.FV().NumPy() - wanted)[free]).max() > POTENTIAL * np.abs(wanted).max():
+        exact = force.vec.FV().NumPy()
+        if np.abs((derivative.FV().NumPy() - exact)[free]).max() > POTENTIAL * np.abs(exact).max():
             raise UsageError(
                 f"A pressure that follows the surface {self.surface!r} has no potential.",
                 why="The rim of this surface can move, so the work of the pressure would depend on the path.",

@@ -135,7 +135,7 @@ def pad_share(problem: Any, x: Any) -> PadShare:
             why="None of its interactions has a pad stiffness.",
             fix="Ask it of a problem with a SphereProbe or a GluedPad.",
         )
-    aside = _aside(_converged(problem.open(), x))
+    aside = _aside(_solve(problem.open(), x))
     less, more = (_logarithms(_with_pads(problem, np.exp(s * CHANGE / 2)), x, aside) for s in (-1, 1))
     energy, force, stiffness = ((more - less) / CHANGE).tolist()
     return PadShare(energy, force, stiffness)
@@ -170,12 +170,12 @@ def _with_pads(problem: Any, factor: float) -> Any:
 def _logarithms(problem: Any, x: Any, aside: np.ndarray) -> np.ndarray:
     """Return logarithms of energy, force and stiffness, shape (3,)."""
     solver, place = problem.open(), np.asarray(x, dtype=float)
-    less, here = (_converged(solver, q) for q in (place + aside, place))
+    less, here = (_solve(solver, q) for q in (place + aside, place))
     sizes = [here.potential_energy, *np.linalg.norm([here.response, here.response - less.response], axis=1)]
     return np.log(sizes)
 
 
-def _converged(solver: Any, x: Any) -> Any:
+def _solve(solver: Any, x: Any) -> Any:
     solution = solver.solve(x)
     if solution.converged:
         return solution

@@ -136,31 +136,31 @@ class PrescribedDisplacement(PlainInteraction):
 
     def _constrained(self, field: Any) -> np.ndarray:
         """Return a mask of the constrained unknowns, bool of shape (dof,)."""
-        found = field.surface_dofs(self.surface) if self.within is None else self._in_box(field)
+        mask = field.surface_dofs(self.surface) if self.within is None else self._in_box(field)
         if self.sliding:
             space, across = field.displacement.space, np.zeros(field.size, dtype=bool)
             for axis in np.argmax(np.abs(np.array(self.directions)), axis=1).tolist():
                 component = space.Range(axis)
                 across[component.start : component.stop] = True
-            found = found & across
-        return np.asarray(found)
+            mask = mask & across
+        return np.asarray(mask)
 
     def _in_box(self, field: Any) -> np.ndarray:
         mesh, space = field.rest, field.displacement.space
         lower, upper = (np.asarray(corner) for corner in self.within or mesh.corners)
         slack = SLACK * float(np.linalg.norm(mesh.corners[1] - mesh.corners[0]))
         inside = ((mesh.points >= lower - slack) & (mesh.points <= upper + slack)).all(axis=1)
-        found = np.zeros(field.size, dtype=bool)
+        mask = np.zeros(field.size, dtype=bool)
         for element in field.surface(self.surface).Elements():
             if all(inside[vertex.nr] for vertex in element.vertices):
-                found[list(space.GetDofNrs(element))] = True
-        if not found.any():
+                mask[list(space.GetDofNrs(element))] = True
+        if not mask.any():
             raise UsageError(
                 f"No element of the surface {self.surface!r} lies in the box {self.within} m.",
                 why="Only elements whose corners are all in the box are moved.",
                 fix="Give `element`, so that the mesh follows the box, or make the box larger.",
             )
-        return found
+        return mask
 
 
 def _word(direction: Point, index: int, count: int) -> str:
@@ -191,8 +191,8 @@ def _ends(value: Any, count: int) -> tuple[Ends, ...]:
             why="Each direction needs a range of its own.",
             fix="Give one pair (low, high) in m for each direction.",
         )
-    found = tuple(interval("A prescribed displacement", part, "m") for part in several)
-    return tuple(ends for ends in found if isinstance(ends, tuple))
+    ranges = tuple(interval("A prescribed displacement", part, "m") for part in several)
+    return tuple(ends for ends in ranges if isinstance(ends, tuple))
 
 
 def _box(value: Any) -> tuple[Point, Point]:

@@ -147,12 +147,12 @@ class SphereProbe(PlainInteraction):
         contacts, distance = contact_points(self._patch(geometry), centres)
         return group_into_chains(centres, contacts, distance, self.radius)
 
-    def sized(self, geometry: Geometry, radius: float) -> SphereProbe:
+    def with_radius(self, geometry: Geometry, radius: float) -> SphereProbe:
         """Return a probe of another radius in m that visits the same contact points to the same depths."""
         low, high = self._box(self._patch(geometry))
         return replace(self, radius=radius, over=(tuple(low.tolist()), tuple(high.tolist())))
 
-    def moved(self, geometry: Geometry, centres: np.ndarray, radius: float) -> np.ndarray:
+    def shift_centres(self, geometry: Geometry, centres: np.ndarray, radius: float) -> np.ndarray:
         """Return positions (N, 3) in m of a probe of another radius that lies over the same places as deep."""
         patch = self._patch(geometry)
         normals = np.array([patch.nearest(centre)[1] for centre in centres])

@@ -115,7 +115,7 @@ class Contact:
         The surface must not be pressed past the pad's stop; where it is pressed it must face the centre, so that
         the pad pushes and never pulls; and the centre must be outside the deformed body.
         """
-        places, normals = self._deformed()
+        places, normals = self._deformed_surface()
         towards = centre - places
         distance = np.linalg.norm(towards, axis=1)
         penetration = self.radius - distance
@@ -165,7 +165,7 @@ class Contact:
 
         return np.asarray((ngs.CF((ngs.x, ngs.y, ngs.z)) + self.field.base)(self._points()))
 
-    def _deformed(self) -> tuple[np.ndarray, np.ndarray]:
+    def _deformed_surface(self) -> tuple[np.ndarray, np.ndarray]:
         """Return positions (N, 3) in m and outward unit normals (N, 3) of the deformed surface."""
         import ngsolve as ngs
 

@@ -78,7 +78,7 @@ def group_into_chains(
     series = _series(others, np.round(contacts / (SAME * radius)).astype(np.int64))
     whole += [rows for rows in series if rows.size > 1]
     single = np.array([rows[0] for rows in series if rows.size == 1], dtype=int)
-    return [rows[np.argsort(-distance[rows], kind="stable")] for rows in [*whole, *_halved(contacts, single)]]
+    return [rows[np.argsort(-distance[rows], kind="stable")] for rows in [*whole, *_halve(contacts, single)]]
 
 
 def _runs(centres: np.ndarray, distance: np.ndarray) -> list[np.ndarray]:
@@ -108,7 +108,7 @@ def _series(rows: np.ndarray, keys: np.ndarray) -> list[np.ndarray]:
     return [np.array(rows) for rows in series.values()]
 
 
-def _halved(contacts: np.ndarray, rows: np.ndarray) -> list[np.ndarray]:
+def _halve(contacts: np.ndarray, rows: np.ndarray) -> list[np.ndarray]:
     pending, done = [rows], []
     while pending:
         part = pending.pop()

@@ -130,14 +130,14 @@ class Patch:
         """
         across = [i for i in range(3) if i != axis]
         a, b, c = np.moveaxis(self.corners[:, :, across], 1, 0)
-        found = np.full((len(places), 3), np.nan)
+        outermost = np.full((len(places), 3), np.nan)
         for row, place in enumerate(places):
             weights = _barycentric(a, b, c, place)
             hits = np.flatnonzero((weights >= -1e-9).all(axis=1))
             if hits.size:
                 points = np.einsum("tk,tki->ti", weights[hits], self.corners[hits])
-                found[row] = points[np.argmax(sign * points[:, axis])]
-        return found
+                outermost[row] = points[np.argmax(sign * points[:, axis])]
+        return outermost
 
     def spread(self, unit: np.ndarray) -> np.ndarray:
         """Return points (N, 3) spread evenly over the area, from places (N, 2) in the unit square."""

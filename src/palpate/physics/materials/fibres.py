@@ -170,17 +170,17 @@ class FibreReinforced(MadeFrom):
         """Return the matrix's internal variables at the end of the step."""
         return self.matrix.advance(F, state, dt)
 
-    def stored(self, F: Tensor, state: Mapping[str, Any]) -> Scalar:
+    def stored_energy(self, F: Tensor, state: Mapping[str, Any]) -> Scalar:
         """Return the free energy in J/m³: the matrix's and the fibres'."""
-        stored = getattr(self.matrix, "stored", self.matrix.energy)
+        stored = getattr(self.matrix, "stored_energy", self.matrix.energy)
         return stored(F, state) + sum(family.energy(F) for family in self.families)
 
     def stored_distortion(self, F: Tensor, state: Mapping[str, Any]) -> Scalar:
-        """Return `stored` without the matrix's volumetric part, which a mixed formulation writes in its own way."""
+        """`stored_energy` without the matrix's volumetric part, which a mixed formulation writes in its own way."""
         stored = getattr(self.matrix, "stored_distortion", self.matrix.distortion)
         return stored(F, state) + sum(family.energy(F) for family in self.families)
 
-    def dissipated(self, F: Tensor, state: Mapping[str, Any], dt: Any) -> Scalar:
+    def dissipated_energy(self, F: Tensor, state: Mapping[str, Any], dt: Any) -> Scalar:
         """Return the dissipation of a step in J/m³: the matrix's; fibres are elastic."""
-        heat = getattr(self.matrix, "dissipated", None)
+        heat = getattr(self.matrix, "dissipated_energy", None)
         return heat(F, state, dt) if heat else 0.0

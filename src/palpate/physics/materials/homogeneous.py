@@ -98,15 +98,15 @@ def _shorten(
     """Return the share of each step that lowers the energy, up to rounding, and keeps its volume; 0 where none does."""
     start = energy(F)
     rounding = rounding + 1e-12 * np.abs(start)
-    share, found = np.ones(len(F)), np.zeros(len(F), dtype=bool)
+    share, good = np.ones(len(F)), np.zeros(len(F), dtype=bool)
     for _ in range(40):
         trial = F + share[:, None, None] * move
         value = energy(trial)
-        found = (_volume(trial, small) > 0) & (value <= start + 1e-4 * share * slope + rounding)
-        if found.all():
+        good = (_volume(trial, small) > 0) & (value <= start + 1e-4 * share * slope + rounding)
+        if good.all():
             break
-        share = np.where(found, share, share / 2)
-    return np.where(found, share, 0.0)
+        share = np.where(good, share, share / 2)
+    return np.where(good, share, 0.0)
 
 
 def _volume(F: np.ndarray, small: bool) -> np.ndarray:

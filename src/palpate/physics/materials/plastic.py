@@ -117,16 +117,16 @@ class Plastic(MadeFrom):
         strain, accumulated = state["plastic_strain"] + change, state["accumulated"] + flow
         return compile_values({"plastic_strain": strain, "accumulated": accumulated})
 
-    def stored(self, F: Tensor, state: Mapping[str, Any]) -> Scalar:
+    def stored_energy(self, F: Tensor, state: Mapping[str, Any]) -> Scalar:
         """Return the elastic energy in J/m³ at F, with the state after the step: what unloading gives back."""
         return self.stored_distortion(F, state) + self.volumetric.energy(F)
 
     def stored_distortion(self, F: Tensor, state: Mapping[str, Any]) -> Scalar:
-        """Return `stored` without the volumetric part, which a mixed formulation writes in its own way."""
+        """Return `stored_energy` without the volumetric part, which a mixed formulation writes in its own way."""
         shape = deviator(sym(F - identity(F)) - state["plastic_strain"])
         return self.shear_modulus * inner(shape, shape)
 
-    def dissipated(self, F: Tensor, state: Mapping[str, Any], dt: Any = None) -> Scalar:
+    def dissipated_energy(self, F: Tensor, state: Mapping[str, Any], dt: Any = None) -> Scalar:
         """Return the plastic work of a step from `state` to F in J/m³, never negative."""
         *_, flow = self._return(F, state)
         work = self.hardening.work

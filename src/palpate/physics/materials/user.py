@@ -216,9 +216,9 @@ def _turned_and_straight() -> tuple[np.ndarray, np.ndarray]:
     return Q @ F, F
 
 
-def _no_energy(law: UserMaterial, found: str, rule: str) -> UsageError:
+def _no_energy(law: UserMaterial, fault: str, rule: str) -> UsageError:
     return UsageError(
-        f"{law.name} is not the energy of an undeformed body: {found}.",
+        f"{law.name} is not the energy of an undeformed body: {fault}.",
         why=f"A body at rest {rule}.",
         fix="Check the function: add what is missing (such as −μ ln J, or bulk=…), or kinematics='small'.",
     )
@@ -239,10 +239,10 @@ def _reference(name: str, function: Callable[..., Any]) -> tuple[str, str]:
     """Module and path by which another process finds the function."""
     module, path = getattr(function, "__module__", ""), _path(function)
     try:
-        found = _find(module, path)
+        located = _find(module, path)
     except (ImportError, AttributeError, ValueError):
-        found = None
-    if found is not function:
+        located = None
+    if located is not function:
         raise UsageError(
             f"The material {name} can't be sent to another process.",
             why=f"Its function {path} is not found by that name in its module {module}.",
@@ -252,8 +252,8 @@ def _reference(name: str, function: Callable[..., Any]) -> tuple[str, str]:
 
 
 def _find(module: str, path: str) -> Any:
-    found = reduce(getattr, path.split("."), importlib.import_module(module))
-    return found.function if isinstance(found, UserMaterial) else found
+    target = reduce(getattr, path.split("."), importlib.import_module(module))
+    return target.function if isinstance(target, UserMaterial) else target
 
 
 def _rebuild(names: dict[str, tuple[str, str]], rest: dict[str, Any]) -> UserMaterial:

@@ -102,10 +102,10 @@ class Scaled(ShearAndBulk, MadeFrom):
     @property
     def bulk_modulus(self) -> float:
         """K in Pa; the volumetric part's share of it is not scaled."""
-        kept = kept_bulk(self.base, self.part)
+        elastic_bulk = unrelaxed_bulk(self.base, self.part)
         # both may be infinite, and their difference then vanishes
-        rest = 0.0 if kept == self.base.bulk_modulus else self.base.bulk_modulus - kept
-        return kept + self.factor * rest
+        rest = 0.0 if elastic_bulk == self.base.bulk_modulus else self.base.bulk_modulus - elastic_bulk
+        return elastic_bulk + self.factor * rest
 
     @property
     def volumetric(self) -> Volumetric | None:
@@ -125,7 +125,7 @@ def part_of(base: Material, part: Part, F: Tensor) -> Scalar:
     return base.energy(F) if part == "all" or base.volumetric is None else base.distortion(F)
 
 
-def kept_bulk(base: Material, part: Part) -> float:
+def unrelaxed_bulk(base: Material, part: Part) -> float:
     """Return the bulk modulus in Pa that is not in that part: of a separate volumetric energy, if any."""
     return 0.0 if part == "all" or base.volumetric is None else base.volumetric.modulus
 
@@ -219,7 +219,7 @@ class Viscoelastic(MadeFrom):
         names = ("stress", *self._overstresses)
         return tuple(StateVariable(name, (3, 3), _ZERO) for name in names)
 
-    def relaxed(self) -> Scaled:
+    def relaxed_law(self) -> Scaled:
         """Return the elastic law that is left in the end, with the equilibrium moduli.
 
         Raises
@@ -271,7 +271,7 @@ class Viscoelastic(MadeFrom):
             after[name] = scale(decay, state[name]) + scale(share * gain, change)
         return compile_values(after)
 
-    def stored(self, F: Tensor, state: Mapping[str, Any]) -> Scalar:
+    def stored_energy(self, F: Tensor, state: Mapping[str, Any]) -> Scalar:
         """Return the free energy in J/m³ at F, with the state after the step: relaxed law and springs of the terms.
 
         Exact where the base law's stress is linear in its strain; elsewhere an estimate, see `spring_energy`.
@@ -280,7 +280,7 @@ class Viscoelastic(MadeFrom):
         return relaxed if self.volumetric is None else relaxed + self.volumetric.energy(F)
 
     def stored_distortion(self, F: Tensor, state: Mapping[str, Any]) -> Scalar:
-        """Return `stored` without the elastic volumetric part, which a mixed formulation writes in its own way."""
+        """`stored_energy` without the elastic volumetric part, which a mixed formulation writes in its own way."""
         series, bulk = self.prony, self._bulk
         springs = sum(
             spring_energy(state[name], share * self.shear_modulus, share * bulk)
@@ -288,7 +288,7 @@ class Viscoelastic(MadeFrom):
         )
         return series.equilibrium * part_of(self.base, self.part, F) + springs
 
-    def dissipated(self, F: Tensor, state: Mapping[str, Any], dt: float) -> Scalar:
+    def dissipated_energy(self, F: Tensor, state: Mapping[str, Any], dt: float) -> Scalar:
         """Return the heat of the dashpots in a step from `state` to F, in J/m³, never negative."""
         change, bulk = self._stress(F) - state["stress"], self._bulk
         return sum(
@@ -300,7 +300,7 @@ class Viscoelastic(MadeFrom):
 
     def __str__(self) -> str:
         """Return the law, its moduli at once and in the end, the Prony terms and the source, in words."""
-        left = self.relaxed().young if self.prony.equilibrium > 0 else 0.0
+        left = self.relaxed_law().young if self.prony.equilibrium > 0 else 0.0
         return in_words(self, f"{self.prony} to E = {left:.4g} Pa", at_once=True)
 
     @property
@@ -310,8 +310,8 @@ class Viscoelastic(MadeFrom):
     @property
     def _bulk(self) -> float:
         """Bulk modulus in Pa of the part that relaxes."""
-        kept = kept_bulk(self.base, self.part)
-        return 0.0 if kept == self.bulk_modulus else self.bulk_modulus - kept
+        elastic_bulk = unrelaxed_bulk(self.base, self.part)
+        return 0.0 if elastic_bulk == self.bulk_modulus else self.bulk_modulus - elastic_bulk
 
     def _weight(self, dt: Any) -> Any:
         """Return γ_∞ + Σ γ_i a_i."""

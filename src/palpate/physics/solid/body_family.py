@@ -254,8 +254,8 @@ class FamilyProblem:
             return
         probe = self._probe
         ends = (self.varied[self._radius].low, self.varied[self._radius].high)
-        sized = [probe.sized(self.base.body.geometry, radius) for radius in ends]
-        wanted = [replace(self.base, interactions=(interaction,)).refinements for interaction in sized]
+        probes = [probe.with_radius(self.base.body.geometry, radius) for radius in ends]
+        wanted = [replace(self.base, interactions=(interaction,)).refinements for interaction in probes]
         object.__setattr__(self, "base", replace(self.base, fine=_both(*wanted)))
 
     @property
@@ -288,7 +288,7 @@ class FamilyProblem:
             return self.base.ranges
         radii, body = self.varied[self._radius], self.base.body
         ends = [
-            self._probe.sized(body.geometry, radius).ranges(body.geometry)
+            self._probe.with_radius(body.geometry, radius).ranges(body.geometry)
             for radius in (radii.low, radii.high)
         ]
         return tuple(
@@ -331,7 +331,7 @@ class FamilyProblem:
         body = with_values(self.base.body, self.varied, values)
         if self._radius is None:
             return replace(self.base, body=body)
-        probe = self._probe.sized(self.base.body.geometry, values[self._radius])
+        probe = self._probe.with_radius(self.base.body.geometry, values[self._radius])
         return replace(self.base, body=body, interactions=(probe,))
 
     def describe(self) -> dict[str, Any]:
@@ -367,7 +367,7 @@ class FamilyProblem:
             values[rows] = low + u * (high - low)
             if self._radius is not None:
                 radius, geometry = values[rows[0], self._radius], self.base.body.geometry
-                points[rows] = self._probe.moved(geometry, points[rows], radius)
+                points[rows] = self._probe.shift_centres(geometry, points[rows], radius)
         return np.hstack([points, values])
 
     def chains(self, points: Any) -> list[np.ndarray]:

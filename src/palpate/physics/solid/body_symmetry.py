@@ -45,9 +45,9 @@ class Symmetry:
     def __len__(self) -> int:
         return len(self.matrices)
 
-    def part(self, kept: Iterable[bool]) -> Symmetry:
-        """Return the isometries that are kept; they must be a group too."""
-        return Symmetry(self.matrices[list(kept)], self.about)
+    def part(self, mask: Iterable[bool]) -> Symmetry:
+        """Return the isometries of a mask; they must be a group too."""
+        return Symmetry(self.matrices[list(mask)], self.about)
 
     def describe(self) -> dict[str, Any]:
         """Return the group as plain data for a JSON file."""
@@ -65,19 +65,19 @@ def symmetry_of(body: Body, touches: str) -> Symmetry:
     whole: tuple[Isometry, ...] = getattr(shape, "isometries", NO_ISOMETRIES)
     if body.held or any(_is_directed(material) for material in body.materials.values()):
         whole = NO_ISOMETRIES
-    fixed = {name for one in body.fixed for name in members(one, shape.surfaces)}
+    fixed = {name for entry in body.fixed for name in members(entry, shape.surfaces)}
     touched = set(members(touches, shape.surfaces))
     gravity = np.array(body.gravity)
     stretches = [np.diag(m.stretches) for m in body.materials.values() if isinstance(m, PreStretched)]
-    kept = [
-        one
-        for one in whole
-        if {one.surface(name) for name in fixed} == fixed
-        and {one.surface(name) for name in touched} == touched
-        and np.allclose(one.matrix @ gravity, gravity)
-        and all(np.allclose(one.matrix @ S @ one.matrix.T, S) for S in stretches)
+    isometries = [
+        isometry
+        for isometry in whole
+        if {isometry.surface(name) for name in fixed} == fixed
+        and {isometry.surface(name) for name in touched} == touched
+        and np.allclose(isometry.matrix @ gravity, gravity)
+        and all(np.allclose(isometry.matrix @ S @ isometry.matrix.T, S) for S in stretches)
     ]
-    return Symmetry(np.array([one.matrix for one in kept]), np.array(kept[0].about))
+    return Symmetry(np.array([isometry.matrix for isometry in isometries]), np.array(isometries[0].about))
 
 
 def _is_directed(material: Any) -> bool:
@@ -86,7 +86,7 @@ def _is_directed(material: Any) -> bool:
         return True
     if not is_dataclass(material):
         return False
-    parts = (getattr(material, one.name) for one in fields(material))
+    parts = (getattr(material, entry.name) for entry in fields(material))
     return any(_is_directed(part) for part in parts if is_dataclass(part))
 
 

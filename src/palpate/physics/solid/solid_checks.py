@@ -67,11 +67,11 @@ def surfaces_of(given: Any, geometry: Any) -> tuple[str, ...]:
         If the geometry does not have one.
     """
     names = given if isinstance(given, Iterable) and not isinstance(given, str) else (given,)
-    found: list[str] = []
+    surfaces: list[str] = []
     for name in names:
         require_known("surface", name, geometry.surfaces)
-        found += members(name, geometry.surfaces)
-    return tuple(dict.fromkeys(found))
+        surfaces += members(name, geometry.surfaces)
+    return tuple(dict.fromkeys(surfaces))
 
 
 def by_region(

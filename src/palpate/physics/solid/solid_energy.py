@@ -90,7 +90,7 @@ def stored_density(field: SolidField, region: str, material: Material, state: Ma
     """Return the free energy in J/m³ of the state under inspection; None where the law does not know it."""
     F = deformation_gradient(field.displacement)
     pressure = field.pressure.get(region)
-    stored = getattr(material, "stored" if pressure is None else "stored_distortion", None)
+    stored = getattr(material, "stored_energy" if pressure is None else "stored_distortion", None)
     if stored is None or pressure is None:
         return stored and stored(F, state)
     return stored(F, state) + _volumetric_density(material, F, pressure)

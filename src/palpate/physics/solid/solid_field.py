@@ -143,7 +143,7 @@ class SolidField:
 
         image = ngsolve.GridFunction(self.base.space)
         image.Set(displacement)
-        return self._embedded(image.vec.FV().NumPy())
+        return self._embed(image.vec.FV().NumPy())
 
     def load(self, integrand: Callable[[Any], Any]) -> np.ndarray:
         """Return the load vector l (dof,) of a linear form, given as a function of the test displacement v."""
@@ -152,7 +152,7 @@ class SolidField:
         form = ngsolve.LinearForm(self.base.space)
         form += integrand(self.base.space.TestFunction())
         form.Assemble()
-        return self._embedded(form.vec.FV().NumPy())
+        return self._embed(form.vec.FV().NumPy())
 
     def mid_sides(self) -> MidSides:
         """Return the middles of edges, displaced as the field is."""
@@ -173,7 +173,7 @@ class SolidField:
         points = np.asarray(ngsolve.CF((ngsolve.x, ngsolve.y, ngsolve.z))(places))
         return edges, places, points
 
-    def _embedded(self, motion: np.ndarray) -> np.ndarray:
+    def _embed(self, motion: np.ndarray) -> np.ndarray:
         unknowns = np.zeros(self.size)
         unknowns[: self.motion_size] = motion
         return unknowns

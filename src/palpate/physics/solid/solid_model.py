@@ -11,7 +11,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.physics.interactions.interaction import Attached, Energy
-from palpate.physics.interactions.interaction_checks import require_held
+from palpate.physics.interactions.interaction_checks import require_support
 from palpate.physics.materials.pre_stretched import PreStretched
 from palpate.physics.solid.solid_energy import History, material_energies
 from palpate.physics.solid.solid_field import SolidField
@@ -204,8 +204,8 @@ class SolidModel:
     @property
     def _knows_stored_energy(self) -> bool:
         """True where there are histories, all of laws that know their free energy."""
-        known = [history.stored is not None for history in self.histories.values()]
-        return bool(known) and all(known)
+        available = [history.stored is not None for history in self.histories.values()]
+        return bool(available) and all(available)
 
     def _work(self, z: np.ndarray) -> float:
         """Return the interactions' energy in J less the potential of the loads, both from the base state."""
@@ -362,13 +362,13 @@ def open_problem(problem: SolidProblem, solver: str, tolerance: float) -> OpenPr
         )
 
     if constants:
-        require_held(field, [constant.attached for constant in constants])
+        require_support(field, [constant.attached for constant in constants])
         settled = _settle(model(constants=[], varied=[c.attached for c in constants], base=rest), constants)
         base = settled.last.z
         field.set_base(base)
     varied = [interaction.attach(field) for interaction in problem.interactions]
     if not constants:
-        require_held(field, varied)
+        require_support(field, varied)
     opened = model(constants, varied, base)
     if any(isinstance(material, PreStretched) for material in body.materials.values()):
         _require_balance(opened, base)

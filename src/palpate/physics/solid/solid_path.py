@@ -89,7 +89,7 @@ def predict(model: SolidModel, here: PathPoint, q: np.ndarray) -> np.ndarray:
     if here.slope is None or (model.histories and _turns_back(here, q)):
         return best
     least = _badness(model, best)
-    for guess in _extrapolated(here, q):
+    for guess in _extrapolations(here, q):
         guess = model.impose(guess, q)
         badness = _badness(model, guess)
         if badness < least or not np.isfinite(least):
@@ -112,7 +112,7 @@ def _badness(model: SolidModel, guess: np.ndarray) -> float:
     return model.error(guess) if model.has_tangent else 0.0
 
 
-def _extrapolated(here: PathPoint, q: np.ndarray) -> Iterator[np.ndarray]:
+def _extrapolations(here: PathPoint, q: np.ndarray) -> Iterator[np.ndarray]:
     """Yield extrapolations from the boldest to the most timid."""
     ahead = q - here.q
     assert here.slope is not None  # only a state with a slope is extrapolated

@@ -140,7 +140,7 @@ class SolidProblem:
     @property
     def design_name(self) -> str | None:
         """Name of the problem's own design, None where it has none."""
-        return None if self._planned() is None else "columns"
+        return None if self._planned_interaction() is None else "columns"
 
     def describe(self) -> dict[str, Any]:
         """Return everything that decides the answers, as plain data for a JSON file."""
@@ -237,7 +237,7 @@ class SolidProblem:
         UsageError
             If the interactions leave the design to the caller.
         """
-        planned = self._planned()
+        planned = self._planned_interaction()
         if planned is None:
             raise UsageError(
                 "This problem has no design of its own.",
@@ -250,7 +250,7 @@ class SolidProblem:
         """Return rows of `points` (N, n) to be solved one after the other by one solver, chain by chain."""
         points = np.asarray(points, dtype=float)
         self.check_points(points)
-        planned = self._planned()
+        planned = self._planned_interaction()
         if planned is None:
             return [np.arange(len(points))]
         return list(planned.chains(self.body.geometry, points))
@@ -304,6 +304,6 @@ class SolidProblem:
         require_near(values[None, :], self.ranges, self.longest)
         return values
 
-    def _planned(self) -> Any:
+    def _planned_interaction(self) -> Any:
         only = self.interactions[0]
         return only if len(self.interactions) == 1 and isinstance(only, Planned) else None

@@ -218,8 +218,8 @@ class Inputs:
 
     def sensitivity(self, system: System, z: np.ndarray) -> np.ndarray:
         """Return ∂z/∂q (n, dof) with the system's present tangent."""
-        coupling = self._coupling(z) + self._lifted(system)
-        return np.asarray(self.lifts - self._solved(system, coupling))
+        coupling = self._coupling(z) + self._lift_forces(system)
+        return np.asarray(self.lifts - self._solve_rows(system, coupling))
 
     def hessian(self, system: System, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return ∂²U/∂q∂q (n, n) and ∂z/∂q (n, dof), with the system's present tangent, which is to be that at z."""
@@ -228,11 +228,11 @@ class Inputs:
 
     def raw_hessian(self, system: System, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return ∂²U/∂q∂q as it is computed, symmetric but for roundings, and ∂z/∂q."""
-        explicit, lifted = self._coupling(z), self._lifted(system)
+        explicit, lifted = self._coupling(z), self._lift_forces(system)
         coupling = explicit + lifted
-        inner = self._solved(system, coupling)
+        inner = self._solve_rows(system, coupling)
         mixed = self.lifts @ explicit.T
-        own = self._own(z) + mixed + mixed.T + self.lifts @ lifted.T
+        own = self._input_hessian(z) + mixed + mixed.T + self.lifts @ lifted.T
         return own - coupling @ inner.T, self.lifts - inner
 
     def _add(self, part: Attached, rows: slice) -> None:
@@ -268,18 +268,18 @@ class Inputs:
                 row += result.FV().NumPy()
         return coupling
 
-    def _own(self, z: np.ndarray) -> np.ndarray:
+    def _input_hessian(self, z: np.ndarray) -> np.ndarray:
         """Return ∂²Π/∂q∂q, shape (n, n)."""
         state, own = self._at(z), np.zeros((self.size, self.size))
         for (i, j), forms in self._second.items():
             own[i, j] = own[j, i] = sum(form.Energy(state) for form in forms)
         return own
 
-    def _lifted(self, system: System) -> np.ndarray:
+    def _lift_forces(self, system: System) -> np.ndarray:
         """Return K Lᵢ, shape (n, dof)."""
         return np.array([system.multiply(lift) if lift.any() else lift for lift in self.lifts])
 
-    def _solved(self, system: System, rows: np.ndarray) -> np.ndarray:
+    def _solve_rows(self, system: System, rows: np.ndarray) -> np.ndarray:
         return np.array([system.solve(row) for row in rows]).reshape(self.size, -1)
 
     def _at(self, z: np.ndarray) -> Any:

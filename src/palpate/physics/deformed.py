@@ -174,9 +174,9 @@ def fine_body(solution: Any) -> FineBody:
 def _middles(edges: np.ndarray, ends: np.ndarray) -> np.ndarray:
     """Index of the edge, among (m, 2) in ascending order, with the given ends (..., 2)."""
     span = int(edges.max()) + 1
-    sought = np.sort(ends, axis=-1)
+    pairs = np.sort(ends, axis=-1)
     keys = edges[:, 0] * span + edges[:, 1]
-    return np.asarray(np.searchsorted(keys, sought[..., 0] * span + sought[..., 1]))
+    return np.asarray(np.searchsorted(keys, pairs[..., 0] * span + pairs[..., 1]))
 
 
 @dataclass(frozen=True, eq=False)

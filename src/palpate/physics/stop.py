@@ -31,7 +31,7 @@ class Stop(StrEnum):
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a check says of a state that Newton's method has accepted.
+    """Verdict of a check on a state that Newton's method has accepted.
 
     Attributes
     ----------

@@ -1,19 +1,17 @@
 """Files for ParaView: VTU for one solution, PVD for several.
 
-VTK's XML format of unstructured grids, version 1.0 with 64-bit headers: arrays in base64, packed by zlib. Written
-here and not by a mesh library, because none of those at hand writes what belongs to the whole (`FieldData`).
+meshio writes mesh and fields; what belongs to the whole body (`FieldData`) it reads but does not write, so that is
+added here.
 """
 
 from __future__ import annotations
 
-import base64
 import os
-import sys
-import zlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import quoteattr
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -22,14 +20,13 @@ from palpate.physics.deformed import ball_of, nodal_strain, require_state
 
 __all__ = ["write_pvd", "write_vtu"]
 
-TRIANGLE, TETRA = 5, 10  # VTK's numbers of cell types
 # a number of the whole body, beside the nodes' means of the same name
-CALLED = {"largest_strain": "largest strain at a quadrature point"}
-NOT_HERE = -1  # region of a triangle, surface of a tetrahedron
+TITLES = {"largest_strain": "largest strain at a quadrature point"}
+NOWHERE = -1  # region of a triangle, surface of a tetrahedron
 
 
 def write_vtu(solution: Any, path: str | os.PathLike[str]) -> Path:
-    """Write a solution as VTU.
+    """Write a solution as a VTU file.
 
     The cells are the tetrahedra and, after them, the triangles of the outer surface. Point data: ``displacement`` (m),
     ``largest strain`` (|λ − 1|) and, where the solution has it, ``von Mises stress`` (Pa). Cell data: ``region`` and
@@ -53,21 +50,31 @@ def write_vtu(solution: Any, path: str | os.PathLike[str]) -> Path:
     UsageError
         If the solution did not converge, the file can't be written or its name has another ending.
     """
-    target = _ending_in(".vtu", path)
+    import meshio
+
+    target = _require_ending(".vtu", path)
     require_state(solution)
     mesh = solution.mesh
-    sections = [
-        _section("FieldData", _metadata(solution)),
-        f'<Piece NumberOfPoints="{len(mesh.points)}" NumberOfCells="{len(mesh.tetrahedra) + len(mesh.triangles)}">',
-        _section("PointData", _point_data(solution)),
-        _section("CellData", _cell_data(mesh)),
-        _section("Points", {"Points": np.asarray(mesh.points, dtype=float)}),
-        _section("Cells", _cells(mesh)),
-        "</Piece>",
+    blocks = [
+        ("tetra", mesh.tetrahedra, mesh.region_of, np.full(len(mesh.tetrahedra), NOWHERE)),
+        ("triangle", mesh.triangles, np.full(len(mesh.triangles), NOWHERE), mesh.surface_of),
     ]
-    body = "\n".join(["<UnstructuredGrid>", *sections, "</UnstructuredGrid>"])
-    head = 'type="UnstructuredGrid" version="1.0" header_type="UInt64" compressor="vtkZLibDataCompressor"'
-    return _write(target, head, body)
+    blocks = [block for block in blocks if len(block[1])]
+    cells = [(kind, nodes) for kind, nodes, _, _ in blocks]
+    data = {
+        name: [np.asarray(block[column], dtype=np.int32) for block in blocks]
+        for name, column in (("region", 2), ("surface", 3))
+    }
+    grid = meshio.Mesh(mesh.points, cells, point_data=_point_data(solution), cell_data=data)
+    with _reported(target):
+        meshio.vtu.write(target, grid, header_type="UInt64")
+        # what belongs to the whole body meshio reads, but does not write
+        tree = ElementTree.parse(target)
+        body = tree.getroot().find("UnstructuredGrid")
+        assert body is not None
+        body.insert(0, _field_data(_metadata(solution)))
+        tree.write(target, encoding="utf-8", xml_declaration=True)
+    return target
 
 
 def write_pvd(
@@ -93,20 +100,23 @@ def write_pvd(
     UsageError
         If there are no solutions, not as many values, or a file can't be written.
     """
-    target = _ending_in(".pvd", path)
+    target = _require_ending(".pvd", path)
     times = list(range(len(solutions))) if values is None else [float(v) for v in values]
     if not solutions or len(times) != len(solutions):
         raise UsageError(f"{len(solutions)} solutions and {len(times)} values make no series.")
     folder = target.with_suffix("")
-    _made(folder)
-    rows = []
+    with _reported(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    file = ElementTree.Element("VTKFile", type="Collection", version="0.1")
+    collection = ElementTree.SubElement(file, "Collection")
     for step, (time, solution) in enumerate(zip(times, solutions, strict=True)):
         name = f"{step:04d}.vtu"
         write_vtu(solution, folder / name)
-        file = quoteattr(f"{folder.name}/{name}")
-        rows.append(f'<DataSet timestep="{time:.17g}" group="" part="0" file={file}/>')
-    body = "\n".join(["<Collection>", *rows, "</Collection>"])
-    return _write(target, 'type="Collection" version="0.1"', body)
+        entry = {"timestep": f"{time:.17g}", "group": "", "part": "0", "file": f"{folder.name}/{name}"}
+        ElementTree.SubElement(collection, "DataSet", entry)
+    with _reported(target):
+        ElementTree.ElementTree(file).write(target, encoding="utf-8", xml_declaration=True)
+    return target
 
 
 def _point_data(solution: Any) -> dict[str, np.ndarray]:
@@ -117,25 +127,6 @@ def _point_data(solution: Any) -> dict[str, np.ndarray]:
     return data
 
 
-def _cell_data(mesh: Any) -> dict[str, np.ndarray]:
-    no_surface = np.full(len(mesh.tetrahedra), NOT_HERE)
-    no_region = np.full(len(mesh.triangles), NOT_HERE)
-    return {
-        "region": np.concatenate([mesh.region_of, no_region]).astype(np.int32),
-        "surface": np.concatenate([no_surface, mesh.surface_of]).astype(np.int32),
-    }
-
-
-def _cells(mesh: Any) -> dict[str, np.ndarray]:
-    solid, skin = np.asarray(mesh.tetrahedra), np.asarray(mesh.triangles)
-    corners = np.repeat([4, 3], [len(solid), len(skin)])
-    return {
-        "connectivity": np.concatenate([solid.ravel(), skin.ravel()]).astype(np.int64),
-        "offsets": np.cumsum(corners).astype(np.int64),
-        "types": np.repeat([TETRA, TRIANGLE], [len(solid), len(skin)]).astype(np.uint8),
-    }
-
-
 def _metadata(solution: Any) -> dict[str, np.ndarray]:
     mesh = solution.mesh
     data: dict[str, np.ndarray] = {}
@@ -143,7 +134,7 @@ def _metadata(solution: Any) -> dict[str, np.ndarray]:
     for name in (*names, "least_volume_ratio", "largest_strain", "iterations", "residual"):
         value = getattr(solution, name, None)
         if value is not None:
-            data[CALLED.get(name, name.replace("_", " "))] = np.atleast_1d(
+            data[TITLES.get(name, name.replace("_", " "))] = np.atleast_1d(
                 np.asarray(value, dtype=float)
             ).reshape(1, -1)
     if (sphere := ball_of(solution, True)) is not None:
@@ -153,28 +144,19 @@ def _metadata(solution: Any) -> dict[str, np.ndarray]:
     return data
 
 
-def _section(tag: str, arrays: Mapping[str, np.ndarray]) -> str:
-    rows = [_array(name, values) for name, values in arrays.items()]
-    return "\n".join([f"<{tag}>", *rows, f"</{tag}>"])
+def _field_data(arrays: Mapping[str, np.ndarray]) -> ElementTree.Element:
+    """Return the XML element of arrays that belong to the whole body."""
+    element = ElementTree.Element("FieldData")
+    for name, values in arrays.items():
+        kind = "Float64" if values.dtype.kind == "f" else "Int32"
+        head = {"type": kind, "Name": name, "NumberOfTuples": str(len(values)), "format": "ascii"}
+        width = {"NumberOfComponents": str(values.shape[1])} if values.ndim == 2 else {}
+        row = ElementTree.SubElement(element, "DataArray", head | width)
+        row.text = " ".join(map(repr, values.ravel().tolist()))
+    return element
 
 
-def _array(name: str, values: np.ndarray) -> str:
-    kind = {"f": "Float", "i": "Int", "u": "UInt"}[values.dtype.kind] + str(8 * values.dtype.itemsize)
-    width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
-    count = f' NumberOfTuples="{len(values)}"'
-    head = f'<DataArray type={quoteattr(kind)} Name={quoteattr(name)}{width}{count} format="binary">'
-    return f"{head}{_packed(np.ascontiguousarray(values))}</DataArray>"
-
-
-def _packed(values: np.ndarray) -> str:
-    """One zlib block, after its header: count of blocks, size of a block, of the last, and packed."""
-    data = values.tobytes()
-    packed = zlib.compress(data)
-    header = np.array([1, len(data), len(data), len(packed)], dtype=np.uint64)
-    return base64.b64encode(header.tobytes()).decode() + base64.b64encode(packed).decode()
-
-
-def _ending_in(suffix: str, path: str | os.PathLike[str]) -> Path:
+def _require_ending(suffix: str, path: str | os.PathLike[str]) -> Path:
     target = Path(path)
     if target.suffix.lower() == suffix:
         return target
@@ -185,19 +167,14 @@ def _ending_in(suffix: str, path: str | os.PathLike[str]) -> Path:
     )
 
 
-def _write(path: Path, head: str, body: str) -> Path:
-    order = "LittleEndian" if sys.byteorder == "little" else "BigEndian"
-    text = '<?xml version="1.0"?>\n<!-- written by palpate; SI units -->\n'
-    text += f'<VTKFile {head} byte_order="{order}">\n{body}\n</VTKFile>\n'
+@contextmanager
+def _reported(path: Path) -> Iterator[None]:
+    """Turn a failure to write a file or folder into an error that names it."""
     try:
-        path.write_text(text, encoding="utf-8", newline="\n")
+        yield
     except OSError as error:
-        raise UsageError(f"Could not write {path}.", why=str(error)) from error
-    return path
-
-
-def _made(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UsageError(f"Could not make the folder {folder}.", why=str(error)) from error
+        raise UsageError(
+            f"Could not write {path}.",
+            why=f"{error.strerror or error}.",
+            fix="Write to a folder that exists.",
+        ) from error

@@ -72,12 +72,12 @@ class Dome(Solid):
 
     def __post_init__(self) -> None:
         checks.positive("The dome's radius", self.radius, "m")
-        checks.positive("The dome's height", self.rise, "m")
+        checks.positive("The dome's height", self.peak, "m")
         if self.layer:
             checks.positive("The thickness of the dome's skin", self.layer, "m")
-        if self.layer >= min(self.radius, self.rise):
+        if self.layer >= min(self.radius, self.peak):
             raise UsageError(
-                f"The dome's skin is {self.layer:g} m thick, the dome {min(self.radius, self.rise):g} m.",
+                f"The dome's skin is {self.layer:g} m thick, the dome {min(self.radius, self.peak):g} m.",
                 why="The skin would leave no body.",
                 fix="Give a thinner skin, or none.",
             )
@@ -86,8 +86,8 @@ class Dome(Solid):
         self.check_extent("The dome")
 
     @property
-    def rise(self) -> float:
-        """Height in m."""
+    def peak(self) -> float:
+        """Height of the top above the base in m: `height`, or the radius."""
         return self.radius if self.height is None else self.height
 
     @property
@@ -103,7 +103,7 @@ class Dome(Solid):
     @property
     def size(self) -> tuple[float, float, float]:
         """Extent along x, y and z in m."""
-        return (2 * self.radius, 2 * self.radius, self.rise)
+        return (2 * self.radius, 2 * self.radius, self.peak)
 
     @property
     def isometries(self) -> tuple[Isometry, ...]:
@@ -114,7 +114,7 @@ class Dome(Solid):
     def __str__(self) -> str:
         skin = f", skin of {millimetres(self.layer)}" if self.layer else ""
         inside = f", inclusion of radius {millimetres(self.inclusion.radius)}" if self.inclusion else ""
-        return f"dome of radius {millimetres(self.radius)}, {millimetres(self.rise)} high{skin}{inside}"
+        return f"dome of radius {millimetres(self.radius)}, {millimetres(self.peak)} high{skin}{inside}"
 
     def solid(self) -> Any:
         """The dome with its inner parts, glued; its faces named."""
@@ -144,7 +144,7 @@ class Dome(Solid):
         """Half an ellipsoid whose half axes are shorter than the dome's by `inset` m."""
         from netgen.occ import Axes, Box, Ellipsoid, Pnt, Sphere, X, Z
 
-        a, c = self.radius - inset, self.rise - inset
+        a, c = self.radius - inset, self.peak - inset
         round_body = Sphere(Pnt(0, 0, 0), a) if a == c else Ellipsoid(Axes((0, 0, 0), Z, X), c, a, a)
         round_body.faces.name = surface
         above = Box(Pnt(-2 * a, -2 * a, 0), Pnt(2 * a, 2 * a, 2 * c))
@@ -158,12 +158,12 @@ class Dome(Solid):
         the base by as much; sufficient, since an ellipsoid's inner parallel body contains that ellipsoid.
         """
         inset = self.layer + inclusion.radius
-        a, c = self.radius - inset, self.rise - inset
+        a, c = self.radius - inset, self.peak - inset
         x, y, z = inclusion.centre
         if min(a, c) > 0 and (x * x + y * y) / (a * a) + z * z / (c * c) < 1 and z > inclusion.radius:
             return
         raise UsageError(
             f"The inclusion of radius {inclusion.radius:g} m at {inclusion.centre} m leaves the dome's body.",
             why="It must lie clear of the base and of the skin.",
-            fix=f"Choose a smaller one, or move it, for example to (0, 0, {self.rise / 2:g}).",
+            fix=f"Choose a smaller one, or move it, for example to (0, 0, {self.peak / 2:g}).",
         )

@@ -14,11 +14,14 @@ __all__ = [
     "duration",
     "interval",
     "length",
+    "millimetres",
+    "number",
     "plain",
     "power_of_ten",
     "pressure",
     "scientific",
     "share",
+    "span",
 ]
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -114,3 +117,20 @@ def criterion_figure(value: float | tuple[float, float], kind: str) -> str:
     if kind == "share":
         return share(value)
     return f"{plain(value, 3)}°" if kind == "degrees" else f"{plain(value, 3)} ×"
+
+
+def number(value: float, digits: int = 4) -> str:
+    """Write a number with `digits` digits at most: 0.05, 1e+04; what rounds to zero has no sign."""
+    return f"{value + 0.0:.{digits}g}"
+
+
+def millimetres(*lengths: float) -> str:
+    """Write lengths given in m, in mm: 100 × 100 × 50 mm."""
+    return " × ".join(number(1e3 * value) for value in lengths) + " mm"
+
+
+def span(ends: float | tuple[float, float], unit: str) -> str:
+    """Write a value that stays, or the ends between which it varies: 0 … 5 N."""
+    if isinstance(ends, tuple):
+        return " … ".join(map(number, ends)) + f" {unit}"
+    return f"{number(ends)} {unit}"

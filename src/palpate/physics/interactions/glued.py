@@ -10,6 +10,7 @@ import numpy as np
 
 from palpate import checks
 from palpate.errors import UsageError
+from palpate.format import millimetres, number
 from palpate.physics.interactions.footprint import (
     MARGIN,
     QUADRATURE,
@@ -21,8 +22,7 @@ from palpate.physics.interactions.footprint import (
 )
 from palpate.physics.interactions.interaction import Attached, Energy, PlainInteraction
 from palpate.physics.interactions.interaction_checks import AXES, Interval, interval, tag
-from palpate.physics.shapes.naming import require_known, require_triple
-from palpate.physics.words import millimetres, number
+from palpate.physics.shapes.naming import require_known
 from palpate.units import Range
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ class GluedPad(PlainInteraction):
                 checks.positive(f"The {what}", size, "m")
         self._require_place()
         if self.at is not None:
-            object.__setattr__(self, "at", require_triple("The point of a glued pad", self.at))
+            object.__setattr__(self, "at", checks.triple("The point of a glued pad", self.at, "m"))
         if self.over is not None:
             object.__setattr__(self, "over", _rectangle(self.over))
         object.__setattr__(self, "displacement", _three(self.displacement))

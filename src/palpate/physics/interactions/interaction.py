@@ -19,8 +19,8 @@ import numpy as np
 
 from palpate import checks
 from palpate.errors import UsageError
+from palpate.format import number
 from palpate.physics.stop import Verdict
-from palpate.physics.words import number
 
 if TYPE_CHECKING:
     from palpate.physics.shapes.mesh import BodyMesh

@@ -10,8 +10,8 @@ import numpy as np
 
 from palpate import checks
 from palpate.errors import UsageError
+from palpate.format import number
 from palpate.physics.interactions.interaction import Attached
-from palpate.physics.words import number
 
 __all__ = [
     "AXES",

@@ -22,6 +22,7 @@ import numpy as np
 
 from palpate import checks
 from palpate.errors import UsageError
+from palpate.format import number
 from palpate.physics.interactions.footprint import (
     MARGIN,
     QUADRATURE,
@@ -32,8 +33,7 @@ from palpate.physics.interactions.footprint import (
 )
 from palpate.physics.interactions.interaction import Attached, Energy, PlainInteraction
 from palpate.physics.interactions.interaction_checks import along, direction_of, range_of
-from palpate.physics.shapes.naming import require_known, require_triple
-from palpate.physics.words import number
+from palpate.physics.shapes.naming import require_known
 from palpate.units import Range
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ class PointForce(PlainInteraction):
         checks.positive("The radius of a point force", self.radius, "m")
         if self.element is not None:
             checks.positive("The element under a point force", self.element, "m")
-        object.__setattr__(self, "at", require_triple("The point of a force", self.at))
+        object.__setattr__(self, "at", checks.triple("The point of a force", self.at, "m"))
         object.__setattr__(self, "force", range_of("A point force", self.force, "N"))
         direction = direction_of("The direction of a point force", self.direction)
         object.__setattr__(self, "direction", direction)
@@ -305,7 +305,7 @@ class Pressure(PlainInteraction):
     def __post_init__(self) -> None:
         object.__setattr__(self, "pressure", range_of("A pressure", self.pressure, "Pa"))
         if self.symmetry is not None:
-            symmetry = require_triple("The point of a pressure's planes of symmetry", self.symmetry)
+            symmetry = checks.triple("The point of a pressure's planes of symmetry", self.symmetry, "m")
             object.__setattr__(self, "symmetry", symmetry)
 
     def ranges(self, geometry: Any) -> tuple[Range, ...]:

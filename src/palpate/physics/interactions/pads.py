@@ -22,9 +22,9 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import SolverError, UsageError
+from palpate.format import millimetres, number
 from palpate.physics.advice import ModelWarning, advise
 from palpate.physics.interactions.sphere_contact import REACH, pressed_energy
-from palpate.physics.words import millimetres, number
 
 __all__ = [
     "PadShare",

@@ -15,7 +15,7 @@ from palpate import checks
 from palpate.errors import UsageError
 from palpate.physics.interactions.interaction import Attached, Fixed, PlainInteraction
 from palpate.physics.interactions.interaction_checks import AXES, along, direction_of, interval, tag
-from palpate.physics.shapes.naming import require_known, require_triple
+from palpate.physics.shapes.naming import require_known
 from palpate.units import Range
 
 if TYPE_CHECKING:
@@ -204,8 +204,8 @@ def _box(value: Any) -> tuple[Point, Point]:
             why="It needs a lower and an upper corner.",
             fix="For example within=((0, 0, 0.05), (0.02, 0.02, 0.05)), in m.",
         ) from None
-    lower = require_triple("The lower corner of a box", low)
-    upper = require_triple("The upper corner of a box", high)
+    lower = checks.triple("The lower corner of a box", low, "m")
+    upper = checks.triple("The upper corner of a box", high, "m")
     if any(a > b for a, b in zip(lower, upper, strict=True)):
         raise UsageError(
             f"The box {lower} … {upper} m is empty.",

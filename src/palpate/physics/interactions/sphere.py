@@ -9,6 +9,7 @@ import numpy as np
 
 from palpate import checks
 from palpate.errors import UsageError
+from palpate.format import millimetres, number
 from palpate.physics.interactions.interaction import Attached, Energy, Field, PlainInteraction
 from palpate.physics.interactions.interaction_checks import range_of
 from palpate.physics.interactions.sphere_design import (
@@ -21,7 +22,6 @@ from palpate.physics.interactions.sphere_design import (
 from palpate.physics.interactions.surface_patch import Patch, surface_of
 from palpate.physics.shapes.meshing import FineMesh
 from palpate.physics.shapes.naming import require_known
-from palpate.physics.words import millimetres, number
 from palpate.units import Range
 
 if TYPE_CHECKING:

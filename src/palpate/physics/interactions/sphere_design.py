@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.format import millimetres
 from palpate.physics.interactions.surface_patch import Patch
-from palpate.physics.words import millimetres
 
 __all__ = [
     "contact_points",

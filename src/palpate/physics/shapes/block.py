@@ -10,10 +10,10 @@ import numpy as np
 
 from palpate import checks
 from palpate.errors import UsageError
+from palpate.format import millimetres
 from palpate.physics.shapes.meshing import FineMesh
 from palpate.physics.shapes.naming import UPRIGHT, require_name
 from palpate.physics.shapes.shape import Isometry, Solid, box_isometries
-from palpate.physics.words import millimetres
 
 __all__ = [
     "Block",

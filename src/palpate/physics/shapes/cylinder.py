@@ -7,9 +7,9 @@ from typing import Any, ClassVar
 
 from palpate import checks
 from palpate.errors import UsageError
+from palpate.format import millimetres
 from palpate.physics.shapes.block import name_upright_faces
 from palpate.physics.shapes.shape import Isometry, Solid, round_isometries
-from palpate.physics.words import millimetres
 
 __all__ = [
     "Cylinder",

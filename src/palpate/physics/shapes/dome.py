@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 
 from palpate import checks
 from palpate.errors import UsageError
+from palpate.format import millimetres
 from palpate.physics.shapes.shape import Isometry, Solid, mirror_isometries, round_isometries
-from palpate.physics.words import millimetres
 
 __all__ = ["Dome", "Inclusion"]
 

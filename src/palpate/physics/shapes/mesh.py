@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from palpate.checks import own_arrays
+from palpate.format import number
 from palpate.physics.shapes.naming import members, require_known
-from palpate.physics.words import number
 
 __all__ = [
     "UNNAMED",

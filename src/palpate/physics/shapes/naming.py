@@ -7,10 +7,9 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
-from palpate import checks
 from palpate.errors import UsageError
 
-__all__ = ["GROUPS", "UPRIGHT", "members", "plain_name", "require_known", "require_name", "require_triple"]
+__all__ = ["GROUPS", "UPRIGHT", "members", "plain_name", "require_known", "require_name"]
 
 UPRIGHT = ("x_min", "x_max", "y_min", "y_max")  # the upright faces of a box, by where they are
 GROUPS = {"side": UPRIGHT}
@@ -83,8 +82,3 @@ def plain_name(name: str) -> str:
     """Return a name from a file with the signs that NGSolve reads as patterns replaced by ``_``."""
     plain = re.sub(r"[^\w \-]+", "_", name).strip(" -")
     return plain or "unnamed"
-
-
-def require_triple(what: str, value: Any, unit: str = "m") -> tuple[float, float, float]:
-    """Return three finite numbers; see `palpate.checks.triple`."""
-    return checks.triple(what, value, unit)

@@ -9,8 +9,8 @@ import numpy as np
 
 from palpate import checks
 from palpate.errors import UsageError
+from palpate.format import millimetres
 from palpate.physics.shapes.shape import Solid
-from palpate.physics.words import millimetres
 
 __all__ = ["Organ"]
 

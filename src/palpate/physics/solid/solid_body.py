@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from palpate import checks
 from palpate.errors import UsageError
+from palpate.format import number
 from palpate.physics.interactions.interaction import Fixed, Interaction
-from palpate.physics.shapes.naming import require_triple
 from palpate.physics.solid.solid_checks import (
     advise_on_modulus,
     by_region,
@@ -20,7 +20,6 @@ from palpate.physics.solid.solid_checks import (
     require_weight,
     surfaces_of,
 )
-from palpate.physics.words import number
 
 if TYPE_CHECKING:
     from palpate.physics.materials.material import Material
@@ -88,7 +87,7 @@ class Body:
         require_geometry(self.geometry)
         object.__setattr__(self, "fixed", surfaces_of(self.fixed, self.geometry))
         object.__setattr__(self, "held", require_held_values(self.held))
-        object.__setattr__(self, "gravity", require_triple("Gravity", self.gravity, "m/s²"))
+        object.__setattr__(self, "gravity", checks.triple("Gravity", self.gravity, "m/s²"))
         object.__setattr__(self, "material", by_region(self.material, self.geometry.regions))
         if any(self.gravity):
             require_weight(self.materials)

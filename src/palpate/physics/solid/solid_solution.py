@@ -9,9 +9,9 @@ import numpy as np
 
 from palpate.dataset import conjugate_unit
 from palpate.errors import UsageError
+from palpate.format import number, span
 from palpate.physics.shapes.mesh import BodyMesh
 from palpate.physics.stop import Stop
-from palpate.physics.words import number, span
 from palpate.units import Range
 
 if TYPE_CHECKING:

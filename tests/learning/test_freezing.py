@@ -8,7 +8,7 @@ import pytest
 from laws.beams import INPUT, OUTPUTS, stiffening
 from palpate.learning import Learner, freeze, initial, learn, refined_network
 from palpate.learning.choosing.problem import Problem
-from palpate.learning.stream.gauge import Gauge
+from palpate.learning.stream.output_scaling import OutputScaling
 from palpate.network import Network, Scaling
 from palpate.rbf.filter.prediction import value
 from palpate.rbf.freezing import training_record
@@ -22,7 +22,7 @@ def test_a_frozen_state_says_what_the_state_says_with_modes_or_without():
     plain = freeze(learnt.state, learnt.settings, INPUT, OUTPUTS, learnt.scaling)
     np.testing.assert_allclose(learnt.scaling.scale_outputs(plain.predict(X)), scaled, atol=1e-12)
     V = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
-    turned = Gauge(learnt.scaling, V).frozen(learnt.state, learnt.settings, INPUT, OUTPUTS)
+    turned = OutputScaling(learnt.scaling, V).freeze(learnt.state, learnt.settings, INPUT, OUTPUTS)
     np.testing.assert_allclose(learnt.scaling.scale_outputs(turned.predict(X)), scaled @ V.T, atol=1e-12)
 
 

@@ -8,7 +8,7 @@ import pytest
 from palpate.errors import UsageError
 from palpate.learning.choosing.automatic import automatic, ranges_of
 from palpate.learning.choosing.problem import Problem
-from palpate.learning.measures import relative_error, spread_of
+from palpate.rbf.sample_checks import relative_error, spread_of
 from palpate.units import Quantity
 
 RNG = np.random.default_rng(0)

@@ -227,7 +227,7 @@ def test_reservoir_is_a_uniform_sample():
     for seed in range(runs):
         kept = Reservoir(R, 1, 1, seed=seed)
         for i in range(t):
-            kept.add(np.array([float(i)]), np.array([-float(i)]))
+            kept.add(Observation(np.array([float(i)]), np.array([-float(i)])))
         assert len(kept) == R
         np.testing.assert_array_equal(kept.Y, -kept.X)
         np.testing.assert_array_equal(kept.ages, t - 1 - kept.X[:, 0])
@@ -243,7 +243,7 @@ def test_other_reservoirs_keep_the_recent_past():
     ages = []
     for i in range(3000):
         for kept in (latest, fading):
-            assert kept.add(np.array([float(i)]), np.zeros(1))
+            assert kept.add(Observation(np.array([float(i)]), np.zeros(1)))
         if i > 200:
             ages.append(fading.ages.mean())
     np.testing.assert_array_equal(np.sort(latest.ages), np.arange(10))
@@ -254,8 +254,8 @@ def test_other_reservoirs_keep_the_recent_past():
 def test_a_second_sight_of_a_sample_takes_the_place_of_the_first():
     kept = Reservoir(5, 2, 1)
     for y in range(4):
-        kept.add(np.array([0.1, 0.2]), np.array([float(y)]))
-        kept.add(np.array([0.1, 0.3 + y]), np.array([9.0]))
+        kept.add(Observation(np.array([0.1, 0.2]), np.array([float(y)])))
+        kept.add(Observation(np.array([0.1, 0.3 + y]), np.array([9.0])))
     assert len(kept) == 5
     assert kept.Y[(kept.X == [0.1, 0.2]).all(axis=1)].ravel().tolist() == [3.0]
 
@@ -376,7 +376,7 @@ def test_a_retained_sample_counts_in_the_refinement_what_it_counts_in_the_filter
     inputs, outputs = (Range("x", -1.0, 1.0, "m"),), (Range("y", -1.0, 1.0, "N"),)
     learner = Learner(inputs, outputs, refining=Refining(samples=50, every=1000))
     learner.observe(np.array([0.5]), np.array([0.25]), weight=4.0, slopes=np.array([[1.0]]), slope_weight=0.5)
-    kept = learner._kept
+    kept = learner._reservoir
     seen = Observation(np.array([0.5]), np.array([0.25]), 4.0, np.array([[1.0]]), 0.5)
     rows = Rows.of(
         default().regressors(1),

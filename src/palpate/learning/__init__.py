@@ -20,8 +20,8 @@ dispatch     `palpate.learn`: whichever fits the dataset
 from palpate.learning.bodies import TouchHistory, learn_body
 from palpate.learning.choosing.automatic import automatic
 from palpate.learning.choosing.choice import Fitted, fit
-from palpate.learning.history import History
 from palpate.learning.learn import Learned, freeze, learn
+from palpate.learning.learning_history import History
 from palpate.learning.refinement.structure import Trial, grow, prune, refined_network
 from palpate.learning.stream.learner import Learner
 from palpate.learning.stream.refining import Refining

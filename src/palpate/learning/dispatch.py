@@ -7,7 +7,7 @@ from typing import Any
 from palpate.dataset import Dataset
 from palpate.learning.bodies import TouchHistory, is_touched, learn_body
 from palpate.learning.grasp import HeldSolves, LearntGrasp, learn_grasp
-from palpate.learning.history import History
+from palpate.learning.learning_history import History
 from palpate.learning.touch import learn_touch
 from palpate.surrogates import TouchedBody, TouchModel
 from palpate.surrogates.grasp import GraspSurrogate

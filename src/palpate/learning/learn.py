@@ -10,8 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from palpate.errors import UsageError
 from palpate.learning.choosing.automatic import automatic, check_target
-from palpate.learning.history import History
-from palpate.learning.measures import relative_error, spread_of
+from palpate.learning.learning_history import History
 from palpate.network import Network, Scaling
 from palpate.rbf.filter.observation import Observation
 from palpate.rbf.filter.prediction import value
@@ -20,7 +19,7 @@ from palpate.rbf.filter.state import State, initial
 from palpate.rbf.filter.step import Event, observe
 from palpate.rbf.freezing import freeze, training_record
 from palpate.rbf.output_modes import output_modes
-from palpate.rbf.sample_checks import samples
+from palpate.rbf.sample_checks import relative_error, samples, spread_of
 from palpate.units import Quantity, Range
 
 __all__ = ["Learned", "freeze", "learn"]

@@ -1,4 +1,7 @@
-"""What a user hands over, made into arrays that fit together, or refused in words."""
+"""Samples as arrays that fit together, or refused in words; and errors relative to how much the outputs vary.
+
+Spread and errors hold in whatever unit: squares of SI numbers may under- or overflow.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,14 @@ import numpy as np
 
 from palpate.errors import UsageError
 
-__all__ = ["numbers", "real", "samples", "second_derivatives"]
+__all__ = [
+    "numbers",
+    "real",
+    "relative_error",
+    "samples",
+    "second_derivatives",
+    "spread_of",
+]
 
 
 def numbers(what: str, given: Any, shape: tuple[int | None, ...], *, finite: bool = True) -> np.ndarray:
@@ -205,3 +215,17 @@ def _weights(what: str, given: Any, N: int, columns: int = 0) -> np.ndarray:
             fix="Give a sample that is to be left out a weight of zero.",
         )
     return found
+
+
+def spread_of(Y: np.ndarray) -> float:
+    """Root mean square deviation of the outputs Y (N, m) from their means; 1 where they do not vary."""
+    size = float(np.abs(Y).max())
+    if size == 0.0:
+        return 1.0
+    scaled = Y / size
+    return float(np.sqrt(((scaled - scaled.mean(axis=0)) ** 2).mean())) * size or 1.0
+
+
+def relative_error(predicted: np.ndarray, Y: np.ndarray, spread: float) -> float:
+    """Root mean square error (N, m) over the outputs' spread."""
+    return float(np.sqrt((((predicted - Y) / spread) ** 2).mean()))

@@ -10,8 +10,8 @@ import numpy as np
 
 from palpate.dataset import Dataset, Layout
 from palpate.errors import UsageError
+from palpate.learning.dataset_symmetry import declared_symmetry, widen_ranges
 from palpate.learning.energy.columns import columns_of
-from palpate.learning.symmetry import symmetry_told, widened
 from palpate.surrogates import TouchedSurface
 from palpate.units import Range
 
@@ -96,13 +96,13 @@ class Touches:
         which, radius = _radius_input(data), float(probe["radius"])
         largest = radius if which is None else data.ranges[which].high
         radius = radius if which is None else (data.ranges[which].low + largest) / 2
-        matrices, about = symmetry_told(data)
+        matrices, about = declared_symmetry(data)
         element = data.provenance["problem"].get("element")
         return cls(
             data,
             radius,
             which,
-            (*widened(data.ranges[:3], matrices, about), *data.ranges[3:]),
+            (*widen_ranges(data.ranges[:3], matrices, about), *data.ranges[3:]),
             TouchedSurface.of(
                 rest,
                 touched,

@@ -30,10 +30,9 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.learning.choosing.scatter import noise_variance, spacing
-from palpate.learning.measures import relative_error, spread_of
 from palpate.network import Scaling
 from palpate.rbf.filter.settings import Settings
-from palpate.rbf.sample_checks import numbers, samples
+from palpate.rbf.sample_checks import numbers, relative_error, samples, spread_of
 from palpate.units import Quantity, Range
 
 __all__ = ["UNITS_MAX", "automatic", "check_target", "ranges_of", "relative_error", "spread_of"]

@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from palpate.learning.measures import spread_of
 from palpate.network import Network, Scaling
 from palpate.network.radial import RadialFunction
 from palpate.rbf.freezing import training_record
 from palpate.rbf.output_modes import leading_modes
-from palpate.rbf.sample_checks import samples
+from palpate.rbf.sample_checks import samples, spread_of
 from palpate.units import Quantity, Range
 
 __all__ = ["Problem"]

@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
-from palpate.learning.symmetry import symmetry_told, widened
+from palpate.learning.dataset_symmetry import declared_symmetry, widen_ranges
 from palpate.units import Range
 
 __all__ = ["HeldSolves"]
@@ -65,12 +65,12 @@ class HeldSolves:
         places = [i for i, name in enumerate(own) if name in _AXES]
         order = moves + places + [i for i in range(len(own)) if i not in (*moves, *places)]
         axes = tuple(_AXES[own[i]] for i in places)
-        matrices, about = symmetry_told(data)
+        matrices, about = declared_symmetry(data)
         ranges = tuple(data.ranges[i] for i in order)
         end, k = 3 + len(axes), list(axes)
         inputs = (
-            *widened(ranges[:3], matrices, np.zeros(3)),
-            *(widened(ranges[3:end], matrices[:, k][:, :, k], about[k]) if axes else ()),
+            *widen_ranges(ranges[:3], matrices, np.zeros(3)),
+            *(widen_ranges(ranges[3:end], matrices[:, k][:, :, k], about[k]) if axes else ()),
             *ranges[end:],
         )
         return cls(

@@ -1,5 +1,5 @@
 """Learning while it runs.
 
-learner    the object that observes                  gauge      scaling and modes of a stream
-reservoir  samples retained                          refining   bounded refinement on them
+learner    the object that observes                  output_scaling  scaling and modes of a stream
+reservoir  samples retained                          refining        bounded refinement on them
 """

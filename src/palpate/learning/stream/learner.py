@@ -15,8 +15,8 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from palpate.errors import UsageError
-from palpate.learning.history import History
-from palpate.learning.stream.gauge import Gauge, declared
+from palpate.learning.learning_history import History
+from palpate.learning.stream.output_scaling import OutputScaling, declared_scaling
 from palpate.learning.stream.refining import Progress, Refining, refined_state
 from palpate.learning.stream.reservoir import Reservoir
 from palpate.network import Network, Publisher, Scaling
@@ -98,7 +98,7 @@ class Learner:
                 "A learner needs inputs, outputs, and positive counts.",
                 fix="Name every column, and settle on one observation at least.",
             )
-        self.settings = _checked(inputs, outputs, settings)
+        self.settings = _check_declarations(inputs, outputs, settings)
         self.inputs = tuple(inputs)
         self.outputs = tuple(o if isinstance(o, Quantity) else Quantity(o.name, o.unit) for o in outputs)
         self.refining = refining if refining is not None and refining.every else None
@@ -106,18 +106,18 @@ class Learner:
         # two rules that both add units would add too many
         grows = self.refining is not None and self.refining.grows
         self._filter = replace(self.settings, units_max=0) if grows else self.settings
-        self._scaling = scaling or declared(inputs, outputs)
-        self._gauge: Gauge | None = None
+        self._scaling = scaling or declared_scaling(inputs, outputs)
+        self._output_scaling: OutputScaling | None = None
         self._settle, self._basis, self._seed = settle, basis, seed
         self._early: deque[Observation] = deque(maxlen=_PATIENCE * settle)
         self._state: State | None = None
-        self._kept: Reservoir | None = None
+        self._reservoir: Reservoir | None = None
         self._progress = Progress()
         self._events: deque[tuple[Event, float]] = deque(maxlen=remember)
         self._threads = ThreadpoolController()
         by_modes = self.settings.update == "shared" and len(outputs) > self.settings.modes
         if self._scaling is not None and basis is None and not by_modes:
-            self._start(Gauge(self._scaling))
+            self._start(OutputScaling(self._scaling))
 
     def __repr__(self) -> str:
         return str(self)
@@ -174,8 +174,8 @@ class Learner:
         slopes = None if slopes is None else np.array(slopes, np.float64)
         curvatures = None if curvatures is None else np.array(curvatures, np.float64)
         n, m = len(self.inputs), len(self.outputs)
-        seen = Observation(x, y, weight, slopes, slope_weight, curvatures, curvature_weight)
-        if not _fits(seen, n, m):
+        observation = Observation(x, y, weight, slopes, slope_weight, curvatures, curvature_weight)
+        if not _fits(observation, n, m):
             raise UsageError(
                 f"An observation of shapes {x.shape} and {y.shape} came to a learner of {n} inputs and {m} outputs.",
                 why="Every array has a row for each output, and weights one number, or one for each column.",
@@ -185,7 +185,9 @@ class Learner:
         self.count += 1
         with self._threads.limit(limits=1), np.errstate(all="ignore"):
             event = (
-                self._settling(seen) if self._gauge is None else self._learnt(self._gauge.observation(seen))
+                self._settle_scaling(observation)
+                if self._output_scaling is None
+                else self._learn(self._output_scaling.scale(observation))
             )
         innovation = np.nan if self._state is None else self._state.innovation
         self._events.append((event, innovation))
@@ -209,18 +211,18 @@ class Learner:
 
     @property
     def network(self) -> Network:
-        """What has been learnt so far, frozen.
+        """The network learnt so far, frozen.
 
         Raises
         ------
         UsageError
             Before the first observation, unless the scaling is declared.
         """
-        if self._gauge is not None:
-            return self._gauge.frozen(self.state, self.settings, self.inputs, self.outputs)
+        if self._output_scaling is not None:
+            return self._output_scaling.freeze(self.state, self.settings, self.inputs, self.outputs)
         if not self._early:
             raise UsageError("Nothing has been observed yet.", fix="Observe, or declare the scaling.")
-        scaling = self._scaling or Scaling.of(self.inputs, np.array([one.y for one in self._early]))
+        scaling = self._scaling or Scaling.of(self.inputs, np.array([o.y for o in self._early]))
         mean = initial(len(self.inputs), len(self.outputs), self.settings)
         return freeze(mean, self.settings, self.inputs, self.outputs, scaling)
 
@@ -241,88 +243,84 @@ class Learner:
 
     @property
     def numbers(self) -> int:
-        """How many numbers are kept, but for events: parameters, covariance, memory and retained samples."""
+        """Count of the numbers kept, but for events: parameters, covariance, memory and retained samples."""
         s = self.state
         own = s.coefficients.size + s.theta.size + s.covariance.numbers + s.memory.size + s.errors.size
-        return own + (0 if self._kept is None else self._kept.numbers)
+        return own + (0 if self._reservoir is None else self._reservoir.numbers)
 
     @property
     def history(self) -> History:
-        """What the last observations did."""
+        """The record of the last observations."""
         events, innovation = zip(*self._events, strict=True) if self._events else ((), ())
         return History.of(events, innovation, (), 1)
 
-    def _settling(self, seen: Observation) -> Event:
+    def _settle_scaling(self, observation: Observation) -> Event:
         """Before the scaling is known: collect; with the last one, learn all."""
-        if seen.flaw:
-            return _skipped(0, seen.flaw)
-        self._early.append(seen)
+        if observation.flaw:
+            return _skip(0, observation.flaw)
+        self._early.append(observation)
         if not self._settled():
-            return _skipped(0, "settling the scaling")
-        Y = np.array([one.y for one in self._early])
+            return _skip(0, "settling the scaling")
+        Y = np.array([o.y for o in self._early])
         scaling = self._scaling or Scaling.of(self.inputs, Y)
         directions = output_modes(scaling.scale_outputs(Y), self._basis) if self._basis else None
-        gauge = self._start(Gauge(scaling, directions), Y)
+        output_scaling = self._start(OutputScaling(scaling, directions), Y)
         early = list(self._early)
         self._early.clear()
-        return [self._learnt(gauge.observation(one)) for one in early][-1]
+        return [self._learn(output_scaling.scale(o)) for o in early][-1]
 
     def _settled(self) -> bool:
-        """Whether what came so far says something of the outputs' size: an idle sensor does not."""
+        """True once the observations say something of the outputs' size: an idle sensor does not."""
         if len(self._early) < self._settle:
             return False
-        X = np.array([one.x for one in self._early])
+        X = np.array([o.x for o in self._early])
         low, high = bounds(self.inputs)
         moved = float((np.ptp(X, axis=0) / (high - low)).max()) >= _MOVED
-        varied = any(not np.array_equal(one.y, self._early[0].y) for one in self._early)
+        varied = any(not np.array_equal(o.y, self._early[0].y) for o in self._early)
         return self._scaling is not None or (varied and (moved or len(self._early) == self._early.maxlen))
 
-    def _start(self, gauge: Gauge, Y: np.ndarray | None = None) -> Gauge:
-        self._gauge, self._state = gauge, gauge.initial(self.settings, Y)
+    def _start(self, output_scaling: OutputScaling, Y: np.ndarray | None = None) -> OutputScaling:
+        self._output_scaling, self._state = output_scaling, output_scaling.initial_state(self.settings, Y)
         if self.refining is not None:
             size = self._state.inputs, self._state.outputs
             keeping, samples = self.refining.keeping, self.refining.samples
-            self._kept = Reservoir(samples, *size, keeping=keeping, seed=self._seed)
-        return gauge
+            self._reservoir = Reservoir(samples, *size, keeping=keeping, seed=self._seed)
+        return output_scaling
 
-    def _learnt(self, seen: Observation) -> Event:
+    def _learn(self, observation: Observation) -> Event:
         state = self.state
-        if seen.flaw:
-            return _skipped(state.units, seen.flaw)
-        if np.abs(seen.x).max() > _FARTHEST_INPUT or np.abs(seen.targets()).max() > _FARTHEST_OUTPUT:
-            return _skipped(state.units, "far outside the declared scales")
-        state, event = observe(state, seen, self._filter, donate=True)
+        if observation.flaw:
+            return _skip(state.units, observation.flaw)
+        if (
+            np.abs(observation.x).max() > _FARTHEST_INPUT
+            or np.abs(observation.targets()).max() > _FARTHEST_OUTPUT
+        ):
+            return _skip(state.units, "far outside the declared scales")
+        state, event = observe(state, observation, self._filter, donate=True)
         if event.why:
             return event
-        if self._kept is not None and self.refining is not None:
-            self._kept.add(
-                *(seen.x, seen.y),
-                weight=seen.weight,
-                slopes=seen.slopes,
-                slope_weight=seen.slope_weight,
-                curvatures=seen.curvatures,
-                curvature_weight=seen.curvature_weight,
-            )
-            if self._kept.seen % self.refining.every == 0:
-                before, state = state.units, self._refined(state, self._kept, self.refining)
+        if self._reservoir is not None and self.refining is not None:
+            self._reservoir.add(observation)
+            if self._reservoir.seen % self.refining.every == 0:
+                before, state = state.units, self._refine(state, self._reservoir, self.refining)
                 event = replace(
                     event, grew=event.grew or state.units > before, units=state.units, refined=True
                 )
         self._state = state
         return event
 
-    def _refined(self, state: State, kept: Reservoir, refining: Refining) -> State:
+    def _refine(self, state: State, reservoir: Reservoir, refining: Refining) -> State:
         try:
-            found, progress = refined_state(state, kept, self.settings, refining, self._progress)
+            refined, progress = refined_state(state, reservoir, self.settings, refining, self._progress)
         except ValueError:  # LAPACK's, for a matrix that is singular or not finite: the filter goes on alone
             self._progress = Progress()
             return state
-        sound = np.isfinite(found.coefficients).all() and np.isfinite(found.theta).all()
+        sound = np.isfinite(refined.coefficients).all() and np.isfinite(refined.theta).all()
         self._progress = progress if sound else Progress()
-        return found if sound else state
+        return refined if sound else state
 
 
-def _checked(
+def _check_declarations(
     inputs: Sequence[Range], outputs: Sequence[Quantity | Range], settings: Settings | None
 ) -> Settings:
     """The settings, once the declarations are what they are taken for."""
@@ -338,16 +336,16 @@ def _checked(
     return default() if settings is None else settings
 
 
-def _skipped(units: int, why: str) -> Event:
+def _skip(units: int, why: str) -> Event:
     return Event(np.nan, np.nan, False, False, 0, units, why)
 
 
-def _fits(seen: Observation, n: int, m: int) -> bool:
-    """Whether an observation's arrays are those of n inputs and m outputs."""
-    fits = seen.x.shape == (n,) and seen.y.shape == (m,)
+def _fits(observation: Observation, n: int, m: int) -> bool:
+    """True where an observation's arrays are those of n inputs and m outputs."""
+    fits = observation.x.shape == (n,) and observation.y.shape == (m,)
     for known, weight, q in (
-        (seen.slopes, seen.slope_weight, n),
-        (seen.curvatures, seen.curvature_weight, n * (n + 1) // 2),
+        (observation.slopes, observation.slope_weight, n),
+        (observation.curvatures, observation.curvature_weight, n * (n + 1) // 2),
     ):
         fits = fits and (known is None or known.shape == (m, q)) and np.shape(weight) in {(), (q,)}
     return fits

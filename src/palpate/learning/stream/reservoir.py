@@ -7,6 +7,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.rbf.filter.observation import Observation
 
 __all__ = ["Keeping", "Reservoir"]
 
@@ -73,7 +74,7 @@ class Reservoir:
 
     @property
     def ages(self) -> np.ndarray:
-        """How many samples came after each, (N,)."""
+        """Count of the samples that came after each, (N,)."""
         return np.asarray(self.seen - 1 - self._times[: len(self)])
 
     @property
@@ -103,36 +104,28 @@ class Reservoir:
 
     @property
     def numbers(self) -> int:
-        """How many numbers there is room for."""
+        """Count of the numbers that there is room for."""
         first = (self._slopes, self._slope_weights)
         second = (self._curvatures, self._curvature_weights)
         parts = (self._x, self._y, self._times, self._weights, *first, *second)
         return sum(p.size for p in parts if p is not None)
 
-    def add(
-        self,
-        x: np.ndarray,
-        y: np.ndarray,
-        *,
-        weight: float = 1.0,
-        slopes: np.ndarray | None = None,
-        slope_weight: float | np.ndarray = 1.0,
-        curvatures: np.ndarray | None = None,
-        curvature_weight: float | np.ndarray = 1.0,
-    ) -> bool:
-        """Show one more sample x (n,), y (m,), with what `Observation` may hold; whether it was kept."""
-        place = self._place(x)
+    def add(self, observation: Observation) -> bool:
+        """Show one more sample, in scaled quantities; True where it was kept."""
+        o, place = observation, self._place(observation.x)
         self.seen += 1
         if place >= self.capacity:
             return False
-        self._x[place], self._y[place] = x, y
+        self._x[place], self._y[place] = o.x, o.y
         self._times[place] = self.seen - 1
-        self._weights[place] = weight
+        self._weights[place] = o.weight
         self._slopes, self._slope_weights = _put(
-            *(place, self.capacity, self._slopes, self._slope_weights), slopes, slope_weight
+            *(place, self.capacity, self._slopes, self._slope_weights), o.slopes, o.slope_weight
         )
         self._curvatures, self._curvature_weights = _put(
-            *(place, self.capacity, self._curvatures, self._curvature_weights), curvatures, curvature_weight
+            *(place, self.capacity, self._curvatures, self._curvature_weights),
+            o.curvatures,
+            o.curvature_weight,
         )
         return True
 

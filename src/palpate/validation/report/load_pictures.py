@@ -10,7 +10,7 @@ import numpy as np
 from palpate.dataset import Dataset
 from palpate.format import count, length, plain, scientific
 from palpate.learning import History
-from palpate.learning.drawing import draw_passes, draw_units
+from palpate.learning.learning_history import draw_passes, draw_units
 from palpate.surrogates import TouchModel
 from palpate.units import bounds
 from palpate.validation.figures.by_load import NETWORKS, NetworkErrors, node_truth, predicted_field

@@ -9,16 +9,16 @@ import numpy as np
 from palpate.dataset import Dataset
 from palpate.units import Range, bounds
 
-__all__ = ["symmetry_told", "widened"]
+__all__ = ["declared_symmetry", "widen_ranges"]
 
 
-def symmetry_told(data: Dataset) -> tuple[np.ndarray, np.ndarray]:
+def declared_symmetry(data: Dataset) -> tuple[np.ndarray, np.ndarray]:
     """Isometries (k, 3, 3) by a dataset's provenance, the identity among them, and the point (3,) that stays, m."""
     told = data.provenance.get("symmetry") or {"about": [0.0, 0.0, 0.0], "isometries": [np.eye(3).tolist()]}
     return np.array(told["isometries"], dtype=float), np.array(told["about"], dtype=float)
 
 
-def widened(ranges: tuple[Range, ...], matrices: np.ndarray, about: np.ndarray) -> tuple[Range, ...]:
+def widen_ranges(ranges: tuple[Range, ...], matrices: np.ndarray, about: np.ndarray) -> tuple[Range, ...]:
     """The ranges of a vector's components, so that all images of their box are inside.
 
     Parameters

@@ -1,4 +1,4 @@
-"""Between what a sensor says and what the filter learns: scaled inputs, scaled outputs or their modes."""
+"""Scaling of a stream: from a sensor's quantities to those that the filter learns, scaled outputs or their modes."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from palpate.rbf.output_modes import output_modes
 from palpate.rbf.regressors import pairs
 from palpate.units import Quantity, Range, bounds
 
-__all__ = ["Gauge", "declared"]
+__all__ = ["OutputScaling", "declared_scaling"]
 
 
 @dataclass(frozen=True, eq=False)
-class Gauge:
+class OutputScaling:
     """A scaling, and output modes to learn in.
 
     Attributes
@@ -33,19 +33,25 @@ class Gauge:
     scaling: Scaling
     directions: np.ndarray | None = None
 
-    def observation(self, seen: Observation) -> Observation:
-        """In the filter's quantities, from SI units."""
+    def scale(self, observation: Observation) -> Observation:
+        """An observation in SI units, in the filter's quantities."""
         s, V = self.scaling, self.directions
-        y = s.scale_outputs(seen.y)
-        slopes = None if seen.slopes is None else seen.slopes * s.input_half / s.output_scale[:, None]
-        curvatures, (i, j) = seen.curvatures, pairs(seen.x.size)
+        y = s.scale_outputs(observation.y)
+        slopes = (
+            None
+            if observation.slopes is None
+            else observation.slopes * s.input_half / s.output_scale[:, None]
+        )
+        curvatures, (i, j) = observation.curvatures, pairs(observation.x.size)
         if curvatures is not None:
             curvatures = curvatures * (s.input_half[i] * s.input_half[j]) / s.output_scale[:, None]
         if V is not None:
             y, slopes, curvatures = y @ V, _along(V, slopes), _along(V, curvatures)
-        return replace(seen, x=s.scale_inputs(seen.x), y=y, slopes=slopes, curvatures=curvatures)
+        return replace(
+            observation, x=s.scale_inputs(observation.x), y=y, slopes=slopes, curvatures=curvatures
+        )
 
-    def initial(self, settings: Settings, Y: np.ndarray | None) -> State:
+    def initial_state(self, settings: Settings, Y: np.ndarray | None) -> State:
         """The state to begin with; early outputs Y (N, m) in SI units decide the shared-weight rule's modes."""
         n, m = self.scaling.input_half.size, self.scaling.output_scale.size
         modes = None
@@ -56,7 +62,7 @@ class Gauge:
             modes = output_modes(self.scaling.scale_outputs(Y), settings.modes)
         return initial(n, m, settings, modes if settings.update == "shared" else None)
 
-    def frozen(
+    def freeze(
         self, state: State, settings: Settings, inputs: tuple[Range, ...], outputs: tuple[Quantity, ...]
     ) -> Network:
         """The state as a network value in SI units."""
@@ -64,8 +70,8 @@ class Gauge:
         return freeze(state, settings, inputs, outputs, self.scaling, basis=self.directions, meta=meta)
 
 
-def declared(inputs: Sequence[Range], outputs: Sequence[Quantity | Range]) -> Scaling | None:
-    """The scaling that ranges of all outputs declare: their middles, and half of the widest."""
+def declared_scaling(inputs: Sequence[Range], outputs: Sequence[Quantity | Range]) -> Scaling | None:
+    """The scaling that ranges of all outputs declare, their middles and half of the widest; None without them."""
     ranges = [o for o in outputs if isinstance(o, Range)]
     if len(ranges) < len(outputs):
         return None

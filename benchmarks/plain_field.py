@@ -16,7 +16,7 @@ from numpy.polynomial.chebyshev import chebvander
 from benchmarks.plain_query import PlainQuery
 from palpate.network import Network, Scaling, TrainedRegion
 from palpate.surrogates import ContactLaw, FieldSurrogate, TouchedSurface, TouchSurrogate
-from palpate.surrogates.field import Dimple, Rise, Variation
+from palpate.surrogates.fields import DepthAmplitude, LocalMode, Variation
 from palpate.units import Quantity, Range, bounds
 
 __all__ = ["PlainField", "made"]
@@ -28,8 +28,8 @@ class PlainField:
     """The field of a surrogate of Gaussian units and fixed radius, on a plane face z = 0, one touch at a time."""
 
     def __init__(self, field: FieldSurrogate) -> None:
-        assert field.dimple is not None
-        net, self.field, self.dimple = field.network, field, field.dimple
+        assert field.local_mode is not None
+        net, self.field, self.local_mode = field.network, field, field.local_mode
         s = net.scaling
         self.rows = np.hstack([net.tail, net.weights]) * s.output_scale[:, None]
         self.modes = field.modes.reshape(len(field.modes), -1)
@@ -38,19 +38,21 @@ class PlainField:
 
     def __call__(self, c: np.ndarray) -> np.ndarray:
         """The field (nodes, 3) of a probe with its centre at c (3,), in contact."""
-        net, table, reach = self.field.network, self.dimple.table, self.dimple.reach
+        net, table, reach = self.field.network, self.local_mode.table, self.local_mode.reach
         s = self.field.radius - c[2]
         x = (c - net.scaling.input_centre) / net.scaling.input_half
         v = net.factors @ x - net.shifts
         b = self.rows @ np.concatenate([[1.0], x, np.exp(-(v * v).sum(axis=1))])
-        f = float(self.field.rise.at(np.array(s)))
+        f = float(self.field.amplitude.at(np.array(s)))
         out = ((f * b) @ self.modes).reshape(-1, 3) + self.field.rest
         foot, r = np.array([c[0], c[1], 0.0]), table.shape[1]
         offset = (self.points - foot) / reach
         distance = np.sqrt((offset**2).sum(axis=1))
         near = np.flatnonzero(distance < 1.0)
-        j, of_depth = _splines(np.array([s / self.field.rise.deepest]) * (table.shape[2] - 3), table.shape[2])
-        profile = self.varied(foot, s / self.field.rise.deepest)
+        j, of_depth = _splines(
+            np.array([s / self.field.amplitude.deepest]) * (table.shape[2] - 3), table.shape[2]
+        )
+        profile = self.varied(foot, s / self.field.amplitude.deepest)
         along, across = table[:, :, j[0] : j[0] + 4] @ of_depth[:, 0]
         profile[:, 0, 2] += along
         profile[:, 1, 0] += across
@@ -63,7 +65,7 @@ class PlainField:
 
     def varied(self, foot: np.ndarray, share: float) -> np.ndarray:
         """The variation's profile (r, 4, 3) at a foot (3,) and a share of the deepest depth."""
-        own = self.dimple.variation
+        own = self.local_mode.variation
         assert own is not None
         q, m = own.table.shape[:2]
         j, of_depth = _splines(np.array([share]) * (q - 3), q)
@@ -112,10 +114,10 @@ def made(nodes: int = NODES, modes: int = MODES) -> tuple[TouchSurrogate, FieldS
         points,
         np.zeros((0, 3), np.int64),
         np.full(nodes, 1.0 / nodes),
-        rise=Rise("series", DEEPEST, 1e-3),
+        amplitude=DepthAmplitude("series", DEEPEST, 1e-3),
         surface=face,
         radius=RADIUS,
-        dimple=Dimple(table, 5 * RADIUS, 1e-4, variation),
+        local_mode=LocalMode(table, 5 * RADIUS, 1e-4, variation),
     )
     region = TrainedRegion.of(rng.uniform(-1.0, 1.0, (400, 3)))
     root = 1e-3 * rng.normal(size=(4 + UNITS, 20))

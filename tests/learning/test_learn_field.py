@@ -16,14 +16,20 @@ from palpate.learning.fields import (
     learn_snapshots,
     lumped_mass,
 )
-from palpate.learning.fields.dimples import borders, faded, fitted_dimple
-from palpate.learning.fields.modes import left_out
-from palpate.learning.fields.solves import Solves
-from palpate.learning.fields.varying import by_conjugate_gradients, degrees, directions
+from palpate.learning.fields.decompose_field import left_out
+from palpate.learning.fields.fit_local_mode import (
+    border_widths,
+    by_conjugate_gradients,
+    degrees,
+    directions,
+    fade_out,
+    fit_local_mode,
+)
+from palpate.learning.fields.snapshots import Solves
 from palpate.surrogates import TouchedSurface
-from palpate.surrogates.field import Dimple, Rise, Variation
-from palpate.surrogates.field.carrying import Carrier
-from palpate.surrogates.field.dimple import design
+from palpate.surrogates.fields import DepthAmplitude, LocalMode, Variation
+from palpate.surrogates.fields.local_mode import design
+from palpate.surrogates.fields.surface_interpolation import SurfaceInterpolation
 from palpate.units import Range
 
 RADIUS, DEEPEST = 0.010, 0.006
@@ -134,9 +140,9 @@ def test_rigid_fields_whose_coefficients_are_affine_are_found_exactly(face):
     values = 1e-3 * np.tensordot(f[:, None] * b, shapes, 1)
     known = {"points": points, "triangles": triangles, "surface": surface, "radius": RADIUS, "inputs": BOX}
     learnt = learn_field(
-        X, values, **known, tolerance=1e-12, travelling=False, groups=column, units_max=4, seconds=10
+        X, values, **known, tolerance=1e-12, moving=False, groups=column, units_max=4, seconds=10
     )
-    assert learnt.field.rise.name == "square"
+    assert learnt.field.amplitude.name == "square"
     assert len(learnt.field.modes) == 4
     new, _ = columns(5, seed=1)
     bn = np.column_stack(
@@ -152,10 +158,10 @@ def test_rigid_fields_whose_coefficients_are_affine_are_found_exactly(face):
 
 @pytest.mark.parametrize("components", [1, 3])
 def test_a_dimple_alone_needs_no_modes(face, components):
-    """A field that is the same everywhere in the probe's frame is shown by the travelling part, where modes fail."""
+    """A field that is the same everywhere in the probe's frame is shown by the moving part, where modes fail."""
     points, triangles, surface = face
     mass = lumped_mass(points, triangles)
-    rise = Rise("square", DEEPEST)
+    amplitude = DepthAmplitude("square", DEEPEST)
 
     def dimples(X):
         offset = points[None] - np.column_stack([X[:, :2], np.zeros(len(X))])[:, None]
@@ -174,14 +180,14 @@ def test_a_dimple_alone_needs_no_modes(face, components):
         one = Snapshots(X, dimples(X), np.arange(len(X)), points, mass, triangles)
         return Solves.of([one], BOX, surface, RADIUS, points, triangles, mass)
 
-    dimple = fitted_dimple(solves(X), rise)
-    (shown,) = solves(new).travelling(dimple, rise)
+    local_mode = fit_local_mode(solves(X), amplitude)
+    (shown,) = solves(new).moving(local_mode, amplitude)
     # splines of 3.6 mm on a polynomial of degree 8: h⁴ |g''''|/384 of it
     assert np.abs(shown - dimples(new)).max() < 0.01 * np.abs(dimples(new)).max()
 
     more = {**known, "triangles": triangles, "radius": RADIUS, "inputs": BOX, "groups": column}
     errors = [
-        learn_field(X, dimples(X), **more, travelling=t, rise="square", seconds=3, units_max=2)
+        learn_field(X, dimples(X), **more, moving=t, amplitude="square", seconds=3, units_max=2)
         .field.errors(new, dimples(new))
         .mean()
         for t in (True, False)
@@ -204,10 +210,10 @@ def test_a_dimple_that_differs_from_place_to_place_is_learnt(face, components):
     X, column = columns(30)
     new, _ = columns(12, seed=1)
     known = {"surface": surface, "points": points, "triangles": triangles, "radius": RADIUS, "inputs": BOX}
-    learnt = learn_field(X, dimples(X), **known, groups=column, rise="square", seconds=1, units_max=2)
-    assert learnt.field.dimple.variation is not None
-    assert "a dimple that varies" in str(learnt.field)
-    fixed = replace(learnt.field, dimple=replace(learnt.field.dimple, variation=None))
+    learnt = learn_field(X, dimples(X), **known, groups=column, amplitude="square", seconds=1, units_max=2)
+    assert learnt.field.local_mode.variation is not None
+    assert "a local mode that varies" in str(learnt.field)
+    fixed = replace(learnt.field, local_mode=replace(learnt.field.local_mode, variation=None))
     missed, without = (F.errors(new, dimples(new)) for F in (learnt.field, fixed))
     assert missed.max() < 0.2 * without.max()
     assert missed.mean() < 0.1 * without.mean()
@@ -222,10 +228,12 @@ def test_a_dimple_that_is_the_same_everywhere_does_not_vary(face):
     values = 1e-3 * np.where(rho < 1, (1 - rho**2) ** 4, 0.0) * (s**2)[:, None]
     values += rng.normal(0.0, 1e-5, values.shape)  # what no place tells
     known = {"surface": surface, "points": points, "triangles": triangles, "radius": RADIUS, "inputs": BOX}
-    learnt = learn_field(X, values, **known, groups=column, rise="square", seconds=1, units_max=2)
-    assert learnt.field.dimple.variation is None
-    alone = learn_field(X, values, **known, groups=np.zeros(len(X)), rise="square", seconds=1, units_max=2)
-    assert alone.field.dimple.variation is None, "nothing can be left out"
+    learnt = learn_field(X, values, **known, groups=column, amplitude="square", seconds=1, units_max=2)
+    assert learnt.field.local_mode.variation is None
+    alone = learn_field(
+        X, values, **known, groups=np.zeros(len(X)), amplitude="square", seconds=1, units_max=2
+    )
+    assert alone.field.local_mode.variation is None, "nothing can be left out"
 
 
 @pytest.mark.parametrize(("off", "count"), [(0.0, 1), (3e-4, 2), (1e-3, 1)])
@@ -238,7 +246,7 @@ def test_nodes_that_lie_a_little_off_the_surface_are_tried_with_and_without(face
     X, column = columns(2)
     one = Snapshots(X, np.zeros((6, 3, 1)), column, points, np.full(3, 1 / 3), triangles)
     solves = Solves.of([one], BOX, face[2], RADIUS, points, triangles, one.mass)
-    assert len(borders(solves)) == count
+    assert len(border_widths(solves)) == count
 
 
 def test_a_dimple_fades_to_nothing_at_its_reach():
@@ -250,8 +258,8 @@ def test_a_dimple_fades_to_nothing_at_its_reach():
     smooth = np.cos(3.0 * greville)[None, :, None] * rng.uniform(0.5, 1.0, (2, 1, 4))
     varied = smooth[0, :, 0][None, None, :, None, None] * rng.normal(size=(4, 3, 1, 4, 3))
     own = Variation(varied, np.array([[0], [1], [2]]), np.eye(3)[:1], np.array([[0.0], [1.0]]))
-    free = Dimple(smooth, 0.05, 1e-4, own)
-    found = faded(free)
+    free = LocalMode(smooth, 0.05, 1e-4, own)
+    found = fade_out(free)
     u = np.clip((t - 0.3) / 0.7, 0.0, 1.0)
     window = (1.0 - u) ** 3 * (1.0 + 3.0 * u + 6.0 * u**2)  # 1 and 0 at its ends, with two derivatives
     before, after = (np.einsum("ti,pij->tpj", design(t * (r - 3), r), one.table) for one in (free, found))
@@ -266,7 +274,7 @@ def test_a_dimple_fades_to_nothing_at_its_reach():
 
 
 def test_what_travels_is_learnt_at_the_nodes_that_it_was_solved_on(face):
-    """A dimple as narrow as two elements, on three meshes: carried from node to node it loses its flank."""
+    """A local mode as narrow as two elements, on three meshes: carried from node to node it loses its flank."""
     points, triangles, surface = face
     rng = np.random.default_rng(0)
     inner = (np.abs(points[:, :2]) < 0.029).all(axis=1)
@@ -285,13 +293,16 @@ def test_what_travels_is_learnt_at_the_nodes_that_it_was_solved_on(face):
     new, _ = columns(12, seed=1)
     mass = lumped_mass(points, triangles)
     known = {"inputs": BOX, "points": points, "triangles": triangles, "surface": surface, "radius": RADIUS}
-    known |= {"rise": "linear", "seconds": 1, "units_max": 2, "mass": mass}
+    known |= {"amplitude": "linear", "seconds": 1, "units_max": 2, "mass": mass}
     own = Snapshots(
         X, dimples(X, solved)[..., None], column, solved, lumped_mass(solved, triangles), triangles
     )
     up = np.tile([0.0, 0.0, 1.0], (len(points), 1))
     carried = replace(
-        own, values=Carrier.of(solved, triangles, points, up)(own.values), points=points, mass=mass
+        own,
+        values=SurfaceInterpolation.of(solved, triangles, points, up)(own.values),
+        points=points,
+        mass=mass,
     )
     errors = []
     for one in (own, carried):
@@ -359,7 +370,7 @@ def test_what_cannot_be_learnt_is_refused(face):
     known = {"points": points, "triangles": triangles, "surface": surface, "radius": RADIUS, "inputs": BOX}
     values = np.zeros((9, len(points), 3))
     for more, words in (
-        ({"rise": "cube"}, "rise"),
+        ({"amplitude": "cube"}, "grow"),
         ({"seconds": 0}, "no learning"),
         ({"triangles": triangles[:0]}, "area"),
     ):

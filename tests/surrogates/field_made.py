@@ -10,7 +10,7 @@ from touch_made import BOX, DEEPEST, RADIUS, ball, plane
 
 from palpate.network import Network, Scaling
 from palpate.surrogates import FieldSurrogate
-from palpate.surrogates.field import Dimple, Rise, Variation
+from palpate.surrogates.fields import DepthAmplitude, LocalMode, Variation
 from palpate.units import Quantity, Range, bounds
 
 
@@ -38,9 +38,17 @@ def variation(components: int, parameters: Sequence[Range], rng: np.random.Gener
 
 
 def field(
-    *, components: int = 3, modes: int = 5, extra=(), dimple=True, varied=True, curved=False, seed=0, **more
+    *,
+    components: int = 3,
+    modes: int = 5,
+    extra=(),
+    local_mode=True,
+    varied=True,
+    curved=False,
+    seed=0,
+    **more,
 ) -> FieldSurrogate:
-    """A field of random modes, coefficients and dimple on the grid."""
+    """A field of random modes, coefficients and local mode on the grid."""
     rng = np.random.default_rng(seed)
     points, triangles = grid()
     nodes, inputs = len(points), (*BOX, *extra)
@@ -61,10 +69,10 @@ def field(
         scaling=Scaling((low + high) / 2, (high - low) / 2, np.zeros(modes), np.full(modes, 1e-3)),
     )
     parts = {
-        "rise": Rise("series", DEEPEST, 1e-3),
+        "amplitude": DepthAmplitude("series", DEEPEST, 1e-3),
         "surface": ball() if curved else plane(),
         "radius": RADIUS,
-        "dimple": Dimple(table, 0.02, 2e-3, own) if dimple else None,
+        "local_mode": LocalMode(table, 0.02, 2e-3, own) if local_mode else None,
         "rest": rng.normal(0.0, 1e-3, (nodes, components)),
     } | more
     rest = parts.pop("rest")

@@ -15,9 +15,9 @@ from palpate.learning.correction.written import raised
 from palpate.network import Archive, load_archive, save_archive
 from palpate.runtime.touchable import load_touchable, touchable
 from palpate.surrogates import FieldSurrogate, TouchedBody
-from palpate.surrogates.field import Dimple, Rise, Variation
-from palpate.surrogates.field.dimple import products
-from palpate.surrogates.field.rise import RISES
+from palpate.surrogates.fields import DepthAmplitude, LocalMode, Variation
+from palpate.surrogates.fields.depth_amplitude import AMPLITUDES
+from palpate.surrogates.fields.local_mode import products
 from palpate.surrogates.loading import load
 
 
@@ -27,25 +27,29 @@ def by_formula(F: FieldSurrogate, x: np.ndarray) -> np.ndarray:
 
     d, n, _ = (a[0] for a in F.surface.at(x[None, :3]))
     s = F.radius - d
-    p, a = {"linear": 1.0, "hertz": 1.5, "square": 2.0, "series": 2.0}[F.rise.name], F.rise.length
-    f = (s / F.rise.deepest) ** p * math.sqrt((1 + F.rise.deepest / a) / (1 + s / a))
+    p, a = {"linear": 1.0, "hertz": 1.5, "square": 2.0, "series": 2.0}[F.amplitude.name], F.amplitude.length
+    f = (s / F.amplitude.deepest) ** p * math.sqrt((1 + F.amplitude.deepest / a) / (1 + s / a))
     shown = np.tensordot(F.network.predict(x[None])[0], F.modes, 1)
-    if F.dimple is not None:
-        _, r, q = F.dimple.table.shape
+    if F.local_mode is not None:
+        _, r, q = F.local_mode.table.shape
         offset = F.points - (x[:3] - d * n)
         rho = np.linalg.norm(offset, axis=1)
-        near = np.flatnonzero(F.touched & (rho < F.dimple.reach))
-        in_depth = BSpline(np.arange(-3.0, q + 1), np.moveaxis(F.dimple.table, 2, 0), 3)
-        profile = in_depth(s / F.rise.deepest * (q - 3))  # (parts, r)
-        g = BSpline(np.arange(-3.0, r + 1), profile.T, 3)(rho[near] / F.dimple.reach * (r - 3))
+        near = np.flatnonzero(F.touched & (rho < F.local_mode.reach))
+        in_depth = BSpline(np.arange(-3.0, q + 1), np.moveaxis(F.local_mode.table, 2, 0), 3)
+        profile = in_depth(s / F.amplitude.deepest * (q - 3))  # (parts, r)
+        g = BSpline(np.arange(-3.0, r + 1), profile.T, 3)(rho[near] / F.local_mode.reach * (r - 3))
         if F.rest.shape[1] == 1:
             shown[near, 0] += g[:, 0]
         else:
             across = offset[near] - (offset[near] @ n)[:, None] * n
-            shown[near] += g[:, :1] * n + g[:, 1:] * across / F.dimple.reach
-        if F.dimple.variation is not None:
+            shown[near] += g[:, :1] * n + g[:, 1:] * across / F.local_mode.reach
+        if F.local_mode.variation is not None:
             shown[near] += varied(
-                F.dimple.variation, x, x[:3] - d * n, s / F.rise.deepest, offset[near] / F.dimple.reach
+                F.local_mode.variation,
+                x,
+                x[:3] - d * n,
+                s / F.amplitude.deepest,
+                offset[near] / F.local_mode.reach,
             )
     return F.rest + f * shown
 
@@ -65,10 +69,13 @@ def varied(own: Variation, x: np.ndarray, foot: np.ndarray, share: float, offset
     return np.einsum("nh,nhc->nc", np.column_stack([np.ones(len(rho)), offset]), at)
 
 
-@pytest.mark.parametrize("rise", RISES)
+@pytest.mark.parametrize("amplitude", AMPLITUDES)
 @pytest.mark.parametrize("components", [1, 3])
-def test_the_field_is_its_formula(rise, components):
-    F = field(components=components, rise=Rise(rise, DEEPEST, 1e-3 if rise == "series" else math.inf))
+def test_the_field_is_its_formula(amplitude, components):
+    F = field(
+        components=components,
+        amplitude=DepthAmplitude(amplitude, DEEPEST, 1e-3 if amplitude == "series" else math.inf),
+    )
     X = inside_points(20)
     expected = np.array([by_formula(F, x) for x in X])
     assert F.touched.sum() == len(F.points) - 1
@@ -88,7 +95,7 @@ def test_the_dimple_of_a_family_varies_with_its_parameters_and_the_place_as_far_
     X = inside_points(20, (SOFT,))
     expected = np.array([by_formula(F, x) for x in X])
     np.testing.assert_allclose(F.values(X), expected, rtol=0, atol=1e-13 * np.abs(expected).max())
-    told = F.dimple.variation.variables(X[:, :3], X[:, 3:])
+    told = F.local_mode.variation.variables(X[:, :3], X[:, 3:])
     assert (np.abs(told) == 1.0).any()
     assert (np.abs(told[:, 2]) < 1.0).any()
 
@@ -137,9 +144,9 @@ def test_with_rest_zero_nothing_moves_without_contact_and_little_at_first_touch(
 
 
 def test_beyond_the_trained_depth_the_field_goes_on_in_proportion():
-    rise = Rise("square", DEEPEST)
+    amplitude = DepthAmplitude("square", DEEPEST)
     s = DEEPEST * np.array([-1.0, 0.0, 0.5, 1.0, 2.0, 3.0])
-    np.testing.assert_allclose(rise.at(s), [0, 0, 0.25, 1, 2, 3], rtol=1e-15)
+    np.testing.assert_allclose(amplitude.at(s), [0, 0, 0.25, 1, 2, 3], rtol=1e-15)
     F = field()
     far = np.array([[0.0, 0.0, -0.2], [0.3, 0.2, 0.0], [0.0, 0.0, RADIUS - 10 * DEEPEST]])
     assert np.isfinite(F.values(far)).all()
@@ -161,14 +168,14 @@ def test_single_precision_costs_seven_digits_and_no_more():
         ev(x)
         double(x)
         size = np.abs(F.modes).max(axis=(1, 2)) @ np.abs(double.coefficients) + np.abs(F.rest).max()
-        # 2 + k roundings of 2⁻²⁴ on each side of k + 1 products, and the dimple's
+        # 2 + k roundings of 2⁻²⁴ on each side of k + 1 products, and the local mode's
         assert np.abs(ev.field() - double.field()).max() <= 2 * (len(F.modes) + 4) * 2.0**-24 * size
         np.testing.assert_array_equal(double.values, F.values(x[None])[0])
         np.testing.assert_array_equal(double.coefficients, F.coefficients(x[None])[0])
 
 
 def test_an_input_that_is_not_finite_gives_no_number():
-    ev = field(dimple=False).evaluator()
+    ev = field(local_mode=False).evaluator()
     assert not ev([0.0, np.nan, 0.005])
     assert np.isnan(ev.field()).all()
 
@@ -204,7 +211,11 @@ def test_the_splines_are_the_textbook_ones():
 
 @pytest.mark.parametrize(
     "more",
-    [{}, {"components": 1, "dimple": False}, {"extra": (SOFT, PROBE), "radius_input": 4, "radius": math.nan}],
+    [
+        {},
+        {"components": 1, "local_mode": False},
+        {"extra": (SOFT, PROBE), "radius_input": 4, "radius": math.nan},
+    ],
     ids=["vector", "scalar", "family"],
 )
 def test_the_file_gives_the_same_bits_back(tmp_path, more):
@@ -279,7 +290,7 @@ def test_fields_of_another_body_are_refused():
 
 @pytest.mark.parametrize(
     "change",
-    [{"rise": "cube"}, {"reach": -1.0}, {"radius": True}, {"widths": [0.1]}, {"meta": []}, {"name": 3}],
+    [{"amplitude": "cube"}, {"reach": -1.0}, {"radius": True}, {"widths": [0.1]}, {"meta": []}, {"name": 3}],
 )
 def test_a_file_with_a_valid_checksum_and_parts_that_do_not_fit_is_refused(tmp_path, change):
     archive = load_archive(field().save(tmp_path / "f.palpate"))
@@ -315,28 +326,28 @@ def test_parts_that_do_not_fit_are_refused():
         {"triangles": np.array([[0, 1, 999]])},
         {"radius_input": 2},
         {"modes": F.modes[:-1]},
-        {"dimple": Dimple(F.dimple.table[:1], 0.02, 1e-4)},
-        {"dimple": Dimple(np.ones((2, 9, 5)), 0.02, 1e-4)},  # does not end at its reach
+        {"local_mode": LocalMode(F.local_mode.table[:1], 0.02, 1e-4)},
+        {"local_mode": LocalMode(np.ones((2, 9, 5)), 0.02, 1e-4)},  # does not end at its reach
     ):
         with pytest.raises(UsageError, match="field surrogate"):
             dataclasses.replace(F, **more)
-    with pytest.raises(UsageError, match="rise"):
-        Rise("cube", 0.01)
+    with pytest.raises(UsageError, match="grow"):
+        DepthAmplitude("cube", 0.01)
     with pytest.raises(UsageError, match="length"):
-        Rise("square", 0.01, 1e-3)
-    with pytest.raises(UsageError, match="dimple"):
-        Dimple(np.full((2, 9, 5), np.nan), 0.02, 1e-4)
+        DepthAmplitude("square", 0.01, 1e-3)
+    with pytest.raises(UsageError, match="local mode"):
+        LocalMode(np.full((2, 9, 5), np.nan), 0.02, 1e-4)
     with pytest.raises(UsageError, match="within"):
-        Dimple(np.zeros((2, 9, 5)), 0.02, 0.0)
-    own = F.dimple.variation
+        LocalMode(np.zeros((2, 9, 5)), 0.02, 0.0)
+    own = F.local_mode.variation
     for more in ({"table": own.table[:, :-1]}, {"scales": -own.scales}, {"axes": own.axes[:, :2]}):
-        with pytest.raises(UsageError, match="how a dimple varies"):
+        with pytest.raises(UsageError, match="how a local mode varies"):
             dataclasses.replace(own, **more)
     scalar = dataclasses.replace(own, table=own.table[..., :1])
-    with pytest.raises(UsageError, match="another dimple"):
-        dataclasses.replace(F.dimple, variation=scalar)
+    with pytest.raises(UsageError, match="another local mode"):
+        dataclasses.replace(F.local_mode, variation=scalar)
     with pytest.raises(UsageError, match="other inputs"):
-        dataclasses.replace(field(extra=(SOFT,)), dimple=F.dimple)
+        dataclasses.replace(field(extra=(SOFT,)), local_mode=F.local_mode)
     with pytest.raises(UsageError, match="shape"):
         F.values(np.zeros((3, 2)))
     with pytest.raises(UsageError, match="answered"):

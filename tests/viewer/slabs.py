@@ -7,8 +7,8 @@ import numpy as np
 import pressed
 from models import linear_network
 from palpate.surrogates import ContactLaw, Continuation, FieldSurrogate, TouchedBody, TouchSurrogate
-from palpate.surrogates.field import Dimple, Rise, Variation
-from palpate.surrogates.field.dimple import design
+from palpate.surrogates.fields import DepthAmplitude, LocalMode, Variation
+from palpate.surrogates.fields.local_mode import design
 from palpate.surrogates.plastic import Dents
 from palpate.units import Quantity, Range
 
@@ -64,10 +64,10 @@ def _field(touch, components: int) -> FieldSurrogate:
         points,
         triangles,
         mass,
-        rise=Rise("linear", pressed.DEEPEST),
+        amplitude=DepthAmplitude("linear", pressed.DEEPEST),
         surface=touch.surface,
         radius=pressed.RADIUS,
-        dimple=Dimple(_table(components), 0.03, 1e-4, _variation(components)),
+        local_mode=LocalMode(_table(components), 0.03, 1e-4, _variation(components)),
     )
 
 

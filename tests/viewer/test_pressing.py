@@ -177,7 +177,7 @@ def test_the_page_gets_the_skin_and_the_modes_once(pressed_viewer: Viewer, slab:
     np.testing.assert_array_equal(surface.touchable > 0, top)
     modes = Modes.unpack(fetched(pressed_viewer, "fields/0"))
     assert modes.modes.size == 2 * surface.rest.size
-    assert modes.rows == slab.fields["displacement"].dimple.table.shape[1]
+    assert modes.rows == slab.fields["displacement"].local_mode.table.shape[1]
     with pytest.raises(HTTPError, match="404"):
         fetched(pressed_viewer, "fields/2")
 

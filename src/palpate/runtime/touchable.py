@@ -251,7 +251,7 @@ class Touchable:
         if spacing is None or skin is None:
             return None
         corners = skin.triangles
-        if skin.dimple is not None:
+        if skin.local_mode is not None:
             corners = corners[skin.touched[corners].all(axis=1)]
         return Patches.over(skin.points, corners, spacing, width=width, energy=energy)
 

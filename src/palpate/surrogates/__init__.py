@@ -14,7 +14,7 @@
 """
 
 from palpate.surrogates.continuation import Continuation
-from palpate.surrogates.field import FieldEvaluator, FieldSurrogate, TouchedBody
+from palpate.surrogates.fields import FieldEvaluator, FieldSurrogate, TouchedBody
 from palpate.surrogates.laws import ContactLaw
 from palpate.surrogates.surface import TouchedSurface
 from palpate.surrogates.surrogate_evaluator import SurrogateEvaluator

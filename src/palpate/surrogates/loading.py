@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TypeAlias
 
 from palpate.network import load_archive
-from palpate.surrogates.field.field import FieldSurrogate
-from palpate.surrogates.field.field_file import KIND as FIELD
-from palpate.surrogates.field.field_file import load_field
-from palpate.surrogates.field.touched_body import KIND as BODY
-from palpate.surrogates.field.touched_body import TouchedBody
+from palpate.surrogates.fields.field_file import KIND as FIELD
+from palpate.surrogates.fields.field_file import load_field
+from palpate.surrogates.fields.field_surrogate import FieldSurrogate
+from palpate.surrogates.fields.touched_body import KIND as BODY
+from palpate.surrogates.fields.touched_body import TouchedBody
 from palpate.surrogates.grasp.file import KIND as GRASP
 from palpate.surrogates.grasp.surrogate import GraspSurrogate
 from palpate.surrogates.plastic.held_body import HeldBody

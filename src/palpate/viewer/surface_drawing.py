@@ -84,8 +84,8 @@ class SurfaceDrawing:
         """Return what the page needs to sum up field `index`."""
         field, nodes = self.fields[index], self.nodes
         return Modes(
-            reach=0.0 if field.dimple is None else field.dimple.reach,
-            rows=0 if field.dimple is None else field.dimple.table.shape[1],
+            reach=0.0 if field.local_mode is None else field.local_mode.reach,
+            rows=0 if field.local_mode is None else field.local_mode.table.shape[1],
             rest=field.rest[nodes].ravel(),
             modes=field.modes[:, nodes].ravel(),
             touched=np.flatnonzero(field.touched[nodes]),
@@ -153,7 +153,7 @@ class SurfaceDrawing:
             if evaluator(centre, parameters):
                 foot = evaluator.place
             parts.append(evaluator.coefficients)
-            if field.dimple is not None:
+            if field.local_mode is not None:
                 parts.append(evaluator.profile().ravel())
         return foot, np.concatenate(parts) if parts else np.zeros(0)
 

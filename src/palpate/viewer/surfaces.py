@@ -109,7 +109,7 @@ def _components(count: int, pairs: np.ndarray) -> np.ndarray:
 def touchable_triangles(body: Touchable, field: FieldSurrogate) -> np.ndarray:
     """Return for each triangle (t,) of a field's surface whether it belongs to the touched surface."""
     corners = field.points[field.triangles]
-    if field.dimple is not None:
+    if field.local_mode is not None:
         return np.asarray(field.touched[field.triangles].all(axis=1) & _near(body, corners))
     return _near(body, corners)
 

@@ -17,12 +17,12 @@ from palpate.learning import TouchHistory, learn_body
 from palpate.learning.bodies import Touches
 from palpate.learning.bodies.images import snapshots_of
 from palpate.learning.fields import Snapshots, lumped_mass
-from palpate.learning.fields.dimples import faded, fitted_dimple
-from palpate.learning.fields.solves import Solves
+from palpate.learning.fields.fit_local_mode import fade_out, fit_local_mode
+from palpate.learning.fields.snapshots import Solves
 from palpate.physics.solid.body_symmetry import fundamental_part
 from palpate.surrogates import ContactLaw, TouchedBody, TouchModel
-from palpate.surrogates.field import Rise
-from palpate.surrogates.field.carrying import Carrier
+from palpate.surrogates.fields import DepthAmplitude
+from palpate.surrogates.fields.surface_interpolation import SurfaceInterpolation
 from palpate.sweeps import sweep
 from palpate.sweeps.plan import provenance
 from palpate.validation import validate
@@ -48,16 +48,18 @@ def carried_error(count: int) -> float:
     """Largest error of a smooth function carried from a mesh with `count` nodes on a side."""
     points, triangles = grid(count, jitter=0.3)
     places = np.random.default_rng(1).uniform(0.2, 0.8, (200, 3)) * (1.0, 1.0, 0.0)
-    carrier = Carrier.of(points, triangles, places, np.tile([0.0, 0.0, 1.0], (200, 1)))
+    interpolation = SurfaceInterpolation.of(points, triangles, places, np.tile([0.0, 0.0, 1.0], (200, 1)))
     truth, values = (np.sin(3 * p[:, 0]) * np.cos(4 * p[:, 1]) for p in (places, points))
-    return float(np.abs(carrier(values[None, :, None])[0, :, 0] - truth).max())
+    return float(np.abs(interpolation(values[None, :, None])[0, :, 0] - truth).max())
 
 
 def test_carried_values_are_exact_at_nodes_and_of_third_order_between():
     points, triangles = grid(9, jitter=0.3)
     up = np.tile([0.0, 0.0, 1.0], (len(points), 1))
     values = np.random.default_rng(2).normal(size=(2, len(points), 3))
-    np.testing.assert_allclose(Carrier.of(points, triangles, points, up)(values), values, atol=1e-6)
+    np.testing.assert_allclose(
+        SurfaceInterpolation.of(points, triangles, points, up)(values), values, atol=1e-6
+    )
     order = math.log2(carried_error(13) / carried_error(25))
     assert order > 2.0, f"linear interpolation has order 2, these {order:.2f}"
 
@@ -65,9 +67,9 @@ def test_carried_values_are_exact_at_nodes_and_of_third_order_between():
 def test_a_linear_field_is_carried_as_it_is():
     points, triangles = grid(9, jitter=0.3)
     places = np.random.default_rng(1).uniform(0, 1, (50, 3)) * (1.0, 1.0, 0.0)
-    carrier = Carrier.of(points, triangles, places, np.tile([0.0, 0.0, 1.0], (50, 1)))
+    interpolation = SurfaceInterpolation.of(points, triangles, places, np.tile([0.0, 0.0, 1.0], (50, 1)))
     slope = np.array([[1.0, 2.0, 0.0], [0.5, -1.0, 0.0]])
-    np.testing.assert_allclose(carrier((points @ slope.T)[None])[0], places @ slope.T, atol=1e-9)
+    np.testing.assert_allclose(interpolation((points @ slope.T)[None])[0], places @ slope.T, atol=1e-9)
 
 
 MIDDLE = np.array([0.03, 0.03, 0.03])
@@ -139,31 +141,33 @@ def test_images_of_a_field_are_fields_of_the_images(field):
 
 
 def test_what_a_dimple_leaves_is_carried_beside_the_touched_surface_as_it_is():
-    """On another mesh: the whole field where nothing is touched, and the field less the dimple where it is."""
+    """On another mesh: the whole field where nothing is touched, and the field less the local mode where it is."""
     body, probe = block()
     found = Touches.of(touches(), body.problem(probe, element=0.006).layout)
     mass = lumped_mass(found.points, found.triangles)
     known = (found.inputs, found.surface, found.radius, found.points, found.triangles, mass)
     solves = Solves.of(snapshots_of(found), *known).touching
-    rise = Rise("linear", float(solves.depth.max()))
-    dimple = faded(fitted_dimple(solves, rise))
-    touched = dimple.touches(found.surface, found.points)
+    amplitude = DepthAmplitude("linear", float(solves.depth.max()))
+    local_mode = fade_out(fit_local_mode(solves, amplitude))
+    touched = local_mode.touches(found.surface, found.points)
     assert 0 < touched.sum() < len(touched)
     truth = answers(solves.X, found.points)["displacement"]
     there = Solves.of(
         [Snapshots(solves.X, truth, solves.groups, found.points, mass, found.triangles)], *known
     )
-    (shown,) = there.travelling(dimple, rise)
+    (shown,) = there.moving(local_mode, amplitude)
     assert np.linalg.norm(shown[:, ~touched], axis=2).max() > 0.3 * np.linalg.norm(truth, axis=2).max()
     miss = np.linalg.norm(
-        solves.remainder(dimple, rise) - np.where(touched[:, None], truth - shown, truth), axis=2
+        solves.remainder(local_mode, amplitude) - np.where(touched[:, None], truth - shown, truth), axis=2
     )
-    # cubic in h/w = ½ with a factor below one where the whole is carried; the dimple itself is one of this formula
+    # cubic in h/w = ½ with a factor below one where the whole is carried; the local mode itself is one of this formula
     assert miss[:, ~touched].max() < 0.1 * np.linalg.norm(truth, axis=2).max()
     assert miss[:, touched].max() < 0.02 * np.linalg.norm(truth, axis=2).max()
     half = solves.take(solves.groups < np.median(solves.groups))
     rows = solves.groups < np.median(solves.groups)
-    np.testing.assert_array_equal(half.remainder(dimple, rise), solves.remainder(dimple, rise)[rows])
+    np.testing.assert_array_equal(
+        half.remainder(local_mode, amplitude), solves.remainder(local_mode, amplitude)[rows]
+    )
 
 
 def test_too_many_images_are_thinned_by_whole_columns():

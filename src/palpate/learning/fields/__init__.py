@@ -1,19 +1,18 @@
 """Fields over a body's surface, learnt from solves.
 
-modes        proper orthogonal decomposition in the mean over the surface
-solves       fields, each on the mesh that it was solved on
-dimples      the part that travels with the probe
-varying      … and how it differs from place to place
-parting      what travels, what modes are left for
-kernel       the modes' coefficients by a unit at every solve
-search       the same by a few units that move; which of both is decided by solves left out
-learn_field  all of it, of solves on one mesh; learn_snapshots of those on several
+::
+
+    learn_field      all of it, of solves on one mesh; learn_snapshots of those on several
+    snapshots        fields, each on the mesh that it was solved on
+    decompose_field  growth with depth, local mode, modes: what misses least of solves left out
+    fit_local_mode   the part that moves with the probe
+    kernel           the modes' coefficients by a unit at every solve
+    search           the same by a few units that move; which of both is decided by solves left out
 """
 
-from palpate.learning.fields.learn_field import learn_displacement, learn_field
-from palpate.learning.fields.learn_snapshots import LearntField, learn_snapshots
-from palpate.learning.fields.modes import SurfaceModes, lumped_mass
-from palpate.learning.fields.solves import Snapshots
+from palpate.learning.fields.decompose_field import SurfaceModes, lumped_mass
+from palpate.learning.fields.learn_field import LearntField, learn_displacement, learn_field, learn_snapshots
+from palpate.learning.fields.snapshots import Snapshots
 
 __all__ = [
     "LearntField",

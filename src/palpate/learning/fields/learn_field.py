@@ -1,22 +1,160 @@
-"""From solves of a touched body to a field surrogate."""
+"""From solves of a touched body, each on the mesh where it was solved, to a field surrogate on one mesh."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
-from palpate.learning.fields.learn_snapshots import LearntField, learn_snapshots
-from palpate.learning.fields.modes import lumped_mass
-from palpate.learning.fields.solves import Snapshots
+from palpate.learning.fields.decompose_field import Decomposition, best_decomposition, lumped_mass
+from palpate.learning.fields.kernel import at_solves
+from palpate.learning.fields.search import FieldTrial, searched
+from palpate.learning.fields.snapshots import Snapshots, Solves
+from palpate.network import Network, Scaling
+from palpate.rbf.freezing import freeze_refined, training_record
 from palpate.rbf.sample_checks import numbers
-from palpate.surrogates import TouchedSurface
-from palpate.units import Range
+from palpate.surrogates import FieldSurrogate, TouchedSurface
+from palpate.surrogates.fields.depth_amplitude import AMPLITUDES
+from palpate.units import Quantity, Range, bounds
 
-__all__ = ["learn_displacement", "learn_field"]
+__all__ = [
+    "LearntField",
+    "learn_displacement",
+    "learn_field",
+    "learn_snapshots",
+]
+
+_TOLERANCE = 5e-3  # of the snapshots' root mean square
+
+
+@dataclass(frozen=True, eq=False)
+class LearntField:
+    """A field surrogate, and how it was found.
+
+    Attributes
+    ----------
+    field : FieldSurrogate
+    trials : tuple of FieldTrial
+        Networks that were tried.
+    truncation : float
+        What the modes miss of the training solves: root mean square over surface and solves, in the field's unit.
+    truncation_left_out : float
+        The same of solves that the modes were not made of (but the moving part was).
+    learning_left_out : float
+        Left-out error of the coefficients, likewise.
+    """
+
+    field: FieldSurrogate
+    trials: tuple[FieldTrial, ...]
+    truncation: float
+    truncation_left_out: float
+    learning_left_out: float
+
+
+def learn_snapshots(
+    snapshots: Sequence[Snapshots],
+    *,
+    inputs: Sequence[Range],
+    points: np.ndarray,
+    triangles: np.ndarray,
+    mass: np.ndarray,
+    surface: TouchedSurface,
+    radius: float,
+    radius_input: int | None = None,
+    rest: np.ndarray | None = None,
+    name: str = "displacement",
+    unit: str = "m",
+    tolerance: float | None = None,
+    modes_max: int = 60,
+    moving: bool = True,
+    amplitude: str = "auto",
+    length: float | None = None,
+    units_max: int = 36,
+    seconds: float = 30.0,
+    seed: int = 0,
+) -> LearntField:
+    """Learn a field on a mesh from snapshots on the meshes that they were solved on; the options are `learn_field`'s.
+
+    Raises
+    ------
+    UsageError
+        If an option is not one, or no snapshot has contact.
+    """
+    if amplitude != "auto" and amplitude not in AMPLITUDES:
+        raise UsageError(
+            f"A field does not grow by {amplitude!r}.",
+            fix=f"Choose 'auto' or one of {', '.join(AMPLITUDES)}.",
+        )
+    if not (seconds > 0 and modes_max > 0 and units_max >= 0 and radius > 0):
+        raise UsageError(
+            f"seconds={seconds}, modes_max={modes_max}, units_max={units_max}, radius={radius} allow no learning.",
+            fix="Give positive numbers.",
+        )
+    known = (inputs, surface, radius, points, triangles, mass, radius_input)
+    solves = Solves.of(snapshots, *known).touching
+    tolerance = _TOLERANCE * solves.size if tolerance is None else tolerance
+    length = radius / 10.0 if length is None else length
+    with threadpool_limits(1):  # small matrices: more BLAS threads cost time and the bits of the result
+        names = AMPLITUDES if amplitude == "auto" else (amplitude,)
+        best = best_decomposition(solves, names, length, tolerance, modes_max, moving)
+        network, error, trials = _learnt(best, solves.inputs, units_max, seconds, seed)
+    fields = np.concatenate([values.ravel() for values in solves.values])
+    meta = {
+        **training_record(solves.X, fields, solves.inputs),
+        "solves": len(solves.X),
+        "tolerance": tolerance,
+        "modes": len(best.modes.modes),
+        "amplitude": best.amplitude.name,
+        "truncation": best.truncation,
+        "truncation_left_out": _real(best.truncation_left_out),
+        "learning_left_out": _real(error),
+    }
+    field = FieldSurrogate(
+        *(name, unit, network, best.modes.modes),
+        *(np.zeros((len(points), solves.components)) if rest is None else rest, points, triangles, mass),
+        amplitude=best.amplitude,
+        surface=surface,
+        radius=radius if radius_input is None else math.nan,
+        radius_input=radius_input,
+        local_mode=best.local_mode,
+        meta=meta,
+    )
+    return LearntField(field, trials, best.truncation, best.truncation_left_out, error)
+
+
+def _learnt(
+    best: Decomposition, inputs: tuple[Range, ...], units_max: int, seconds: float, seed: int
+) -> tuple[Network, float, tuple[FieldTrial, ...]]:
+    """The coefficients' network, its left-out error and what was tried: a unit at each solve, or a few that move."""
+    whole = at_solves(best.problem)
+    target = 0.1 * best.truncation
+    found, error, trials = searched(
+        best.problem, units_max=units_max, seconds=seconds, target=target, seed=seed
+    )
+    names, scaling = _outputs(best, inputs)
+    if whole.error < error:
+        return whole.network(inputs, names, scaling), whole.error, (*whole.trials, *trials)
+    network = replace(freeze_refined(found, inputs, names, scaling), meta={})
+    return network, error, (*whole.trials, *trials)
+
+
+def _outputs(best: Decomposition, inputs: tuple[Range, ...]) -> tuple[list[Quantity], Scaling]:
+    low, high = bounds(inputs)
+    k = best.problem.along.shape[1]
+    scale = np.full(k, best.problem.scale)
+    scaling = Scaling((low + high) / 2, (high - low) / 2, np.zeros(k), scale)
+    return [Quantity(f"coefficient {i}", "") for i in range(1, k + 1)], scaling
+
+
+def _real(number: float) -> float | None:
+    """What JSON can hold."""
+    return number if math.isfinite(number) else None
 
 
 def learn_displacement(data: Dataset, **options: Any) -> LearntField:
@@ -51,8 +189,8 @@ def learn_field(
     mass: np.ndarray | None = None,
     tolerance: float | None = None,
     modes_max: int = 60,
-    travelling: bool = True,
-    rise: str = "auto",
+    moving: bool = True,
+    amplitude: str = "auto",
     length: float | None = None,
     groups: np.ndarray | None = None,
     units_max: int = 36,
@@ -74,7 +212,7 @@ def learn_field(
         Of the surface, in these nodes.
     surface : TouchedSurface
     radius : float
-        Of the probe, m; where it is an input, a usual one, by which the travelling part is as wide.
+        Of the probe, m; where it is an input, a usual one, by which the moving part is as wide.
     radius_input : int, optional
         The input, 3 or later, that is the probe's radius.
     name, unit : str
@@ -86,9 +224,9 @@ def learn_field(
         Of the modes: root mean square over surface and solves that they may miss, in the field's unit; half a
         percent of the field's own by default.
     modes_max : int
-    travelling : bool
+    moving : bool
         Whether a part that travels with the probe is taken out first.
-    rise : {"auto", "linear", "hertz", "square", "series"}
+    amplitude : {"auto", "linear", "hertz", "square", "series"}
         How the field begins with depth; "auto" compares all by what is missed of solves left out.
     length : float, optional
         Crossing length a of "series", m; a tenth of the radius by default.
@@ -122,8 +260,8 @@ def learn_field(
         unit=unit,
         tolerance=tolerance,
         modes_max=modes_max,
-        travelling=travelling,
-        rise=rise,
+        moving=moving,
+        amplitude=amplitude,
         length=length,
         units_max=units_max,
         seconds=seconds,

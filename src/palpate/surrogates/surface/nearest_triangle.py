@@ -76,7 +76,7 @@ def _apart(discs: np.ndarray, i: int, x: float, y: float, z: float, best: float)
     height = max(abs(along) - discs[i, 6], 0.0)
     square = height * height
     if square >= best:
-        return square
+        return float(square)
     across = max(np.sqrt(max(x * x + y * y + z * z - along * along, 0.0)) - discs[i, 7], 0.0)
     return float(square + across * across)
 

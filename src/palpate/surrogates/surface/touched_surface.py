@@ -186,7 +186,8 @@ class TouchedSurface:
         axes = frame[4:13].reshape(-1, 3)
         if profile.size and np.abs(axes @ axes.T - np.eye(3)).max() > 1e-9:
             raise FileFormatError("The axes of a flat touched surface are no rotation.")
-        return cls(*(np.ascontiguousarray(a) for a in (frame, C, profile)), *lengths.tolist())
+        frame, C, profile = (np.ascontiguousarray(a) for a in (frame, C, profile))
+        return cls(frame, C, profile, *lengths.tolist())
 
     def __repr__(self) -> str:
         nodes = " × ".join(str(n) for n in self.coefficients.shape if n > 1)

@@ -1,33 +1,143 @@
-"""How a dimple varies from place to place, by regularised least squares over all nodes of all solves.
+"""The part of a field that moves with the probe, by linear least squares over all nodes of all solves at once.
 
-For one solve the regressors are a product: what depends on the node (splines in ρ times offsets) by what depends on
-the touch (splines in s times polynomials of the place). So the normal equations are a sum of Kronecker products, and
-conjugate gradients (Hestenes & Stiefel 1952) never form them. A priori a coefficient of total degree n is smaller by
-b^{−n/2} than a constant, and profiles are smooth in ρ; b is what misses least of columns left out.
+**The local mode.** Per solve some hundred nodes of the touched surface lie in reach of the probe, each at another
+distance ρ: a few solves decide the whole table of splines in (ρ, s). Where no node has been, a small penalty on second
+differences decides (Eilers & Marx 1996), and on the slope at the contact point: what is smooth in the body is even
+in ρ.
+
+**Its variation from place to place.** For one solve the regressors are a product: what depends on the node (splines in
+ρ times offsets) by what depends on the touch (splines in s times polynomials of the place). So the normal equations
+are a sum of Kronecker products, and conjugate gradients (Hestenes & Stiefel 1952) never form them. A priori a
+coefficient of total degree n is smaller by b^{−n/2} than a constant, and profiles are smooth in ρ; b is what misses
+least of depth series left out.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from palpate.learning.fields.search import parts_of
-from palpate.learning.fields.solves import Solves
-from palpate.surrogates.field.dimple import Dimple, design
-from palpate.surrogates.field.rise import Rise
-from palpate.surrogates.field.variation import OFFSETS, Variation, polynomials
+from palpate.learning.fields.snapshots import Solves
+from palpate.surrogates.fields.depth_amplitude import DepthAmplitude
+from palpate.surrogates.fields.local_mode import OFFSETS, LocalMode, Variation, design, polynomials, products
 
-__all__ = ["VaryingDimples", "by_conjugate_gradients", "degrees", "directions", "fitted_variation"]
+__all__ = [
+    "VariationRegressors",
+    "border_widths",
+    "by_conjugate_gradients",
+    "degrees",
+    "directions",
+    "fade_out",
+    "fit_local_mode",
+    "fit_variation",
+]
+
+_REACH = 5.0  # times the radius
+_FULL = 0.3  # of the reach: from there on it fades
+_CELLS = 14  # to the reach, a third of the radius each: smaller ones show the mesh
+_PENALTY = 1e-5  # of the mean diagonal
+# of the radius, with and without nodes on the border: the smooth distance rounds that by 2 to 4 % of the radius
+WITHIN = (0.06, 0.01)
+_EVEN = 1e3  # an even profile is known, not guessed
+_LEAST = 1e-6  # keeps the system regular
+
+
+def border_widths(solves: Solves) -> tuple[float, ...]:
+    """Which of `WITHIN` make a difference."""
+    distances = [np.abs(solves.surface.at(np.ascontiguousarray(one.points))[0]) for one in solves.snapshots]
+    wide, narrow = ([d < within * solves.radius for d in distances] for within in WITHIN)
+    same = all((a == b).all() for a, b in zip(wide, narrow, strict=True))
+    return WITHIN[:1] if same else WITHIN
+
+
+def fade_out(local_mode: LocalMode) -> LocalMode:
+    """The same, and its variation, times a window that is one in the middle and ends at the reach.
+
+    Fitted so that it ends by itself, it would fall within the last cells from what the field is there to nothing: a
+    ring that travels with the probe, which modes can't make up for.
+    """
+    fade, own = _fading(local_mode.table.shape[1]), local_mode.variation
+    if own is not None:
+        own = replace(own, table=np.einsum("ij,qmjhc->qmihc", fade, own.table))
+    return replace(local_mode, table=fade @ local_mode.table, variation=own)
+
+
+def _fading(r: int) -> np.ndarray:
+    """Coefficients (r, r) of the window times each spline, by least squares, the last three zero."""
+    t = (np.arange(40 * (r - 3)) + 0.5) / (40 * (r - 3))
+    u = np.clip((t - _FULL) / (1.0 - _FULL), 0.0, 1.0)
+    window = 1.0 - u**3 * (10.0 - 15.0 * u + 6.0 * u * u)
+    B, fade = design(t * (r - 3), r), np.zeros((r, r))
+    fade[: r - 3] = np.linalg.lstsq(B[:, : r - 3], window[:, None] * B, rcond=None)[0]
+    return fade
+
+
+def fit_local_mode(solves: Solves, amplitude: DepthAmplitude, within: float = WITHIN[0]) -> LocalMode | None:
+    """The local mode of fields where they were solved, not yet faded out; None where no node is in reach.
+
+    Fields of one component are scalars, those of three vectors; others have no local_mode. Nodes on the border of the
+    touched surface, which also belong to another one, may move otherwise: by `within`, a share of the radius, they
+    can be left to the modes.
+    """
+    if solves.components not in (1, 3):
+        return None
+    levels = int(np.clip(len(np.unique(np.round(solves.depth / amplitude.deepest, 6))), 1, 5))
+    parts, r, q = 1 if solves.components == 1 else 2, _CELLS + 3, max(4, levels)
+    blank = LocalMode(np.zeros((parts, r, q)), _REACH * solves.radius, within * solves.radius)
+    G, b = np.zeros((parts * r * q,) * 2), np.zeros(parts * r * q)
+    for k, i, rows, A in _regressors(blank, solves, amplitude):
+        w = np.repeat(solves.snapshots[k].mass[rows], solves.components)
+        G += A.T @ (A * w[:, None])
+        b += A.T @ (w * solves.snapshots[k].values[i, rows].ravel())
+    mean = float(np.trace(G)) / len(G)
+    if not mean > 0:
+        return None
+    G += _PENALTY * mean * np.kron(np.eye(parts), _roughness(r, q))
+    return replace(blank, table=np.linalg.solve(G, b).reshape(parts, r, q))
+
+
+def _roughness(r: int, q: int) -> np.ndarray:
+    """Squares of second differences in ρ and s, and of the slope at ρ = 0, of the r · q coefficients."""
+    in_rho = np.diff(np.eye(r), n=2, axis=0)
+    in_s = np.diff(np.eye(q), n=2, axis=0)
+    slope = np.zeros(r)
+    slope[[0, 2]] = -1.0, 1.0
+    along = in_rho.T @ in_rho + _EVEN * np.outer(slope, slope)
+    return np.asarray(np.kron(along, np.eye(q)) + np.kron(np.eye(r), in_s.T @ in_s) + _LEAST * np.eye(r * q))
+
+
+def _regressors(
+    local_mode: LocalMode, solves: Solves, amplitude: DepthAmplitude
+) -> Iterator[tuple[int, int, np.ndarray, np.ndarray]]:
+    """Of every solve: snapshots and row, nodes in reach (rows,), regressors (rows · components, table.size)."""
+    feet, normals = solves.feet
+    touched = [local_mode.touches(solves.surface, one.points) for one in solves.snapshots]
+    for (k, i), foot, n, s in zip(solves.rows(), feet, normals, solves.depth, strict=True):
+        offset = (solves.snapshots[k].points - foot) / local_mode.reach
+        distance = np.sqrt((offset**2).sum(axis=1))
+        rows = np.flatnonzero(touched[k] & (distance < 1.0))
+        shares = np.full(len(rows), min(s / amplitude.deepest, 1.0))
+        P = float(amplitude.at(np.array(s))) * products(distance[rows], shares, local_mode.table.shape[1:])
+        P = P.reshape(len(rows), -1)
+        if solves.components == 1:
+            yield k, i, rows, P
+            continue
+        across = offset[rows] - (offset[rows] @ n)[:, None] * n
+        A = np.stack([P[:, None] * n[:, None], P[:, None] * across[:, :, None]], axis=2)
+        yield k, i, rows, A.reshape(len(rows) * 3, 2 * P.shape[1])
+
 
 _IN_DEPTH = 4  # one cubic
 _MOST = 84  # polynomials
 _DEGREE = 10
 _BASES = (4.0, 8.0)
 _RIDGE = 1e-4  # of the mean diagonal
-_ROUGH, _LEAST = 0.1, 0.01  # of second differences in ρ, of the coefficients themselves
+_ROUGH, _LEAST_OF_PRIOR = 0.1, 0.01  # of second differences in ρ, of the coefficients themselves
 _UPRIGHT = 0.2  # cosine: a surface whose normals stay this near to their mean is a graph over a plane
 _ITERATIONS, _TOLERANCE = 400, 1e-4  # of conjugate gradients: relative residual
 _PARTS = 2  # of six of the solves, each left out once
@@ -35,7 +145,7 @@ _GAIN = 0.8  # of the squares in reach that are missed of columns left out: more
 
 
 @dataclass(frozen=True, eq=False)
-class VaryingDimples:
+class VariationRegressors:
     """Regressors of N solves, parted into nodes' and touches'.
 
     Attributes
@@ -60,10 +170,10 @@ class VaryingDimples:
         return np.asarray(np.tensordot(self.touches[rows].reshape(len(rows), -1), flat, 1))
 
 
-def fitted_variation(
-    solves: Solves, remainder: list[np.ndarray], dimple: Dimple, rise: Rise
+def fit_variation(
+    solves: Solves, remainder: list[np.ndarray], local_mode: LocalMode, amplitude: DepthAmplitude
 ) -> Variation | None:
-    """How the dimple of fields varies, not yet faded.
+    """How the local mode of fields varies, not yet faded out.
 
     None where it is of no use: with one group alone, or where it gains little of columns left out.
 
@@ -71,9 +181,9 @@ def fitted_variation(
     ----------
     solves : Solves
     remainder : list of (N, P, components) arrays
-        Fields of the snapshots, less what the dimple gives.
-    dimple : Dimple
-    rise : Rise
+        Fields of the snapshots, less what the local mode gives.
+    local_mode : LocalMode
+    amplitude : DepthAmplitude
     """
     parts = parts_of(solves.groups)
     if len(parts) < 2:
@@ -84,8 +194,8 @@ def fitted_variation(
     low, high = told.min(axis=0), told.max(axis=0)
     scales = np.array([(low + high) / 2, np.maximum((high - low) / 2, 1e-9)])
     powers = degrees(told.shape[1])
-    empty = np.zeros((_IN_DEPTH, len(powers), dimple.table.shape[1], OFFSETS, solves.components))
-    regressors = _regressors(Variation(empty, powers, axes, scales), dimple, rise, solves)
+    empty = np.zeros((_IN_DEPTH, len(powers), local_mode.table.shape[1], OFFSETS, solves.components))
+    regressors = _variation_regressors(Variation(empty, powers, axes, scales), local_mode, amplitude, solves)
     fit = _Fit(regressors, solves, remainder, powers.sum(axis=1))
     base, missed = _best_base(fit, parts)
     if missed > _GAIN:
@@ -112,29 +222,31 @@ def degrees(v: int) -> np.ndarray:
     return np.array(sorted(every, key=lambda p: (sum(p), p)))
 
 
-def _regressors(blank: Variation, dimple: Dimple, rise: Rise, solves: Solves) -> VaryingDimples:
+def _variation_regressors(
+    blank: Variation, local_mode: LocalMode, amplitude: DepthAmplitude, solves: Solves
+) -> VariationRegressors:
     r, components = blank.table.shape[2], blank.table.shape[4]
-    touched = [np.flatnonzero(dimple.touches(solves.surface, one.points)) for one in solves.snapshots]
+    touched = [np.flatnonzero(local_mode.touches(solves.surface, one.points)) for one in solves.snapshots]
     feet, nodes, near = solves.feet[0], [], []
     for (k, _), foot in zip(solves.rows(), feet, strict=True):
-        offset = (solves.snapshots[k].points[touched[k]] - foot) / dimple.reach
+        offset = (solves.snapshots[k].points[touched[k]] - foot) / local_mode.reach
         distance = np.linalg.norm(offset, axis=1)
         some = np.flatnonzero(distance < 1.0)
         B = design(distance[some] * (r - 3), r)
         around = np.column_stack([np.ones(len(some)), offset[some]])
         nodes.append(touched[k][some])
         near.append((B[:, :, None] * around[:, None, :]).reshape(len(some), -1))
-    in_depth = design(np.minimum(solves.depth / rise.deepest, 1.0) * (_IN_DEPTH - 3), _IN_DEPTH)
+    in_depth = design(np.minimum(solves.depth / amplitude.deepest, 1.0) * (_IN_DEPTH - 3), _IN_DEPTH)
     in_place = polynomials(blank.variables(feet, solves.X[:, 3:]), blank.powers)
-    touches = rise.at(solves.depth)[:, None, None] * in_depth[:, :, None] * in_place[:, None, :]
-    return VaryingDimples(nodes, near, touches, (r, components))
+    touches = amplitude.at(solves.depth)[:, None, None] * in_depth[:, :, None] * in_place[:, None, :]
+    return VariationRegressors(nodes, near, touches, (r, components))
 
 
 class _Fit:
     """Normal equations of all solves, each as a product."""
 
     def __init__(
-        self, regressors: VaryingDimples, solves: Solves, fields: list[np.ndarray], total: np.ndarray
+        self, regressors: VariationRegressors, solves: Solves, fields: list[np.ndarray], total: np.ndarray
     ) -> None:
         self._regressors, self._total = regressors, total
         rows = list(zip(solves.rows(), regressors.nodes, strict=True))
@@ -142,7 +254,7 @@ class _Fit:
         self._mass = [solves.snapshots[k].mass[nodes] for (k, _), nodes in rows]
         r = regressors.shape[0]
         rough = np.diff(np.eye(r), n=2, axis=0)
-        smooth = np.linalg.cholesky(np.linalg.inv(_ROUGH * rough.T @ rough + _LEAST * np.eye(r)))
+        smooth = np.linalg.cholesky(np.linalg.inv(_ROUGH * rough.T @ rough + _LEAST_OF_PRIOR * np.eye(r)))
         self._prior = np.kron(smooth, np.eye(OFFSETS))
         weighted = [A * mass[:, None] for A, mass in zip(regressors.near, self._mass, strict=True)]
         G = [A.T @ W for A, W in zip(regressors.near, weighted, strict=True)]

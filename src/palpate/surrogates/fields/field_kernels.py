@@ -1,21 +1,21 @@
 """A field at one touch, compiled; nothing is allocated.
 
-    y = rest + f(s) [Σ_k b_k(x̃) φ_k + dimple]            x = (c, further inputs)
+    y = rest + f(s) [Σ_k b_k(x̃) φ_k + local mode]            x = (c, further inputs)
 
 with the coefficients b a network's, taken at x̃ as the energy is (see `palpate.surrogates.continuation`). Two steps:
-the coefficients, within microseconds, and then the dimple's profile and the field on all nodes, in one pass over the
-modes.
+the coefficients, within microseconds, and then the local mode's profile and the field on all nodes, in one pass over
+the modes. What moves with the probe is also known at any places of the touched surface, of many touches at once.
 
 What the kernels take:
 
     z         (1 + k,) answer of the first step: 1, then f b_k; in the precision of the modes
-    place     (FRAME + p,) answer of the first step: s, f, foot (3), normal (3), then the further inputs
-    profile   (r, 4, components): the dimple is Σ_i B_i(ρ/L) Σ_h ξ_h/L profile[i, h] per component, ξ_h/L = 1 and the
-              coordinates of ξ/L = (X − foot)/L
+    place     (FRAME + p,) answer of the first step: s, f, contact point (3), normal (3), then the further inputs
+    profile   (r, 4, components): the local mode is Σ_i B_i(ρ/L) Σ_h ξ_h/L profile[i, h] per component, ξ_h/L = 1
+              and the coordinates of ξ/L = (X − contact point)/L
     lines     (2, n) scratch: x and x̃;  small (2, 3, 3) scratch: ∇²d, then ∇d as a row;  b (k,) scratch
-    numbers   R, the input that R is or −1, s* and its w, then (p, s*, a) of the rise
+    numbers   R, the input that R is or −1, s* and its w, then (p, s*, a) of the amplitude
     limits    (3, n): low and high ends and w of every input
-    table     (parts, r, q), the dimple's own
+    table     (parts, r, q), the local mode's own
     varied    (q · m, r · 4 · components) of `Variation`, with its powers, axes and scales; (0, …) without one
     chebyshev (v, degree + 1) and weights (4 + m + 4 m,) scratch
     reach     L, then touched nodes (T,) and their points (T, 3)
@@ -24,15 +24,26 @@ What the kernels take:
 from __future__ import annotations
 
 import math
+from typing import Any
 
+import numpy as np
 from numba import njit, uint64
 
 from palpate.network.network_kernels import combine, value_into
 from palpate.surrogates.continuation import saturated
-from palpate.surrogates.field.rise import rise_at
+from palpate.surrogates.fields.depth_amplitude import amplitude_at
+from palpate.surrogates.fields.local_mode import OFFSETS, LocalMode
 from palpate.surrogates.surface import distance_into
 
-__all__ = ["FRAME", "coefficients_into", "field_into", "profile_into", "travelling_into"]
+__all__ = [
+    "FRAME",
+    "coefficients_into",
+    "field_into",
+    "moving_into",
+    "moving_values",
+    "profile_arguments",
+    "profile_into",
+]
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
 # a product and a sum rounded once: faster, and no less exact
@@ -74,7 +85,7 @@ def coefficients_into(c, p, z, place, b, lines, small, numbers, limits, surface,
     place[0] = s
     if s <= 0.0:
         return False
-    f = rise_at(s, numbers[4], numbers[5], numbers[6])
+    f = amplitude_at(s, numbers[4], numbers[5], numbers[6])
     place[1] = f
     for i in range(lines.shape[1]):
         lines[1, i] = lines[0, i]
@@ -122,7 +133,7 @@ def _products(place, powers, axes, scales, chebyshev, values) -> None:  # type: 
 
 @_jit
 def profile_into(profile, place, deepest, table, varied, powers, axes, scales, chebyshev, weights) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
-    """The dimple at one touch, f included: splines in ρ times 1 and the offset's coordinates over L; see above."""
+    """The local mode at one touch, f included: splines in ρ times 1 and the offset's coordinates over L; see above."""
     four, share, f = weights[:4], min(place[0] / deepest, 1.0), place[1]
     r, many, components = profile.shape
     flat = profile.reshape(r * many * components)
@@ -160,8 +171,8 @@ def profile_into(profile, place, deepest, table, varied, powers, axes, scales, c
 
 
 @_fused
-def travelling_into(y, place, profile, line, reach, nodes, points) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
-    """Add the travelling part to y (nodes · components,); line (4 · components,) is scratch."""
+def moving_into(y, place, profile, line, reach, nodes, points) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """Add the moving part to y (nodes · components,); line (4 · components,) is scratch."""
     r, components = profile.shape[0], profile.shape[2]
     wide = line.size
     flat = profile.reshape(r, wide)
@@ -195,4 +206,43 @@ def field_into(y, z, place, rows, profile, line, reach, nodes, points) -> None: 
         return
     combine(z, rows, y)
     if nodes.size and place[1] > 0.0:
-        travelling_into(y, place, profile, line, reach, nodes, points)
+        moving_into(y, place, profile, line, reach, nodes, points)
+
+
+def profile_arguments(local_mode: LocalMode | None, deepest: float) -> tuple[Any, ...]:
+    """(s*, table, varied, powers, axes, scales, chebyshev, weights): what `profile_into` takes last."""
+    table = np.zeros((1, 4, 4)) if local_mode is None else local_mode.table
+    own = None if local_mode is None else local_mode.variation
+    if own is None:
+        none = (np.zeros((0, 0)), np.zeros((0, 0), np.int64), np.zeros((0, 3)), np.zeros((2, 0)))
+        return deepest, table, *none, np.zeros((0, 2)), np.zeros(4)
+    q, m = own.table.shape[:2]
+    degrees = np.zeros((own.powers.shape[1], max(int(own.powers.max(initial=0)), 1) + 1))
+    known = (own.table.reshape(q * m, -1), own.powers, own.axes, own.scales)
+    return deepest, table, *known, degrees, np.zeros(4 + 5 * m)
+
+
+def moving_values(
+    local_mode: LocalMode, deepest: float, touches: np.ndarray, points: np.ndarray
+) -> np.ndarray:
+    """The local mode (N, P, components), f included, as if all points were on the touched surface.
+
+    Parameters
+    ----------
+    local_mode : LocalMode
+    deepest : float
+        s* of the amplitude, m.
+    touches : (N, 8 + p)
+        Depth s (m), f, foot (m), normal, further inputs.
+    points : (P, 3)
+        At rest, m.
+    """
+    components = 1 if len(local_mode.table) == 1 else 3
+    known = profile_arguments(local_mode, deepest)
+    profile = np.zeros((local_mode.table.shape[1], OFFSETS, components))
+    out, line = np.zeros((len(touches), len(points), components)), np.zeros(OFFSETS * components)
+    points, every = np.ascontiguousarray(points), np.arange(len(points))
+    for touch, values in zip(np.ascontiguousarray(touches), out, strict=True):
+        profile_into(profile, touch, *known)
+        moving_into(values.reshape(-1), touch, profile, line, local_mode.reach, every, points)
+    return out

@@ -12,8 +12,8 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.network import Archive, save_archive
-from palpate.surrogates.field.field import FieldSurrogate
-from palpate.surrogates.field.field_file import arrays_of, described, field_of
+from palpate.surrogates.fields.field_file import arrays_of, described, field_of
+from palpate.surrogates.fields.field_surrogate import FieldSurrogate
 from palpate.surrogates.file_parts import read
 from palpate.surrogates.touch_file import archive_of, surrogate_of
 from palpate.surrogates.touch_surrogate import TouchSurrogate

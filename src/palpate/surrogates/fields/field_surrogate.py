@@ -1,10 +1,10 @@
 """A field over a body's surface under a touch: displacement, von Mises stress, stretch.
 
-    y(X; c, p) = y₀(X) + f(s) [Σ_k b_k(c, p) φ_k(X) + dimple(X; c, s)]
+    y(X; c, p) = y₀(X) + f(s) [Σ_k b_k(c, p) φ_k(X) + local mode(X; c, s)]
 
-s = R − d(c) is the depth of the rigid probe, f how the field begins (`rise`), φ_k modes that are orthonormal in the
-mean over the surface (proper orthogonal decomposition, Sirovich 1987), b a network, and the dimple what travels with
-the probe. Without contact the field is y₀, exactly.
+s = R − d(c) is the depth of the rigid probe, f how the field grows with depth (`depth_amplitude`), φ_k modes that are
+orthonormal in the mean over the surface (proper orthogonal decomposition, Sirovich 1987), b a network, and the local
+mode what moves with the probe. Without contact the field is y₀, exactly.
 """
 
 from __future__ import annotations
@@ -25,16 +25,78 @@ from palpate.network import Network
 from palpate.network.network_kernels import Precision
 from palpate.surrogates.arguments import rows_of
 from palpate.surrogates.continuation import Continuation
-from palpate.surrogates.field.carrying import Carrier, node_normals
-from palpate.surrogates.field.dimple import Dimple
-from palpate.surrogates.field.errors import FieldErrors, sizes_of
-from palpate.surrogates.field.evaluator import FieldEvaluator
-from palpate.surrogates.field.rise import Rise
-from palpate.surrogates.field.travelling import profiling, travelling_values
+from palpate.surrogates.fields.depth_amplitude import DepthAmplitude
+from palpate.surrogates.fields.field_evaluator import FieldEvaluator
+from palpate.surrogates.fields.field_kernels import moving_values, profile_arguments
+from palpate.surrogates.fields.local_mode import LocalMode
+from palpate.surrogates.fields.surface_interpolation import SurfaceInterpolation, node_normals
 from palpate.surrogates.surface import TouchedSurface
 from palpate.units import Range, bounds
 
-__all__ = ["FieldSurrogate"]
+__all__ = [
+    "FieldErrors",
+    "FieldSurrogate",
+    "sizes_of",
+]
+
+_SHOWN = {"m": (1e3, "mm"), "Pa": (1e-3, "kPa")}  # factor and unit in which people read
+
+
+def sizes_of(errors: np.ndarray) -> np.ndarray:
+    """Size (N, nodes) of errors (N, nodes, components) at each node."""
+    return np.asarray(np.sqrt((errors**2).sum(axis=2)))
+
+
+@dataclass(frozen=True, eq=False)
+class FieldErrors:
+    """Errors of N solves at each node, as sizes in the field's unit.
+
+    Attributes
+    ----------
+    truncation : (N, nodes)
+        Of the nearest field that the modes and the moving part can show.
+    learning : (N, nodes)
+        Between that and the field that is answered.
+    total : (N, nodes)
+        Of the field that is answered.
+    mass : (nodes,)
+        Shares of the surface.
+    unit : str
+    """
+
+    truncation: np.ndarray
+    learning: np.ndarray
+    total: np.ndarray
+    mass: np.ndarray
+    unit: str
+
+    def rms(self, what: str = "total") -> np.ndarray:
+        """Root mean square over the surface (N,); total² = truncation² + learning²."""
+        return np.asarray(np.sqrt(getattr(self, what) ** 2 @ self.mass))
+
+    def mean(self, what: str = "total") -> float:
+        """Mean over nodes and solves."""
+        return float(getattr(self, what).mean())
+
+    def max(self, what: str = "total") -> float:
+        """Largest over nodes and solves."""
+        return float(getattr(self, what).max())
+
+    def as_dict(self) -> dict[str, dict[str, float]]:
+        """Mean and max of each, for a record."""
+        names = ("truncation", "learning", "total")
+        return {name: {"mean": self.mean(name), "max": self.max(name)} for name in names}
+
+    def __str__(self) -> str:
+        factor, unit = _SHOWN.get(self.unit, (1.0, self.unit))
+        parts = [
+            f"{name} {factor * figures['mean']:.3g} / {factor * figures['max']:.3g}"
+            for name, figures in self.as_dict().items()
+        ]
+        return f"mean / max error over {len(self.total)} solves: {', '.join(parts)} {unit}".rstrip()
+
+    __repr__ = __str__
+
 
 _ARRAYS = ("modes", "rest", "points", "mass")
 
@@ -58,14 +120,14 @@ class FieldSurrogate:
         Of the surface, in these nodes.
     mass : (nodes,)
         Share of the surface that each node stands for; they add up to one.
-    rise : Rise
+    amplitude : DepthAmplitude
     surface : TouchedSurface
     radius : float
         R of the probe, m; not used where `radius_input` says which input it is.
-    dimple : Dimple, optional
+    local_mode : LocalMode, optional
     radius_input : int, optional
     continuation : Continuation, optional
-        How far b is followed beyond its training; of the network's ranges and the rise's depth unless given.
+        How far b is followed beyond its training; of the network's ranges and the amplitude's depth unless given.
     meta : mapping
         JSON-able.
 
@@ -83,10 +145,10 @@ class FieldSurrogate:
     points: np.ndarray
     triangles: np.ndarray
     mass: np.ndarray
-    rise: Rise
+    amplitude: DepthAmplitude
     surface: TouchedSurface
     radius: float = math.nan
-    dimple: Dimple | None = None
+    local_mode: LocalMode | None = None
     radius_input: int | None = None
     continuation: Continuation | None = None
     meta: Mapping[str, Any] = field(default_factory=dict)
@@ -95,7 +157,7 @@ class FieldSurrogate:
         own_arrays(self, *_ARRAYS)
         own_arrays(self, "triangles", dtype=np.int64)
         if self.continuation is None and len(self.network.inputs) >= 3:
-            going = Continuation.of(self.network.inputs, deepest=self.rise.deepest)
+            going = Continuation.of(self.network.inputs, deepest=self.amplitude.deepest)
             object.__setattr__(self, "continuation", going)
         if fault := self._fault():
             raise UsageError(
@@ -129,37 +191,37 @@ class FieldSurrogate:
             return f"its probe has a radius of {self.radius} m"
         if self.continuation is not None and self.continuation.widths.shape != (n,):
             return f"its continuation has {self.continuation.widths.size} widths for {n} inputs"
-        return self._fault_of_dimple()
+        return self._fault_of_local_mode()
 
-    def _fault_of_dimple(self) -> str:
-        wanted, dimple = {1: 1, 3: 2}.get(self.rest.shape[1]), self.dimple
-        if dimple is None:
+    def _fault_of_local_mode(self) -> str:
+        wanted, local_mode = {1: 1, 3: 2}.get(self.rest.shape[1]), self.local_mode
+        if local_mode is None:
             return ""
-        if len(dimple.table) != wanted:
-            return "its travelling part is of other components"
-        own, further = dimple.variation, len(self.inputs) - 3
-        ends = [dimple.table[:, -3:], *([] if own is None else [own.table[:, :, -3:]])]
+        if len(local_mode.table) != wanted:
+            return "its moving part is of other components"
+        own, further = local_mode.variation, len(self.inputs) - 3
+        ends = [local_mode.table[:, -3:], *([] if own is None else [own.table[:, :, -3:]])]
         if any(end.any() for end in ends):
-            return "its travelling part does not end at its reach"
+            return "its moving part does not end at its reach"
         strange = own is not None and own.powers.shape[1] != len(own.axes) + further
-        return "its travelling part varies with other inputs" if strange else ""
+        return "its moving part varies with other inputs" if strange else ""
 
     def __str__(self) -> str:
         nodes, components = self.rest.shape
         names = ", ".join(str(r) for r in self.inputs)
         return (
             f"FieldSurrogate: {self.name} ({self.unit or '1'}) on {nodes} nodes, {components} each; {names}; "
-            f"{len(self.modes)} modes{self._dimple_in_words}, rise {self.rise.name!r}, "
+            f"{len(self.modes)} modes{self._local_mode_in_words}, amplitude {self.amplitude.name!r}, "
             f"{self.network.units} units"
         )
 
     __repr__ = __str__
 
     @property
-    def _dimple_in_words(self) -> str:
-        if self.dimple is None:
+    def _local_mode_in_words(self) -> str:
+        if self.local_mode is None:
             return ""
-        return " and a dimple" if self.dimple.variation is None else " and a dimple that varies"
+        return " and a local_mode" if self.local_mode.variation is None else " and a local mode that varies"
 
     @property
     def inputs(self) -> tuple[Range, ...]:
@@ -168,10 +230,10 @@ class FieldSurrogate:
 
     @cached_property
     def touched(self) -> np.ndarray:
-        """Nodes (nodes,) that the travelling part moves, bool."""
-        if self.dimple is None:
+        """Nodes (nodes,) that the moving part moves, bool."""
+        if self.local_mode is None:
             return np.zeros(len(self.points), dtype=np.bool_)
-        return self.dimple.touches(self.surface, self.points)
+        return self.local_mode.touches(self.surface, self.points)
 
     @cached_property
     def _fixed(self) -> tuple[np.ndarray, np.ndarray]:
@@ -180,23 +242,23 @@ class FieldSurrogate:
         low, high = bounds(self.inputs)
         own = -1 if self.radius_input is None else self.radius_input
         radius = self.radius if own < 0 else self.inputs[own].low
-        numbers = [radius, own, going.deepest, going.depth_width, *self.rise.numbers()]
+        numbers = [radius, own, going.deepest, going.depth_width, *self.amplitude.numbers()]
         return np.array(numbers, dtype=np.float64), np.array([low, high, going.widths])
 
     def compiled(self) -> tuple[Any, ...]:
         """(numbers, limits, surface, net): what `coefficients_into` takes last, with scratch for one thread."""
         return (*self._fixed, self.surface.compiled(), self.network.compiled())
 
-    def profiling(self) -> tuple[Any, ...]:
+    def profile_arguments(self) -> tuple[Any, ...]:
         """What `profile_into` takes last."""
-        return profiling(self.dimple, self.rise.deepest)
+        return profile_arguments(self.local_mode, self.amplitude.deepest)
 
-    def travelling(self) -> tuple[Any, ...]:
+    def moving_arguments(self) -> tuple[Any, ...]:
         """(reach, nodes, points): what `field_into` takes last."""
-        if self.dimple is None:
+        if self.local_mode is None:
             return 1.0, np.zeros(0, np.int64), np.zeros((0, 3))
         nodes = np.flatnonzero(self.touched)
-        return float(self.dimple.reach), nodes, np.ascontiguousarray(self.points[nodes])
+        return float(self.local_mode.reach), nodes, np.ascontiguousarray(self.points[nodes])
 
     def _checked(self, X: np.ndarray) -> np.ndarray:
         return rows_of(X, self.inputs, "field")
@@ -234,7 +296,7 @@ class FieldSurrogate:
     def values_at(self, X: np.ndarray, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
         """The field (N, P, components) at the nodes of another mesh of the same surface.
 
-        The travelling part is known everywhere; the others are carried from node to node.
+        The moving part is known everywhere; the others are carried from node to node.
 
         Parameters
         ----------
@@ -245,22 +307,24 @@ class FieldSurrogate:
         """
         if points.shape == self.points.shape and np.allclose(points, self.points, rtol=0, atol=1e-9):
             return self.values(X)
-        carrier = Carrier.of(self.points, self.triangles, points, node_normals(points, triangles))
+        interpolation = SurfaceInterpolation.of(
+            self.points, self.triangles, points, node_normals(points, triangles)
+        )
         values = self.values(X)
-        out = carrier(values)
-        if self.dimple is None:
+        out = interpolation(values)
+        if self.local_mode is None:
             return out
-        here, touched = self._travelling_values(X, self.points), self.dimple.touches(self.surface, points)
-        out[:, touched] = (self._travelling_values(X, points) + carrier(values - here))[:, touched]
+        here, touched = self._moving_values(X, self.points), self.local_mode.touches(self.surface, points)
+        out[:, touched] = (self._moving_values(X, points) + interpolation(values - here))[:, touched]
         return out
 
-    def _travelling_values(self, X: np.ndarray, points: np.ndarray) -> np.ndarray:
-        assert self.dimple is not None
+    def _moving_values(self, X: np.ndarray, points: np.ndarray) -> np.ndarray:
+        assert self.local_mode is not None
         ev, touches = self.evaluator(precision="double"), []
         for x in self._checked(X):
             ev(x[:3], x[3:])
             touches.append(ev.place.copy())
-        return travelling_values(self.dimple, self.rise.deepest, np.array(touches), points)
+        return moving_values(self.local_mode, self.amplitude.deepest, np.array(touches), points)
 
     def errors(self, X: np.ndarray, values: np.ndarray) -> FieldErrors:
         """Errors at solves X (N, n) with the fields (N, nodes, components), split into truncation and learning.
@@ -300,7 +364,7 @@ class FieldSurrogate:
         UsageError
             If the file can't be written.
         """
-        from palpate.surrogates.field.field_file import save_field
+        from palpate.surrogates.fields.field_file import save_field
 
         return save_field(path, self)
 
@@ -313,6 +377,6 @@ class FieldSurrogate:
         FileFormatError
             If the file is missing, corrupt, foreign or from a later version.
         """
-        from palpate.surrogates.field.field_file import load_field
+        from palpate.surrogates.fields.field_file import load_field
 
         return load_field(path)

@@ -9,11 +9,11 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.network.network_kernels import PRECISIONS, Precision
 from palpate.surrogates.arguments import NONE, touch_at
-from palpate.surrogates.field.kernels import FRAME, coefficients_into, field_into, profile_into
-from palpate.surrogates.field.variation import OFFSETS
+from palpate.surrogates.fields.field_kernels import FRAME, coefficients_into, field_into, profile_into
+from palpate.surrogates.fields.local_mode import OFFSETS
 
 if TYPE_CHECKING:
-    from palpate.surrogates.field.field import FieldSurrogate
+    from palpate.surrogates.fields.field_surrogate import FieldSurrogate
 
 __all__ = ["FieldEvaluator"]
 
@@ -44,12 +44,12 @@ class FieldEvaluator:
         scratch = (np.zeros(k), np.zeros((2, n)), np.zeros((2, 3, 3)))
         self._first: tuple[Any, ...] = (self._z, self._place, *scratch, numbers, limits, surface, net)
         rows = np.concatenate([surrogate.rest[None], surrogate.modes]).reshape(1 + k, -1).astype(kind)
-        deepest, table, *others = surrogate.profiling()
+        deepest, table, *others = surrogate.profile_arguments()
         self._profile = np.zeros((table.shape[1], OFFSETS, surrogate.rest.shape[1]))
         self._second: tuple[Any, ...] = (self._profile, self._place, deepest, table, *others)
         line = np.zeros(self._profile[0].size)
         known = (self._flat, self._z, self._place, np.ascontiguousarray(rows), self._profile, line)
-        self._third: tuple[Any, ...] = (*known, *surrogate.travelling())
+        self._third: tuple[Any, ...] = (*known, *surrogate.moving_arguments())
         self._shape = (n - 3,)
         low = np.array([r.low for r in surrogate.inputs])
         self(low[:3], low[3:])  # compile now, not in the loop
@@ -73,7 +73,7 @@ class FieldEvaluator:
         return self.values
 
     def profile(self) -> np.ndarray:
-        """The dimple's profile (r, 4, components) at the last call's touch, see `kernels`; one array for all calls."""
+        """Profile of the local mode (r, 4, components) at the last call's touch, as in `field_kernels`; one array."""
         profile_into(*self._second)
         return self._profile
 

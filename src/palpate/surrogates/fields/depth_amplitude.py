@@ -19,16 +19,16 @@ from numba import njit
 
 from palpate.errors import UsageError
 
-__all__ = ["RISES", "Rise", "rise_at"]
+__all__ = ["AMPLITUDES", "DepthAmplitude", "amplitude_at"]
 
 _POWERS = {"linear": 1.0, "hertz": 1.5, "square": 2.0, "series": 2.0}
-RISES = tuple(_POWERS)
+AMPLITUDES = tuple(_POWERS)
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
 
 
 @dataclass(frozen=True)
-class Rise:
+class DepthAmplitude:
     """One such growth.
 
     Attributes
@@ -53,31 +53,31 @@ class Rise:
     def __post_init__(self) -> None:
         if self.name not in _POWERS:
             raise UsageError(
-                f"A field does not rise by {self.name!r}.", fix=f"Choose one of {', '.join(RISES)}."
+                f"A field does not grow by {self.name!r}.", fix=f"Choose one of {', '.join(AMPLITUDES)}."
             )
         series = self.name == "series"
         if not (self.length > 0 and 0 < self.deepest < math.inf) or math.isfinite(self.length) != series:
             raise UsageError(
-                f"A field can't rise by {self.name!r} with a length of {self.length} m to a depth of "
+                f"A field can't grow by {self.name!r} with a length of {self.length} m to a depth of "
                 f"{self.deepest} m.",
                 why="Only 'series' crosses from one power to another, and it does so at a positive length.",
                 fix="Give a positive, finite depth, and a length with 'series' alone.",
             )
 
     def numbers(self) -> tuple[float, float, float]:
-        """(p, s*, a), what `rise_at` takes."""
+        """(p, s*, a), what `amplitude_at` takes."""
         return _POWERS[self.name], self.deepest, self.length
 
     def at(self, s: np.ndarray) -> np.ndarray:
         """Values f at depths s (m) of any shape; zero where s ≤ 0."""
         s = np.asarray(s, dtype=np.float64)
         out = np.empty(s.size)
-        _rises_into(s.ravel(), out, *self.numbers())
+        _amplitudes_into(s.ravel(), out, *self.numbers())
         return out.reshape(s.shape)
 
 
 @_jit
-def rise_at(s, power, deepest, length) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def amplitude_at(s, power, deepest, length) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Values f at one depth s (m)."""
     if s <= 0.0:
         return 0.0
@@ -93,6 +93,6 @@ def rise_at(s, power, deepest, length) -> float:  # type: ignore[no-untyped-def]
 
 
 @_jit
-def _rises_into(s, out, power, deepest, length) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def _amplitudes_into(s, out, power, deepest, length) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     for i in range(s.size):
-        out[i] = rise_at(s[i], power, deepest, length)
+        out[i] = amplitude_at(s[i], power, deepest, length)

@@ -2,7 +2,7 @@
 
 Locally, by cubic radial functions |r|³ with a quadratic tail in the tangent plane (Duchon 1977; Wendland 2005, ch. 11),
 through the nearest nodes that face the same way: of third order between nodes, exact at them. Straight facets would
-cut off the bottom of a dimple by h²/8R, a third of a millimetre for elements of 5 mm under a ball of 10 mm.
+cut off the bottom of a local mode by h²/8R, a third of a millimetre for elements of 5 mm under a ball of 10 mm.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["Carrier", "node_normals"]
+__all__ = ["SurfaceInterpolation", "node_normals"]
 
 NEAREST = 20  # nodes that decide a value
 FACING = 0.5  # how far a normal turned by 1 rad sets a node back, over the distance of nodes around
@@ -20,7 +20,7 @@ RIDGE = 1e-10  # of the system: where nodes coincide or lie on a conic in the ta
 
 
 @dataclass(frozen=True, eq=False)
-class Carrier:
+class SurfaceInterpolation:
     """Carries values from P nodes to Q places.
 
     Attributes
@@ -33,7 +33,9 @@ class Carrier:
     weights: np.ndarray
 
     @classmethod
-    def of(cls, points: np.ndarray, triangles: np.ndarray, places: np.ndarray, facing: np.ndarray) -> Carrier:
+    def of(
+        cls, points: np.ndarray, triangles: np.ndarray, places: np.ndarray, facing: np.ndarray
+    ) -> SurfaceInterpolation:
         """From the nodes (P, 3) of triangles (t, 3) to places (Q, 3) with outward unit normals (Q, 3); lengths in m."""
         count = min(NEAREST, len(points))
         nodes = _neighbours(points, node_normals(points, triangles), places, facing, count)

@@ -12,14 +12,13 @@ import numpy as np
 
 from palpate.network import Archive, Network, save_archive
 from palpate.surrogates.continuation import Continuation
-from palpate.surrogates.field.dimple import Dimple
-from palpate.surrogates.field.rise import Rise
-from palpate.surrogates.field.variation import Variation
+from palpate.surrogates.fields.depth_amplitude import DepthAmplitude
+from palpate.surrogates.fields.local_mode import LocalMode, Variation
 from palpate.surrogates.file_parts import finite, number, read
 from palpate.surrogates.surface import TouchedSurface
 
 if TYPE_CHECKING:
-    from palpate.surrogates.field.field import FieldSurrogate
+    from palpate.surrogates.fields.field_surrogate import FieldSurrogate
 
 __all__ = ["KIND", "arrays_of", "described", "field_of", "load_field", "save_field"]
 
@@ -27,7 +26,18 @@ KIND = "field-surrogate"
 _NETWORK, _SURFACE = "coefficients", "surface/"
 _OWN = ("modes", "rest", "points", "triangles", "mass")
 _VARIED, _PARTS = "varied/", ("table", "powers", "axes", "scales")
-_KEYS = {"name", "unit", "rise", "deepest", "length", "radius", "radius_input", "reach", "within", "widths"}
+_KEYS = {
+    "name",
+    "unit",
+    "amplitude",
+    "deepest",
+    "length",
+    "radius",
+    "radius_input",
+    "reach",
+    "within",
+    "widths",
+}
 _KEYS |= {"trained", "trained_width", "meta"}
 
 
@@ -65,27 +75,27 @@ def _alone(archive: Archive) -> FieldSurrogate:
 def arrays_of(field: FieldSurrogate) -> dict[str, np.ndarray]:
     """Its own arrays, network and surface apart."""
     arrays = {name: getattr(field, name) for name in _OWN}
-    if field.dimple is not None:
-        arrays |= {"table": field.dimple.table}
-        if (own := field.dimple.variation) is not None:
+    if field.local_mode is not None:
+        arrays |= {"table": field.local_mode.table}
+        if (own := field.local_mode.variation) is not None:
             arrays |= {_VARIED + name: getattr(own, name) for name in _PARTS}
     return arrays
 
 
 def described(field: FieldSurrogate) -> dict[str, Any]:
     """All that is no array, for JSON."""
-    going, rise, dimple = field.continuation, field.rise, field.dimple
+    going, amplitude, local_mode = field.continuation, field.amplitude, field.local_mode
     assert going is not None
     return {
         "name": field.name,
         "unit": field.unit,
-        "rise": rise.name,
-        "deepest": rise.deepest,
-        "length": finite(rise.length),
+        "amplitude": amplitude.name,
+        "deepest": amplitude.deepest,
+        "length": finite(amplitude.length),
         "radius": finite(field.radius),
         "radius_input": field.radius_input,
-        "reach": None if dimple is None else dimple.reach,
-        "within": None if dimple is None else dimple.within,
+        "reach": None if local_mode is None else local_mode.reach,
+        "within": None if local_mode is None else local_mode.within,
         "widths": going.widths.tolist(),
         "trained": finite(going.deepest),
         "trained_width": going.depth_width,
@@ -103,7 +113,7 @@ def field_of(
     KeyError, TypeError, ValueError, UsageError
         If they are not those of one.
     """
-    from palpate.surrogates.field.field import FieldSurrogate
+    from palpate.surrogates.fields.field_surrogate import FieldSurrogate
 
     expected = {*_OWN, *(("table",) if meta.get("reach") is not None else ())}
     varies = meta.get("reach") is not None and any(name.startswith(_VARIED) for name in arrays)
@@ -119,20 +129,22 @@ def field_of(
     for name, array in arrays.items():
         if array.dtype != kinds.get(name, np.float64):
             raise TypeError(f"its {name} holds {array.dtype} numbers")
-    dimple = None
+    local_mode = None
     if meta["reach"] is not None:
         variation = Variation(**{name: arrays[_VARIED + name] for name in _PARTS}) if varies else None
-        dimple = Dimple(arrays["table"], number(meta, "reach"), number(meta, "within"), variation)
+        local_mode = LocalMode(arrays["table"], number(meta, "reach"), number(meta, "within"), variation)
     widths = np.array([number({"width": w}, "width") for w in meta["widths"]])
     return FieldSurrogate(
         name=meta["name"],
         unit=meta["unit"],
         network=network,
         **{name: arrays[name] for name in _OWN},
-        rise=Rise(meta["rise"], number(meta, "deepest"), number(meta, "length", math.inf)),
+        amplitude=DepthAmplitude(
+            meta["amplitude"], number(meta, "deepest"), number(meta, "length", math.inf)
+        ),
         surface=surface,
         radius=number(meta, "radius", math.nan),
-        dimple=dimple,
+        local_mode=local_mode,
         radius_input=own,
         continuation=Continuation(widths, number(meta, "trained", math.inf), number(meta, "trained_width")),
         meta=meta["meta"],

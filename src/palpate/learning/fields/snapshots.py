@@ -1,6 +1,6 @@
 """Fields of solves, each at the nodes of the mesh that it was solved on, and the mesh that they shall be shown on.
 
-What travels with the probe is learnt where it was solved: carried to other nodes first, the flank of a dimple would
+What travels with the probe is learnt where it was solved: carried to other nodes first, the flank of a local mode would
 lose some tenths of a millimetre between elements of 5 mm. Only what that leaves, which is smooth, is carried.
 """
 
@@ -14,9 +14,9 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.surrogates import TouchedSurface
-from palpate.surrogates.field import Dimple, Rise
-from palpate.surrogates.field.carrying import Carrier, node_normals
-from palpate.surrogates.field.travelling import travelling_values
+from palpate.surrogates.fields import DepthAmplitude, LocalMode
+from palpate.surrogates.fields.field_kernels import moving_values
+from palpate.surrogates.fields.surface_interpolation import SurfaceInterpolation, node_normals
 from palpate.units import Range, bounds
 
 __all__ = ["Snapshots", "Solves"]
@@ -64,7 +64,7 @@ class Solves:
         Of the mesh that the field is shown on.
     radius_input : int or None
         The input that is the radius.
-    carriers : tuple of Carrier or None
+    interpolations : tuple of SurfaceInterpolation or None
         From the nodes of each snapshots to those; None where they are the same.
     """
 
@@ -76,7 +76,7 @@ class Solves:
     triangles: np.ndarray
     mass: np.ndarray
     radius_input: int | None
-    carriers: tuple[Carrier | None, ...]
+    interpolations: tuple[SurfaceInterpolation | None, ...]
 
     @classmethod
     def of(
@@ -92,14 +92,14 @@ class Solves:
     ) -> Solves:
         """All of them, as they are."""
         facing = node_normals(points, triangles)
-        carriers = tuple(
+        interpolations = tuple(
             None
             if one.points.shape == points.shape and (one.points == points).all()
-            else Carrier.of(one.points, one.triangles, points, facing)
+            else SurfaceInterpolation.of(one.points, one.triangles, points, facing)
             for one in snapshots
         )
         known = (surface, radius, points, triangles, mass, radius_input)
-        return cls(tuple(snapshots), tuple(inputs), *known, carriers)
+        return cls(tuple(snapshots), tuple(inputs), *known, interpolations)
 
     @property
     def touching(self) -> Solves:
@@ -122,12 +122,14 @@ class Solves:
     def take(self, some: np.ndarray) -> Solves:
         """Those where `some` (N,) is true."""
         kept = [
-            (replace(one, X=one.X[own], values=one.values[own], groups=one.groups[own]), carrier)
-            for one, carrier, own in zip(self.snapshots, self.carriers, self._split(some), strict=True)
+            (replace(one, X=one.X[own], values=one.values[own], groups=one.groups[own]), interpolation)
+            for one, interpolation, own in zip(
+                self.snapshots, self.interpolations, self._split(some), strict=True
+            )
             if own.any()
         ]
-        snapshots, carriers = zip(*kept, strict=True)
-        return replace(self, snapshots=snapshots, carriers=carriers)
+        snapshots, interpolations = zip(*kept, strict=True)
+        return replace(self, snapshots=snapshots, interpolations=interpolations)
 
     def _split(self, rows: np.ndarray) -> list[np.ndarray]:
         """What belongs to each snapshots, of an array (N, …)."""
@@ -182,30 +184,32 @@ class Solves:
         """Of every solve the number of its snapshots, and the row there."""
         return ((k, i) for k, one in enumerate(self.snapshots) for i in range(len(one.X)))
 
-    def travelling(self, dimple: Dimple, rise: Rise) -> list[np.ndarray]:
-        """What a dimple gives of the snapshots, each (N, P, components), as if all nodes were touched."""
+    def moving(self, local_mode: LocalMode, amplitude: DepthAmplitude) -> list[np.ndarray]:
+        """What a local mode gives of the snapshots, each (N, P, components), as if all nodes were touched."""
         return [
-            travelling_values(dimple, rise.deepest, touches, one.points)
-            for touches, one in zip(self._touches(rise), self.snapshots, strict=True)
+            moving_values(local_mode, amplitude.deepest, touches, one.points)
+            for touches, one in zip(self._touches(amplitude), self.snapshots, strict=True)
         ]
 
-    def _touches(self, rise: Rise) -> list[np.ndarray]:
+    def _touches(self, amplitude: DepthAmplitude) -> list[np.ndarray]:
         """Of the snapshots s, f, foot, normal and further inputs, each (N, 8 + p)."""
-        known = (self.depth[:, None], rise.at(self.depth)[:, None], *self.feet, self.X[:, 3:])
+        known = (self.depth[:, None], amplitude.at(self.depth)[:, None], *self.feet, self.X[:, 3:])
         return self._split(np.hstack(known))
 
-    def remainder(self, dimple: Dimple | None, rise: Rise) -> np.ndarray:
-        """What a dimple leaves of the fields at the nodes that are shown, (N, nodes, components).
+    def remainder(self, local_mode: LocalMode | None, amplitude: DepthAmplitude) -> np.ndarray:
+        """What a local mode leaves of the fields at the nodes that are shown, (N, nodes, components).
 
         It is taken away where it is known, at the nodes of the snapshots; only the rest is carried.
         """
-        whole = self._carried(self.values)
-        if dimple is None:
+        whole = self._interpolated(self.values)
+        if local_mode is None:
             return whole
-        shown = self.travelling(dimple, rise)
-        rest = self._carried([u - one for u, one in zip(self.values, shown, strict=True)])
-        return np.where(dimple.touches(self.surface, self.points)[:, None], rest, whole)
+        shown = self.moving(local_mode, amplitude)
+        rest = self._interpolated([u - one for u, one in zip(self.values, shown, strict=True)])
+        return np.where(local_mode.touches(self.surface, self.points)[:, None], rest, whole)
 
-    def _carried(self, fields: Sequence[np.ndarray]) -> np.ndarray:
-        both = zip(self.carriers, fields, strict=True)
-        return np.concatenate([field if carrier is None else carrier(field) for carrier, field in both])
+    def _interpolated(self, fields: Sequence[np.ndarray]) -> np.ndarray:
+        both = zip(self.interpolations, fields, strict=True)
+        return np.concatenate(
+            [field if interpolation is None else interpolation(field) for interpolation, field in both]
+        )

@@ -19,7 +19,7 @@ from palpate.learning.energy.columns import columns_of
 from palpate.learning.plastic import HeldPaths
 from palpate.learning.touch import hand_coordinates
 from palpate.surrogates import TouchedBody, TouchModel, TouchSurrogate
-from palpate.surrogates.field.field import FieldSurrogate
+from palpate.surrogates.fields.field_surrogate import FieldSurrogate
 from palpate.surrogates.plastic import HeldBody
 from palpate.surrogates.touch import SLACK
 from palpate.units import Range, bounds

@@ -25,7 +25,7 @@ from palpate.viewer.hand_lock import Command, HandLock
 from palpate.viewer.messages import Credit, Frame, Hand, Hello, Loop, Notice
 from palpate.viewer.page_model import PageModel, vector
 
-__all__ = ["LoopLike", "Session"]
+__all__ = ["LoopLike", "Page", "Session"]
 
 logger = logging.getLogger("palpate.viewer")
 

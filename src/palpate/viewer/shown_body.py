@@ -207,13 +207,13 @@ def _step_of(solution: Any) -> ShownStep:
         displacement=solution.displacement,
         values={name: values for name, values in known.items() if values is not None},
         ball=ball,
-        figures=figures(
+        figures=_figures(
             getattr(solution, "response", None), getattr(solution, "potential_energy", None), ball
         ),
     )
 
 
-def figures(response: Any, energy: Any, ball: tuple[np.ndarray, float] | None) -> dict[str, str]:
+def _figures(response: Any, energy: Any, ball: tuple[np.ndarray, float] | None) -> dict[str, str]:
     """Return the figures of a state in words, as far as they are known."""
     found: dict[str, str] = {}
     if ball is not None:
@@ -227,7 +227,7 @@ def figures(response: Any, energy: Any, ball: tuple[np.ndarray, float] | None) -
     return found
 
 
-def unreadable(path: Path, why: str) -> FileFormatError:
+def _unreadable(path: Path, why: str) -> FileFormatError:
     """Return the error of a file that can't be shown."""
     return FileFormatError(
         f"{path} can't be shown.",
@@ -248,7 +248,7 @@ def body_of_file(path: Path, name: str = "") -> ShownBody:
         If there is none, or nothing that can be shown.
     """
     if not path.exists():
-        raise unreadable(path, "There is no such file.")
+        raise _unreadable(path, "There is no such file.")
     if path.is_dir():
         from palpate.dataset import Dataset
 
@@ -293,7 +293,7 @@ def _sample(data: Any, row: int, radius: float | None) -> ShownStep:
         displacement=np.asarray(sample["displacement"].values, dtype=float),
         ball=ball,
         label=f"sample {row}",
-        figures=figures(response, energy, ball),
+        figures=_figures(response, energy, ball),
     )
 
 
@@ -322,10 +322,10 @@ def _series(path: Path, name: str) -> ShownBody:
     try:
         rows = ElementTree.parse(path).getroot().findall("Collection/DataSet")
     except ElementTree.ParseError as error:
-        raise unreadable(path, str(error)) from error
+        raise _unreadable(path, str(error)) from error
     files = [path.parent / row.get("file", "") for row in rows]
     if not files:
-        raise unreadable(path, "It names no files.")
+        raise _unreadable(path, "It names no files.")
     return _vtu_body(files, [f"t = {row.get('timestep', '')}" for row in rows], name)
 
 
@@ -337,7 +337,7 @@ def _vtu_body(paths: list[Path], labels: list[str], name: str) -> ShownBody:
     elif "triangle" in cells:
         triangles = cells["triangle"]
     else:
-        raise unreadable(
+        raise _unreadable(
             paths[0], f"Its cells are {', '.join(cells) or 'none'}; tetrahedra or triangles are needed."
         )
     meshes = [first, *map(_read, paths[1:])]
@@ -356,7 +356,7 @@ def _vtu_step(mesh: Any, label: str) -> ShownStep:
     energy = np.ravel(notes["potential energy"])[0] if "potential energy" in notes else None
     response = np.ravel(notes["response"]) if "response" in notes else None
     displacement = np.asarray(mesh.point_data.get("displacement", np.zeros((count, 3))), dtype=float)
-    return ShownStep(displacement, values, ball, label, figures(response, energy, ball))
+    return ShownStep(displacement, values, ball, label, _figures(response, energy, ball))
 
 
 def _read(path: Path) -> Any:
@@ -366,4 +366,4 @@ def _read(path: Path) -> Any:
     try:
         return vtu.read(path)
     except (meshio.ReadError, OSError, ElementTree.ParseError, ValueError) as error:
-        raise unreadable(path, str(error) or "It is no VTU file.") from error
+        raise _unreadable(path, str(error) or "It is no VTU file.") from error

@@ -1,4 +1,4 @@
-// What is known of the model: its own figures, and what its file says of how it was made.
+// Facts about the model: its own figures, and the record of its making in its file.
 
 import { fixed, share, tidy } from "./units";
 

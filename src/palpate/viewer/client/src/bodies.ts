@@ -26,9 +26,9 @@ export interface Body {
   readonly view: (View & { arrow: Arrow; grip: Vector3 }) | null;
   open(): Promise<void>;
   show(frame: Frame): void;
-  /** How it is drawn, in words. */
+  /** Notes on how it is drawn. */
   notes(): string[];
-  /** What else follows the picture, for programs that drive the page. */
+  /** Publish where the hand's place is, for programs that drive the page. */
   place(): void;
 }
 

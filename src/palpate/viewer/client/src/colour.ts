@@ -17,7 +17,7 @@ export function shade(share: number): Rgb {
   return [0, 1, 2].map((k) => a[k]! + (b[k]! - a[k]!) * (at - i)) as Rgb;
 }
 
-/** The same as a CSS gradient from left to right. */
+/** The colour scale as a CSS gradient from left to right. */
 export function gradient(): string {
   const stops = Array.from({ length: 13 }, (_, i) => shade(i / 12).map((c) => Math.round(255 * c)));
   return `linear-gradient(to right, ${stops.map((c) => `rgb(${c.join(" ")})`).join(", ")})`;

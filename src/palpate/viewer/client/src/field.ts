@@ -1,5 +1,5 @@
-// A field on a body's surface under a touch, summed on the page: rest + coefficients · modes + dimple. The dimple is what
-// travels with the probe: cubic B-splines in the distance from its foot, times 1 and the coordinates of the offset from
+// A field on a body's surface under a touch, summed on the page: rest + coefficients · modes + local mode. The local mode
+// travels with the probe: cubic B-splines in the distance from the contact point, times 1 and the coordinates of the offset from
 // it (docs/method/touch-field.md); the server sends its profile with each picture.
 
 import type { FieldInfo, Modes, Surface, Vec3 } from "./messages";
@@ -25,8 +25,8 @@ export class Field {
     return this.info.modes + OFFSETS * this.modes.rows * this.info.components;
   }
 
-  /** Sum it up: `numbers` are its modes' coefficients and its dimple's profile. */
-  update(numbers: Float32Array, foot: Vec3): void {
+  /** Sum it up: `numbers` are its modes' coefficients and its local mode's profile. */
+  update(numbers: Float32Array, contact: Vec3): void {
     const { values, modes } = this;
     const n = values.length;
     values.set(modes.rest);
@@ -36,7 +36,7 @@ export class Field {
       const mode = modes.modes.subarray(k * n, (k + 1) * n);
       for (let i = 0; i < n; i++) values[i]! += b * mode[i]!;
     }
-    if (modes.rows > 0) this.dimple(numbers.subarray(this.info.modes), foot);
+    if (modes.rows > 0) this.local(numbers.subarray(this.info.modes), contact);
   }
 
   /** The size of the field at each point. */
@@ -50,13 +50,13 @@ export class Field {
     });
   }
 
-  private dimple(profile: Float32Array, foot: Vec3): void {
+  private local(profile: Float32Array, contact: Vec3): void {
     if (!profile.some((x) => x !== 0)) return;
     const { values, points } = this;
     const { reach, rows } = this.modes;
     const per = this.info.components;
     for (const i of this.touched) {
-      const offset = [1, ...foot.map((o, c) => (points[3 * i + c]! - o) / reach)];
+      const offset = [1, ...contact.map((o, c) => (points[3 * i + c]! - o) / reach)];
       const far = Math.hypot(offset[1]!, offset[2]!, offset[3]!);
       if (far >= 1) continue;
       const t = far * (rows - 3);

@@ -1,4 +1,4 @@
-// What a page says in plain words: what is out of the ordinary, its banner and its status.
+// Words of a page: flags for all that is out of the ordinary, the banner, the status.
 
 import { Hold, Loop } from "./messages";
 import type { Frame, Hello, Notice } from "./messages";
@@ -6,7 +6,7 @@ import { element, tidy } from "./units";
 
 const SLOW = 0.9; // of the rate aimed at
 
-/** How a kind of body says where the hand is. */
+/** Words of a kind of body for where the hand is. */
 export interface Places {
   free: string;
   inside: string;
@@ -21,16 +21,16 @@ export interface Flag {
 
 /** The flags of one frame, the worst first. */
 export function flags(frame: Frame, hello: Hello, places: Places): Flag[] {
-  const found = [...failures(frame, hello), ...limits(frame, hello, places)];
-  if (found.length === 0) found.push(ordinary(frame, places));
+  const list = [...failures(frame, hello), ...limits(frame, hello, places)];
+  if (list.length === 0) list.push(ordinary(frame, places));
   if (frame.hold === Hold.ANOTHER) {
-    found.push({ id: "watching", tone: "calm", words: "Another page holds the hand; this one watches." });
+    list.push({ id: "watching", tone: "calm", words: "Another page holds the hand; this one watches." });
   }
   if (frame.faults > 0 && frame.fault === 0) {
     const last = hello.faults[frame.last_fault] ?? `code ${frame.last_fault}`;
-    found.push({ id: "faults", tone: "calm", words: `Faults so far: ${frame.faults}, the last one: ${last}.` });
+    list.push({ id: "faults", tone: "calm", words: `Faults so far: ${frame.faults}, the last one: ${last}.` });
   }
-  return found;
+  return list;
 }
 
 function failures(frame: Frame, hello: Hello): Flag[] {
@@ -40,34 +40,34 @@ function failures(frame: Frame, hello: Hello): Flag[] {
   if (frame.loop === Loop.FROZEN) {
     return [{ id: "frozen", tone: "bad", words: "The real-time process stands still. The force is zero." }];
   }
-  const found: Flag[] = [];
+  const list: Flag[] = [];
   if (frame.fault !== 0) {
     const words = hello.faults[frame.fault] ?? `code ${frame.fault}`;
-    found.push({ id: "fault", tone: "bad", words: `Fault: ${words}. The force is zero.` });
+    list.push({ id: "fault", tone: "bad", words: `Fault: ${words}. The force is zero.` });
   }
   if (frame.stalled && frame.grabbed) {
-    found.push({
+    list.push({
       id: "stalled",
       tone: "warn",
       words: "Nothing was heard of the hand for too long. The force is zero until it is back.",
     });
   }
-  return found;
+  return list;
 }
 
 function limits(frame: Frame, hello: Hello, places: Places): Flag[] {
-  const found: Flag[] = [];
+  const list: Flag[] = [];
   if (!frame.inside) {
-    found.push({ id: "outside", tone: "warn", words: places.outside });
+    list.push({ id: "outside", tone: "warn", words: places.outside });
   }
   if (frame.clamped) {
-    found.push({ id: "clamped", tone: "warn", words: `Force limited to ${tidy(hello.max_force)} N.` });
+    list.push({ id: "clamped", tone: "warn", words: `Force limited to ${tidy(hello.max_force)} N.` });
   }
   if (frame.rate < SLOW * hello.rate && frame.tick > hello.rate) {
     const words = `The real-time loop reaches only ${tidy(frame.rate)} of ${tidy(hello.rate)} ticks per second.`;
-    found.push({ id: "slow", tone: "warn", words });
+    list.push({ id: "slow", tone: "warn", words });
   }
-  return found;
+  return list;
 }
 
 function ordinary(frame: Frame, places: Places): Flag {

@@ -18,7 +18,7 @@ export interface Free {
   bottom: number;
 }
 
-/** What the elements that stand above and below a canvas's middle leave of it. */
+/** The part of a canvas that the elements above and below its middle leave free. */
 export function free(canvas: HTMLCanvasElement, words: Iterable<Element>): Free {
   const box = canvas.getBoundingClientRect();
   let [top, bottom] = [0, box.height];

@@ -52,10 +52,10 @@ export abstract class Hand {
   protected abstract down(e: PointerEvent): void;
   protected abstract move(e: PointerEvent): void;
   protected abstract key(e: KeyboardEvent): void;
-  /** What the view does when the hand takes hold or lets go. */
+  /** Let the view follow: the hand takes hold or lets go. */
   protected abstract held(on: boolean): void;
 
-  /** Called for every picture: while holding, the hand is told at display rate. */
+  /** Called for every picture: while holding, the hand's place is sent at display rate. */
   tick(): void {
     if (this.grabbed) this.send();
   }
@@ -98,7 +98,7 @@ export abstract class Hand {
   }
 }
 
-/** What a view offers to a hand that takes hold. */
+/** A view as a hand that takes hold sees it. */
 export interface Handle {
   readonly grip: Vector3;
   turnable: boolean;

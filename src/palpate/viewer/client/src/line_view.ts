@@ -105,7 +105,7 @@ export class LineView extends View {
     this.look();
   }
 
-  /** How it is drawn, in words. */
+  /** Notes on how it is drawn. */
   notes(): string[] {
     const times = (n: number): string => (n === 1 ? "to scale" : `drawn × ${tidy(n)}`);
     return [`displacement ${times(this.enlarged)}`, `thickness ${times(this.thickened)}`, "bands: nodes of interest"];

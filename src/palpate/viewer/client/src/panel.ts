@@ -43,7 +43,7 @@ export class Panel {
     this.last = 0;
   }
 
-  /** How deep a press goes at first and at most, m. */
+  /** Depths of a press at first and at most, m. */
   static depths(hello: Hello): readonly [first: number, most: number] {
     return [AT_FIRST * hello.deepest, MOST * hello.deepest];
   }
@@ -90,7 +90,7 @@ export class Panel {
     this.last = now;
     this.numbers(frame);
     this.timing.show(frame, now);
-    this.tell(flags(frame, hello, hello.holds ? PULLING : PRESSING));
+    this.list(flags(frame, hello, hello.holds ? PULLING : PRESSING));
     follow(frame);
     const peak = round125(Math.max(this.force.peak(frame.time), 0.05 * hello.force_max, 1e-9));
     this.force.draw(frame.time, { unit: "N", low: 0, high: peak, logarithmic: false, stepped: false });
@@ -98,7 +98,7 @@ export class Panel {
 
   /** The tab went to the background. */
   hidden(): void {
-    this.tell([{ id: "hidden", tone: "warn", words: "This tab is in the background: the hand has let go." }]);
+    this.list([{ id: "hidden", tone: "warn", words: "This tab is in the background: the hand has let go." }]);
   }
 
   /** Nothing is known any more. */
@@ -106,7 +106,7 @@ export class Panel {
     for (const id of UNKNOWN) put(id, NaN, 0);
     element("trust").textContent = element("deviation").textContent = "–";
     delete document.documentElement.dataset["tick"];
-    this.tell([{ id: "lost", tone: "bad", words: "Disconnected: nothing is known of the body. Trying again." }]);
+    this.list([{ id: "lost", tone: "bad", words: "Disconnected: nothing is known of the body. Trying again." }]);
   }
 
   private numbers(frame: Frame): void {
@@ -126,12 +126,12 @@ export class Panel {
   }
 
   /** The list of flags; changed only when they change, since it is read aloud. */
-  private tell(found: Flag[]): void {
-    const key = JSON.stringify(found);
+  private list(flagged: Flag[]): void {
+    const key = JSON.stringify(flagged);
     if (key === this.flagged) return;
     this.flagged = key;
     element("flags").replaceChildren(
-      ...found.map((flag) => {
+      ...flagged.map((flag) => {
         const row = worded("li", flag.words);
         [row.dataset["flag"], row.dataset["tone"]] = [flag.id, flag.tone];
         return row;
@@ -140,7 +140,7 @@ export class Panel {
   }
 }
 
-/** How late the loop is, and how far pictures trail the hand. */
+/** Lateness of the loop, and delay of the pictures behind the hand. */
 class Timing {
   private readonly lateness = new Plot(element<HTMLCanvasElement>("lateness-plot"), "--accent-2");
   private pictures = 0;
@@ -186,7 +186,7 @@ function subtitle(hello: Hello): (Node | string)[] {
   return hello.holds ? ["trained on ", ...joined] : joined;
 }
 
-/** What every frame tells programs that read the page. */
+/** Publish a frame for programs that read the page. */
 function record(frame: Frame): void {
   const data = document.documentElement.dataset;
   for (const name of ["position", "force", "contact", "parameters"] as const) data[name] = frame[name].join(" ");
@@ -209,7 +209,7 @@ function trained(range: RangeInfo): HTMLElement {
   return words;
 }
 
-/** How far the force may be off, in words. */
+/** The deviation of the force, in words. */
 function deviation(frame: Frame): string {
   if (!frame.grabbed) return "–";
   return Number.isNaN(frame.deviation) ? "not known" : `± ${share(frame.deviation)}`;

@@ -25,7 +25,7 @@ export function mode(name: Mode): void {
   element("view").setAttribute("aria-label", LABELS[name]);
 }
 
-/** Keep a view fitting its canvas and the theme; `recolour` is told of a new theme as well. */
+/** Keep a view fitting its canvas and the theme; `recolour` hears of a new theme as well. */
 export function watch(view: () => View | null, recolour: () => void = () => {}): void {
   const canvas = element("view");
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {

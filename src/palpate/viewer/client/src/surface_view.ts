@@ -195,7 +195,7 @@ export class SurfaceView extends View {
     return geometry;
   }
 
-  /** What a clamped body stands on, if its lowest surface is the fixed one. */
+  /** A plate under a clamped body, if its lowest surface is the fixed one. */
   private plate(): Mesh {
     const thickness = 0.008 * this.across();
     const span = new Vector3().subVectors(this.high, this.low);

@@ -1,4 +1,4 @@
-// What stands around the body: the wall that clamps it, and a floor with a scale in metres.
+// Surroundings of a line: the wall that clamps it, and a floor with a scale in metres.
 
 import {
   BoxGeometry,

@@ -25,14 +25,14 @@ export function touch(): void {
 
   const connection = new Connection({ hello: start, notice: warn, lost });
 
-  function start(told: Hello): void {
-    if (hello && JSON.stringify(hello) !== JSON.stringify(told)) {
+  function start(news: Hello): void {
+    if (hello && JSON.stringify(hello) !== JSON.stringify(news)) {
       location.reload(); // the server is back with another body: a fresh page is simpler than a changed one
       return;
     }
     element("banner").hidden = true;
-    mode(told.line ? "line" : told.holds ? "pad" : "press");
-    panel.start(told, {
+    mode(news.line ? "line" : news.holds ? "pad" : "press");
+    panel.start(news, {
       moved: (i, value) => {
         const values = Float32Array.from(latest?.parameters ?? []);
         values[i] = value;
@@ -42,12 +42,12 @@ export function touch(): void {
       deeper: (depth) => body && "wanted" in body.hand && (body.hand.wanted = depth),
     });
     lastFrame = performance.now();
-    if (!body) open(told).catch((error: unknown) => say(`The body can't be shown: ${String(error)}.`, "calm"));
-    hello = told;
+    if (!body) open(news).catch((error: unknown) => say(`The body can't be shown: ${String(error)}.`, "calm"));
+    hello = news;
   }
 
-  async function open(told: Hello): Promise<void> {
-    body = bodyOf(told, canvas, connection, panel);
+  async function open(news: Hello): Promise<void> {
+    body = bodyOf(news, canvas, connection, panel);
     await body.open(); // without WebGL this fails, and the numbers are still shown
     notes();
     body.view!.look(); // now that the words stand where they will
@@ -129,7 +129,7 @@ function label(view: NonNullable<Body["view"]>, frame: Frame): void {
   tag.style.transform = `translate(${Math.max(x, 4)}px, ${Math.max(y, 4)}px)`;
 }
 
-/** Whether two frames look different: a body at rest is not drawn again. */
+/** True where two frames look different: a body at rest is not drawn again. */
 function changed(a: Frame, b: Frame | null): boolean {
   if (!b || a.grabbed !== b.grabbed) return true;
   const parts = ["displacement", "coefficients", "prints", "contact", "force", "position", "parameters"] as const;

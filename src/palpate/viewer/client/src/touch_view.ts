@@ -60,7 +60,7 @@ export class PressView extends SurfaceView {
     this.dirty = true;
   }
 
-  /** What lies under a point of the canvas (CSS pixels) on the surface at rest; null beside the body. */
+  /** The place on the surface at rest under a point of the canvas (CSS pixels); null beside the body. */
   spotAt(x: number, y: number): Spot | null {
     const ray = this.ray(x, y);
     const hit = ray.intersectObject(this.still, false)[0];

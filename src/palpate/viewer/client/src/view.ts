@@ -15,7 +15,7 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { fit, free, project } from "./framing";
 import type { Size } from "./framing";
 
-/** How a kind of body is looked at first, and lit. */
+/** First view and light of a kind of body. */
 export interface Stance {
   up: Vector3;
   from: Vector3; // direction of the camera at first
@@ -89,7 +89,7 @@ export abstract class View {
     this.dirty = true;
   }
 
-  /** Whether the mouse and fingers turn the view. */
+  /** True while the mouse and fingers turn the view. */
   set turnable(on: boolean) {
     this.controls.enabled = on;
   }

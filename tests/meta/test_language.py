@@ -16,7 +16,6 @@ WITHOUT_SUBJECT = {
     "estimators",
     "learning",
     "network",
-    "physics",
     "rbf",
     "runtime",
     "study",

@@ -26,7 +26,7 @@ from benchmarks.peer_rivals import MISSING, RIVALS
 from benchmarks.plain import PlainNetwork
 from benchmarks.runner import main
 from benchmarks.table import Claim, Column, Table
-from palpate.learning.choosing.choice import fit
+from palpate.learning.arrays.fit import fit
 from palpate.network import Network
 from palpate.units import Quantity, Range
 

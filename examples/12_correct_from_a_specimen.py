@@ -37,7 +37,7 @@ corners = SIDE * np.array([[-1, -1, 0], [2, -1, 0], [2, 2, 0], [-1, 2, 0]])
 surface = TouchedSurface.of(corners, np.array([[0, 1, 2], [0, 2, 3]]), radius=R)
 inputs = [Range("x", 0, SIDE, "m"), Range("y", 0, SIDE, "m"), Range("z", -0.002, R, "m")]
 learnt = learn_surrogate(
-    X, energy(X), F, None, surface=surface, radius=R, inputs=inputs, law=LAW, units_max=12, seconds=4.0
+    X, energy(X), F, None, surface=surface, radius=R, inputs=inputs, law=LAW, units_max=12, effort=0.2
 )
 model = learnt.surrogate
 

@@ -18,7 +18,7 @@ cup = pp.GluedPad(
 )
 solves = pp.sweep(tissue, cup, samples=8, seed=0)
 
-surrogate, found = pp.learn(solves, seconds=3.0)
+surrogate, found = pp.learn(solves, effort=0.1)
 print(surrogate)
 print(f"left-out force error: {100 * np.median(found.errors):.2f} % median")
 

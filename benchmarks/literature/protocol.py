@@ -17,7 +17,7 @@ import numpy as np
 
 from benchmarks.table import Claim, Column
 from palpate.learning import Learner, Refining, Settings, State, default, initial, learn, refine, step
-from palpate.learning.refinement.structure import grow
+from palpate.learning.structure import grow
 from palpate.network import Scaling
 from palpate.rbf.filter.prediction import value
 from palpate.rbf.forms import unit_form

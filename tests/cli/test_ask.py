@@ -138,7 +138,7 @@ def test_of_a_body_that_relaxes_the_answer_is_that_of_an_instant(palpate, file, 
 @pytest.fixture(scope="module")
 def fitted(tmp_path_factory):
     X = np.random.default_rng(0).uniform(-1.0, 1.0, (60, 2))
-    found = pp.fit(X, np.column_stack([np.sin(X[:, 0]), X[:, 1] ** 2]), seconds=1.0)
+    found = pp.fit(X, np.column_stack([np.sin(X[:, 0]), X[:, 1] ** 2]), effort=0.03)
     return found, found.save(tmp_path_factory.mktemp("fitted") / "fit.palpate")
 
 

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from palpate.errors import UsageError
-from palpate.learning.choosing.choice import fit
-from palpate.learning.choosing.committee import Member, averaged, expected_error, refitted
-from palpate.learning.choosing.kernel_layer import KernelLayer, Metric, _unlikelihood, likely_metric
-from palpate.learning.choosing.race import Race, Runner, Split, carried, start
+from palpate.learning.arrays.fit import fit
+from palpate.learning.arrays.held_out import HeldOut, carry, start_units
+from palpate.learning.arrays.members import Member, expected_error, refit_weights
+from palpate.learning.ensemble import Ensemble
+from palpate.learning.kernel_layer import KernelLayer, Metric, likely_metric, negative_likelihood
+from palpate.learning.search import Candidate
 from palpate.network.radial import RADIAL_FUNCTIONS
 from palpate.rbf.forms import unit_form
 from palpate.rbf.regressors import Regressors
@@ -52,13 +54,13 @@ def cubic_error(X, Y, X_test, Y_test):
 @pytest.fixture(scope="module")
 def ridge_fit():
     data = samples(ridges)
-    return fit(*data[:2], INPUTS, OUTPUTS, seconds=15.0), data
+    return fit(*data[:2], INPUTS, OUTPUTS, effort=0.5), data
 
 
 @pytest.fixture(scope="module")
 def bump_fit():
     data = samples(rotated_bumps)
-    return fit(*data[:2], INPUTS, OUTPUTS, seconds=15.0), data
+    return fit(*data[:2], INPUTS, OUTPUTS, effort=0.5), data
 
 
 def test_ridges_are_learnt_by_ridges(ridge_fit):
@@ -81,19 +83,18 @@ def test_heldout_error_tells_the_test_error_roughly(which, request):
 
 def test_seed_decides_everything():
     X, Y, _, _ = samples(ridges, count=80)
-    # a target that is met soon, so that no clock has a say
-    one, two = (fit(X, Y, INPUTS, OUTPUTS, seconds=60.0, seed=3, target=0.05) for _ in range(2))
-    assert [(t.what, t.heldout) for t in one.trials] == [(t.what, t.heldout) for t in two.trials]
+    one, two = (fit(X, Y, INPUTS, OUTPUTS, effort=0.05, seed=3, workers=w) for w in (1, 2))
+    assert [(t.name, t.error) for t in one.trials] == [(t.name, t.error) for t in two.trials]
     for name in ("factors", "shifts", "weights", "tail"):
         np.testing.assert_array_equal(getattr(one.network, name), getattr(two.network, name))
-    other = fit(X, Y, INPUTS, OUTPUTS, seconds=60.0, seed=4, target=0.05)
-    assert other.trials[0].heldout != one.trials[0].heldout
+    other = fit(X, Y, INPUTS, OUTPUTS, effort=0.05, seed=4)
+    assert other.trials[0].error != one.trials[0].error
 
 
 def test_noise_is_not_learnt():
     X, _, X_test, _ = samples(ridges)
     noise = np.random.default_rng(5).normal(size=(len(X), 4))
-    found = fit(X, noise, INPUTS, OUTPUTS, seconds=3.0)
+    found = fit(X, noise, INPUTS, OUTPUTS, effort=0.1)
     assert found.heldout > 0.8
     assert np.sqrt((found.network.predict(X_test) ** 2).mean()) < 0.6
 
@@ -101,7 +102,7 @@ def test_noise_is_not_learnt():
 def test_constant_outputs():
     X, Y, X_test, _ = samples(ridges, count=30)
     Y[:, 2] = 0.1
-    found = fit(X, Y, INPUTS, OUTPUTS, seconds=2.0)
+    found = fit(X, Y, INPUTS, OUTPUTS, effort=0.07)
     np.testing.assert_allclose(found.predict(X_test)[:, 2], 0.1)
     assert found.deviation(X_test)[:, 2].max() < 1e-9
     with pytest.raises(UsageError, match="same outputs"):
@@ -111,7 +112,7 @@ def test_constant_outputs():
 def test_affine_outputs_need_no_units():
     X, _, X_test, _ = samples(ridges, count=60)
     slopes = np.random.default_rng(0).normal(size=(3, 4))
-    found = fit(X, X @ slopes + 3, INPUTS, OUTPUTS, seconds=2.0)
+    found = fit(X, X @ slopes + 3, INPUTS, OUTPUTS, effort=0.07)
     assert found.units == 0
     np.testing.assert_allclose(found.network.predict(X_test), X_test @ slopes + 3, rtol=1e-9)
 
@@ -120,7 +121,7 @@ def test_many_outputs_of_few_modes_go_through_a_basis(ridge_fit):
     X, Y, X_test, Y_test = ridge_fit[1]
     many = np.random.default_rng(0).normal(size=(4, 200))
     outputs = tuple(Quantity(f"u{i}", "m") for i in range(200))
-    found = fit(X, Y @ many, INPUTS, outputs, seconds=3.0)
+    found = fit(X, Y @ many, INPUTS, outputs, effort=0.1)
     assert found.network.basis.shape == (200, 4)
     miss = found.network.predict(X_test) - Y_test @ many
     assert np.linalg.norm(miss) < 0.1 * np.linalg.norm((Y_test - Y.mean(axis=0)) @ many)
@@ -145,9 +146,11 @@ def test_likelihood_has_its_gradient(name):
     rng = np.random.default_rng(0)
     X, Y = rng.uniform(-1, 1, (25, 2)), rng.normal(size=(25, 3))
     logs = np.array([0.2, -0.3, -2.0])
-    gradient = _unlikelihood(logs, name, X, Y)[1]
+    gradient = negative_likelihood(logs, name, X, Y)[1]
     for i, step in enumerate(1e-6 * np.eye(3)):
-        difference = _unlikelihood(logs + step, name, X, Y)[0] - _unlikelihood(logs - step, name, X, Y)[0]
+        difference = (
+            negative_likelihood(logs + step, name, X, Y)[0] - negative_likelihood(logs - step, name, X, Y)[0]
+        )
         np.testing.assert_allclose(gradient[i], difference / 2e-6, rtol=1e-5, atol=1e-8)
 
 
@@ -177,9 +180,9 @@ def test_kernel_layer_interpolates_and_its_units_are_itself():
 def test_carried_units_stand_where_they_stood_as_wide_at_half_height(name):
     X = np.random.default_rng(0).uniform(-1, 1, (50, 3))
     f = unit_form(name, 3)
-    theta = start(f, X, np.array([0.5, 1.0, 2.0]), 7, seed=0)
-    before = Runner(Regressors(f, "inverse-multiquadric"), theta)
-    after = carried(before, "gaussian")
+    theta = start_units(f, X, np.array([0.5, 1.0, 2.0]), 7, seed=0)
+    before = Candidate(Regressors(f, "inverse-multiquadric"), theta, "random")
+    after = carry(before, "gaussian")
     (A, b), (A2, b2) = f.factors(before.theta), f.factors(after.theta)
     np.testing.assert_allclose(A2, 0.48 * A, rtol=1e-12)
     np.testing.assert_allclose(b2, 0.48 * b, rtol=1e-12)
@@ -187,30 +190,30 @@ def test_carried_units_stand_where_they_stood_as_wide_at_half_height(name):
     assert np.exp(-(0.48**2) * 3) == pytest.approx(0.5, abs=2e-3)
 
 
-def test_committee_is_the_mean_of_its_members_and_errs_no_more_than_they_on_average():
+def test_an_ensemble_is_the_mean_of_its_members_and_errs_no_more_than_they_on_average():
     X, Y, X_test, Y_test = samples(rotated_bumps, count=120)
     xs, xt, ys, yt = (X - 4) / 2, (X_test - 4) / 2, Y - 7, Y_test - 7
     members = []
     for k in range(3):
-        split = Split.of(xs, ys, share=0.2, seed=0, fold=k)
+        split = HeldOut.of(xs, ys, share=0.2, seed=0, fold=k)
         assert len(split.X) + len(split.unseen[0]) == 120
-        race = Race(split, np.ones(3), k, np.inf)
-        runner = race.run(race.entered("rotated", 90), 20)
-        members.append(Member(refitted(runner.found, xs, ys, 1e-10), runner.heldout))
-    A, b, weights, tail = averaged(members)
+        found = split.evaluate(split.enter("rotated", 90, np.ones(3), k), 20)
+        members.append(Member(refit_weights(found.network, xs, ys, 1e-10), found.error))
+    mean = Ensemble(tuple(member.network for member in members))
+    (A, b), (weights, tail) = mean.regressors.form.factors(mean.theta), mean.weights_and_tail
     v = np.einsum("kri,ni->nkr", A, xt) - b
     together = 1 / np.sqrt(1 + (v * v).sum(axis=2)) @ weights + np.c_[np.ones(len(xt)), xt] @ tail
-    np.testing.assert_allclose(together, np.mean([m.found.predict(xt) for m in members], axis=0), rtol=1e-9)
-    squares = np.mean([((m.found.predict(xt) - yt) ** 2).mean() for m in members])
+    np.testing.assert_allclose(together, np.mean([m.network.predict(xt) for m in members], axis=0), rtol=1e-9)
+    squares = np.mean([((m.network.predict(xt) - yt) ** 2).mean() for m in members])
     assert ((together - yt) ** 2).mean() <= squares
-    assert expected_error(members, xs) <= np.sqrt(np.mean([m.heldout**2 for m in members]))
+    assert expected_error(members, xs) <= np.sqrt(np.mean([m.error**2 for m in members]))
 
 
 def test_what_is_handed_over_is_about_as_good_as_the_best_that_was_tried():
-    """A committee must not be spoilt by members that were caught in another minimum."""
+    """A mean must not be spoilt by members that were caught in another minimum."""
     X = np.random.default_rng(0).uniform(-1, 1, (60, 2))
     names = [Range(c, -1.0, 1.0) for c in "ab"], [Quantity(c) for c in "uv"]
-    found = fit(X, np.sin(X), *names, seconds=5.0)
+    found = fit(X, np.sin(X), *names, effort=0.15)
     Z = np.random.default_rng(1).uniform(-1, 1, (500, 2))
     error = np.sqrt(((found.network.predict(Z) - np.sin(Z)) ** 2).mean()) / np.sin(Z).std()
-    assert error < 5.0 * min(trial.heldout for trial in found.trials)
+    assert error < 5.0 * min(trial.error for trial in found.trials)

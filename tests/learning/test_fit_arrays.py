@@ -8,10 +8,10 @@ import pytest
 
 import palpate
 from palpate.errors import FileFormatError, UsageError
-from palpate.learning.choosing import calibration
-from palpate.learning.choosing.calibration import Evidence
-from palpate.learning.choosing.fitted import Fitted
-from palpate.learning.choosing.kernel_layer import KernelLayer, Metric
+from palpate.learning.arrays import calibration
+from palpate.learning.arrays.calibration import Evidence
+from palpate.learning.arrays.fitted import Fitted
+from palpate.learning.kernel_layer import KernelLayer, Metric
 from palpate.network import Network, Uncertainty
 from palpate.rbf.forms import unit_form
 from palpate.rbf.refinement.refine import refine
@@ -30,14 +30,14 @@ def noisy(count, seed=0, noise=NOISE):
 
 @pytest.fixture(scope="module")
 def found():
-    return palpate.fit(*noisy(300), seconds=4.0)
+    return palpate.fit(*noisy(300), effort=0.13)
 
 
 @pytest.fixture(scope="module")
 def single():
     """One input, one output, both flat."""
     x = np.linspace(-2, 2, 60)
-    return palpate.fit(x, np.sin(3 * x), seconds=2.0)
+    return palpate.fit(x, np.sin(3 * x), effort=0.07)
 
 
 def covered(found, X, Y, level=None):
@@ -57,17 +57,17 @@ def test_intervals_hold_nine_in_ten_of_unseen_samples(found):
 @pytest.mark.parametrize("noise", [0.0, 0.2])
 def test_intervals_of_few_samples_are_rather_too_wide(noise):
     shares = [
-        covered(palpate.fit(*noisy(40, s, noise), seconds=3.0), *noisy(2000, 9, noise)) for s in range(3)
+        covered(palpate.fit(*noisy(40, s, noise), effort=0.1), *noisy(2000, 9, noise)) for s in range(3)
     ]
     assert np.mean(shares) > 0.85
 
 
 def test_another_level_is_calibrated_for():
-    found = palpate.fit(*noisy(300), seconds=2.0, level=0.6)
+    found = palpate.fit(*noisy(300), effort=0.07, level=0.6)
     share = covered(found, *noisy(4000, seed=1))
     # sixty samples are held out, and how many of sixty fall inside scatters by √(0.6 · 0.4/60) = 0.063
     assert share.mean() == pytest.approx(0.6, abs=3 * 0.063)
-    wide = palpate.fit(*noisy(300), seconds=2.0, level=0.6).interval(noisy(5)[0], 0.9)
+    wide = palpate.fit(*noisy(300), effort=0.07, level=0.6).interval(noisy(5)[0], 0.9)
     assert (wide[1] - wide[0] > np.diff(found.interval(noisy(5)[0]), axis=0)[0]).all()
 
 
@@ -93,7 +93,7 @@ def test_root_gives_the_coefficients_of_least_squares():
     units = np.array([r.form.unit(x, 0.3, seed=0) for x in X[:10]])
     two = [refine(X, Y, theta, r, ridge=1e-12, iterations=0) for theta in (units[:4], units[4:])]
     np.testing.assert_allclose(calibration.regressor_root(two[0], X) @ Y, two[0].coefficients, atol=1e-6)
-    both = calibration.committee_root(two, X) @ Y
+    both = calibration.mean_root(two, X) @ Y
     np.testing.assert_allclose(both[:3], (two[0].tail + two[1].tail) / 2, atol=1e-6)
     np.testing.assert_allclose(both[3:], np.vstack([one.weights for one in two]) / 2, atol=1e-6)
 
@@ -152,7 +152,7 @@ def test_flat_arrays_and_lists_do(single):
     np.testing.assert_allclose(single.predict([0.5]), np.sin(1.5), atol=0.02)
     assert single.trusted([[0.5]]).tolist() == [True]
     X, Y = noisy(30)
-    listed = palpate.fit(X.tolist(), Y.tolist(), seconds=1.0, target=0.5)
+    listed = palpate.fit(X.tolist(), Y.tolist(), effort=0.03, target=0.5)
     assert listed.predict(X.tolist()).shape == (30, 2)
 
 
@@ -206,6 +206,7 @@ def test_samples_that_are_none_are_refused(name):
     "option",
     [
         *({"seconds": v} for v in (-1, 0, float("nan"), float("inf"), "ten", True)),
+        *({"effort": v} for v in (-1, 0, float("nan"), float("inf"), "much", True)),
         *({"target": v} for v in (-1, 0, float("nan"), "small")),
         *({"seed": v} for v in (-1, 1.5, None)),
         *({"level": v} for v in (0, 1, 90, float("nan"), "high")),
@@ -233,7 +234,7 @@ def test_copies_of_samples_do_not_judge_what_was_learnt_from_them():
     rng = np.random.default_rng(0)
     X = rng.uniform(-1, 1, (25, 2))
     y = np.sin(5 * X[:, 0]) * np.exp(X[:, 1]) + 0.2 * rng.normal(size=25)
-    found = palpate.fit(np.tile(X, (4, 1)), np.tile(y, 4), seconds=2.0)
+    found = palpate.fit(np.tile(X, (4, 1)), np.tile(y, 4), effort=0.07)
     Z = rng.uniform(-1, 1, (1000, 2))
     truth = np.sin(5 * Z[:, 0]) * np.exp(Z[:, 1])
     error = np.sqrt(((found.predict(Z) - truth) ** 2).mean()) / truth.std()
@@ -244,4 +245,4 @@ def test_masked_numbers_are_missing_numbers():
     X = np.random.default_rng(0).uniform(-1, 1, (60, 1))
     Y = np.ma.masked_array(np.where(X > 0.8, 9999.0, X), mask=X > 0.8)
     with pytest.raises(palpate.PalpateError, match="finite"):
-        palpate.fit(X, Y, seconds=1.0)
+        palpate.fit(X, Y, effort=0.03)

@@ -7,7 +7,7 @@ import pytest
 
 from laws.beams import INPUT, OUTPUTS, stiffening
 from palpate.learning import Learner, freeze, initial, learn, refined_network
-from palpate.learning.choosing.problem import Problem
+from palpate.learning.arrays.array_samples import ArrayProblem
 from palpate.learning.stream.output_scaling import OutputScaling
 from palpate.network import Network, Scaling
 from palpate.rbf.filter.prediction import value
@@ -42,7 +42,7 @@ def test_the_hash_is_of_the_numbers_and_the_ranges():
 def test_every_way_to_a_network_leaves_the_record(tmp_path):
     X, Y = stiffening(24)
     record = training_record(X, Y, INPUT)["training"]
-    problem = Problem.of(X, Y, INPUT, OUTPUTS)
+    problem = ArrayProblem.of(X, Y, INPUT, OUTPUTS)
     k = problem.basis.shape[0]
     none = (np.zeros((0, 1, 1)), np.zeros((0, 1)), np.zeros((0, k)), np.zeros((2, k)), "gaussian")
     for network in (

@@ -14,7 +14,7 @@ from palpate.surrogates.grasp import RestStiffness, Stiffening
 from palpate.surrogates.grasp.stiffening import exponents, powers
 from palpate.validation import TouchSolves, validate
 
-QUICK = {"seconds": 2.0, "form": "rotated", "radial": "inverse-multiquadric", "units_max": 16}
+QUICK = {"effort": 0.2, "form": "rotated", "radial": "inverse-multiquadric", "units_max": 16}
 
 
 def learnt(count=16, *, derivatives=True, **more):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from palpate.errors import UsageError
-from palpate.learning.choosing.automatic import automatic, ranges_of
-from palpate.learning.choosing.problem import Problem
+from palpate.learning.arrays.array_samples import ArrayProblem
+from palpate.learning.automatic import automatic, ranges_of
 from palpate.rbf.sample_checks import relative_error, spread_of
 from palpate.units import Quantity
 
@@ -32,7 +32,10 @@ def test_spread_is_the_deviation_from_each_outputs_mean():
 
 @pytest.mark.parametrize("unit", [1e-200, 1e200])
 def test_a_problem_is_the_same_in_any_unit(unit):
-    here, there = Problem.of(X, Y, ranges_of(X), OUTPUTS), Problem.of(X, unit * Y, ranges_of(X), OUTPUTS)
+    here, there = (
+        ArrayProblem.of(X, Y, ranges_of(X), OUTPUTS),
+        ArrayProblem.of(X, unit * Y, ranges_of(X), OUTPUTS),
+    )
     np.testing.assert_allclose(there.Y @ there.basis, here.Y @ here.basis, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(there.scaling.output_scale / unit, here.scaling.output_scale, rtol=1e-12)
 
@@ -62,7 +65,7 @@ def test_lists_are_samples_too():
     ],
 )
 def test_what_is_no_samples_is_refused(x, y):
-    for ask in (lambda: automatic(x, y, target=0.1), lambda: Problem.of(x, y, ranges_of(X), OUTPUTS)):
+    for ask in (lambda: automatic(x, y, target=0.1), lambda: ArrayProblem.of(x, y, ranges_of(X), OUTPUTS)):
         with pytest.raises(UsageError) as caught:
             ask()
         assert caught.value.fix

@@ -32,7 +32,7 @@ def small(name: str) -> Study:
         "interaction": {"depth": (3e-4, 0.0015)},
         "sweep": {"samples": 6, "element": 1.7 * study.sweep.element},
         "test": {"samples": 1, "depths": 2},
-        "learning": {"seconds": 2.0},
+        "learning": {"effort": 0.1},
     }
     return study.model_copy(
         update={part: getattr(study, part).model_copy(update=new) for part, new in changes.items()}

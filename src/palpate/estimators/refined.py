@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -14,14 +13,15 @@ from threadpoolctl import threadpool_limits
 from palpate import checks
 from palpate.errors import UsageError
 from palpate.estimators.radial_regressor import RadialRegressor, Units, refused_as_bad_value
-from palpate.learning.choosing import choice
-from palpate.learning.choosing.arrays import check_search, constant
-from palpate.learning.choosing.calibration import Evidence, calibrated, regressor_root, spread_of
-from palpate.learning.choosing.fitted import Choice
-from palpate.learning.refinement.structure import Trial, freeze_refined, placed
+from palpate.learning.arrays.array_samples import constant
+from palpate.learning.arrays.calibration import Evidence, calibrated, regressor_root, spread_of
+from palpate.learning.arrays.fit import fit as fit_arrays
+from palpate.learning.search import Budget, Candidate, Trial
+from palpate.learning.starts import placed
 from palpate.network import Scaling, Uncertainty
 from palpate.network.radial import RADIAL_FUNCTIONS
 from palpate.rbf.forms import unit_form
+from palpate.rbf.freezing import freeze_refined
 from palpate.rbf.refinement.refine import Refined, refine
 from palpate.rbf.regressors import Regressors, Tail
 
@@ -48,14 +48,16 @@ class RBFNetworkRegressor(RadialRegressor):
         square deviation from the mean.
     form : str, optional
         Of a unit (see `palpate.rbf.forms`); if left out rotated up to three inputs, ridges above.
-        "auto" tries forms, radial functions and sizes against each other (`palpate.learning.fit`) and takes up to
-        `seconds`; `radial`, `tail` and `units_max` then have no effect. Where weights differ, or below 20
+        "auto" tries forms, radial functions and sizes against each other (`palpate.learning.fit`);
+        `radial`, `tail` and `units_max` then have no effect. Where weights differ, or below 20
         samples, it is as if left out.
     radial : {"gaussian", "inverse-multiquadric", "matern-5/2"}
     tail : {"affine", "constant", "none"}
     units_max : int
-    seconds : float
-        Time after which no more units are added.
+    effort : float
+        Multiplies the iterations per size, and the work of "auto"; 0.1 gives a quick look.
+    seconds : float, optional
+        Time after which no more units are added; by default there is no limit.
     ranges : sequence of (low, high), optional
         Trained interval of each input; of the data if left out.
     scale_outputs : {"each", "together"}
@@ -70,7 +72,7 @@ class RBFNetworkRegressor(RadialRegressor):
         What predicts.
     error_ : float
         Its error on the samples that judged, relative as `target`.
-    trials_ : tuple of Trial or Choice
+    trials_ : tuple of Trial
         What was tried.
     uncertainty_ : Uncertainty
         Behind `predict(X, return_std=True)`: ±1.64 deviations hold nine in ten of the samples kept apart.
@@ -93,7 +95,7 @@ class RBFNetworkRegressor(RadialRegressor):
     """
 
     error_: float
-    trials_: tuple[Trial | Choice, ...]
+    trials_: tuple[Trial, ...]
     uncertainty_: Uncertainty
 
     def __init__(
@@ -104,7 +106,8 @@ class RBFNetworkRegressor(RadialRegressor):
         radial: str = "gaussian",
         tail: str = "affine",
         units_max: int = 100,
-        seconds: float = 30.0,
+        effort: float = 1.0,
+        seconds: float | None = None,
         ranges: Sequence[tuple[float, float]] | None = None,
         scale_outputs: Literal["each", "together"] = "each",
         random_state: Any = None,
@@ -114,6 +117,7 @@ class RBFNetworkRegressor(RadialRegressor):
         self.radial = radial
         self.tail = tail
         self.units_max = units_max
+        self.effort = effort
         self.seconds = seconds
         self.ranges = ranges
         self.scale_outputs = scale_outputs
@@ -125,7 +129,7 @@ class RBFNetworkRegressor(RadialRegressor):
         checks.fits("The parameter units_max", self.units_max, least=0, whole=True)
         if not (self.form is None or isinstance(self.form, str)):
             raise UsageError(f"form is {self.form!r}.", fix='Give a name, such as "rotated", or "auto".')
-        check_search(self.seconds, 0, None, _LEVEL)
+        Budget.of(self.effort, self.seconds)
         super()._check_parameters()
 
     def _learn(self, X: np.ndarray, Y: np.ndarray, weights: np.ndarray, units: Units, seed: int) -> None:
@@ -138,9 +142,10 @@ class RBFNetworkRegressor(RadialRegressor):
         return self.uncertainty_.deviation(X)
 
     def _choose(self, X: np.ndarray, Y: np.ndarray, units: Units, seed: int) -> None:
-        options = {"seconds": self.seconds, "seed": seed, "target": self.target, "level": _LEVEL}
+        options: dict[str, Any] = {"seed": seed, "target": self.target, "level": _LEVEL}
+        options |= {"effort": self.effort, "seconds": self.seconds}
         with refused_as_bad_value():
-            fitted = choice.fit(X, Y, units.inputs, units.outputs, **options)
+            fitted = fit_arrays(X, Y, units.inputs, units.outputs, **options)
         self.error_, self.trials_ = fitted.heldout, fitted.trials
         self.network_ = units.whole(fitted.network)
         self.uncertainty_ = replace(fitted.uncertainty, network=self.network_)
@@ -158,23 +163,28 @@ class RBFNetworkRegressor(RadialRegressor):
 
     def _growth(self, X: np.ndarray, Y: np.ndarray, weights: np.ndarray, target: float, seed: int) -> _Growth:
         """The first size that meets the target, or the best until more units bring nothing, or time is up."""
-        start = time.monotonic()
+        budget = Budget.of(self.effort, self.seconds)
         regressors, most = self._regressors(X.shape[1], Y)
         learns = _learns(len(X), seed)
         unseen = None if learns.all() else (X[~learns], Y[~learns])
         xs, ys = X[learns], Y[learns]
-        fit = partial(refine, weights=weights[learns], iterations=_ITERATIONS, heldout=unseen)
+        fit = partial(refine, weights=weights[learns], iterations=budget.count(_ITERATIONS), heldout=unseen)
         best = fit(xs, ys, np.zeros((0, regressors.form.size)), regressors)
-        least, trials, worse = _error(best), [Trial.of(best)], 0
+        least, trials, worse = _error(best), [_trial(best)], 0
         while least > target and len(best.theta) + worse < most and worse < _PATIENCE:
-            left = self.seconds - (time.monotonic() - start)
-            if left <= 0:
+            if budget.over:
                 break
             # where a size brought nothing, the next one sets out from the same units with one more
             h = len(best.theta)
             new = placed(xs, ys, best, min(max(1, h // 4) + worse, most - h), seed)
-            now = fit(xs, ys, np.vstack([best.theta, new]), regressors, seconds=left)
-            trials.append(Trial.of(now))
+            now = fit(
+                xs,
+                ys,
+                np.vstack([best.theta, new]),
+                regressors,
+                seconds=None if np.isinf(budget.left) else budget.left,
+            )
+            trials.append(_trial(now))
             worse = 0 if _error(now) < _GAIN * least else worse + 1
             if _error(now) < least:
                 best, least = now, _error(now)
@@ -235,6 +245,11 @@ def _learns(rows: int, seed: int) -> np.ndarray:
     if rows >= _FEWEST:
         learns[np.random.default_rng(seed).permutation(rows)[: rows // 5]] = False
     return learns
+
+
+def _trial(network: Refined) -> Trial:
+    """Return the record of a size."""
+    return Candidate(network.regressors, network.theta, "grown", _error(network), network).trial
 
 
 def _error(network: Refined) -> float:

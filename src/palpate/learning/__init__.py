@@ -1,11 +1,11 @@
 """Learning from datasets: networks of arrays, energies of solved bodies, streams. `palpate.rbf` has the rules.
 
 learn        a fold of the filter's step over a data set
-refinement   growth and pruning around the refinement
-choosing     form, size and thresholds from the data alone
+search       the search for a network's structure, on which stand arrays, energy, fields and structure
+pool         processes that search; ensemble, folds, starts and kernel_layer are the search's other parts
+structure    growth and pruning around the refinement
+arrays       a network from samples alone; automatic: the filter's thresholds from a target
 stream       learning while it runs: a learner, samples retained, bounded refinement
-history      what happened meanwhile, and its picture (drawing)
-measures     errors relative to the outputs' spread
 touch        a dataset of beam loads made into a body that can be touched
 energy       an energy of touch from solved energies, forces and stiffnesses
 bodies       a dataset of touches made into a body that can be pressed anywhere
@@ -13,19 +13,20 @@ fields       how it deforms: modes that travel with the touch
 grasp        a body held by a glued pad
 plastic      a body that stays bent, and how it got there
 correction   a learnt body bent to what a specimen answers
-symmetry     isometries that a dataset tells, and how far its images reach
 dispatch     `palpate.learn`: whichever fits the dataset
 """
 
+from palpate.learning.arrays.fit import fit
+from palpate.learning.arrays.fitted import Fitted
+from palpate.learning.automatic import automatic
 from palpate.learning.bodies import TouchHistory, learn_body
-from palpate.learning.choosing.automatic import automatic
-from palpate.learning.choosing.choice import Fitted, fit
 from palpate.learning.learn import Learned, freeze, learn
 from palpate.learning.learning_history import History
-from palpate.learning.refinement.structure import Trial, grow, prune, refined_network
+from palpate.learning.search import Trial
 from palpate.learning.stream.learner import Learner
 from palpate.learning.stream.refining import Refining
 from palpate.learning.stream.reservoir import Reservoir
+from palpate.learning.structure import grow, prune, refined_network
 from palpate.learning.touch import FEWEST, Refinement, hand_coordinates, learn_touch, node_outputs
 from palpate.rbf.filter.observation import Observation
 from palpate.rbf.filter.settings import PRESETS, Settings, default, founding, recommended

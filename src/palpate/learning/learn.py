@@ -9,7 +9,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from palpate.errors import UsageError
-from palpate.learning.choosing.automatic import automatic, check_target
+from palpate.learning.automatic import automatic, check_target
 from palpate.learning.learning_history import History
 from palpate.network import Network, Scaling
 from palpate.rbf.filter.observation import Observation

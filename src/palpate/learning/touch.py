@@ -14,7 +14,7 @@ from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.learning.learn import Learned, learn
 from palpate.learning.learning_history import History
-from palpate.learning.refinement.structure import refined_network
+from palpate.learning.structure import refined_network
 from palpate.network import Network
 from palpate.rbf.filter.settings import Settings, recommended
 from palpate.rbf.forms import Centred

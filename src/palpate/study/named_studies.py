@@ -104,7 +104,7 @@ _LESS: dict[str, dict[str, dict[str, Any]]] = {
 }
 _QUICK: dict[str, Any] = {
     "test": {"samples": 24},
-    "learning": {"seconds": 10.0, "units_max": 64},
+    "learning": {"effort": 0.3, "units_max": 64},
     # coarse elements show through and few touches can't tell them from the body: softer limits than a whole study's
     "target": {
         "force_median": 0.035,

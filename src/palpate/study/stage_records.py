@@ -197,16 +197,17 @@ class LoadLearningRecord(Record):
 class PadLearningRecord(Record):
     """The search for the network of the energy."""
 
+    effort: float = Field(1.0, gt=0, description="multiplies the work of the search; 0.1 is a quick look")
     seconds: float | None = Field(
         None,
         gt=0,
-        description="cap on the time of the search; left out: one for each solve, at least 60",
+        description="limit on the time of learning; left out: none",
         examples=[60.0],
     )
     workers: int | None = Field(
         None,
         ge=1,
-        description="processes that search the energy; left out: one per core, eight at most",
+        description="processes that search, with the same result; left out: one per core, eight at most",
         examples=[2],
     )
     units_max: int = Field(160, ge=0, description="most units of the energy, mirror images among them")

@@ -185,7 +185,7 @@ def test_a_body_is_learnt_judged_and_kept(tmp_path):
     body, probe = block()
     train, test = touches().take(np.arange(20)), touches().take(np.arange(20, 24))
     layout = body.problem(probe, element=0.006).layout
-    touch, history = pp.learn(train, layout=layout, seconds=4.0, law=ContactLaw("pad"))
+    touch, history = pp.learn(train, layout=layout, effort=0.2, law=ContactLaw("pad"))
     assert isinstance(touch, TouchedBody)
     assert isinstance(history, TouchHistory)
     judged = validate(touch, test)
@@ -261,7 +261,7 @@ def test_a_family_of_bodies_is_learnt_as_one():
     family = pp.BodyFamily(body, varied)
     small = family.problem(fundamental_part(body, probe), element=0.012)
     data = sweep(small, samples=24, seed=2, workers=1, progress=False)
-    touch, _ = learn_body(data, seconds=8.0, shape=False)
+    touch, _ = learn_body(data, effort=0.4, shape=False)
     assert [r.name for r in touch.touch.parameters] == ["young", "probe.radius"]
     assert touch.touch.radius_input == 4
     # what was solved is met, in force and in the slope of the energy by the modulus

@@ -8,18 +8,17 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from palpate.dataset import Dataset, Layout
-from palpate.errors import UsageError
 from palpate.format import share
 from palpate.learning.bodies.images import snapshots_of
 from palpate.learning.bodies.touches import Touches
 from palpate.learning.energy import LearntSurrogate, learn_surrogate
-from palpate.learning.energy.strategy import time_for
 from palpate.learning.fields import LearntField, learn_snapshots, lumped_mass
+from palpate.learning.search import Budget
 from palpate.surrogates import TouchedBody
 
 __all__ = ["TouchHistory", "learn_body"]
 
-SHARE = 0.25  # of the energy's time for the shape: most of it is found at once
+SHARE = 0.25  # of the energy's time for a field, where time is limited
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +71,9 @@ def learn_body(
     *,
     name: str = "body",
     layout: Layout | None = None,
+    effort: float = 1.0,
     seconds: float | None = None,
+    workers: int | None = None,
     units_max: int = 160,
     target: float = 1e-3,
     shape: bool = True,
@@ -89,9 +90,14 @@ def learn_body(
     name : str
     layout : Layout, optional
         Of a mesh that is fine wherever the body shall be touched, where the sweep's is fine in a part only.
+    effort : float
+        Multiplies the counts of candidates and iterations of the search; 0.1 gives a quick look.
     seconds : float, optional
-        To search the network of the energy, one for each solve by default, a minute at least; a quarter as long for
-        the shape, and for the stress where the sweep has it.
+        Limit on the time of learning; by default none. A limit that ends a search early makes the result depend on
+        the machine.
+    workers : int, optional
+        Processes that search at a time; one for each core by default, at most eight. The result is the same with any
+        number.
     units_max : int
         Most units of the energy; mirror images count.
     target : float
@@ -113,28 +119,35 @@ def learn_body(
     UsageError
         If the data is of no body under one probe, lacks energies, has too few solves or none in contact.
     """
-    if seconds is not None and not seconds > 0:
-        raise UsageError(f"{seconds} s allow no learning.", fix="Give a positive time.")
-    began = time.monotonic()
+    budget, began = Budget.of(effort, seconds), time.monotonic()
     touches = Touches.of(train, layout)
-    seconds = time_for(len(touches.data), seconds)
-    say(f"energy of {len(touches.data)} solves")
-    energy = _energy(
-        touches, {"seconds": seconds, "units_max": units_max, "target": target, "seed": seed} | options
-    )
-    found, stress = None, None
-    if shape:
-        say("shape")
-        found = _field(touches, "displacement", "m", SHARE * seconds, seed)
+    fields = [("displacement", "m")] if shape else []
     if shape and "von_mises" in touches.data:
-        say("stress")
-        stress = _field(touches, "von_mises", "Pa", SHARE * seconds, seed)
+        fields.append(("von_mises", "Pa"))
+    searched: dict[str, Any] = {"effort": effort, "workers": workers, "seed": seed}
+
+    def limit(share: float) -> float | None:
+        """Return a share of the time that is left; nothing where it is not limited."""
+        return None if seconds is None else max(share * budget.left, 0.1)
+
+    say(f"energy of {len(touches.data)} solves")
+    own = {"seconds": limit(1.0 / (1.0 + SHARE * len(fields))), "units_max": units_max, "target": target}
+    energy = _energy(touches, searched | own | options)
+    learnt: dict[str, LearntField] = {}
+    for i, (quantity, unit) in enumerate(fields):
+        say("shape" if quantity == "displacement" else "stress")
+        own = {"seconds": limit(1.0 / (len(fields) - i))}
+        learnt[quantity] = _field(touches, quantity, unit, searched | own)
     meta = {**energy.surrogate.meta, "name": name, "dataset": _origin(touches.data)}
     touch = replace(energy.surrogate, meta=meta)
-    learnt = {"displacement": found, "von_mises": stress}
-    fields = {name: one.field for name, one in learnt.items() if one is not None}
-    history = TouchHistory(energy, found, len(touches.data), time.monotonic() - began, stress)
-    return TouchedBody(touch, fields), history
+    history = TouchHistory(
+        energy,
+        learnt.get("displacement"),
+        len(touches.data),
+        time.monotonic() - began,
+        learnt.get("von_mises"),
+    )
+    return TouchedBody(touch, {quantity: one.field for quantity, one in learnt.items()}), history
 
 
 def _energy(touches: Touches, options: dict[str, Any]) -> LearntSurrogate:
@@ -153,9 +166,9 @@ def _energy(touches: Touches, options: dict[str, Any]) -> LearntSurrogate:
     return learn_surrogate(data.X, data.potential_energy, data.response, K, **(known | options))
 
 
-def _field(touches: Touches, name: str, unit: str, seconds: float, seed: int) -> LearntField:
+def _field(touches: Touches, name: str, unit: str, options: dict[str, Any]) -> LearntField:
     return learn_snapshots(
-        snapshots_of(touches, name, seed=seed),
+        snapshots_of(touches, name, seed=options["seed"]),
         inputs=touches.inputs,
         points=touches.points,
         triangles=touches.triangles,
@@ -165,8 +178,7 @@ def _field(touches: Touches, name: str, unit: str, seconds: float, seed: int) ->
         radius_input=touches.radius_input,
         name=name,
         unit=unit,
-        seconds=seconds,
-        seed=seed,
+        **options,
     )
 
 

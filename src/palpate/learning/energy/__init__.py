@@ -3,8 +3,8 @@
 samples          (U, F, ∂F/∂c) as values, slopes and curvatures of ℓ, each weighted to make its error relative
 columns          which solves lie over one place
 images           a body's symmetry, in scaled inputs
-search           starts, growth and choice by the leave-one-solve-out error
-strategy         in which order it goes
+energy_problem   what the search needs of an energy: refinement, and errors of solves left out
+energy_search    kinds of units, growth, random starts, and the mean of the best networks
 laws             which contact law, and where it crosses over
 trust            the posterior of the linear weights, calibrated by what leaving solves out has shown
 written          what was found, as the parts of a surrogate
@@ -13,6 +13,5 @@ learn_surrogate  all of it
 
 from palpate.learning.energy.learn_surrogate import LearntSurrogate, learn_surrogate
 from palpate.learning.energy.samples import EnergySamples
-from palpate.learning.energy.search import EnergyTrial
 
-__all__ = ["EnergySamples", "EnergyTrial", "LearntSurrogate", "learn_surrogate"]
+__all__ = ["EnergySamples", "LearntSurrogate", "learn_surrogate"]

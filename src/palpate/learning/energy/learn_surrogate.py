@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -12,15 +11,14 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from palpate.errors import UsageError
-from palpate.learning.energy.crew import processes_for, sought
+from palpate.learning.energy.energy_problem import EnergyProblem
+from palpate.learning.energy.energy_search import search_energy
 from palpate.learning.energy.images import images_of
 from palpate.learning.energy.laws import chosen_law
 from palpate.learning.energy.samples import EnergySamples
-from palpate.learning.energy.search import EnergyTrial, Problem
-from palpate.learning.energy.strategy import time_for
-from palpate.learning.energy.task import Task
 from palpate.learning.energy.trust import trust_of
 from palpate.learning.energy.written import trained_region, training_meta, written_out
+from palpate.learning.search import Budget, Trial
 from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction
 from palpate.surrogates import ContactLaw, Continuation, TouchedSurface, TouchSurrogate
 from palpate.units import Range
@@ -39,7 +37,7 @@ class LearntSurrogate:
     Attributes
     ----------
     surrogate : TouchSurrogate
-    trials : tuple of EnergyTrial
+    trials : tuple of Trial
         All networks that were tried, in order.
     errors : (N,)
         Relative force error of each solve in contact when it is left out.
@@ -49,7 +47,7 @@ class LearntSurrogate:
     """
 
     surrogate: TouchSurrogate
-    trials: tuple[EnergyTrial, ...]
+    trials: tuple[Trial, ...]
     errors: np.ndarray
     loo: float
 
@@ -71,6 +69,7 @@ def learn_surrogate(
     units_max: int = 160,
     networks: int = 12,
     target: float = 1e-3,
+    effort: float = 1.0,
     seconds: float | None = None,
     workers: int | None = None,
     resolved: float | None = None,
@@ -112,12 +111,13 @@ def learn_surrogate(
         several miss less.
     target : float
         Leave-one-solve-out error at which no more units are added.
+    effort : float
+        Multiplies the counts of candidates and iterations of the search; 0.1 gives a quick look.
     seconds : float, optional
-        For the search, and for refining what it found again without some of the solves; one for each solve by
-        default, a minute at least.
+        Limit on time; by default none. A limit that ends the search early makes the result depend on the machine.
     workers : int, optional
-        Processes that search at a time, each from starts of its own; one for each core by default, at most eight,
-        and one alone where there are less than 20 s.
+        Processes that search at a time; one for each core by default, at most eight. The result is the same with any
+        number.
     resolved : float, optional
         Depth (m) at which a contact is as wide as an element; an eighth of the radius by default, for elements of
         half the radius.
@@ -128,7 +128,7 @@ def learn_surrogate(
         Of a unit (see `palpate.rbf.forms`), or "auto".
     radial : {"gaussian", "inverse-multiquadric", "matern-5/2", "auto"}
     seed : int
-        Decides the starts. With a limit on time the result also depends on the machine's speed and cores.
+        Decides the starts, and with them the result.
 
     Returns
     -------
@@ -139,32 +139,38 @@ def learn_surrogate(
     UsageError
         If samples, surface, symmetry or options do not fit.
     """
-    begun, inputs = time.monotonic(), tuple(inputs)
-    lasting = seconds is None or (math.isfinite(seconds) and seconds > 0)
-    if not (lasting and radius > 0 and units_max >= 0 and networks >= 1):
+    budget, inputs = Budget.of(effort, seconds), tuple(inputs)
+    if not (radius > 0 and units_max >= 0 and networks >= 1):
         raise UsageError(
-            f"seconds={seconds}, radius={radius}, units_max={units_max} and networks={networks} allow no learning.",
+            f"radius={radius}, units_max={units_max} and networks={networks} allow no learning.",
             fix="Give positive numbers.",
         )
     if radial != "auto" and radial not in get_args(RadialFunction):
         raise UsageError(f"There is no radial function {radial!r}.", fix=f"Choose from {RADIAL_FUNCTIONS}.")
     known = {"surface": surface, "radius": radius, "inputs": inputs, "radius_input": radius_input}
     samples = EnergySamples.of(X, energy, force, stiffness, **known)  # type: ignore[arg-type]
-    images, seconds = images_of(symmetry, about, inputs), time_for(len(samples.X), seconds)
-    processes = processes_for(seconds, workers)
+    images = images_of(symmetry, about, inputs)
     resolved = radius / 8.0 if resolved is None else resolved
     with threadpool_limits(1):  # small matrices: more BLAS threads cost time and the bits of the result
-        trials: tuple[EnergyTrial, ...] = ()
+        trials: tuple[Trial, ...] = ()
         if not isinstance(law, ContactLaw):
             guess = radius / 10.0 if length is None else length
-            share = _LAW_SHARE * seconds
-            law, trials = chosen_law(samples, images, guess, resolved=resolved, seconds=share, seed=seed)
+            share = budget.part(_LAW_SHARE)
+            law, trials = chosen_law(samples, images, guess, resolved=resolved, budget=share, seed=seed)
         rows = samples.rows(law, resolved=resolved)
-        problem = Problem(samples.scaled, rows, images, str(law), finest=samples.finest(radius))
-        task = Task(problem, begun, seconds, form, radial, units_max, target, seed)
-        found, tried = sought(task, networks, processes)
+        problem = EnergyProblem(samples.scaled, rows, images, finest=samples.finest(radius))
+        found, tried = search_energy(
+            problem,
+            form=form,
+            radial=radial,
+            units_max=units_max,
+            networks=networks,
+            target=target,
+            budget=budget,
+            workers=workers,
+            seed=seed,
+        )
         trust = trust_of(found, samples)
-    trials = (*trials, *tried)
     meta = training_meta(samples, found, trust.errors)
     network, root = written_out(found, trust.root, samples, meta)
     surrogate = TouchSurrogate(
@@ -176,7 +182,7 @@ def learn_surrogate(
         root=root,
         meta=meta,
     )
-    return LearntSurrogate(surrogate, trials, trust.errors, found.error)
+    return LearntSurrogate(surrogate, (*trials, *tried), trust.errors, found.error)
 
 
 def _reached(depths: np.ndarray, wanted: float | None) -> float:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.learning.energy.average import Average
+from palpate.learning.energy.energy_search import EnergyEnsemble
 from palpate.learning.energy.written import Solves
 from palpate.rbf.refinement.rows import Rows
 
@@ -40,7 +40,7 @@ class Trust:
     errors: np.ndarray
 
 
-def trust_of(found: Average, samples: Solves) -> Trust:
+def trust_of(found: EnergyEnsemble, samples: Solves) -> Trust:
     """From what a mean of networks misses of the solves that it was refined on, when they are left out."""
     rows, fit, fold = found.left_out.rows, found.left_out.fit, found.left_out.together
     missed, Q = found.left_out.errors @ rows.modes, fit.Q

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from palpate.learning.energy.average import Average
+from palpate.learning.energy.energy_search import EnergyEnsemble
 from palpate.network import Network, Scaling, TrainedRegion
 from palpate.rbf.freezing import training_record
 from palpate.rbf.symmetric_units import Images, SymmetricRegressors
@@ -49,7 +49,7 @@ class Solves(Protocol):
 
 
 def written_out(
-    found: Average, root: np.ndarray, samples: Solves, meta: dict[str, Any]
+    found: EnergyEnsemble, root: np.ndarray, samples: Solves, meta: dict[str, Any]
 ) -> tuple[Network, np.ndarray]:
     """The network with every unit's images as units of their own, and the root of its weights' covariance."""
     of, n = found.regressors, len(samples.inputs)
@@ -85,7 +85,7 @@ def trained_region(samples: Solves, images: Images | None, groups: np.ndarray | 
     return TrainedRegion.of(points.reshape(-1, len(samples.inputs)), groups=together, most=_COPIES)
 
 
-def training_meta(samples: Solves, found: Average, errors: np.ndarray) -> dict[str, Any]:
+def training_meta(samples: Solves, found: EnergyEnsemble, errors: np.ndarray) -> dict[str, Any]:
     """What a surrogate's file tells of its training; errors (N,) of solves left out, relative."""
     return {
         **training_record(samples.X, samples.energy[:, None], samples.inputs),

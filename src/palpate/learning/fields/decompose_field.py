@@ -15,10 +15,10 @@ from functools import cached_property
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.learning.fields.field_search import FOLDS, Coefficients, layer_at_solves
 from palpate.learning.fields.fit_local_mode import border_widths, fade_out, fit_local_mode, fit_variation
-from palpate.learning.fields.kernel import at_solves
-from palpate.learning.fields.search import Coefficients, parts_of
 from palpate.learning.fields.snapshots import Solves
+from palpate.learning.folds import fold_masks
 from palpate.network.radial import RadialFunction
 from palpate.surrogates.fields import DepthAmplitude, LocalMode
 
@@ -151,12 +151,12 @@ class Decomposition:
     @cached_property
     def missed(self) -> float:
         """Mean square of what modes, and coefficients by a unit at each solve, miss of solves left out."""
-        learnt = at_solves(self.problem, radials=_TO_COMPARE).error
+        learnt = layer_at_solves(self.problem, radials=_TO_COMPARE).error
         return float(learnt**2 + np.nan_to_num(self.truncation_left_out) ** 2)
 
     def missed_of(self, left: Solves) -> float:
         """Squares, averaged over the surface and summed over other solves, that are missed of these."""
-        answered = at_solves(self.problem, radials=_TO_COMPARE).layer.predict(left.scaled)
+        answered = layer_at_solves(self.problem, radials=_TO_COMPARE).layer.predict(left.scaled)
         along = answered * (self.problem.scale * self.amplitude.at(left.depth))[:, None]
         missed = left.remainder(self.local_mode, self.amplitude) - np.tensordot(along, self.modes.modes, 1)
         return float(((missed**2).sum(axis=2) @ left.mass).sum())
@@ -211,7 +211,7 @@ def _best_of_both(solves: Solves, even: Decomposition, tolerance: float, most: i
         return even
     within = even.free.within / solves.radius
     missed = np.zeros(2)
-    for out in parts_of(solves.groups)[:_PARTS]:
+    for out in fold_masks(solves.groups, FOLDS)[:_PARTS]:
         kept, left = solves.take(~out), solves.take(out)
         free = fit_local_mode(kept, even.amplitude, within)
         without = _with_modes(kept, even.amplitude, free, tolerance, most)

@@ -21,8 +21,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.learning.fields.search import parts_of
+from palpate.learning.fields.field_search import FOLDS
 from palpate.learning.fields.snapshots import Solves
+from palpate.learning.folds import fold_masks
 from palpate.surrogates.fields.depth_amplitude import DepthAmplitude
 from palpate.surrogates.fields.local_mode import OFFSETS, LocalMode, Variation, design, polynomials, products
 
@@ -185,7 +186,7 @@ def fit_variation(
     local_mode : LocalMode
     amplitude : DepthAmplitude
     """
-    parts = parts_of(solves.groups)
+    parts = fold_masks(solves.groups, FOLDS)
     if len(parts) < 2:
         return None
     feet, normals = solves.feet

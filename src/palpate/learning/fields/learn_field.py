@@ -13,9 +13,9 @@ from threadpoolctl import threadpool_limits
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.learning.fields.decompose_field import Decomposition, best_decomposition, lumped_mass
-from palpate.learning.fields.kernel import at_solves
-from palpate.learning.fields.search import FieldTrial, searched
+from palpate.learning.fields.field_search import layer_at_solves, search_coefficients
 from palpate.learning.fields.snapshots import Snapshots, Solves
+from palpate.learning.search import Budget, Trial
 from palpate.network import Network, Scaling
 from palpate.rbf.freezing import freeze_refined, training_record
 from palpate.rbf.sample_checks import numbers
@@ -40,7 +40,7 @@ class LearntField:
     Attributes
     ----------
     field : FieldSurrogate
-    trials : tuple of FieldTrial
+    trials : tuple of Trial
         Networks that were tried.
     truncation : float
         What the modes miss of the training solves: root mean square over surface and solves, in the field's unit.
@@ -51,7 +51,7 @@ class LearntField:
     """
 
     field: FieldSurrogate
-    trials: tuple[FieldTrial, ...]
+    trials: tuple[Trial, ...]
     truncation: float
     truncation_left_out: float
     learning_left_out: float
@@ -76,7 +76,9 @@ def learn_snapshots(
     amplitude: str = "auto",
     length: float | None = None,
     units_max: int = 36,
-    seconds: float = 30.0,
+    effort: float = 1.0,
+    seconds: float | None = None,
+    workers: int | None = None,
     seed: int = 0,
 ) -> LearntField:
     """Learn a field on a mesh from snapshots on the meshes that they were solved on; the options are `learn_field`'s.
@@ -91,9 +93,10 @@ def learn_snapshots(
             f"A field does not grow by {amplitude!r}.",
             fix=f"Choose 'auto' or one of {', '.join(AMPLITUDES)}.",
         )
-    if not (seconds > 0 and modes_max > 0 and units_max >= 0 and radius > 0):
+    budget = Budget.of(effort, seconds)
+    if not (modes_max > 0 and units_max >= 0 and radius > 0):
         raise UsageError(
-            f"seconds={seconds}, modes_max={modes_max}, units_max={units_max}, radius={radius} allow no learning.",
+            f"modes_max={modes_max}, units_max={units_max}, radius={radius} allow no learning.",
             fix="Give positive numbers.",
         )
     known = (inputs, surface, radius, points, triangles, mass, radius_input)
@@ -103,7 +106,7 @@ def learn_snapshots(
     with threadpool_limits(1):  # small matrices: more BLAS threads cost time and the bits of the result
         names = AMPLITUDES if amplitude == "auto" else (amplitude,)
         best = best_decomposition(solves, names, length, tolerance, modes_max, moving)
-        network, error, trials = _learnt(best, solves.inputs, units_max, seconds, seed)
+        network, error, trials = _learnt(best, solves.inputs, units_max, budget, seed, workers)
     fields = np.concatenate([values.ravel() for values in solves.values])
     meta = {
         **training_record(solves.X, fields, solves.inputs),
@@ -129,13 +132,18 @@ def learn_snapshots(
 
 
 def _learnt(
-    best: Decomposition, inputs: tuple[Range, ...], units_max: int, seconds: float, seed: int
-) -> tuple[Network, float, tuple[FieldTrial, ...]]:
+    best: Decomposition,
+    inputs: tuple[Range, ...],
+    units_max: int,
+    budget: Budget,
+    seed: int,
+    workers: int | None,
+) -> tuple[Network, float, tuple[Trial, ...]]:
     """The coefficients' network, its left-out error and what was tried: a unit at each solve, or a few that move."""
-    whole = at_solves(best.problem)
+    whole = layer_at_solves(best.problem)
     target = 0.1 * best.truncation
-    found, error, trials = searched(
-        best.problem, units_max=units_max, seconds=seconds, target=target, seed=seed
+    found, error, trials = search_coefficients(
+        best.problem, units_max=units_max, budget=budget, target=target, seed=seed, workers=workers
     )
     names, scaling = _outputs(best, inputs)
     if whole.error < error:
@@ -194,7 +202,9 @@ def learn_field(
     length: float | None = None,
     groups: np.ndarray | None = None,
     units_max: int = 36,
-    seconds: float = 30.0,
+    effort: float = 1.0,
+    seconds: float | None = None,
+    workers: int | None = None,
     seed: int = 0,
 ) -> LearntField:
     """Learn a field on a body's surface from solves.
@@ -233,8 +243,15 @@ def learn_field(
     groups : (N,) int, optional
         Solves of one group, such as a column, are left out together.
     units_max : int
-    seconds : float
-        For the search of a small network, which is taken where it misses less than a unit at every solve.
+    effort : float
+        Multiplies the iterations of the search of a small network, which is taken where it misses less than a unit at
+        every solve; 0.1 gives a quick look.
+    seconds : float, optional
+        Limit on that search's time; by default none. A limit that ends the search early makes the result depend on
+        the machine.
+    workers : int, optional
+        Processes that search at a time; one for each core by default, at most eight. The result is the same with any
+        number.
     seed : int
 
     Returns
@@ -264,7 +281,9 @@ def learn_field(
         amplitude=amplitude,
         length=length,
         units_max=units_max,
+        effort=effort,
         seconds=seconds,
+        workers=workers,
         seed=seed,
     )
 

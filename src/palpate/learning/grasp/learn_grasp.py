@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -13,15 +11,14 @@ from threadpoolctl import threadpool_limits
 
 from palpate.errors import UsageError
 from palpate.format import share
-from palpate.learning.energy.crew import processes_for, sought
-from palpate.learning.energy.search import EnergyTrial, Problem
-from palpate.learning.energy.strategy import time_for
-from palpate.learning.energy.task import Task
+from palpate.learning.energy.energy_problem import EnergyProblem
+from palpate.learning.energy.energy_search import search_energy
 from palpate.learning.energy.trust import trust_of
 from palpate.learning.energy.written import trained_region, training_meta, written_out
 from palpate.learning.grasp.images import hold_images
 from palpate.learning.grasp.rest import found_law
 from palpate.learning.grasp.samples import GraspSamples
+from palpate.learning.search import Budget, Trial
 from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction
 from palpate.surrogates.grasp import GraspSurrogate
 from palpate.units import Range
@@ -41,7 +38,7 @@ class LearntGrasp:
     Attributes
     ----------
     surrogate : GraspSurrogate
-    trials : tuple of EnergyTrial
+    trials : tuple of Trial
         All networks that were tried, in order.
     errors : (N,)
         Relative force error of each solve with a displaced pad when it is left out.
@@ -53,7 +50,7 @@ class LearntGrasp:
     """
 
     surrogate: GraspSurrogate
-    trials: tuple[EnergyTrial, ...]
+    trials: tuple[Trial, ...]
     errors: np.ndarray
     loo: float
     law_errors: dict[tuple[int, int], float]
@@ -83,6 +80,7 @@ def learn_grasp(
     units_max: int = 192,
     networks: int = 4,
     target: float = 1e-3,
+    effort: float = 1.0,
     seconds: float | None = None,
     workers: int | None = None,
     form: str = "auto",
@@ -118,17 +116,18 @@ def learn_grasp(
         How many at most make one surrogate, as their mean; one answers faster, four miss less.
     target : float
         Leave-one-solve-out error at which no more units are added.
+    effort : float
+        Multiplies the counts of candidates and iterations of the search; 0.1 gives a quick look.
     seconds : float, optional
-        For the search, and for refining what it found again without some of the solves; one for each solve by
-        default, a minute at least.
+        Limit on time; by default none. A limit that ends the search early makes the result depend on the machine.
     workers : int, optional
-        Processes that search at a time, each from starts of its own; one for each core by default, at most eight,
-        and one alone where there are less than 20 s.
+        Processes that search at a time; one for each core by default, at most eight. The result is the same with any
+        number.
     form : str
         Of a unit (see `palpate.rbf.forms`), or "auto".
     radial : {"gaussian", "inverse-multiquadric", "matern-5/2", "auto"}
     seed : int
-        Decides the starts. With a limit on time the result also depends on the machine's speed and cores.
+        Decides the starts, and with them the result.
 
     Returns
     -------
@@ -139,16 +138,15 @@ def learn_grasp(
     UsageError
         If samples, symmetry or options do not fit, or there are fewer than four samples.
     """
-    inputs = tuple(inputs)
-    _require(seconds, units_max, networks, radial, axes, len(inputs))
+    budget, inputs = Budget.of(effort, seconds), tuple(inputs)
+    _require(units_max, networks, radial, axes, len(inputs))
     if len(X) < FEWEST:
         raise UsageError(
             f"{len(X)} converged solves are too few to learn a held body from.",
             fix=f"Sweep at least {FEWEST}, better 20 or more.",
         )
     samples = GraspSamples.of(X, energy, force, stiffness, inputs=inputs)
-    images, seconds = hold_images(symmetry, about, inputs, axes), time_for(len(X), seconds)
-    processes = processes_for(seconds, workers)
+    images = hold_images(symmetry, about, inputs, axes)
     with threadpool_limits(1):  # small matrices: more BLAS threads cost time and the bits of the result
         found = found_law(
             samples,
@@ -158,26 +156,31 @@ def learn_grasp(
             None if stiffening == "auto" else stiffening,
         )
         rows = samples.rows(found.rest, found.stiffening)
-        law = f"degrees {found.rest.degree} and {found.stiffening.degree}"
-        problem = Problem(samples.scaled, rows, images, law, _RIDGE)
-        task = Task(problem, time.monotonic(), seconds, form, radial, units_max, target, seed)
-        mean, trials = sought(task, networks, processes)
+        problem = EnergyProblem(samples.scaled, rows, images, _RIDGE)
+        mean, trials = search_energy(
+            problem,
+            form=form,
+            radial=radial,
+            units_max=units_max,
+            networks=networks,
+            target=target,
+            budget=budget,
+            workers=workers,
+            seed=seed,
+        )
         trust = trust_of(mean, samples)
     meta = training_meta(samples, mean, trust.errors)
     network, root = written_out(mean, trust.root, samples, meta)
     surrogate = GraspSurrogate(
         network, found.rest, found.stiffening, region=trained_region(samples, images), root=root, meta=meta
     )
-    return LearntGrasp(surrogate, tuple(trials), trust.errors, mean.error, found.errors)
+    return LearntGrasp(surrogate, trials, trust.errors, mean.error, found.errors)
 
 
-def _require(
-    seconds: float | None, units_max: int, networks: int, radial: str, axes: Sequence[int], inputs: int
-) -> None:
-    lasting = seconds is None or (math.isfinite(seconds) and seconds > 0)
-    if not (lasting and units_max >= 0 and networks >= 1):
+def _require(units_max: int, networks: int, radial: str, axes: Sequence[int], inputs: int) -> None:
+    if not (units_max >= 0 and networks >= 1):
         raise UsageError(
-            f"seconds={seconds}, units_max={units_max} and networks={networks} allow no learning.",
+            f"units_max={units_max} and networks={networks} allow no learning.",
             fix="Give positive numbers.",
         )
     if radial != "auto" and radial not in get_args(RadialFunction):

@@ -20,7 +20,7 @@ from threadpoolctl import threadpool_limits
 from palpate.errors import UsageError
 from palpate.format import share
 from palpate.learning.plastic.paths import HeldPath, HeldPaths
-from palpate.learning.refinement.structure import refined_network
+from palpate.learning.structure import refined_network
 from palpate.network import Network
 from palpate.surrogates.plastic import Elements, HeldBody
 from palpate.units import Quantity, Range

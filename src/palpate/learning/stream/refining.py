@@ -8,6 +8,7 @@ from typing import Any, get_args
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.learning.starts import units_at_errors
 from palpate.learning.stream.reservoir import Keeping, Reservoir
 from palpate.rbf.filter.settings import Settings
 from palpate.rbf.filter.state import State
@@ -256,13 +257,8 @@ def _drawn(
     f = np.hstack([of.tail_rows(X), of.phi(X, state.theta)]) @ state.coefficients
     error = ((kept.Y - f) ** 2).sum(axis=1)
     width = _WIDE * 2.0 / (state.units + count) ** (1.0 / n)
-    distance = np.full(len(X), width**2)
-    units = []
-    for w in width * np.exp(rng.normal(0.0, _WIDTHS, count)):
-        i = int(np.argmax(error * distance * rng.exponential(size=len(X))))
-        units.append(of.form.unit(X[i], w, seed=int(rng.integers(2**31))))
-        distance = np.minimum(distance, ((X - X[i]) ** 2).sum(axis=1))
-    return np.array(units)
+    widths = width * np.exp(rng.normal(0.0, _WIDTHS, count))
+    return units_at_errors(of.form, X, error, widths, spacing=width, rng=rng)
 
 
 def _refined(state: State, settings: Settings, theta: np.ndarray, coefficients: np.ndarray) -> Refined:

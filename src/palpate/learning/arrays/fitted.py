@@ -10,23 +10,14 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import FileFormatError, UsageError
-from palpate.learning.choosing.arrays import points
+from palpate.learning.arrays.array_samples import points
+from palpate.learning.search import Trial
 from palpate.network import Network, TrainedRegion
 from palpate.network.uncertainty import Uncertainty
 
-__all__ = ["Choice", "Fitted"]
+__all__ = ["Fitted"]
 
 _SHOWN = 5  # of what was tried
-
-
-@dataclass(frozen=True)
-class Choice:
-    """One thing that was tried: what, with how many units, its held-out error (scaled) and when, s."""
-
-    what: str
-    units: int
-    heldout: float
-    seconds: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +33,8 @@ class Fitted:
     units : int
     heldout : float
         Error on held-out samples relative to the outputs' standard deviation, before the weights saw them.
-    trials : tuple of Choice
+    trials : tuple of Trial
+        The candidates, each with its error on held-out samples.
     seconds : float
     uncertainty : Uncertainty
         Of the network.
@@ -59,7 +51,7 @@ class Fitted:
     radial: str
     units: int
     heldout: float
-    trials: tuple[Choice, ...]
+    trials: tuple[Trial, ...]
     seconds: float
     uncertainty: Uncertainty
     region: TrainedRegion
@@ -181,8 +173,8 @@ class Fitted:
         ]
         if self.trials:
             best: dict[str, float] = {}
-            for trial in sorted(self.trials, key=lambda trial: trial.heldout):
-                best.setdefault(trial.what, trial.heldout)
+            for trial in sorted(self.trials, key=lambda trial: trial.error):
+                best.setdefault(trial.name, trial.error)
             lines += [f"  {len(best)} tried in {self.seconds:.1f} s, among them:"]
             lines += [f"    {error:.1e}  {what}" for what, error in list(best.items())[:_SHOWN]]
         return "\n".join(lines)

@@ -19,11 +19,12 @@ from scipy.optimize import minimize
 
 from palpate.network.radial import RadialFunction, radial
 
-__all__ = ["KernelLayer", "Metric", "likely_metric"]
+__all__ = ["CENTRES_MAX", "KernelLayer", "Metric", "likely_metric"]
 
 _SCALES = (np.log(1e-3), np.log(30.0))
 _RIDGES = (np.log(1e-11), np.log(10.0))
-_UNITS_MAX = 2000  # beyond as many centres the others are fitted by least squares
+CENTRES_MAX = 2000
+"""Samples that become centres; the others are then fitted in least squares."""
 
 
 @dataclass(frozen=True)
@@ -61,16 +62,18 @@ class KernelLayer:
     tail: np.ndarray
 
     @classmethod
-    def fit(cls, metric: Metric, X: np.ndarray, Y: np.ndarray, *, seed: int = 0) -> KernelLayer:
-        """To X (N, n) and Y (N, k); up to 2,000 samples become centres, the others are fitted in least squares."""
+    def fit(
+        cls, metric: Metric, X: np.ndarray, Y: np.ndarray, *, seed: int = 0, most: int = CENTRES_MAX
+    ) -> KernelLayer:
+        """Return the layer of X (N, n) and Y (N, k): `most` samples become centres, the others are fitted too."""
         one = _tail(X)
         tail = np.linalg.lstsq(one, Y, rcond=None)[0]
         residual = Y - one @ tail
-        if len(X) <= _UNITS_MAX:
+        if len(X) <= most:
             C = metric.kernel(X, X)
             C[np.diag_indices(len(C))] += metric.ridge
             return cls(metric, X, _solved(C, residual), tail)
-        chosen = np.random.default_rng(seed).choice(len(X), _UNITS_MAX, replace=False)
+        chosen = np.random.default_rng(seed).choice(len(X), most, replace=False)
         Z = X[np.sort(chosen)]
         cross, own = metric.kernel(X, Z), metric.kernel(Z, Z)
         # the subset-of-regressors equations (Rasmussen & Williams 2006, eq. 8.14)
@@ -102,7 +105,7 @@ def likely_metric(
     if not np.any(Y) or len(X) < n + 3:
         return Metric(name, np.exp(start[:n]), 1e-8)
     found = minimize(
-        _unlikelihood,
+        negative_likelihood,
         start,
         args=(name, X, Y),
         jac=True,
@@ -113,7 +116,7 @@ def likely_metric(
     return Metric(name, np.exp(found.x[:n]), float(np.exp(found.x[n])))
 
 
-def _unlikelihood(
+def negative_likelihood(
     logs: np.ndarray, name: RadialFunction, X: np.ndarray, Y: np.ndarray
 ) -> tuple[float, np.ndarray]:
     """L per number observed and its gradient by log s and log λ."""

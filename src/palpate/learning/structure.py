@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from palpate.learning.search import Candidate, Search, Trial, sizes
+from palpate.learning.starts import placed, spread
 from palpate.network import Network, Scaling
 from palpate.network.radial import RadialFunction
 from palpate.rbf.forms import unit_form
@@ -16,23 +18,23 @@ from palpate.rbf.regressors import Regressors, Tail
 from palpate.rbf.sample_checks import samples
 from palpate.units import Quantity, Range
 
-__all__ = ["Trial", "freeze_refined", "grow", "placed", "prune", "refined_network", "spread"]
+__all__ = ["grow", "prune", "refined_network"]
 
 Refine = Callable[[np.ndarray, np.ndarray, np.ndarray, Regressors], Refined]
 
 
-@dataclass(frozen=True)
-class Trial:
-    """One size that was tried: number of units, leave-one-out error per scaled output, condition number."""
+@dataclass(frozen=True, eq=False)
+class _Scaled:
+    """Scaled samples X (N, n), Y (N, m) whose networks are compared by the leave-one-out error."""
 
-    units: int
-    loo: float
-    condition: float
+    X: np.ndarray
+    Y: np.ndarray
+    fit: Refine = refine
 
-    @classmethod
-    def of(cls, found: Refined) -> Trial:
-        """What is kept of a refinement."""
-        return cls(len(found.theta), found.loo, found.condition)
+    def evaluate(self, candidate: Candidate, iterations: int, seconds: float | None = None) -> Candidate:
+        """Refine a candidate as `fit` does."""
+        network = self.fit(self.X, self.Y, candidate.theta, candidate.regressors)
+        return replace(candidate, error=network.loo, network=network, iterations=network.iterations)
 
 
 def refined_network(
@@ -50,7 +52,7 @@ def refined_network(
     radial: RadialFunction = "gaussian",
     tail: Tail = "affine",
 ) -> tuple[Network, Refined, tuple[Trial, ...]]:
-    """The smallest refined network whose leave-one-out error is under the target, or the best up to `units_max`.
+    """Return the smallest refined network whose leave-one-out error is under the target, or the best there is.
 
     Sizes are tried upwards, each from several starts; a size that meets the target after a leap is pruned back.
 
@@ -64,9 +66,11 @@ def refined_network(
     target : float
         Leave-one-out error wanted, relative to the largest deviation of any output from its mean.
     units_max : int
+        Largest number of units.
     starts : int
         Starts per size; the cost has many minima.
     seed : int
+        Decides the starts.
     known : (h, p), optional
         Scaled units of this form that the sequential filter found; they are one of the starts.
     form : str
@@ -77,6 +81,7 @@ def refined_network(
     Returns
     -------
     Network, Refined, tuple of Trial
+        The records are of the best start of each size.
 
     Raises
     ------
@@ -87,15 +92,23 @@ def refined_network(
     scaling = Scaling.of(inputs, Y)
     xs, ys = scaling.scale_inputs(X), scaling.scale_outputs(Y)
     regressors = Regressors(unit_form(form, len(inputs)), radial, tail)
-    best = refine(xs, ys, _none(regressors), regressors)
-    trials = [Trial.of(best)]
-    for h in _sizes(min(units_max, _room(best))):
-        if best.loo <= target:
-            break
-        found = [refine(xs, ys, s, regressors) for s in _starts(xs, ys, h, starts, seed, known, best)]
-        winner = min(found, key=lambda r: r.loo)
-        trials.append(Trial.of(winner))
-        best = min(best, winner, key=lambda r: r.loo)
+    search, winners = Search(_Scaled(xs, ys)), list[Candidate]()
+
+    def judge(winner: Candidate) -> Candidate:
+        winners.append(winner)
+        return winner
+
+    def begin(h: int, best: Candidate | None) -> Iterator[Candidate]:
+        network = None if best is None else best.network
+        for theta in _starts(xs, ys, h, starts, seed, known, regressors, network):
+            yield Candidate(regressors, theta, "spread")
+
+    none = search.grow(lambda *_: [Candidate(regressors, _none(regressors), "tail")], [0], 0, judge=judge)
+    most = min(units_max, _room(none))
+    search.grow(begin, sizes(1, most), 0, begin=none, target=target, judge=judge)
+    best = search.best.network
+    assert best is not None
+    trials = [winner.trial for winner in winners]
     if best.loo <= target and len(trials) > 1 and trials[-1].units > trials[-2].units + 1:
         best, pruned = prune(xs, ys, best, target=target)
         trials += pruned
@@ -115,7 +128,7 @@ def grow(
     seed: int = 0,
     fit: Refine = refine,
 ) -> tuple[Refined, tuple[Trial, ...]]:
-    """Forward growth: refine, add units where the error is, and again, to the target or `units_max`.
+    """Grow a network: refine, add units where the error is, and again, to the target or `units_max`.
 
     There are never more than the samples can decide on, 1 + p unknowns each.
 
@@ -124,11 +137,13 @@ def grow(
     X, Y : (N, n), (N, m)
         Scaled.
     regressors : Regressors
+        Form and radial function of the units, and the tail.
     theta : (h, p), optional
         Units to begin with.
     target : float
         Leave-one-out error per scaled output.
     units_max : int
+        Largest number of units.
     share : float
         New units at a time, relative to those there are; one at least.
     seed : int
@@ -141,22 +156,31 @@ def grow(
     Refined, tuple of Trial
         The best by leave-one-out error, and what was tried.
     """
-    best = now = fit(X, Y, _none(regressors) if theta is None else theta, regressors)
-    trials = [Trial.of(now)]
-    units_max = min(units_max, _room(now))
-    while best.loo > target and len(now.theta) < units_max:
-        h = len(now.theta)
-        new = min(max(1, round(share * h)), units_max - h)
-        now = fit(X, Y, np.vstack([now.theta, placed(X, Y, now, new, seed)]), regressors)
-        trials.append(Trial.of(now))
-        best = min(best, now, key=lambda r: r.loo)
-    return best, tuple(trials)
+    search = Search(_Scaled(X, Y, fit))
+    first = Candidate(regressors, _none(regressors) if theta is None else theta, "first")
+    begun = search.try_all([first], 0)[0]
+    most, ladder, h = min(units_max, _room(begun)), [], len(first.theta)
+    while h < most:
+        h = min(h + max(1, round(share * h)), most)
+        ladder.append(h)
+
+    def more(units: int, _: Candidate | None) -> Iterator[Candidate]:
+        last = search.tried[
+            -1
+        ].network  # not the best: a size that gains nothing may be on the way to one that does
+        assert last is not None
+        new = placed(X, Y, last, units - len(last.theta), seed)
+        yield Candidate(regressors, np.vstack([last.theta, new]), "grown")
+
+    search.grow(more, ladder, 0, begin=begun, target=target)
+    assert search.best.network is not None
+    return search.best.network, search.trials
 
 
 def prune(
-    X: np.ndarray, Y: np.ndarray, found: Refined, *, target: float, fit: Refine = refine
+    X: np.ndarray, Y: np.ndarray, network: Refined, *, target: float, fit: Refine = refine
 ) -> tuple[Refined, tuple[Trial, ...]]:
-    """Backward pruning: while the leave-one-out error stays under the target, drop the unit it misses least.
+    """Prune a network: while the leave-one-out error stays under the target, drop the unit that it misses least.
 
     Which one that is follows in closed form for all units at once; the others are refined after each removal.
 
@@ -164,65 +188,38 @@ def prune(
     ----------
     X, Y : (N, n), (N, m)
         Scaled.
-    found : Refined
+    network : Refined
+        To begin with.
     target : float
         Leave-one-out error per scaled output that must be kept.
     fit : callable
-        `refine`, with the options bound that `found` was made with.
+        `refine`, with the options bound that the network was made with.
 
     Returns
     -------
     Refined, tuple of Trial
-        The smallest that meets the target, or `found`.
+        The smallest that meets the target, or the network itself.
     """
-    trials = []
-    while len(found.theta):
-        fewer = fit(X, Y, np.delete(found.theta, int(np.argmin(found.without)), axis=0), found.regressors)
-        trials.append(Trial.of(fewer))
-        if not fewer.loo <= target:
+    search, kept = Search(_Scaled(X, Y, fit)), network
+    while len(kept.theta):
+        theta = np.delete(kept.theta, int(np.argmin(kept.without)), axis=0)
+        fewer = search.try_all([Candidate(kept.regressors, theta, "pruned")], 0)[0]
+        if fewer.network is None or not fewer.error <= target:
             break
-        found = fewer
-    return found, tuple(trials)
-
-
-def placed(X: np.ndarray, Y: np.ndarray, found: Refined, count: int, seed: int = 0) -> np.ndarray:
-    """New units (count, p) where the error is large and other units are far, as wide as their spacing."""
-    f, h = found.regressors.form, len(found.theta) + count
-    error = ((Y - found.predict(X)) ** 2).sum(axis=1)
-    width = 2.0 / h ** (1.0 / f.inputs)
-    distance = np.full(len(X), width**2)
-    units = []
-    for k in range(count):
-        i = int(np.argmax(error * distance))
-        units.append(f.unit(X[i], width, seed=1000 * seed + h + k))
-        distance = np.minimum(distance, ((X - X[i]) ** 2).sum(axis=1))
-    return np.array(units)
-
-
-def spread(points: np.ndarray, count: int) -> np.ndarray:
-    """Indices of `count` points far from each other, by farthest-point selection (Gonzalez 1985)."""
-    chosen = [int(np.argmin(points.sum(axis=1)))]
-    distance = np.full(len(points), np.inf)
-    while len(chosen) < count:
-        distance = np.minimum(distance, ((points - points[chosen[-1]]) ** 2).sum(axis=1))
-        chosen.append(int(np.argmax(distance)))
-    return np.array(chosen)
+        kept = fewer.network
+    return kept, search.trials
 
 
 def _none(regressors: Regressors) -> np.ndarray:
     return np.zeros((0, regressors.form.size))
 
 
-def _room(found: Refined) -> int:
-    """How many units its samples can decide on: as many unknowns would interpolate anything and judge nothing."""
-    r = found.regressors
-    return max(0, (found.rows - r.tail_size) // (1 + r.form.size))
-
-
-def _sizes(largest: int) -> list[int]:
-    """Every size up to six, then by about a third more each time."""
-    sizes = [h for h in (1, 2, 3, 4, 5, 6, 8, 11, 15, 20, 27, 36, 48, 64) if h <= largest]
-    return sizes if not sizes or sizes[-1] == largest else [*sizes, largest]
+def _room(candidate: Candidate | None) -> int:
+    """Return how many units the samples can decide on: as many unknowns would interpolate anything."""
+    assert candidate is not None
+    assert candidate.network is not None
+    r = candidate.regressors
+    return max(0, (candidate.network.rows - r.tail_size) // (1 + r.form.size))
 
 
 def _starts(
@@ -232,15 +229,16 @@ def _starts(
     count: int,
     seed: int,
     known: np.ndarray | None,
-    best: Refined,
+    regressors: Regressors,
+    best: Refined | None,
 ) -> Iterator[np.ndarray]:
-    """Spread-out units of several widths, random ones, the filter's units, and the last size's and some more."""
-    f = best.regressors.form
+    """Yield the filter's units, the best network's with some more, and spread-out and random ones of several widths."""
+    f = regressors.form
     rng = np.random.default_rng((seed, h))
     spacing = 2.0 / h ** (1.0 / f.inputs)
     if known is not None and len(known) >= h:
         yield known[spread(f.centres(known), h)]
-    if 0 < len(best.theta) < h:
+    if best is not None and 0 < len(best.theta) < h:
         yield np.vstack([best.theta, placed(xs, ys, best, h - len(best.theta), seed)])
     for i in range(count):
         rows = spread(xs, h) if i % 2 == 0 else rng.choice(len(xs), h, replace=False)

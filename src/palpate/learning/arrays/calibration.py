@@ -17,6 +17,7 @@ a fold of which it then has seen nothing, and what those miss on their folds cou
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
@@ -24,18 +25,26 @@ from statistics import NormalDist
 import numpy as np
 from scipy.special import stdtrit
 
-from palpate.learning.choosing.kernel_layer import KernelLayer
-from palpate.network import Network
+from palpate.learning.arrays.array_samples import ArrayProblem, Samples
+from palpate.learning.arrays.fitted import Fitted
+from palpate.learning.arrays.held_out import HeldOut
+from palpate.learning.arrays.members import ROWS, Member
+from palpate.learning.ensemble import Ensemble
+from palpate.learning.kernel_layer import KernelLayer
+from palpate.learning.search import Trial
+from palpate.network import Network, TrainedRegion
+from palpate.network.radial import RadialFunction
 from palpate.network.uncertainty import Uncertainty
 from palpate.rbf.refinement.refine import Refined
 
 __all__ = [
     "LARGEST",
     "Evidence",
+    "Finish",
     "calibrated",
-    "committee_root",
     "kernel_covariance",
     "kernel_spread",
+    "mean_root",
     "regressor_root",
     "spread_of",
 ]
@@ -69,25 +78,36 @@ class Evidence:
         return cls(np.vstack([p.missed for p in parts]) * gain, np.concatenate([p.spread for p in parts]))
 
 
-def regressor_root(found: Refined, X: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
-    """G (c, N) by which the coefficients follow from outputs at X (N, n), the units as they are.
+def regressor_root(network: Refined, X: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
+    """Return G (c, N) by which the coefficients follow from outputs at X (N, n), the units as they are.
 
-    With weights (N,) it is of the outputs times their roots, whose noise is then alike.
+    With weights (N,) it is of the outputs times their roots, whose noise is then alike. Of more than 4,000 samples it
+    is (c, 4000), made of some of them, and G Gᵀ about the same.
     """
-    rows = _rows(found, X) if weights is None else _rows(found, X) * np.sqrt(weights)[:, None]
+    some, share = _some(len(X))
+    rows = _rows(network, X[some])
+    if weights is not None:
+        rows *= np.sqrt(weights[some])[:, None]
     U, s, Vt = np.linalg.svd(rows, full_matrices=False)
-    return np.asarray((Vt.T * (s / (s * s + _RIDGE * len(X)))) @ U.T)
+    return np.asarray((Vt.T * (math.sqrt(share) * s / (s * s + _RIDGE * len(rows)))) @ U.T)
 
 
-def spread_of(found: Refined, root: np.ndarray, X: np.ndarray) -> np.ndarray:
-    """1 + φ̃ᵀ G Gᵀ φ̃ (N',) at X (N', n)."""
-    return np.asarray(1.0 + ((_rows(found, X) @ root) ** 2).sum(axis=1))
+def _some(count: int) -> tuple[np.ndarray, float]:
+    """Return which of so many samples a covariance is made of, and their share."""
+    if count <= ROWS:
+        return np.arange(count), 1.0
+    return np.sort(np.random.default_rng(0).choice(count, ROWS, replace=False)), ROWS / count
 
 
-def committee_root(found: Sequence[Refined], X: np.ndarray) -> np.ndarray:
-    """The same G of the average of several networks as one: mean of the tails, then all units' weights."""
-    roots = [regressor_root(one, X) / len(found) for one in found]
-    tails = [one.regressors.tail_size for one in found]
+def spread_of(network: Refined, root: np.ndarray, X: np.ndarray) -> np.ndarray:
+    """Return 1 + φ̃ᵀ G Gᵀ φ̃ (N',) at X (N', n)."""
+    return np.asarray(1.0 + ((_rows(network, X) @ root) ** 2).sum(axis=1))
+
+
+def mean_root(networks: Sequence[Refined], X: np.ndarray) -> np.ndarray:
+    """Return the same G of the mean of several networks as one: mean of the tails, then all units' weights."""
+    roots = [regressor_root(network, X) / len(networks) for network in networks]
+    tails = [network.regressors.tail_size for network in networks]
     tail = sum(root[:t] for root, t in zip(roots, tails, strict=True))
     return np.vstack([tail, *(root[t:] for root, t in zip(roots, tails, strict=True))])
 
@@ -150,9 +170,9 @@ def _quantiles(scores: np.ndarray, level: float) -> np.ndarray:
     return np.full(scores.shape[1], float(stdtrit(count, (1.0 + level) / 2.0)))  # quantile of Student's t
 
 
-def _rows(found: Refined, X: np.ndarray) -> np.ndarray:
-    r = found.regressors
-    return np.hstack([r.tail_rows(X), r.phi(X, found.theta)])
+def _rows(network: Refined, X: np.ndarray) -> np.ndarray:
+    r = network.regressors
+    return np.hstack([r.tail_rows(X), r.phi(X, network.theta)])
 
 
 def _kernel(layer: KernelLayer) -> tuple[np.ndarray, float]:
@@ -161,3 +181,87 @@ def _kernel(layer: KernelLayer) -> tuple[np.ndarray, float]:
     C = layer.metric.kernel(layer.centres, layer.centres)
     C[np.diag_indices(len(C))] += ridge
     return C, ridge
+
+
+@dataclass(frozen=True, eq=False)
+class Finish:
+    """The last stage of a fit: what a result holds beside its network."""
+
+    samples: Samples
+    problem: ArrayProblem
+    split: HeldOut
+    trials: Sequence[Trial]
+    began: float
+    seed: int
+    level: float
+
+    def network(
+        self,
+        members: Sequence[Member],
+        error: float,
+        *,
+        form: str | None = None,
+        evidence: Sequence[Evidence] = (),
+    ) -> Fitted:
+        """Return the result for one network or the mean of several; what they missed sets the intervals."""
+        mean = Ensemble(tuple(member.network for member in members))
+        evidence = [self._own(members, error), *evidence]
+        M = None
+        if sum(len(network.coefficients) for network in mean.members) <= LARGEST:
+            root = mean_root(mean.members, self.problem.X)
+            M = root @ root.T
+        arrays = (*mean.regressors.form.factors(mean.theta), *mean.weights_and_tail)
+        name = form or mean.regressors.form.name
+        return self._fitted(arrays, mean.regressors.radial, name, error, M, evidence)
+
+    def kernel_network(self, layer: KernelLayer, judged: KernelLayer, error: float) -> Fitted:
+        """Return the result for a kernel layer; `judged` is one that has not seen the samples held out."""
+        held = self.split.unseen[0]
+        M, spread = None, np.ones(len(held))
+        if len(layer.centres) <= LARGEST:
+            M, spread = kernel_covariance(layer), kernel_spread(judged, held)
+        evidence = [Evidence(self._missed(judged.predict(held), self.split), spread)]
+        arrays = (*layer.units(), layer.weights, layer.tail)
+        return self._fitted(arrays, layer.metric.radial, "kernel layer", error, M, evidence)
+
+    def evidence(self, found: Refined, split: HeldOut) -> Evidence:
+        """Return what a network that learnt from a split's samples misses on those held out."""
+        held = split.unseen[0]
+        root = regressor_root(found, split.X)
+        return Evidence(self._missed(found.predict(held), split), spread_of(found, root, held))
+
+    def _own(self, members: Sequence[Member], error: float) -> Evidence:
+        """Return each member's held-out errors, less by what their mean is expected to gain."""
+        single = float(np.sqrt(np.mean([member.error**2 for member in members])))
+        parts = [self.evidence(m.before, m.split) for m in members if m.before and m.split]
+        return Evidence.together(parts, min(1.0, error / max(single, 1e-300)))
+
+    def _missed(self, latent: np.ndarray, split: HeldOut) -> np.ndarray:
+        """Return errors (N', m) in scaled outputs of latent ones (N', k) at the held-out samples."""
+        wanted = self.problem.scaling.scale_outputs(self.samples.Y[split.held])
+        return np.asarray(wanted - latent @ self.problem.basis)
+
+    def _fitted(
+        self,
+        arrays: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+        radial: RadialFunction,
+        form: str,
+        error: float,
+        M: np.ndarray | None,
+        evidence: Sequence[Evidence],
+    ) -> Fitted:
+        heldout = float(error / self.problem.unit)
+        network = self.problem.network(*arrays, radial, heldout=heldout)
+        return Fitted(
+            network,
+            form,
+            radial,
+            network.units,
+            heldout,
+            tuple(self.trials),
+            time.monotonic() - self.began,
+            calibrated(network, M, evidence, self.level),
+            TrainedRegion.of(self.problem.X),
+            self.level,
+            self.samples.one_output,
+        )

@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.learning.choosing.scatter import noise_variance, spacing
+from palpate.learning.scatter import noise_variance, spacing
 from palpate.network import Scaling
 from palpate.rbf.filter.settings import Settings
 from palpate.rbf.sample_checks import numbers, relative_error, samples, spread_of

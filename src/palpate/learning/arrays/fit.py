@@ -1,0 +1,410 @@
+"""A network from nothing but samples: unit form, radial function, size and ridge are chosen by held-out error.
+
+No form wins everywhere: ridges follow targets made of plane waves, rotated units those made of bumps, and a kernel
+layer whatever has no small structure. So a kernel layer sets the mark; every form is refined a little, and the best go
+on with more units, more samples and more iterations (see `held_out`). What work is left goes to a mean of several of
+the winner's kind, where that is worth more (see `members`).
+
+Work is counted in multiplications, so the seed decides the result; a limit on time only ends the search early.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from palpate.learning.arrays.array_samples import ArrayProblem, Samples, check_search
+from palpate.learning.arrays.calibration import Evidence, Finish
+from palpate.learning.arrays.fitted import Fitted
+from palpate.learning.arrays.held_out import RIDGE, HeldOut, carry, forms_for
+from palpate.learning.arrays.members import (
+    LOOK_SAMPLES,
+    ROWS,
+    Fresh,
+    Member,
+    expected_error,
+    refit_weights,
+)
+from palpate.learning.kernel_layer import CENTRES_MAX, KernelLayer, Metric, likely_metric
+from palpate.learning.pool import Pool
+from palpate.learning.search import Budget, Candidate, Trial, Work, evaluate_all
+from palpate.network.radial import RADIAL_FUNCTIONS
+from palpate.rbf.forms import unit_form
+from palpate.rbf.refinement.refine import refine
+from palpate.rbf.regressors import Regressors
+from palpate.units import Quantity, Range
+
+__all__ = ["fit"]
+
+_WORK = 5e11  # multiplications at the default effort, which are half a minute's at most
+_SECONDS = 30.0  # that the default effort is made for: a shorter limit plans for less
+_NUMBERS = 1500  # unknowns in the units of a full-size candidate at the default effort
+_SMALL = 600  # and of one that is only looked at
+_METRIC_SAMPLES = 500  # for the likelihood
+_MEMBERS = 5
+_CROSSED_BELOW = 500  # samples: intervals then rest on networks of their own
+_BEHIND = 1.2  # times the best error: too far for another ten iterations
+_ROUND_OFF = 1e-9  # of the outputs: nobody asks for less
+_ASTRAY = 3.0  # times the best member's error: not of its kind
+_HOPELESS = 3.0  # times the kernel layer's error after the first stages: no refinement will make up for that
+
+
+def fit(
+    X: Any,
+    Y: Any,
+    inputs: Sequence[Range] | None = None,
+    outputs: Sequence[Quantity] | None = None,
+    *,
+    effort: float = 1.0,
+    seconds: float | None = None,
+    workers: int = 1,
+    seed: int = 0,
+    target: float | None = None,
+    level: float = 0.9,
+) -> Fitted:
+    """Choose and fit a network from samples alone.
+
+    Parameters
+    ----------
+    X : (N, n)
+        Inputs; 20 samples at least. Arrays, nested lists or tables; (N,) for a single input.
+    Y : (N, m)
+        Outputs, parts of one quantity: what is small beside the others is learnt less closely relative to its own
+        size. (N,) for one output, which then comes back as (N,).
+    inputs : sequence of n ranges, optional
+        Of the data if left out, named x0, x1, … or as a table's columns are.
+    outputs : sequence of m quantities, optional
+        Named y0, y1, … if left out.
+    effort : float
+        Multiplies the work of the search, which takes about half a minute on one core at the default of 1; 0.1 gives
+        a quick look. The result depends on it, never on how fast or busy the machine is.
+    seconds : float, optional
+        Limit on time; by default none. A limit below 30 plans for as much less work, and what still takes longer on
+        this machine is left out: the result then depends on the machine.
+    workers : int
+        Processes that refine networks at a time; the result is the same with any number.
+    seed : int
+        Decides everything that is drawn.
+    target : float, optional
+        Held-out error relative to the outputs' standard deviation that is good enough.
+    level : float
+        Share of unseen samples that the intervals are to hold.
+
+    Returns
+    -------
+    Fitted
+        Its network, intervals and trained region.
+
+    Notes
+    -----
+    A fifth of the samples (15 % of a thousand and more) is held out to choose by, and its errors, before any
+    weights saw it, set the intervals' widths. Then the weights are fitted to all samples: no sample is lost to the
+    calibration, and its guarantee is approximate (see `palpate.learning.arrays.calibration`). Below 500 samples,
+    where the effort allows, networks learnt without a fold are judged on it too, and the wider widths count.
+
+    Raises
+    ------
+    UsageError
+        If there are too few samples, shapes disagree, numbers are not finite or all outputs the same, or an option
+        can't be.
+    """
+    from threadpoolctl import threadpool_limits
+
+    began = time.monotonic()
+    budget = Budget.of(effort, seconds)
+    check_search(seed, target, level)
+    samples = Samples.of(X, Y, inputs, outputs)
+    if seconds is not None:
+        # fitting to all samples and freezing come after the search
+        budget = Budget(min(budget.effort, seconds / _SECONDS), began + 0.85 * seconds)
+    with threadpool_limits(1):  # small matrices: threads would cost more than they bring
+        return _Chooser(samples, began, budget, Pool(workers), seed, target, level).chosen()
+
+
+class _Chooser:
+    """The stages of a choice, and the trials so far."""
+
+    def __init__(
+        self,
+        samples: Samples,
+        began: float,
+        budget: Budget,
+        pool: Pool,
+        seed: int,
+        target: float | None,
+        level: float,
+    ) -> None:
+        problem = ArrayProblem.of(samples.X, samples.Y, samples.inputs, samples.outputs)
+        self.problem, self.seed, self.pool, self.budget = problem, seed, pool, budget
+        self.X, self.Y = problem.X, problem.Y
+        # errors are per latent output until they are told
+        self.target = max(target or 0.0, _ROUND_OFF) * problem.unit
+        self.total = _WORK * budget.effort
+        self.work = Work(self.total, budget.deadline)
+        self.size = min(2.0, math.sqrt(budget.effort))
+        self.share = 0.15 if len(self.X) >= 1000 else 0.2
+        self.split = HeldOut.of(self.X, self.Y, share=self.share, seed=seed)
+        self.scales = np.ones(self.X.shape[1])
+        self.centres = int(np.clip((0.15 * self.total) ** (1 / 3), 300, CENTRES_MAX))
+        self.trials: list[Trial] = []
+        self.finish = Finish(samples, problem, self.split, self.trials, began, seed, level)
+        self.ran: list[Candidate] = []
+
+    def chosen(self) -> Fitted:
+        tail = self._tail()
+        if tail.error <= self.target:
+            return self.finish.network([self._member(tail, self.split)], tail.error, form="affine")
+        metric, mark = self._kernel()
+        winner = self._radials(*self._forms(mark))
+        if winner.theta.size < 0.6 * _NUMBERS * self.size:
+            winner = self._sizes(winner)
+        if winner.error > _HOPELESS * mark:
+            return self._kernel_network(metric, mark)
+        if winner.error > self.target:
+            winner = self._run([winner], round(120 * self.size), self.split)[0]
+        if winner.network is None or winner.error > max(mark, self.target):
+            return self._kernel_network(metric, mark)
+        members, error = self._finalists(winner)
+        return self.finish.network(members, error, evidence=self._crossed(winner))
+
+    def _run(
+        self, candidates: Sequence[Candidate], iterations: int, split: HeldOut, *, record: bool = True
+    ) -> list[Candidate]:
+        """Return the candidates after so many more iterations at most, as they were where no work is left."""
+        each = sum(split.work(candidate) for candidate in candidates)
+        most = min(iterations, int(self.work.left / max(each, 1.0)))
+        if most < 1:
+            return list(candidates)
+        found = evaluate_all(split, candidates, most, self.budget.deadline, self.pool)
+        results = []
+        for old, new in zip(candidates, found, strict=True):
+            if new is not None:
+                self.work.spend((new.iterations - old.iterations + 1) * split.work(old))
+                if record:
+                    self.ran.append(new)
+                    self.trials.append(self._told(new.trial))
+            results.append(old if new is None else new)
+        return results
+
+    def _told(self, trial: Trial) -> Trial:
+        """Return a record with its error relative to the outputs' standard deviation."""
+        return replace(trial, error=trial.error / self.problem.unit)
+
+    def _tail(self) -> Candidate:
+        """Return an affine function without units, and its error."""
+        form = unit_form("axis-aligned", self.X.shape[1])
+        regressors, none = Regressors(form, "gaussian"), np.zeros((0, form.size))
+        found = refine(self.split.X[:ROWS], self.split.Y[:ROWS], none, regressors, heldout=self.split.unseen)
+        return Candidate(regressors, none, "affine", found.heldout, found)
+
+    def _kernel(self) -> tuple[Metric, float]:
+        """Return the kernel layer's metric and error, and take the input scales from which units start."""
+        found = []
+        samples = min(len(self.split.X), round(_METRIC_SAMPLES * min(1.0, self.size)))
+        for name in RADIAL_FUNCTIONS:
+            likelihood = 80.0 * samples**3
+            if found and self.work.left < 2.0 * likelihood:  # a limit on time is near
+                break
+            metric = likely_metric(name, self.split.X, self.split.Y, samples=samples)
+            self.work.spend(likelihood)
+            found.append((self._kernel_error(metric), metric))
+            if name == "inverse-multiquadric":
+                self.scales = metric.scales
+        error, best = min(found, key=lambda pair: pair[0])
+        # the likelihood was of a part of the samples: more of them may want another width
+        for scale, ridge in ((1.25, 1.0), (0.8, 1.0), (1.0, 0.1), (1.0, 10.0)):
+            other = best.altered(scale, ridge)
+            if self.work.left > 0.8 * self.total and not self.budget.over:
+                trial = self._kernel_error(other)
+                if trial < error:
+                    error, best = trial, other
+        return best, error
+
+    def _kernel_error(self, metric: Metric) -> float:
+        began = time.monotonic()
+        (asked, wanted), rows = self.split.unseen, self._kernel_rows(0.03, len(self.split.X))
+        layer = self._layer(metric, self.split.X[:rows], self.split.Y[:rows])
+        error = float(np.sqrt(((layer.predict(asked) - wanted) ** 2).mean()))
+        self.work.spend(rows * float(len(layer.centres)) ** 2)
+        took = time.monotonic() - began
+        self.trials.append(
+            Trial(
+                "kernel", "kernel layer", metric.radial, len(layer.centres), error / self.problem.unit, took
+            )
+        )
+        return error
+
+    def _kernel_rows(self, share: float, samples: int) -> int:
+        """Return of how many samples a layer is fitted with this share of all work."""
+        affordable = min(share * self.total, 0.5 * max(self.work.left, 0.0))
+        return min(samples, max(self.centres, int(affordable / self.centres**2)))
+
+    def _layer(self, metric: Metric, X: np.ndarray, Y: np.ndarray) -> KernelLayer:
+        return KernelLayer.fit(metric, X, Y, seed=self.seed, most=self.centres)
+
+    def _kernel_network(self, metric: Metric, error: float) -> Fitted:
+        some = self._kernel_rows(0.1, len(self.X))
+        rows = np.sort(np.random.default_rng(self.seed).permutation(len(self.X))[:some])
+        judging = self._kernel_rows(0.03, len(self.split.X))
+        judged = self._layer(metric, self.split.X[:judging], self.split.Y[:judging])
+        return self.finish.kernel_network(self._layer(metric, self.X[rows], self.Y[rows]), judged, error)
+
+    def _forms(self, mark: float) -> tuple[Candidate, Candidate]:
+        """Return the form that does best, at full size if a look needs less, and it before its last run."""
+        few = self.split.first(LOOK_SAMPLES)
+        names = forms_for(self.X.shape[1])
+        looks = self._run([self._enter(name, _SMALL) for name in names], 20, few)
+        best = _best_of(looks)
+        # a form that leads by far, and leads the kernel layer too, has won; else the larger size tells
+        far = 2.0 if best.error < mark else 3.0
+        kept = sorted((one for one in looks if one.error <= far * best.error), key=_error)
+        # rotated units show what they can do only when there are many: they and the best other go on
+        others = [one for one in kept if one.kind[0] != "rotated"][:1]
+        kept = others + [one for one in kept if one.kind[0] == "rotated"]
+        larger = [self._enter(one.kind[0], _NUMBERS) for one in kept]
+        larger = [new for new, old in zip(larger, kept, strict=True) if len(new.theta) > 1.5 * len(old.theta)]
+        grown = self._run(larger, 10, few) if larger else []
+        if not grown or grown[0].network is None:
+            best = self._ahead(looks)
+            return best, best
+        least = _best_of(grown).error
+        near = [one for one in grown if one.error <= _BEHIND * least]
+        pairs = [*zip(self._run(near, 15, few), near, strict=True), (best, best)]
+        return min(pairs, key=lambda pair: pair[0].error)
+
+    def _enter(self, form: str, numbers: float) -> Candidate:
+        return self.split.enter(form, round(numbers * self.size), self.scales, self.seed)
+
+    def _ahead(self, looks: list[Candidate]) -> Candidate:
+        """Return of small networks, soon refined, the one whose form does best on two further folds too."""
+        best = _best_of(looks)
+        close = [one for one in looks if one.error <= 1.5 * best.error]
+        if len(close) == 1 or best.error <= self.target:
+            return best
+        squares = np.array([one.error**2 for one in close])
+        for k in (1, 2):
+            split = self._fold(k)
+            fresh = [split.enter(one.kind[0], one.theta.size, self.scales, self.seed + k) for one in close]
+            again = evaluate_all(split.first(LOOK_SAMPLES), fresh, 20, self.budget.deadline, self.pool)
+            self.work.spend(20 * sum(split.first(LOOK_SAMPLES).work(one) for one in fresh))
+            squares += [math.inf if one is None else one.error**2 for one in again]
+        return close[int(np.argmin(squares))]
+
+    def _fold(self, k: int) -> HeldOut:
+        return HeldOut.of(self.X, self.Y, share=self.share, seed=self.seed, fold=k)
+
+    def _radials(self, winner: Candidate, before: Candidate) -> Candidate:
+        """Return the same units with the best radial function; those not far behind go on to all samples."""
+        if winner.error <= self.target:
+            return winner
+        others = [carry(before, name) for name in RADIAL_FUNCTIONS if name != winner.regressors.radial]
+        all_three = [winner, *self._run(others, 15, self.split.first(LOOK_SAMPLES))]
+        least = _best_of(all_three).error
+        kept = [one for one in all_three if one.error <= 1.6 * least]
+        return kept[0] if len(kept) == 1 else _best_of(self._run(kept, 15, self.split))
+
+    def _sizes(self, winner: Candidate) -> Candidate:
+        """Return fewer units where samples set their number: the largest network may know too much by heart."""
+        tried = [winner]
+        for factor in (0.6, 0.35, 0.2):
+            if tried[-1].error <= self.target or (len(tried) > 1 and _best_of(tried) is not tried[-1]):
+                break
+            form, numbers = winner.kind[0], round(factor * winner.theta.size)
+            fresh = self.split.enter(form, numbers, self.scales, self.seed)
+            fresh = self._run([fresh], 10, self.split, record=False)[0]
+            fresh = carry(fresh, winner.regressors.radial)
+            tried += self._run([fresh], max(30, winner.iterations), self.split)
+        return _best_of(tried)
+
+    def _finalists(self, winner: Candidate) -> tuple[list[Member], float]:
+        """Return the members of the best mean and its error: the winner's, or a rival's if work allows."""
+        best = self._mean(winner)
+        if len(best[0]) == _MEMBERS:
+            for rival in self._rivals(winner):
+                if self.work.left < 2.0 * _MEMBERS * self._fresh(rival).work(self.split):
+                    break
+                other = self._mean(self._run([rival], rival.iterations, self.split, record=False)[0])
+                if len(other[0]) == _MEMBERS and other[1] < best[1]:
+                    best = other
+        members, error = best
+        least = min(member.error for member in members)
+        # folds differ, but not so much: such a member was caught in another minimum, and would spoil the mean
+        near = [member for member in members if member.error <= _ASTRAY * least]
+        if len(near) < len(members):
+            members, error = near, expected_error(near, self.X)
+        single = float(np.sqrt(np.mean([member.error**2 for member in members])))
+        if len(members) == 1 or error > 0.9 * single:
+            return members[:1], single
+        return members, error
+
+    def _rivals(self, winner: Candidate) -> list[Candidate]:
+        """Return the best of three other pairs of form and radial function, if they are not far behind."""
+        found: dict[tuple[str, str], Candidate] = {}
+        for one in sorted(self.ran, key=_error):
+            if one.error < 2.5 * winner.error:
+                found.setdefault(one.kind, one)
+        return [one for kind, one in found.items() if kind != winner.kind][:3]
+
+    def _mean(self, winner: Candidate) -> tuple[list[Member], float]:
+        """Return the winner, others of its kind from other starts and folds, and the error to expect."""
+        members, fresh = [self._member(winner, self.split)], self._fresh(winner)
+        more = int(np.clip(self.work.left / (1.3 * fresh.work(self.split)), 0, _MEMBERS - 1))
+        splits = [self._fold(k) for k in range(1, more + 1)]
+        for split, one in zip(splits, self._refined_afresh(fresh, splits), strict=True):
+            if one is not None:
+                members.append(self._member(one, split))
+        error = expected_error(members, self.X)
+        if len(members) > 1:
+            units = len(members) * len(winner.theta)
+            self.trials.append(self._told(replace(winner.trial, start="mean", units=units, error=error)))
+        return members, error
+
+    def _fresh(self, like: Candidate) -> Fresh:
+        return Fresh(like, self.scales, self.budget.deadline)
+
+    def _refined_afresh(self, fresh: Fresh, splits: Sequence[HeldOut]) -> list[Candidate | None]:
+        seeds = [self.seed + k for k in range(1, len(splits) + 1)]
+        found = self.pool.map(fresh.refined, list(zip(splits, seeds, strict=True)))
+        for split, one in zip(splits, found, strict=True):
+            self.work.spend(split.work(fresh.like) * one.iterations if one else 0.0)
+        return found
+
+    def _member(self, one: Candidate, split: HeldOut) -> Member:
+        assert one.network is not None
+        return Member(refit_weights(one.network, self.X, self.Y, RIDGE), one.error, one.network, split)
+
+    def _crossed(self, winner: Candidate) -> Sequence[Evidence]:
+        """Return what networks of the winner's kind miss on folds of which they have seen nothing; of few samples only.
+
+        Each stops by other samples than those that it is judged by: on a handful the best iterate is there by luck.
+        """
+        fresh = self._fresh(winner)
+        if len(self.X) >= _CROSSED_BELOW or self.work.left < _MEMBERS * fresh.work(self.split):
+            return ()
+        wholes = [
+            HeldOut.of(self.X, self.Y, share=1.0 / _MEMBERS, seed=self.seed, fold=k) for k in range(_MEMBERS)
+        ]
+        parts = [HeldOut.of(whole.X, whole.Y, share=self.share, seed=self.seed) for whole in wholes]
+        found = self._refined_afresh(fresh, parts)
+        if self.budget.over:  # cut short, they would say too much
+            return ()
+        evidence = []
+        for whole, one in zip(wholes, found, strict=True):
+            if one is None or one.network is None:
+                return ()
+            evidence.append(self.finish.evidence(refit_weights(one.network, whole.X, whole.Y, RIDGE), whole))
+        return (Evidence.together(evidence),)
+
+
+def _best_of(candidates: Sequence[Candidate]) -> Candidate:
+    """Return the candidate of least error on held-out samples."""
+    return min(candidates, key=_error)
+
+
+def _error(candidate: Candidate) -> float:
+    return candidate.error

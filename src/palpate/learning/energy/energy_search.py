@@ -1,0 +1,221 @@
+"""The search for an energy's network: kinds of units, growth of the best two, random starts, and a mean of the best.
+
+Every kind of unit is tried at one size; the best three grow while more units gain; then random starts of about the best
+size race by successive halving. The best networks are judged by refining them again without some of the solves, and
+the mean of those that together miss least is the result.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Literal
+
+import numpy as np
+
+from palpate.learning.energy.energy_problem import EnergyProblem, LeftOut, mean_error
+from palpate.learning.ensemble import Ensemble, Judged, select_members
+from palpate.learning.pool import Pool
+from palpate.learning.search import Budget, Candidate, Search, Trial, sizes
+from palpate.learning.starts import random_units
+from palpate.network.radial import RadialFunction
+from palpate.rbf.regressors import Regressors
+
+__all__ = ["EnergyEnsemble", "search_energy"]
+
+_FORMS = ("rotated", "axis-aligned", "rank-2")  # the last for more inputs than the position
+_RADIALS: tuple[RadialFunction, ...] = ("inverse-multiquadric", "matern-5/2", "gaussian")
+_FIRST = 6  # units by which kinds are compared
+_ITERATIONS = 120
+_KIND_ITERATIONS = 60
+_KIND_STARTS = 2
+_GROWN = 3  # kinds that grow
+_PATIENCE = 3  # sizes without a gain
+_RANDOM = 24  # further starts
+_ROUNDS = (50, 100)  # iterations of these, the better half going on
+_SAME_KIND = 0.5  # share of them of the best one's kind, so that a mean has some to choose from
+_SPREAD = (0.7, 1.5)  # their sizes over that of the best
+_JUDGED = 20  # networks
+_UNITS = 320  # of a mean, images counted: a query costs about 25 ns for each
+_SCATTER = 0.05  # of random units about the solves, in scaled inputs
+_SEARCH_SHARE = 0.65  # of a limit on time; the rest is for judging
+
+
+@dataclass(frozen=True, eq=False)
+class EnergyEnsemble(Ensemble):
+    """The networks of an energy, and what their mean misses of solves left out.
+
+    Attributes
+    ----------
+    left_out : LeftOut
+        What their mean misses of solves that each was refined again without; rows and fit are the best one's.
+    error : float
+        Geometric mean of what is missed, over solves, by refining again and by the closed form.
+    """
+
+    left_out: LeftOut
+    error: float
+
+
+def search_energy(
+    problem: EnergyProblem,
+    *,
+    form: str = "auto",
+    radial: RadialFunction | Literal["auto"] = "auto",
+    units_max: int = 160,
+    networks: int = 12,
+    target: float = 1e-3,
+    budget: Budget | None = None,
+    workers: int | None = None,
+    seed: int = 0,
+) -> tuple[EnergyEnsemble, tuple[Trial, ...]]:
+    """Return the mean of at most so many networks, and the records of all that were tried.
+
+    Parameters
+    ----------
+    problem : EnergyProblem
+    form : str
+        Of a unit, or "auto".
+    radial : {"gaussian", "inverse-multiquadric", "matern-5/2", "auto"}
+    units_max : int
+        Most units of one network; images count.
+    networks : int
+        Most members of the mean.
+    target : float
+        Leave-one-solve-out error at which no more units are added.
+    budget : Budget, optional
+        Effort, and the limit on time; the default effort without a limit if left out.
+    workers : int, optional
+        Processes; see `palpate.learning.pool`.
+    seed : int
+        Decides all starts.
+
+    Raises
+    ------
+    UsageError
+        If `workers` is below 1.
+    """
+    budget, pool = budget or Budget(), Pool(workers)
+    search = Search(problem, budget.part(_SEARCH_SHARE), pool)
+    _search_structure(search, form, radial, units_max, target, seed)
+    order = sorted(search.tried, key=lambda one: one.error)[: budget.count(_JUDGED, 2)]
+    judged = pool.map(partial(_judge, problem, budget.deadline), list(enumerate(order)))
+    ensemble = mean_of(problem, [one for one in judged if one is not None], networks)
+    return ensemble, search.trials
+
+
+def mean_of(
+    problem: EnergyProblem, judged: Sequence[Judged], most: int, units: int = _UNITS
+) -> EnergyEnsemble:
+    """Return the mean of at most so many judged networks, of no more than so many units, that misses least."""
+    rows = problem.fitted(judged[0].network)[0]
+
+    def error(misses: tuple[np.ndarray, ...]) -> float:
+        return math.sqrt(math.prod(mean_error(rows, miss) for miss in misses))
+
+    members, misses = select_members(judged, error, most=most, units=units)
+    best = members[0].network
+    rows, fit = problem.fitted(best)
+    left_out = LeftOut(rows, fit, misses[0], problem.folds(rows.groups))
+    return EnergyEnsemble(tuple(one.network for one in members), left_out, error(misses))
+
+
+def judge(problem: EnergyProblem, candidate: Candidate, seconds: float | None = None) -> Judged:
+    """Return a candidate's network with what it misses: refined again without each fold, and by the closed form."""
+    assert candidate.network is not None
+    again = problem.cross_validate(candidate.network, seconds=seconds)
+    return Judged(candidate.network, (again.errors, candidate.detail))
+
+
+def _judge(problem: EnergyProblem, deadline: float, numbered: tuple[int, Candidate]) -> Judged | None:
+    """Return a candidate judged; nothing where the time is over, but for the first."""
+    number, candidate = numbered
+    if math.isinf(deadline):
+        return judge(problem, candidate)
+    left = deadline - time.monotonic()
+    return judge(problem, candidate, max(left, 0.1)) if left > 0 or number == 0 else None
+
+
+def _search_structure(
+    search: Search,
+    form: str,
+    radial: RadialFunction | Literal["auto"],
+    units_max: int,
+    target: float,
+    seed: int,
+) -> None:
+    """Try every kind of unit at one size, grow the best, and try random starts about the best size."""
+    problem, budget = search.problem, search.budget
+    assert isinstance(problem, EnergyProblem)
+    starts = _Starts(problem, units_max, seed)
+    kinds = [problem.regressors(*kind) for kind in _kinds(form, radial, problem.X.shape[1])]
+    found = search.try_all(
+        (starts.random(kind, _FIRST, "kind") for kind in kinds for _ in range(_KIND_STARTS)),
+        budget.count(_KIND_ITERATIONS, 10),
+    )
+    found.sort(key=lambda one: one.error)
+    found = list({one.kind: one for one in reversed(found)}.values())[::-1]
+    iterations = budget.count(_ITERATIONS, 10)
+    for one in found[:_GROWN]:
+        ladder = sizes(max(len(one.theta), 2), starts.most(one.regressors))
+        search.grow(
+            partial(starts.grown, one.regressors),
+            ladder,
+            iterations,
+            begin=one,
+            target=target,
+            patience=_PATIENCE,
+        )
+    best = search.best
+    if best.error <= target or not len(best.theta):
+        return
+    rng = np.random.default_rng([seed, len(found)])
+    further = []
+    for _ in range(budget.count(_RANDOM, 0)):
+        another = found[int(rng.integers(min(3, len(found))))]
+        regressors = (best if rng.random() < _SAME_KIND else another).regressors
+        units = max(1, round(len(best.theta) * rng.uniform(*_SPREAD)))
+        further.append(starts.random(regressors, units, "random"))
+    if further:
+        search.halve(further, [budget.count(k, 5) for k in _ROUNDS])
+
+
+@dataclass(eq=False)
+class _Starts:
+    """Units to begin with, drawn by a seed."""
+
+    problem: EnergyProblem
+    units_max: int
+    seed: int
+    drawn: int = 0
+
+    def most(self, regressors: Regressors) -> int:
+        """Return the largest number of units of a kind."""
+        return min(self.units_max // regressors.copies, self.problem.room(regressors))
+
+    def random(self, regressors: Regressors, units: int, start: str) -> Candidate:
+        return Candidate(regressors, self._units(regressors, min(units, self.most(regressors))), start)
+
+    def grown(self, regressors: Regressors, units: int, best: Candidate | None) -> Iterator[Candidate]:
+        """Yield the best network's units and more, and random ones."""
+        if best is not None and 0 < len(best.theta) < units:
+            more = self._units(regressors, units - len(best.theta))
+            yield Candidate(regressors, np.vstack([best.theta, more]), "grown")
+        yield self.random(regressors, units, "random")
+
+    def _units(self, regressors: Regressors, count: int) -> np.ndarray:
+        self.drawn += 1
+        rng = np.random.default_rng([self.seed, self.drawn])
+        return random_units(regressors.form, self.problem.X, max(count, 0), rng, scatter=_SCATTER)
+
+
+def _kinds(
+    form: str, radial: RadialFunction | Literal["auto"], inputs: int
+) -> list[tuple[str, RadialFunction]]:
+    """Return forms and radial functions to try: the first of each list with all of the other."""
+    forms = [f for f in _FORMS if f != "rank-2" or inputs > 3] if form == "auto" else [form]
+    radials = list(_RADIALS) if radial == "auto" else [radial]
+    return [(forms[0], r) for r in radials] + [(f, r) for f in forms[1:] for r in radials[:2]]

@@ -1,1 +1,0 @@
-"""How many units a network needs: growth and pruning around the refinement."""

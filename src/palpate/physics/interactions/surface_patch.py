@@ -159,9 +159,11 @@ def winding_number(points: np.ndarray, triangles: np.ndarray, place: np.ndarray)
     Parameters
     ----------
     points : (node, 3) array
+        Nodes in m.
     triangles : (t, 3) int array
-        Counter-clockwise as seen from outside.
+        Nodes of each triangle, counter-clockwise as seen from outside.
     place : (3,) array
+        Place in m.
     """
     a, b, c = np.moveaxis(points[triangles] - place, 1, 0)
     la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))

@@ -398,6 +398,7 @@ class FamilySolver:
     Parameters
     ----------
     problem : FamilyProblem
+        The family under interactions.
     """
 
     def __init__(self, problem: FamilyProblem) -> None:

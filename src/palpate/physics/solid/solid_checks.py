@@ -82,9 +82,11 @@ def by_region(
     Parameters
     ----------
     given : Material, or mapping or pairs of (region, Material)
+        One material for all regions, or one for each.
     regions : tuple of str
+        Names of the body's regions.
     needed : tuple of str
-        Members that a material must have.
+        Names of the members that a material must have.
 
     Raises
     ------

@@ -23,10 +23,10 @@ from palpate.physics.stop import Stop, Verdict
 
 if TYPE_CHECKING:
     from palpate.physics.solid.solid_body import Body
-    from palpate.physics.solid.solid_energy import History
     from palpate.physics.solid.solid_problem import SolidProblem
 
 __all__ = [
+    "BodyElements",
     "ConstantInteraction",
     "OpenProblem",
     "SolidModel",
@@ -49,74 +49,100 @@ class ConstantInteraction:
     values: np.ndarray
 
 
+class BodyElements:
+    """Finite elements of a body without interactions: its unknowns, energies, histories and measures.
+
+    Parameters
+    ----------
+    problem : SolidProblem
+        Gives the body, and the places where its mesh is fine.
+    solver : str
+        NGSolve's name of a sparse solver.
+    tolerance : float
+        Relative error in the energy norm at which an iteration ends.
+
+    Attributes
+    ----------
+    field : SolidField
+        The unknowns.
+    histories : mapping of str to History
+        Internal variables by region, of materials with a history.
+    energies : list of Energy
+        Energy of the material of each region.
+    measures : Measures
+        Strains and stresses of the state that the field shows.
+    time_step : ngsolve.Parameter
+        Duration of a load step in s.
+    """
+
+    def __init__(self, problem: SolidProblem, solver: str, tolerance: float) -> None:
+        import ngsolve
+
+        body = self.body = problem.body
+        self.solver, self.tolerance = solver, tolerance
+        mesh = body.geometry.mesh(problem.refinements)
+        self.field = SolidField(mesh, problem.mesh, body.order, body.fixed, body.mixed_regions)
+        self.time_step = ngsolve.Parameter(SETTLED)
+        self.histories = {
+            region: History(self.field, region, material, self.time_step)
+            for region, material in body.materials.items()
+            if material.states
+        }
+        self.energies = material_energies(self.field, body.materials, self.histories)
+        self.measures = Measures(self.field, body.materials, self.histories)
+
+    def system(self, energies: Sequence[Energy], free: np.ndarray) -> System:
+        """Return the equations of a sum of energies on the free unknowns, a mask (dof,)."""
+        return System(self.field, energies, free, self.solver)
+
+
 class SolidModel:
     """Π(z; q) of a body: its material, constant interactions and those whose inputs q (n,) vary.
 
     Parameters
     ----------
-    field : SolidField
-    materials : sequence of Energy
-    histories : mapping of str to History
+    elements : BodyElements
+        The body.
     constants : sequence of ConstantInteraction
+        Interactions whose inputs stay.
     varied : sequence of Attached
+        Interactions whose inputs vary.
     base : (dof,) array
         Unknowns under the constant interactions alone.
-    solver : str
-        NGSolve's name of a sparse solver.
-    tolerance : float
-        Relative error in the energy norm.
-    measures : Measures
-    time_step : ngsolve.Parameter
-        Duration of a load step in s.
-    strain_limit : float
-        Largest principal strain at which a law of small strain is still asked.
-    step_error : float
-        Error in time of the response that one step of a body with a history may make, over the largest response.
 
     Attributes
     ----------
     duration : float
-        Of the whole path that is followed, in s.
+        Duration of the whole path that is followed, in s.
     """
 
     def __init__(
         self,
-        field: SolidField,
-        materials: Sequence[Energy],
-        histories: Mapping[str, History],
+        elements: BodyElements,
         constants: Sequence[ConstantInteraction],
         varied: Sequence[Attached],
         base: np.ndarray,
-        solver: str,
-        tolerance: float,
-        measures: Measures,
-        time_step: Any,
-        strain_limit: float,
-        step_error: float,
     ) -> None:
-        self.duration, self._time_step = 0.0, time_step
-        self.field, self.base, self.histories, self.measures = field, base, histories, measures
-        self.inputs = Inputs(field, varied)
-        self._tolerance = tolerance
-        self._constants, self._strain_limit, self.step_error = tuple(constants), strain_limit, step_error
-        fixed = Inputs(field, [constant.attached for constant in constants])
+        self._elements, self.base, self._constants = elements, base, tuple(constants)
+        self.field, self.histories, self.measures = elements.field, elements.histories, elements.measures
+        self.duration, self.step_error = 0.0, elements.body.step_error
+        self.inputs = Inputs(self.field, varied)
+        fixed = Inputs(self.field, [constant.attached for constant in constants])
         values = np.concatenate([[], *(constant.values for constant in constants)])
         fixed.set(values)
         self._load = values @ fixed.loads
-        self._given = ~field.free | fixed.constrained | self.inputs.constrained
+        self._given = ~self.field.free | fixed.constrained | self.inputs.constrained
         parts = {
-            "materials": list(materials),
+            "materials": elements.energies,
             "constant": [energy for constant in constants for energy in constant.attached.energies],
             "varied": [energy for part in varied for energy in part.energies],
         }
-        self.system = System(field, list(itertools.chain(*parts.values())), ~self._given, solver)
+        self.system = elements.system(list(itertools.chain(*parts.values())), ~self._given)
         self._terms = {
-            name: System(field, energies, ~self._given, solver)
-            for name, energies in parts.items()
-            if energies
+            name: elements.system(energies, ~self._given) for name, energies in parts.items() if energies
         }
         self._base_step = self._base_stored = self._base_constant = 0.0
-        self._floor = FLOOR * measures.shear_modulus * measures.volume
+        self._floor = FLOOR * self.measures.shear_modulus * self.measures.volume
         self.scale = Scale(0.0, self._floor)
         self._tangent = False
         self.spans = np.ones(self.inputs.size)
@@ -152,7 +178,7 @@ class SolidModel:
     def begin(self, share: float) -> None:
         """Get ready for a load step that takes a share of the duration."""
         if self.histories:
-            self._time_step.Set(max(share * self.duration, INSTANT))
+            self._elements.time_step.Set(max(share * self.duration, INSTANT))
             for history in self.histories.values():
                 history.begin()
 
@@ -221,7 +247,12 @@ class SolidModel:
         """Search the equilibrium under inputs q near a guess (dof,), with a fresh or the present tangent, if any."""
         self.set(q)
         end = equilibrate(
-            self.system, guess, self.scale, self._tolerance, STEP_LIMIT, fresh=fresh or not self._tangent
+            self.system,
+            guess,
+            self.scale,
+            self._elements.tolerance,
+            STEP_LIMIT,
+            fresh=fresh or not self._tangent,
         )
         self._tangent = self._tangent or end.iterations > 0
         if end.stop is Stop.CONVERGED:
@@ -257,8 +288,10 @@ class SolidModel:
         if figures["least_volume_ratio"] <= 0:
             return Verdict(Stop.ELEMENT_INVERTED, f"det F = {figures['least_volume_ratio']:.2g}", figures)
         strain = self.measures.largest_small_strain()
-        if strain > self._strain_limit:
-            return Verdict(Stop.STRAIN_LIMIT, f"{strain:.2g} against {self._strain_limit:g}", figures)
+        if strain > self._elements.body.strain_limit:
+            return Verdict(
+                Stop.STRAIN_LIMIT, f"{strain:.2g} against {self._elements.body.strain_limit:g}", figures
+            )
         for part, values in self._acting(q):
             verdict = part.inspect(values)
             for name, figure in verdict.figures.items():
@@ -328,52 +361,24 @@ def open_problem(problem: SolidProblem, solver: str, tolerance: float) -> OpenPr
     UsageError
         If a rigid motion of the body is free.
     """
-    import ngsolve
-
-    body = problem.body
-    mesh = body.geometry.mesh(problem.refinements)
-    field = SolidField(mesh, problem.mesh, body.order, body.fixed, body.mixed_regions)
-    time_step = ngsolve.Parameter(SETTLED)
-    histories = {
-        region: History(field, region, material, time_step)
-        for region, material in body.materials.items()
-        if material.states
-    }
-    energies = material_energies(field, body.materials, histories)
-    measures = Measures(field, body.materials, histories)
+    elements = BodyElements(problem, solver, tolerance)
+    field, body = elements.field, problem.body
     constants = _constants(field, body)
-    rest = np.zeros(field.size)
-    base, settled = rest, None
-
-    def model(constants: list[ConstantInteraction], varied: list[Attached], base: np.ndarray) -> SolidModel:
-        return SolidModel(
-            field,
-            energies,
-            histories,
-            constants,
-            varied,
-            base,
-            solver,
-            tolerance,
-            measures,
-            time_step,
-            body.strain_limit,
-            body.step_error,
-        )
-
+    base, settled = np.zeros(field.size), None
     if constants:
         require_support(field, [constant.attached for constant in constants])
-        settled = _settle(model(constants=[], varied=[c.attached for c in constants], base=rest), constants)
+        alone = SolidModel(elements, [], [constant.attached for constant in constants], base)
+        settled = _settle(alone, constants)
         base = settled.last.z
         field.set_base(base)
     varied = [interaction.attach(field) for interaction in problem.interactions]
     if not constants:
         require_support(field, varied)
-    opened = model(constants, varied, base)
+    model = SolidModel(elements, constants, varied, base)
     if any(isinstance(material, PreStretched) for material in body.materials.values()):
-        _require_balance(opened, base)
-    opened.spans = np.array([r.high - r.low for r in problem.ranges])
-    return OpenProblem(opened, settled)
+        _require_balance(model, base)
+    model.spans = np.array([r.high - r.low for r in problem.ranges])
+    return OpenProblem(model, settled)
 
 
 def _require_balance(model: SolidModel, base: np.ndarray) -> None:

@@ -28,7 +28,6 @@ BARE_PARAMETERS = {
     "estimators",
     "learning",
     "network",
-    "physics",
     "rbf",
     "runtime",
     "study",
@@ -41,7 +40,6 @@ OLD_TERMS = {
     "estimators",
     "learning",
     "network",
-    "physics",
     "rbf",
     "runtime",
     "study",
@@ -95,6 +93,8 @@ GIVEN_UP = {
         "twins",
     ),
 }
+# Words of everyday English in the physics: the height of a dome, and the time in which a load grows.
+ALLOWED = {("physics", "rise")}
 GIVEN_UP_CLASSES = {
     *("ContactLaw", "GraspSurrogate", "HeldBody", "HeldPaths", "HeldStudy", "RestStiffness", "Stiffening"),
     *("TouchModel", "TouchStudy", "TouchSurrogate", "TouchedBody"),
@@ -165,8 +165,11 @@ def test_terms_given_up_are_gone(package):
         for file in files()
         if package_of(file) == package
         for name in set(names_in(file))
-        if name in GIVEN_UP_CLASSES
-        or GIVEN_UP & set(re.findall(r"[a-z]+", re.sub(r"([A-Z])", r"_\1", name).lower()))
+        if (package, name) not in ALLOWED
+        and (
+            name in GIVEN_UP_CLASSES
+            or GIVEN_UP & set(re.findall(r"[a-z]+", re.sub(r"([A-Z])", r"_\1", name).lower()))
+        )
     )
     assert old == []
 

@@ -40,7 +40,7 @@ class Verdict:
     detail : str
         Figures that belong to the reason.
     figures : mapping of str to float
-        What was measured, for example ``{"penetration": 1e-3}``.
+        Measured figures, for example ``{"penetration": 1e-3}``.
     """
 
     stop: Stop = Stop.CONVERGED

@@ -9,7 +9,7 @@ loads               a point force, a traction, a body force, a pressure that fol
 sphere_contact      a sphere's contact energy, and whether a state is admissible
 sphere_design       places and order in which a sphere's positions are solved
 surface_patch       a touched surface as triangles
-footprint           the bump under a glued pad or a point force
+bump                the weight under a glued pad or a point force
 pads                the pad's share of what a hand feels
 interaction_checks  directions, ranges, and whether a body can float away
 """

@@ -11,7 +11,7 @@ import numpy as np
 from palpate import checks
 from palpate.errors import UsageError
 from palpate.format import millimetres, number
-from palpate.physics.interactions.footprint import (
+from palpate.physics.interactions.bump import (
     MARGIN,
     QUADRATURE,
     Chart,
@@ -127,7 +127,7 @@ class GluedPad(PlainInteraction):
     def keeps(self, matrix: np.ndarray, about: np.ndarray, geometry: Any) -> bool:
         """Return whether an isometry M about a point (m) of the body leaves the pads' energy and places the same.
 
-        The footprint is seen along one axis, so that must stay; a fixed place must stay where it is. A place that
+        The bump is seen along one axis, so that must stay; a fixed place must stay where it is. A place that
         is an input, and the displacement, turn with M.
         """
         chart = _placement(self, geometry.rest())[0]
@@ -138,7 +138,7 @@ class GluedPad(PlainInteraction):
         return bool(np.isclose(along, 1.0) and np.allclose(about + matrix @ (at - about), at))
 
     def refinements(self, geometry: Any) -> tuple[FineMesh, ...]:
-        """Return fine elements wherever the footprint may be."""
+        """Return fine elements wherever the pad may be."""
         chart, lower, upper = _placement(self, geometry.rest())
         if chart is None or self.radius is None:
             return ()

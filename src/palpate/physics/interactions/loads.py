@@ -23,7 +23,7 @@ import numpy as np
 from palpate import checks
 from palpate.errors import UsageError
 from palpate.format import number
-from palpate.physics.interactions.footprint import (
+from palpate.physics.interactions.bump import (
     MARGIN,
     QUADRATURE,
     Chart,
@@ -61,10 +61,10 @@ def dead_load(load: np.ndarray) -> Attached:
 
 @dataclass(frozen=True)
 class PointForce(PlainInteraction):
-    """A force at a point of a surface, spread over a small footprint.
+    """A force at a point of a surface, spread over a small disc.
 
     A force on a mathematical point would sink in without bound as the mesh gets finer. So it is spread as a
-    traction F ρ/∫ρ dA with the bump ρ of radius a (see `footprint`); the response is the displacement along the
+    traction F ρ/∫ρ dA with the bump ρ of radius a (see `bump`); the response is the displacement along the
     force, in m, averaged with the same weight.
 
     Attributes
@@ -80,7 +80,7 @@ class PointForce(PlainInteraction):
     surface : str
         Name of the surface.
     element : float, optional
-        Size in m of the elements under the footprint; by default a third of the radius.
+        Size in m of the elements under the disc; by default a third of the radius.
     name : str
         Name of the input.
 
@@ -113,7 +113,7 @@ class PointForce(PlainInteraction):
         Raises
         ------
         UsageError
-            If the body has no such surface, the point is not on it or its footprint hangs over the edge.
+            If the body has no such surface, the point is not on it or its disc hangs over the edge.
         """
         self._chart(geometry.rest())
         return (Range(self.name, *self.force, "N"),)
@@ -123,7 +123,7 @@ class PointForce(PlainInteraction):
         return f"force along {along(self.direction)} at ({at}) mm of {self.surface!r}"
 
     def refinements(self, geometry: Any) -> tuple[FineMesh, ...]:
-        """Return fine elements under the footprint."""
+        """Return fine elements under the disc."""
         mesh = geometry.rest()
         chart = self._chart(mesh)
         centre, margin = np.asarray(self.at)[list(chart.across)], MARGIN * self.radius

@@ -35,9 +35,9 @@ ROUND_ELEMENT = 0.4  # the same on curved surfaces, where the elements' shape ad
 LAYERED_ELEMENT = (
     0.25  # in bodies of several regions: on a skin over soft fat 0.5 makes the force 3 to 7 % too large
 )
-MARGIN = 1.3  # how far beyond the footprint of its centres the probe may touch, over its radius
-END = 1e-3  # of the radius: as near as that a footprint ends where the surface does
-INSET = 3.0  # distance of the footprint from the surface's rim over the radius, unless it is given
+MARGIN = 1.3  # how far beyond its contact points the probe may touch, over its radius
+END = 1e-3  # of the radius: as near as that the box of contact points ends where the surface does
+INSET = 3.0  # distance of the contact points from the surface's rim over the radius, unless it is given
 MOST_INSET = 0.4  # the same, at most, over the surface's width
 SIDEWAYS = 3.0  # how much dearer a move across is than one along the normal
 FIRST = 0.25  # first step along the approach over the radius
@@ -73,7 +73,7 @@ class SphereProbe(PlainInteraction):
     depth : tuple of two floats
         Least and largest depth of the sphere's tip below the surface at rest, in m.
     over : tuple of two corners, optional
-        Box of the footprints on the surface in m: ((x0, y0), (x1, y1)) or with z as well. By default the surface
+        Box of the contact points on the surface in m: ((x0, y0), (x1, y1)) or with z as well. By default the surface
         less a margin of 3 R, at most 0.4 of its width, in the directions along it.
 
     Raises
@@ -220,8 +220,8 @@ class SphereProbe(PlainInteraction):
         contacts = contacts[hit]
         if not len(contacts):
             raise UsageError(
-                f"The probe's footprint misses the surface {self.touches!r}.",
-                why=f"The footprint is {low} … {high} m, the surface {patch.box[0]} … {patch.box[1]} m.",
+                f"The probe's contact points miss the surface {self.touches!r}.",
+                why=f"They are to be in {low} … {high} m, the surface {patch.box[0]} … {patch.box[1]} m.",
                 fix="Give `over` within the surface, in m.",
             )
         return contacts, np.array([patch.nearest(contact)[1] for contact in contacts]), hit
@@ -315,7 +315,7 @@ def _checked_box(value: Any) -> tuple[Corner, Corner]:
         or (corners[0] > corners[1]).any()
     ):
         raise UsageError(
-            f"The probe's footprint is {value}.",
+            f"The box of the probe's contact points is {value}.",
             why="It needs a lower and an upper corner, each of two or three coordinates in m.",
             fix="For example over=((0.03, 0.03), (0.07, 0.07)).",
         )

@@ -128,7 +128,7 @@ def require_fit(
     deepest: float,
     slack: float,
 ) -> None:
-    """Refuse a footprint that reaches beyond an upright plane surface, or a depth that is all of the body's thickness.
+    """Refuse contact points that reach beyond an upright plane surface, or a depth that is all of the body's thickness.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def require_fit(
         beyond = max(float(low[i] - over[0][i]), float(over[1][i] - high[i]))
         if beyond > slack:
             raise UsageError(
-                f"The probe's footprint reaches {millimetres(beyond)} beyond the surface along {'xyz'[i]}.",
+                f"The probe's contact points reach {millimetres(beyond)} beyond the surface along {'xyz'[i]}.",
                 why=f"It is asked for from {millimetres(over[0][i])} to {millimetres(over[1][i])}, the surface is from "
                 f"{millimetres(float(low[i]))} to {millimetres(float(high[i]))}.",
                 fix="Give `over` within the surface, in m; its edges may be among it.",

@@ -63,7 +63,7 @@ class Varied:
     path : str
         ``"REGION.PROPERTY"``, for example ``"fat.young"``; of a body of one region the property alone will do.
         A material inside another is one more step: ``"fat.base.young"``. ``"LAYER.thickness"`` of a `LayeredBlock`:
-        what a layer takes, the deepest one gives, so the touched surface stays. ``"probe.radius"``: footprints and
+        what a layer takes, the deepest one gives, so the touched surface stays. ``"probe.radius"``: contact points and
         depths stay.
     low, high : float
         Ends of its range, in SI units.
@@ -465,7 +465,7 @@ def _both(first: tuple[FineMesh, ...], second: tuple[FineMesh, ...]) -> tuple[Fi
         if a == b:  # wanted by what holds the body
             fine.append(a)
             continue
-        # a probe wants it in a box around its footprints
+        # a probe wants it in a box around its contact points
         lower = np.minimum(np.array(a.lower), np.array(b.lower)).tolist()
         upper = np.maximum(np.array(a.upper), np.array(b.upper)).tolist()
         fine.append(FineMesh(a.surface, min(a.element, b.element), tuple(lower), tuple(upper)))

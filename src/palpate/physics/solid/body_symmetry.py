@@ -93,7 +93,7 @@ def _is_directed(material: Any) -> bool:
 def fundamental_part(body: Body, probe: SphereProbe) -> SphereProbe:
     """Return the probe, over a part of its contact points whose images are all of it.
 
-    For groups about an upright axis in the middle of the footprint: with n mirror planes the box around a sector
+    For groups about an upright axis in the middle of the contact points: with n mirror planes the box around a sector
     of the angle π/n. Any other probe comes back as it is. The mesh is then fine there only.
     """
     symmetry = symmetry_of(body, probe.touches)

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from palpate.errors import UsageError
-from palpate.physics.interactions.footprint import (
+from palpate.physics.interactions.bump import (
     QUADRATURE,
     bump,
+    bump_area,
     chart_at,
     chart_of,
-    footprint_area,
     require_on_surface,
 )
 from palpate.physics.shapes import Block, Cylinder, FineMesh
@@ -27,8 +27,8 @@ def test_its_integral_over_a_plane_is_a_quarter_of_the_disc():
     mesh = Block((0.04, 0.03, 0.02)).mesh((FineMesh("top", 0.004),))
     weight = bump(chart_of(BLOCK.rest(), "top"), (0.021, 0.014), 0.008)
     surface = ngsolve.ds(definedon=mesh.Boundaries("top"), bonus_intorder=QUADRATURE)
-    assert ngsolve.Integrate(weight * surface, mesh) == pytest.approx(footprint_area(0.008), rel=1e-5)
-    assert footprint_area(0.008) == pytest.approx(math.pi * 0.008**2 / 4)
+    assert ngsolve.Integrate(weight * surface, mesh) == pytest.approx(bump_area(0.008), rel=1e-5)
+    assert bump_area(0.008) == pytest.approx(math.pi * 0.008**2 / 4)
 
 
 def test_it_is_there_on_the_side_that_faces_the_axis_only():

@@ -1,4 +1,4 @@
-"""The footprint of a pad or of a spread force on a named surface: a smooth bump of compact support.
+"""The bump that weighs a pad or a spread force on a named surface: smooth, of compact support.
 
 Seen along an axis that the surface faces, the bump around the point p is
 
@@ -23,14 +23,14 @@ from palpate.physics.shapes.mesh import BodyMesh
 from palpate.physics.shapes.meshing import FineMesh
 from palpate.physics.shapes.naming import require_known
 
-__all__ = ["QUADRATURE", "Chart", "bump", "chart_at", "chart_of", "footprint_area", "require_on_surface"]
+__all__ = ["QUADRATURE", "Chart", "bump", "bump_area", "chart_at", "chart_of", "require_on_surface"]
 
 # orders of quadrature beyond the elements' own: the bump is no polynomial on an element it cuts
 QUADRATURE = 6
-MARGIN = 1.2  # a fine mesh reaches that many radii from the footprint's centre
+MARGIN = 1.2  # a fine mesh reaches that many radii from the bump's centre
 PLAIN = 0.1  # a surface has a mean direction if its area vectors add up to more than this share of its area
 ON_SURFACE = 0.02  # share of the body's size by which a point may miss a curved surface's triangles
-# share of a footprint that must lie on the surface; the rest is for the triangles of a round edge
+# share of a bump that must lie on the surface; the rest is for the triangles of a round edge
 COVERED = 0.98
 
 
@@ -92,7 +92,7 @@ def bump(chart: Chart, centre: tuple[Any, Any], radius: float) -> Any:
     return ng.IfPos(faces, ng.IfPos(inside, inside**3, 0), 0)
 
 
-def footprint_area(radius: float) -> float:
+def bump_area(radius: float) -> float:
     """Return ∫ρ dA = πa²/4 on a plane, in m²."""
     return math.pi * radius**2 / 4
 
@@ -146,7 +146,7 @@ def _along(surface: str, normal: np.ndarray) -> Chart:
 def require_on_surface(
     mesh: BodyMesh, chart: Chart, lower: np.ndarray, upper: np.ndarray, radius: float
 ) -> None:
-    """Refuse footprints that hang over the edge of the surface.
+    """Refuse bumps that hang over the edge of the surface.
 
     Parameters
     ----------
@@ -155,14 +155,14 @@ def require_on_surface(
     chart : Chart
         How the surface is seen.
     lower, upper : (2,) array
-        Corners in m of the rectangle in which the centre of the footprint may be.
+        Corners in m of the rectangle in which the centre of the bump may be.
     radius : float
-        Radius of the footprint in m.
+        Radius of the bump in m.
 
     Raises
     ------
     UsageError
-        If more than a fiftieth of any footprint is off the surface.
+        If more than a fiftieth of any bump is off the surface.
     """
     facing = chart.sign * mesh.area_vectors[:, chart.axis] > 0
     mine = facing & mesh.on(chart.surface)
@@ -173,7 +173,7 @@ def require_on_surface(
         if share < COVERED:
             raise UsageError(
                 f"The pad around {_words(corner)} m hangs over the edge of the surface {chart.surface!r}.",
-                why=f"Only {share:.0%} of its footprint, of radius {radius:g} m, lies on the surface.",
+                why=f"Only {share:.0%} of its area, of radius {radius:g} m, lies on the surface.",
                 fix="Keep its centre a radius away from the edge, or make it smaller.",
             )
 

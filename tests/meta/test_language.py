@@ -93,7 +93,7 @@ GIVEN_UP = {
         "twins",
     ),
 }
-# Words of everyday English in the physics: the height of a dome, and the time in which a load grows.
+# A word of everyday English in the physics: the time in which a load rises to its size.
 ALLOWED = {("physics", "rise")}
 GIVEN_UP_CLASSES = {
     *("ContactLaw", "GraspSurrogate", "HeldBody", "HeldPaths", "HeldStudy", "RestStiffness", "Stiffening"),

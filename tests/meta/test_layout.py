@@ -65,18 +65,9 @@ def test_heavy_packages_wait_until_they_are_needed(code, absent):
 
 
 # Packages whose files still wait for a name of their own, or lie too deep; it only gets shorter.
-UNFINISHED = {
-    "cli",
-    "learning",
-    "network",
-    "physics",
-    "rbf",
-    "study",
-    "surrogates",
-    "validation",
-}
+UNFINISHED = {"learning", "surrogates"}
 LONGEST_FILE, LONGEST_FUNCTION, SHORT_FILE = 500, 50, 60
-SHARE_OF_SHORT_FILES = 0.14
+SHARE_OF_SHORT_FILES = 0.08
 
 
 def test_files_stay_readable():
@@ -125,7 +116,12 @@ def test_public_functions_and_classes_are_listed():
             if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
             for name in ast.literal_eval(node.value)
         }
-        defined = {node.name for node in tree(file).body if isinstance(node, (*FUNCTIONS, ast.ClassDef))}
+        defined = {
+            node.name
+            for node in tree(file).body
+            if isinstance(node, (*FUNCTIONS, ast.ClassDef))
+            and not any(".command(" in ast.unparse(decorator) for decorator in node.decorator_list)
+        }
         public = {name for name in defined if not name.startswith("_")}
         if not public <= listed and not file.name.startswith("__") and package_of(file) not in UNFINISHED:
             unlisted[str(file)] = sorted(public - listed)

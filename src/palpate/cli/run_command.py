@@ -24,7 +24,7 @@ LOOK = 0.02  # s between two looks at the loop
 
 
 @dataclass
-class Peak:
+class _Peak:
     """The largest force (N) and depth (m) that were seen, and how often the hand was where nothing was trained."""
 
     force: float = 0.0
@@ -80,7 +80,7 @@ def run_loop(model: Path, seconds: float, device: str, rate: float | None, conso
     if warning := warning_of(touch.meta):
         console.say(f"its correction was warned of: {warning}")
     limit = settings.get("max_force")
-    peak = Peak()
+    peak = _Peak()
     # whoever stops it early still wants to know
     with (
         LoopProcess(model, device=device, rate=rate, max_force=limit) as loop,
@@ -106,7 +106,7 @@ def _aimed(device: str, touch: Touchable, scale: float) -> str:
     )
 
 
-def _wait(loop: LoopProcess, seconds: float, console: Console, peak: Peak) -> None:
+def _wait(loop: LoopProcess, seconds: float, console: Console, peak: _Peak) -> None:
     """Look at the force while the loop runs, and show it in a terminal."""
     end = time.monotonic() + seconds
     shown = sys.stderr.isatty() and not console.as_json

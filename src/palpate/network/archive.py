@@ -32,6 +32,7 @@ __all__ = [
     "Archive",
     "load_archive",
     "load_single_network",
+    "network_to_json",
     "quantity_from_json",
     "range_from_json",
     "save_archive",
@@ -167,7 +168,7 @@ def _archive(container: Container) -> Archive:
     for name, description in content["networks"].items():
         begin = f"net/{name}/"
         own = {k.removeprefix(begin): tensors.pop(k) for k in list(tensors) if k.startswith(begin)}
-        networks[name] = network_from_json(description, own, old=container.version == "1")
+        networks[name] = _network_from_json(description, own, old=container.version == "1")
         if fault := flaw(networks[name]):
             raise ValueError(f"network {name!r}: {fault}")
     arrays = {k.removeprefix("array/"): v for k, v in tensors.items() if k.startswith("array/")}
@@ -201,7 +202,7 @@ def network_to_json(network: Network) -> tuple[dict[str, Any], dict[str, np.ndar
     return description, arrays
 
 
-def network_from_json(
+def _network_from_json(
     description: Mapping[str, Any], arrays: Mapping[str, np.ndarray], *, old: bool = False
 ) -> Network:
     """The network of a description and exactly its arrays; `old` ones don't mention kernel and basis.

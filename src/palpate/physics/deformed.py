@@ -21,11 +21,20 @@ __all__ = [
     "FineBody",
     "NodalField",
     "ball_of",
+    "circles",
+    "colour_limits",
+    "corner_normals",
+    "cut_lines",
     "fine_body",
     "fixed_of",
+    "hatching",
+    "heights_above",
     "nodal_field",
     "nodal_strain",
+    "outline",
     "require_state",
+    "rim",
+    "section",
 ]
 
 Ball = tuple[np.ndarray, float]

@@ -20,7 +20,7 @@ from palpate.errors import UsageError
 from palpate.physics import deformed
 from palpate.physics.deformed import Ball, NodalField
 
-__all__ = ["Camera", "Picture", "plot_solution"]
+__all__ = ["Camera", "Picture", "draw_body", "draw_triangles", "palette", "plot_solution"]
 
 SMOOTHING = 2  # samples per pixel along each side
 PIECES = 12  # of a line between two nodes, each of which is hidden or not

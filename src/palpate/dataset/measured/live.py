@@ -50,7 +50,7 @@ _WAITING = 10_000  # lines read and not yet taken; the sender then waits
 _ANSWERS = 1.0  # s that an answer may take; who does not read them gets none any more
 
 
-def lines_of(stream: BinaryIO, stall: float, say: Callable[[str], None] = lambda why: None) -> Iterator[str]:
+def lines_of(stream: BinaryIO, stall: float, log: Callable[[str], None] = lambda why: None) -> Iterator[str]:
     """Yield lines of a stream of bytes until it ends, breaks, or is silent.
 
     Parameters
@@ -59,7 +59,7 @@ def lines_of(stream: BinaryIO, stall: float, say: Callable[[str], None] = lambda
         Source of the lines, in UTF-8.
     stall : float
         Seconds of silence that end the stream.
-    say : function of a text
+    log : function of a text
         Called with the reason where the stream did not end by itself.
     """
     read: queue.Queue[bytes | str] = queue.Queue(_WAITING)  # lines as bytes, at last the reason of the end
@@ -68,11 +68,11 @@ def lines_of(stream: BinaryIO, stall: float, say: Callable[[str], None] = lambda
         try:
             line = read.get(timeout=stall)
         except queue.Empty:
-            say(f"nothing came for {stall:g} s")
+            log(f"nothing came for {stall:g} s")
             return
         if isinstance(line, str):
             if line:
-                say(line)
+                log(line)
             return
         yield line.decode("utf-8", errors="replace").rstrip("\r\n")
 
@@ -101,9 +101,9 @@ class Connection:
         self._socket, self._file = other, other.makefile("rb")
         self._deaf = False
 
-    def lines(self, stall: float, say: Callable[[str], None] = lambda why: None) -> Iterator[str]:
+    def lines(self, stall: float, log: Callable[[str], None] = lambda why: None) -> Iterator[str]:
         """Yield its lines as `lines_of` does."""
-        return lines_of(self._file, stall, say)
+        return lines_of(self._file, stall, log)
 
     def answer(self, text: str) -> None:
         """Send one line; a sender that does not read is not waited for twice."""
@@ -125,7 +125,7 @@ class Connection:
 
 
 @contextlib.contextmanager
-def listening(port: int, wait: float, say: Callable[[int], None]) -> Iterator[Connection]:
+def listening(port: int, wait: float, announce: Callable[[int], None]) -> Iterator[Connection]:
     """Wait for the first connection to a port of this machine and yield it; a context manager.
 
     Parameters
@@ -134,7 +134,7 @@ def listening(port: int, wait: float, say: Callable[[int], None]) -> Iterator[Co
         Port on 127.0.0.1; 0 takes any free one.
     wait : float
         Seconds until someone must have connected.
-    say : function of the port
+    announce : function of the port
         Called once it listens.
 
     Raises
@@ -153,7 +153,7 @@ def listening(port: int, wait: float, say: Callable[[int], None]) -> Iterator[Co
             server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         _bind(server, port)
         server.settimeout(wait)
-        say(int(server.getsockname()[1]))
+        announce(int(server.getsockname()[1]))
         try:
             other, _ = server.accept()
         except TimeoutError:

@@ -15,13 +15,7 @@ from palpate import checks
 from palpate.errors import UsageError
 from palpate.units import Range
 
-__all__ = [
-    "Load",
-    "LoadAndUnload",
-    "PointLoad",
-    "StepAndHold",
-    "TipLoad",
-]
+__all__ = ["Load", "LoadAndUnload", "PointLoad", "StepAndHold", "TipLoad", "as_loads"]
 
 
 class Load(Protocol):

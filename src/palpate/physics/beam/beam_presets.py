@@ -48,7 +48,7 @@ class Preset:
         return self.body.problem(self.loads)
 
 
-def founding_beam(material: str) -> Cantilever:
+def _founding_beam(material: str) -> Cantilever:
     """The cantilever of Narayanan, Singla, Garimella, Waz & Krovi 2011: L = 1 m, r = 5 mm, six nodes.
 
     The founding text is ambiguous. It gives the length as 0.1 m and its node table as 1 m; 1 m is taken here.
@@ -73,12 +73,12 @@ def _tip(material: str, newton: int, samples: int) -> Callable[[], Preset]:
     def build() -> Preset:
         name = f"beam-{material}" + ("" if newton == 5 else f"-{newton}n")
         summary = f"{material} cantilever of the founding study, tip load 0 … {newton} N, {samples} solves"
-        return Preset(name, summary, founding_beam(material), (TipLoad(0.0, newton),), "grid", samples)
+        return Preset(name, summary, _founding_beam(material), (TipLoad(0.0, newton),), "grid", samples)
 
     return build
 
 
-def beam_plane() -> Preset:
+def _beam_plane() -> Preset:
     """Nylon cantilever whose tip is pushed in the plane.
 
     The beam buckles under an axial load of π²EI/4L² = 2.42 N (Euler 1744); 1.5 N stays well below it. With at
@@ -89,17 +89,17 @@ def beam_plane() -> Preset:
         TipLoad(-5.0, 5.0, direction=(0.0, 1.0), name="P_y"),
     )
     summary = "nylon cantilever, tip pushed in the plane: P_x ±1.5 N, P_y ±5 N, 768 solves"
-    return Preset("beam-plane", summary, founding_beam("nylon"), loads, "sobol", 768)
+    return Preset("beam-plane", summary, _founding_beam("nylon"), loads, "sobol", 768)
 
 
-def beam_three_loads() -> Preset:
+def _beam_three_loads() -> Preset:
     """Nylon cantilever pushed down at three nodes: the n-dimensional case that the founding study planned."""
     loads = tuple(PointLoad(f"P_{x:g}m", x, 0.0, 2.0) for x in (0.4, 0.6, 1.0))
     summary = "nylon cantilever pushed down at 0.4, 0.6 and 1.0 m by 0 … 2 N each, 768 solves"
-    return Preset("beam-three-loads", summary, founding_beam("nylon"), loads, "sobol", 768)
+    return Preset("beam-three-loads", summary, _founding_beam("nylon"), loads, "sobol", 768)
 
 
-def beam_plastic() -> Preset:
+def _beam_plastic() -> Preset:
     """The founding copper beam, annealed, loaded past yield and unloaded.
 
     Its outer fibres yield at the clamp from π r³ σ_y/4L = 12.3 N on, and without hardening it would collapse at
@@ -114,7 +114,7 @@ def beam_plastic() -> Preset:
     return Preset("beam-plastic", summary, body, loads, "sobol", 256)
 
 
-def beam_viscoelastic() -> Preset:
+def _beam_viscoelastic() -> Preset:
     """The founding nylon beam with an illustrative creep, under a load that is put on at once and held.
 
     The Prony series is an illustration, no measurement: nylon's depends on its kind, moisture and temperature.
@@ -139,14 +139,14 @@ PRESETS: dict[str, Callable[[], Preset]] = {
     "beam-nylon": _tip("nylon", 5, 501),
     "beam-copper-10n": _tip("copper", 10, 201),
     "beam-nylon-10n": _tip("nylon", 10, 201),
-    "beam-plane": beam_plane,
-    "beam-three-loads": beam_three_loads,
+    "beam-plane": _beam_plane,
+    "beam-three-loads": _beam_three_loads,
 }
 """Every preset of an elastic beam by its name; studies of these can be named."""
 
 HISTORY_PRESETS: dict[str, Callable[[], Preset]] = {
-    "beam-plastic": beam_plastic,
-    "beam-viscoelastic": beam_viscoelastic,
+    "beam-plastic": _beam_plastic,
+    "beam-viscoelastic": _beam_viscoelastic,
 }
 """Every preset of a beam that remembers by its name."""
 

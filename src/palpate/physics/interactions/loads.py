@@ -52,7 +52,7 @@ Ends = tuple[float, float]
 Point = tuple[float, float, float]
 
 
-def dead_load(load: np.ndarray) -> Attached:
+def _dead_load(load: np.ndarray) -> Attached:
     """Return one input whose load vector is (dof,)."""
     import ngsolve as ng
 
@@ -141,7 +141,7 @@ class PointForce(PlainInteraction):
         load = field.load(lambda v: weight * ng.InnerProduct(ng.CF(self.direction), v) * surface)
         # the same quadrature gives the area, so that the force is exact on any mesh
         along = field.interpolate(ng.CF(self.direction))
-        return dead_load(load / float(load @ along))
+        return _dead_load(load / float(load @ along))
 
     def _chart(self, mesh: BodyMesh) -> Chart:
         chart = chart_at(mesh, self.surface, self.at)
@@ -198,7 +198,7 @@ class SurfaceTraction(PlainInteraction):
 
         direction = ng.specialcf.normal(3) if self.direction == "normal" else ng.CF(self.direction)
         surface = ng.ds(definedon=field.surface(self.surface))
-        return dead_load(field.load(lambda v: ng.InnerProduct(direction, v) * surface))
+        return _dead_load(field.load(lambda v: ng.InnerProduct(direction, v) * surface))
 
 
 @dataclass(frozen=True)
@@ -249,7 +249,7 @@ class BodyForce(PlainInteraction):
         import ngsolve as ng
 
         part = ng.dx if self.region is None else ng.dx(definedon=field.mesh.Materials(self.region))
-        return dead_load(field.load(lambda v: ng.InnerProduct(ng.CF(self.direction), v) * part))
+        return _dead_load(field.load(lambda v: ng.InnerProduct(ng.CF(self.direction), v) * part))
 
 
 POTENTIAL = 1e-8  # largest difference, relative to the force, that round-off may leave

@@ -147,7 +147,7 @@ class VoceHardening:
         both = stiffness + self.modulus
         target = positive_part(excess) * self.rate / both
         share = self.saturation * self.rate / both * exp(-self.rate * accumulated)
-        return saturating_root(target, share, self.saturation * self.rate / both) / self.rate
+        return _saturating_root(target, share, self.saturation * self.rate / both) / self.rate
 
     def describe(self) -> dict[str, Any]:
         """Return plain data for JSON: the law's name and its constants in SI units."""
@@ -176,7 +176,7 @@ def require_hardening(thing: Any) -> None:
         )
 
 
-def saturating_root(target: Any, share: Any, largest: float) -> Any:
+def _saturating_root(target: Any, share: Any, largest: float) -> Any:
     """Return x ≥ 0 with x + share (1 − exp(−x)) = target, for target ≥ 0 and 0 ≤ share ≤ largest.
 
     The left side is concave and rises, so Newton's method climbs to the root from any point below it and needs no

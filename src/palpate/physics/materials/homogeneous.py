@@ -26,7 +26,9 @@ from palpate.physics.materials.tensors import (
 
 __all__ = [
     "Response",
+    "energy_of",
     "equibiaxial",
+    "is_incompressible",
     "planar",
     "relax_free",
     "simple_shear",

@@ -37,6 +37,7 @@ __all__ = [
     "StateVariable",
     "Volumetric",
     "YoungAndPoisson",
+    "in_words",
     "incompressible",
     "initial_state",
     "log_volume",

@@ -28,11 +28,7 @@ from palpate import checks
 from palpate.errors import UsageError
 from palpate.physics.materials.tensors import Scalar, Tensor, deviator, exp, inner, is_symbolic, trace, where
 
-__all__ = [
-    "PronySeries",
-    "dashpot_loss",
-    "spring_energy",
-]
+__all__ = ["PronySeries", "dashpot_loss", "mean_decay", "spring_energy"]
 
 
 @dataclass(frozen=True)

@@ -57,22 +57,22 @@ class StVenantKirchhoff(YoungAndPoisson):
     def volumetric(self) -> Volumetric | None:
         """½ λ (tr E)², if λ is positive."""
         lame = self._lame
-        return Volumetric(lame, green_volume) if lame > 0 else None
+        return Volumetric(lame, _green_volume) if lame > 0 else None
 
     def distortion(self, F: Tensor, state: Mapping[str, Any] = NO_STATE, dt: Any = None) -> Scalar:
         """μ E : E, in J/m³; with the other term where λ ≤ 0."""
-        strain = green_strain(F)
+        strain = _green_strain(F)
         shape = self.shear_modulus * inner(strain, strain)
         if self.volumetric is not None:
             return shape
-        return shape + 0.5 * self._lame * green_volume(F) ** 2
+        return shape + 0.5 * self._lame * _green_volume(F) ** 2
 
 
-def green_strain(F: Tensor) -> Tensor:
+def _green_strain(F: Tensor) -> Tensor:
     """The Green–Lagrange strain ½(FᵀF − I)."""
     return 0.5 * (matmul(transpose(F), F) - identity(F))
 
 
-def green_volume(F: Tensor) -> Scalar:
+def _green_volume(F: Tensor) -> Scalar:
     """The trace of the Green–Lagrange strain."""
-    return trace(green_strain(F))
+    return trace(_green_strain(F))

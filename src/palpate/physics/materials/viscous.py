@@ -102,7 +102,7 @@ class Scaled(ShearAndBulk, MadeFrom):
     @property
     def bulk_modulus(self) -> float:
         """K in Pa; the volumetric part's share of it is not scaled."""
-        elastic_bulk = unrelaxed_bulk(self.base, self.part)
+        elastic_bulk = _unrelaxed_bulk(self.base, self.part)
         # both may be infinite, and their difference then vanishes
         rest = 0.0 if elastic_bulk == self.base.bulk_modulus else self.base.bulk_modulus - elastic_bulk
         return elastic_bulk + self.factor * rest
@@ -117,15 +117,15 @@ class Scaled(ShearAndBulk, MadeFrom):
 
     def distortion(self, F: Tensor, state: Mapping[str, Any] = NO_STATE, dt: Any = None) -> Scalar:
         """Factor times the base law's distortion, in J/m³; of its whole energy where it has no volumetric part."""
-        return self.factor * part_of(self.base, "distortion", F)
+        return self.factor * _part_of(self.base, "distortion", F)
 
 
-def part_of(base: Material, part: Part, F: Tensor) -> Scalar:
+def _part_of(base: Material, part: Part, F: Tensor) -> Scalar:
     """Return the energy in J/m³ of all of an elastic law, or of all but a separate volumetric part."""
     return base.energy(F) if part == "all" or base.volumetric is None else base.distortion(F)
 
 
-def unrelaxed_bulk(base: Material, part: Part) -> float:
+def _unrelaxed_bulk(base: Material, part: Part) -> float:
     """Return the bulk modulus in Pa that is not in that part: of a separate volumetric energy, if any."""
     return 0.0 if part == "all" or base.volumetric is None else base.volumetric.modulus
 
@@ -242,7 +242,7 @@ class Viscoelastic(MadeFrom):
 
         Its gradient is the stress; its value is no stored energy. `dt` in s; None is an instant, infinity for ever.
         """
-        energy = self._weight(dt) * part_of(self.base, self.part, F)
+        energy = self._weight(dt) * _part_of(self.base, self.part, F)
         if not state:
             return energy
         memory = state["memory"] if "memory" in state else self.prepare(state, dt)["memory"]
@@ -286,7 +286,7 @@ class Viscoelastic(MadeFrom):
             spring_energy(state[name], share * self.shear_modulus, share * bulk)
             for name, share in zip(self._overstresses, series.shares, strict=True)
         )
-        return series.equilibrium * part_of(self.base, self.part, F) + springs
+        return series.equilibrium * _part_of(self.base, self.part, F) + springs
 
     def dissipated_energy(self, F: Tensor, state: Mapping[str, Any], dt: float) -> Scalar:
         """Return the heat of the dashpots in a step from `state` to F, in J/m³, never negative."""
@@ -310,7 +310,7 @@ class Viscoelastic(MadeFrom):
     @property
     def _bulk(self) -> float:
         """Bulk modulus in Pa of the part that relaxes."""
-        elastic_bulk = unrelaxed_bulk(self.base, self.part)
+        elastic_bulk = _unrelaxed_bulk(self.base, self.part)
         return 0.0 if elastic_bulk == self.bulk_modulus else self.bulk_modulus - elastic_bulk
 
     def _weight(self, dt: Any) -> Any:
@@ -327,5 +327,5 @@ class Viscoelastic(MadeFrom):
 
     def _stress(self, F: Tensor) -> Tensor:
         """Return S_0 of the part that relaxes (second Piola–Kirchhoff; Cauchy at small strain), in Pa."""
-        first = gradient(lambda A: part_of(self.base, self.part, A), F)
+        first = gradient(lambda A: _part_of(self.base, self.part, A), F)
         return sym(first) if self.kinematics == "small" else sym(matmul(inverse(F), first))

@@ -30,6 +30,7 @@ __all__ = [
     "material_energies",
     "mixed_density",
     "stored_density",
+    "volume_rule",
 ]
 
 
@@ -65,7 +66,7 @@ def _region_energy(field: SolidField, region: str, material: Material, history: 
     return Energy(density, ngsolve.dx(definedon=field.region(region), intrules=rules))
 
 
-def rule_order(field: SolidField, material: Material) -> int:
+def _rule_order(field: SolidField, material: Material) -> int:
     """Return the order to which a material's energy is integrated.
 
     Small strain: exact for products of two strains. Large strain: two orders more, as under a probe an element may turn
@@ -78,7 +79,7 @@ def volume_rule(field: SolidField, material: Material) -> Any:
     """Return the quadrature of a material's energy in a tetrahedron."""
     import ngsolve
 
-    return ngsolve.IntegrationRule(ngsolve.ET.TET, rule_order(field, material))
+    return ngsolve.IntegrationRule(ngsolve.ET.TET, _rule_order(field, material))
 
 
 def mixed_density(material: Material, F: Any, pressure: Any, past: tuple[Any, ...] = ()) -> Any:
@@ -149,7 +150,7 @@ class History:
         from ngsolve.comp import IntegrationRuleSpace
 
         # its rule is exact to twice the order given here
-        points = IntegrationRuleSpace(field.mesh, order=rule_order(field, material) // 2)
+        points = IntegrationRuleSpace(field.mesh, order=_rule_order(field, material) // 2)
         self._region = field.region(region)
         self._variables = material.states
         spaces = {v.name: ngsolve.MatrixValued(points) if v.shape else points for v in self._variables}

@@ -76,9 +76,9 @@ class SolidField:
         for name in fixed:
             require_known("surface", name, rest.surfaces)
         fixed_parts = [member for name in fixed for member in members(name, rest.surfaces)]
-        motion = ngsolve.VectorH1(mesh, order=order, dirichlet=pattern(fixed_parts))
+        motion = ngsolve.VectorH1(mesh, order=order, dirichlet=_pattern(fixed_parts))
         pressures = [
-            ngsolve.Compress(ngsolve.H1(mesh, order=order - 1, definedon=mesh.Materials(pattern([region]))))
+            ngsolve.Compress(ngsolve.H1(mesh, order=order - 1, definedon=mesh.Materials(_pattern([region]))))
             for region in mixed
         ]
         self.space = ngsolve.FESpace([motion, *pressures]) if mixed else motion
@@ -120,11 +120,11 @@ class SolidField:
             If there is none.
         """
         require_known("surface", name, self.rest.surfaces)
-        return self.mesh.Boundaries(pattern(members(name, self.rest.surfaces)))
+        return self.mesh.Boundaries(_pattern(members(name, self.rest.surfaces)))
 
     def region(self, name: str) -> Any:
         """Return the NGSolve region of a named part of the volume."""
-        return self.mesh.Materials(pattern([name]))
+        return self.mesh.Materials(_pattern([name]))
 
     def surface_dofs(self, name: str) -> np.ndarray:
         """Return a mask of the displacements on a named surface, bool of shape (dof,)."""
@@ -179,6 +179,6 @@ class SolidField:
         return unknowns
 
 
-def pattern(names: Sequence[str]) -> str:
+def _pattern(names: Sequence[str]) -> str:
     """Return a regular expression that matches these names only, as NGSolve reads regions."""
     return "|".join(re.escape(name) for name in names)

@@ -19,7 +19,9 @@ __all__ = [
     "ForceSamples",
     "angles",
     "energy_errors",
+    "energy_of_touches",
     "force_errors",
+    "force_on_hand",
     "quantile",
 ]
 

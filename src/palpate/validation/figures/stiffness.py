@@ -12,7 +12,7 @@ from palpate.validation.figures.figure import Figure, Judged
 from palpate.validation.subject import Subject
 from palpate.validation.worst import Worst
 
-__all__ = ["StiffnessErrors", "curve_slope", "matrix_errors"]
+__all__ = ["StiffnessErrors", "curve_slope", "matrix_errors", "stiffness_matrix"]
 
 METHOD = (
     "the Jacobian of the force network against the slope of a cubic spline through the finite-element loads and "

@@ -14,7 +14,7 @@ import tempfile
 import time
 from collections.abc import Sequence
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 from palpate.errors import DeviceError, UsageError
 from palpate.processes import helper_environment
@@ -23,6 +23,8 @@ from palpate.runtime.loop_report import LoopReport
 from palpate.runtime.shared_state import Shared, State, now
 
 __all__ = ["LoopProcess"]
+
+T = TypeVar("T")
 
 _START = 60.0  # s: the first start on a machine compiles the kernels
 _STOP = 2.0  # s
@@ -135,11 +137,7 @@ class LoopProcess:
     @property
     def shared(self) -> Shared:
         """The shared memory: `write_command` steers the loop."""
-        if self._shared is None:
-            raise UsageError(
-                "The real-time process was not started.", fix="Use LoopProcess in a with statement."
-            )
-        return self._shared
+        return _started(self._shared)
 
     @property
     def pid(self) -> int:
@@ -148,11 +146,7 @@ class LoopProcess:
 
     @property
     def _running(self) -> subprocess.Popen[str]:
-        if self._process is None:
-            raise UsageError(
-                "The real-time process was not started.", fix="Use LoopProcess in a with statement."
-            )
-        return self._process
+        return _started(self._process)
 
     @property
     def alive(self) -> bool:
@@ -245,3 +239,9 @@ class LoopProcess:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.stop()
+
+
+def _started(part: T | None) -> T:
+    if part is None:
+        raise UsageError("The real-time process was not started.", fix="Use LoopProcess in a with statement.")
+    return part

@@ -16,6 +16,7 @@ import signal
 import socket
 import sys
 import threading
+import time
 import webbrowser
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
@@ -40,7 +41,6 @@ __all__ = [
     "TRIES",
     "Guard",
     "LocalServer",
-    "Running",
     "free_port",
     "listen",
     "local_application",
@@ -203,78 +203,6 @@ def local_application(routes: Sequence[BaseRoute], **options: Any) -> Starlette:
     return Starlette(routes=[*routes, files], middleware=[Middleware(Guard)], **options)
 
 
-class Running:
-    """A server that runs while the context lasts.
-
-    Parameters
-    ----------
-    page : Starlette
-        The application that answers.
-    listener : socket.socket
-        Listening already.
-
-    Raises
-    ------
-    DeviceError
-        On entering, if the server doesn't start.
-    """
-
-    def __init__(self, page: Starlette, listener: socket.socket) -> None:
-        self._server = _server(page)
-        self._thread = threading.Thread(
-            target=self._server.run, args=([listener],), name="palpate viewer", daemon=True
-        )
-
-    def wait(self) -> None:
-        """Return when the server has ended."""
-        while self._thread.is_alive():
-            self._thread.join(0.5)  # in steps: a join without end can't be interrupted on every system
-
-    def __enter__(self) -> Self:
-        self._thread.start()
-        try:
-            self._await()
-        except BaseException:
-            self.__exit__(None, None, None)
-            raise
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._server.should_exit = True
-        self._thread.join()
-
-    def _await(self) -> None:
-        deadline = threading.Event()
-        for _ in range(int(START / 0.01)):
-            if self._server.started:
-                return
-            if not self._thread.is_alive():
-                break
-            deadline.wait(0.01)
-        raise DeviceError(
-            "The viewer's server did not start.",
-            why="Its thread ended or hangs; the log of 'uvicorn.error' says more.",
-            fix="Try another port, or see `palpate doctor`.",
-        )
-
-
-def _server(page: Starlette) -> uvicorn.Server:
-    return uvicorn.Server(
-        uvicorn.Config(
-            page,
-            log_config=None,  # the program that embeds us decides on logging
-            access_log=False,
-            ws="websockets-sansio",
-            ws_max_size=LARGEST_MESSAGE,
-            ws_per_message_deflate=False,  # frames are small, and packing them would cost more than sending
-            timeout_graceful_shutdown=1,
-            server_header=False,
-        )
-    )
-
-
 class LocalServer(ABC):
     """A page at `url` while the context lasts; the base of what serves one.
 
@@ -326,13 +254,43 @@ class LocalServer(ABC):
         """
         try:
             port, host, strict = self._wanted
-            socket = self._closing.enter_context(listen(port, host, strict=strict))
-            self.port = int(socket.getsockname()[1])
-            self._running = self._closing.enter_context(Running(self._application(), socket))
+            listener = self._closing.enter_context(listen(port, host, strict=strict))
+            self.port = int(listener.getsockname()[1])
+            self._serve(self._application(), listener)
         except BaseException:
             self.stop()
             raise
         return self
+
+    def _serve(self, application: Starlette, listener: socket.socket) -> None:
+        """Run the application in a thread of its own; return once it listens."""
+        server = uvicorn.Server(
+            uvicorn.Config(
+                application,
+                log_config=None,  # the program that embeds us decides on logging
+                access_log=False,
+                ws="websockets-sansio",
+                ws_max_size=LARGEST_MESSAGE,
+                ws_per_message_deflate=False,  # frames are small, and packing them would cost more than sending
+                timeout_graceful_shutdown=1,
+                server_header=False,
+            )
+        )
+        self._thread = threading.Thread(
+            target=server.run, args=([listener],), name="palpate viewer", daemon=True
+        )
+        self._thread.start()
+        self._closing.callback(self._thread.join)
+        self._closing.callback(setattr, server, "should_exit", True)
+        until = time.monotonic() + START
+        while not server.started:
+            if not self._thread.is_alive() or time.monotonic() > until:
+                raise DeviceError(
+                    "The viewer's server did not start.",
+                    why="Its thread ended or hangs; the log of 'uvicorn.error' says more.",
+                    fix="Try another port, or see `palpate doctor`.",
+                )
+            time.sleep(0.01)
 
     def stop(self) -> None:
         """End the server and what it started. Harmless when repeated."""
@@ -340,7 +298,8 @@ class LocalServer(ABC):
 
     def wait(self) -> None:
         """Return when the server has ended."""
-        self._running.wait()
+        while self._thread.is_alive():
+            self._thread.join(0.5)  # in steps: a join without end can't be interrupted on every system
 
     def __enter__(self) -> Self:
         return self.start()

@@ -6,7 +6,7 @@
 cantilever  the filter's forms, the refined network and batch rivals on the founding study's two beams
 latency     one query, interleaved with NumPy, SciPy and scikit-learn in the same run
 online      a stream with bounded refinement beside refining all of it at once
-stability   relapses of the pure filter over many orders of presentation and thresholds
+stability   regressions of the pure filter over many orders of presentation and thresholds
 runtime     the 1 kHz loop in its own process: CPU time of a tick, and lateness
 sweep       solves per second, serial and on the local Dask cluster
 touching    a sphere on a block: a sweep beside a plain NGSolve script, the mesh's imprint, nearly incompressible tissue

@@ -34,7 +34,7 @@ FORMS: dict[str, Callable[[], Settings]] = {
     "default form, thresholds ÷ 10": lambda: tightened(default()),
 }
 
-# for the two forms that have targets: (RMSE by beam, relapse, outer against rest)
+# for the two forms that have targets: (RMSE by beam, regression, outer against rest)
 TARGETS: dict[str, tuple[dict[str, float], float | None, float | None]] = {
     "founding form": ({"copper": 2e-3, "nylon": 2e-3}, None, None),
     "default form": ({"copper": 1e-4, "nylon": 1e-3}, 2.0, 2.0),
@@ -48,7 +48,7 @@ class Run:
 
     errors: Errors
     units: int
-    relapse: float = float("nan")
+    regression: float = float("nan")
 
 
 def tightened(settings: Settings) -> Settings:
@@ -105,14 +105,14 @@ def _forms(cases: Sequence[Case], seeds: Sequence[int], shape: str) -> Table:
             Column("rmse", "RMSE / full scale"),
             Column("largest", "largest error"),
             Column("units", "units"),
-            Column("relapse", "relapse"),
+            Column("regression", "regression"),
             Column("outer", "outer / rest"),
             Column("seconds", "CPU s", ".1f"),
         ),
         rows,
         claims,
         (
-            "relapse: largest held-out error over its best so far, over all observations of five shuffled passes",
+            "regression: largest held-out error over its best so far, over all observations of five shuffled passes",
             "outer / rest: RMSE in the outer 10 % of the range (5 % at each end) over RMSE in the rest",
             "CPU s: one learning run, without the held-out evaluation after every observation",
         ),
@@ -127,7 +127,7 @@ def _sequential(c: Case, settings: Settings, seed: int) -> Run:
         seed=seed,
         heldout=(c.X_test, c.Y_test),
     )
-    return Run(c.errors(found.network.predict(c.X_test)), found.network.units, found.history.relapse)
+    return Run(c.errors(found.network.predict(c.X_test)), found.network.units, found.history.regression)
 
 
 def _refined_run(c: Case, seed: int) -> Run:
@@ -147,7 +147,7 @@ def _row(beam: str, form: str, solves: int, runs: Sequence[Run], seconds: float)
         "rmse": ([r.errors.rmse for r in runs], ".1e"),
         "largest": ([r.errors.largest for r in runs], ".1e"),
         "units": ([r.units for r in runs], ".0f"),
-        "relapse": ([r.relapse for r in runs], ".2f"),
+        "regression": ([r.regression for r in runs], ".2f"),
         "outer": ([r.errors.outer / r.errors.rest for r in runs], ".2f"),
     }
     row: dict[str, Any] = {"beam": beam, "form": form, "solves": solves, "seconds": seconds}
@@ -161,11 +161,11 @@ def _row(beam: str, form: str, solves: int, runs: Sequence[Run], seconds: float)
 def _claims(beam: str, form: str, runs: Sequence[Run]) -> list[Claim]:
     if form not in TARGETS:
         return []
-    rmse, relapse, outer = TARGETS[form]
+    rmse, regression, outer = TARGETS[form]
     what = f"{beam}, {form}"
     found = [Claim(f"{what}, RMSE / full scale", tuple(r.errors.rmse for r in runs), rmse[beam])]
-    if relapse:
-        found.append(Claim(f"{what}, relapse", tuple(r.relapse for r in runs), relapse, ".2f"))
+    if regression:
+        found.append(Claim(f"{what}, regression", tuple(r.regression for r in runs), regression, ".2f"))
     if outer:
         ratios = tuple(r.errors.outer / r.errors.rest for r in runs)
         found.append(Claim(f"{what}, outer / rest", ratios, outer, ".2f"))

@@ -1,4 +1,4 @@
-"""Does the pure filter relapse? Both cantilevers, many orders of presentation, thresholds over two decades.
+"""Does the pure filter regress? Both cantilevers, many orders of presentation, thresholds over two decades.
 
 python -m benchmarks.stability [--quick] [--json | --markdown]
 """
@@ -24,7 +24,7 @@ PASSES = 5
 SEEDS = 100
 WORKERS = 2
 FACTORS = (0.1, 0.316, 1.0, 3.16, 10.0)  # on the growth thresholds e_min, e'_min and ε_min
-RELAPSE = 2.0
+REGRESSION = 2.0
 RMSE = {"copper": 1e-4, "nylon": 1e-3}
 UNITS = 10
 
@@ -34,7 +34,7 @@ class Run:
     """One order of presentation: held-out RMSE over full scale, its largest ratio to its best so far, units."""
 
     rmse: float
-    relapse: float
+    regression: float
     units: int
 
 
@@ -67,7 +67,7 @@ def run(c: Case, factor: float, seed: int) -> Run:
         seed=seed,
         heldout=(c.X_test, c.Y_test),
     )
-    return Run(float(found.history.heldout[-1]), found.history.relapse, found.network.units)
+    return Run(float(found.history.heldout[-1]), found.history.regression, found.network.units)
 
 
 def scaled(factor: float) -> Settings:
@@ -82,18 +82,18 @@ def scaled(factor: float) -> Settings:
 
 
 def _row(beam: str, factor: float, runs: Sequence[Run]) -> dict[str, Any]:
-    relapses = [r.relapse for r in runs]
+    regressions = [r.regression for r in runs]
     errors, units = [r.rmse for r in runs], [r.units for r in runs]
     return {
         "beam": beam,
         "factor": factor,
-        "relapse": statistics.median(relapses),
-        "worst": max(relapses),
-        "over": sum(r > RELAPSE for r in relapses),
+        "regression": statistics.median(regressions),
+        "worst": max(regressions),
+        "over": sum(r > REGRESSION for r in regressions),
         "rmse": statistics.median(errors),
         "rmse_worst": max(errors),
         "units": f"{statistics.median(units):.0f} / {max(units)}",
-        "relapse_all": relapses,
+        "regression_all": regressions,
         "rmse_all": errors,
         "units_all": units,
     }
@@ -101,7 +101,12 @@ def _row(beam: str, factor: float, runs: Sequence[Run]) -> dict[str, Any]:
 
 def _claims(beam: str, factor: float, runs: Sequence[Run], *, quick: bool) -> list[Claim]:
     found = [
-        Claim(f"{beam}, thresholds × {factor:g}, relapse", tuple(r.relapse for r in runs), RELAPSE, ".2f")
+        Claim(
+            f"{beam}, thresholds × {factor:g}, regression",
+            tuple(r.regression for r in runs),
+            REGRESSION,
+            ".2f",
+        )
     ]
     if factor == 1.0 and not quick:
         found.append(Claim(f"{beam}, RMSE / full scale", tuple(r.rmse for r in runs), RMSE[beam]))
@@ -116,9 +121,9 @@ def _table(rows: list[dict[str, Any]], claims: list[Claim], seeds: int, shape: s
         (
             Column("beam", "beam"),
             Column("factor", "thresholds ×", "g"),
-            Column("relapse", "relapse, median", ".2f"),
+            Column("regression", "regression, median", ".2f"),
             Column("worst", "worst", ".2f"),
-            Column("over", f"above {RELAPSE:g}", "d"),
+            Column("over", f"above {REGRESSION:g}", "d"),
             Column("rmse", "RMSE / full scale, median", ".1e"),
             Column("rmse_worst", "worst", ".1e"),
             Column("units", "units, median / most"),
@@ -126,7 +131,7 @@ def _table(rows: list[dict[str, Any]], claims: list[Claim], seeds: int, shape: s
         rows,
         claims,
         (
-            "relapse: largest held-out error over its best so far, over all observations of five shuffled passes",
+            "regression: largest held-out error over its best so far, over all observations of five shuffled passes",
             "thresholds: e_min, e'_min and ε_min of the default settings",
         ),
     )

@@ -14,7 +14,7 @@ settings = Settings(
     error_rms_min=0.03,
     distance_min=0.1,
     noise=1e-4,
-    relapse_limit=2.0,
+    regression_limit=2.0,
     prune_below=0.05,
     prune_after=30,
 )

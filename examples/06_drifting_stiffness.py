@@ -55,7 +55,7 @@ def main(picture=None):
 
     outputs = [Range(f"u_y at {problem.rest[i, 0]:g} m", -1.0, 0.0, "m") for i in nodes]
     # what was learnt does not stay true, so nothing may forbid to unlearn it
-    wandering = replace(default(), process_noise=1e-3, relapse_limit=0.0)
+    wandering = replace(default(), process_noise=1e-3, regression_limit=0.0)
     following = Learner(problem.ranges, outputs, settings=wandering, refining=None)
     constant = Learner(problem.ranges, outputs, settings=default(), refining=None)
 

@@ -20,7 +20,7 @@ def exact(**changes: object) -> Settings:
         "edge_weight": 1.0,
         "iterations": 1,
         "step_bound": 0.0,
-        "relapse_limit": 0.0,
+        "regression_limit": 0.0,
         "prune_after": 0,
         "error_min": 1e9,
     }

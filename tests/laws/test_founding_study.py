@@ -71,8 +71,8 @@ def test_founding_form(beam):
     assert np.median(errors) < 2e-3
 
 
-def test_tightened_tenfold_the_default_form_relapses_less_than_the_founding_one(beam):
-    worst = [max(beam.filtered(tight(f()), s).history.relapse for s in SEEDS) for f in (default, founding)]
+def test_tightened_tenfold_the_default_form_regresses_less_than_the_founding_one(beam):
+    worst = [max(beam.filtered(tight(f()), s).history.regression for s in SEEDS) for f in (default, founding)]
     assert worst[0] < 0.5 * worst[1]
 
 
@@ -84,13 +84,13 @@ def test_default_form(beam, request):
         learned = beam.filtered(default(), seed)
         assert beam.rmse(learned.network) < target
         assert beam.rmse(learned.network) < beam.rmse(beam.filtered(founding(), seed).network)
-        assert learned.history.relapse < 2.0
+        assert learned.history.regression < 2.0
         assert beam.rmse(learned.network, outer) < 2.0 * beam.rmse(learned.network, ~outer)
 
 
 def test_default_form_is_stable_when_its_thresholds_are_tightened_tenfold(beam):
     for seed in SEEDS:
-        assert beam.filtered(tight(default()), seed).history.relapse < 2.0
+        assert beam.filtered(tight(default()), seed).history.regression < 2.0
 
 
 def test_refined_network_from_26_solves(beam):

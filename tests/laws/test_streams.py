@@ -1,11 +1,11 @@
-"""Sequential learning on the common data sets: it does not relapse, and with refinement it ends where batch does."""
+"""Sequential learning on the common data sets: it does not regress, and with refinement it ends where batch does."""
 
 from __future__ import annotations
 
 import pytest
 from benchmarks.cases import case
 from benchmarks.online import RATIO, at_once, streamed, streams
-from benchmarks.stability import RELAPSE, run
+from benchmarks.stability import REGRESSION, run
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 
@@ -19,7 +19,7 @@ def test_bounded_refinement_ends_within_three_times_the_batch_error_at_equal_uni
     assert error < RATIO * batch[0]
 
 
-# orders in which the filter relapsed while it remembered 50 observations, judged each step by itself, or gave
+# orders in which the filter regressiond while it remembered 50 observations, judged each step by itself, or gave
 # every new unit its weight at once
 @pytest.mark.parametrize(
     ("beam", "factor", "seed"),
@@ -32,5 +32,5 @@ def test_bounded_refinement_ends_within_three_times_the_batch_error_at_equal_uni
         ("copper", 0.1, 16),
     ],
 )
-def test_the_pure_filter_does_not_relapse(beam, factor, seed):
-    assert run(case(beam), factor, seed).relapse < RELAPSE
+def test_the_pure_filter_does_not_regress(beam, factor, seed):
+    assert run(case(beam), factor, seed).regression < REGRESSION

@@ -152,7 +152,7 @@ def test_covariance_stays_positive_definite_for_every_form(name, update):
 def test_a_refused_step_makes_nothing_surer():
     """Where the memory forbids any step, the estimate rests, and so does the covariance."""
     for update in ("full", "decoupled", "winner", "shared"):
-        settings = exact(update=update, relapse_limit=1e-12, noise=1e-6)
+        settings = exact(update=update, regression_limit=1e-12, noise=1e-6)
         state = populated(1, 1, 2, settings, seed=3)
         # remembered observations that the network meets exactly: any step spoils them
         X = np.linspace(-1, 1, 9)[:, None]

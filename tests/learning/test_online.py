@@ -266,7 +266,7 @@ def test_a_second_sight_of_a_sample_takes_the_place_of_the_first():
 def test_drift_is_followed(refining):
     """A spring whose stiffness falls by 30 %: the network stays near it, a frozen one does not."""
     rng = np.random.default_rng(0)
-    settings = replace(default(), process_noise=1e-3, relapse_limit=0.0)
+    settings = replace(default(), process_noise=1e-3, regression_limit=0.0)
     learner = Learner(
         [Range("P", 0.0, 5.0, "N")], [Range("u", 0.0, 1.0, "m")], settings=settings, refining=refining
     )

@@ -131,7 +131,7 @@ def test_no_step_moves_a_unit_beyond_the_bound(seed):
 
 @given(st.integers(0, 10_000))
 def test_no_update_raises_the_windows_error_beyond_what_is_allowed(seed):
-    settings = exact(relapse_limit=1.0, noise=1e-6)
+    settings = exact(regression_limit=1.0, noise=1e-6)
     rng = np.random.default_rng(seed)
     state = add_unit(initial(1, 1, settings), rng.uniform(-1, 1, 1), rng.normal(size=1), settings)
     seen = rng.normal(size=(6, 2))
@@ -144,11 +144,11 @@ def test_no_update_raises_the_windows_error_beyond_what_is_allowed(seed):
     assert error(after) <= error(state) * (1 + 1e-12)
 
 
-def test_learning_a_smooth_map_reaches_its_accuracy_and_never_relapses():
+def test_learning_a_smooth_map_reaches_its_accuracy_and_never_regresses():
     X, Y = stiffening(200)
     learned = learn(X[::2], Y[::2], INPUT, OUTPUTS, heldout=(X[1::2], Y[1::2]), seed=1)
     assert learned.history.heldout[-1] < 1e-3
-    assert learned.history.relapse < 2.0
+    assert learned.history.regression < 2.0
     error = learned.network.predict(X[1::2]) - Y[1::2]
     assert np.sqrt((error**2).mean()) / Y.max() == pytest.approx(learned.history.heldout[-1], rel=1e-9)
 

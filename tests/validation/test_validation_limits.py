@@ -114,11 +114,11 @@ def test_a_limit_is_a_positive_number(value: float) -> None:
         Limits(force_p95=value)
 
 
-def test_relapse_comes_from_the_history() -> None:
-    v = validate(tip_model(), tip_data(), history=history(), limits=Limits(filter_relapse=1.9))
-    assert v.networks.relapse == pytest.approx(2.0)
-    assert [c.criterion.key for c in v.failures] == ["filter_relapse"]
-    assert validate(tip_model(), tip_data(), history=history(heldout=())).networks.relapse is None
+def test_regression_comes_from_the_history() -> None:
+    v = validate(tip_model(), tip_data(), history=history(), limits=Limits(filter_regression=1.9))
+    assert v.networks.regression == pytest.approx(2.0)
+    assert [c.criterion.key for c in v.failures] == ["filter_regression"]
+    assert validate(tip_model(), tip_data(), history=history(heldout=())).networks.regression is None
 
 
 def test_the_table_names_every_check_and_shouts_a_miss() -> None:

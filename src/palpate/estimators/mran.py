@@ -63,6 +63,7 @@ class MRANRegressor(RadialRegressor):
     history_ : History
         Of `fit`; it plots itself.
     n_features_in_ : int
+        Number of inputs n.
     feature_names_in_ : (n,)
         Where X was a table with named columns.
 

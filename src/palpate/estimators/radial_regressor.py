@@ -42,6 +42,7 @@ class RadialRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type:
     network_ : Network
         In the units of the data.
     n_features_in_ : int
+        Number of inputs n.
     feature_names_in_ : (n,)
         Where X was a table with named columns.
     """
@@ -184,7 +185,9 @@ class Units:
     Attributes
     ----------
     inputs : n ranges
+        Names and trained intervals of the inputs.
     outputs : m quantities
+        Names of the outputs.
     divisor : (m,)
         Largest deviation of each output from its mean, or of all of them.
     """

@@ -52,8 +52,11 @@ class RBFNetworkRegressor(RadialRegressor):
         `radial`, `tail` and `units_max` then have no effect. Where weights differ, or below 20
         samples, it is as if left out.
     radial : {"gaussian", "inverse-multiquadric", "matern-5/2"}
+        Radial function of the units.
     tail : {"affine", "constant", "none"}
+        Function added to the units: T·[1, x], T, or nothing.
     units_max : int
+        Most units; growth stops there.
     effort : float
         Multiplies the iterations per size, and the work of "auto"; 0.1 gives a quick look.
     seconds : float, optional
@@ -77,6 +80,7 @@ class RBFNetworkRegressor(RadialRegressor):
     uncertainty_ : Uncertainty
         Behind `predict(X, return_std=True)`: ±1.64 deviations hold nine in ten of the samples kept apart.
     n_features_in_ : int
+        Number of inputs n.
     feature_names_in_ : (n,)
         Where X was a table with named columns.
 

@@ -24,7 +24,9 @@ def widen_ranges(ranges: tuple[Range, ...], matrices: np.ndarray, about: np.ndar
     Parameters
     ----------
     ranges : n ranges
+        Intervals of the components, in any unit.
     matrices : (k, n, n)
+        Isometries, the identity among them.
     about : (n,)
         The point that stays.
     """

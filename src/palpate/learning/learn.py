@@ -38,6 +38,7 @@ class Learned:
     scaling : Scaling
         Between the state's scaled quantities and physical ones.
     history : History
+        Errors and units after every observation.
     settings : Settings
         Those that were used.
     target : float, optional
@@ -57,7 +58,7 @@ class Learned:
 
     @property
     def reached(self) -> bool:
-        """Whether the error is within the target; True where none was set."""
+        """True where the error is within the target; True where none was set."""
         return self.target is None or self.error <= self.target
 
     def __repr__(self) -> str:
@@ -107,6 +108,7 @@ def learn(
     Y : (N, m)
         Outputs in SI units.
     inputs, outputs : sequences of n ranges and m quantities
+        Names and units of the columns of X and Y, and the trained interval of each input.
     settings : Settings, optional
         `default()` if left out, or `automatic` ones if a target is given.
     target : float, optional
@@ -180,7 +182,7 @@ def learn(
 
 
 def _limit(learned: Learned) -> str:
-    """What kept the filter from its target, as far as its own records tell."""
+    """The reason why the filter missed its target, as far as its own records tell."""
     settings, innovation = learned.settings, learned.history.innovation
     if learned.state.units >= settings.units_max:
         return f"The network is at its limit of {settings.units_max} units (units_max)."

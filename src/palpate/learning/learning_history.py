@@ -48,6 +48,7 @@ class History:
     heldout : (T,)
         RMSE on held-out data after each observation, relative to full scale; empty where none were given.
     passes : int
+        Times that each sample was presented.
     """
 
     units: np.ndarray
@@ -124,7 +125,7 @@ class History:
         return _figure_of(self, ax)
 
     @property
-    def relapse(self) -> float:
+    def regression(self) -> float:
         """Largest ratio of the held-out error to its best so far; 1 is monotone, nan without held-out data."""
         if not self.heldout.size:
             return float("nan")
@@ -136,7 +137,8 @@ class History:
             f"{self.pruned.sum()} pruned, {self.units[-1] if self.units.size else 0} left"
         )
         if self.heldout.size:
-            text += f"; held-out error {self.heldout[-1]:.1e} of full scale, never above {self.relapse:.2f} × its best"
+            text += f"; held-out error {self.heldout[-1]:.1e} of full scale, "
+            text += f"never above {self.regression:.2f} × its best"
         return text
 
 

@@ -63,6 +63,7 @@ class Archive:
     Attributes
     ----------
     networks : mapping of name to Network
+        Networks by name; a name has no slash.
     arrays : mapping of name to array
         Further arrays, such as rest positions.
     meta : mapping
@@ -111,6 +112,7 @@ def load_archive(path: str | os.PathLike[str], *, kind: str | None = None) -> Ar
     Parameters
     ----------
     path : path
+        The file.
     kind : str, optional
         Refuse archives of another kind.
 

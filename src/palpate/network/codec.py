@@ -116,6 +116,7 @@ def decode(cls: type[T], archive: Archive) -> T:
     cls : type
         What it is; the types of its fields say what must stand in the archive.
     archive : Archive
+        As `load_archive` returns it.
 
     Raises
     ------
@@ -146,6 +147,7 @@ def load_value(path: str | os.PathLike[str], cls: type[T], *, kind: str, noun: s
     Parameters
     ----------
     path : path
+        The file.
     cls : type
         What the file must hold.
     kind : str
@@ -171,7 +173,7 @@ def load_value(path: str | os.PathLike[str], cls: type[T], *, kind: str, noun: s
 
 @dataclass
 class _Parts:
-    """What an archive holds beside its JSON, and what has been written to it or read of it already."""
+    """Parts of an archive beside its JSON, and the places and values that were written or read already."""
 
     networks: dict[str, Network] = field(default_factory=dict)
     arrays: dict[str, np.ndarray] = field(default_factory=dict)
@@ -180,7 +182,7 @@ class _Parts:
     held: list[object] = field(default_factory=list)  # as long as its id is in use
 
     def first_place(self, value: object, path: str) -> str:
-        """Where a value already stands, or this path, if it stands nowhere yet."""
+        """The place where a value stands already, or this path, if it stands nowhere yet."""
         self.held.append(value)
         return self.places.setdefault(id(value), path)
 
@@ -195,7 +197,7 @@ class _Parts:
 
 
 class _Form(Protocol):
-    """How values of one type become JSON and parts, and come back."""
+    """The form in which values of one type are stored: as JSON and parts, and back."""
 
     def write(self, value: Any, path: str, parts: _Parts) -> Any: ...
 

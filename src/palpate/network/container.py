@@ -43,6 +43,7 @@ class Container:
     content : str
         JSON text.
     tensors : mapping of name to array
+        Arrays of plain numbers by name.
     version : str
         Of the layout, "1" to the latest.
     """

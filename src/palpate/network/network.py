@@ -46,7 +46,9 @@ class Scaling:
     Attributes
     ----------
     input_centre, input_half : (n,)
+        Middle and half width of each input's range, in its unit.
     output_centre, output_scale : (m,)
+        Zero and unit of each scaled output, in its unit.
     """
 
     input_centre: np.ndarray
@@ -88,6 +90,7 @@ class Evaluator:
     Parameters
     ----------
     network : Network
+        The network to evaluate.
     precision : {"double", "single"}
         In single precision units, weights and outputs are 32-bit numbers; how much that costs is for
         `Network.precision_error` to measure, it is not known beforehand.
@@ -166,6 +169,7 @@ class Network:
     inputs : n ranges
         Names, units and the trained interval of each input.
     outputs : m quantities
+        Names and units.
     factors : (h, r, n)
         A_k. Axis-aligned Gaussians have A_k = diag(1/σ_k).
     shifts : (h, r)
@@ -175,6 +179,7 @@ class Network:
     tail : (k, 1 + n)
         Zero where there is none, or no slope.
     scaling : Scaling
+        Between physical and scaled inputs and outputs.
     radial : {"gaussian", "inverse-multiquadric", "matern-5/2"}
         The radial function g.
     basis : (m, k), optional
@@ -268,7 +273,7 @@ class Network:
 
     @property
     def form(self) -> str:
-        """What the factors look like: isotropic, axis-aligned, rotated (triangular), full, or their rank."""
+        """The shape of the factors: isotropic, axis-aligned, rotated (triangular), full, or their rank."""
         r, n = self.factors.shape[1:]
         rows, columns = pattern(self.factors).T
         if r < n:
@@ -290,7 +295,7 @@ class Network:
         return packed(self, "double")
 
     def compiled(self, precision: Precision = "double") -> tuple[np.ndarray, ...]:
-        """What the kernels of `evaluate` take after their own arguments, with a workspace for one thread."""
+        """The arguments that `network_kernels` take after their own, with a workspace for one thread."""
         parts = self._packed if precision == "double" else packed(self, precision)
         return (*workspace(parts), *parts)
 

@@ -253,7 +253,7 @@ def _gradients(J, line, latent, work, rows, modes) -> None:
 
 @_jit
 def _places(work, layout, scales, units) -> tuple[int, int]:
-    """Where in work the lines and the latent outputs begin."""
+    """Rows of work at which the lines and the latent outputs begin."""
     line = HEAD + units.shape[0] - (layout.shape[0] - 1)
     return line, line + 1 + scales.shape[1]
 

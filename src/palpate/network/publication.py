@@ -93,7 +93,7 @@ class _Memory:
 
 
 def _parts_of(network: Network) -> tuple[np.ndarray, ...]:
-    """What travels of a network, in order."""
+    """The arrays of a network that travel, in order."""
     s = network.scaling
     scales = (s.input_centre, s.input_half, s.output_centre, s.output_scale)
     own = (network.factors, network.shifts, network.weights, network.tail, *scales)
@@ -186,7 +186,7 @@ class Publisher:
 
     @property
     def name(self) -> str:
-        """What `Subscriber.attach` needs."""
+        """The name that `Subscriber.attach` needs."""
         return self._memory.name
 
     def publish(self, network: Network) -> int:

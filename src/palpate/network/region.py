@@ -1,4 +1,4 @@
-"""Where a network was trained: the distance to its data, cheap enough for a 1 kHz loop.
+"""The region where a network was trained: the distance to its data, cheap enough for a 1 kHz loop.
 
 A box of ranges says little in several dimensions, and units of less than full rank do not decay, so neither tells
 interpolation from extrapolation. The nearest training input does.
@@ -32,6 +32,7 @@ class TrainedRegion:
     points : (S, n)
         The data, or so many of them that all others lie within the radius of one.
     radius : float
+        Of each ball, in scaled inputs.
     """
 
     points: np.ndarray
@@ -54,7 +55,7 @@ class TrainedRegion:
 
     @classmethod
     def of(cls, X: np.ndarray, *, groups: np.ndarray | None = None, most: int = _MOST) -> TrainedRegion:
-        """Of scaled training inputs X (N, n).
+        """The region of scaled training inputs X (N, n).
 
         More than `most` are thinned by farthest-point selection (Gonzalez 1985). The radius is what 99 % of the
         data are from their nearest other kept point, as each was left out, and never less than what it takes to
@@ -63,6 +64,7 @@ class TrainedRegion:
         Parameters
         ----------
         X : (N, n)
+            Scaled training inputs, one row a sample.
         groups : (N,) int, optional
             What is one sample and is left out as a whole: depths pressed over one place, with their mirror images.
             They are nearer to each other than any new input is to them. By default each row is one.
@@ -90,7 +92,7 @@ class TrainedRegion:
         return cls(everything[kept], max(typical, float(np.sqrt(cover))))
 
     def distance(self, x: np.ndarray) -> float:
-        """From a scaled input x (n,) to the nearest point; infinite where x is not finite.
+        """Distance from a scaled input x (n,) to the nearest point; infinite where x is not finite.
 
         Raises
         ------
@@ -100,7 +102,7 @@ class TrainedRegion:
         return float(_distance(self._checked(x), self.points))
 
     def distances(self, X: np.ndarray) -> np.ndarray:
-        """From scaled inputs X (N, n) to the nearest points, (N,).
+        """Distances (N,) from scaled inputs X (N, n) to the nearest points.
 
         Raises
         ------
@@ -113,7 +115,7 @@ class TrainedRegion:
         return np.asarray(_distances(X, self.points))
 
     def inside(self, x: np.ndarray) -> bool:
-        """Whether a scaled input x (n,) is within the radius of a training input.
+        """True where a scaled input x (n,) is within the radius of a training input.
 
         Raises
         ------

@@ -32,7 +32,7 @@ _RAM = Path("/dev/shm")
 
 
 def folder() -> Path:
-    """Where the files are made."""
+    """The folder in which the files are made."""
     return _RAM if os.access(_RAM, os.W_OK) else Path(tempfile.gettempdir())
 
 

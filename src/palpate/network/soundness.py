@@ -1,4 +1,4 @@
-"""Whether a network can be evaluated: parts that fit, finite numbers, real scales, and none so large as to overflow."""
+"""Checks that a network can be evaluated: parts that fit, finite numbers, real scales, none that overflows."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def check_shapes(network: Network) -> None:
 
 
 def flaw(network: Network) -> str:
-    """What makes the network unusable over its trained ranges; "" if nothing does."""
+    """The reason why a network can't be used over its trained ranges; "" if there is none."""
     for name, array in network.extras.items():
         if array.dtype.kind == "f" and not np.isfinite(array).all():
             return f"its extra array {name!r} holds numbers that are not finite"
@@ -60,7 +60,7 @@ def flaw(network: Network) -> str:
 
 
 def unreal(network: Network) -> str:
-    """Which of the network's own numbers are not finite, or scale by nothing; "" if none."""
+    """The parts of a network whose numbers are not finite, or scale by nothing; "" if none."""
     s = network.scaling
     numbers = {
         "factors": network.factors,

@@ -31,7 +31,7 @@ _CHUNK = 32  # points at a time: memory stays at 32 h (h p) numbers
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """How far a network's outputs may be off, at any input.
+    """The uncertainty of a network's outputs at any input.
 
     Attributes
     ----------
@@ -91,6 +91,7 @@ class Uncertainty:
         X, Y : (N, n), (N, m)
             In SI units, neither trained on nor used to choose the network.
         level : float
+            Share of unseen samples that the intervals shall hold.
 
         Raises
         ------
@@ -171,7 +172,7 @@ class Uncertainty:
             raise UsageError("The uncertainty's pattern or noise is not one.", fix="Make it anew.")
 
     def _variance(self, xs: np.ndarray) -> np.ndarray:
-        """Of the scaled outputs (N, m) at scaled inputs (N, n)."""
+        """Variance of the scaled outputs (N, m) at scaled inputs (N, n)."""
         if not self.coefficients.size:
             return np.tile(self.noise, (len(xs), 1))
         phi, D = _by_factors(self.network, self.pattern, xs)

@@ -39,6 +39,7 @@ def slopes_by_factors(
     g : two of (c, N, h)
         g' and g''.
     A : (h, r, n)
+        Factors of the units.
     pattern : two of (e,) int, optional
         Rows and columns of A's entries; without it the derivatives by A and b are left out.
     """

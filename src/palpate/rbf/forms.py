@@ -33,11 +33,12 @@ Widths = Literal["log", "plain"]
 
 
 class Form(Protocol):
-    """How the p numbers θ_k of a unit make its factor A_k (r, n) and shift b_k (r,).
+    """The contract of a form: p numbers θ_k of a unit make its factor A_k (r, n) and shift b_k (r,).
 
     Attributes
     ----------
     name : str
+        As `unit_form` takes it.
     inputs, rank, size : int
         n, r and p.
     rows, columns : (e,) int
@@ -146,7 +147,7 @@ class Centred:
         return np.asarray(self.of(x[None], np.full((1, self.inputs), width))[0])
 
     def pull(self, theta: np.ndarray, by_entry: np.ndarray, by_shift: np.ndarray) -> np.ndarray:
-        """With b = A μ, an entry A_ij acts directly and through b_i; μ_j acts through b."""
+        """Chain rule with b = A μ: an entry A_ij acts directly and through b_i; μ_j acts through b."""
         n, w = self.inputs, self._widths
         entries = self._entries(theta)
         out = np.empty((*by_entry.shape[:-1], self.size))

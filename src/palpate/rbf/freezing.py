@@ -1,4 +1,4 @@
-"""From what was learnt to a frozen network value, with a record of what it was learnt from."""
+"""Networks as frozen values of a state or a refinement, with a record of the samples they were learnt from."""
 
 from __future__ import annotations
 
@@ -36,9 +36,11 @@ def freeze(
     Parameters
     ----------
     state : State
+        The filter's state.
     settings : Settings
         Those it was learnt with.
     inputs, outputs : sequences of n ranges and m quantities
+        Names and units of inputs and outputs, and the trained interval of each input.
     scaling : Scaling
         Between the state's quantities and physical ones.
     basis : (m, k), optional
@@ -102,7 +104,7 @@ def frozen(
 
 
 def training_record(X: np.ndarray, Y: np.ndarray, inputs: Sequence[Range]) -> dict[str, Any]:
-    """What a network was trained on, for its `meta`: how many samples, and a hash that no other samples have.
+    """The record of training samples for a network's `meta`: their number, and a hash that no other samples have.
 
     SHA-256 over the shapes, X and Y as little-endian doubles row by row, and the declared ranges.
     """

@@ -58,7 +58,9 @@ class Regressors:
     Attributes
     ----------
     form : Form
+        Of every unit.
     radial : {"gaussian", "inverse-multiquadric", "matern-5/2"}
+        Radial function g.
     tail : {"affine", "constant", "none"}
         T·[1, x], T, or nothing.
 
@@ -127,7 +129,7 @@ class Regressors:
     def _slopes_at(
         self, points: np.ndarray, turns: np.ndarray, theta: np.ndarray, pattern: Pattern | None = None
     ) -> Derivatives:
-        """The same, summed over images (c, N, n) of the samples, whose slopes `turns` (c, n, n) turn back."""
+        """Slopes summed over images (c, N, n) of the samples, which `turns` (c, n, n) turn back."""
         A, b = self.form.factors(theta)
         v, (_, g1, g2) = self._v_and_radial(points, A, b)
         return slopes_by_factors(points, turns, v, (g1, g2), A, pattern)
@@ -144,7 +146,7 @@ class Regressors:
     def _curvatures_at(
         self, points: np.ndarray, turns: np.ndarray, theta: np.ndarray, pattern: Pattern | None = None
     ) -> Derivatives:
-        """The same, summed over images (c, N, n); `turns` (c, q, q) turn the q pairs back."""
+        """Curvatures summed over images (c, N, n); `turns` (c, q, q) turn the q pairs back."""
         A, b = self.form.factors(theta)
         v, (_, g1, g2) = self._v_and_radial(points, A, b)
         g3 = third(self.radial, np.einsum("cnkr,cnkr->cnk", v, v)) if pattern else g2  # of no use without

@@ -29,7 +29,9 @@ def numbers(what: str, given: Any, shape: tuple[int | None, ...], *, finite: boo
     what : str
         Its name, as the message begins.
     given : array-like
+        The numbers to check.
     shape : tuple of int or None
+        Length along each axis.
     finite : bool
         Whether infinities and not-a-number are refused.
 
@@ -72,7 +74,9 @@ def samples(
     Parameters
     ----------
     X : (N, n)
+        Inputs, one row a sample.
     Y : (N, m)
+        Outputs of the same samples.
     weights : (N,), optional
         Not negative, one positive; ones if left out.
     slopes : (N, m, n), optional
@@ -162,7 +166,7 @@ def second_derivatives(
 
 
 def _counting(derivatives: np.ndarray, w: np.ndarray, s: np.ndarray) -> np.ndarray:
-    """Those of derivatives (N, m, q) whose weights, w (N,) times s (N,) or (N, q), are positive."""
+    """The derivatives, of (N, m, q), whose weights, w (N,) times s (N,) or (N, q), are positive."""
     each = np.broadcast_to(s if s.ndim > 1 else s[:, None], (len(w), derivatives.shape[2]))
     return np.asarray(derivatives.transpose(0, 2, 1)[(each > 0) & (w > 0)[:, None]])
 

@@ -175,7 +175,7 @@ class SymmetricRegressors(Regressors):
 
     @cached_property
     def _turns_of_pairs(self) -> np.ndarray:
-        """How curvatures of an image, pair by pair, make those of the point: (c, n(n+1)/2, n(n+1)/2)."""
+        """The linear map from curvatures of an image, pair by pair, to those of the point: (c, n(n+1)/2, n(n+1)/2)."""
         turns = self._images.turns
         i, j = pairs(self.form.inputs)
         a, b = i[:, None], j[:, None]

@@ -233,7 +233,7 @@ class LoadTargetRecord(Record):
     filter_outer_ratio: float = Field(
         2.0, ge=0, description="its error at the ends over the rest; 0: not asked"
     )
-    filter_relapse: float = Field(2.0, ge=0, description="its error over its best so far; 0: not asked")
+    filter_regression: float = Field(2.0, ge=0, description="its error over its best so far; 0: not asked")
     force_median: float = Field(0.01, gt=0, description="relative force error, median")
     force_p95: float = Field(0.035, gt=0, description="relative force error, 95th percentile")
 

@@ -57,7 +57,7 @@ class Limits:
         The same of the sequential filter's own network.
     filter_outer_ratio : float
         RMSE of the filter's network in the outer 10 % of the range over that in the rest.
-    filter_relapse : float
+    filter_regression : float
         Largest ratio of the filter's held-out error to its best so far: what tells drift from convergence.
     displacement_mean, displacement_max : float
         Distance of the shown shape's nodes from the finite-element ones, m.
@@ -94,7 +94,7 @@ class Limits:
     rmse: float | None = 1e-3
     filter_rmse: float | None = None
     filter_outer_ratio: float | None = None
-    filter_relapse: float | None = None
+    filter_regression: float | None = None
     displacement_mean: float | None = 0.35e-3
     displacement_max: float | None = 1e-3
     force_median: float | None = 0.035
@@ -248,7 +248,7 @@ CRITERIA = (
         "sweep more loads (`samples` in [sweep]).",
     ),
     Criterion(
-        "filter_relapse",
+        "filter_regression",
         "Sequential filter, held-out error against its best so far",
         "times",
         1.1,

@@ -104,11 +104,11 @@ class Full:
         return self.lower.size
 
     def add_unit(self, weights: np.ndarray, shape: np.ndarray) -> Full:
-        """With one more unit of prior variances (m,) and (p,)."""
+        """The covariance with one more unit of prior variances (m,) and (p,)."""
         return Full(_border_triangle(self.lower, np.concatenate([weights, shape])), self.tail)
 
     def remove_unit(self, unit: int, size: int) -> Full:
-        """Without the rows and columns of one unit of `size` unknowns."""
+        """The covariance without the rows and columns of one unit of `size` unknowns."""
         start = self.tail + unit * size
         return Full(_trim_triangle(self.lower, start, start + size), self.tail)
 
@@ -154,13 +154,13 @@ class Blocks:
         return self.first.size + self.units.size
 
     def add_unit(self, weights: np.ndarray, shape: np.ndarray) -> Blocks:
-        """With one more unit of prior variances (m,) and (p,)."""
+        """The covariance with one more unit of prior variances (m,) and (p,)."""
         return Blocks(
             self.first, np.concatenate([self.units, np.diag(np.concatenate([weights, shape]))[None]])
         )
 
     def remove_unit(self, unit: int, size: int) -> Blocks:
-        """Without one unit's block."""
+        """The covariance without one unit's block."""
         return Blocks(self.first, np.delete(self.units, unit, axis=0))
 
     def times(self, Ht: np.ndarray) -> np.ndarray:
@@ -180,7 +180,7 @@ class Blocks:
         return Blocks(self.first, self.units[unit : unit + 1])
 
     def with_unit_of(self, unit: int, part: Blocks, *, donate: bool) -> Blocks:
-        """With the tail's block and one unit's from another covariance."""
+        """The covariance with the tail's block and one unit's from another one."""
         units = self.units if donate else self.units.copy()
         units[unit] = part.units[0]
         return Blocks(part.first, units)
@@ -226,11 +226,11 @@ class Shared:
         return self.regressors.size + self.shapes.size
 
     def add_unit(self, weights: np.ndarray, shape: np.ndarray) -> Shared:
-        """With one more unit of prior variances (any,), all equal, and (p,)."""
+        """The covariance with one more unit of prior variances (any,), all equal, and (p,)."""
         return Shared(_border_triangle(self.regressors, weights[:1]), _border_triangle(self.shapes, shape))
 
     def remove_unit(self, unit: int, size: int) -> Shared:
-        """Without one unit of `size` = p numbers."""
+        """The covariance without one unit of `size` = p numbers."""
         h = len(self.shapes) // size
         place = len(self.regressors) - h + unit
         return Shared(

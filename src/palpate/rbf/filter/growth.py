@@ -24,7 +24,7 @@ import numpy as np
 
 from palpate.rbf.filter.covariance import Shared
 from palpate.rbf.filter.prediction import activations
-from palpate.rbf.filter.relapse import exceeds_relapse_limit
+from palpate.rbf.filter.regression import exceeds_regression_limit
 from palpate.rbf.filter.settings import Settings
 from palpate.rbf.filter.state import State
 
@@ -114,7 +114,7 @@ def contributions(state: State, x: np.ndarray, settings: Settings) -> np.ndarray
 def prune_units(state: State, x: np.ndarray, settings: Settings) -> State:
     """The state without the units that x (n,) shows to be of no use, and with the silent ones counted.
 
-    With a limit on relapses, only units without which the window's error stays within it are removed.
+    With a limit on regressions, only units without which the window's error stays within it are removed.
     """
     if not state.units or settings.prune_after == 0:
         return state
@@ -124,7 +124,7 @@ def prune_units(state: State, x: np.ndarray, settings: Settings) -> State:
     state = replace(state, silent=silent)
     for k in np.flatnonzero(silent >= settings.prune_after)[::-1]:
         fewer = remove_unit(state, int(k))
-        if not exceeds_relapse_limit(state, fewer.latent_coefficients, fewer.theta, settings):
+        if not exceeds_regression_limit(state, fewer.latent_coefficients, fewer.theta, settings):
             state = fewer
     return state
 

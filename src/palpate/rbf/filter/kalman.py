@@ -23,7 +23,7 @@ from scipy.linalg.lapack import dpotrf, dpotrs
 from palpate.rbf.filter.covariance import Blocks, Full
 from palpate.rbf.filter.observation import Observation
 from palpate.rbf.filter.prediction import linearise, measurement
-from palpate.rbf.filter.relapse import exceeds_relapse_limit
+from palpate.rbf.filter.regression import exceeds_regression_limit
 from palpate.rbf.filter.settings import Settings
 from palpate.rbf.filter.state import State
 
@@ -111,7 +111,7 @@ def kalman_update(
     if refuses is None:
 
         def refuses(z: np.ndarray) -> bool:
-            return exceeds_relapse_limit(state, *state.split(z), settings)
+            return exceeds_regression_limit(state, *state.split(z), settings)
 
     error = (observation.targets() - prediction[0])[: observation.y.size]
     r = measurement_variance(observation.x, error, state.innovation, settings)

@@ -16,7 +16,9 @@ class Observation:
     Attributes
     ----------
     x : (n,)
+        Scaled input.
     y : (m,)
+        Scaled output there.
     weight : float
         How many ordinary observations this one counts as: its measurement variance is R/weight.
     slopes : (m, n), optional
@@ -40,7 +42,7 @@ class Observation:
 
     @property
     def flaw(self) -> str:
-        """Why nothing can be learnt from it; empty if something can."""
+        """The reason why nothing can be learnt from it; empty if something can."""
         shares = [np.ravel(s) for s in (self.slope_weight, self.curvature_weight)]
         weights = np.concatenate([[self.weight], *shares])
         if not (np.isfinite(weights).all() and self.weight > 0 and (weights >= 0).all()):
@@ -50,17 +52,17 @@ class Observation:
 
     @property
     def finite(self) -> bool:
-        """Whether something can be learnt from it."""
+        """True where something can be learnt from it."""
         return not self.flaw
 
     @property
     def plain(self) -> bool:
-        """Whether it is a value alone."""
+        """True for a value alone."""
         return self.slopes is None and self.curvatures is None
 
     @property
     def counts(self) -> np.ndarray:
-        """Which of y, the slopes and the curvatures, row by row, have a weight."""
+        """Mask of the numbers of y, slopes and curvatures, row by row, that have a weight."""
         return np.asarray(self._shares() > 0)
 
     def targets(self) -> np.ndarray:
@@ -92,7 +94,7 @@ class Observation:
         return [p for p in (self.y, self.slopes, self.curvatures) if p is not None]
 
     def _shares(self) -> np.ndarray:
-        """How many ordinary values each number counts as."""
+        """The count of ordinary values that each number stands for."""
         shares = [np.ones(self.y.size)]
         if self.slopes is not None:
             shares.append(np.broadcast_to(self.slope_weight, self.slopes.shape).ravel())

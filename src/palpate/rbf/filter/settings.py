@@ -58,7 +58,7 @@ _POSITIVE = (
     *("distance_decay", "noise", "edge_weight", "iterations", "forgetting_factor", "learning_rate", "modes"),
 )
 _NOT_NEGATIVE = (
-    *("error_min", "error_rms_min", "process_noise", "noise_share", "gate", "step_bound", "relapse_limit"),
+    *("error_min", "error_rms_min", "process_noise", "noise_share", "gate", "step_bound", "regression_limit"),
     *("prune_below", "prune_after", "units_max", "memory"),
 )
 
@@ -74,6 +74,7 @@ class Settings:
     form : str
         Of a unit: isotropic, axis-aligned, rotated, rank-1, rank-2, … (see `palpate.rbf.forms`).
     radial : {"gaussian", "inverse-multiquadric", "matern-5/2"}
+        Radial function g of a unit.
     tail : {"affine", "constant", "none"}
         What is added to the units: T·[1, x], T, or nothing.
     widths : {"log", "plain"}
@@ -117,7 +118,7 @@ class Settings:
         λ in (0, 1]: every update divides the covariance by it, so that old observations fade like λᵗ.
     learning_rate : float
         α of the gradient rule.
-    relapse_limit : float
+    regression_limit : float
         Largest factor by which one update, or a unit added or removed, may raise the squared error over the
         memory; 0 for no limit. The gradient rule knows none.
     memory : int
@@ -168,7 +169,7 @@ class Settings:
     step_bound: float = 0.1
     forgetting_factor: float = 1.0
     learning_rate: float = 0.05
-    relapse_limit: float = 1.1
+    regression_limit: float = 1.1
     memory: int = 250
     update_on_growth: bool = True
     prune_below: float = 1e-4
@@ -273,7 +274,7 @@ def mran() -> Settings:
         widths="plain",
         wait_for_window=True,
         window=25,
-        relapse_limit=0.0,
+        regression_limit=0.0,
         noise=1e-3,
         noise_share=0.0,
         gate=0.0,

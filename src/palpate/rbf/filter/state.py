@@ -29,7 +29,7 @@ class State:
     errors : (≤ M,)
         The last squared error norms ‖e‖², newest last.
     memory : (≤ S, n + m) or (≤ S, n + r)
-        Remembered observations [x, y], newest last (see `relapse`); y by the output modes where there are some.
+        Remembered observations [x, y], newest last (see `regression`); y by the output modes where there are some.
     memory_times : (≤ S,) int
         Which observation each of those was, counting from one.
     silent : (h,) int

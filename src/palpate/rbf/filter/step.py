@@ -12,7 +12,7 @@ import numpy as np
 from palpate.rbf.filter.growth import add_unit, prune_units, wants_growth
 from palpate.rbf.filter.kalman import running_mean_square
 from palpate.rbf.filter.observation import Observation
-from palpate.rbf.filter.relapse import exceeds_relapse_limit, remember, track_least_error
+from palpate.rbf.filter.regression import exceeds_regression_limit, remember, track_least_error
 from palpate.rbf.filter.settings import Settings
 from palpate.rbf.filter.state import State
 from palpate.rbf.filter.updates import predict_observation, update_state
@@ -22,7 +22,7 @@ __all__ = ["Event", "observe", "step"]
 
 @dataclass(frozen=True)
 class Event:
-    """What one observation did.
+    """The outcome of one observation.
 
     Attributes
     ----------
@@ -31,6 +31,7 @@ class Event:
     window_rms : float
         RMS error norm over the window.
     grew, updated : bool
+        True where a unit was added, and where the parameters were updated.
     pruned : int
         Units removed.
     units : int
@@ -59,11 +60,13 @@ def step(
     Parameters
     ----------
     state : State
+        The state before the observation.
     x : (n,)
         Scaled input.
     y : (m,)
         Scaled output.
     settings : Settings
+        Rules and thresholds, the same for every step of a run.
     donate : bool
         Whether the old state's arrays may be overwritten. It saves copying the covariance; the old state must
         not be used again.
@@ -112,7 +115,7 @@ def observe(
 def _grow(state: State, x: np.ndarray, error: np.ndarray, settings: Settings) -> State:
     """The state with a unit at x; without weight, for the update to decide, where it would spoil what was learnt."""
     more = add_unit(state, x, error, settings)
-    if exceeds_relapse_limit(state, more.latent_coefficients, more.theta, settings):
+    if exceeds_regression_limit(state, more.latent_coefficients, more.theta, settings):
         return add_unit(state, x, np.zeros_like(error), settings)
     return more
 

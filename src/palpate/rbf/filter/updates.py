@@ -34,7 +34,7 @@ from palpate.rbf.filter.growth import nearest_unit
 from palpate.rbf.filter.kalman import TRIES, kalman_update, measurement_variance, step_excess
 from palpate.rbf.filter.observation import Observation
 from palpate.rbf.filter.prediction import linearise, measurement
-from palpate.rbf.filter.relapse import exceeds_relapse_limit
+from palpate.rbf.filter.regression import exceeds_regression_limit
 from palpate.rbf.filter.settings import Settings
 from palpate.rbf.filter.state import State
 
@@ -113,7 +113,7 @@ def _winner(
         return coefficients, theta
 
     def refuses(z: np.ndarray) -> bool:
-        return exceeds_relapse_limit(state, *whole(z), settings)
+        return exceeds_regression_limit(state, *whole(z), settings)
 
     part = kalman_update(part, rest, (own, H), settings, refuses=refuses)
     assert isinstance(part.covariance, Blocks)
@@ -149,7 +149,7 @@ def _shared(
         step = (PH @ lam).reshape(state.theta.shape)
         latent_coefficients = state.latent_coefficients + np.outer(gain, lam)
         excess = step_excess(state, step, settings)
-        if excess <= 1.0 and not exceeds_relapse_limit(
+        if excess <= 1.0 and not exceeds_regression_limit(
             state, latent_coefficients, state.theta + step, settings
         ):
             break

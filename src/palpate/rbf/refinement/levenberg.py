@@ -50,7 +50,7 @@ class DampedSystem:
         return step * self._shrink if np.isfinite(step).all() else None
 
     def predicted_gain(self, step: np.ndarray) -> float:
-        """How much the cost falls along a step, to second order."""
+        """The fall of the cost along a step, to second order."""
         s = step / self._shrink
         return float(2.0 * self._descent @ s - s @ self._times(1.0, self._G, s.astype(self._kind), lower=1))
 

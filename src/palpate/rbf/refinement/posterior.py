@@ -106,11 +106,12 @@ class Posterior:
         slope_weight: float | np.ndarray | None = None,
         curvature_weight: float | np.ndarray | None = None,
     ) -> Posterior:
-        """From the samples that the network was refined on.
+        """The posterior from the samples that the network was refined on.
 
         Parameters
         ----------
         refined : Refined
+            The network whose parameters are the mean.
         X : (N, n)
             Scaled inputs.
         Y : (N, m), optional
@@ -221,7 +222,7 @@ def _noise(refined: Refined, X: np.ndarray, Y: np.ndarray | None, weights: np.nd
 
 
 def _positive(variances: float | np.ndarray) -> bool:
-    """Whether all are positive and finite."""
+    """True where all are positive and finite."""
     found = np.asarray(variances, float)
     return bool(((found > 0) & np.isfinite(found)).all())
 
@@ -257,6 +258,7 @@ def posterior(
     X : (N, n)
         Scaled inputs it was refined on.
     settings : Settings
+        Those of the filter that goes on; their noise and prior variances count.
     modes : (m, r), optional
         Orthonormal output directions for the shared-weight rule.
     weights : (N,), optional

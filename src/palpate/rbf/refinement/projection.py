@@ -36,11 +36,13 @@ class Fit:
     coefficients : (c, k)
         Of the tail, then of the units, per mode.
     residual : (R, k)
+        Weighted targets less the fit, per mode.
     cost : float
         ‖residual‖² + penalty ‖weights‖².
     reflectors : (R + c, c)
         Q as LAPACK keeps it, with R in the upper triangle.
     tau : (c,)
+        Factors of the Householder reflectors.
     """
 
     coefficients: np.ndarray

@@ -44,6 +44,7 @@ class Refined:
     Attributes
     ----------
     regressors : Regressors
+        Kind of units and tail.
     theta : (h, p)
         Its units.
     coefficients : (p_t + h, m)
@@ -59,6 +60,7 @@ class Refined:
     condition : float
         2-norm condition number of the regressors; large values mean that units nearly cancel.
     iterations : int
+        Accepted steps that were taken.
     converged : bool
         Whether the last steps brought no more gain; False means that a limit came first.
     without : (h,)
@@ -132,6 +134,7 @@ def refine(
     theta : (h, p)
         Start; h = 0 fits the tail alone.
     regressors : Regressors
+        Kind of units and tail.
     weights : (N,), optional
         w; a weight of two is the sample given twice.
     slopes : (N, m, n), optional
@@ -207,7 +210,7 @@ def refine(
 
 @dataclass(frozen=True, eq=False)
 class _Point:
-    """Where the search stands: units, their fit, and the damping to begin with."""
+    """The state of the search: units, their fit, and the damping to begin with."""
 
     theta: np.ndarray
     fit: Fit

@@ -31,6 +31,7 @@ class Rows:
     Attributes
     ----------
     regressors : Regressors
+        Kind of units and tail.
     X : (N, n)
         Where values are known.
     scale : (N,)
@@ -79,7 +80,7 @@ class Rows:
         curvature_weight: float | np.ndarray = 1.0,
         groups: np.ndarray | None = None,
     ) -> Rows:
-        """From X (N, n), Y (N, m) and what else is known of them.
+        """The rows of X (N, n), Y (N, m) and of all that is known of them besides.
 
         That is weights w (N,), slopes ∂y_j/∂x_l (N, m, n) with s (N,) or (N, n), curvatures ∂²y_j/∂x_l∂x_k
         (N, m, n(n+1)/2), l ≤ k, with c (N,) or (N, n(n+1)/2), and groups (N,); each sample is one by default.
@@ -150,7 +151,7 @@ class Rows:
 
     @property
     def samples(self) -> np.ndarray:
-        """Which sample each row is of, (R,)."""
+        """The sample of each row, (R,)."""
         slopes = np.repeat(self.sloped, (self.slope_scale > 0).sum(axis=1))
         curvatures = np.repeat(self.curved, (self.curvature_scale > 0).sum(axis=1))
         return np.concatenate([np.arange(len(self.X)), slopes, curvatures])
@@ -191,7 +192,7 @@ class Rows:
 
 
 def _scales(w: np.ndarray, s: np.ndarray, count: int, kept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Which of the kept samples have derivatives of any weight, and the roots of the weights (S, count)."""
+    """The samples among `kept` whose derivatives have any weight, and the roots of the weights (S, count)."""
     each = np.broadcast_to(s if s.ndim > 1 else s[:, None], (len(w), count))[kept]
     some = np.flatnonzero((each > 0).any(axis=1))
     return some, np.sqrt(w[kept][some, None] * each[some])

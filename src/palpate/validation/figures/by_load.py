@@ -149,19 +149,19 @@ class NetworkErrors(Figure):
         Of the refined network.
     filter : OutputErrors or None
         Of the sequential filter's own network, if the model holds it.
-    relapse : float or None
+    regression : float or None
         Largest ratio of the filter's held-out error to its best so far.
     """
 
     refined: OutputErrors
     filter: OutputErrors | None
-    relapse: float | None
+    regression: float | None
 
     def judged(self) -> Judged:
         """Return the values that are compared with limits."""
         values: dict[str, tuple[float | None, Worst | str | None]] = {
             "rmse": (self.refined.relative, self.refined.worst),
-            "filter_relapse": (self.relapse, None),
+            "filter_regression": (self.regression, None),
         }
         if self.filter is not None:
             values["filter_rmse"] = (self.filter.relative, self.filter.worst)
@@ -195,8 +195,8 @@ def network_outputs(subject: Subject) -> NetworkErrors | None:
         if key in touch.networks
     }
     watched = subject.history
-    relapse = watched.relapse if watched is not None and math.isfinite(watched.relapse) else None
-    return NetworkErrors(errors["refined"], errors.get("filter"), relapse)
+    regression = watched.regression if watched is not None and math.isfinite(watched.regression) else None
+    return NetworkErrors(errors["refined"], errors.get("filter"), regression)
 
 
 def shape_by_load(subject: Subject) -> ShapeErrors | None:

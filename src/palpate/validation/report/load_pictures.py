@@ -135,7 +135,7 @@ def _grown(h: History) -> str:
     if h.heldout.size:
         text += (
             f" The error on unseen solves ends at {scientific(float(h.heldout[-1]))} of full scale and was never above "
-            f"{plain(h.relapse, 3)} times its best so far."
+            f"{plain(h.regression, 3)} times its best so far."
         )
     return text
 
@@ -143,7 +143,7 @@ def _grown(h: History) -> str:
 def _compared(rivals: Mapping[str, History]) -> str:
     told = [
         f"{name} ends at {scientific(float(r.heldout[-1]))} with {count(int(r.units[-1]), 'unit')} and rose to "
-        f"{plain(r.relapse, 3)} times its best"
+        f"{plain(r.regression, 3)} times its best"
         for name, r in rivals.items()
         if r.heldout.size
     ]

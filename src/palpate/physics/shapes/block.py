@@ -12,7 +12,7 @@ from palpate import checks
 from palpate.errors import UsageError
 from palpate.format import millimetres
 from palpate.physics.shapes.meshing import FineMesh
-from palpate.physics.shapes.naming import UPRIGHT, require_name
+from palpate.physics.shapes.naming import INTERFACE, UPRIGHT, require_name
 from palpate.physics.shapes.shape import Isometry, Solid, box_isometries
 
 __all__ = [
@@ -21,6 +21,8 @@ __all__ = [
     "name_sides",
     "name_upright_faces",
 ]
+
+FLATTEST = 3.0  # element size over thickness of its layer: flatter tetrahedra condition the system badly
 
 
 @dataclass(frozen=True)
@@ -91,9 +93,6 @@ def name_sides(solid: Any, size: tuple[float, float, float]) -> None:
         for axis, at, far in zip("xy", (face.center.x, face.center.y), size, strict=False):
             if face.name == "side" and min(abs(at), abs(at - far)) < 1e-6 * far:
                 face.name = f"{axis}_min" if at < far / 2 else f"{axis}_max"
-
-
-FLATTEST = 3.0  # element size over thickness of its layer: flatter tetrahedra condition the system badly
 
 
 @dataclass(frozen=True)
@@ -236,7 +235,7 @@ class LayeredBlock(Solid):
         name_sides(block, self.size)
         for face in block.faces:
             if face.name == "side":
-                face.name = "between layers"
+                face.name = INTERFACE
         return block
 
 

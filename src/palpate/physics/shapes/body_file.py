@@ -38,6 +38,8 @@ __all__ = [
 ]
 
 UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
+FEATURE_ANGLE = 40.0  # degrees between neighbouring triangles from which the edge between them is sharp
+Point = tuple[float, float, float]
 
 
 def require_unit(unit: Any) -> None:
@@ -135,10 +137,6 @@ def _unreadable(path: str, error: BaseException) -> FileFormatError:
         why=f"It is corrupt, cut short or of another format than its name says ({said}).",
         fix="Open it in the program that made it and export it again, as VTU, MSH or STL for example.",
     )
-
-
-FEATURE_ANGLE = 40.0  # degrees between neighbouring triangles from which the edge between them is sharp
-Point = tuple[float, float, float]
 
 
 @dataclass(frozen=True)

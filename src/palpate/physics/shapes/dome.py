@@ -8,11 +8,10 @@ from typing import Any, ClassVar
 from palpate import checks
 from palpate.errors import UsageError
 from palpate.format import millimetres
+from palpate.physics.shapes.naming import INTERFACE
 from palpate.physics.shapes.shape import Isometry, Solid, mirror_isometries, round_isometries
 
 __all__ = ["Dome", "Inclusion"]
-
-INTERFACE = "between regions"
 
 
 @dataclass(frozen=True)

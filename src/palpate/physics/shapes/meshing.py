@@ -35,6 +35,9 @@ GRADING = 0.4  # growth of the element size per distance from a fine surface
 THREADS = 1  # of Netgen; its own four gain nothing, and spin: ten times slower where another process works
 MOST_ELEMENTS = 400_000  # about half a million nodes of second order: beyond any direct solver on one machine
 Point = tuple[float, float, float]
+FLAT = 1e-5  # thickness over length below which a face counts as upright and plane
+PADDING = 1e-7  # m by which the CAD kernel's boxes are larger than the faces within
+SHORTEST = 1e-5  # shortest edge over the body's length that is meshed as such; Netgen's own default is in mm
 
 
 @dataclass(frozen=True)
@@ -201,11 +204,6 @@ def _halve(corners: np.ndarray) -> np.ndarray:
     a, b, c = (corners[rows, (apex + k) % 3] for k in range(3))
     middle = (b + c) / 2
     return np.concatenate([np.stack([a, b, middle], axis=1), np.stack([a, middle, c], axis=1)])
-
-
-FLAT = 1e-5  # thickness over length below which a face counts as upright and plane
-PADDING = 1e-7  # m by which the CAD kernel's boxes are larger than the faces within
-SHORTEST = 1e-5  # shortest edge over the body's length that is meshed as such; Netgen's own default is in mm
 
 
 def mesh_solid(solid: Any, coarse: float, refinements: tuple[FineMesh, ...]) -> Any:

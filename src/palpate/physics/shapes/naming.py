@@ -9,10 +9,11 @@ from typing import Any
 
 from palpate.errors import UsageError
 
-__all__ = ["GROUPS", "UPRIGHT", "members", "plain_name", "require_known", "require_name"]
+__all__ = ["GROUPS", "INTERFACE", "UPRIGHT", "members", "plain_name", "require_known", "require_name"]
 
 UPRIGHT = ("x_min", "x_max", "y_min", "y_max")  # the upright faces of a box, by where they are
 GROUPS = {"side": UPRIGHT}
+INTERFACE = "between regions"  # name of the faces that are no part of the outer surface
 
 
 def members(name: str, surfaces: Iterable[str]) -> tuple[str, ...]:

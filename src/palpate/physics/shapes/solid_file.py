@@ -23,18 +23,17 @@ from palpate.physics.shapes.body_file import (
 )
 from palpate.physics.shapes.mesh import BodyMesh, Face, faces_of, to_ngsolve
 from palpate.physics.shapes.meshing import FineMesh, mesh_solid
-from palpate.physics.shapes.naming import plain_name
+from palpate.physics.shapes.naming import INTERFACE, plain_name
 from palpate.physics.shapes.shape import Shape, require_size
 from palpate.physics.shapes.stl_file import fill_surface, name_parts, read_stl
 
 __all__ = [
-    "INTERFACE",
     "ImportedSolid",
     "read_step",
 ]
 
-INTERFACE = "between regions"
 MILLIMETRE = 1e-3  # the CAD kernel turns every unit that a STEP file states into mm
+STEP, STL = (".step", ".stp"), (".stl",)
 
 
 def read_step(path: str, patches: tuple[SurfacePatch, ...]) -> Any:
@@ -153,9 +152,6 @@ def _name_patches(patches: tuple[SurfacePatch, ...], body: Any) -> None:
     )
     for face, i in zip(faces, index, strict=True):
         face.name = names[i]
-
-
-STEP, STL = (".step", ".stp"), (".stl",)
 
 
 @dataclass(frozen=True)

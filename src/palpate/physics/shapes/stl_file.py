@@ -20,13 +20,17 @@ from palpate.physics.shapes.meshing import (
     require_budget,
     split_triangles,
 )
+from palpate.physics.shapes.shape import require_size
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
-from palpate.physics.shapes.shape import require_size
-
 __all__ = ["fill_surface", "name_parts", "read_stl", "require_closed", "unite_points"]
+
+LENGTH = 100.0  # longest side in the units in which Netgen meshes: its tolerances are those of millimetres
+SHARP = (
+    0.05  # weight of a normal's direction against distance over the body's length, where faces are compared
+)
 
 
 def unite_points(points: np.ndarray, triangles: np.ndarray) -> Trimesh:
@@ -144,12 +148,6 @@ def _pierces(edges_of: np.ndarray, triangles: np.ndarray) -> np.ndarray:
         edge = 1e-9
         hit |= slanted & (p > edge) & (q > edge) & (p + q < 1 - edge) & (t > edge) & (t < 1 - edge)
     return hit
-
-
-LENGTH = 100.0  # longest side in the units in which Netgen meshes: its tolerances are those of millimetres
-SHARP = (
-    0.05  # weight of a normal's direction against distance over the body's length, when faces are told apart
-)
 
 
 def read_stl(path: str, unit: str) -> Trimesh:

@@ -26,7 +26,7 @@ BLOCK = Body(Block((0.06, 0.04, 0.02)), NeoHookean(9e3, 0.4))
         ("x_max", ((0.05, 0.0, 0.0), (0.06, 0.04, 0.025)), r"5 mm beyond the surface along z"),
     ],
 )
-def test_a_footprint_beyond_a_plane_is_refused(touches, over, words):
+def test_contact_points_beyond_a_plane_are_refused(touches, over, words):
     with pytest.raises(UsageError, match=words):
         ranges(SphereProbe(0.01, touches=touches, depth=(0.0, 0.004), over=over))
 

@@ -98,7 +98,7 @@ def test_a_pad_keeps_what_leaves_its_places_where_they_are(shape, pad, count):
             assert np.isclose(M, one @ other).all(axis=(1, 2)).any()
 
 
-def test_images_of_the_fundamental_part_are_the_whole_footprint():
+def test_images_of_the_fundamental_part_are_the_whole():
     """Every place of a square, and of a disc, is an image of one in the part that is solved."""
     random = np.random.default_rng(0).uniform(-1, 1, (400, 2))
     discs = random[np.hypot(*random.T) < 1]
@@ -119,7 +119,7 @@ def test_images_of_the_fundamental_part_are_the_whole_footprint():
             assert inside.all(axis=1).any()
 
 
-def test_a_footprint_beside_the_middle_stays_whole():
+def test_contact_points_beside_the_middle_stay_whole():
     probe = SphereProbe(0.01, touches="top", over=((0.02, 0.03), (0.05, 0.06)))
     assert fundamental_part(Body(CUBE, SOFT), probe) == probe
 

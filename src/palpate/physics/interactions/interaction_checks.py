@@ -180,13 +180,7 @@ def free_motions(field: Any, attached: Iterable[Attached]) -> np.ndarray:
 
 
 def require_support(field: Any, attached: Iterable[Attached]) -> None:
-    """Refuse a body that could float away.
-
-    Raises
-    ------
-    UsageError
-        Naming the motions that nothing resists.
-    """
+    """Refuse a body that could float away."""
     loose = free_motions(field, attached)
     if not len(loose):
         return

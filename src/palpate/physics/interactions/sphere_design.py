@@ -142,11 +142,6 @@ def require_fit(
         Largest depth in m.
     slack : float
         Distance in m that the box may reach beyond the surface.
-
-    Raises
-    ------
-    UsageError
-        With how far it reaches, and what there is.
     """
     axis = int(np.argmax(np.abs(patch.facing)))
     if not patch.is_plane or abs(patch.facing[axis]) < 1 - UPRIGHT:

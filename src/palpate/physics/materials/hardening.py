@@ -160,13 +160,7 @@ class VoceHardening:
 
 
 def require_hardening(thing: Any) -> None:
-    """Refuse what is no law of hardening.
-
-    Raises
-    ------
-    UsageError
-        If it lacks a member of one.
-    """
+    """Refuse what is no law of hardening."""
     members = ("yield_stress", "flow_stress", "slope", "work", "increment", "describe")
     if isinstance(thing, type) or not all(hasattr(thing, name) for name in members):
         raise UsageError(

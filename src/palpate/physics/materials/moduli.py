@@ -80,13 +80,7 @@ def require_poisson(poisson: float) -> None:
 
 
 def require_density(density: float) -> None:
-    """Refuse a density that is negative or no number.
-
-    Raises
-    ------
-    UsageError
-        If it is.
-    """
+    """Refuse a density that is negative or no number."""
     checks.fits("The density", density, "kg/m³", least=0)
 
 

@@ -1,4 +1,7 @@
-"""Checks of a body, its parts and its inputs, with hints on mistaken units."""
+"""Checks of a body, its parts and its inputs.
+
+Each raises a `UsageError` with a hint on what was meant, often other units.
+"""
 
 from __future__ import annotations
 
@@ -43,13 +46,7 @@ MATERIAL = ("poisson", "density", "kinematics", "states", "volumetric", "energy"
 
 
 def require_geometry(thing: Any) -> None:
-    """Refuse what is no geometry.
-
-    Raises
-    ------
-    UsageError
-        If it lacks a member of one.
-    """
+    """Refuse what is no geometry."""
     if _lacks(thing, GEOMETRY) or isinstance(thing, type):
         raise UsageError(
             f"The geometry of a body is {thing!r}, of type {type(thing).__name__}.",
@@ -135,13 +132,7 @@ def require_held_values(given: Any) -> tuple[Fixed, ...]:
 
 
 def require_order(order: Any) -> None:
-    """Refuse a polynomial order that is no whole number from 2 on.
-
-    Raises
-    ------
-    UsageError
-        If it is not.
-    """
+    """Refuse a polynomial order that is no whole number from 2 on."""
     if isinstance(order, Integral) and int(order) >= 2:
         return
     raise UsageError(
@@ -152,13 +143,7 @@ def require_order(order: Any) -> None:
 
 
 def require_weight(materials: Mapping[str, Any]) -> None:
-    """Refuse gravity on a material without a density.
-
-    Raises
-    ------
-    UsageError
-        With the region's name.
-    """
+    """Refuse gravity on a material without a density."""
     for region, material in materials.items():
         if not material.density:
             raise UsageError(
@@ -207,13 +192,7 @@ def longest_side(geometry: Any) -> float:
 
 
 def require_lengths(interaction: Any, longest: float) -> None:
-    """Refuse an interaction with a length that the body's longest side in m leaves no room for.
-
-    Raises
-    ------
-    UsageError
-        With the length and a hint on units.
-    """
+    """Refuse an interaction with a length that the body's longest side in m leaves no room for."""
     for what, share in LENGTHS.items():
         for length in _numbers(getattr(interaction, what, None)):
             if abs(length) > share * longest:
@@ -221,26 +200,14 @@ def require_lengths(interaction: Any, longest: float) -> None:
 
 
 def require_element(element: Any, longest: float) -> None:
-    """Refuse an element size that is not positive, or larger than the body.
-
-    Raises
-    ------
-    UsageError
-        With a hint on units.
-    """
+    """Refuse an element size that is not positive, or larger than the body."""
     checks.positive("The element size of a problem", element, "m")
     if element > longest:
         raise _too_long("The element size of the problem", element, longest)
 
 
 def require_finite(values: np.ndarray, ranges: Sequence[Range]) -> None:
-    """Refuse inputs (n,) that are no finite numbers.
-
-    Raises
-    ------
-    UsageError
-        With the first one's name.
-    """
+    """Refuse inputs (n,) that are no finite numbers."""
     for value, given in zip(values.tolist(), ranges, strict=True):
         if not math.isfinite(value):
             raise UsageError(
@@ -253,13 +220,7 @@ def require_finite(values: np.ndarray, ranges: Sequence[Range]) -> None:
 
 
 def require_near(points: np.ndarray, ranges: Sequence[Range], longest: float) -> None:
-    """Refuse inputs (N, n) in m that are farther from their ranges than the body is long.
-
-    Raises
-    ------
-    UsageError
-        With the input and a hint on units.
-    """
+    """Refuse inputs (N, n) in m that are farther from their ranges than the body is long."""
     low, high = bounds(ranges)
     beyond = np.maximum(low - points, points - high)
     beyond[:, [r.unit != "m" for r in ranges]] = 0.0

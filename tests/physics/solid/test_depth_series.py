@@ -69,7 +69,7 @@ def test_columns_on_a_dome_are_chains_too():
     assert height.max() == pytest.approx(0.06 + RADIUS, rel=0.02)
 
 
-def test_the_default_footprint_keeps_three_radii_from_the_rim():
+def test_the_contact_points_keep_three_radii_from_the_rim():
     x, y, z = SphereProbe(radius=0.01).ranges(Block((0.1, 0.1, 0.05)))
     assert (x.low, x.high) == pytest.approx((0.03, 0.07))
     assert (y.low, y.high) == pytest.approx((0.03, 0.07))
@@ -112,7 +112,7 @@ def test_other_interactions_leave_the_design_to_the_caller():
     assert [list(chain) for chain in problem.chains(np.zeros((3, 1)))] == [[0, 1, 2]]
 
 
-def test_footprints_are_denser_where_the_surface_ends():
+def test_contact_points_are_denser_where_the_surface_ends():
     whole = SphereProbe(0.01, depth=(0.0, 0.005), over=((0.0, 0.0), (0.1, 0.1)))
     corner = replace(whole, over=((0.05, 0.0), (0.1, 0.05)))
     middle = replace(whole, over=((0.02, 0.02), (0.08, 0.08)))

@@ -237,3 +237,30 @@ def test_what_the_value_itself_refuses_is_refused(tmp_path):
     path = save_archive(tmp_path / "t.palpate", replace(ARCHIVE, meta=described))
     with pytest.raises(FileFormatError, match="A spring does not push"):
         load_value(path, Thing, **FORM)
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    values: np.ndarray
+
+
+def test_large_smooth_tables_are_packed_without_loss(tmp_path):
+    x = np.linspace(0.0, 1.0, 70)
+    smooth = Table(np.exp(-(x[:, None, None] ** 2) - x[:, None] ** 2) * np.ones(70))
+    path = save_value(tmp_path / "smooth.palpate", smooth, kind="table")
+    assert path.stat().st_size < 0.75 * smooth.values.nbytes
+    again = load_value(path, Table, kind="table", noun="a table")
+    np.testing.assert_array_equal(again.values, smooth.values)
+    rough = Table(np.random.default_rng(0).normal(size=(400, 400)))
+    again = load_value(
+        save_value(tmp_path / "rough.palpate", rough, kind="table"), Table, kind="table", noun="a table"
+    )
+    np.testing.assert_array_equal(again.values, rough.values)
+
+
+@pytest.mark.parametrize("shape", [[70, 70, 71], [70, 70], [-70, 70, -70], [70.0, 70, 70], "70", None])
+def test_a_packed_table_of_another_size_is_refused(tmp_path, shape):
+    archive = encode(Table(np.ones((70, 70, 70))), kind="table")
+    archive.meta["values"]["packed"] = shape
+    with pytest.raises(FileFormatError, match="a table"):
+        load_value(save_archive(tmp_path / "t.palpate", archive), Table, kind="table", noun="a table")

@@ -115,6 +115,12 @@ class Dataset:
         """Return the SHA-256 of all variables and coordinates but `exclude`, as hexadecimal digits."""
         return store.fingerprint(self.data, exclude)
 
+    @property
+    def folder(self) -> Path | None:
+        """Folder of the store that the dataset was read from, or None."""
+        source = self.data.encoding.get("source")
+        return None if source is None else Path(source)
+
     # ---- rows ----
 
     def __len__(self) -> int:

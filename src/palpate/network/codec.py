@@ -18,7 +18,8 @@ A dataclass opts in by its annotations alone: each field that ``__init__`` takes
     X | Y of dataclasses      one of them, under its class's name
 
 and its ``__post_init__`` refuses parts that do not fit each other, with `UsageError`: reading calls it too. What
-several fields share (one surface for all fields of a body) is stored once and is one object again when read.
+several fields share (one surface for all fields of a body) is stored once and is one object again when read. Large
+tables of smooth numbers are packed without loss.
 The type decides what is read, so nothing in a file can choose a class that its reader did not ask for.
 """
 
@@ -38,11 +39,17 @@ import numpy as np
 from palpate.errors import FileFormatError, UsageError
 from palpate.network.archive import Archive, load_archive, save_archive
 from palpate.network.network import Network
+from palpate.network.packing import pack, unpack
 
 __all__ = ["decode", "encode", "load_value", "register_kind", "registered_kinds", "save_value"]
 
 T = TypeVar("T")
 _ALONE = "value"  # the name of what is stored where nothing contains it
+_LARGE, _WORTH, _PACKED = (
+    1_000_000,
+    0.75,
+    "packed",
+)  # bytes from which an array is packed, where that saves a quarter
 _KIND, _SAME = "class", "same as"  # neither can be the name of a field
 _NOT_FINITE = {"inf": math.inf, "-inf": -math.inf, "nan": math.nan}
 _kinds: dict[type, dict[str, type]] = {}
@@ -252,14 +259,23 @@ class _Json:
 class _Array:
     kind: type[np.generic] | None = None  # any of `_ARRAYS` if none is named
 
-    def write(self, value: Any, path: str, parts: _Parts) -> str:
+    def write(self, value: Any, path: str, parts: _Parts) -> Any:
         if not (isinstance(value, np.ndarray) and self._fits(value.dtype.name)):
             raise _refused(value, path, f"an array of {np.dtype(self.kind or np.float64)}")
+        packed = pack(value) if value.dtype == np.float64 and value.nbytes >= _LARGE else None
+        if packed is not None and packed.nbytes < _WORTH * value.nbytes:
+            _put(parts.arrays, path, packed)
+            return {_PACKED: list(value.shape)}
         _put(parts.arrays, path, np.ascontiguousarray(value))
         return str(value.dtype.name)
 
     def read(self, stored: Any, path: str, parts: _Parts) -> np.ndarray:
         array = parts.arrays.pop(path)
+        if isinstance(stored, Mapping) and self._fits("float64"):
+            shape = stored[_PACKED]
+            if array.dtype != np.uint8 or not all(type(n) is int and 0 < n < 2**31 for n in shape):
+                raise TypeError(f"{path} is packed as {array.dtype} of {shape!r:.40}")
+            return unpack(array, tuple(shape))
         if stored != array.dtype.name or not self._fits(stored):
             raise TypeError(f"{path} is an array of {array.dtype}, described as {stored!r:.40}")
         return array

@@ -20,7 +20,7 @@ from palpate.learning.fields import Snapshots, lumped_mass
 from palpate.learning.fields.fit_local_mode import fade_out, fit_local_mode
 from palpate.learning.fields.snapshots import Solves
 from palpate.physics.solid.body_symmetry import fundamental_part
-from palpate.surrogates import ContactLaw, TouchedBody, TouchModel
+from palpate.surrogates import ContactLaw, TouchedBody, TouchedSurface, TouchModel
 from palpate.surrogates.fields import DepthAmplitude
 from palpate.surrogates.fields.surface_interpolation import SurfaceInterpolation
 from palpate.sweeps import sweep
@@ -126,6 +126,23 @@ def test_ranges_and_symmetry_are_those_of_the_whole():
     columns = found.columns.reshape(6, 4)
     assert (columns == columns[:, :1]).all()
     assert len(np.unique(columns)) == 6
+
+
+def test_the_distance_of_a_surface_is_built_once_for_a_store(tmp_path, monkeypatch):
+    store = touches().save(tmp_path / "touches.zarr")
+    surface = Touches.of(Dataset.open(store)).surface
+    assert surface.equals(Touches.of(touches()).surface)
+    damaged = store / ".touched_surface"
+    plain = damaged.read_bytes()
+    damaged.write_bytes(plain[:-5])
+    assert Touches.of(Dataset.open(store)).surface.equals(surface)
+    assert damaged.stat().st_size == len(plain)
+    monkeypatch.setattr(TouchedSurface, "of", None)
+    again = Dataset.open(store)
+    assert again.hash == touches().hash
+    assert Touches.of(again).surface.equals(surface)
+    with pytest.raises(TypeError):
+        Touches.of(touches())
 
 
 @pytest.mark.parametrize("field", ["displacement", "von_mises"])

@@ -273,10 +273,45 @@ def test_the_kernel_is_the_tensor_product_spline():
 
 
 def test_a_surface_goes_through_arrays_unchanged():
-    again = TouchedSurface.from_arrays(face().arrays())
-    C = uniform(-0.05, 0.05, 100)
-    assert all((a == b).all() for a, b in zip(face().at(C), again.at(C), strict=True))
-    assert repr(again) == repr(face())
+    for surface in (face(), sphere()):
+        again = TouchedSurface.from_arrays(surface.arrays())
+        assert again.equals(surface)
+        assert repr(again) == repr(surface)
+
+
+def test_a_table_that_is_not_packed_is_read_too():
+    plain = {"frame": sphere().frame, "coefficients": sphere().coefficients, "lengths": sphere().lengths}
+    assert TouchedSurface.from_arrays(plain).equals(sphere())
+
+
+def test_a_flat_surface_takes_little_room_and_a_curved_one_a_fraction_of_its_table():
+    assert sum(a.nbytes for a in face().arrays().values()) < 200_000
+    assert sum(a.nbytes for a in sphere().arrays().values()) < 0.4 * sphere().coefficients.nbytes
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong"),
+    [
+        ("packed", np.zeros(100, dtype=np.uint8)),
+        ("packed", np.zeros(100)),
+        ("shape", np.array([4.0, 4.0, 4.0])),
+        ("shape", np.array([4.0, 4.0, -4.0])),
+        ("shape", np.array([9e3, 9e3, 9e3])),
+        ("shape", None),
+    ],
+)
+def test_damaged_packed_tables_are_refused(name, wrong):
+    arrays = sphere().arrays() | {name: wrong}
+    if wrong is None:
+        del arrays[name]
+    with pytest.raises(FileFormatError):
+        TouchedSurface.from_arrays(arrays)
+
+
+def test_a_raised_surface_is_nearer_everywhere():
+    for surface in (face(), sphere()):
+        C = uniform(-0.05, 0.05, 100)
+        assert surface.raised(1e-3).at(C)[0] == pytest.approx(surface.at(C)[0] - 1e-3, abs=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -284,7 +319,10 @@ def test_a_surface_goes_through_arrays_unchanged():
     [
         ("frame", np.zeros(3)),
         ("frame", np.zeros(4)),
-        ("frame", np.array([0, 0, 0, np.nan])),
+        ("frame", np.zeros(15)),
+        ("frame", np.ones(15)),
+        ("profile", np.zeros((3, 9))),
+        ("profile", np.full((9, 9), np.nan)),
         ("coefficients", np.zeros((3, 9, 9))),
         ("coefficients", np.zeros((9, 9, 9), dtype=np.float32)),
         ("coefficients", np.full((9, 9, 9), np.inf)),

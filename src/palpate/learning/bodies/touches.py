@@ -10,6 +10,7 @@ import numpy as np
 
 from palpate.dataset import Dataset, Layout
 from palpate.errors import UsageError
+from palpate.learning.bodies.kept_surface import touched_surface
 from palpate.learning.dataset_symmetry import declared_symmetry, widen_ranges
 from palpate.learning.energy.columns import columns_of
 from palpate.surrogates import TouchedSurface
@@ -103,7 +104,8 @@ class Touches:
             radius,
             which,
             (*widen_ranges(data.ranges[:3], matrices, about), *data.ranges[3:]),
-            TouchedSurface.of(
+            touched_surface(
+                data,
                 rest,
                 touched,
                 radius=largest,

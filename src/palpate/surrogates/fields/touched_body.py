@@ -8,8 +8,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from palpate.errors import UsageError
 from palpate.network import Archive, save_archive
 from palpate.surrogates.fields.field_file import arrays_of, described, field_of
@@ -48,13 +46,9 @@ class TouchedBody:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "fields", dict(self.fields))
-        own = self.touch.surface.arrays()
         names = [(r.name, r.unit) for r in self.touch.inputs]
         for name, one in self.fields.items():
-            theirs = one.surface.arrays()
-            same = one.surface is self.touch.surface or all(
-                np.array_equal(theirs[k], own[k], equal_nan=True) for k in own
-            )
+            same = one.surface.equals(self.touch.surface)
             if not same or [(r.name, r.unit) for r in one.inputs] != names:
                 raise UsageError(
                     f"The field {name!r} is not of the body that is touched.",

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from palpate.errors import FileFormatError, UsageError
+from palpate.network.packing import pack, unpack
 from palpate.surrogates.surface.distance_kernels import distances_into
 
 __all__ = ["TouchedSurface"]
@@ -53,6 +54,23 @@ class TouchedSurface:
     reach: float
     inner: float
     error: float
+
+    def __post_init__(self) -> None:
+        fault = ""
+        arrays = (*self.compiled(), self.lengths)
+        if not _fit(*self.compiled()):
+            fault = "its tables have the wrong shapes"
+        elif not all(np.isfinite(a).all() for a in arrays):
+            fault = "a number of it is not finite"
+        elif not (self.frame[3] > 0 and min(self.radius, self.reach, self.inner) > 0 and self.error >= 0):
+            fault = "its spacing or a length of it is not positive"
+        elif self.profile.size and np.abs(_gram(self.frame) - np.eye(3)).max() > 1e-9:
+            fault = "its axes are no rotation"
+        if fault:
+            raise UsageError(
+                f"A touched surface can't be made: {fault}.",
+                fix="Let `TouchedSurface.of` make it of triangles.",
+            )
 
     @classmethod
     def of(
@@ -156,10 +174,23 @@ class TouchedSurface:
         return self.frame, self.coefficients, self.profile
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Everything as arrays, for a file."""
-        lengths = np.array([self.radius, self.reach, self.inner, self.error])
-        flat = {"profile": self.profile} if self.profile.size else {}
-        return {"frame": self.frame, "coefficients": self.coefficients, "lengths": lengths} | flat
+        """Everything as arrays, for a file; the table of a curved surface is packed."""
+        if self.profile.size:
+            tables = {"coefficients": self.coefficients, "profile": self.profile}
+        else:
+            shape = np.array(self.coefficients.shape, dtype=np.float64)
+            tables = {"packed": pack(self.coefficients), "shape": shape}
+        return {"frame": self.frame, "lengths": self.lengths} | tables
+
+    def equals(self, other: TouchedSurface) -> bool:
+        """Whether another surface is the same, number by number."""
+        mine, theirs = ((*surface.compiled(), surface.lengths) for surface in (self, other))
+        return self is other or all(np.array_equal(a, b) for a, b in zip(mine, theirs, strict=True))
+
+    @property
+    def lengths(self) -> np.ndarray:
+        """Radius, reach, inner reach and error in m, (4,)."""
+        return np.array([self.radius, self.reach, self.inner, self.error])
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, np.ndarray]) -> TouchedSurface:
@@ -171,23 +202,21 @@ class TouchedSurface:
             If they are not those of one, or describe none that could be evaluated.
         """
         try:
-            frame, C, lengths = (arrays[k] for k in ("frame", "coefficients", "lengths"))
+            frame, lengths = arrays["frame"], arrays["lengths"]
+            C = _unpacked(arrays) if "packed" in arrays else arrays["coefficients"]
         except KeyError as error:
             raise FileFormatError(f"A touched surface lacks its array {error}.") from error
+        except ValueError as error:
+            raise FileFormatError("The table of a touched surface can't be read.", why=str(error)) from error
         profile = arrays.get("profile", np.zeros((0, 0)))
         every = (frame, C, lengths, profile)
-        if {np.asarray(a).dtype for a in every} != {np.dtype(np.float64)} or not _fit(*every):
+        if {np.asarray(a).dtype for a in every} != {np.dtype(np.float64)} or np.shape(lengths) != (4,):
             raise FileFormatError("The arrays of a touched surface have the wrong shapes or kinds.")
-        finite = all(np.isfinite(a).all() for a in every)
-        if not (finite and frame[3] > 0 and (lengths[:3] > 0).all() and lengths[3] >= 0):
-            raise FileFormatError(
-                "The numbers of a touched surface are not finite, or its lengths not positive."
-            )
-        axes = frame[4:13].reshape(-1, 3)
-        if profile.size and np.abs(axes @ axes.T - np.eye(3)).max() > 1e-9:
-            raise FileFormatError("The axes of a flat touched surface are no rotation.")
-        frame, C, profile = (np.ascontiguousarray(a) for a in (frame, C, profile))
-        return cls(frame, C, profile, *lengths.tolist())
+        try:
+            frame, C, profile = (np.ascontiguousarray(a) for a in (frame, C, profile))
+            return cls(frame, C, profile, *lengths.tolist())
+        except UsageError as error:
+            raise FileFormatError("These arrays are no touched surface.", why=str(error)) from error
 
     def __repr__(self) -> str:
         nodes = " × ".join(str(n) for n in self.coefficients.shape if n > 1)
@@ -198,14 +227,25 @@ class TouchedSurface:
         )
 
 
-def _fit(frame: np.ndarray, C: np.ndarray, lengths: np.ndarray, profile: np.ndarray) -> bool:
-    """Whether arrays have the shapes of a curved surface's, or of a flat one's."""
-    if np.shape(lengths) != (4,) or np.ndim(C) != 3:
+def _unpacked(arrays: Mapping[str, np.ndarray]) -> np.ndarray:
+    packed, shape = arrays["packed"], arrays["shape"]
+    if packed.dtype != np.uint8 or shape.shape != (3,) or not ((shape >= 4) & (shape < 1e4)).all():
+        raise ValueError(f"it is described as {shape} numbers of kind {packed.dtype}")
+    return unpack(packed, tuple(shape.astype(np.int64).tolist()))
+
+
+def _fit(frame: np.ndarray, C: np.ndarray, profile: np.ndarray) -> bool:
+    """Return whether arrays have the shapes of a curved surface's, or of a flat one's."""
+    if C.ndim != 3 or profile.ndim != 2:
         return False
     if profile.size == 0:
-        return np.shape(frame) == (4,) and min(C.shape) >= 4
-    tables = np.ndim(profile) == 2 and min(*profile.shape, *C.shape[:2]) >= 4
-    return tables and np.shape(frame) == (FLAT_FRAME,) and C.shape[2] == 1
+        return frame.shape == (4,) and min(C.shape) >= 4
+    return min(*profile.shape, *C.shape[:2]) >= 4 and frame.shape == (FLAT_FRAME,) and C.shape[2] == 1
+
+
+def _gram(frame: np.ndarray) -> np.ndarray:
+    axes = frame[4:13].reshape(3, 3)
+    return np.asarray(axes @ axes.T)
 
 
 def _refuse_lengths(**lengths: float) -> None:

@@ -202,6 +202,11 @@ def test_every_study_takes_a_number_of_workers(name):
     assert study.with_workers(2).name == study.name
 
 
+def test_a_target_of_the_first_version_keeps_its_meaning(tmp_path):
+    text = 'name = "old"\n[[loads]]\nname = "P"\nlow = 0\nhigh = 2\n[target]\nfilter_relapse = 3.0'
+    assert read_study(study_file(tmp_path, text)).target.filter_regression == 3.0
+
+
 FIRST_VERSION = {
     'name = "old"\n[[loads]]\nname = "P"\nlow = 0\nhigh = "2 N"': {
         "loads": [{"name": "P", "low": 0, "high": 2}]

@@ -120,7 +120,9 @@ class Prediction:
     inputs : (n,)
         In the inputs' units.
     outputs : m quantities
+        Names and units of the outputs.
     values : (m,)
+        Values, in the outputs' units.
     deviations : (m,), optional
         Standard deviation of what would be measured; None where the file has none. Beyond the ranges it says nothing
         and is not-a-number.

@@ -1,4 +1,7 @@
-"""The commands. Each parses, calls the study, prints; heavy imports wait until a command needs them."""
+"""Commands of the command line. Each one reads its arguments, calls the work, and prints the result.
+
+Heavy packages are imported only by the command that needs them.
+"""
 
 from __future__ import annotations
 
@@ -22,17 +25,23 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-StudyFile = Annotated[Path, typer.Argument(help="A study file; write one with [bold]palpate init[/].")]
-ModelFile = Annotated[Path, typer.Argument(help="A .palpate file, as [bold]palpate learn[/] writes it.")]
-Json = Annotated[bool, typer.Option("--json", help="Results as one JSON object on stdout.")]
-Workers = Annotated[int | None, typer.Option(min=1, help="Worker processes; by default one per core.")]
+StudyFile = Annotated[Path, typer.Argument(help="Study file, as [bold]palpate init[/] writes it.")]
+ModelFile = Annotated[
+    Path, typer.Argument(help="Model file (.palpate), as [bold]palpate learn[/] writes it.")
+]
+Json = Annotated[bool, typer.Option("--json", help="Print the results as one JSON object.")]
+Workers = Annotated[
+    int | None, typer.Option(min=1, help="Number of worker processes. Default: one per core.")
+]
 Port = Annotated[
     int | None,
     typer.Option(
-        min=0, max=65535, help="Port of the page, by default the study's; a busy one moves on to the next."
+        min=0,
+        max=65535,
+        help="Port of the page. Default: that of the study. If it is busy, the next free port is used.",
     ),
 ]
-Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")]
+Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a web browser.")]
 
 STUDY = Path("study.toml")
 _INTERRUPTED = 130  # the shell's code of a program that Ctrl-C has ended
@@ -53,19 +62,22 @@ def _root(
 def demo(
     names: Annotated[
         list[str] | None,
-        typer.Argument(help="Studies to run, such as block; by default both founding beams."),
+        typer.Argument(help="Names of studies, such as block or grasp. Default: beam-copper and beam-nylon."),
     ] = None,
-    folder: Annotated[Path, typer.Option(help="Where files go.")] = Path("palpate-demo"),
-    view: Annotated[bool, typer.Option("--view/--no-view", help="Serve the page at the end.")] = True,
+    folder: Annotated[Path, typer.Option(help="Folder for all files.")] = Path("palpate-demo"),
+    view: Annotated[
+        bool, typer.Option("--view/--no-view", help="Show the last model on a page at the end.")
+    ] = True,
     quick: Annotated[
-        bool, typer.Option("--quick", help="Coarse elements and few touches: under two minutes.")
+        bool,
+        typer.Option("--quick", help="Use coarse elements and few solves. This takes less than two minutes."),
     ] = False,
     workers: Workers = None,
     port: Port = None,
     browser: Browser = True,
     as_json: Json = False,
 ) -> None:
-    """Run studies with a name from finite elements to the fingertip; the founding beams take under a minute."""
+    """Run named studies completely: solve, learn, check, and show the result. The two beams take about a minute."""
     from palpate.cli.demo_command import run_demo
 
     console = Console(as_json)
@@ -82,12 +94,14 @@ def init(
     path: Annotated[Path, typer.Argument(help="File to write.")] = STUDY,
     preset: Annotated[
         str,
-        typer.Option(help="Study to start from, such as block, layered, breast-dome, liver, beam-copper."),
+        typer.Option(
+            help="Named study to start from, such as block, layered, liver, grasp, beam-copper or beam-plastic."
+        ),
     ] = "beam-nylon",
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
-    show: Annotated[bool, typer.Option("--print", help="Print it instead of writing a file.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace a file that exists.")] = False,
+    show: Annotated[bool, typer.Option("--print", help="Print the study instead of writing a file.")] = False,
 ) -> None:
-    """Write a commented study file."""
+    """Write a study file with a comment for every key."""
     from palpate.study import preset_study, to_toml
 
     if path.is_dir():
@@ -112,7 +126,7 @@ def init(
 
 @app.command()
 def schema() -> None:
-    """Print the JSON schema of study files, with which an editor checks them."""
+    """Print the JSON schema of study files. An editor can use it to check and complete a study file."""
     from palpate.study import study_schema
 
     typer.echo(study_schema())
@@ -120,7 +134,7 @@ def schema() -> None:
 
 @app.command()
 def sweep(study: StudyFile = STUDY, workers: Workers = None, as_json: Json = False) -> None:
-    """Solve the study's model over its ranges; an interrupted sweep goes on where it stopped."""
+    """Solve the finite-element model of a study over its ranges. An interrupted sweep continues where it stopped."""
     from palpate.cli.study_commands import sweep_file
 
     sweep_file(study, workers, Console(as_json))
@@ -128,7 +142,7 @@ def sweep(study: StudyFile = STUDY, workers: Workers = None, as_json: Json = Fal
 
 @app.command()
 def learn(study: StudyFile = STUDY, as_json: Json = False) -> None:
-    """Learn the study's dataset: networks that grow and prune themselves, then refinement."""
+    """Learn a surrogate from the solves of a study, check it, and write it to a model file."""
     from palpate.cli.study_commands import learn_file
 
     learn_file(study, Console(as_json))
@@ -136,17 +150,25 @@ def learn(study: StudyFile = STUDY, as_json: Json = False) -> None:
 
 @app.command()
 def validate(
-    study: Annotated[Path, typer.Argument(help="A study file, or a touch surrogate.")] = STUDY,
+    study: Annotated[Path, typer.Argument(help="Study file or model file.")] = STUDY,
     test: Annotated[
-        Path | None, typer.Option(help="Unseen solves of a surrogate's body, by default NAME-test.zarr.")
+        Path | None,
+        typer.Option(
+            help="For a model file: dataset of solves that it was not learnt from. Default: NAME-test.zarr."
+        ),
     ] = None,
     refined: Annotated[
-        Path | None, typer.Option(help="The same on a finer mesh, which tell the mesh's own error.")
+        Path | None,
+        typer.Option(
+            help="For a model file: solves at some of these places on a finer mesh. They show the error of the mesh."
+        ),
     ] = None,
-    report: Annotated[bool, typer.Option("--report/--no-report", help="Write the HTML report.")] = True,
+    report: Annotated[
+        bool, typer.Option("--report/--no-report", help="Write a report as an HTML page.")
+    ] = True,
     as_json: Json = False,
 ) -> None:
-    """Judge what was learnt on solves it has never seen; exit code 1 where it misses a limit."""
+    """Check a surrogate with solves that it was not learnt from. The exit code is 1 if a limit is missed."""
     from palpate.cli.study_commands import is_archive, validate_model, validate_study_file
 
     console = Console(as_json)
@@ -155,7 +177,7 @@ def validate(
         return
     if test is not None or refined is not None:
         raise UsageError(
-            "A study file says by itself what it is tested with.", fix="Leave out --test and --refined."
+            "A study file already names the solves that test it.", fix="Leave out --test and --refined."
         )
     validate_study_file(study, report, console)
 
@@ -164,23 +186,25 @@ def validate(
 def view(
     model: ModelFile,
     port: Port = None,
-    strict_port: Annotated[bool, typer.Option("--strict-port", help="Fail where the port is busy.")] = False,
+    strict_port: Annotated[
+        bool, typer.Option("--strict-port", help="Stop with an error if the port is busy.")
+    ] = False,
     browser: Browser = True,
 ) -> None:
-    """Serve the page on which the model can be touched, on this machine only."""
+    """Open a page on which you can touch the model. Only this machine can reach it."""
     _serve(model, port=port, browser=browser, strict_port=strict_port)
 
 
 @app.command()
 def show(
-    file: Annotated[
-        Path, typer.Argument(help="A .vtu or .pvd file, or the .zarr folder of a solid's sweep.")
-    ],
+    file: Annotated[Path, typer.Argument(help="File (.vtu or .pvd) or dataset (.zarr) with solved bodies.")],
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the page.")] = 8080,
-    strict_port: Annotated[bool, typer.Option("--strict-port", help="Fail where the port is busy.")] = False,
+    strict_port: Annotated[
+        bool, typer.Option("--strict-port", help="Stop with an error if the port is busy.")
+    ] = False,
     browser: Browser = True,
 ) -> None:
-    """Serve a page on which solved bodies are looked at: deformed, coloured, state by state."""
+    """Open a page that shows solved bodies: their deformation, in colour, one state after the other."""
     from palpate.viewer import show as show_body
 
     show_body(file, port=port, strict_port=strict_port, open_browser=browser and sys.stdout.isatty())
@@ -191,11 +215,13 @@ def ask(
     model: ModelFile,
     at: Annotated[
         list[str] | None,
-        typer.Option(help="Inputs with commas between, SI units: 0.05,0.05,0.055. May be given again."),
+        typer.Option(
+            help="Values of all inputs in SI units, with commas between: 0.05,0.05,0.055. Can be given several times."
+        ),
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Say what a learnt body's file holds, or the force, stiffness and trust at a place."""
+    """Print what a model file holds, or the force, the stiffness and the trust at given places."""
     from palpate.cli.ask_command import ask as ask_model
 
     ask_model(model, at or [], Console(as_json))
@@ -204,12 +230,17 @@ def ask(
 @app.command()
 def run(
     model: ModelFile,
-    seconds: Annotated[float, typer.Option(min=0.1, help="How long.")] = 5.0,
-    device: Annotated[str, typer.Option(help="For example stroke:amplitude=0.02,frequency=1.")] = "stroke",
-    rate: Annotated[float | None, typer.Option(min=10, max=10000, help="Hz; by default the study's.")] = None,
+    seconds: Annotated[float, typer.Option(min=0.1, help="Duration in seconds.")] = 5.0,
+    device: Annotated[
+        str, typer.Option(help="Device with its settings, for example stroke:amplitude=0.02,frequency=1.")
+    ] = "stroke",
+    rate: Annotated[
+        float | None,
+        typer.Option(min=10, max=10000, help="Ticks per second (Hz). Default: that of the study."),
+    ] = None,
     as_json: Json = False,
 ) -> None:
-    """Run the real-time loop without a page, and print how late it was."""
+    """Run the real-time loop without a page, and print how late its ticks were."""
     from palpate.cli.run_command import run_loop
 
     run_loop(model, seconds, device, rate, Console(as_json))
@@ -217,30 +248,61 @@ def run(
 
 @app.command()
 def correct(
-    model: Annotated[Path, typer.Argument(help="The .palpate file of a body that is pressed.")],
-    out: Annotated[Path, typer.Option(help="File to write the corrected surrogate to.")],
+    model: Annotated[Path, typer.Argument(help="Model file (.palpate) of a body that a probe presses.")],
+    out: Annotated[Path, typer.Option(help="File for the corrected model.")],
     file: Annotated[Path | None, typer.Option(help="Table of measured positions and forces.")] = None,
-    stdin: Annotated[bool, typer.Option("--stdin", help="Lines of a sensor from standard input.")] = False,
+    stdin: Annotated[
+        bool, typer.Option("--stdin", help="Read the lines of a sensor from standard input.")
+    ] = False,
     port: Annotated[
         int | None,
-        typer.Option(min=0, max=65535, help="Lines from one connection to 127.0.0.1; 0: any port."),
+        typer.Option(
+            min=0,
+            max=65535,
+            help="Read lines from one connection to 127.0.0.1 at this port. 0: any free port.",
+        ),
     ] = None,
     parameter: Annotated[
-        list[str] | None, typer.Option(help="NAME=VALUE of a further input of the model.")
+        list[str] | None,
+        typer.Option(help="Value of a further input of the model: NAME=VALUE. Can be given several times."),
     ] = None,
     offset: Annotated[
-        float, typer.Option(min=0, help="How far the surface's height may be off, m (one deviation).")
+        float,
+        typer.Option(min=0, help="Uncertainty of the height of the surface, in m (one standard deviation)."),
     ] = 5e-4,
-    constant: Annotated[float, typer.Option(min=0, help="How far ln of the stiffness may be off.")] = 0.5,
-    varying: Annotated[float, typer.Option(min=0, help="The same, of what varies with place.")] = 0.3,
-    noise: Annotated[float, typer.Option(help="Of a measured component, N (one deviation).")] = 0.005,
-    relative: Annotated[float, typer.Option(min=0, help="The same, of the force's size.")] = 0.01,
-    jitter: Annotated[float, typer.Option(min=0, help="Of the measured position, m.")] = 0.0,
-    stall: Annotated[float, typer.Option(min=0.1, help="Seconds of silence that end a stream.")] = 30.0,
-    wait: Annotated[float, typer.Option(min=0.1, help="Seconds that a connection is waited for.")] = 60.0,
+    constant: Annotated[
+        float,
+        typer.Option(
+            min=0,
+            help="Uncertainty of the stiffness of the whole body, as a natural logarithm (one standard deviation).",
+        ),
+    ] = 0.5,
+    varying: Annotated[
+        float,
+        typer.Option(
+            min=0,
+            help="Uncertainty of the stiffness from place to place, as a natural logarithm (one standard deviation).",
+        ),
+    ] = 0.3,
+    noise: Annotated[
+        float, typer.Option(help="Noise of a measured force component, in N (one standard deviation).")
+    ] = 0.005,
+    relative: Annotated[
+        float,
+        typer.Option(
+            min=0, help="Noise of a measured force, as a share of its size (one standard deviation)."
+        ),
+    ] = 0.01,
+    jitter: Annotated[
+        float, typer.Option(min=0, help="Noise of the measured position, in m (one standard deviation).")
+    ] = 0.0,
+    stall: Annotated[
+        float, typer.Option(min=0.1, help="A stream ends after so many seconds without a line.")
+    ] = 30.0,
+    wait: Annotated[float, typer.Option(min=0.1, help="Seconds to wait for a connection.")] = 60.0,
     as_json: Json = False,
 ) -> None:
-    """Correct a touch surrogate by forces measured on a specimen; prints the error before and after."""
+    """Correct a model by forces measured on a specimen, and print the error before and after."""
     from palpate.cli.correct_command import Source, correct_model
     from palpate.learning.correction import Discrepancy, Noise
 
@@ -253,7 +315,7 @@ def correct(
 
 @app.command()
 def doctor(as_json: Json = False) -> None:
-    """Say what this machine can do, and what to do about each miss."""
+    """Check this machine: software, real-time scheduling and devices, with advice for what is missing."""
     from palpate.cli.doctor import report
 
     report(Console(as_json))
@@ -275,7 +337,7 @@ def _serve(model: Path, *, port: int | None, browser: bool, strict_port: bool = 
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Entry point: exit codes from the error tree, never a traceback for an error palpate foresaw."""
+    """Run the command line; an error that palpate foresaw ends with its exit code and without a traceback."""
     words = sys.argv[1:] if arguments is None else arguments
     try:
         with advice_in_words():

@@ -1,4 +1,4 @@
-"""`palpate ask`: what a learnt file holds, and what that answers at a place."""
+"""`palpate ask`: print the content of a learnt file, or its answers at given places."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from palpate.learning import Fitted
 from palpate.learning.plastic.paths import KIND, HeldPaths
 from palpate.network import Archive, Network, load_archive
 from palpate.runtime.touchable import touchable
-from palpate.surrogates import TouchedBody, TouchSurrogate
 from palpate.surrogates.learnt_energy import LearntEnergy, warning_of
 from palpate.surrogates.loading import load
 from palpate.units import Range
@@ -27,7 +26,7 @@ _STEPS = 16  # in a radius
 
 
 def ask(model: Path, at: Sequence[str], console: Console) -> None:
-    """Print what a file holds; with places, what it answers there instead.
+    """Print the content of a file, or with places its answers there.
 
     Raises
     ------
@@ -36,14 +35,16 @@ def ask(model: Path, at: Sequence[str], console: Console) -> None:
     UsageError
         If a place is not as many numbers as there are inputs, or what the file holds has no answer to a place.
     """
-    found = _read(model)
-    asked = found.touch if isinstance(found, TouchedBody) else found
-    what, inputs = type(found).__name__, _inputs(asked)
+    content_of_file = _read(model)
+    asked = getattr(content_of_file, "touch", content_of_file)
+    what, inputs = type(content_of_file).__name__, _inputs(asked)
     if not at:
         ranges = [{"name": r.name, "low": r.low, "high": r.high, "unit": r.unit} for r in inputs]
-        content = {"model": str(model), "kind": what, "inputs": ranges, "text": str(found)}
+        content = {"model": str(model), "kind": what, "inputs": ranges, "text": str(content_of_file)}
         warning = _warning(asked)
-        console.result("\n".join([f"{what} in {model}\n{found}", *warning]), content | _as_field(warning))
+        console.result(
+            "\n".join([f"{what} in {model}\n{content_of_file}", *warning]), content | _as_field(warning)
+        )
         return
     if isinstance(asked, LearntEnergy):
         X = _places(at, inputs)
@@ -64,7 +65,7 @@ def ask(model: Path, at: Sequence[str], console: Console) -> None:
 
 
 def _read(path: Path) -> Any:
-    """What a file of any kind holds."""
+    """Return the content of a file of any kind."""
     kind = load_archive(path).kind
     if kind == KIND:
         return HeldPaths.load(path)
@@ -77,7 +78,7 @@ def _read(path: Path) -> Any:
 
 
 def _inputs(asked: Any) -> tuple[Range, ...]:
-    """Ranges of the n inputs; none of histories."""
+    """Return the ranges of the n inputs; none of histories."""
     if isinstance(asked, HeldPaths):
         return ()
     return tuple(asked.network.inputs if isinstance(asked, Fitted) else asked.inputs)
@@ -92,14 +93,14 @@ def _answered(energy: LearntEnergy, X: np.ndarray) -> list[Answer]:
     answers = [
         Answer(x, float(U), F, K, float(d), bool(i)) for x, U, F, K, d, i in zip(X, *columns, strict=True)
     ]
-    if not isinstance(energy, TouchSurrogate):
+    if (surface := getattr(energy, "surface", None)) is None:
         return answers
-    let_go, end = _let_go(energy, X), energy.surface.inner
+    let_go, end = _let_go(energy, X), surface.inner
     return [one.ended(end) if gone else one for one, gone in zip(answers, let_go, strict=True)]
 
 
-def _let_go(touch: TouchSurrogate, X: np.ndarray) -> list[bool]:
-    """Whether the loop would let go of a probe (N,) at inputs X (N, n), so that no force is known there.
+def _let_go(touch: Any, X: np.ndarray) -> list[bool]:
+    """Return whether the loop would let go of a probe (N,) at inputs X (N, n), so that no force is known there.
 
     One that feels nothing is led out along the body's normal: from beneath the touched surface it meets that from
     behind, and the body lets go of it; from the air it meets nothing, or a front.
@@ -139,7 +140,7 @@ def _places(texts: Sequence[str], inputs: Sequence[Range]) -> np.ndarray:
 
 
 def _place(text: str, inputs: Sequence[Range]) -> list[float]:
-    """Numbers with commas or blanks between them, as many as there are inputs."""
+    """Return numbers with commas or blanks between them, as many as there are inputs."""
     try:
         found = [float(word) for word in text.replace(",", " ").split()]
     except ValueError:

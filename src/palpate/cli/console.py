@@ -1,4 +1,4 @@
-"""Where words go: progress and errors to stderr, results to stdout, as text or as one JSON object."""
+"""Output of the commands: progress and errors to stderr, results to stdout, as text or as one JSON object."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ __all__ = ["Console", "advice_in_words"]
 @contextlib.contextmanager
 def advice_in_words() -> Iterator[None]:
     """Show warnings of palpate's own as what they say, each once, without the line of code that led to it."""
-    usual, told = warnings.showwarning, set[str]()
+    usual, shown = warnings.showwarning, set[str]()
 
     def show(message: Warning | str, category: type[Warning], *place: Any) -> None:
         if category.__module__.partition(".")[0] != "palpate":
             usual(message, category, *place)
-        elif str(message) not in told:
-            told.add(str(message))
+        elif str(message) not in shown:
+            shown.add(str(message))
             print(f"warning: {message}", file=sys.stderr, flush=True)  # noqa: T201
 
     warnings.showwarning = show  # type: ignore[assignment]
@@ -37,7 +37,7 @@ def advice_in_words() -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Console:
-    """What a command prints with.
+    """Printer of a command.
 
     Attributes
     ----------
@@ -48,17 +48,17 @@ class Console:
     as_json: bool = False
 
     def say(self, text: str) -> None:
-        """Progress: one line on stderr, in a terminal or not."""
+        """Print one line of progress to stderr."""
         if not self.as_json:
             print(text, file=sys.stderr, flush=True)  # noqa: T201
 
     def result(self, text: str, content: Mapping[str, Any]) -> None:
-        """The answer of a command."""
+        """Print the result of a command to stdout."""
         # not-a-number is no JSON: it becomes null
         print(json.dumps(_finite(content), indent=2) if self.as_json else text, flush=True)  # noqa: T201
 
     def error(self, error: PalpateError) -> None:
-        """A failure: what, why and what to do."""
+        """Print an error: what happened, why, and what to do."""
         if self.as_json:
             parts = {"kind": type(error).__name__, "what": error.what, "why": error.why, "fix": error.fix}
             print(json.dumps({"error": parts}, indent=2), flush=True)  # noqa: T201

@@ -1,4 +1,4 @@
-"""`palpate correct`: a touch surrogate follows a specimen, from a file, a pipe or a sensor's script."""
+"""`palpate correct`: correct a model by measurements from a file, from standard input or from a port."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,6 @@ from palpate.cli.console import Console
 from palpate.dataset.measured import Measured, lines_of, listening, measurements, read_measured
 from palpate.errors import AccuracyError, UsageError
 from palpate.learning.correction import Corrected, Corrector, Discrepancy, Noise, correct, judged
-from palpate.surrogates import TouchedBody, TouchSurrogate
 from palpate.surrogates.loading import load
 from palpate.units import to_si
 
@@ -25,13 +25,16 @@ _OFTEN = 100  # measurements between two lines of progress
 
 @dataclass(frozen=True)
 class Source:
-    """Where measurements come from: one of a file, standard input, a port.
+    """Source of measurements: one of a file, standard input, a port.
 
     Attributes
     ----------
     file : Path, optional
+        Table of measurements.
     stdin : bool
+        True to read lines from standard input.
     port : int, optional
+        Port of 127.0.0.1 at which one connection is awaited; 0: any free port.
     stall, wait : float
         Seconds of silence that end a stream, and that a connection is waited for.
     """
@@ -69,14 +72,14 @@ def correct_model(
     AccuracyError
         If the forces have another sign, or may have another unit, than the model's; everything has been written then.
     """
-    body = load(model)
-    if not isinstance(body, TouchedBody | TouchSurrogate):
+    body: Any = load(model)
+    surrogate = getattr(body, "touch", body)
+    if getattr(surrogate, "surface", None) is None:
         raise UsageError(
             f"{model} holds no body that is pressed.",
             why=f"It holds a {type(body).__name__}; measured forces correct what a probe presses.",
             fix="Give the model of a study of touches, such as `palpate demo block` writes.",
         )
-    surrogate = body.touch if isinstance(body, TouchedBody) else body
     if out.exists() and out.samefile(model):
         raise UsageError(
             f"{out} is the model itself.",
@@ -93,8 +96,8 @@ def correct_model(
     else:
         corrector = Corrector(surrogate, parameters=values, discrepancy=discrepancy, noise=noise)
         done = _streamed(corrector, source, console)
-    found = done.surrogate
-    path = (body.felt_as(found) if isinstance(body, TouchedBody) else found).save(out)
+    corrected = done.surrogate if body is surrogate else body.felt_as(done.surrogate)
+    path = corrected.save(out)
     if done.warning and not done.doubtful:
         console.say(done.warning)
     console.result(f"{done}\n{path}", {**done.as_dict(), "warning": done.warning or None, "model": str(path)})
@@ -144,8 +147,8 @@ def _learnt(corrector: Corrector, lines: Iterable[Measured], console: Console) -
     return judged(corrector, record)
 
 
-def _parameters(surrogate: TouchSurrogate, words: Sequence[str]) -> list[float]:
-    """Values of the further inputs, in their order, from NAME=VALUE in SI units or with a unit."""
+def _parameters(surrogate: Any, words: Sequence[str]) -> list[float]:
+    """Return the values of the further inputs, in their order, from NAME=VALUE in SI units or with a unit."""
     said = dict(word.partition("=")[::2] for word in words)
     names = [r.name for r in surrogate.parameters]
     if set(said) != set(names) or len(said) != len(words):

@@ -1,4 +1,4 @@
-"""`palpate demo`: studies with a name, from finite elements to a report and a model that can be touched."""
+"""`palpate demo`: named studies, from finite elements to a report and a model that can be touched."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def run_demo(
     Returns
     -------
     list of Path
-        The models' files.
+        Files of the models.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""`palpate doctor`: what this machine can do, and what to do about each miss."""
+"""`palpate doctor`: findings about this machine, and advice for what is missing."""
 
 from __future__ import annotations
 

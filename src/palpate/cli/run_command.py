@@ -34,7 +34,7 @@ class _Peak:
     let_go: int = 0
 
     def see(self, state: State) -> None:
-        """One look at the loop."""
+        """Take one look at the loop."""
         self.force = max(self.force, math.hypot(*state.force))
         self.depth = max(self.depth, state.depth)
         self.looks += 1
@@ -57,7 +57,7 @@ class _Peak:
         return words
 
     def as_dict(self) -> dict[str, float]:
-        """For a program."""
+        """Return the figures as data for a program."""
         looks = max(self.looks, 1)
         return {
             "largest_force": self.force,
@@ -92,7 +92,7 @@ def run_loop(model: Path, seconds: float, device: str, rate: float | None, conso
 
 
 def _aimed(device: str, touch: Touchable, scale: float) -> str:
-    """The scripted stroke, unless it is told where to go, presses where a body was trained to be pressed."""
+    """Return the device; a scripted stroke without a place presses where the body was trained to be pressed."""
     name, _, text = device.partition(":")
     if name != "stroke" or touch.holds:
         return device

@@ -126,6 +126,7 @@ def validate_model(
     report : bool
         Whether to write the report.
     console : Console
+        Printer of the result.
 
     Raises
     ------

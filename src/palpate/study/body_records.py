@@ -175,7 +175,7 @@ class CantileverRecord(Record):
 
     @property
     def has_memory(self) -> bool:
-        """Whether the material yields or creeps, so that the answer depends on the history."""
+        """True if the material yields or creeps, so that the answer depends on the history."""
         return not isinstance(_material(self.material), LinearElastic)
 
     def surface_names(self) -> tuple[str, ...]:
@@ -214,7 +214,7 @@ class _SolidRecord(Record):
 
     @property
     def has_memory(self) -> bool:
-        """Whether the answer depends on the history: not for the materials that a study file can name."""
+        """True if the answer depends on the history: not for the materials that a study file can name."""
         return False
 
     def surface_names(self) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""What acts on the body of a study: the table `[interaction]` with a kind, what varies beside it, and memory."""
+"""Interactions of a study: the table `[interaction]` with a kind, numbers that vary beside it, and memory."""
 
 from __future__ import annotations
 

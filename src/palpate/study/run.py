@@ -52,7 +52,7 @@ Rows: TypeAlias = Dataset | HeldPaths
 
 @dataclass(frozen=True)
 class Paths:
-    """Where a study's files are: all named after the study, in one folder."""
+    """Files of a study: all named after the study, in one folder."""
 
     folder: Path
     name: str
@@ -79,7 +79,7 @@ class Paths:
 
     @property
     def model(self) -> Path:
-        """What was learnt."""
+        """File of the surrogate."""
         return self.folder / f"{self.name}.palpate"
 
     @property
@@ -100,16 +100,19 @@ class Outcome:
     Attributes
     ----------
     study : Study
+        The study that was carried out.
     model : Surrogate
-        What was learnt.
+        Result of learning, with its errors on unseen solves written into it.
     train, test : Dataset or load histories
         Solves that were learnt from, and solves that were not.
     validation : Validation
+        Figures of the surrogate on the unseen solves.
     history : optional
-        What happened while it was learnt.
+        Record of learning.
     rivals : mapping of name to History
         The founding form of the filter beside ours, for studies with one input.
     timings : mapping of stage to seconds
+        Duration of each stage.
     """
 
     study: Study
@@ -144,6 +147,7 @@ def sweep_study(
     Parameters
     ----------
     study : Study
+        The study to solve.
     paths : Paths, optional
         Where datasets are written as they grow; an interrupted sweep goes on where it stopped.
     cluster : optional
@@ -261,7 +265,9 @@ def learn_study(
     Parameters
     ----------
     study : Study
+        The study whose settings are used.
     train : Dataset or load histories
+        Solves to learn from.
     test : Dataset or load histories, optional
         Unseen rows, which are only watched while a filter learns.
     progress : callable, optional
@@ -272,6 +278,7 @@ def learn_study(
     Returns
     -------
     surrogate, history
+        What `palpate.learn` returns, and for a body with memory how well it fits.
     """
     if not isinstance(train, Dataset):
         model, history = learn_histories(study, train)
@@ -374,6 +381,7 @@ def carry_out(
     Parameters
     ----------
     study : Study
+        The study to carry out.
     paths : Paths
         Where files are written.
     cluster : optional

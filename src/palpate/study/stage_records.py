@@ -53,7 +53,7 @@ class _SweepRecord(Record):
 
 
 class LoadSweepRecord(_SweepRecord):
-    """Which loads are solved."""
+    """Loads that are solved."""
 
     element: ClassVar[float | None] = None
     symmetric: ClassVar[bool] = False
@@ -67,7 +67,7 @@ class LoadSweepRecord(_SweepRecord):
 
 
 class PadSweepRecord(_SweepRecord):
-    """Which displacements and places of the pad are solved."""
+    """Displacements and places of the pad that are solved."""
 
     symmetric: ClassVar[bool] = False
     element: Metres | None = Field(
@@ -79,7 +79,7 @@ class PadSweepRecord(_SweepRecord):
 
 
 class ProbeSweepRecord(_SweepRecord):
-    """Which touches are solved: columns into the body, each from shallow to deep."""
+    """Touches that are solved: columns into the body, each from shallow to deep."""
 
     samples: int = Field(40, ge=FEWEST, description="number of solves")
     depths: int = Field(5, ge=1, description="solves in a column")
@@ -103,7 +103,7 @@ class ProbeSweepRecord(_SweepRecord):
 
 
 class LoadTestRecord(Record):
-    """Which solves the network never sees."""
+    """Solves that the network never sees."""
 
     every: int = Field(2, ge=0, description="one row in so many of the sweep is kept for testing; 0: none")
     random: int = Field(100, ge=0, description="further solves at random loads")
@@ -226,7 +226,7 @@ class ProbeLearningRecord(PadLearningRecord):
 
 
 class LoadTargetRecord(Record):
-    """What `palpate validate` asks of the networks on unseen loads."""
+    """Limits of `palpate validate` for the networks on unseen loads."""
 
     rmse: float = Field(5e-6, gt=0, description="refined network, relative to full scale")
     filter_rmse: float = Field(1e-3, ge=0, description="sequential filter alone; 0: not asked")
@@ -245,7 +245,7 @@ class LoadTargetRecord(Record):
 
 
 class TouchTargetRecord(Record):
-    """What `palpate validate` asks on unseen solves; 0: not asked."""
+    """Limits of `palpate validate` on unseen solves; 0: not asked."""
 
     force_median: float = Field(0.01, ge=0, description="relative force error, median")
     force_p95: float = Field(0.035, ge=0, description="relative force error, 95th percentile")
@@ -273,7 +273,7 @@ class TouchTargetRecord(Record):
 
 
 class HistoryTargetRecord(Record):
-    """What `palpate validate` asks on unseen histories, over the largest force."""
+    """Limits of `palpate validate` on unseen histories, over the largest force."""
 
     force_median: float = Field(0.01, gt=0, description="force error, median")
     force_p95: float = Field(0.035, gt=0, description="force error, 95th percentile")

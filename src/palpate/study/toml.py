@@ -35,7 +35,7 @@ def read_study(path: str | os.PathLike[str]) -> Study:
     Parameters
     ----------
     path : path
-        Of a TOML file such as `palpate init` writes.
+        TOML file, as `palpate init` writes it.
 
     Raises
     ------
@@ -77,6 +77,11 @@ def _from_first_version(content: dict[str, Any]) -> dict[str, Any]:
         content["interaction"] = {"kind": "loads", "loads": content.pop("loads")}
     elif isinstance(content.get("probe"), dict):
         content["interaction"] = {"kind": "probe", **content.pop("probe")}
+    target = content.get("target")
+    if isinstance(target, dict) and "filter_relapse" in target:
+        content["target"] = {
+            "filter_regression" if k == "filter_relapse" else k: v for k, v in target.items()
+        }
     return content
 
 

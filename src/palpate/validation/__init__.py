@@ -1,16 +1,9 @@
-"""Is it true: a model against solves it has never seen, and the report that says so.
+"""Validation: a model against solves it has never seen, and the report that shows the result.
 
-    limits     what is asked, and why a person would notice       words     figures as a person reads them
-    region     the outer part of the range; where the worst is    outputs   errors of nodal displacements
-    field      errors of the whole deflected shape                force     errors of the force on the hand
-    stiffness  ∂F/∂x against the finite-element curve             loops     work around closed paths
-    judge      figures against limits                             judgement what every model's result can do
-    result     of a body held at one node                         surrogate of a body touched anywhere
-    solves     what a touched body is judged by                   dispatch  `validate`
-    strokes    smoothness of the force at 1 kHz                   coverage  does the interval hold what it says
-    quadrature work around closed paths, converged                mesh_error the mesh's error apart
-    parts      shallow, deep, edge, worst cases                   held     of a held body that remembers
-    report/    one self-contained page with figures and tables
+validate        `validate` and its result, made of figures    figures/   one figure a file
+subject         a model and the solves that judge it          limits     limits, and the reasons for them
+unseen_solves   solves and functions of place as values       worst      worst cases, and the outer part of the range
+report/         one self-contained page with pictures and tables
 
 Names are loaded when they are first used: Matplotlib and Jinja2 cost time that only a report needs.
 """

@@ -40,7 +40,7 @@ Bound = float | tuple[float, float]
 
 
 def _within(value: float, bound: Bound) -> bool:
-    """Whether a figure keeps a bound; not-a-number never does."""
+    """Return whether a figure keeps a bound; not-a-number never does."""
     low, high = bound if isinstance(bound, tuple) else (-math.inf, bound)
     return bool(low <= value <= high)
 
@@ -141,6 +141,7 @@ class Criterion:
     key : str
         Its name in `Limits`.
     label : str
+        The criterion in words, for tables.
     kind : "scale", "metres", "share", "degrees" or "times"
         How its figures are written.
     good : float, (float, float) or None
@@ -166,8 +167,11 @@ class Check:
     Attributes
     ----------
     criterion : Criterion
+        What is compared.
     measured : float
+        Measured value.
     limit : float or (float, float)
+        Largest value that passes, or the smallest and the largest.
     where : str
         The worst case in words; empty where there is none to name.
     """
@@ -179,7 +183,7 @@ class Check:
 
     @property
     def passed(self) -> bool:
-        """Whether the figure is within its limit; not-a-number never is."""
+        """True if the figure is within its limit; not-a-number never is."""
         return _within(self.measured, self.limit)
 
     @property
@@ -196,7 +200,7 @@ class Check:
         return "good" if good is not None and _within(self.measured, good) else "pass"
 
     def __str__(self) -> str:
-        """What was measured, what was asked, where the worst case is, what to do."""
+        """Return the measured value, the limit, the worst case, and after a miss the advice."""
         from palpate.format import criterion_figure
 
         kind = self.criterion.kind

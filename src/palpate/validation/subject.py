@@ -1,4 +1,4 @@
-"""What is judged, and by what: a model as functions that can be asked, and solves that it has never seen.
+"""Subject of a validation: a model as functions that can be asked, and solves that it has never seen.
 
 `Subject.of` is the one place that knows how each kind of model is asked; figures see only what a subject can answer.
 """
@@ -18,7 +18,7 @@ from palpate.learning import History
 from palpate.learning.energy.columns import columns_of
 from palpate.learning.plastic import HeldPaths
 from palpate.learning.touch import hand_coordinates
-from palpate.surrogates import TouchedBody, TouchModel, TouchSurrogate
+from palpate.surrogates import TouchModel
 from palpate.surrogates.fields.field_surrogate import FieldSurrogate
 from palpate.surrogates.plastic import HeldBody
 from palpate.surrogates.touch import SLACK
@@ -135,8 +135,8 @@ def _by_place(
     model: Any, test: Dataset | TouchSolves, refined: Any, strokes: Sequence[TouchSolves], seed: int
 ) -> Subject:
     """Return a model whose force is a function of place."""
-    field = model.fields.get("displacement") if isinstance(model, TouchedBody) else None
-    energy = model.touch if isinstance(model, TouchedBody) else model
+    field = getattr(model, "fields", {}).get("displacement")
+    energy = getattr(model, "touch", model)
     function = TouchFunction.of(energy)
     _refuse_radius(energy, test)
     solves = TouchSolves.of(test, function.inputs)
@@ -175,32 +175,30 @@ def _seen(model: Any, X: np.ndarray) -> np.ndarray:
 
     A surrogate remembers its training inputs and their images under the body's symmetry, up to 512 of them.
     """
-    if isinstance(model, TouchFunction) or model.region is None:
+    region = getattr(model, "region", None)
+    if region is None:
         return np.zeros(len(X), dtype=bool)
     low, high = bounds(model.inputs)
-    return np.asarray(model.region.distances(2 * (X - low) / (high - low) - 1) < SEEN)
+    return np.asarray(region.distances(2 * (X - low) / (high - low) - 1) < SEEN)
 
 
 def _refuse_radius(model: Any, data: Dataset | TouchSolves) -> None:
     """Refuse solves with another probe than the surrogate's."""
-    if (
-        not isinstance(model, TouchSurrogate)
-        or not isinstance(data, Dataset)
-        or model.radius_input is not None
-    ):
+    own = getattr(model, "radius", None)
+    if own is None or model.radius_input is not None or not isinstance(data, Dataset):
         return
     acting = data.provenance.get("problem", {}).get("interactions", [])
     radii = [a["radius"] for a in acting if isinstance(a, dict) and "radius" in a]
-    if any(abs(r - model.radius) > RADIUS * model.radius for r in radii):
+    if any(abs(r - own) > RADIUS * own for r in radii):
         raise UsageError(
-            f"The solves' probe has a radius of {1e3 * radii[0]:g} mm, the surrogate's {1e3 * model.radius:g} mm.",
+            f"The solves' probe has a radius of {1e3 * radii[0]:g} mm, the surrogate's {1e3 * own:g} mm.",
             fix="Test with solves of the probe that the surrogate was learnt with.",
         )
 
 
 def _places(model: Any, solves: TouchSolves) -> list[str]:
     """Return a sentence where several depths over one place were solved: these tell less than as many places."""
-    if not isinstance(model, TouchSurrogate):
+    if getattr(model, "surface", None) is None:
         return []
     own = model.radius_input
     radius = model.radius if own is None else float(solves.X[:, own].mean())

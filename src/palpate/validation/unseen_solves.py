@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.learning.grasp.solves import HeldSolves
-from palpate.surrogates import TouchSurrogate
-from palpate.surrogates.grasp import GraspSurrogate
 from palpate.units import Range
 from palpate.validation.limits import FAINT, FAINT_JND, FORCE_JND
 
@@ -191,13 +190,18 @@ class TouchFunction:
     Attributes
     ----------
     name : str
+        Name in tables and headings.
     inputs : n ranges
+        Names, trained ranges and units of the inputs; the first three are coordinates in m.
     force : callable (N, n) → (N, 3)
         N.
     energy, stiffness, depth, inside, deviation : callable, optional
         (N, n) → (N,) in J, (N, 3, 3) in N/m, (N,) in m, (N,) bool, (N,) relative to the force. What is missing is
         not judged, and said not to be.
     units : int
+        Units of the network that answers.
+    holds : bool
+        True if the hand holds the body and x is its displacement from rest; False if x is the centre of a probe.
     """
 
     name: str
@@ -209,23 +213,24 @@ class TouchFunction:
     inside: Answer | None = None
     deviation: Answer | None = None
     units: int = 0
+    holds: bool = False
 
     @classmethod
-    def of(cls, model: TouchSurrogate | GraspSurrogate | TouchFunction) -> TouchFunction:
+    def of(cls, model: Any) -> TouchFunction:
         """Return the function that a surrogate answers; a function as it is."""
         if isinstance(model, TouchFunction):
             return model
-        touched = isinstance(model, TouchSurrogate)
         return cls(
-            str(model.meta.get("name", "touch surrogate" if touched else "grasp surrogate")),
+            str(model.meta.get("name", "surrogate")),
             model.inputs,
             model.force,
             model.energy,
             model.stiffness,
-            model.depth if isinstance(model, TouchSurrogate) else None,
+            getattr(model, "depth", None),
             model.inside,
             None if model.root is None else model.deviation,
             model.network.units,
+            holds=getattr(model, "surface", None) is None,
         )
 
     def within(self, X: np.ndarray) -> np.ndarray:

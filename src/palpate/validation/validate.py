@@ -225,12 +225,13 @@ def checks(figures: Any, limits: Limits, fixes: Mapping[str, str]) -> tuple[Chec
     Parameters
     ----------
     figures : iterable of Figure
+        Figures that were measured.
     limits : Limits
         A limit of None asks nothing.
     fixes : mapping of names of limits to advice after a miss
         Where it differs from the advice of the criterion.
     """
-    measured = {key: value for figure in figures for key, value in figure.judged().items()}
+    measured = {key: value for figure in figures for key, value in figure.measured().items()}
     found = []
     for criterion in CRITERIA:
         limit = getattr(limits, criterion.key)

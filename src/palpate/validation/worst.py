@@ -22,7 +22,9 @@ class Worst:
     Attributes
     ----------
     value : float
+        The figure at this sample.
     inputs : tuple of (name, value, unit)
+        Inputs of this sample.
     place : str
         Node or output of the sample; may be empty.
     """

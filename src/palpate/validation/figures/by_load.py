@@ -18,7 +18,7 @@ from palpate.learning.touch import node_outputs
 from palpate.network import Network
 from palpate.surrogates import TouchEvaluator, TouchModel
 from palpate.validation.figures.displayed_shape import ShapeErrors
-from palpate.validation.figures.figure import Figure, Judged
+from palpate.validation.figures.figure import Figure, Measured
 from palpate.validation.figures.loop_work import LoopWork
 from palpate.validation.figures.stiffness import StiffnessErrors, curve_slope
 from palpate.validation.subject import Subject, hand_positions
@@ -73,6 +73,7 @@ class OutputErrors:
     relative, relative_max : float
         The same over full scale.
     per_output : tuple of OutputError
+        Errors of each output.
     outer_count : int
         Samples with any input within 5 % of an end of its range.
     outer, rest : float or None
@@ -157,7 +158,7 @@ class NetworkErrors(Figure):
     filter: OutputErrors | None
     regression: float | None
 
-    def judged(self) -> Judged:
+    def measured(self) -> Measured:
         """Return the values that are compared with limits."""
         values: dict[str, tuple[float | None, Worst | str | None]] = {
             "rmse": (self.refined.relative, self.refined.worst),
@@ -271,7 +272,9 @@ def stiffness_errors(touch: TouchModel, test: Dataset, hand: np.ndarray) -> Stif
     Parameters
     ----------
     touch : TouchModel
+        Model whose networks answer by load.
     test : Dataset
+        Converged unseen solves.
     hand : (N, k)
         Coordinates of the hand, m.
     """
@@ -302,10 +305,13 @@ def loop_work(
     Parameters
     ----------
     touch : TouchModel
+        Model whose networks answer by load.
     test : Dataset
+        Converged unseen solves.
     hand : (N, k)
         Coordinates of the hand, m.
     loops, seed : int
+        Number of polygons, and the seed that decides them.
 
     Returns
     -------
@@ -339,6 +345,7 @@ def work_around(
     Parameters
     ----------
     evaluate : TouchEvaluator
+        Evaluator of the model, asked point by point.
     corners : (c, 3)
         Hand positions, m; the last one leads back to the first.
     parameters : (p,)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.validation.figures.figure import Figure, Judged
+from palpate.validation.figures.figure import Figure, Measured
 from palpate.validation.subject import Subject
 
 __all__ = ["NINE_TENTHS", "Coverage", "coverage"]
@@ -36,7 +36,7 @@ class Coverage(Figure):
     share: float
     median_deviation: float
 
-    def judged(self) -> Judged:
+    def measured(self) -> Measured:
         """Return the value that is compared with a limit."""
         return {"interval_coverage": (self.share, None)}
 

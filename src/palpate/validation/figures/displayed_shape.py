@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.surrogates import FieldSurrogate
-from palpate.validation.figures.figure import Figure, Judged
+from palpate.validation.figures.figure import Figure, Measured
 from palpate.validation.subject import Subject
 from palpate.validation.worst import Worst
 
@@ -26,6 +26,7 @@ class ShapeErrors(Figure):
     largest : float
         Largest displacement of the solves, m.
     worst : Worst
+        Node and solve with the largest distance.
     """
 
     mean: float
@@ -33,7 +34,7 @@ class ShapeErrors(Figure):
     largest: float
     worst: Worst
 
-    def judged(self) -> Judged:
+    def measured(self) -> Measured:
         """Return the values that are compared with limits."""
         return {"displacement_mean": (self.mean, None), "displacement_max": (self.max, self.worst)}
 

@@ -1,4 +1,4 @@
-"""Base of all figures: what a measurement of a model on unseen solves can say.
+"""Base of all figures: measurements of a model on unseen solves.
 
 A figure is a function of a `Subject` that returns a value derived from `Figure`; a sentence where the figure can't be
 measured; or None where it does not apply. `palpate.validation.figures` lists all of them.
@@ -10,16 +10,16 @@ from collections.abc import Mapping
 
 from palpate.validation.worst import Worst
 
-__all__ = ["Figure", "Judged"]
+__all__ = ["Figure", "Measured"]
 
-Judged = Mapping[str, tuple[float | None, Worst | str | None]]
+Measured = Mapping[str, tuple[float | None, Worst | str | None]]
 """Measured values by their names in `Limits`, each with its worst case; values of None are not judged."""
 
 
 class Figure:
     """One measurement of a model on unseen solves."""
 
-    def judged(self) -> Judged:
+    def measured(self) -> Measured:
         """Return the values that are compared with limits."""
         return {}
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.units import Range
-from palpate.validation.figures.figure import Figure, Judged
+from palpate.validation.figures.figure import Figure, Measured
 from palpate.validation.subject import Subject
 from palpate.validation.unseen_solves import ForceSamples
 from palpate.validation.worst import Worst
@@ -49,6 +49,7 @@ class ForceErrors(Figure):
     direction_p95 : float or None
         Angle between the forces in degrees above f₀; None where the hand feels one direction only.
     worst, light_worst, direction_worst : Worst or None
+        Solves with the largest error above f₀, up to it, and in direction.
     """
 
     units: int
@@ -69,7 +70,7 @@ class ForceErrors(Figure):
     light_worst: Worst | None
     direction_worst: Worst | None
 
-    def judged(self) -> Judged:
+    def measured(self) -> Measured:
         """Return the values that are compared with limits."""
         return {
             "force_median": (self.median, self.worst),
@@ -87,9 +88,11 @@ def force_errors(
     Parameters
     ----------
     samples : ForceSamples
+        Forces of the model and of finite elements.
     X : (N, n)
         Inputs of the solves.
     ranges : n ranges
+        Names, bounds and units of the inputs.
     units : int
         Of the network.
     turning : bool

@@ -15,7 +15,7 @@ from palpate.errors import UsageError
 from palpate.format import length, plain, share
 from palpate.learning.plastic import HeldPath, HeldPaths
 from palpate.surrogates.plastic import HeldBody
-from palpate.validation.figures.figure import Figure, Judged
+from palpate.validation.figures.figure import Figure, Measured
 from palpate.validation.subject import Subject
 
 __all__ = ["Followed", "HistoryErrors", "follow_unseen", "history_following"]
@@ -98,7 +98,7 @@ class HistoryErrors(Figure):
     gives: float
     where: str
 
-    def judged(self) -> Judged:
+    def measured(self) -> Measured:
         """Return the values that are compared with limits."""
         return {
             "history_force_median": (self.median, None),

@@ -16,7 +16,7 @@ import numpy as np
 
 from palpate.format import share
 from palpate.units import bounds
-from palpate.validation.figures.figure import Figure, Judged
+from palpate.validation.figures.figure import Figure, Measured
 from palpate.validation.subject import Subject
 from palpate.validation.unseen_solves import TouchFunction, TouchSolves
 
@@ -46,6 +46,7 @@ class LoopWork(Figure):
     Attributes
     ----------
     loops : int
+        Number of polygons.
     median, p95, max : float
         |∮F·dx| / ½∮|F·dx|.
     energy : float
@@ -61,7 +62,7 @@ class LoopWork(Figure):
     energy: float
     open: float = 0.0
 
-    def judged(self) -> Judged:
+    def measured(self) -> Measured:
         """Return the value that is compared with a limit."""
         return {"loop_work": (self.max, None)}
 
@@ -78,7 +79,7 @@ class LoopWork(Figure):
 class BorderLoopWork(LoopWork):
     """Net work around random closed polygons that cross the border of the trained region; see `LoopWork`."""
 
-    def judged(self) -> Judged:
+    def measured(self) -> Measured:
         """Return the value that is compared with a limit."""
         return {"border_loop_work": (self.max, None)}
 
@@ -105,11 +106,13 @@ def function_work(
     Parameters
     ----------
     model : TouchFunction
+        Force as a function of place.
     test : TouchSolves
         Corners are where its solves are.
     border : bool
         Corners instead at random in a box 30 % beyond the ranges, some trained and some not.
     loops, seed : int
+        Number of polygons, and the seed that decides them.
 
     Returns
     -------
@@ -176,6 +179,7 @@ def work_of_polygons(
     Parameters
     ----------
     force : callable (M, n) → (M, 3)
+        Force at M inputs, N.
     corners : list of (c, n)
         Inputs at the corners, m; the last leads back to the first. Inputs beyond the third must not change.
     most : int

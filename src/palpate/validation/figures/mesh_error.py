@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.format import count, share
-from palpate.validation.figures.figure import Figure, Judged
+from palpate.validation.figures.figure import Figure, Measured
 from palpate.validation.figures.force import quantile
 from palpate.validation.subject import Subject
 from palpate.validation.unseen_solves import TouchFunction, TouchSolves
@@ -48,7 +48,7 @@ class MeshErrors(Figure):
     mesh_p95: float | None
     worst: Worst
 
-    def judged(self) -> Judged:
+    def measured(self) -> Measured:
         """Return the values that are compared with limits."""
         return {
             "refined_force_median": (self.together_median, self.worst),
@@ -87,6 +87,7 @@ def mesh_errors(model: TouchFunction, test: TouchSolves, refined: TouchSolves, l
     Parameters
     ----------
     model : TouchFunction
+        Force as a function of place.
     test, refined : TouchSolves
         Of the ordinary and of the refined mesh; rows of both with the same inputs give the mesh's own error.
     light : float

@@ -14,7 +14,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.format import count as counted
-from palpate.validation.figures.figure import Figure, Judged
+from palpate.validation.figures.figure import Figure, Measured
 from palpate.validation.subject import Subject
 from palpate.validation.unseen_solves import TouchFunction, TouchSolves
 from palpate.validation.worst import Worst
@@ -37,11 +37,13 @@ class Smoothness(Figure):
     Attributes
     ----------
     strokes : int
+        Number of strokes.
     median, p95, max : float
         Of the ratio over the strokes.
     largest : float
         Largest second difference of the model, N.
     reference : str
+        The reference in words.
     worst : Worst
         Where the stroke with the largest ratio begins.
     """
@@ -54,7 +56,7 @@ class Smoothness(Figure):
     reference: str
     worst: Worst
 
-    def judged(self) -> Judged:
+    def measured(self) -> Measured:
         """Return the value that is compared with a limit."""
         return {"smoothness": (self.p95, self.worst)}
 
@@ -86,6 +88,7 @@ def smoothness(
     Parameters
     ----------
     model : TouchFunction
+        Force as a function of place.
     test : TouchSolves
         Random strokes are straight lines between two of its touches, without those that lift off on the way.
     strokes : sequence of TouchSolves, optional

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.units import Range
-from palpate.validation.figures.figure import Figure, Judged
+from palpate.validation.figures.figure import Figure, Measured
 from palpate.validation.subject import Subject
 from palpate.validation.worst import Worst
 
@@ -32,7 +32,7 @@ class StiffnessErrors(Figure):
     worst: Worst
     method: str = METHOD
 
-    def judged(self) -> Judged:
+    def measured(self) -> Measured:
         """Return the value that is compared with a limit."""
         return {"stiffness_p95": (self.p95, self.worst)}
 
@@ -47,7 +47,9 @@ def matrix_errors(
     truth, answer : (N, 3, 3)
         ∂F/∂c, N/m; rows whose truth is zero (no contact) or unknown are left out.
     X : (N, n)
+        Inputs of the solves.
     ranges : n ranges
+        Names, bounds and units of the inputs.
     """
     size = np.linalg.norm(truth, axis=(1, 2))
     rows = np.isfinite(size) & (size > 0)

@@ -25,6 +25,7 @@ class Part:
     Attributes
     ----------
     name : str
+        The part in words.
     count, felt : int
         Solves, and how many of them above f₀.
     median, p95 : float or None
@@ -120,8 +121,11 @@ def parts(
     Parameters
     ----------
     model : TouchFunction
+        Force as a function of place.
     test : TouchSolves
+        Unseen solves.
     samples : ForceSamples
+        Forces of the model and of finite elements at each solve.
     stiffness : (N,), optional
         ‖ΔK‖/‖K‖, not-a-number where unknown.
     """

@@ -72,12 +72,12 @@ class Chapter:
 
     @property
     def meta(self) -> Mapping[str, Any]:
-        """What the model says of its making."""
+        """Description that the model has of its making."""
         meta: Mapping[str, Any] = getattr(self.energy, "meta", {})
         return meta
 
     @property
     def origin(self) -> Mapping[str, Any]:
-        """Where the solves come from: given, or said by the training set."""
+        """Provenance of the solves: given, or that of the training set."""
         origin: Mapping[str, Any] = self.provenance or getattr(self.train, "provenance", None) or {}
         return origin

@@ -1,4 +1,4 @@
-"""Picture of the force error as a hand feels it, of every model that answers a force at each solve."""
+"""Pictures of the force on the hand: its error as a hand feels it, and its course where the hand holds the body."""
 
 from __future__ import annotations
 
@@ -9,24 +9,36 @@ import numpy as np
 from palpate.format import plain, share
 from palpate.validation.limits import FAINT, FAINT_JND, FORCE_JND
 from palpate.validation.report.chapter import Chapter
-from palpate.validation.report.style import BLUE, ORANGE, Picture, figure, logarithmic, picture
-from palpate.validation.unseen_solves import ForceSamples
+from palpate.validation.report.style import BLUE, ORANGE, Picture, figure, logarithmic, picture, series
+from palpate.validation.unseen_solves import ForceSamples, TouchFunction, TouchSolves
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["hand_pictures", "plot_force_errors"]
+__all__ = ["hand_pictures", "plot_course", "plot_force_errors"]
 
 
 def hand_pictures(chapter: Chapter, key: str) -> list[Picture]:
-    """Draw the force error in just noticeable differences, where a force was judged."""
+    """Draw the force error in just noticeable differences, and the course of the force, where one was judged."""
     force, samples = chapter.validation.force, chapter.subject.samples
     if force is None or samples is None:
         return []
+    function, solves = chapter.subject.function, chapter.subject.solves
+    made = []
+    if function is not None and solves is not None and function.holds:
+        made.append(
+            picture(
+                f"{key}-course",
+                "Force against displacement",
+                f"Size of the force on the hand against the displacement of {chapter.name}, learnt and solved.",
+                "Straight lines from rest to the unseen solves that are displaced farthest. Dots: finite elements.",
+                lambda: plot_course(function, solves),
+            )
+        )
     felt = "No touch was strong enough to judge in relative terms."
     if force.p95 is not None and force.max is not None:
         felt = f"95 of 100 forces are within {share(force.p95)}, all within {share(force.max)}; a person notices 7 %."
-    return [
+    made.append(
         picture(
             f"{key}-felt",
             "Force error as a hand feels it",
@@ -35,7 +47,29 @@ def hand_pictures(chapter: Chapter, key: str) -> list[Picture]:
             "against f₀ instead.",
             lambda: plot_force_errors(samples),
         )
-    ]
+    )
+    return made
+
+
+def plot_course(function: TouchFunction, solves: TouchSolves, most: int = 4) -> Figure:
+    """Draw the size of the force on straight lines from rest to the solves that are displaced farthest."""
+    fig, axes = figure(1, 1, size=(4.6, 3.4))
+    axis = axes[0, 0]
+    size = np.linalg.norm(solves.X[:, :3], axis=1)
+    rows = np.argsort(-size, kind="stable")[:most]
+    along = np.linspace(0.0, 1.0, 61)
+    for row, style in zip(rows, series(len(rows)), strict=True):
+        line = np.repeat(solves.X[row][None], len(along), axis=0)
+        line[:, :3] *= along[:, None]
+        axis.plot(1e3 * along * size[row], np.linalg.norm(function.force(line), axis=1), **style)
+        axis.plot(
+            1e3 * size[row], np.linalg.norm(solves.force[row]), "o", color=style["color"], markersize=4.5
+        )
+    axis.set_xlabel("displacement of the hand / mm")
+    axis.set_ylabel("‖F‖ / N")
+    axis.set_xlim(left=0)
+    axis.set_ylim(bottom=0)
+    return fig
 
 
 def plot_force_errors(samples: ForceSamples) -> Figure:

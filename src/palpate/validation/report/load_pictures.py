@@ -212,6 +212,7 @@ def plot_shapes(touch: TouchModel, data: Dataset) -> Figure:
     Parameters
     ----------
     touch : TouchModel
+        Model whose networks answer by load.
     data : Dataset
         Converged solves.
     """
@@ -288,8 +289,11 @@ def node_errors(touch: TouchModel, data: Dataset, label: str) -> tuple[list[str]
     Parameters
     ----------
     touch : TouchModel
+        Model whose networks answer by load.
     data : Dataset
+        Converged solves.
     label : "refined" or "filter"
+        The refined network, or that of the sequential filter.
     """
     network = touch.networks[NETWORKS[label]]
     error = network.predict(data.X) - node_truth(touch, data)
@@ -305,6 +309,7 @@ def plot_node_errors(touch: TouchModel, data: Dataset, limit: float | None = Non
     Parameters
     ----------
     touch : TouchModel
+        Model whose networks answer by load.
     data : Dataset
         Converged solves that the networks have never seen.
     limit : float, optional
@@ -412,6 +417,7 @@ def plot_history(history: History, rivals: Mapping[str, History] | None = None) 
     Parameters
     ----------
     history : History
+        Record of the sequential filter.
     rivals : mapping of str to History, optional
         Other runs to draw in other colours and dashes.
     """

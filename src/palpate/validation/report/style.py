@@ -157,6 +157,7 @@ def inline_svg(figure: Figure, key: str, alt: str) -> str:
     Parameters
     ----------
     figure : Figure
+        Figure of Matplotlib.
     key : str
         Prefix of every id; letters, digits and hyphens.
     alt : str

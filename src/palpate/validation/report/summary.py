@@ -30,8 +30,11 @@ class Story:
     Attributes
     ----------
     verdict : str
+        The result in a few words.
     passed : bool
+        True if every limit is kept.
     facts : tuple of Fact
+        Figures that stand for many.
     solved, learnt, good : str
         A paragraph each.
     """

@@ -15,11 +15,11 @@ from palpate.validation.limits import CRITERIA
 from palpate.validation.report.chapter import Chapter
 from palpate.validation.validate import Validation
 
-__all__ = ["Judged", "flat", "judged_rows", "node_rows", "sources", "tables", "timing_rows"]
+__all__ = ["CheckRow", "flat", "check_rows", "node_rows", "sources", "tables", "timing_rows"]
 
 
 @dataclass(frozen=True)
-class Judged:
+class CheckRow:
     """One line of the table of limits, all cells as text."""
 
     label: str
@@ -30,10 +30,10 @@ class Judged:
     where: str
 
 
-def judged_rows(validation: Validation) -> list[Judged]:
+def check_rows(validation: Validation) -> list[CheckRow]:
     """Return every check as text."""
     return [
-        Judged(
+        CheckRow(
             c.criterion.label,
             criterion_figure(c.measured, c.criterion.kind),
             criterion_figure(c.limit, c.criterion.kind),

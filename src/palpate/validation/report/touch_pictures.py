@@ -164,7 +164,9 @@ def at_depth(
     Parameters
     ----------
     surrogate : TouchSurrogate
+        Energy with a touched surface.
     view : View
+        Directions in which the surface is seen.
     places : (N, 2)
         m.
     like : (n,)

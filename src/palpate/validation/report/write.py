@@ -17,7 +17,7 @@ from palpate.validation.report.history_pictures import history_pictures
 from palpate.validation.report.load_pictures import load_pictures, network_rows
 from palpate.validation.report.style import Picture
 from palpate.validation.report.summary import story
-from palpate.validation.report.tables import flat, judged_rows, sources, tables, timing_rows
+from palpate.validation.report.tables import flat, check_rows, sources, tables, timing_rows
 from palpate.validation.report.touch_pictures import touch_pictures
 
 if TYPE_CHECKING:
@@ -52,6 +52,7 @@ def write_report(
     chapters : sequence of Chapter
         One per body.
     title : str
+        Heading of the page.
     machine : mapping, optional
         Where the figures were made: processor, system, versions.
 
@@ -137,7 +138,7 @@ def report_context(chapter: Chapter, key: str) -> dict[str, Any]:
         "name": chapter.name,
         "story": story(chapter),
         "pictures": pictures(chapter, key),
-        "judged": judged_rows(v),
+        "checks": check_rows(v),
         "failures": [str(c) for c in v.failures],
         "notes": (*remarks, *v.notes),
         "networks": [] if loads is None else network_rows(loads),

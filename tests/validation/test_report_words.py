@@ -18,7 +18,8 @@ from palpate.units import Range
 from palpate.validation import Chapter, Limits, validate
 from palpate.validation.limits import CRITERIA
 from palpate.validation.report.body_words import body_words, strain_words
-from palpate.validation.report.load_pictures import heading, network_rows, plot_force
+from palpate.validation.report.load_pictures import heading, plot_force
+from palpate.validation.report.network_pictures import network_rows
 from palpate.validation.report.summary import story
 from palpate.validation.report.write import pictures
 from palpate.validation.subject import Subject

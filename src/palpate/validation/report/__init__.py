@@ -3,7 +3,8 @@
 chapter        content on one body                write           the page
 summary        plain words on top                 tables          rows of the tables
 style          look of the pictures               body_words      a body in words
-load_pictures, touch_pictures, history_pictures, hand_pictures   the pictures, each of what the figures can show
+load_pictures, network_pictures, touch_pictures, history_pictures, hand_pictures
+               the pictures, each of what the figures can show
 """
 
 from palpate.validation.report.chapter import Chapter

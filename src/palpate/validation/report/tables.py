@@ -15,7 +15,7 @@ from palpate.validation.limits import CRITERIA
 from palpate.validation.report.chapter import Chapter
 from palpate.validation.validate import Validation
 
-__all__ = ["CheckRow", "flat", "check_rows", "node_rows", "sources", "tables", "timing_rows"]
+__all__ = ["CheckRow", "check_rows", "flat", "node_rows", "sources", "tables", "timing_rows"]
 
 
 @dataclass(frozen=True)

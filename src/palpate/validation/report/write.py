@@ -14,10 +14,11 @@ from palpate.format import bind_units
 from palpate.validation.report.chapter import Chapter
 from palpate.validation.report.hand_pictures import hand_pictures
 from palpate.validation.report.history_pictures import history_pictures
-from palpate.validation.report.load_pictures import load_pictures, network_rows
+from palpate.validation.report.load_pictures import load_pictures
+from palpate.validation.report.network_pictures import network_rows
 from palpate.validation.report.style import Picture
 from palpate.validation.report.summary import story
-from palpate.validation.report.tables import flat, check_rows, sources, tables, timing_rows
+from palpate.validation.report.tables import check_rows, flat, sources, tables, timing_rows
 from palpate.validation.report.touch_pictures import touch_pictures
 
 if TYPE_CHECKING:

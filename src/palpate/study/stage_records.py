@@ -220,7 +220,7 @@ class PadLearningRecord(Record):
 
 
 class ProbeLearningRecord(PadLearningRecord):
-    """The search for the networks of the energy and of the shape; the shape gets a quarter of the time."""
+    """The search for the networks of the energy and of the shape."""
 
     shape: bool = Field(True, description="whether to learn the displacement for the eye")
 

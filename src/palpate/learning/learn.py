@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from palpate import checks
 from palpate.errors import UsageError
 from palpate.learning.automatic import automatic, check_target
 from palpate.learning.learning_history import History
@@ -241,6 +242,5 @@ def _check_run(
             f"Settings are {settings!r}, not a Settings record.",
             fix='Take a preset, such as PRESETS["default"](), or Settings(…).',
         )
-    for name, count, least in (("passes", passes, 1), ("seed", seed, 0)):
-        if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < least:
-            raise UsageError(f"{name} is {count!r}; it must be a whole number of at least {least}.")
+    checks.fits("The number of passes", passes, least=1, whole=True)
+    checks.fits("The seed", seed, least=0, whole=True)

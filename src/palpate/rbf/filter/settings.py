@@ -21,8 +21,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal, get_args
 
-import numpy as np
-
+from palpate import checks
 from palpate.errors import UsageError
 from palpate.network.radial import RadialFunction
 from palpate.rbf.forms import Widths, unit_form
@@ -179,19 +178,22 @@ class Settings:
 
     def __post_init__(self) -> None:
         for name in (*_POSITIVE, *_NOT_NEGATIVE):
-            self._check_number(name)
+            value, positive = getattr(self, name), name in _POSITIVE
+            if isinstance(value, bool):
+                raise UsageError(f"The filter's {name} is {value!r}; it must be a number.")
+            checks.fits(
+                f"The filter's {name}", value, above=0 if positive else None, least=None if positive else 0
+            )
+            if name in _COUNTS and value != int(value):
+                raise UsageError(f"The filter's {name} is {value}; it must be a whole number.")
         for name in ("distance_decay", "forgetting_factor"):
-            if not 0 < getattr(self, name) <= 1:
-                raise UsageError(f"The filter's {name} is {getattr(self, name)}; it must lie in (0, 1].")
+            checks.fits(f"The filter's {name}", getattr(self, name), above=0, most=1)
         if self.distance_max < self.distance_min:
             raise UsageError(
                 f"The filter's distance_max {self.distance_max} is less than its distance_min {self.distance_min}."
             )
-        for name, known in _CHOICES.items():
-            if getattr(self, name) not in known:
-                raise UsageError(
-                    f"The filter's {name} is {getattr(self, name)!r}; it is one of {', '.join(known)}."
-                )
+        for name, choices in _CHOICES.items():
+            checks.one_of(f"The filter's {name}", getattr(self, name), choices)
         if not isinstance(self.form, str):
             raise UsageError(f"The filter's form is {self.form!r}; it must be a name, such as 'rotated'.")
         if "significance" in {self.growth, self.pruning} and self.form.startswith("rank-"):
@@ -200,17 +202,6 @@ class Settings:
                 why="They do not decay across the range, so their mean contribution says little of their use.",
                 fix='Choose growth="distance" and pruning="contribution", or a form with a centre.',
             )
-
-    def _check_number(self, name: str) -> None:
-        value = getattr(self, name)
-        if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
-            raise UsageError(f"The filter's {name} is {value!r}; it must be a number.")
-        if not (value > 0 if name in _POSITIVE else value >= 0):
-            rule = "be positive" if name in _POSITIVE else "not be negative"
-            raise UsageError(f"The filter's {name} is {value}; it must {rule}.")
-        if not np.isfinite(value) or (name in _COUNTS and value != int(value)):
-            rule = "be a whole number" if name in _COUNTS else "be finite"
-            raise UsageError(f"The filter's {name} is {value}; it must {rule}.")
 
     def regressors(self, inputs: int) -> Regressors:
         """Units and tail for n inputs.

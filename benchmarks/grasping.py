@@ -1,6 +1,6 @@
 """How a held body's force is learnt from few solves: the grasp surrogate beside interpolation of the forces.
 
-python -m benchmarks.grasping [--seconds 20]        errors on unseen solves against the number of solves, as a table
+python -m benchmarks.grasping [--effort 0.3]        errors on unseen solves against the number of solves, as a table
 
 The solves, of the block of docs/method/grasp.md, lie in grasp_block.npz with words of how they were made.
 """
@@ -71,8 +71,8 @@ def interpolated(train: dict[str, np.ndarray], X: np.ndarray, *, images: bool) -
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seconds", type=float, default=20.0, help="for each search of units")
-    seconds = parser.parse_args().seconds
+    parser.add_argument("--effort", type=float, default=0.3, help="of each search of units")
+    effort = parser.parse_args().effort
     train, test = solves("train"), solves("unseen")
     print(f"{len(test['X'])} unseen solves; error of the force median / p95, its angle p95, stiffness p95")
     for count in sorted({min(n, len(train["X"])) for n in COUNTS}):
@@ -80,7 +80,7 @@ def main() -> None:
         begun = time.perf_counter()
         found = learn_grasp(
             some["X"], some["energy"], some["force"], some["stiffness"],
-            inputs=INPUTS, symmetry=SQUARE, seconds=seconds,
+            inputs=INPUTS, symmetry=SQUARE, effort=effort,
         )  # fmt: skip
         S, took = found.surrogate, time.perf_counter() - begun
         rows = {

@@ -62,7 +62,7 @@ SETS: dict[str, Callable[..., peer_data.Samples]] = {
 
 
 def tables(*, quick: bool = False) -> list[Table]:
-    """One table for all sets; `quick` takes the smallest set, two rivals and two seconds."""
+    """One table for all sets; `quick` takes the smallest set, two rivals and little effort."""
     rows: list[dict[str, Any]] = []
     claims: list[Claim] = []
     ratios = {}
@@ -122,7 +122,7 @@ def _set_rows(data: PeerSet, quick: bool) -> list[dict[str, Any]]:
     inputs = [Range(f"x{i}", -1.0, 1.0) for i in range(data.X.shape[1])]
     outputs = [Quantity(f"y{i}") for i in range(data.Y.shape[1])]
     began = time.perf_counter()
-    ours = fit(data.X, data.Y, inputs, outputs, seconds=2.0 if quick else 30.0)
+    ours = fit(data.X, data.Y, inputs, outputs, effort=0.07 if quick else 1.0)
     spent = time.perf_counter() - began
     network, evaluator, plain = ours.network, ours.network.evaluator(), PlainNetwork(ours.network)
     x = np.ascontiguousarray(data.X_test[0])

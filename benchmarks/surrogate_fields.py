@@ -20,7 +20,7 @@ MISSED = 1e-8  # of the snapshots' energy: what the rival's modes leave out
 MEAN, MOST = 1e-4, 3e-4  # m: what an eye sees, a pixel's third and one
 
 
-def field_table(case: Case, size: int, seconds: float, mark: str) -> list[Table]:
+def field_table(case: Case, size: int, effort: float, mark: str) -> list[Table]:
     """Distances of nodes at a number of solves; nothing where the file holds no fields."""
     # solves of a round body are turned about its axis, their fields are not
     if "displacement_mm" not in case.arrays or case.study.symmetry == "round":
@@ -34,7 +34,7 @@ def field_table(case: Case, size: int, seconds: float, mark: str) -> list[Table]
     rows = []
     columns = case.arrays["column"][train]
     methods: dict[str, Callable[[], Predictor]] = {
-        "palpate": lambda: _ours(case, X[train], u[train], columns, seconds),
+        "palpate": lambda: _ours(case, X[train], u[train], columns, effort),
         "POD + cubic RBF": lambda: _pod(case, X[train], u[train]),
     }
     for name, learnt in methods.items():
@@ -75,7 +75,7 @@ def field_table(case: Case, size: int, seconds: float, mark: str) -> list[Table]
     ]
 
 
-def _ours(case: Case, X: np.ndarray, u: np.ndarray, columns: np.ndarray, seconds: float) -> Predictor:
+def _ours(case: Case, X: np.ndarray, u: np.ndarray, columns: np.ndarray, effort: float) -> Predictor:
     points = case.arrays["nodes"]
     return learn_field(
         X,
@@ -88,7 +88,7 @@ def _ours(case: Case, X: np.ndarray, u: np.ndarray, columns: np.ndarray, seconds
         surface=case.surface,
         radius=case.radius,
         groups=columns,
-        seconds=seconds,
+        effort=effort,
     ).field.values
 
 

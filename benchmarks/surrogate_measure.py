@@ -55,7 +55,7 @@ def measured(
     case: Case,
     sizes: tuple[int, ...],
     *,
-    seconds: float | None,
+    effort: float,
     detailed: int,
     loops: int,
     report: Callable[[str], None],
@@ -66,21 +66,21 @@ def measured(
     ----------
     case : Case
     sizes : tuple of int
-    seconds : float or None
-        That ours may search for; as long as it takes by itself where none.
+    effort : float
+        Of our search, 1 by default elsewhere.
     detailed, loops : int
     report : callable
         Takes a line for each result.
     """
     test, rows, ours = case.solves("test"), [], {}
     assert test is not None
-    learnt(case, min(sizes), 0.1)  # what is compiled once is no part of learning
+    learnt(case, min(sizes), 0.05)  # what is compiled once is no part of learning
     for size in sizes:
         training = case.training(size)
         for name in (OURS, *RIVALS):
             wall, begun = time.perf_counter(), _processor_time()
             if name == OURS:
-                ours[size] = learnt(case, size, seconds)
+                ours[size] = learnt(case, size, effort)
                 model = TouchFunction.of(ours[size])
             else:
                 model = RIVALS[name](case, training)
@@ -101,7 +101,7 @@ def _processor_time() -> float:
     return sum(os.times()[:4])
 
 
-def learnt(case: Case, size: int, seconds: float | None) -> TouchSurrogate:
+def learnt(case: Case, size: int, effort: float) -> TouchSurrogate:
     """Our surrogate of so many solves."""
     training = case.training(size)
     return learn_surrogate(
@@ -114,7 +114,7 @@ def learnt(case: Case, size: int, seconds: float | None) -> TouchSurrogate:
         inputs=case.inputs,
         symmetry=case.symmetry,
         about=case.about if case.symmetry else None,
-        seconds=seconds,
+        effort=effort,
         seed=SEED,
     ).surrogate
 

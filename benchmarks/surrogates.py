@@ -29,8 +29,8 @@ from palpate.validation.limits import Check
 
 __all__ = ["tables"]
 
-FIELD_SECONDS, LOOPS = 60.0, 20
-QUICK_SECONDS, QUICK_SIZE = 1.0, 10
+LOOPS = 20
+QUICK_EFFORT, QUICK_SIZE = 0.1, 10
 STIFFNESS = 0.04  # asked for on the block
 # what is of no study, by the name on the command line
 BESIDE: dict[str, Callable[[bool], list[Table]]] = {
@@ -40,7 +40,7 @@ BESIDE: dict[str, Callable[[bool], list[Table]]] = {
 
 
 def tables(*, quick: bool = False, studies: Sequence[str] = ()) -> list[Table]:
-    """The tables; `quick` learns the block once, from few solves, for a second, without springs."""
+    """The tables; `quick` learns the block once, from few solves, with little effort, without springs."""
     found: list[Table] = []
     for name in studies or (*(("block",) if quick else STUDIES), *BESIDE):
         if name in BESIDE:
@@ -64,7 +64,7 @@ def _study(case: Case, quick: bool) -> list[Table]:
     result = measured(
         case,
         sizes,
-        seconds=QUICK_SECONDS if quick else None,
+        effort=QUICK_EFFORT if quick else 1.0,
         detailed=detailed,
         loops=10 if quick else LOOPS,
         report=lambda line: print(f"  {line}", file=sys.stderr, flush=True),
@@ -75,7 +75,7 @@ def _study(case: Case, quick: bool) -> list[Table]:
         _curve_table(result, sizes, mark),
         _rival_table(result, beside, detailed, mark),
         _good_table(result, detailed, mark),
-        *field_table(case, detailed, QUICK_SECONDS if quick else FIELD_SECONDS, mark),
+        *field_table(case, detailed, QUICK_EFFORT if quick else 1.0, mark),
     ]
 
 
@@ -107,7 +107,11 @@ def _curve_table(result: Measured, sizes: tuple[int, ...], mark: str) -> Table:
             f"smallest 95th percentile by others: {'; '.join(lost)}"
             if lost
             else "of these, palpate's 95th percentile is the smallest at every number of solves",
-            *(() if mark else ("palpate learns for a second a solve, a minute at least",)),
+            *(
+                ()
+                if mark
+                else ("palpate learns by its default effort, a counted number of networks and iterations",)
+            ),
         ),
     )
 

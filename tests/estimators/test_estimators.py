@@ -44,7 +44,7 @@ def test_conventions(estimator, check):
 # 200 samples of 10 features, eight times in arrays of other kinds: above, one pass of each is checked
 SAME_FIT_AGAIN = {"check_regressors_train", "check_regressor_data_not_an_array"}
 # a target that is met at once, so that no clock decides what is found
-CHOOSING = RBFNetworkRegressor(form="auto", target=0.9, seconds=2.0, random_state=0)
+CHOOSING = RBFNetworkRegressor(form="auto", target=0.9, effort=0.07, random_state=0)
 
 
 @pytest.mark.slow
@@ -98,7 +98,7 @@ def test_refined_meets_its_target_with_few_units(wave):
 def test_form_and_kernel_by_trial(wave):
     X, y = wave
     Y = np.vstack([1e3 * y, X[:, 0] ** 2]).T
-    model = RBFNetworkRegressor(form="auto", target=1e-2, seconds=5.0, random_state=0).fit(X[:100], Y[:100])
+    model = RBFNetworkRegressor(form="auto", target=1e-2, effort=0.15, random_state=0).fit(X[:100], Y[:100])
     assert 1.0 - model.score(X[100:], Y[100:]) < (5 * 1e-2) ** 2
     assert model.error_ < 0.05
     # differing weights are not for the trial; they count all the same
@@ -250,7 +250,7 @@ def test_deviations_hold_nine_in_ten(form, size):
     rng = np.random.default_rng(0)
     X = rng.uniform(-1, 1, (2300, 2))
     y = size * (np.sin(2 * X[:, 0]) * np.exp(-X[:, 1]) + 0.1 * rng.normal(size=2300))
-    model = RBFNetworkRegressor(form=form, seconds=3.0, random_state=0).fit(X[:300], y[:300])
+    model = RBFNetworkRegressor(form=form, effort=0.1, random_state=0).fit(X[:300], y[:300])
     assert interval_share(model, X[300:], y[300:]) == pytest.approx(0.9, abs=0.07)
 
 
@@ -309,6 +309,7 @@ WRONG = {
     ),
     "RBF": (
         {"seconds": "a"},
+        {"effort": 0.0},
         {"seconds": -1.0},
         {"seconds": float("nan")},
         {"tail": None},

@@ -246,3 +246,19 @@ def test_masked_numbers_are_missing_numbers():
     Y = np.ma.masked_array(np.where(X > 0.8, 9999.0, X), mask=X > 0.8)
     with pytest.raises(palpate.PalpateError, match="finite"):
         palpate.fit(X, Y, effort=0.03)
+
+
+@pytest.mark.parametrize("count", [200, 20_000])
+def test_a_limit_on_time_plans_for_less_work_however_many_rows(count, monkeypatch):
+    """The processor's time counts, not the clock's, so that other work on the machine has no say."""
+    import time
+
+    rng = np.random.default_rng(0)
+    X = rng.uniform(-1, 1, (count, 3))
+    y = np.sin(3 * X[:, 0]) + X[:, 1] ** 2 * X[:, 2]
+    palpate.fit(X[:100], y[:100], effort=0.02)  # compiles
+    monkeypatch.setattr(time, "monotonic", time.process_time)
+    began = time.process_time()
+    found = palpate.fit(X, y + 0.01 * rng.normal(size=count), seconds=3.0)
+    assert time.process_time() - began < 1.2 * 3.0 + 2.0
+    assert found.heldout < 0.1

@@ -21,7 +21,6 @@ BARE_PARAMETERS = {
     "learning",
     "runtime",
     "surrogates",
-    "viewer",
 }
 OLD_TERMS = {
     "learning",

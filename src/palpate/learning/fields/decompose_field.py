@@ -74,7 +74,7 @@ class SurfaceModes:
 
     @classmethod
     def of(cls, values: np.ndarray, mass: np.ndarray) -> SurfaceModes:
-        """Of fields (N, nodes, components), by a singular value decomposition in shares of mass (nodes,)."""
+        """Return the modes of fields (N, nodes, components), by a singular value decomposition in shares of mass (nodes,)."""
         N, nodes, components = values.shape
         root = np.sqrt(mass)[:, None]
         V, sizes = _right((values * root).reshape(N, -1))
@@ -145,7 +145,7 @@ class Decomposition:
 
     @cached_property
     def truncation_left_out(self) -> float:
-        """What as many modes of other solves miss of some: root mean square over surface and solves."""
+        """Root mean square over surface and solves of what as many modes of other solves miss of some."""
         return left_out(self.remainder, self.mass, len(self.modes.modes), self.problem.groups)
 
     @cached_property
@@ -189,7 +189,7 @@ def _with_modes(
 
 
 def _varied(solves: Solves, part: Decomposition, tolerance: float, most: int) -> Decomposition | None:
-    """The same with a local mode that differs from place to place; None where columns left out say that it does not."""
+    """Return the decomposition whose local mode varies with the place; None where solves left out say it does not."""
     if part.free is None:
         return None
     even = solves.moving(part.free, part.amplitude)

@@ -57,7 +57,7 @@ def border_widths(solves: Solves) -> tuple[float, ...]:
 
 
 def fade_out(local_mode: LocalMode) -> LocalMode:
-    """The same, and its variation, times a window that is one in the middle and ends at the reach.
+    """Return a local mode and its variation times a window that is one in the middle and ends at the reach.
 
     Fitted so that it ends by itself, it would fall within the last cells from what the field is there to nothing: a
     ring that travels with the probe, which modes can't make up for.
@@ -115,7 +115,7 @@ def _roughness(r: int, q: int) -> np.ndarray:
 def _regressors(
     local_mode: LocalMode, solves: Solves, amplitude: DepthAmplitude
 ) -> Iterator[tuple[int, int, np.ndarray, np.ndarray]]:
-    """Of every solve: snapshots and row, nodes in reach (rows,), regressors (rows · components, table.size)."""
+    """Yield for every solve its snapshots and row, nodes in reach (rows,), regressors (rows · components, table.size)."""
     feet, normals = solves.feet
     touched = [local_mode.touches(solves.surface, one.points) for one in solves.snapshots]
     for (k, i), foot, n, s in zip(solves.rows(), feet, normals, solves.depth, strict=True):
@@ -166,7 +166,7 @@ class VariationRegressors:
     shape: tuple[int, int]
 
     def images(self, table: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """What a variation's table is (rows, 4 r, components) at the touch of each solve, f included."""
+        """Return a variation's table (rows, 4 r, components) at the touch of each solve, f included."""
         flat = table.reshape(self.touches[0].size, -1, self.shape[1])
         return np.asarray(np.tensordot(self.touches[rows].reshape(len(rows), -1), flat, 1))
 
@@ -174,7 +174,7 @@ class VariationRegressors:
 def fit_variation(
     solves: Solves, remainder: list[np.ndarray], local_mode: LocalMode, amplitude: DepthAmplitude
 ) -> Variation | None:
-    """How the local mode of fields varies, not yet faded out.
+    """Return the variation of the local mode of fields, not yet faded out.
 
     None where it is of no use: with one group alone, or where it gains little of columns left out.
 
@@ -274,7 +274,7 @@ class _Fit:
         return total
 
     def missed_left_out(self, base: float, out: np.ndarray) -> float:
-        """The same of solves where `out` (N,), by what the others say."""
+        """Return the sum of squares that is missed of solves where `out` (N,), by what the others say."""
         return self.missed(np.flatnonzero(out), self.table(base, np.flatnonzero(~out)))
 
     def table(self, base: float, rows: np.ndarray) -> np.ndarray:

@@ -161,7 +161,7 @@ def _outputs(best: Decomposition, inputs: tuple[Range, ...]) -> tuple[list[Quant
 
 
 def _real(number: float) -> float | None:
-    """What JSON can hold."""
+    """Return a number as JSON can hold it."""
     return number if math.isfinite(number) else None
 
 

@@ -132,7 +132,7 @@ class Solves:
         return replace(self, snapshots=snapshots, interpolations=interpolations)
 
     def _split(self, rows: np.ndarray) -> list[np.ndarray]:
-        """What belongs to each snapshots, of an array (N, …)."""
+        """Return the rows of each snapshots, of an array (N, …)."""
         return np.split(rows, np.cumsum([len(one.X) for one in self.snapshots])[:-1])
 
     @cached_property
@@ -165,7 +165,7 @@ class Solves:
 
     @property
     def components(self) -> int:
-        """Of the field."""
+        """Number of components of the field."""
         return int(self.snapshots[0].values.shape[2])
 
     @property
@@ -181,23 +181,23 @@ class Solves:
         return float(np.sqrt(np.concatenate(squares).mean()))
 
     def rows(self) -> Iterator[tuple[int, int]]:
-        """Of every solve the number of its snapshots, and the row there."""
+        """Return for every solve the number of its snapshots, and the row there."""
         return ((k, i) for k, one in enumerate(self.snapshots) for i in range(len(one.X)))
 
     def moving(self, local_mode: LocalMode, amplitude: DepthAmplitude) -> list[np.ndarray]:
-        """What a local mode gives of the snapshots, each (N, P, components), as if all nodes were touched."""
+        """Return a local mode's share of the snapshots, each (N, P, components), as if all nodes were touched."""
         return [
             moving_values(local_mode, amplitude.deepest, touches, one.points)
             for touches, one in zip(self._touches(amplitude), self.snapshots, strict=True)
         ]
 
     def _touches(self, amplitude: DepthAmplitude) -> list[np.ndarray]:
-        """Of the snapshots s, f, foot, normal and further inputs, each (N, 8 + p)."""
+        """Return s, f, contact point, normal and further inputs of the snapshots, each (N, 8 + p)."""
         known = (self.depth[:, None], amplitude.at(self.depth)[:, None], *self.feet, self.X[:, 3:])
         return self._split(np.hstack(known))
 
     def remainder(self, local_mode: LocalMode | None, amplitude: DepthAmplitude) -> np.ndarray:
-        """What a local mode leaves of the fields at the nodes that are shown, (N, nodes, components).
+        """Return the rest that a local mode leaves of the fields at the nodes that are shown, (N, nodes, components).
 
         It is taken away where it is known, at the nodes of the snapshots; only the rest is carried.
         """

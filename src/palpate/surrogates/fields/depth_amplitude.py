@@ -1,4 +1,4 @@
-"""How a field grows with depth from first touch: f(s), zero without contact and one at the deepest trained depth.
+"""The growth of a field with depth from first touch: f(s), zero without contact and one at the deepest trained depth.
 
 Far from the touched place a field goes with the force, and the force is the slope of the contact law: s² behind a
 soft pad, s^{3/2} on an elastic half-space (Johnson 1985, eq. 4.23), s²/(1 + s/a)^½ for both in series (see

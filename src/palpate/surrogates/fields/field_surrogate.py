@@ -167,7 +167,7 @@ class FieldSurrogate:
             )
 
     def _fault(self) -> str:
-        """What does not fit; "" if all does."""
+        """Return the fault by which parts do not fit; "" if there is none."""
         n, k = len(self.network.inputs), len(self.modes)
         nodes = len(self.points)
         if n < 3 or len(self.network.outputs) != k:
@@ -250,7 +250,7 @@ class FieldSurrogate:
         return (*self._fixed, self.surface.compiled(), self.network.compiled())
 
     def profile_arguments(self) -> tuple[Any, ...]:
-        """What `profile_into` takes last."""
+        """Arguments that `profile_into` takes last."""
         return profile_arguments(self.local_mode, self.amplitude.deepest)
 
     def moving_arguments(self) -> tuple[Any, ...]:

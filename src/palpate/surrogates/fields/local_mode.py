@@ -45,7 +45,7 @@ OFFSETS = 4  # 1 and three coordinates of the offset
 
 @dataclass(frozen=True, eq=False)
 class Variation:
-    """What is added to a local mode's table, as it depends on the place and further inputs.
+    """The part that is added to a local mode's table, as it depends on the place and further inputs.
 
     Attributes
     ----------

@@ -74,7 +74,7 @@ def _neighbours(
 
 
 def _weights(offsets: np.ndarray, facing: np.ndarray) -> np.ndarray:
-    """What each of k nodes at offsets (Q, k, 3) counts at the place itself, (Q, k)."""
+    """Return the weights (Q, k) at each place of k nodes at offsets (Q, k, 3)."""
     Q, k = offsets.shape[:2]
     size = np.linalg.norm(offsets, axis=2).max(axis=1)
     offsets = offsets / size[:, None, None]

@@ -1,4 +1,4 @@
-"""How far a point is from a touched surface: a smooth signed distance, made once and asked within a microsecond.
+"""The signed distance of a point from a touched surface: smooth, made once and asked within a microsecond.
 
 ::
 

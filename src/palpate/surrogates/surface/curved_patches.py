@@ -73,7 +73,7 @@ def patches_of(mesh: OrientedMesh) -> Patches:
 
 
 def _parts(normals: np.ndarray, count: int) -> int:
-    """How many parts an edge needs for its normals to turn by no more than `TURN`."""
+    """Return the number of parts that an edge needs for its normals to turn by no more than `TURN`."""
     cosines = np.einsum("tki,tki->tk", normals, np.roll(normals, -1, axis=1))
     turn = float(np.arccos(np.clip(cosines.min(), -1.0, 1.0)))
     allowed = int(np.sqrt(MOST / count))

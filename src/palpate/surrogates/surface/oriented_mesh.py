@@ -1,6 +1,6 @@
-"""Triangles of a touched surface, checked: who borders on whom, where the surface ends, where it has a crease.
+"""Triangles of a touched surface, checked: neighbours, borders, creases, and normals at their corners.
 
-Normals at the corners of triangles, one for each smooth piece of surface that meets there.
+A corner has one normal for each smooth piece of surface that meets there.
 
 Inside a smooth piece the facets' normals are summed by the weights of Max (1999, "Weights for computing vertex
 normals from facet normals"), exact on a sphere however irregular its mesh. Where the piece ends, that sum leans to one
@@ -166,7 +166,7 @@ FARTHEST = np.cos(np.radians(30.0))  # a fit that turns the normal by more has n
 
 @dataclass(frozen=True, eq=False)
 class Corners:
-    """What is known at the corners of triangles.
+    """Normals and smooth pieces at the corners of triangles.
 
     Attributes
     ----------

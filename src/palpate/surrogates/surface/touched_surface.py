@@ -183,7 +183,7 @@ class TouchedSurface:
         return {"frame": self.frame, "lengths": self.lengths} | tables
 
     def equals(self, other: TouchedSurface) -> bool:
-        """Whether another surface is the same, number by number."""
+        """Return whether another surface is the same, number by number."""
         mine, theirs = ((*surface.compiled(), surface.lengths) for surface in (self, other))
         return self is other or all(np.array_equal(a, b) for a, b in zip(mine, theirs, strict=True))
 

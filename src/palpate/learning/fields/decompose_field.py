@@ -74,7 +74,7 @@ class SurfaceModes:
 
     @classmethod
     def of(cls, values: np.ndarray, mass: np.ndarray) -> SurfaceModes:
-        """Return the modes of fields (N, nodes, components), by a singular value decomposition in shares of mass (nodes,)."""
+        """Return the modes of fields (N, nodes, components), by singular values in shares of mass (nodes,)."""
         N, nodes, components = values.shape
         root = np.sqrt(mass)[:, None]
         V, sizes = _right((values * root).reshape(N, -1))

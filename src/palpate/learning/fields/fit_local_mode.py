@@ -115,7 +115,7 @@ def _roughness(r: int, q: int) -> np.ndarray:
 def _regressors(
     local_mode: LocalMode, solves: Solves, amplitude: DepthAmplitude
 ) -> Iterator[tuple[int, int, np.ndarray, np.ndarray]]:
-    """Yield for every solve its snapshots and row, nodes in reach (rows,), regressors (rows · components, table.size)."""
+    """Yield for each solve snapshots and row, nodes in reach (rows,), regressors (rows · components, table.size)."""
     feet, normals = solves.feet
     touched = [local_mode.touches(solves.surface, one.points) for one in solves.snapshots]
     for (k, i), foot, n, s in zip(solves.rows(), feet, normals, solves.depth, strict=True):

@@ -1,4 +1,4 @@
-"""How a held body's force is learnt from few solves: the grasp surrogate beside interpolation of the forces.
+"""How a held body's force is learnt from few solves: a learnt energy beside interpolation of the forces.
 
 python -m benchmarks.grasping [--effort 0.3]        errors on unseen solves against the number of solves, as a table
 
@@ -13,7 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate.learning.grasp import learn_grasp
+from palpate.learning.energy import learn_energy
+from palpate.learning.pad_fit import fit_pad
+from palpate.surrogates import Solves
 from palpate.units import Range
 
 __all__ = ["INPUTS", "SQUARE", "errors", "interpolated", "solves"]
@@ -78,13 +80,13 @@ def main() -> None:
     for count in sorted({min(n, len(train["X"])) for n in COUNTS}):
         some = {name: values[:count] for name, values in train.items()}
         begun = time.perf_counter()
-        found = learn_grasp(
-            some["X"], some["energy"], some["force"], some["stiffness"],
-            inputs=INPUTS, symmetry=SQUARE, effort=effort,
-        )  # fmt: skip
-        S, took = found.surrogate, time.perf_counter() - begun
+        known = Solves(
+            some["X"], some["energy"], some["force"], some["stiffness"], INPUTS, np.array(SQUARE), axes=(0, 1)
+        )
+        S = learn_energy(known, fit_pad(known)[0], units_max=192, networks=4, effort=effort)[0]
+        took = time.perf_counter() - begun
         rows = {
-            f"grasp surrogate, {S.network.units // 8} units, {took:.0f} s": (
+            f"learnt energy, {S.network.units // 8} units, {took:.0f} s": (
                 S.force(test["X"]),
                 S.stiffness(test["X"]),
             ),

@@ -15,7 +15,7 @@ from numpy.polynomial.chebyshev import chebvander
 
 from benchmarks.plain_query import PlainQuery
 from palpate.network import Network, Scaling, TrainedRegion
-from palpate.surrogates import ContactLaw, FieldSurrogate, TouchedSurface, TouchSurrogate
+from palpate.surrogates import ContactBaseline, ContactLaw, FieldSurrogate, LearntEnergy, TouchedSurface
 from palpate.surrogates.fields import DepthAmplitude, LocalMode, Variation
 from palpate.units import Quantity, Range, bounds
 
@@ -84,7 +84,7 @@ def _splines(t: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     return first, np.array([v**3, 3 * u**3 - 6 * u**2 + 4, 3 * v**3 - 6 * v**2 + 4, u**3]) / 6.0
 
 
-def made(nodes: int = NODES, modes: int = MODES) -> tuple[TouchSurrogate, FieldSurrogate]:
+def made(nodes: int = NODES, modes: int = MODES) -> tuple[LearntEnergy, FieldSurrogate]:
     """An energy and a field by formula, of random numbers, on a plane face of 100 mm."""
     rng = np.random.default_rng(0)
     inputs = (
@@ -121,11 +121,8 @@ def made(nodes: int = NODES, modes: int = MODES) -> tuple[TouchSurrogate, FieldS
     )
     region = TrainedRegion.of(rng.uniform(-1.0, 1.0, (400, 3)))
     root = 1e-3 * rng.normal(size=(4 + UNITS, 20))
-    energy = TouchSurrogate(
-        *(_network(inputs, 1, 0.01, rng), ContactLaw("series", 1e-3), face, RADIUS),
-        region=region,
-        root=root,
-    )
+    baseline = ContactBaseline(ContactLaw("series", 1e-3), face, RADIUS)
+    energy = LearntEnergy(_network(inputs, 1, 0.01, rng), baseline, region=region, root=root)
     return energy, field
 
 

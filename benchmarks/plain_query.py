@@ -1,4 +1,4 @@
-"""A touch surrogate's answer in plain NumPy, inside its trained region: the rival of its compiled evaluator.
+"""A touched body's answer in plain NumPy, inside its trained region: the rival of its compiled evaluator.
 
 python -m benchmarks.plain_query        time of one answer and of one trust figure, both ways
 
@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from palpate.surrogates import TouchSurrogate
+from palpate.surrogates import LearntEnergy
 from palpate.units import bounds
 
 __all__ = ["PlainQuery"]
@@ -22,21 +22,28 @@ __all__ = ["PlainQuery"]
 class PlainQuery:
     """Energy, force, stiffness and trust figure of Gaussian surrogates of fixed radius, one point at a time."""
 
-    def __init__(self, surrogate: TouchSurrogate) -> None:
-        net = surrogate.network
+    def __init__(self, energy: LearntEnergy) -> None:
+        net, baseline = energy.network, energy.baseline
         s = net.scaling
         self.centre, self.half = s.input_centre, s.input_half
         self.A, self.b = net.factors, net.shifts
         self.offset, self.scale = s.output_centre[0], s.output_scale[0]
         self.tail, self.weights = net.tail[0], net.weights[0]
         self.gram = np.einsum("kri,krj->kij", self.A, self.A)
-        self.radius, self.law = surrogate.radius, surrogate.law.numbers()
-        self.frame, self.C = surrogate.surface.frame, surrogate.surface.coefficients
-        self.root = np.zeros((0, 0)) if surrogate.root is None else self.scale * surrogate.root
-        self.region = surrogate.region
+        self.radius, self.law = baseline.radius, baseline.law.numbers()
+        self.frame, self.C = baseline.surface.frame, baseline.surface.coefficients
+        self.flat = None
+        if baseline.surface.profile.size:  # a flat one: its distance over the middle is that of its plane
+            middle = self.centre[None, :3]
+            d, n, _ = baseline.surface.at(middle)
+            self.flat = n[0], d[0] - n[0] @ middle[0]
+        self.root = np.zeros((0, 0)) if energy.root is None else self.scale * energy.root
+        self.region = energy.region
 
     def distance(self, c: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-        """Signed distance, gradient and Hessian of the surface's spline at c (3,)."""
+        """Signed distance, gradient and Hessian of the surface's spline, or over the middle of its plane, at c (3,)."""
+        if self.flat is not None:
+            return float(self.flat[0] @ c + self.flat[1]), self.flat[0], np.zeros((3, 3))
         h = self.frame[3]
         u = (c - self.frame[:3]) / h
         i = u.astype(np.int64)
@@ -115,14 +122,14 @@ def _microseconds(
     return 1e6 * best
 
 
-def example(units: int = 40, inputs: int = 3, rank: int | None = None, networks: int = 1) -> TouchSurrogate:
+def example(units: int = 40, inputs: int = 3, rank: int | None = None, networks: int = 1) -> LearntEnergy:
     """A plane touched by a sphere of 10 mm, with random rotated units, 512 training inputs and a posterior.
 
     The units are of so many `networks`, of which the first has the posterior. Its `rank` is the number of weights by
     default; with a symmetry those of one orbit are one.
     """
     from palpate.network import Network, Scaling, TrainedRegion
-    from palpate.surrogates import ContactLaw, TouchedSurface
+    from palpate.surrogates import ContactBaseline, ContactLaw, TouchedSurface
     from palpate.units import Quantity, Range
 
     rng = np.random.default_rng(1)
@@ -147,11 +154,9 @@ def example(units: int = 40, inputs: int = 3, rank: int | None = None, networks:
     )
     root = 0.01 * rng.normal(size=(1 + inputs + units, rank or 1 + inputs + units))
     root[1 + inputs + units // networks :] = 0.0
-    return TouchSurrogate(
+    return LearntEnergy(
         network,
-        ContactLaw("series", 1e-3),
-        surface,
-        radius=0.01,
+        ContactBaseline(ContactLaw("series", 1e-3), surface, 0.01),
         region=TrainedRegion.of(rng.uniform(-1, 1, (512, inputs))),
         root=root,
     )
@@ -162,11 +167,11 @@ def main() -> None:
     names = ("units", "inputs", "answer µs", "plain", "ratio", "trust µs", "plain", "ratio")
     print("  ".join(f"{name:>9}" for name in names))
     for units, inputs in ((10, 3), (40, 3), (40, 6), (100, 3)):
-        surrogate = example(units, inputs)
-        low, high = bounds(surrogate.inputs)
+        energy = example(units, inputs)
+        low, high = bounds(energy.inputs)
         X = np.random.default_rng(2).uniform(low, high, (1000, inputs))
         X[:, 2] = np.linspace(0.009, -0.001, len(X))
-        evaluator, plain = surrogate.evaluator(), PlainQuery(surrogate)
+        evaluator, plain = energy.evaluator(), PlainQuery(energy)
         halves, whole = [(x[:3].copy(), x[3:].copy()) for x in X], [(x,) for x in X]
         a, b = _microseconds(evaluator, halves), _microseconds(plain, whole)
         c, d = _microseconds(evaluator.trust, halves), _microseconds(plain.trust, whole)

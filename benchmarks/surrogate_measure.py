@@ -13,8 +13,8 @@ import numpy as np
 from benchmarks.surrogate_cases import Case
 from benchmarks.surrogate_rivals import RIVALS
 from benchmarks.surrogate_springs import counts, identified, some
-from palpate.learning.energy import learn_surrogate
-from palpate.surrogates import TouchSurrogate
+from palpate.learning.energy import learn_energy
+from palpate.surrogates import ContactBaseline, ContactLaw, LearntEnergy, Solves
 from palpate.validation import TouchFunction, TouchSolves
 from palpate.validation.figures.force import angles
 from palpate.validation.figures.loop_work import function_work
@@ -38,13 +38,13 @@ class Measured:
     case : Case
     rows : list of mappings
         One for each method and number of solves.
-    surrogates : mapping of int to TouchSurrogate
+    surrogates : mapping of int to LearntEnergy
         Ours, by the number of solves.
     """
 
     case: Case
     rows: list[Row]
-    surrogates: dict[int, TouchSurrogate]
+    surrogates: dict[int, LearntEnergy]
 
     def of(self, method: str, solves: int) -> Row | None:
         """A method's row at a number of solves."""
@@ -101,22 +101,21 @@ def _processor_time() -> float:
     return sum(os.times()[:4])
 
 
-def learnt(case: Case, size: int, effort: float) -> TouchSurrogate:
+def learnt(case: Case, size: int, effort: float) -> LearntEnergy:
     """Our surrogate of so many solves."""
     training = case.training(size)
-    return learn_surrogate(
+    solves = Solves(
         training.X,
         training.energy,
         training.responses,
         training.stiffness,
-        surface=case.surface,
-        radius=case.radius,
-        inputs=case.inputs,
-        symmetry=case.symmetry,
-        about=case.about if case.symmetry else None,
-        effort=effort,
-        seed=SEED,
-    ).surrogate
+        tuple(case.inputs),
+        np.asarray(case.symmetry, float).reshape(-1, 3, 3),
+        case.about if case.symmetry else None,
+    )
+    law = ContactLaw("series", case.radius / 10.0)
+    baseline = ContactBaseline(law, case.surface, case.radius)
+    return learn_energy(solves, baseline, effort=effort, seed=SEED)[0]
 
 
 def errors(model: TouchFunction, test: TouchSolves) -> Row:
@@ -177,7 +176,7 @@ def _loops(model: TouchFunction, test: TouchSolves, loops: int) -> Row:
     )
 
 
-def _query(model: TouchFunction, ours: TouchSurrogate | None, name: str, test: TouchSolves) -> float:
+def _query(model: TouchFunction, ours: LearntEnergy | None, name: str, test: TouchSolves) -> float:
     """CPU time in µs of one force at one place; of ours with the stiffness."""
     X = test.X[np.arange(QUERIES) % len(test)]
     if name == OURS and ours is not None:

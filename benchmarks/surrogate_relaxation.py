@@ -8,14 +8,16 @@ the parameters come from them alone. The patches' width was chosen on all but th
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from benchmarks.surrogate_cases import DATA
 from benchmarks.table import Claim, Column, Table
-from palpate.surrogates.relaxation import Memory, Patches, Record, course, identify_behind_pad
-from palpate.surrogates.relaxation.patches import LEAST
+from palpate.learning.relaxation import Record, identify_behind_pad
+from palpate.surrogates.memories import Patches, RelaxationState, course
+from palpate.surrogates.memories.patches import LEAST
 
 __all__ = ["relaxation_table"]
 
@@ -36,7 +38,10 @@ def relaxation_table(quick: bool) -> list[Table]:
         [Record(d["t"], d["F"][:, 2], energy=float(d["U"][0])) for d in holds], most=2
     )
     patches = _patches(drives, height)
-    rows = [_row(name, drive, Memory(found.branches, patches)) for name, drive in drives.items()]
+    rows = [
+        _row(name, drive, replace(found.relaxation, patches=patches).start())
+        for name, drive in drives.items()
+    ]
     drive = next((row for row in rows if row["drive"] == "unseen"), rows[-1])
     return [
         Table(
@@ -61,7 +66,7 @@ def relaxation_table(quick: bool) -> list[Table]:
                 Claim("energy given by a step's dissipation, J, most", (max(-r["lost"] for r in rows),), 0.0),
             ),
             (
-                f"identified on held presses alone: {found.branches}",
+                f"identified on held presses alone: {found.relaxation}",
                 f"errors relative to the transient force, at least {FLOOR:.0%} of the drive's largest; elastic "
                 "energies and forces by finite elements, so nothing learnt is in between",
             ),
@@ -90,7 +95,7 @@ def _patches(drives: dict[str, Drive], height: float) -> Patches:
     return Patches(points, Patches.width_at(RADIUS, DEPTH), middle, LEAST * SPACING)
 
 
-def _row(name: str, drive: Drive, memory: Memory) -> dict[str, Any]:
+def _row(name: str, drive: Drive, memory: RelaxationState) -> dict[str, Any]:
     felt = course(memory, drive["t"], drive["c"], np.maximum(drive["U"], 0.0), -drive["Fe"])
     size = np.linalg.norm(drive["F"], axis=1)
     scale = np.maximum(size, FLOOR * size.max())

@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
+from palpate.learning.relaxation import Drive, ramp, random_drive, sinusoid, step_hold
 from palpate.physics.interactions import SphereProbe
 from palpate.physics.materials import NeoHookean, Viscoelastic
 from palpate.physics.shapes import Block
 from palpate.physics.solid import Body
-from palpate.surrogates.relaxation import Drive, ramp, random_drive, sinusoid, step_hold
 
 __all__ = ["BRANCHES", "drives", "main"]
 

@@ -18,11 +18,11 @@ cup = pp.GluedPad(
 )
 solves = pp.sweep(tissue, cup, samples=8, seed=0)
 
-surrogate, found = pp.learn(solves, effort=0.1)
+surrogate, history = pp.learn(solves, effort=0.1)
 print(surrogate)
-print(f"left-out force error: {100 * np.median(found.errors):.2f} % median")
+print(f"left-out force error: {100 * np.median(history.energy.errors):.2f} % median")
 
-held = pp.GraspSurrogate.load(surrogate.save("held.palpate")).evaluator()
+held = pp.load(surrogate.save("held.palpate")).energy.evaluator()
 place = np.array([0.030, 0.028])
 for lift in (0.0, 0.001, 0.002, 0.004):
     held(np.array([0.0, 0.0, lift]), place)

@@ -7,15 +7,16 @@ import math
 import numpy as np
 
 from palpate.network import Network, Scaling
-from palpate.surrogates.plastic import Elements, HeldBody
+from palpate.surrogates.memories import IwanElements
+from palpate.surrogates.plastic import HeldBody
 from palpate.units import Quantity, Range
 
 D = np.array([0.0, -1.0, 0.0])
 REACH = 0.4
-YIELDS = Elements.sliders(
+YIELDS = IwanElements.sliders(
     np.array([20.0, 60.0, 40.0]), np.array([math.inf, 0.1, 0.2]), np.array([0.0, 0.1, 0.0])
 )
-CREEPS = Elements.dashpots(np.array([60.0, 40.0]), np.array([math.inf, 0.5]))
+CREEPS = IwanElements.dashpots(np.array([60.0, 40.0]), np.array([math.inf, 0.5]))
 
 
 def affine(inputs: list[Range], names: list[str], tail: np.ndarray) -> Network:
@@ -28,7 +29,7 @@ def affine(inputs: list[Range], names: list[str], tail: np.ndarray) -> Network:
     )
 
 
-def body(elements: Elements = YIELDS, nodes: int = 2) -> HeldBody:
+def body(elements: IwanElements = YIELDS, nodes: int = 2) -> HeldBody:
     """ℓ = ½ w²: h = w exp(w²/2), h' = (1 + w²) exp(w²/2); drawn as a slender rod under a force at its tip."""
     stretch = affine([Range("w²", 0.0, REACH**2, "m²")], ["ℓ"], np.array([[0.0, 0.5]]))
     s = np.linspace(0.0, 1.0, nodes)

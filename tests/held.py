@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from models import linear_network
-from palpate.surrogates.grasp import GraspSurrogate, RestStiffness
+from palpate.surrogates import LearntEnergy, PadBaseline, RestStiffness, Stiffening, Surrogate
 from palpate.units import Quantity, Range
 
 INPUTS = (
@@ -60,10 +60,11 @@ def drawn(count: int, seed: int = 0) -> np.ndarray:
 PAD_SPRING = np.diag([80.0, 90.0, 110.0])  # N/m
 
 
-def pad() -> GraspSurrogate:
+def pad() -> Surrogate:
     """U = ½ d·K d exp(−10 p_x): softer the farther the pad is along x."""
     network = linear_network(list(INPUTS), [Quantity("ln U/U0")], np.array([[0.0, 0.0, 0.0, 0.0, -0.2, 0.0]]))
-    return GraspSurrogate(network, RestStiffness.even(PAD_SPRING, 2), meta={"name": "pad"})
+    baseline = PadBaseline(RestStiffness.even(PAD_SPRING, 2), Stiffening.none(5))
+    return Surrogate(LearntEnergy(network, baseline), meta={"name": "pad"})
 
 
 def pad_force(d: np.ndarray, p_x: float = 0.0) -> np.ndarray:

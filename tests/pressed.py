@@ -12,7 +12,14 @@ import numpy as np
 
 from models import linear_network
 from palpate.dataset import Dataset, Layout, assemble, solid_fields
-from palpate.surrogates import ContactLaw, Continuation, TouchedSurface, TouchSurrogate
+from palpate.surrogates import (
+    ContactBaseline,
+    ContactLaw,
+    Continuation,
+    LearntEnergy,
+    Surrogate,
+    TouchedSurface,
+)
 from palpate.units import Quantity, Range
 from palpate.validation import TouchSolves
 
@@ -38,16 +45,18 @@ def face() -> TouchedSurface:
     return TouchedSurface.of(*CORNERS, radius=RADIUS, spacing=0.003)
 
 
-def surrogate(*, factor: float = 1.0, root: np.ndarray | None = None, **more: Any) -> TouchSurrogate:
-    """The closed form as a surrogate, its energy times `factor`."""
+def surrogate(
+    *, factor: float = 1.0, root: np.ndarray | None = None, memory: Any = None, meta: Any = None
+) -> Surrogate:
+    """The closed form as a learnt body, its energy times `factor`, with a memory and a record."""
     tail = np.array([[np.log(factor * A), B * 0.02, 0.0, 0.0]])
-    parts: dict[str, Any] = {
-        "radius": RADIUS,
-        "continuation": Continuation.of(INPUTS, deepest=DEEPEST),
-        "meta": {"name": "slab"},
-    }
     network = linear_network(list(INPUTS), [Quantity("ln U/U0")], tail)
-    return TouchSurrogate(network, ContactLaw("pad"), face(), root=root, **(parts | more))
+    baseline, going = (
+        ContactBaseline(ContactLaw("pad"), face(), RADIUS),
+        Continuation.of(INPUTS, deepest=DEEPEST),
+    )
+    energy = LearntEnergy(network, baseline, continuation=going, root=root)
+    return Surrogate(energy, memory=memory, meta={"name": "slab"} | (meta or {}))
 
 
 def steady(deviation: float) -> np.ndarray:

@@ -11,7 +11,7 @@ from .learning import Learner as Learner
 from .learning import Refinement as Refinement
 from .learning import Settings as Settings
 from .learning import fit as fit
-from .learning.dispatch import learn as learn
+from .learning.learn_dataset import learn as learn
 from .network import Network as Network
 from .physics import Body as Body
 from .physics import BodyFamily as BodyFamily
@@ -39,12 +39,11 @@ from .physics import shapes as shapes
 from .study import Study as Study
 from .study import preset_study as preset_study
 from .study import read_study as read_study
-from .surrogates import TouchedBody as TouchedBody
-from .surrogates import TouchedSurface as TouchedSurface
+from .surrogates import Baseline as Baseline
+from .surrogates import Surrogate as Surrogate
 from .surrogates import TouchModel as TouchModel
-from .surrogates import TouchSurrogate as TouchSurrogate
-from .surrogates.grasp import GraspSurrogate as GraspSurrogate
-from .surrogates.loading import load as load
+from .surrogates import load as load
+from .surrogates import register_baseline as register_baseline
 from .surrogates.plastic import HeldBody as HeldBody
 from .sweeps import ExternalProblem as ExternalProblem
 from .sweeps import Space as Space

@@ -15,10 +15,11 @@ from benchmarks.surrogate_springs import Springs, identified
 from benchmarks.touch_studies import STUDIES, TouchStudy
 
 from benchmarks import surrogate_cases, surrogate_relaxation, touch_data
+from palpate.learning.relaxation import random_drive, step_hold
 from palpate.physics.materials import NeoHookean
 from palpate.physics.shapes import Block
 from palpate.physics.solid import Body
-from palpate.surrogates.relaxation import Branches, Memory, Patches, course, random_drive, step_hold
+from palpate.surrogates.memories import Patches, Relaxation, course
 from palpate.validation import TouchSolves
 
 SIDE, HEIGHT, R = 0.04, 0.02, 0.01
@@ -256,7 +257,7 @@ def test_relaxation_finds_the_branches_that_made_its_data(tmp_path, monkeypatch)
         "hold5": step_hold(touch, 0.005, times),
         "random": random_drive(touch, 0.005, 0.004, seconds=4, dt=0.02),
     }
-    branches, arrays = Branches(((0.3, 0.1), (0.2, 2.0)), 1e-4), {"height": height}
+    branches, arrays = Relaxation(((0.3, 0.1), (0.2, 2.0)), 1e-4), {"height": height}
     elastic = {}
     for name, drive in drives.items():
         s = np.maximum(touch[2] - drive.positions[:, 2], 0.0)
@@ -267,7 +268,9 @@ def test_relaxation_finds_the_branches_that_made_its_data(tmp_path, monkeypatch)
     patches: Patches = surrogate_relaxation._patches(parts, height)
     for name, drive in drives.items():
         U, F = elastic[name]
-        arrays[f"{name}_F"] = course(Memory(branches, patches), drive.times, drive.positions, U, -F).force
+        arrays[f"{name}_F"] = course(
+            replace(branches, patches=patches).start(), drive.times, drive.positions, U, -F
+        ).force
     np.savez(tmp_path / "visco.npz", **arrays)
     monkeypatch.setattr(surrogate_relaxation, "DATA", tmp_path)
     (table,) = surrogate_relaxation.relaxation_table(quick=False)

@@ -16,8 +16,8 @@ from palpate.dataset.measured import read_measured, write_measured
 from palpate.learning.correction import correct
 from palpate.learning.plastic.paths import HeldPath, HeldPaths
 from palpate.runtime.touchable import touchable
-from palpate.surrogates import TouchedBody, TouchSurrogate
-from palpate.surrogates.relaxation import Branches
+from palpate.surrogates import Surrogate
+from palpate.surrogates.memories import Relaxation
 
 sys.path.append(str(Path(__file__).parents[1] / "learning" / "correction"))
 from correction_made import model, touches
@@ -26,7 +26,7 @@ from correction_made import model, touches
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
     path = tmp_path_factory.mktemp("ask") / "model.palpate"
-    return model().save(path)
+    return Surrogate(model()).save(path)
 
 
 def text_of(x):
@@ -38,11 +38,11 @@ def test_a_file_says_what_it_holds(palpate, file):
     assert answer.code == 0
     for one in model().inputs:
         assert one.name in answer.out
-    assert str(model()).splitlines()[0] in answer.out
+    assert str(Surrogate(model())).splitlines()[0] in answer.out
 
 
 def test_answers_are_the_surrogates(palpate, file):
-    S = TouchSurrogate.load(file)
+    S = Surrogate.load(file).energy
     X = touches(3, 4, shallowest=0.001)
     X[2, 2] = 1.0  # in the air
     places = [word for x in X for word in ("--at", text_of(x))]
@@ -64,15 +64,15 @@ def test_answers_are_the_surrogates(palpate, file):
 
 
 def test_a_body_with_its_shape_answers_by_its_energy(palpate, file, tmp_path):
-    S = TouchSurrogate.load(file)
-    both = TouchedBody(S).save(tmp_path / "both.palpate")
+    S = Surrogate.load(file).energy
+    both = Surrogate(S).save(tmp_path / "both.palpate")
     x = touches(1, 5)
     (answer,) = json.loads(palpate("ask", both, "--at", text_of(x[0]), "--json").out)["answers"]
     np.testing.assert_array_equal(answer["force"], S.force(x)[0])
 
 
 def test_beyond_the_ranges_the_trust_is_not_known(palpate, file):
-    S = TouchSurrogate.load(file)
+    S = Surrogate.load(file).energy
     deep = touches(1, 5)
     deep[0, 2] = S.inputs[2].low - 0.001
     assert S.force(deep).any()
@@ -91,13 +91,13 @@ def test_beyond_the_ranges_the_trust_is_not_known(palpate, file):
 
 
 def test_deeper_than_the_distance_goes_no_force_is_told(palpate, file):
-    S = TouchSurrogate.load(file)
-    end, middle = S.surface.inner, touches(1, 5)
+    S = Surrogate.load(file).energy
+    end, middle = S.baseline.inner, touches(1, 5)
     line = np.repeat(middle, 3, axis=0)
     line[:, 2] = -end + np.array(
-        [0.0005, -0.0005, -1.8 * S.radius]
+        [0.0005, -0.0005, -1.8 * S.baseline.radius]
     )  # just before, just behind, where d turns back
-    behind, air = middle[0] - [0, 0, 10 * S.radius], middle[0] + [0.2, 0, 2 * S.radius]
+    behind, air = middle[0] - [0, 0, 10 * S.baseline.radius], middle[0] + [0.2, 0, 2 * S.baseline.radius]
     assert S.force(line).any(axis=1).all()
     assert S.force(line)[2] @ S.force(line)[0] < 0, "the energy has to end, and pulls the probe in"
     texts = [word for x in line for word in ("--at", text_of(x))]
@@ -120,7 +120,7 @@ def test_deeper_than_the_distance_goes_no_force_is_told(palpate, file):
 
 
 def test_the_stiffness_along_the_force_is_positive_where_pressing_meets_more(palpate, file):
-    S, x = TouchSurrogate.load(file), touches(1, 5)
+    S, x = Surrogate.load(file).energy, touches(1, 5)
     F, K = S.force(x)[0], -S.stiffness(x)[0]
     words = palpate("ask", file, "--at", text_of(x[0])).out
     assert f"stiffness  {F @ K @ F / (F @ F):.4g} N/m along the force" in words
@@ -128,9 +128,9 @@ def test_the_stiffness_along_the_force_is_positive_where_pressing_meets_more(pal
 
 
 def test_of_a_body_that_relaxes_the_answer_is_that_of_an_instant(palpate, file, tmp_path):
-    body = TouchedBody(TouchSurrogate.load(file)).relaxing(Branches(((0.3, 0.1),)), spacing=0.0025)
+    body = Surrogate.load(file).with_memory(Relaxation(((0.3, 0.1),)))
     path = body.save(tmp_path / "relaxing.palpate")
-    assert "relaxes: 30 % in 0.1 s" in palpate("ask", path).out
+    assert "relaxes by 0.3 in 0.1 s" in palpate("ask", path).out
     assert "that of an instant" in palpate("ask", path, "--at", text_of(touches(1, 5)[0])).out
     assert "instant" not in palpate("ask", file, "--at", text_of(touches(1, 5)[0])).out
 
@@ -183,12 +183,12 @@ def test_histories_of_a_held_body_say_what_they_are(palpate, tmp_path):
 def test_what_was_suspicious_of_a_correction_is_told_again(palpate, tmp_path):
     S, X, path = model(), touches(30, 3), tmp_path / "wrong.palpate"
     measured = read_measured(write_measured(tmp_path / "pushed.csv", X, -S.force(X)))
-    correct(S, measured).surrogate.save(path)
+    correct(Surrogate(S), measured).surrogate.save(path)
     for words in ((), ("--at", text_of(X[0]))):
         assert "Change their sign" in palpate("ask", path, *words).out
         assert "Change their sign" in json.loads(palpate("ask", path, *words, "--json").out)["warning"]
-    assert "with a warning" in str(TouchSurrogate.load(path))
-    assert "with a warning" in touchable(TouchSurrogate.load(path)).name
+    assert "with a warning" in str(Surrogate.load(path))
+    assert "with a warning" in touchable(Surrogate.load(path)).name
 
 
 @pytest.mark.parametrize("place", ["0.01,0.02", "1,2,3,4", "a,b,c", "0.01,nan,0.02", ""])

@@ -14,7 +14,7 @@ import pytest
 
 from palpate.dataset.measured import write_measured
 from palpate.learning.correction import force_error
-from palpate.surrogates import TouchedBody, TouchSurrogate
+from palpate.surrogates import Surrogate
 
 sys.path.append(str(Path(__file__).parents[1] / "learning" / "correction"))
 from correction_made import MODULUS, model, scaled, touches
@@ -25,7 +25,7 @@ FACTOR = 1.4
 
 @pytest.fixture
 def folder(tmp_path):
-    model().save(tmp_path / "model.touch")
+    Surrogate(model()).save(tmp_path / "model.touch")
     return tmp_path
 
 
@@ -47,7 +47,7 @@ def ordered(folder):
 
 def follows(path):
     X, F = measured(100, 9)
-    return force_error(TouchSurrogate.load(path), X, F).median < 0.02
+    return force_error(Surrogate.load(path).energy, X, F).median < 0.02
 
 
 def started(folder, *words):
@@ -81,7 +81,7 @@ def test_forces_that_can_hardly_be_this_bodys_are_a_failure_that_loses_nothing(p
     assert answer.code == 1
     assert said in answer.err
     assert "before" in answer.out
-    assert said in TouchSurrogate.load(folder / "new.touch").meta["correction"]["warning"]
+    assert said in Surrogate.load(folder / "new.touch").meta["correction"]["warning"]
     assert said in json.loads(palpate(*words, "--json").out)["warning"]
 
 
@@ -111,13 +111,13 @@ def test_a_short_record_says_that_none_of_it_was_left_out(palpate, folder):
 def test_a_body_with_its_shape_stays_one(palpate, folder):
     X, F = measured()
     write_measured(folder / "specimen.csv", X, F)
-    TouchedBody(model(), {}).save(folder / "body.palpate")
+    Surrogate(model()).save(folder / "body.palpate")
     words = ("correct", folder / "body.palpate", "--file", folder / "specimen.csv", "--out")
     assert palpate(*words, folder / "new.palpate").code == 0
-    found = TouchedBody.load(folder / "new.palpate")
+    found = Surrogate.load(folder / "new.palpate")
     assert "corrected by 40 measured touches" in str(found)
     X, F = measured(100, 9)
-    assert force_error(found.touch, X, F).median < 0.02
+    assert force_error(found.energy, X, F).median < 0.02
     answer = palpate(*words, folder / "body.palpate")
     assert (answer.code, "is the model itself" in answer.err) == (2, True)
 
@@ -171,7 +171,7 @@ def test_a_connection_to_a_real_process(folder):
 
 def test_a_family_takes_its_parameters_with_units(palpate, tmp_path):
     S = model(extra=[MODULUS])
-    S.save(tmp_path / "family.touch")
+    Surrogate(S).save(tmp_path / "family.touch")
     X = touches(30, 5, extra=[MODULUS])
     X[:, 3] = 9e3
     write_measured(tmp_path / "specimen.csv", X[:, :3], scaled(S, 1.3).force(X))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from palpate.dataset import Dataset
-from palpate.surrogates import TouchedBody
+from palpate.surrogates import Surrogate
 
 # a minute on two free cores; a busy machine is no failure
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
@@ -36,13 +36,13 @@ def test_quick_demos_keep_their_limits_and_leave_everything_behind(palpate, fold
         assert grades["force_median"]["measured"] < 0.035
         assert grades["border_loop_work"]["measured"] < 1e-9
         assert "displacement_mean" in grades
-        body = TouchedBody.load(folder / f"{quick}.palpate")
+        body = Surrogate.load(folder / f"{quick}.palpate")
         test = Dataset.open(folder / f"{quick}-random.zarr").ok
         # the file answers what was judged: without the command's own figures
-        off = np.linalg.norm(body.touch.force(test.X) - test.force, axis=1)
+        off = np.linalg.norm(body.energy.force(test.X) - test.force, axis=1)
         felt = np.linalg.norm(test.force, axis=1) > 0.05
         assert np.median(off[felt] / np.linalg.norm(test.force[felt], axis=1)) < 0.035
-        assert body.touch.meta["validation"]["limits kept"] is True
+        assert body.meta["validation"]["limits kept"] is True
     page = (folder / "block-quick.html").read_text(encoding="utf-8")
     for heading in (
         "Force against depth",

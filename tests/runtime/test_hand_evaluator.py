@@ -13,6 +13,7 @@ from held import INPUTS, PAD_SPRING, pad, pad_force
 from models import spring_beam
 from palpate.runtime import LoopProcess, now
 from palpate.runtime.touchable import load_touchable, touchable
+from palpate.surrogates.memories import Relaxation
 
 PLACE = np.array([0.005, -0.01])  # m
 
@@ -21,7 +22,7 @@ BODIES = {
     "rod": body,
     "creeping rod": lambda: body(CREEPS),
     "probe": pressed.surrogate,
-    "relaxing": lambda: pressed.surrogate(meta={"relaxation": {"terms": [[0.3, 0.05]]}}),
+    "relaxing": lambda: pressed.surrogate(memory=Relaxation(((0.3, 0.05),))),
     "pad": pad,
 }
 

@@ -10,7 +10,7 @@ import pytest
 
 from palpate.study import Study, preset_study
 from palpate.study.run import Paths, carry_out, report_study
-from palpate.surrogates import TouchedBody
+from palpate.surrogates import Surrogate
 from palpate.sweeps import LocalCluster, local_cluster
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
@@ -48,12 +48,12 @@ def test_a_named_body_is_solved_learnt_judged_and_told(
     paths = Paths(tmp_path, study.name)
     outcome = carry_out(study, paths, cluster=workers, progress=False)
     assert (len(outcome.train), len(outcome.test)) == (6, 1), "every solve converged"
-    body = TouchedBody.load(paths.model)
+    body = Surrogate.load(paths.model)
     felt = np.linalg.norm(outcome.train.force, axis=1)
-    off = np.linalg.norm(body.touch.force(outcome.train.X) - outcome.train.force, axis=1) / felt
+    off = np.linalg.norm(body.energy.force(outcome.train.X) - outcome.train.force, axis=1) / felt
     assert np.median(off) < 0.05
     away = outcome.train.X + np.array([0.0, 0.0, 0.2])
-    np.testing.assert_array_equal(body.touch.force(away), 0.0)
+    np.testing.assert_array_equal(body.energy.force(away), 0.0)
     # the body is shown on other nodes than those of a part's solves: what moves most is compared
     most = np.abs(body.fields["displacement"].values(outcome.train.X)).max(axis=(1, 2))
     moved = np.abs(outcome.train.displacement).max(axis=(1, 2))

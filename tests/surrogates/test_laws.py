@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.errors import UsageError
-from palpate.surrogates.laws import ContactLaw, choices, crossing_length
+from palpate.surrogates.contact_law import ContactLaw, choices, crossing_length
 
 LAWS = [ContactLaw("square"), ContactLaw("hertz"), ContactLaw("pad"), ContactLaw("series", 1e-3)]
 DEPTHS = np.geomspace(1e-9, 0.05, 60)

@@ -1,4 +1,4 @@
-"""Touch surrogates made by formula, for tests that need one but no solver."""
+"""Energies of touch made by formula, for tests that need one but no solver."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import functools
 import numpy as np
 
 from palpate.network import Network, Scaling, TrainedRegion
-from palpate.surrogates import ContactLaw, Continuation, TouchedSurface, TouchSurrogate
+from palpate.surrogates import ContactBaseline, ContactLaw, Continuation, LearntEnergy, TouchedSurface
 from palpate.units import Quantity, Range, bounds
 
 RADIUS = 0.010
@@ -66,8 +66,10 @@ def ball() -> TouchedSurface:
     return TouchedSurface.of(points, np.array(triangles), radius=0.006, reach=0.013, spacing=0.002)
 
 
-def surrogate(*, extra=(), surface=None, law=None, seed=1, deep=True, **more) -> TouchSurrogate:
-    """A body with the inputs of `BOX` and `extra`, trained at random points of them."""
+def touch_energy(
+    *, extra=(), surface=None, law=None, seed=1, deep=True, radius_at=None, **more
+) -> LearntEnergy:
+    """A touched body with the inputs of `BOX` and `extra`, trained at random points of them."""
     inputs = [*BOX, *extra]
     net = network(inputs, seed=seed, **{k: more.pop(k) for k in ("units", "size") if k in more})
     rng = np.random.default_rng(seed)
@@ -75,9 +77,10 @@ def surrogate(*, extra=(), surface=None, law=None, seed=1, deep=True, **more) ->
         "region": TrainedRegion.of(rng.uniform(-1.0, 1.0, (400, len(inputs)))),
         "continuation": Continuation.of(inputs, deepest=DEEPEST if deep else np.inf),
         "root": 0.002 * rng.normal(size=(1 + len(inputs) + net.units, 20)),
-        "radius": RADIUS,
     }
-    return TouchSurrogate(net, law or ContactLaw("series", 1e-3), surface or plane(), **(parts | more))
+    law = law or ContactLaw("series", 1e-3)
+    baseline = ContactBaseline(law, surface or plane(), more.pop("radius", RADIUS), radius_at)
+    return LearntEnergy(net, baseline, **(parts | more))
 
 
 def inside_points(count: int, extra=(), seed: int = 3) -> np.ndarray:
@@ -107,19 +110,19 @@ def differences(function, X: np.ndarray, steps: np.ndarray) -> np.ndarray:
     return np.stack(columns, axis=-1)
 
 
-def undisturbed(S: TouchSurrogate, X: np.ndarray, reach: float) -> np.ndarray:
+def undisturbed(S: LearntEnergy, X: np.ndarray, reach: float) -> np.ndarray:
     """Rows of X in contact, farther than `reach` (m) from wherever a third derivative of the energy jumps.
 
     That is at the deepest trained depth, where the place at which ℓ is taken crosses the end of a range, and at the
     nodes of the surface; and 20 times as far from first touch, where derivatives by s grow as powers of 1/s.
     """
     going = S.continuation
-    _, slope, _ = S.surface.at(X[:, :3])
+    _, slope, _ = S.baseline.surface.at(X[:, :3])
     s = S.depth(X)
     over = np.maximum(s - going.deepest, 0.0)
     taken = X[:, :3] + (over - going.depth_width * np.tanh(over / going.depth_width))[:, None] * slope
     keep = (s > 20 * reach) & (np.abs(s - going.deepest) > reach)
     for end in bounds(S.inputs[:3]):
         keep &= (np.abs(taken - end) > reach).all(axis=1)
-    cell = (X[:, :3] - S.surface.frame[:3]) / S.surface.frame[3]
-    return X[keep & ((np.abs(cell - np.round(cell)) * S.surface.frame[3]) > reach).all(axis=1)]
+    cell = (X[:, :3] - S.baseline.surface.frame[:3]) / S.baseline.surface.frame[3]
+    return X[keep & ((np.abs(cell - np.round(cell)) * S.baseline.surface.frame[3]) > reach).all(axis=1)]

@@ -12,7 +12,8 @@ import pytest
 from palpate.errors import AccuracyError, UsageError
 from palpate.learning.plastic import HeldPath, HeldPaths
 from palpate.network import Network, Scaling
-from palpate.surrogates.plastic import Elements, HeldBody
+from palpate.surrogates.memories import IwanElements
+from palpate.surrogates.plastic import HeldBody
 from palpate.units import Quantity, Range
 from palpate.validation import Chapter, Limits, validate, write_report
 
@@ -37,7 +38,7 @@ def rod() -> HeldBody:
         name="rod",
         stretch=affine([Range("w²", 0.0, 0.01, "m²")], ["ℓ"], np.zeros((1, 2))),
         shape=affine([Range("w", -0.1, 0.1, "m"), Range("P", -20.0, 20.0, "N")], list("abcd"), tail),
-        elements=Elements.sliders(np.full(2, 100.0), np.array([math.inf, 0.01]), np.zeros(2)),
+        elements=IwanElements.sliders(np.full(2, 100.0), np.array([math.inf, 0.01]), np.zeros(2)),
         mirrors=True,
         rest=REST,
         nodes_of_interest=np.array([1]),

@@ -11,7 +11,7 @@ from linear_bodies import history, tip_data, tip_model
 
 from models import linear_network
 from palpate.format import bind_units, interval
-from palpate.surrogates import ContactLaw, Continuation, TouchSurrogate
+from palpate.surrogates import ContactBaseline, ContactLaw, Continuation, LearntEnergy, Surrogate
 from palpate.units import Quantity, Range
 from palpate.validation import Chapter, TouchSolves, validate, write_report
 from palpate.validation.report.touch_pictures import View, at_depth, contact_points, curves, plot_curves
@@ -30,7 +30,7 @@ def columns() -> TouchSolves:
 
 def test_curves_lie_on_the_closed_form_with_the_solves_of_their_column() -> None:
     test = columns()
-    found = curves(surrogate(), test)
+    found = curves(surrogate().energy, test)
     assert len(found) == 4
     assert sorted(np.concatenate([c.rows for c in found])) == list(range(20))
     for curve in found:
@@ -47,7 +47,7 @@ def test_depths_of_one_place_are_told_from_places() -> None:
 
 
 def test_a_flat_face_is_seen_from_above() -> None:
-    S, X = surrogate(), places(50)
+    S, X = surrogate().energy, places(50)
     view = View.of(S, X)
     np.testing.assert_allclose(view.out, [0, 0, 1], atol=1e-12)
     np.testing.assert_allclose(view.flat(contact_points(S, X)), X[:, :2], atol=1e-12)
@@ -59,14 +59,16 @@ def test_a_flat_face_is_seen_from_above() -> None:
 def test_of_a_family_it_is_told_which_body_is_shown(tmp_path: Path) -> None:
     inputs = (*INPUTS, Range("young", 5e3, 15e3, "Pa"))
     network = linear_network(list(inputs), [Quantity("ln U/U0")], np.array([[np.log(A), B * 0.02, 0, 0, 0]]))
-    S = TouchSurrogate(
-        *(network, ContactLaw("pad"), face(), RADIUS), continuation=Continuation.of(inputs, deepest=DEEPEST)
+    baseline, going = (
+        ContactBaseline(ContactLaw("pad"), face(), RADIUS),
+        Continuation.of(inputs, deepest=DEEPEST),
     )
+    S = Surrogate(LearntEnergy(network, baseline, continuation=going))
     alike = columns()
     X = np.hstack([alike.X, np.repeat([[6e3], [8e3], [1e4], [1.2e4]], 5, axis=0)])
     X[4, 2] -= 1e-5  # the first column's last touch is the deepest
     test = TouchSolves(X, alike.force, alike.energy, alike.stiffness)
-    legend = plot_curves(S, test).axes[0].get_legend()
+    legend = plot_curves(S.energy, test).axes[0].get_legend()
     told = [text.get_text().partition("; ")[2] for text in legend.get_texts()]
     assert sorted(told) == ["young = 1.2e+04 Pa", "young = 1e+04 Pa", "young = 6000 Pa", "young = 8000 Pa"]
     text = write_report(tmp_path / "f.html", [Chapter("f", S, test, validate(S, test))]).read_text("utf-8")

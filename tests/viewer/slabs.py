@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 import pressed
 from models import linear_network
-from palpate.surrogates import ContactLaw, Continuation, FieldSurrogate, TouchedBody, TouchSurrogate
+from palpate.surrogates import (
+    ContactBaseline,
+    ContactLaw,
+    Continuation,
+    FieldSurrogate,
+    LearntEnergy,
+    Surrogate,
+)
 from palpate.surrogates.fields import DepthAmplitude, LocalMode, Variation
 from palpate.surrogates.fields.local_mode import design
-from palpate.surrogates.plastic import Dents
+from palpate.surrogates.memories import Indentation, Relaxation
 from palpate.units import Quantity, Range
 
 HALF, HIGH = 0.03, 0.02  # m: 60 × 60 × 20 mm
@@ -34,13 +43,14 @@ def box(cells: int = 24) -> tuple[np.ndarray, np.ndarray]:
     return points, which.reshape(-1)[triangles]
 
 
-def touched_slab(**more: object) -> TouchedBody:
+def touched_slab(**more: object) -> Surrogate:
     """The slab with its displacement, and a stretch that is a scalar."""
-    touch = pressed.surrogate(root=pressed.steady(DEVIATION), **more)
-    return TouchedBody(touch, {"displacement": _field(touch, 3), "largest stretch": _field(touch, 1)})
+    body = pressed.surrogate(root=pressed.steady(DEVIATION), **more)
+    fields = {"displacement": _field(body.energy, 3), "largest stretch": _field(body.energy, 1)}
+    return replace(body, fields=fields)
 
 
-def _field(touch, components: int) -> FieldSurrogate:
+def _field(energy, components: int) -> FieldSurrogate:
     points, triangles = box()
     nodes = len(points)
     mass = np.full(nodes, 1.0 / nodes)
@@ -65,7 +75,7 @@ def _field(touch, components: int) -> FieldSurrogate:
         triangles,
         mass,
         amplitude=DepthAmplitude("linear", pressed.DEEPEST),
-        surface=touch.surface,
+        surface=energy.baseline.surface,
         radius=pressed.RADIUS,
         local_mode=LocalMode(_table(components), 0.03, 1e-4, _variation(components)),
     )
@@ -93,22 +103,20 @@ def _variation(components: int) -> Variation:
     return Variation(table, powers, np.eye(3)[:2], np.array([[0.0, 0.0], [HALF, HALF]]))
 
 
-def dents(width: float) -> Dents:
+def dents(width: float) -> Indentation:
     """It yields from 1 mm on; pressed to 4 mm in the middle, a quarter of the amplitude stays."""
     first, whole = (np.sqrt(2 * pressed.A * depth**3) for depth in (0.001, 0.004))
     tables = np.array([0.0, 0.25 * whole]), np.array([first, whole]), np.array([1.0, 1.1])
-    return Dents(*tables, np.zeros((1, 3)), width)
+    return Indentation(*tables, np.zeros((1, 3)), width)
 
 
-def family() -> TouchSurrogate:
+def family() -> Surrogate:
     """The slab's energy, e times stiffer at one end of a further input than at the other; it relaxes to 60 %."""
     inputs = (*pressed.INPUTS, Range("firmness", 0.5, 2.0, ""))
     tail = np.array([[np.log(pressed.A), pressed.B * 0.02, 0.0, 0.0, 0.5]])
-    return TouchSurrogate(
+    energy = LearntEnergy(
         linear_network(list(inputs), [Quantity("ln U/U0")], tail),
-        ContactLaw("pad"),
-        pressed.face(),
-        radius=pressed.RADIUS,
+        ContactBaseline(ContactLaw("pad"), pressed.face(), pressed.RADIUS),
         continuation=Continuation.of(inputs, deepest=pressed.DEEPEST),
-        meta={"name": "family", "relaxation": {"terms": [[0.4, 0.05]]}},
     )
+    return Surrogate(energy, memory=Relaxation(((0.4, 0.05),)), meta={"name": "family"})

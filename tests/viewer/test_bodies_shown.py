@@ -110,7 +110,7 @@ def test_files_of_other_programs_are_shown(tmp_path: Path):
 
 
 def solid_dataset(samples: int):
-    """Dents of rising depth in the block as a dataset, the last row not converged."""
+    """Indentation of rising depth in the block as a dataset, the last row not converged."""
     from palpate.dataset import Layout, assemble, solid_fields
     from palpate.units import Range
 

@@ -12,7 +12,7 @@ from playwright.sync_api import Browser, Page
 from slabs import DEVIATION, dents, touched_slab
 
 import pressed
-from palpate.surrogates import TouchedBody
+from palpate.surrogates import Surrogate
 from palpate.viewer import Viewer
 from palpate.viewer.surface_drawing import SurfaceDrawing
 
@@ -20,12 +20,12 @@ pytestmark = pytest.mark.timeout(180)
 
 
 @pytest.fixture(scope="module")
-def slab() -> TouchedBody:
+def slab() -> Surrogate:
     return touched_slab()
 
 
 @pytest.fixture(scope="module")
-def slab_viewer(slab: TouchedBody) -> Iterator[Viewer]:
+def slab_viewer(slab: Surrogate) -> Iterator[Viewer]:
     with Viewer(slab, port=0) as running:
         yield running
 
@@ -70,20 +70,20 @@ def middle(page: Page) -> tuple[float, float]:
     return float(x), float(y)
 
 
-def check(slab: TouchedBody, shown: dict) -> np.ndarray:
+def check(slab: Surrogate, shown: dict) -> np.ndarray:
     """The numbers on the page are the surrogate's at the probe shown; that probe, (1, 3)."""
     x = vector(shown["data"], "position")[None]
-    force = slab.touch.force(x)[0]
+    force = slab.energy.force(x)[0]
     # three decimals on the page, and a position rounded to 32 bits at the largest stiffness
     slack = 0.5e-3 + 1e-6
     told = [number(shown["text"][f"force-{c}"]) for c in "xyz"]
     np.testing.assert_allclose(told, force, rtol=0, atol=slack)
     assert number(shown["text"]["force-norm"]) == pytest.approx(np.linalg.norm(force), abs=slack)
-    assert number(shown["text"]["depth"]) == pytest.approx(1e3 * slab.touch.depth(x)[0], abs=0.0051)
+    assert number(shown["text"]["depth"]) == pytest.approx(1e3 * slab.energy.depth(x)[0], abs=0.0051)
     return x
 
 
-def test_holding_the_button_presses_and_the_numbers_are_the_surrogates(page: Page, keep, slab: TouchedBody):
+def test_holding_the_button_presses_and_the_numbers_are_the_surrogates(page: Page, keep, slab: Surrogate):
     assert number(page.inner_text("#force-norm")) == 0.0
     x, y = middle(page)
     page.mouse.move(x + 20, y + 10)
@@ -92,7 +92,7 @@ def test_holding_the_button_presses_and_the_numbers_are_the_surrogates(page: Pag
     shown = stand_still(page, "inside")
     keep(page, "pressed")
     at = check(slab, shown)
-    assert slab.touch.depth(at)[0] == pytest.approx(0.5 * pressed.DEEPEST, rel=1e-3), "as the slider says"
+    assert slab.energy.depth(at)[0] == pytest.approx(0.5 * pressed.DEEPEST, rel=1e-3), "as the slider says"
     assert shown["text"]["trust"] == "inside"
     assert shown["text"]["deviation"] == f"± {100 * DEVIATION:g}\N{NO-BREAK SPACE}%"
     # the browser has summed modes and dimple to what the field says
@@ -105,7 +105,7 @@ def test_holding_the_button_presses_and_the_numbers_are_the_surrogates(page: Pag
 
 
 @pytest.mark.slow
-def test_moving_slides_the_probe_at_its_depth(page: Page, slab: TouchedBody):
+def test_moving_slides_the_probe_at_its_depth(page: Page, slab: Surrogate):
     x, y = middle(page)
     page.mouse.move(x, y + 10)
     page.mouse.down()
@@ -117,16 +117,16 @@ def test_moving_slides_the_probe_at_its_depth(page: Page, slab: TouchedBody):
 
 
 @pytest.mark.slow
-def test_the_wheel_presses_deeper_and_beyond_the_training_says_so(page: Page, keep, slab: TouchedBody):
+def test_the_wheel_presses_deeper_and_beyond_the_training_says_so(page: Page, keep, slab: Surrogate):
     x, y = middle(page)
     page.mouse.move(x, y + 10)
     page.mouse.down()
-    shallow = slab.touch.depth(check(slab, stand_still(page, "inside")))[0]
+    shallow = slab.energy.depth(check(slab, stand_still(page, "inside")))[0]
     for _ in range(16):  # of a twentieth of the trained depth
         page.mouse.wheel(0, 100)
     shown = stand_still(page, "outside")
     keep(page, "pressed-outside")
-    assert slab.touch.depth(check(slab, shown))[0] == pytest.approx(1.25 * pressed.DEEPEST, rel=1e-3)
+    assert slab.energy.depth(check(slab, shown))[0] == pytest.approx(1.25 * pressed.DEEPEST, rel=1e-3)
     assert shown["text"]["trust"] == "outside"
     assert "untrained" in page.inner_text("#depth-label")
     page.mouse.up()
@@ -134,7 +134,7 @@ def test_the_wheel_presses_deeper_and_beyond_the_training_says_so(page: Page, ke
 
 
 @pytest.mark.slow
-def test_space_presses_arrows_slide_and_escape_lets_go(page: Page, slab: TouchedBody):
+def test_space_presses_arrows_slide_and_escape_lets_go(page: Page, slab: Surrogate):
     page.focus("#view")
     page.keyboard.down("Space")
     before = check(slab, stand_still(page, "inside"))
@@ -143,7 +143,7 @@ def test_space_presses_arrows_slide_and_escape_lets_go(page: Page, slab: Touched
     page.keyboard.press("PageDown")
     after = check(slab, stand_still(page, "inside"))
     assert np.linalg.norm(after[0, :2] - before[0, :2]) > 0.002
-    gone = slab.touch.depth(after)[0] - slab.touch.depth(before)[0]
+    gone = slab.energy.depth(after)[0] - slab.energy.depth(before)[0]
     assert gone == pytest.approx(0.05 * pressed.DEEPEST, rel=0.05)
     page.keyboard.press("Escape")
     stand_still(page, "free")
@@ -173,7 +173,7 @@ def test_beside_the_touched_surface_the_view_turns_instead(page: Page):
 
 
 @pytest.mark.slow
-def test_colours_are_chosen_with_their_own_scale(page: Page, keep, slab: TouchedBody):
+def test_colours_are_chosen_with_their_own_scale(page: Page, keep, slab: Surrogate):
     assert page.inner_text("#legend-title") == "displacement (mm)"
     x, y = middle(page)
     page.get_by_role("button", name="largest stretch").click()
@@ -189,7 +189,7 @@ def test_colours_are_chosen_with_their_own_scale(page: Page, keep, slab: Touched
     page.get_by_role("button", name="displacement").click()
 
 
-def test_the_browser_sums_a_field_as_numpy_does(page: Page, slab: TouchedBody):
+def test_the_browser_sums_a_field_as_numpy_does(page: Page, slab: Surrogate):
     from palpate.runtime.touchable import touchable
 
     drawing = SurfaceDrawing(touchable(slab))
@@ -224,7 +224,7 @@ def test_the_browser_sums_a_field_as_numpy_does(page: Page, slab: TouchedBody):
 
 def test_a_print_stays_on_the_page_when_the_hand_has_gone(browser: Browser, keep):
     complaints: list[str] = []
-    with Viewer(touched_slab().yielding(dents(0.002), spacing=0.002), port=0) as viewer:
+    with Viewer(touched_slab().with_memory(dents(0.002), spacing=0.002), port=0) as viewer:
         page = open_page(browser, viewer, complaints, "middle")
         x, y = middle(page)
         page.mouse.move(x, y + 5)
@@ -257,7 +257,7 @@ def test_a_surrogate_alone_says_that_its_surface_does_not_move(browser: Browser,
         page.mouse.down()
         shown = stand_still(page, "inside")
         keep(page, "pressed-alone")
-        check(TouchedBody(alone), shown)
+        check(alone, shown)
         assert shown["text"]["deviation"] == "not known"
         page.context.close()
     assert_no([c for c in complaints if "WebSocket" not in c])

@@ -16,7 +16,7 @@ from websockets.sync.client import ClientConnection, connect
 import pressed
 from palpate.runtime.touchable import touchable
 from palpate.runtime.workspace import Workspace
-from palpate.surrogates import TouchedBody
+from palpate.surrogates import Surrogate
 from palpate.viewer import Viewer
 from palpate.viewer.messages import Credit, Frame, Hand, Hello, Hold, Modes, Surface
 from palpate.viewer.surface_drawing import SurfaceDrawing
@@ -26,12 +26,12 @@ pytestmark = pytest.mark.timeout(120)
 
 
 @pytest.fixture(scope="module")
-def slab() -> TouchedBody:
+def slab() -> Surrogate:
     return touched_slab()
 
 
 @pytest.fixture(scope="module")
-def pressed_viewer(slab: TouchedBody) -> Iterator[Viewer]:
+def pressed_viewer(slab: Surrogate) -> Iterator[Viewer]:
     with Viewer(slab, port=0) as running:
         yield running
 
@@ -80,16 +80,16 @@ def fetched(viewer: Viewer, path: str) -> bytes:
         return answer.read()
 
 
-def test_force_depth_and_trust_are_the_surrogates_own(pressed_viewer: Viewer, slab: TouchedBody):
+def test_force_depth_and_trust_are_the_surrogates_own(pressed_viewer: Viewer, slab: Surrogate):
     place = np.array([0.008, -0.004, pressed.RADIUS - 0.0045])
     with client_of(pressed_viewer) as client:
         frame = client.held(place)
     x = np.array(frame.position)[None]
     # the position travels in 32 bits: half an ulp of a centimetre at 420 N/m
-    np.testing.assert_allclose(frame.force, slab.touch.force(x)[0], rtol=1e-6, atol=1e-6)
-    assert frame.depth == pytest.approx(slab.touch.depth(x)[0], abs=2e-9)
+    np.testing.assert_allclose(frame.force, slab.energy.force(x)[0], rtol=1e-6, atol=1e-6)
+    assert frame.depth == pytest.approx(slab.energy.depth(x)[0], abs=2e-9)
     n = np.array(frame.force) / np.linalg.norm(frame.force)
-    assert frame.stiffness == pytest.approx(-n @ slab.touch.stiffness(x)[0] @ n, rel=1e-5)
+    assert frame.stiffness == pytest.approx(-n @ slab.energy.stiffness(x)[0] @ n, rel=1e-5)
     assert frame.deviation == pytest.approx(DEVIATION, rel=1e-6)
     assert (frame.inside, frame.hold) == (True, Hold.YOURS)
 
@@ -101,7 +101,7 @@ def test_what_was_not_trained_is_flagged(pressed_viewer: Viewer):
         assert client.held([0.0, 0.0, pressed.RADIUS - 0.003]).inside
 
 
-def test_coefficients_are_the_fields_and_a_frame_is_small(pressed_viewer: Viewer, slab: TouchedBody):
+def test_coefficients_are_the_fields_and_a_frame_is_small(pressed_viewer: Viewer, slab: Surrogate):
     with client_of(pressed_viewer) as client:
         frame = client.held([0.004, 0.006, pressed.RADIUS - 0.004])
     x = np.array(frame.position)[None]
@@ -121,8 +121,8 @@ def test_coefficients_are_the_fields_and_a_frame_is_small(pressed_viewer: Viewer
     assert len(frame.pack()) < 256 + 4 * (14 * 4 * 3 + 14 * 4 * 1)
 
 
-def test_pushed_too_deep_the_body_returns_to_rest_under_the_hand(pressed_viewer: Viewer, slab: TouchedBody):
-    x, end = np.zeros(3), slab.touch.surface.inner
+def test_pushed_too_deep_the_body_returns_to_rest_under_the_hand(pressed_viewer: Viewer, slab: Surrogate):
+    x, end = np.zeros(3), slab.energy.baseline.surface.inner
     with client_of(pressed_viewer) as client:
         x[2] = -end + 5e-4
         deep = client.held(x)
@@ -156,7 +156,7 @@ def test_released_the_force_is_zero_and_the_body_returns_to_rest(pressed_viewer:
         assert frame.drawn == 0.0
 
 
-def test_the_hello_says_what_there_is(pressed_viewer: Viewer, slab: TouchedBody):
+def test_the_hello_says_what_there_is(pressed_viewer: Viewer, slab: Surrogate):
     with client_of(pressed_viewer) as client:
         hello = client.hello
     assert (hello.name, hello.radius, hello.deepest, hello.radius_parameter) == ("slab", 0.010, 0.006, -1)
@@ -169,7 +169,7 @@ def test_the_hello_says_what_there_is(pressed_viewer: Viewer, slab: TouchedBody)
     assert hello.force_max == pytest.approx(touchable(slab).force_max)
 
 
-def test_the_page_gets_the_skin_and_the_modes_once(pressed_viewer: Viewer, slab: TouchedBody):
+def test_the_page_gets_the_skin_and_the_modes_once(pressed_viewer: Viewer, slab: Surrogate):
     assert b"page.js" in fetched(pressed_viewer, "")
     surface = Surface.unpack(fetched(pressed_viewer, "surface"))
     corners = surface.rest.reshape(-1, 3)[surface.triangles.astype(int).reshape(-1, 3)]
@@ -207,6 +207,6 @@ def test_a_family_hears_its_slider_and_relaxes(tmp_path):
     assert soft.parameters.tolist() == [0.5]
     assert np.isnan(soft.deviation), "no posterior, no figure"
     # long after the press what doesn't relax is left; from one end of the input to the other U grows e-fold
-    full = pressed.surrogate(factor=np.exp(-0.5)).force(np.array([soft.position]))[0, 2]
+    full = pressed.surrogate(factor=np.exp(-0.5)).energy.force(np.array([soft.position]))[0, 2]
     assert soft.force[2] == pytest.approx(0.6 * full, rel=1e-3)
     assert firm.force[2] > 2 * soft.force[2]

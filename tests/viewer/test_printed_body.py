@@ -11,15 +11,14 @@ import slabs
 from slabs import touched_slab
 
 import pressed
-from palpate.errors import FileFormatError, UsageError
+from palpate.errors import UsageError
 from palpate.runtime import LoopProcess, now
 from palpate.runtime.loop import Loop
 from palpate.runtime.safety import Limits
 from palpate.runtime.shared_state import MAX_PLACES, Shared
 from palpate.runtime.touchable import Touchable, load_touchable, touchable
-from palpate.surrogates import TouchedBody
-from palpate.surrogates.plastic import Dents
-from palpate.surrogates.relaxation import Branches
+from palpate.surrogates import Surrogate
+from palpate.surrogates.memories import Indentation, Relaxation
 from palpate.viewer.messages import Frame
 from palpate.viewer.page_model import PageModel
 from palpate.viewer.prints import Prints
@@ -48,19 +47,19 @@ def above(depth, x=0.0):
 
 
 @pytest.fixture(scope="module")
-def dents() -> Dents:
+def dents() -> Indentation:
     return slabs.dents(SPACING)
 
 
 @pytest.fixture
 def file(dents, tmp_path):
-    return touched_slab().yielding(dents, spacing=SPACING).save(tmp_path / "printed.palpate")
+    return touched_slab().with_memory(dents, spacing=SPACING).save(tmp_path / "printed.palpate")
 
 
 def test_the_file_tells_of_prints_and_where_they_can_stay(file, dents):
     body = load_touchable(file)
     assert isinstance(body, Touchable)
-    found = body.dents
+    found = body.memory
     for name in ("dent", "reach", "stiffening"):
         np.testing.assert_array_equal(getattr(found, name), getattr(dents, name))
     assert found.width == SPACING
@@ -73,7 +72,7 @@ def test_the_file_tells_of_prints_and_where_they_can_stay(file, dents):
 
 def test_a_print_is_felt_where_it_is_and_nowhere_else(file):
     body = load_touchable(file)
-    answer, elastic = body.evaluator(), touched_slab().touch
+    answer, elastic = body.evaluator(), touched_slab().energy
     answer(above(0.002, x=0.015), NONE)
     untouched = answer.force.copy()
     answer(body.away, NONE)
@@ -89,42 +88,37 @@ def test_a_print_is_felt_where_it_is_and_nowhere_else(file):
 
 
 def test_without_spacing_the_print_travels(dents, tmp_path):
-    kept = TouchedBody.load(touched_slab().yielding(dents).save(tmp_path / "one.palpate"))
+    kept = Surrogate.load(touched_slab().with_memory(dents).save(tmp_path / "one.palpate"))
     answer = touchable(kept).evaluator()
     answer(above(0.004), NONE)
     answer(above(0.002, x=0.015), NONE)
-    assert answer.force[2] < 0.7 * touched_slab().touch.force(above(0.002, x=0.015)[None])[0, 2]
+    assert answer.force[2] < 0.7 * touched_slab().energy.force(above(0.002, x=0.015)[None])[0, 2]
 
 
 def test_a_print_must_be_as_wide_as_places_are_apart(dents):
-    single = Dents.single(dents.dent, dents.reach, dents.stiffening)
+    single = Indentation.single(dents.dent, dents.reach, dents.stiffening)
     with pytest.raises(UsageError, match="do not fit places"):
-        touched_slab().yielding(single, spacing=SPACING)
-    told = touched_slab().yielding(single, spacing=SPACING, width=0.003)
-    assert touchable(told).dents.width == 0.003
+        touched_slab().with_memory(single, spacing=SPACING)
+    body = touched_slab().with_memory(dataclasses.replace(single, width=0.003), spacing=SPACING)
+    assert touchable(body).memory.width == 0.003
 
 
 def test_one_memory_takes_the_place_of_the_other(dents):
-    body = touched_slab().relaxing(Branches(((0.3, 0.1),)), spacing=0.0025)
-    assert touchable(body).branches == Branches(((0.3, 0.1),))
-    assert "relaxes: 30 % in 0.1 s" in str(body)
-    printed = body.yielding(dents)
+    body = touched_slab().with_memory(Relaxation(((0.3, 0.1),)), spacing=0.0025)
+    assert touchable(body).memory.terms == ((0.3, 0.1),)
+    assert len(touchable(body).memory.patches) > 10
+    assert "relaxes by 0.3 in 0.1 s" in str(body)
+    printed = body.with_memory(dents)
     assert "relaxes" not in str(printed)
-    assert "yields and keeps prints" in str(printed)
-    assert touchable(printed).branches is None
-    assert touchable(printed).dents is not None
-    assert touchable(printed.relaxing(Branches(((0.3, 0.1),)))).dents is None
+    assert "yields from" in str(printed)
+    assert touchable(printed).indentation is printed.memory
+    assert touchable(body).indentation is None
+    assert touchable(printed.with_memory(None)).memory is None
 
 
-@pytest.mark.parametrize(
-    "wrong", [{}, "soon", {"dent": [0.0], "reach": [1.0], "stiffening": [1.0], "width": 1.0}]
-)
-def test_yielding_that_is_none_is_refused(wrong):
-    with pytest.raises(FileFormatError, match="how the body yields"):
-        touchable(pressed.surrogate(meta={"yielding": wrong})).evaluator()
-    both = {"yielding": wrong, "relaxation": {"terms": [[0.3, 0.1]]}}
-    with pytest.raises(FileFormatError, match="that it relaxes"):
-        touchable(pressed.surrogate(meta=both)).evaluator()
+def test_a_body_without_a_drawn_surface_has_no_places_for_a_memory(dents):
+    with pytest.raises(UsageError, match="no drawn surface"):
+        pressed.surrogate().with_memory(dents, spacing=SPACING)
 
 
 @pytest.fixture
@@ -140,7 +134,7 @@ def printed(file):
 def test_a_print_is_drawn_as_deep_as_a_ball_rests_on_it(printed):
     body, answer, line = printed
     prints = Prints(body, line)
-    met = body.dents.shares(line) @ answer.prints
+    met = body.memory.shares(line) @ answer.prints
     # U = A s³ exp(b x), so √(2U) = p at s = (p²/2A)^⅓ exp(−b x/3)
     rests = np.cbrt(met**2 / (2 * pressed.A)) * np.exp(-pressed.B * line[:, 0] / 3)
     np.testing.assert_allclose(prints.depths(answer.prints), rests, atol=1e-5)
@@ -164,7 +158,7 @@ def test_a_virgin_body_draws_no_print(file):
     prints = Prints(body, np.zeros((1, 3)))
     assert len(prints.depths(np.zeros(0))) == 0
     assert prints.under(np.zeros(3), np.array([0.0, 0.0, 1.0]), np.zeros(0)) == 0.0
-    assert not prints.depths(np.zeros(len(body.dents.points))).any()
+    assert not prints.depths(np.zeros(len(body.memory.points))).any()
 
 
 def test_all_points_of_the_top_may_keep_a_print_and_no_others(file, dents, tmp_path):
@@ -178,7 +172,7 @@ def test_all_points_of_the_top_may_keep_a_print_and_no_others(file, dents, tmp_p
         model.hello(Shared.private().read_state(), 1e3).remembers
         == "pressed deeper than 1 mm it keeps a print"
     )
-    travelling = touched_slab().yielding(dents).save(tmp_path / "one.palpate")
+    travelling = touched_slab().with_memory(dents).save(tmp_path / "one.palpate")
     assert len(PageModel(load_touchable(travelling)).surface.printable) == 0
 
 
@@ -220,8 +214,8 @@ def _printable(model):
 
 
 def test_more_places_than_the_shared_memory_carries_are_refused(dents):
-    body = touchable(touched_slab().yielding(dents, spacing=0.0007, width=0.002))
-    assert len(body.dents.points) > MAX_PLACES
+    body = touchable(touched_slab().with_memory(dents, spacing=0.0007))
+    assert len(body.memory.points) > MAX_PLACES
     with pytest.raises(UsageError, match=f"carries {MAX_PLACES}"):
         Loop(body, object(), Shared.private(), body.workspace(0.06), Limits(8.0))
 

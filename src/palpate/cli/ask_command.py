@@ -16,8 +16,8 @@ from palpate.learning import Fitted
 from palpate.learning.plastic.paths import KIND, HeldPaths
 from palpate.network import Archive, Network, load_archive
 from palpate.runtime.touchable import touchable
-from palpate.surrogates.learnt_energy import LearntEnergy, warning_of
-from palpate.surrogates.loading import load
+from palpate.surrogates import LearntEnergy, Surrogate, load
+from palpate.surrogates.surrogate import correction_warning
 from palpate.units import Range
 
 __all__ = ["ask"]
@@ -35,23 +35,20 @@ def ask(model: Path, at: Sequence[str], console: Console) -> None:
     UsageError
         If a place is not as many numbers as there are inputs, or what the file holds has no answer to a place.
     """
-    content_of_file = _read(model)
-    asked = getattr(content_of_file, "touch", content_of_file)
-    what, inputs = type(content_of_file).__name__, _inputs(asked)
+    contents = _read(model)
+    what, inputs = type(contents).__name__, _inputs(contents)
     if not at:
         ranges = [{"name": r.name, "low": r.low, "high": r.high, "unit": r.unit} for r in inputs]
-        content = {"model": str(model), "kind": what, "inputs": ranges, "text": str(content_of_file)}
-        warning = _warning(asked)
-        console.result(
-            "\n".join([f"{what} in {model}\n{content_of_file}", *warning]), content | _as_field(warning)
-        )
+        content = {"model": str(model), "kind": what, "inputs": ranges, "text": str(contents)}
+        warning = _warning(contents)
+        console.result("\n".join([f"{what} in {model}\n{contents}", *warning]), content | _as_field(warning))
         return
-    if isinstance(asked, LearntEnergy):
+    if isinstance(contents, Surrogate):
         X = _places(at, inputs)
-        answers: Sequence[Any] = _answered(asked, X)
-        words = [one.words(inputs) for one in answers] + _reservations(asked)
-    elif isinstance(asked, Fitted | Network):
-        answers = predictions(asked, _places(at, inputs))
+        answers: Sequence[Any] = _answered(contents, X)
+        words = [one.words(inputs) for one in answers] + _reservations(contents)
+    elif isinstance(contents, Fitted | Network):
+        answers = predictions(contents, _places(at, inputs))
         words = [one.words(inputs) for one in answers]
     else:
         raise UsageError(
@@ -61,7 +58,7 @@ def ask(model: Path, at: Sequence[str], console: Console) -> None:
             fix="Try `palpate run` or `palpate view`, or the value that `pp.load` reads.",
         )
     content = {"model": str(model), "answers": [one.as_dict(inputs) for one in answers]}
-    console.result("\n".join(words), content | _as_field(_warning(asked)))
+    console.result("\n".join(words), content | _as_field(_warning(contents)))
 
 
 def _read(path: Path) -> Any:
@@ -84,7 +81,8 @@ def _inputs(asked: Any) -> tuple[Range, ...]:
     return tuple(asked.network.inputs if isinstance(asked, Fitted) else asked.inputs)
 
 
-def _answered(energy: LearntEnergy, X: np.ndarray) -> list[Answer]:
+def _answered(body: Surrogate, X: np.ndarray) -> list[Answer]:
+    energy: LearntEnergy = body.energy
     known = energy.deviation(X) if energy.root is not None else np.full(len(X), math.nan)
     forces = energy.force(X)
     # a deviation is of what is like the training, and says nothing beyond it; that nothing is touched is exact
@@ -93,42 +91,42 @@ def _answered(energy: LearntEnergy, X: np.ndarray) -> list[Answer]:
     answers = [
         Answer(x, float(U), F, K, float(d), bool(i)) for x, U, F, K, d, i in zip(X, *columns, strict=True)
     ]
-    if (surface := getattr(energy, "surface", None)) is None:
+    if energy.baseline.surface is None:
         return answers
-    let_go, end = _let_go(energy, X), surface.inner
+    let_go, end = _let_go(body, X), energy.baseline.inner
     return [one.ended(end) if gone else one for one, gone in zip(answers, let_go, strict=True)]
 
 
-def _let_go(touch: Any, X: np.ndarray) -> list[bool]:
+def _let_go(surrogate: Surrogate, X: np.ndarray) -> list[bool]:
     """Return whether the loop would let go of a probe (N,) at inputs X (N, n), so that no force is known there.
 
     One that feels nothing is led out along the body's normal: from beneath the touched surface it meets that from
     behind, and the body lets go of it; from the air it meets nothing, or a front.
     """
-    body = touchable(touch)
-    loop, (low, high) = body.evaluator(), touch.surface.box
+    body = touchable(surrogate)
+    assert body.surface is not None
+    loop, (low, high) = body.evaluator(), body.surface.box
     far = float(np.linalg.norm(high - low))
-    ways = np.linspace(0.0, far, max(2, int(_STEPS * far / touch.surface.radius)))
-    found = []
+    ways = np.linspace(0.0, far, max(2, int(_STEPS * far / body.surface.radius)))
+    gone = []
     for x in X:
         loop(body.away, x[3:])  # every probe begins in the air
         for way in ways:
             loop(x[:3] + way * body.normal, x[3:])
             if loop.depth > 0.0 or loop.let_go:
                 break
-        found.append(loop.let_go)
-    return found
+        gone.append(loop.let_go)
+    return gone
 
 
-def _reservations(energy: LearntEnergy) -> list[str]:
-    memory = {"relaxation", "yielding"} & set(energy.meta)
+def _reservations(body: Surrogate) -> list[str]:
     instant = "This is the elastic answer, that of an instant: the body remembers, which `palpate run` shows."
-    return [instant] * bool(memory) + _warning(energy)
+    return [instant] * (body.memory is not None) + _warning(body)
 
 
 def _warning(asked: Any) -> list[str]:
-    told = warning_of(asked.meta) if isinstance(asked, LearntEnergy) else ""
-    return [f"Its correction was warned of: {told}"] if told else []
+    warning = correction_warning(asked.meta) if isinstance(asked, Surrogate) else ""
+    return [f"Its correction was warned of: {warning}"] if warning else []
 
 
 def _as_field(warning: list[str]) -> dict[str, str]:
@@ -142,10 +140,10 @@ def _places(texts: Sequence[str], inputs: Sequence[Range]) -> np.ndarray:
 def _place(text: str, inputs: Sequence[Range]) -> list[float]:
     """Return numbers with commas or blanks between them, as many as there are inputs."""
     try:
-        found = [float(word) for word in text.replace(",", " ").split()]
+        values = [float(word) for word in text.replace(",", " ").split()]
     except ValueError:
-        found = []
-    if len(found) != len(inputs) or not all(map(math.isfinite, found)):
+        values = []
+    if len(values) != len(inputs) or not all(map(math.isfinite, values)):
         names = ", ".join(f"{r.name} ({r.unit})" if r.unit else r.name for r in inputs)
         example = ",".join(f"{(r.low + r.high) / 2:.4g}" for r in inputs)
         raise UsageError(
@@ -153,4 +151,4 @@ def _place(text: str, inputs: Sequence[Range]) -> list[float]:
             why=f"It has {len(inputs)} inputs: {names}.",
             fix=f"Give as many numbers with commas between, for example --at {example}.",
         )
-    return found
+    return values

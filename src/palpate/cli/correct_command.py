@@ -7,7 +7,6 @@ import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from palpate.cli.console import Console
 from palpate.dataset.measured import Measured, lines_of, listening, measurements, read_measured
 from palpate.errors import AccuracyError, UsageError
 from palpate.learning.correction import Corrected, Corrector, Discrepancy, Noise, correct, judged
+from palpate.surrogates import Surrogate
 from palpate.surrogates.loading import load
 from palpate.units import to_si
 
@@ -72,12 +72,11 @@ def correct_model(
     AccuracyError
         If the forces have another sign, or may have another unit, than the model's; everything has been written then.
     """
-    body: Any = load(model)
-    surrogate = getattr(body, "touch", body)
-    if getattr(surrogate, "surface", None) is None:
+    body = load(model)
+    if not isinstance(body, Surrogate) or body.energy.baseline.holds:
         raise UsageError(
             f"{model} holds no body that is pressed.",
-            why=f"It holds a {type(body).__name__}; measured forces correct what a probe presses.",
+            why="Measured forces correct what a probe presses.",
             fix="Give the model of a study of touches, such as `palpate demo block` writes.",
         )
     if out.exists() and out.samefile(model):
@@ -86,18 +85,17 @@ def correct_model(
             why="The corrected one would take its place, and could not be corrected anew.",
             fix="Choose another name for --out.",
         )
-    values = _parameters(surrogate, parameters)
+    values = _parameters(body, parameters)
     if not out.absolute().parent.is_dir():  # before anything is measured
         raise UsageError(f"There is no folder for {out}.", fix="Choose a folder that exists.")
     if source.file is not None:
         done = correct(
-            surrogate, read_measured(source.file), parameters=values, discrepancy=discrepancy, noise=noise
+            body, read_measured(source.file), parameters=values, discrepancy=discrepancy, noise=noise
         )
     else:
-        corrector = Corrector(surrogate, parameters=values, discrepancy=discrepancy, noise=noise)
+        corrector = Corrector(body, parameters=values, discrepancy=discrepancy, noise=noise)
         done = _streamed(corrector, source, console)
-    corrected = done.surrogate if body is surrogate else body.felt_as(done.surrogate)
-    path = corrected.save(out)
+    path = done.surrogate.save(out)
     if done.warning and not done.doubtful:
         console.say(done.warning)
     console.result(f"{done}\n{path}", {**done.as_dict(), "warning": done.warning or None, "model": str(path)})
@@ -147,7 +145,7 @@ def _learnt(corrector: Corrector, lines: Iterable[Measured], console: Console) -
     return judged(corrector, record)
 
 
-def _parameters(surrogate: Any, words: Sequence[str]) -> list[float]:
+def _parameters(surrogate: Surrogate, words: Sequence[str]) -> list[float]:
     """Return the values of the further inputs, in their order, from NAME=VALUE in SI units or with a unit."""
     said = dict(word.partition("=")[::2] for word in words)
     names = [r.name for r in surrogate.parameters]

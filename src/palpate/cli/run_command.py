@@ -16,7 +16,7 @@ from palpate.runtime.devices import device_traits
 from palpate.runtime.shared_state import State
 from palpate.runtime.stability import stiffness_warning
 from palpate.runtime.touchable import Touchable, load_touchable
-from palpate.surrogates.learnt_energy import warning_of
+from palpate.surrogates.surrogate import correction_warning
 
 __all__ = ["run_loop"]
 
@@ -77,7 +77,7 @@ def run_loop(model: Path, seconds: float, device: str, rate: float | None, conso
     device = _aimed(device, touch, workspace.scale)
     if warning := stiffness_warning(felt, traits.damping, rate):
         console.say(warning)
-    if warning := warning_of(touch.meta):
+    if warning := correction_warning(touch.meta):
         console.say(f"its correction was warned of: {warning}")
     limit = settings.get("max_force")
     peak = _Peak()

@@ -136,8 +136,8 @@ def validate_model(
         If a limit is missed; everything has been printed and written then.
     """
     from palpate.dataset import Dataset
-    from palpate.surrogates.learnt_energy import corrected_by
     from palpate.surrogates.loading import load
+    from palpate.surrogates.surrogate import correction_count
     from palpate.validation import Chapter, validate, write_report
 
     model: Any = load(path)
@@ -150,7 +150,7 @@ def validate_model(
         )
     data, fine = _test_set(path, test), None if refined is None else Dataset.open(refined)
     validation = replace(validate(model, data, refined=fine), name=path.stem)
-    if touches := corrected_by(energy.meta):
+    if touches := correction_count(energy.meta):
         validation = replace(validation, notes=(*validation.notes, _CORRECTED.format(touches)))
     text, target = str(validation), path.with_suffix(".html") if report else None
     if target is not None:

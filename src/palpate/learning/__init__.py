@@ -7,21 +7,25 @@ structure    growth and pruning around the refinement
 arrays       a network from samples alone; automatic: the filter's thresholds from a target
 stream       learning while it runs: a learner, samples retained, bounded refinement
 touch        a dataset of beam loads made into a body that can be touched
-energy       an energy of touch from solved energies, forces and stiffnesses
-bodies       a dataset of touches made into a body that can be pressed anywhere
+energy       the energy of a body from solved energies, forces and stiffnesses
+pressed_solves, pad_solves   what a dataset knows of a body that a probe presses, or a pad holds
+pad_fit      the baseline of a body that is held by a pad
 fields       how it deforms: modes that travel with the touch
-grasp        a body held by a glued pad
 plastic      a body that stays bent, and how it got there
 correction   a learnt body bent to what a specimen answers
-dispatch     `palpate.learn`: whichever fits the dataset
+symmetry     isometries that a dataset tells, and how far its images reach
+learn_dataset  `palpate.learn`: a dataset made into a body that is felt and seen
 """
 
 from palpate.learning.arrays.fit import fit
 from palpate.learning.arrays.fitted import Fitted
 from palpate.learning.automatic import automatic
-from palpate.learning.bodies import TouchHistory, learn_body
+from palpate.learning.energy import EnergyHistory, learn_energy
 from palpate.learning.learn import Learned, freeze, learn
+from palpate.learning.learn_dataset import LearningHistory
+from palpate.learning.learn_dataset import learn as learn_dataset
 from palpate.learning.learning_history import History
+from palpate.learning.pad_fit import fit_pad
 from palpate.learning.search import Trial
 from palpate.learning.stream.learner import Learner
 from palpate.learning.stream.refining import Refining
@@ -38,11 +42,13 @@ from palpate.rbf.refinement.refine import Refined, refine
 __all__ = [
     "FEWEST",
     "PRESETS",
+    "EnergyHistory",
     "Event",
     "Fitted",
     "History",
     "Learned",
     "Learner",
+    "LearningHistory",
     "Observation",
     "Posterior",
     "Refined",
@@ -51,18 +57,19 @@ __all__ = [
     "Reservoir",
     "Settings",
     "State",
-    "TouchHistory",
     "Trial",
     "automatic",
     "default",
     "fit",
+    "fit_pad",
     "founding",
     "freeze",
     "grow",
     "hand_coordinates",
     "initial",
     "learn",
-    "learn_body",
+    "learn_dataset",
+    "learn_energy",
     "learn_touch",
     "node_outputs",
     "observe",

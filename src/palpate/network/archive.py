@@ -41,10 +41,7 @@ __all__ = [
 _READERS = {
     "networks": "palpate.Network.load or palpate.Fitted.load",
     "touch": "palpate.TouchModel.load",
-    "touched-body": "palpate.TouchedBody.load",
-    "touch-surrogate": "palpate.TouchSurrogate.load",
-    "field-surrogate": "palpate.surrogates.FieldSurrogate.load",
-    "grasp-surrogate": "palpate.GraspSurrogate.load",
+    "surrogate": "palpate.load",
     "held-body": "palpate.HeldBody.load",
     "held-paths": "palpate.learning.plastic.HeldPaths.load",
 }

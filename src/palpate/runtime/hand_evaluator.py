@@ -40,15 +40,19 @@ class Elastic(Protocol):
         ∂F/∂x, N/m; zero where it isn't known.
     inside : bool
         Whether the answer is of the trained region.
+    slope : (3,)
+        ∇q, √J/m.
     """
 
     force: np.ndarray
     stiffness: np.ndarray
     inside: bool
 
+    slope: np.ndarray
+
     @property
-    def energy(self) -> float:
-        """U, J."""
+    def amplitude(self) -> float:
+        """Signed amplitude q, √J; U = ½ q²."""
         ...
 
     @property
@@ -94,9 +98,9 @@ class HandEvaluator:
     ----------
     elastic : Elastic
     memory : optional
-        With ``force`` and ``step(position, energy, slope, dt)`` as `palpate.surrogates.relaxation.Memory` has them.
-        One with ``release(dt)`` and ``lies`` (3,) says where the body lies that nobody holds; one with ``now`` keeps
-        prints.
+        With ``force`` and ``step(position, amplitude, slope, dt)`` as `palpate.surrogates.memories.MemoryState` has
+        them. One with ``release(dt)`` and ``lies`` (3,) says where the body lies that nobody holds; one with ``now``
+        keeps prints.
     holds : bool
         Whether the hand holds a patch or a node, and doesn't move a free probe.
     directions : (k, 3)
@@ -139,7 +143,7 @@ class HandEvaluator:
         self._follows = not hasattr(elastic, "contact")
         self.contact: np.ndarray = getattr(elastic, "contact", np.zeros(3))
         self.loads: np.ndarray = getattr(elastic, "loads", np.zeros(0))
-        self._slope, self._grip, self._held = np.zeros(3), np.zeros(3), False
+        self._grip, self._held = np.zeros(3), False
         felt = np.eye(3) if directions is None else directions
         self._felt: list[list[float]] = (felt.T @ felt).tolist()
         self.inside, self.mirrored, self.let_go = True, False, False
@@ -190,14 +194,13 @@ class HandEvaluator:
             good = self._stays.release(self.elapsed)
         else:
             elastic(position, parameters)
-            energy = elastic.energy
+            amplitude = elastic.amplitude
             if not self._holds:
                 self._hold_or_let_go(elastic.depth, parameters)
                 if self.let_go:
-                    energy = 0.0
+                    amplitude = 0.0
                     elastic.force[:] = 0.0
-            np.negative(elastic.force, out=self._slope)
-            good = memory is None or memory.step(position, energy, self._slope, self.elapsed)
+            good = memory is None or memory.step(position, amplitude, elastic.slope, self.elapsed)
         if self._follows:
             self.contact[:] = position
         self.mirrored = elastic.mirrored if not self._follows else False

@@ -52,22 +52,22 @@ class BeamTouchable(Touchable):
         return float(self.energy.radius)
 
     @property
-    def reach(self) -> float:  # type: ignore[override]  # known beforehand here
+    def reach(self) -> float:
         """Largest trained displacement of the held node, m."""
         return float(self.energy.reach)
 
     @property
-    def deepest(self) -> float:  # type: ignore[override]  # known beforehand here
+    def deepest(self) -> float:
         """Largest trained displacement of the held node, m."""
         return self.reach
 
     @property
-    def stiffness_max(self) -> float:  # type: ignore[override]  # known beforehand here
+    def stiffness_max(self) -> float:
         """Largest stiffness that the hand can meet, N/m."""
         return float(self.energy.stiffness_max)
 
     @property
-    def force_max(self) -> float:  # type: ignore[override]  # known beforehand here
+    def force_max(self) -> float:
         """Largest trained load at the held node, N."""
         loads = [self.inputs[i] for i in self.energy.touched]
         return float(np.linalg.norm([max(abs(r.low), abs(r.high)) for r in loads]))
@@ -105,7 +105,7 @@ class RodTouchable(BeamTouchable):
         return True
 
     @property
-    def force_max(self) -> float:  # type: ignore[override]  # known beforehand here
+    def force_max(self) -> float:
         """Largest load of the trained range, N."""
         return max(abs(self.inputs[1].low), abs(self.inputs[1].high))
 
@@ -136,8 +136,8 @@ class RodTouchable(BeamTouchable):
 class _BeamAnswer(TouchEvaluator):
     """A touch model's evaluator; it knows force and place, but neither energy nor stiffness."""
 
-    energy, depth = 0.0, 0.0
-    stiffness = np.zeros((3, 3))
+    amplitude, depth = 0.0, 0.0
+    stiffness, slope = np.zeros((3, 3)), np.zeros(3)
 
 
 class _RodAnswer:
@@ -151,8 +151,8 @@ class _RodAnswer:
         Where the held node is along the load, m.
     """
 
-    energy, depth, mirrored = 0.0, 0.0, False
-    stiffness = np.zeros((3, 3))
+    amplitude, depth, mirrored = 0.0, 0.0, False
+    stiffness, slope = np.zeros((3, 3)), np.zeros(3)
 
     def __init__(self, body: HeldEvaluator, direction: np.ndarray) -> None:
         self._body, self._direction = body, direction
@@ -162,7 +162,7 @@ class _RodAnswer:
     def __call__(self, position: np.ndarray, parameters: np.ndarray) -> None:
         """Leave the answer to `step`."""
 
-    def step(self, position: np.ndarray, energy: float, slope: np.ndarray, dt: float) -> bool:
+    def step(self, position: np.ndarray, amplitude: float, slope: np.ndarray, dt: float) -> bool:
         """Lead the node to a position (3,), m, within dt seconds; False if that can't be answered."""
         return self._renewed(self._body.step(position, dt))
 

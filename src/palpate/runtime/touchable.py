@@ -19,21 +19,18 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from palpate.errors import FileFormatError, UsageError
+from palpate.errors import UsageError
 from palpate.runtime.hand_evaluator import HandEvaluator
-from palpate.runtime.recorded import branches_told, dents_told, spacing_told
 from palpate.runtime.workspace import Workspace
-from palpate.surrogates import FieldSurrogate, TouchedBody, TouchModel, TouchSurrogate
-from palpate.surrogates.grasp import GraspSurrogate
-from palpate.surrogates.learnt_energy import corrected_by, warning_of
-from palpate.surrogates.loading import load
-from palpate.surrogates.plastic import DentMemory, Dents, HeldBody
-from palpate.surrogates.relaxation import Branches, Memory, Patches
+from palpate.surrogates import FieldSurrogate, Surrogate, TouchedSurface, TouchModel, load
+from palpate.surrogates.memories import Memory
+from palpate.surrogates.plastic import HeldBody
+from palpate.surrogates.surrogate import correction_count, correction_warning
 from palpate.units import Range, bounds
 
 __all__ = ["Learnt", "Touchable", "load_touchable", "touchable"]
 
-Learnt: TypeAlias = TouchModel | TouchedBody | TouchSurrogate | HeldBody | GraspSurrogate
+Learnt: TypeAlias = TouchModel | HeldBody | Surrogate
 
 _SAMPLES = 4096  # of the trained ranges, for what is largest there
 _SHARE = 0.75  # of the deepest trained depth: how deep a scripted stroke goes
@@ -46,15 +43,21 @@ class Touchable:
 
     Attributes
     ----------
-    energy : TouchSurrogate or GraspSurrogate
+    energy : LearntEnergy
     fields : mapping of name to FieldSurrogate
         What the eye sees; may be empty.
     name : str
+    memory : Memory, optional
+        What it remembers of how it was touched.
+    meta : mapping
+        What the file says of its making.
     """
 
     energy: Any
     fields: Mapping[str, FieldSurrogate] = field(default_factory=dict)
     name: str = "body"
+    memory: Memory | None = None
+    meta: Mapping[str, Any] = field(default_factory=dict)
 
     def __str__(self) -> str:
         return f"Touchable {self.name}: {self.energy}"
@@ -72,19 +75,14 @@ class Touchable:
         return tuple(self.energy.parameters)
 
     @property
-    def meta(self) -> Mapping[str, Any]:
-        """What the file says of its making."""
-        return self.energy.meta  # type: ignore[no-any-return]
-
-    @property
-    def surface(self) -> Any:
+    def surface(self) -> TouchedSurface | None:
         """The touched surface at rest, where a free probe touches one; otherwise None."""
-        return getattr(self.energy, "surface", None)
+        return self.energy.baseline.surface  # type: ignore[no-any-return]
 
     @property
     def holds(self) -> bool:
         """Whether the hand holds a patch or a node of the body, and doesn't move a free probe."""
-        return self.surface is None
+        return bool(self.energy.baseline.holds)
 
     @property
     def upright(self) -> bool:
@@ -99,7 +97,7 @@ class Touchable:
     @property
     def radius_parameter(self) -> int | None:
         """Which of the further inputs is the probe's radius; None where that is fixed."""
-        own = getattr(self.energy, "radius_input", None)
+        own = self.energy.baseline.radius_input
         return None if own is None else own - 3
 
     @property
@@ -108,7 +106,7 @@ class Touchable:
         if self.radius_parameter is not None:
             own = self.parameters[self.radius_parameter]
             return (own.low + own.high) / 2.0
-        return self.reach / 2.0 if self.holds else float(self.energy.radius)
+        return self.reach / 2.0 if self.holds else float(self.energy.baseline.radius)
 
     @cached_property
     def trained_inputs(self) -> np.ndarray:
@@ -138,8 +136,6 @@ class Touchable:
 
     def depth(self, X: np.ndarray) -> np.ndarray:
         """Depth (N,) of the probe in the surface at rest, or displacement of what is held, at inputs (N, n), m."""
-        if self.holds:
-            return np.linalg.norm(X[:, :3], axis=1)
         return np.asarray(self.energy.depth(X))
 
     @cached_property
@@ -155,7 +151,7 @@ class Touchable:
     @cached_property
     def deepest(self) -> float:
         """Deepest trained depth, or largest trained displacement of what is held, m."""
-        known = math.inf if self.holds else self.energy.continuation.deepest
+        known = self.energy.going.deepest
         return known if math.isfinite(known) else float(self.depth(self.trained_inputs).max())
 
     @cached_property
@@ -167,6 +163,10 @@ class Touchable:
         low, high = bounds(self.inputs)
         # the middle of the ranges where that is a press; on a curved body it may lie too deep
         x = X[np.argmin((((X - (low + high) / 2.0) / (high - low)) ** 2).sum(axis=1))]
+        if self.surface is None:  # a probe that is felt without a surface: it comes against its force
+            force = self.energy.force(x[None])[0]
+            normal = force / np.linalg.norm(force)
+            return x[:3] + self.depth(x[None])[0] * normal, normal
         distance, slope, _ = self.surface.at(x[None, :3])
         normal = slope[0] / np.linalg.norm(slope[0])
         return x[:3] + (self.radius - distance[0]) * normal, normal
@@ -202,62 +202,14 @@ class Touchable:
         """How far from `home` the hand was in training, m."""
         return float(np.linalg.norm(self.trained_inputs[:, :3] - self.home, axis=1).max())
 
-    @cached_property
-    def branches(self) -> Branches | None:
-        """The branches of its force that relax, where its file says so.
-
-        Raises
-        ------
-        FileFormatError
-            If it says so in other words than `recorded` knows.
-        """
-        return branches_told(self.meta)
-
-    @cached_property
-    def dents(self) -> Dents | None:
-        """The law by which it yields, where its file says so.
-
-        Raises
-        ------
-        FileFormatError
-            If it says so in other words than `recorded` knows, or that it relaxes too.
-        """
-        if "yielding" in self.meta and "relaxation" in self.meta:
-            raise FileFormatError(
-                "The file says that the body yields and that it relaxes.",
-                why="A print and branches on one energy are not made to go together.",
-                fix="Save it with one of them.",
-            )
-        places = None if "yielding" not in self.meta else self._places(width=1.0, energy=0.0)
-        return dents_told(self.meta, None if places is None else places.points)
-
-    def memory(self) -> Memory | DentMemory | None:
-        """Return the body's memory at rest, or None for one that forgets nothing."""
-        if self.dents is not None:
-            return self.dents.memory()
-        if self.branches is None or not self.branches.terms:
-            return None
-        if spacing_told(self.meta) is None:
-            return Memory(self.branches)
-        depth = self.deepest / 2.0  # typical
-        X = self.trained_inputs
-        near = np.argmin(np.abs(self.depth(X) - depth))
-        energy = float(self.energy.energy(X[near : near + 1])[0])
-        return Memory(self.branches, self._places(Patches.width_at(self.radius, depth), energy))
-
-    def _places(self, width: float, energy: float) -> Patches | None:
-        """Places of the memory on the touched surface; None where it travels with the probe."""
-        spacing, skin = spacing_told(self.meta), next(iter(self.fields.values()), None)
-        if spacing is None or skin is None:
-            return None
-        corners = skin.triangles
-        if skin.local_mode is not None:
-            corners = corners[skin.touched[corners].all(axis=1)]
-        return Patches.over(skin.points, corners, spacing, width=width, energy=energy)
+    @property
+    def indentation(self) -> Any:
+        """The law of the prints that it keeps; None for a body that keeps none."""
+        return self.memory if self.memory is not None and self.memory.keeps_prints else None
 
     def evaluator(self) -> HandEvaluator:
         """Return the allocation-free evaluator of the 1 kHz path."""
-        elastic, memory = self.energy.evaluator(), self.memory()
+        elastic, memory = self.energy.evaluator(), None if self.memory is None else self.memory.start()
         if self.holds:
             # lengths among the further inputs of what is held say where it is held
             places = tuple(i for i, r in enumerate(self.parameters) if r.unit == "m")
@@ -268,8 +220,8 @@ class Touchable:
             holds=False,
             away=self.away,
             normal=self.normal,
-            inner=self.surface.inner,
-            radius=self.energy.radius,
+            inner=self.energy.baseline.inner,
+            radius=self.energy.baseline.radius,
             radius_input=self.radius_parameter,
         )
 
@@ -316,14 +268,15 @@ def touchable(model: Learnt, name: str = "") -> Touchable:
     from palpate.runtime.held_node import BeamTouchable, RodTouchable
 
     if isinstance(model, HeldBody):
-        return RodTouchable(model, {}, model.name)
+        return RodTouchable(model, {}, model.name, None, model.meta)
     if isinstance(model, TouchModel):
-        return BeamTouchable(model, {}, model.name)
-    energy = model.touch if isinstance(model, TouchedBody) else model
-    known = str(energy.meta.get("name", "")) or name or "body"
-    if (touches := corrected_by(energy.meta)) is not None:
-        known += f", corrected by {touches} touches" + (" with a warning" if warning_of(energy.meta) else "")
-    return Touchable(energy, dict(model.fields) if isinstance(model, TouchedBody) else {}, known)
+        return BeamTouchable(model, {}, model.name, None, model.meta)
+    known = str(model.meta.get("name", "")) or name or "body"
+    if (touches := correction_count(model.meta)) is not None:
+        known += f", corrected by {touches} touches" + (
+            " with a warning" if correction_warning(model.meta) else ""
+        )
+    return Touchable(model.energy, dict(model.fields), known, model.memory, model.meta)
 
 
 def load_touchable(path: str | os.PathLike[str]) -> Touchable:
@@ -340,10 +293,4 @@ def load_touchable(path: str | os.PathLike[str]) -> Touchable:
         If the file is missing, corrupt, foreign, or of something that no hand can be laid on.
     """
     path = Path(path)
-    model = load(path)
-    if isinstance(model, FieldSurrogate):
-        raise FileFormatError(
-            f"{path} holds a field alone, which gives no force.",
-            fix="Save it with its energy: TouchedBody(touch, fields).save(file).",
-        )
-    return touchable(model, path.stem)
+    return touchable(load(path), path.stem)

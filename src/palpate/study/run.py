@@ -20,9 +20,8 @@ import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
-from palpate.learning import History, Settings, founding, node_outputs
+from palpate.learning import History, Settings, founding, learn_dataset, node_outputs
 from palpate.learning import learn as learn_samples
-from palpate.learning.dispatch import learn as learn_dataset
 from palpate.learning.plastic import HeldPaths
 from palpate.study.memory_stages import learn_histories, sweep_histories
 from palpate.study.study import Study
@@ -299,19 +298,17 @@ def _options(study: Study, train: Dataset, test: Any, progress: Any, log: Log) -
         return {**options, **form, **watched, "seed": study.filter.seed, "name": study.name}
     if "shape" in options:
         # shown on a mesh that is fine wherever the body is touched
-        options |= {"layout": study.problem(whole=True).layout, "say": log, "name": study.name}
+        options |= {"layout": study.problem(whole=True).layout, "log": log, "name": study.name}
     return options
 
 
 def _meta(model: Any) -> Mapping[str, Any]:
-    meta: Mapping[str, Any] = model.meta if hasattr(model, "meta") else model.touch.meta
+    meta: Mapping[str, Any] = model.meta
     return meta
 
 
 def _with_meta(model: Any, more: Mapping[str, Any]) -> Any:
     """Return what was learnt with more said of it, for whoever opens the file later."""
-    if hasattr(model, "touch"):
-        return replace(model, touch=_with_meta(model.touch, more))
     return replace(model, meta={**model.meta, **more})
 
 

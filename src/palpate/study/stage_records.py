@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from palpate.errors import UsageError
 from palpate.learning import PRESETS, Refinement, Settings, recommended
-from palpate.learning.bodies.touches import FEWEST
+from palpate.learning.pressed_solves import FEWEST
 from palpate.study.quantities import Metres, Newtons, Record, Stiffness
 
 if TYPE_CHECKING:

@@ -1,35 +1,60 @@
-"""Networks with physics around them: what a hand, an eye or a program can ask of a learnt body.
+"""Learnt bodies: what a hand, an eye or a program can ask of them.
 
 ::
 
-    touch                          a body held at one node: drag in, force out
-    touch_surrogate                a body touched anywhere: one energy, its force a gradient
-    laws, continuation             … how it begins at first touch, and where its learning ends
-    touch_kernels, touch_trust     … the loops behind it
-    surrogate_evaluator            … one touch at a time, without allocation
-    touch_file                     … in a file
-    field                          what the eye sees of it: displacement, stress, stretch on its surface
-    surface                        how far a point is from a touched surface
-    relaxation                     memory on top of an energy
+    surrogate            the learnt body as one value, with its file
+    energy               the energy that a hand feels: force, stiffness, trust
+    baselines            what of the energy is known beforehand, one file for each kind of interaction
+    contact_law          how a contact begins
+    continuation         where the learning ends
+    energy_kernels       the loops behind it
+    energy_evaluator     one place at a time, without allocation
+    field                what the eye sees of it: displacement, stress, stretch on its surface
+    surface              how far a point is from a touched surface
+    relaxation, plastic  memory on top of an energy
+    touch                a beam, held at one node: drag in, force out
 """
 
+from palpate.surrogates.baselines import (
+    Baseline,
+    ConstantBaseline,
+    ContactBaseline,
+    PadBaseline,
+    RestStiffness,
+    Solves,
+    Stiffening,
+    register_baseline,
+)
+from palpate.surrogates.contact_law import ContactLaw
 from palpate.surrogates.continuation import Continuation
-from palpate.surrogates.fields import FieldEvaluator, FieldSurrogate, TouchedBody
-from palpate.surrogates.laws import ContactLaw
+from palpate.surrogates.energy import LearntEnergy
+from palpate.surrogates.energy_evaluator import EnergyEvaluator
+from palpate.surrogates.energy_kernels import Compiled
+from palpate.surrogates.fields import FieldEvaluator, FieldSurrogate
+from palpate.surrogates.loading import load
 from palpate.surrogates.surface import TouchedSurface
-from palpate.surrogates.surrogate_evaluator import SurrogateEvaluator
+from palpate.surrogates.surrogate import Surrogate
 from palpate.surrogates.touch import TouchEvaluator, TouchModel
-from palpate.surrogates.touch_surrogate import TouchSurrogate
 
 __all__ = [
+    "Baseline",
+    "Compiled",
+    "ConstantBaseline",
+    "ContactBaseline",
     "ContactLaw",
     "Continuation",
+    "EnergyEvaluator",
     "FieldEvaluator",
     "FieldSurrogate",
-    "SurrogateEvaluator",
+    "LearntEnergy",
+    "PadBaseline",
+    "RestStiffness",
+    "Solves",
+    "Stiffening",
+    "Surrogate",
     "TouchEvaluator",
     "TouchModel",
-    "TouchSurrogate",
-    "TouchedBody",
     "TouchedSurface",
+    "load",
+    "register_baseline",
 ]

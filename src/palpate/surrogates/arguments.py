@@ -1,4 +1,4 @@
-"""Where a touch is, as the kernels take it."""
+"""Places and inputs as the kernels take them."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.units import Range
 
-__all__ = ["NONE", "rows_of", "touch_at"]
+__all__ = ["NONE", "place_at", "rows_of"]
 
 NONE = np.zeros(0)
 _DOUBLE = np.dtype(np.float64)
 
 
-def touch_at(position: Any, parameters: Any, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Centre (3,) and further inputs of this shape; float64 arrays are taken as they are, others are converted.
+def place_at(position: Any, parameters: Any, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Return a place (3,) and further inputs of this shape; float64 arrays are taken as they are, others are converted.
 
     Raises
     ------
@@ -30,14 +30,14 @@ def touch_at(position: Any, parameters: Any, shape: tuple[int, ...]) -> tuple[np
         parameters = np.asarray(parameters, np.float64)
     if position.shape != (3,) or parameters.shape != shape:
         raise UsageError(
-            f"A probe at {position.shape} with parameters {parameters.shape} can't be answered.",
-            fix=f"Give its centre (3,) in m and parameters {shape}.",
+            f"A hand at {position.shape} with parameters {parameters.shape} can't be answered.",
+            fix=f"Give its place (3,) in m and parameters {shape}.",
         )
     return position, parameters
 
 
 def rows_of(X: Any, inputs: Sequence[Range], words: str) -> np.ndarray:
-    """Inputs (N, n) in double precision; `words` calls what they are given to by its name.
+    """Return inputs (N, n) in double precision; `words` calls what they are given to by its name.
 
     Raises
     ------

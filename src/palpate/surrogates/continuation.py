@@ -1,4 +1,4 @@
-"""Where the learnt factor is taken once the probe leaves what was trained.
+"""The learnt factor beyond its training: where ℓ is asked once the hand leaves what was trained.
 
 ℓ is taken at x̃(x) instead of x: at x itself inside, and in the end at a fixed point outside. Every coordinate
 saturates by one function, exact below an edge e and never beyond e + w:
@@ -46,7 +46,7 @@ _SHARE = 0.25  # of a range or of the deepest depth: how far ℓ is followed bey
 
 @dataclass(frozen=True, eq=False)
 class Continuation:
-    """How far beyond its training the learnt factor is followed.
+    """The ways over which the learnt factor is followed beyond its training.
 
     Attributes
     ----------
@@ -82,8 +82,10 @@ class Continuation:
             )
 
     @classmethod
-    def of(cls, inputs: Sequence[Range], *, deepest: float = math.inf, share: float = _SHARE) -> Continuation:
-        """A `share` of each range; of the shortest of the first three for positions; of the deepest depth.
+    def of(
+        cls, inputs: Sequence[Range], *, deepest: float = math.inf, share: float = _SHARE, felt: int = 3
+    ) -> Continuation:
+        """Return a `share` of each range; of the shortest of the `felt` first ones for those; of the deepest depth.
 
         Raises
         ------
@@ -91,7 +93,7 @@ class Continuation:
             If the share or the deepest depth is not positive.
         """
         spans = np.array([r.high - r.low for r in inputs])
-        spans[:3] = spans[:3].min()
+        spans[:felt] = spans[:felt].min()
         return cls(share * spans, deepest, share * deepest if math.isfinite(deepest) else 1.0)
 
 

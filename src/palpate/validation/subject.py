@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,10 +16,9 @@ from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.format import count, share
 from palpate.learning import History
-from palpate.learning.energy.columns import columns_of
 from palpate.learning.plastic import HeldPaths
 from palpate.learning.touch import hand_coordinates
-from palpate.surrogates import TouchModel
+from palpate.surrogates import LearntEnergy, Surrogate, TouchModel
 from palpate.surrogates.fields.field_surrogate import FieldSurrogate
 from palpate.surrogates.plastic import HeldBody
 from palpate.surrogates.touch import SLACK
@@ -135,9 +135,9 @@ def _by_place(
     model: Any, test: Dataset | TouchSolves, refined: Any, strokes: Sequence[TouchSolves], seed: int
 ) -> Subject:
     """Return a model whose force is a function of place."""
-    field = getattr(model, "fields", {}).get("displacement")
-    energy = getattr(model, "touch", model)
-    function = TouchFunction.of(energy)
+    field = model.fields.get("displacement") if isinstance(model, Surrogate) else None
+    energy = model.energy if isinstance(model, Surrogate) else None
+    function = TouchFunction.of(model)
     _refuse_radius(energy, test)
     solves = TouchSolves.of(test, function.inputs)
     seen = _seen(energy, solves.X)
@@ -170,23 +170,22 @@ def _by_place(
     )
 
 
-def _seen(model: Any, X: np.ndarray) -> np.ndarray:
+def _seen(energy: LearntEnergy | None, X: np.ndarray) -> np.ndarray:
     """Return which of the inputs (N, n) a model was trained on.
 
     A surrogate remembers its training inputs and their images under the body's symmetry, up to 512 of them.
     """
-    region = getattr(model, "region", None)
-    if region is None:
+    if energy is None or energy.region is None:
         return np.zeros(len(X), dtype=bool)
-    low, high = bounds(model.inputs)
-    return np.asarray(region.distances(2 * (X - low) / (high - low) - 1) < SEEN)
+    low, high = bounds(energy.inputs)
+    return np.asarray(energy.region.distances(2 * (X - low) / (high - low) - 1) < SEEN)
 
 
-def _refuse_radius(model: Any, data: Dataset | TouchSolves) -> None:
+def _refuse_radius(energy: LearntEnergy | None, data: Dataset | TouchSolves) -> None:
     """Refuse solves with another probe than the surrogate's."""
-    own = getattr(model, "radius", None)
-    if own is None or model.radius_input is not None or not isinstance(data, Dataset):
+    if energy is None or not isinstance(data, Dataset) or not math.isfinite(energy.baseline.radius):
         return
+    own = energy.baseline.radius
     acting = data.provenance.get("problem", {}).get("interactions", [])
     radii = [a["radius"] for a in acting if isinstance(a, dict) and "radius" in a]
     if any(abs(r - own) > RADIUS * own for r in radii):
@@ -196,13 +195,11 @@ def _refuse_radius(model: Any, data: Dataset | TouchSolves) -> None:
         )
 
 
-def _places(model: Any, solves: TouchSolves) -> list[str]:
+def _places(energy: LearntEnergy | None, solves: TouchSolves) -> list[str]:
     """Return a sentence where several depths over one place were solved: these tell less than as many places."""
-    if getattr(model, "surface", None) is None:
+    if energy is None or energy.baseline.surface is None:
         return []
-    own = model.radius_input
-    radius = model.radius if own is None else float(solves.X[:, own].mean())
-    places = int(columns_of(solves.X, model.surface, radius).max()) + 1
+    places = int(energy.baseline.groups(solves.X).max()) + 1
     if places == len(solves):
         return []
     return [

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
-from palpate.learning.grasp.solves import HeldSolves
+from palpate.learning.pad_solves import is_padded, pad_solves
+from palpate.surrogates import Surrogate
 from palpate.units import Range
 from palpate.validation.limits import FAINT, FAINT_JND, FORCE_JND
 
@@ -153,24 +153,23 @@ class TouchSolves:
         if isinstance(test, TouchSolves):
             _refuse_inputs([f"input {i}" for i in range(test.X.shape[1])], inputs, len(inputs))
             return test
-        if [r.name for r in test.ranges] != (names := [r.name for r in inputs]) and {"d_x", "d_y", "d_z"} <= {
-            name.split()[-1] for name in names
-        }:
-            held = HeldSolves.of(test)
-            _refuse_inputs([r.name for r in held.inputs], inputs, names)
-            return cls(held.X, held.force[:, :3], held.energy, held.stiffness[:, :3, :3])
+        if is_padded(test):
+            held = pad_solves(test)
+            _refuse_inputs([r.name for r in held.inputs], inputs, [r.name for r in inputs])
+            known = None if held.stiffness is None else held.stiffness[:, :3, :3]
+            return cls(held.X, held.force[:, :3], held.energy, known)
         test = test.ok
         _refuse_inputs([r.name for r in test.ranges], inputs, [r.name for r in inputs])
         if not len(test):
             raise UsageError(
                 "There is no converged solve to test with.", fix="Sweep some samples for testing."
             )
-        known = "response_gradient" in test
+        gradient = "response_gradient" in test
         return cls(
             test.X,
             test.response[:, :3],
             test.potential_energy if "potential_energy" in test else None,
-            test.response_gradient[:, :3, :3] if known else None,
+            test.response_gradient[:, :3, :3] if gradient else None,
         )
 
 
@@ -216,21 +215,22 @@ class TouchFunction:
     holds: bool = False
 
     @classmethod
-    def of(cls, model: Any) -> TouchFunction:
+    def of(cls, model: Surrogate | TouchFunction) -> TouchFunction:
         """Return the function that a surrogate answers; a function as it is."""
         if isinstance(model, TouchFunction):
             return model
+        energy = model.energy
         return cls(
-            str(model.meta.get("name", "surrogate")),
-            model.inputs,
-            model.force,
-            model.energy,
-            model.stiffness,
-            getattr(model, "depth", None),
-            model.inside,
-            None if model.root is None else model.deviation,
-            model.network.units,
-            holds=getattr(model, "surface", None) is None,
+            model.name,
+            energy.inputs,
+            energy.force,
+            energy.energy,
+            energy.stiffness,
+            None if energy.baseline.holds else energy.depth,
+            energy.inside,
+            None if energy.root is None else energy.deviation,
+            energy.network.units,
+            holds=energy.baseline.holds,
         )
 
     def within(self, X: np.ndarray) -> np.ndarray:

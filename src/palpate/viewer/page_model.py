@@ -90,7 +90,7 @@ class PageModel:
             centre=vector(body.home),
             line=self._drawing.line if isinstance(self._drawing, LineDrawing) else None,
             fields=self._drawing.infos,
-            remembers="" if body.is_line else yielding_in_words(body) or str(body.branches or ""),
+            remembers="" if body.is_line else yielding_in_words(body) or str(body.memory or ""),
             scale=state.scale,
             workspace=state.radius,
             max_force=state.max_force,

@@ -1,8 +1,9 @@
 """Prints as they are drawn: how deep a ball would rest on the body without a force, at each point of its skin.
 
 At a point x of the touched surface with the normal n the places' amplitudes meet as p = Σ w_j(x) p_j, as they do under
-a probe (`palpate.surrogates.plastic.dents`), and the print's depth s is where the elastic amplitude √(2U) of a ball at
-x + (R − s) n is p: there the force vanishes. Around a ball at a depth d beyond that, print and the share 1 − s/d of the
+a probe (`palpate.surrogates.memories.indentation`), and the print's depth s is where the elastic amplitude √(2U) of a
+ball at x + (R − s) n is p: there the force vanishes. Around a ball at a depth d beyond that, print and the share
+1 − s/d of the
 elastic shape are drawn, which together touch it.
 """
 
@@ -63,9 +64,10 @@ class Prints:
     """
 
     def __init__(self, body: Touchable, points: np.ndarray) -> None:
-        assert body.dents is not None
-        self._dents, self._depths = body.dents, _Depths(body)
-        slope = body.energy.surface.at(points)[1]
+        assert body.indentation is not None
+        assert body.surface is not None
+        self._dents, self._depths = body.indentation, _Depths(body)
+        slope = body.surface.at(points)[1]
         self.normals = slope / np.linalg.norm(slope, axis=1, keepdims=True)
         parts = np.array_split(points, max(1, -(-len(points) // AT_ONCE)))
         self._shares = np.concatenate([self._dents.shares(part).astype(np.float32) for part in parts])
@@ -97,8 +99,8 @@ class Prints:
 
 def yielding_in_words(body: Touchable) -> str:
     """From which depth in its middle a body yields; empty for one that doesn't."""
-    if body.dents is None:
+    if body.indentation is None:
         return ""
     depths, foot = _Depths(body), body.home - body.radius * body.normal
-    first = depths.of(body.dents.reach[:1], depths.table(foot[None], body.normal[None]))[0]
+    first = depths.of(body.indentation.reach[:1], depths.table(foot[None], body.normal[None]))[0]
     return f"pressed deeper than {1e3 * first:.2g} mm it keeps a print"

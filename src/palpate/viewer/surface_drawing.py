@@ -78,7 +78,7 @@ class SurfaceDrawing:
     @property
     def _keeps_prints(self) -> bool:
         """True where prints stand at places; one that moves with the probe is nowhere when that is gone."""
-        return self.body.dents is not None and len(self.body.dents.points) > 1
+        return self.body.indentation is not None and len(self.body.indentation.points) > 1
 
     def modes(self, index: int) -> Modes:
         """Return what the page needs to sum up field `index`."""

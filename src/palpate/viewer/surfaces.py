@@ -116,6 +116,7 @@ def touchable_triangles(body: Touchable, field: FieldSurrogate) -> np.ndarray:
 
 def _near(body: Touchable, corners: np.ndarray) -> np.ndarray:
     """Return whether triangles (t, 3, 3) lie on the touched surface and look the way it does."""
+    assert body.surface is not None
     distance, slope, _ = body.surface.at(corners.mean(axis=1))
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     along = np.einsum("ti,ti->t", normal, slope) > 0.5 * np.linalg.norm(normal, axis=1)
@@ -157,6 +158,7 @@ def _across(normal: np.ndarray) -> np.ndarray:
 
 def _lowered(body: Touchable, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 3) moved along the middle's normal to distance zero, and which of them got there."""
+    assert body.surface is not None
     normal, most = body.normal, body.radius
     for _ in range(STEPS):
         distance, slope, _ = body.surface.at(points)

@@ -6,8 +6,16 @@ import functools
 
 import numpy as np
 
+from palpate.learning.correction import Corrector
 from palpate.network import Network, Scaling, TrainedRegion
-from palpate.surrogates import ContactLaw, Continuation, TouchedSurface, TouchSurrogate
+from palpate.surrogates import (
+    ContactBaseline,
+    ContactLaw,
+    Continuation,
+    LearntEnergy,
+    Surrogate,
+    TouchedSurface,
+)
 from palpate.units import Quantity, Range, bounds
 
 RADIUS, DEEPEST = 0.010, 0.012
@@ -23,7 +31,7 @@ def face() -> TouchedSurface:
     )
 
 
-def model(*, extra=(), certain: bool = False, units: int = 30, **more) -> TouchSurrogate:
+def model(*, extra=(), certain: bool = False, units: int = 30, **more) -> LearntEnergy:
     """Units of random place and width; weights known to a thousandth of ln κ, or exactly."""
     inputs, rng = [*BOX, *extra], np.random.default_rng(1)
     n = len(inputs)
@@ -45,9 +53,8 @@ def model(*, extra=(), certain: bool = False, units: int = 30, **more) -> TouchS
         "region": TrainedRegion.of(rng.uniform(-1.0, 1.0, (200, n))),
         "continuation": Continuation.of(inputs, deepest=DEEPEST),
         "root": None if certain else 1e-3 * rng.normal(size=(1 + n + units, 12)),
-        "radius": RADIUS,
     }
-    return TouchSurrogate(net, ContactLaw("series", 1e-3), face(), **(parts | more))
+    return LearntEnergy(net, ContactBaseline(ContactLaw("series", 1e-3), face(), RADIUS), **(parts | more))
 
 
 def touches(count: int, seed: int = 0, *, shallowest: float = 0.0005, extra=()) -> np.ndarray:
@@ -57,11 +64,16 @@ def touches(count: int, seed: int = 0, *, shallowest: float = 0.0005, extra=()) 
     return np.random.default_rng(seed).uniform(low, high, (count, len(low)))
 
 
-def scaled(surrogate: TouchSurrogate, factor: float) -> TouchSurrogate:
+def scaled(energy: LearntEnergy, factor: float) -> LearntEnergy:
     """The body of `factor` times the energy."""
     from dataclasses import replace
 
-    net = surrogate.network
+    net = energy.network
     tail = net.tail.copy()
     tail[0, 0] += np.log(factor) / net.scaling.output_scale[0]
-    return replace(surrogate, network=replace(net, tail=tail))
+    return replace(energy, network=replace(net, tail=tail))
+
+
+def corrector_of(energy: LearntEnergy, **options) -> Corrector:
+    """A corrector of a body that has this energy and nothing else."""
+    return Corrector(Surrogate(energy), **options)

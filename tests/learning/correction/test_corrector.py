@@ -6,14 +6,14 @@ import dataclasses
 
 import numpy as np
 import pytest
-from correction_made import BOX, DEEPEST, MODULUS, RADIUS, model, scaled, touches
+from correction_made import BOX, DEEPEST, MODULUS, RADIUS, corrector_of, model, scaled, touches
 
 from palpate.errors import UsageError
 from palpate.learning.correction import Corrector, Discrepancy, Noise, Phantom, force_error
 from palpate.learning.correction.prior import opened
 from palpate.learning.correction.touches import Touches
 from palpate.learning.correction.written import corrected, raised
-from palpate.surrogates import TouchSurrogate
+from palpate.surrogates import Surrogate
 from palpate.units import bounds
 
 ONLY_FACTOR = Discrepancy(constant=0.5, varying=0.0, offset=0.0)
@@ -47,19 +47,19 @@ def test_rows_are_derivatives_of_the_force_and_the_force_is_the_written_surrogat
         def spread(index):
             return 1.0
 
-    written = corrected(S, may, At, {})
+    written = corrected(Surrogate(S), S, may, At, {}).energy
     np.testing.assert_allclose(measured.forces(theta), written.force(X), rtol=1e-9, atol=1e-12)
 
 
 def test_a_raised_surface_is_nearer_by_its_height_everywhere():
     S, h = model(), 3e-4
     X = touches(50)
-    d, g, _ = S.surface.at(X[:, :3])
-    up, h_g, _ = raised(S.surface, h, RADIUS).at(X[:, :3])
+    d, g, _ = S.baseline.touched.at(X[:, :3])
+    up, h_g, _ = raised(S.baseline.touched, h, RADIUS).at(X[:, :3])
     np.testing.assert_allclose(d - up, h, atol=1e-15)
     np.testing.assert_allclose(g, h_g, atol=1e-12)
     with pytest.raises(UsageError, match="can't be raised"):
-        raised(S.surface, 0.005, RADIUS)
+        raised(S.baseline.touched, 0.005, RADIUS)
 
 
 @pytest.mark.parametrize("factor", [0.5, 1.4, 2.5])
@@ -73,11 +73,11 @@ def test_a_constant_factor_is_found_to_within_the_bound_of_the_noise(factor):
         F = specimen.force(X)
         bound = QUIET.absolute / np.sqrt((F**2).sum())
         corrector = fed(
-            Corrector(S, discrepancy=ONLY_FACTOR, noise=QUIET, gate=50.0),
+            corrector_of(S, discrepancy=ONLY_FACTOR, noise=QUIET, gate=50.0),
             X,
             F + QUIET.absolute * rng.standard_normal(F.shape),
         )
-        found = corrector.surrogate.network.tail[0, 0] - S.network.tail[0, 0]
+        found = corrector.surrogate.energy.network.tail[0, 0] - S.network.tail[0, 0]
         errors.append((0.5 * found - np.log(factor)) / bound)
         expected = 1.0 / np.hypot(1.0 / ONLY_FACTOR.constant, 1.0 / bound)  # prior and data
         deviation = ONLY_FACTOR.constant * corrector.belief.spread(0)
@@ -91,14 +91,14 @@ def test_height_and_factor_are_told_apart():
     S = model(certain=True)
     higher = dataclasses.replace(
         scaled(S, 1.3),
-        surface=raised(S.surface, 3e-4, RADIUS),
+        baseline=dataclasses.replace(S.baseline, touched=raised(S.baseline.touched, 3e-4, RADIUS)),
         continuation=dataclasses.replace(S.continuation, deepest=DEEPEST + 3e-4),
     )
     X = touches(60, 3)
     F = higher.force(X) + QUIET.absolute * np.random.default_rng(3).standard_normal((60, 3))
     differs = Discrepancy(constant=0.5, varying=0.0, offset=5e-4)
-    corrector = fed(Corrector(S, discrepancy=differs, noise=QUIET), X, F)
-    found = corrector.surrogate
+    corrector = fed(corrector_of(S, discrepancy=differs, noise=QUIET), X, F)
+    found = corrector.surrogate.energy
     height, sure = corrector.offset
     assert abs(height - 3e-4) < 4 * sure
     assert sure < 2e-5
@@ -106,8 +106,8 @@ def test_height_and_factor_are_told_apart():
     np.testing.assert_allclose(S.depth(X) + height, found.depth(X), atol=1e-12)
     # the learnt factor is taken where it was, also where it is no longer followed
     deep = np.array([[0.0, 0.0, -0.006], [0.03, 0.0, 0.002]])
-    ratio = found.energy(deep) / found.law.energy(found.depth(deep))[0]
-    before = S.energy(deep) / S.law.energy(S.depth(deep))[0]
+    ratio = found.energy(deep) / found.baseline.law.energy(found.depth(deep))[0]
+    before = S.energy(deep) / S.baseline.law.energy(S.depth(deep))[0]
     log_factor = corrector.belief.mean[0] * 0.5
     np.testing.assert_allclose(ratio / before, np.exp(log_factor), rtol=1e-9)
 
@@ -117,20 +117,22 @@ def test_the_order_of_a_record_does_not_matter():
     X = touches(60, 4)
     F = Phantom(S).measured(X, 0.005, np.random.default_rng(4))
     turned = np.random.default_rng(5).permutation(60)
-    one, other = (fed(Corrector(S), X[i], F[i]) for i in (np.arange(60), turned))
+    one, other = (fed(corrector_of(S), X[i], F[i]) for i in (np.arange(60), turned))
     test = touches(40, 6)
-    np.testing.assert_allclose(one.surrogate.force(test), other.surrogate.force(test), rtol=1e-5, atol=1e-7)
+    np.testing.assert_allclose(
+        one.surrogate.energy.force(test), other.surrogate.energy.force(test), rtol=1e-5, atol=1e-7
+    )
     np.testing.assert_allclose(one.belief.covariance, other.belief.covariance, atol=1e-5)
 
 
 def test_a_specimen_with_a_stiffer_layer_is_followed_and_the_deviation_shrinks_where_it_was_measured():
     S = model()
     specimen, differs = Phantom(S), Discrepancy()
-    start = Corrector(S, discrepancy=differs).surrogate
+    start = corrector_of(S, discrepancy=differs).surrogate.energy
     left = touches(150, 7)
     left[:, 0] = -np.abs(left[:, 0])
     F = specimen.measured(left, 0.005, np.random.default_rng(7), 0.01)
-    found = fed(Corrector(S, discrepancy=differs), left, F).surrogate
+    found = fed(corrector_of(S, discrepancy=differs), left, F).surrogate.energy
     test = touches(300, 8, shallowest=0.002)
     known, unknown = test[test[:, 0] < -0.002], test[test[:, 0] > 0.012]
     assert force_error(S, known, specimen.force(known)).median > 0.3
@@ -148,7 +150,7 @@ def test_more_measurements_mean_less_error():
     F = specimen.measured(X, 0.005, np.random.default_rng(10))
     errors = [force_error(S, test, specimen.force(test)).relative]
     for count in (5, 40, 400):
-        found = fed(Corrector(S), X[:count], F[:count]).surrogate
+        found = fed(corrector_of(S), X[:count], F[:count]).surrogate.energy
         errors += [force_error(found, test, specimen.force(test)).relative]
     assert (np.diff(errors) < 0).all()
     assert errors[-1] < 0.05 * errors[0]
@@ -157,7 +159,7 @@ def test_more_measurements_mean_less_error():
 def test_a_closed_path_yields_no_work_after_correction():
     S = model()
     X = touches(80, 11)
-    found = fed(Corrector(S), X, Phantom(S).measured(X, 0.005, np.random.default_rng(11))).surrogate
+    found = fed(corrector_of(S), X, Phantom(S).measured(X, 0.005, np.random.default_rng(11))).surrogate.energy
     turn = np.linspace(0.0, 2 * np.pi, 4097)[:-1]
     tilt = np.random.default_rng(12).normal(0.0, 0.3, (2, 3))
     path = np.stack([0.01 * np.cos(turn), 0.012 * np.sin(turn), 0.005 + 0 * turn], axis=1)
@@ -175,14 +177,16 @@ def test_a_corrected_surrogate_is_saved_and_corrected_further(tmp_path):
     specimen = scaled(S, 1.4)
     X = touches(80, 13)
     F = specimen.force(X) + 0.005 * np.random.default_rng(13).standard_normal((80, 3))
-    once = fed(Corrector(S), X[:10], F[:10]).surrogate
-    again = TouchSurrogate.load(once.save(tmp_path / "once.touch"))
-    np.testing.assert_array_equal(again.force(X), once.force(X))
-    np.testing.assert_array_equal(again.deviation(X), once.deviation(X))
+    before = fed(corrector_of(S), X[:10], F[:10]).surrogate
+    again, once = Surrogate.load(before.save(tmp_path / "once.touch")), before.energy
+    np.testing.assert_array_equal(again.energy.force(X), once.force(X))
+    np.testing.assert_array_equal(again.energy.deviation(X), once.deviation(X))
     assert once.root.shape[1] <= len(once.root)
     # the same specimen: nothing new is unknown but what the height was known to
     left = again.meta["correction"]["offset_deviation"]
-    twice = fed(Corrector(again, discrepancy=Discrepancy(0.0, 0.0, 1.0, left)), X[10:], F[10:]).surrogate
+    twice = fed(
+        Corrector(again, discrepancy=Discrepancy(0.0, 0.0, 1.0, left)), X[10:], F[10:]
+    ).surrogate.energy
     test = touches(100, 14)
     true = specimen.force(test)
     assert force_error(twice, test, true).median < 0.5 * force_error(once, test, true).median
@@ -195,12 +199,12 @@ def test_outliers_are_left_out_and_what_teaches_nothing_is_named():
     F = specimen.force(X) + 0.005 * np.random.default_rng(15).standard_normal((60, 3))
     spoilt = F.copy()
     spoilt[::10] += [0.0, 3.0, -8.0]
-    corrector = fed(Corrector(S), X, spoilt)
-    found = corrector.surrogate
+    corrector = fed(corrector_of(S), X, spoilt)
+    found = corrector.surrogate.energy
     assert corrector.counts["outlier"] == 6
     assert corrector.counts["learnt"] == 54
     clean = np.arange(60) % 10 > 0
-    alone = fed(Corrector(S), X[clean], F[clean]).surrogate
+    alone = fed(corrector_of(S), X[clean], F[clean]).surrogate.energy
     apart = np.linalg.norm(found.force(X) - alone.force(X), axis=1) / np.linalg.norm(found.force(X), axis=1)
     assert (apart < 0.3 * found.deviation(X)).all()  # the scatter is judged by all touches
     assert corrector.observe([0, 0, 0.02], [0, 0, 0.001]).verdict == "no contact"
@@ -208,15 +212,15 @@ def test_outliers_are_left_out_and_what_teaches_nothing_is_named():
     assert corrector.observe([0.03, 0, 0.005], [0, 0, 1.0]).verdict == "outside"
     assert corrector.observe([0, 0, 0.02], [0, 0, 1.0]).verdict == "outlier"
     assert corrector.observe([0, np.nan, 0.0], [0, 0, 1.0]).verdict == "not finite"
-    np.testing.assert_array_equal(corrector.surrogate.force(X), found.force(X))
+    np.testing.assert_array_equal(corrector.surrogate.energy.force(X), found.force(X))
 
 
 def test_noise_larger_than_said_is_noticed_and_the_deviation_widened():
     S, rng = model(certain=True), np.random.default_rng(22)
     specimen, X = scaled(S, 1.4), touches(300, 22, shallowest=0.002)
     F = specimen.force(X) + 0.02 * rng.standard_normal((300, 3))  # four times as much
-    corrector = fed(Corrector(S, discrepancy=ONLY_FACTOR, noise=QUIET), X, F)
-    found = corrector.surrogate
+    corrector = fed(corrector_of(S, discrepancy=ONLY_FACTOR, noise=QUIET), X, F)
+    found = corrector.surrogate.energy
     # 300 sizes of three normals: their median is within a twentieth of 1.538 (four deviations)
     assert corrector.strain == pytest.approx(4.0, rel=0.1)
     assert corrector.counts["outlier"] == 0
@@ -230,10 +234,10 @@ def test_one_component_alone_teaches_only_of_itself():
     F = scaled(S, 1.5).force(X)
     spoilt = F.copy()
     spoilt[:, :2] = 99.0
-    corrector = Corrector(S, discrepancy=ONLY_FACTOR, noise=QUIET)
+    corrector = corrector_of(S, discrepancy=ONLY_FACTOR, noise=QUIET)
     for x, f in zip(X, spoilt, strict=True):
         corrector.observe(x, f, along=np.array([0.0, 0.0, 1.0]))
-    found = corrector.surrogate.network.tail[0, 0] - S.network.tail[0, 0]
+    found = corrector.surrogate.energy.network.tail[0, 0] - S.network.tail[0, 0]
     bound = QUIET.absolute / np.sqrt((F[:, 2] ** 2).sum())
     assert 0.5 * found == pytest.approx(np.log(1.5), abs=4 * bound)
 
@@ -242,11 +246,11 @@ def test_windows_bound_what_is_kept_and_change_little():
     S = model()
     X = touches(120, 17)
     F = Phantom(S).measured(X, 0.005, np.random.default_rng(17), 0.01)
-    whole, parts = fed(Corrector(S), X, F), fed(Corrector(S, window=25), X, F)
+    whole, parts = fed(corrector_of(S), X, F), fed(corrector_of(S, window=25), X, F)
     assert len(parts._seen) < 25
     assert sum(parts.counts.values()) == 120
     test = touches(200, 18, shallowest=0.002)
-    a, b = whole.surrogate, parts.surrogate
+    a, b = whole.surrogate.energy, parts.surrogate.energy
     apart = np.linalg.norm(a.force(test) - b.force(test), axis=1) / np.linalg.norm(a.force(test), axis=1)
     assert np.median(apart / a.deviation(test)) < 1.0
 
@@ -254,27 +258,27 @@ def test_windows_bound_what_is_kept_and_change_little():
 def test_a_memory_follows_a_specimen_that_softens():
     S = model()
     rng = np.random.default_rng(19)
-    kept, forgetful = Corrector(S), Corrector(S, memory=30.0)
+    kept, forgetful = corrector_of(S), corrector_of(S, memory=30.0)
     for i, x in enumerate(touches(400, 19, shallowest=0.003)):
         f = scaled(S, 1.3 if i < 250 else 1.1).force(x[None])[0] + 0.005 * rng.standard_normal(3)
         kept.observe(x, f)
         forgetful.observe(x, f)
     test = touches(100, 20, shallowest=0.003)
     true = scaled(S, 1.1).force(test)
-    assert force_error(forgetful.surrogate, test, true).median < 0.02
-    assert force_error(kept.surrogate, test, true).median > 0.04
+    assert force_error(forgetful.surrogate.energy, test, true).median < 0.02
+    assert force_error(kept.surrogate.energy, test, true).median > 0.04
     assert (np.linalg.eigvalsh(forgetful.belief.covariance) > 0).all()
 
 
 def test_a_member_of_a_family_needs_its_parameters():
     S = model(extra=[MODULUS])
     with pytest.raises(UsageError, match="0 parameters"):
-        Corrector(S)
+        corrector_of(S)
     X = touches(30, 21, extra=[MODULUS])
     X[:, 3] = 9e3
     F = scaled(S, 1.3).force(X)
-    corrector = fed(Corrector(S, parameters=[9e3]), X, F)
-    assert force_error(corrector.surrogate, X, F).median < 0.01
+    corrector = fed(corrector_of(S, parameters=[9e3]), X, F)
+    assert force_error(corrector.surrogate.energy, X, F).median < 0.01
 
 
 @pytest.mark.parametrize("wrong", [{"constant": -1.0}, {"length": 0.0}, {"offset": np.nan}])
@@ -285,11 +289,11 @@ def test_a_discrepancy_that_is_none_is_refused(wrong):
 
 def test_nothing_that_may_change_is_refused():
     with pytest.raises(UsageError, match="nothing to correct"):
-        Corrector(model(certain=True), discrepancy=Discrepancy(0.0, 0.0, 1.0, 0.0))
+        corrector_of(model(certain=True), discrepancy=Discrepancy(0.0, 0.0, 1.0, 0.0))
     with pytest.raises(UsageError):
         Noise(absolute=0.0)
     with pytest.raises(UsageError):
-        Corrector(model(), window=0)
+        corrector_of(model(), window=0)
     low, _ = bounds(BOX)
     with pytest.raises(UsageError, match="no measurement"):
-        Corrector(model()).observe(low[:2], [0, 0, 1])
+        corrector_of(model()).observe(low[:2], [0, 0, 1])

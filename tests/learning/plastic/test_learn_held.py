@@ -13,18 +13,19 @@ from palpate.learning.plastic import (
     HeldPath,
     HeldPaths,
     Press,
-    learn_dents,
     learn_held,
+    learn_indentation,
     random_times,
     random_turns,
 )
 from palpate.learning.plastic.learn_held import HIGHEST, LIMITS, LOWEST, PER_DECADE
-from palpate.surrogates.plastic import Dents, Elements
+from palpate.surrogates.memories import Indentation, IwanElements
+from remembering import press
 
-YIELDS = Elements.sliders(
+YIELDS = IwanElements.sliders(
     np.array([15.0, 60.0, 40.0]), np.array([math.inf, 0.083, 0.21]), np.array([0.0, 0.1, 0.0])
 )
-CREEPS = Elements.dashpots(np.array([60.0, 25.0, 20.0]), np.array([math.inf, 0.1, 2.0]))
+CREEPS = IwanElements.dashpots(np.array([60.0, 25.0, 20.0]), np.array([math.inf, 0.1, 2.0]))
 
 
 def stretch(w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -32,7 +33,7 @@ def stretch(w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return w * np.exp(w * w / 4), (1 + w * w / 2) * np.exp(w * w / 4)
 
 
-def path(elements: Elements, w: np.ndarray, times: np.ndarray | None = None) -> HeldPath:
+def path(elements: IwanElements, w: np.ndarray, times: np.ndarray | None = None) -> HeldPath:
     h, slope = stretch(w)
     force = slope * (elements.elongations(h, times) @ elements.stiffness)
     shape = np.zeros((len(w), 2, 2))
@@ -48,8 +49,8 @@ def paths(*several: HeldPath) -> HeldPaths:
     )
 
 
-def twin(elements: Elements) -> HeldPath:
-    spring = Elements.sliders(np.array([elements.total]), np.array([math.inf]), np.zeros(1))
+def twin(elements: IwanElements) -> HeldPath:
+    spring = IwanElements.sliders(np.array([elements.total]), np.array([math.inf]), np.zeros(1))
     return path(spring, np.linspace(0.02, 0.55, 30))
 
 
@@ -114,16 +115,16 @@ def test_histories_that_fit_nothing_are_refused() -> None:
 def test_the_tables_of_a_dent_come_back() -> None:
     """Knots where the search has its own: what it finds must be what made the presses."""
     reach = np.array([0.5, 1.0, 1.5]) * 2
-    made = Dents.single(np.array([0.0, 0.4, 1.1]), reach, np.array([1.0, 1.1, 1.05]))
+    made = Indentation.single(np.array([0.0, 0.4, 1.1]), reach, np.array([1.0, 1.1, 1.05]))
     s = np.concatenate([np.linspace(0.1, 1.8, 30), np.linspace(1.8, 0.5, 20), np.linspace(0.5, 2.4, 30)])
     s = np.append(s, np.linspace(2.4, 0.5, 20)) * (3.0**0.8 / 2.4)  # q = s^(5/4), to 3
     energy, slope = 0.5 * s**2.5, np.zeros((len(s), 3))
     slope[:, 2] = -1.25 * s**1.5
-    memory, force = made.memory(), np.zeros((len(s), 3))
+    memory, force = made.start(), np.zeros((len(s), 3))
     for i in range(len(s)):
-        memory.step(np.array([0.0, 0.0, -s[i]]), float(energy[i]), slope[i])
+        press(memory, np.array([0.0, 0.0, -s[i]]), float(energy[i]), slope[i])
         force[i] = memory.force
-    found, error = learn_dents([Press(energy, slope, force)], knots=2)
+    found, error = learn_indentation([Press(energy, slope, force)], knots=2)
     assert error < 1e-6
     np.testing.assert_allclose(found.reach, made.reach, rtol=1e-4)
     np.testing.assert_allclose(found.dent, made.dent, atol=1e-4)

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from palpate.errors import UsageError
-from palpate.surrogates.plastic import DentMemory, Dents
+from palpate.surrogates.memories import Indentation, IndentationState
+from remembering import press
 
 P, Q, KAPPA = np.array([0.0, 0.5, 2.0]), np.array([0.4, 1.2, 3.0]), np.array([1.0, 1.05, 1.1])
 PLACES = np.array([(x, 0.0, 0.0) for x in np.arange(-4.0, 5.0)])
@@ -21,10 +22,10 @@ def bowl(c: np.ndarray) -> tuple[float, np.ndarray]:
     return 0.5 * s**2.5, np.array([0.0, 0.0, -1.25 * s**1.5])
 
 
-def lead(memory: DentMemory, points: np.ndarray) -> np.ndarray:
+def lead(memory: IndentationState, points: np.ndarray) -> np.ndarray:
     out = np.empty((len(points), 3))
     for row, c in zip(out, points, strict=True):
-        assert memory.step(c, *bowl(c))
+        assert press(memory, c, *bowl(c))
         row[:] = memory.force
     return out
 
@@ -34,16 +35,16 @@ def down(*depths: float, x: float = 0.0) -> np.ndarray:
 
 
 def test_below_first_yield_the_body_is_elastic() -> None:
-    memory = Dents(P, Q, KAPPA, PLACES, 0.7).memory()
+    memory = Indentation(P, Q, KAPPA, PLACES, 0.7).start()
     for c in down(0.1, 0.3, 0.2):
-        memory.step(c, *bowl(c))
+        press(memory, c, *bowl(c))
         np.testing.assert_allclose(memory.force, -bowl(c)[1], rtol=1e-12)
     assert memory.lost == 0
     assert not memory.depths.any()
 
 
 def test_one_press_follows_the_virgin_curve_and_leaves_its_dent() -> None:
-    memory = Dents.single(P, Q, KAPPA).memory()
+    memory = Indentation.single(P, Q, KAPPA).start()
     s = 1.5
     q = math.sqrt(2 * bowl(down(s)[0])[0])
     p = float(np.interp(q, Q, P))
@@ -55,7 +56,7 @@ def test_one_press_follows_the_virgin_curve_and_leaves_its_dent() -> None:
 
 
 def test_reloading_goes_back_by_the_way_of_unloading() -> None:
-    memory = Dents(P, Q, KAPPA, PLACES, 0.7).memory()
+    memory = Indentation(P, Q, KAPPA, PLACES, 0.7).start()
     way = np.linspace(1.5, 0.5, 11)
     lead(memory, down(1.5))
     there = lead(memory, down(*way))
@@ -66,15 +67,15 @@ def test_reloading_goes_back_by_the_way_of_unloading() -> None:
 
 
 def test_steps_of_any_length_end_in_the_same_force() -> None:
-    dents = Dents(P, Q, KAPPA, PLACES, 0.7)
-    once, often = dents.memory(), dents.memory()
+    dents = Indentation(P, Q, KAPPA, PLACES, 0.7)
+    once, often = dents.start(), dents.start()
     np.testing.assert_allclose(
         lead(often, down(*np.linspace(0, 1.5, 50)))[-1], lead(once, down(1.5))[0], rtol=1e-12, atol=1e-15
     )
 
 
 def test_a_dent_stays_where_it_was_made() -> None:
-    memory = Dents(P, Q, KAPPA, PLACES, 0.5).memory()
+    memory = Indentation(P, Q, KAPPA, PLACES, 0.5).start()
     virgin = lead(memory, down(0.7, x=4.0))[0]
     memory.reset()
     lead(memory, down(1.5, -0.1))
@@ -86,13 +87,13 @@ def test_a_dent_stays_where_it_was_made() -> None:
 
 
 def test_the_force_is_the_gradient_of_what_is_stored() -> None:
-    memory = Dents(P, Q, KAPPA, PLACES, 0.8).memory()
+    memory = Indentation(P, Q, KAPPA, PLACES, 0.8).start()
     lead(memory, down(1.6, -0.1))
     depths, c, h = memory.depths, np.array([0.6, 0.2, -1.0]), 1e-6
 
     def at(point: np.ndarray) -> float:
         memory.depths = depths
-        memory.step(point, *bowl(point))
+        press(memory, point, *bowl(point))
         np.testing.assert_array_equal(memory.depths, depths)  # nothing yields there
         return memory.stored
 
@@ -103,7 +104,7 @@ def test_the_force_is_the_gradient_of_what_is_stored() -> None:
 
 
 def test_closed_ways_over_a_print_take_nothing() -> None:
-    memory = Dents(P, Q, KAPPA, PLACES, 0.8).memory()
+    memory = Indentation(P, Q, KAPPA, PLACES, 0.8).start()
     lead(memory, down(1.8, 1.4))
     t = np.linspace(0, 2 * np.pi, 257)
     circle = np.stack([0.15 * np.sin(t), 0.1 * np.sin(t), -1.45 + 0.05 * np.cos(t)], axis=1)
@@ -120,7 +121,7 @@ def test_closed_ways_over_a_print_take_nothing() -> None:
 
 
 def test_a_random_drive_never_gives_energy() -> None:
-    rng, memory = np.random.default_rng(5), Dents(P, Q, KAPPA, PLACES, 0.8).memory()
+    rng, memory = np.random.default_rng(5), Indentation(P, Q, KAPPA, PLACES, 0.8).start()
     knots = rng.uniform((-3, -1, -2.0), (3, 1, 0.4), (60, 3))
     knots[0, 2] = 0.4  # from outside
     t = np.linspace(0, 59, 6000)
@@ -128,7 +129,7 @@ def test_a_random_drive_never_gives_energy() -> None:
     force, worst = np.zeros(3), 0.0
     work = 0.0
     for last, c in itertools.pairwise(way):
-        memory.step(c, *bowl(c))
+        press(memory, c, *bowl(c))
         work -= float((force + memory.force) @ (c - last)) / 2
         force = memory.force.copy()
         assert memory.lost_in_step >= 0
@@ -152,28 +153,28 @@ def test_tables_that_promise_nothing_are_refused(
     dent: np.ndarray, reach: np.ndarray, kappa: np.ndarray
 ) -> None:
     with pytest.raises(UsageError):
-        Dents(dent, reach, kappa, PLACES, 0.7)
+        Indentation(dent, reach, kappa, PLACES, 0.7)
 
 
 def test_what_is_not_finite_changes_nothing() -> None:
-    memory = Dents(P, Q, KAPPA, PLACES, 0.7).memory()
+    memory = Indentation(P, Q, KAPPA, PLACES, 0.7).start()
     lead(memory, down(1.5))
     depths = memory.depths
-    assert not memory.step(np.array([0.0, np.nan, -2.0]), 1.0, np.zeros(3))
-    assert not memory.step(np.zeros(3), -1.0, np.zeros(3))
+    assert not press(memory, np.array([0.0, np.nan, -2.0]), 1.0, np.zeros(3))
+    assert not press(memory, np.zeros(3), -1.0, np.zeros(3))
     np.testing.assert_array_equal(memory.depths, depths)
     assert not memory.force.any()
 
 
 def test_shares_are_what_a_probe_meets() -> None:
-    memory = Dents(P, Q, np.ones(3), PLACES, 0.7).memory()
+    memory = Indentation(P, Q, np.ones(3), PLACES, 0.7).start()
     memory.depths = np.random.default_rng(0).uniform(0.1, 0.4, len(PLACES))
     before = memory.depths
     for x in (-3.7, 0.0, 1.3):
         c = down(0.6, x=x)[0]
-        memory.step(c, *bowl(c))
+        press(memory, c, *bowl(c))
         met = math.sqrt(2 * bowl(c)[0]) - math.sqrt(2 * memory.stored)
-        assert memory.dents.shares(c[None])[0] @ memory.depths == pytest.approx(met, rel=1e-12)
+        assert memory.indentation.shares(c[None])[0] @ memory.depths == pytest.approx(met, rel=1e-12)
     np.testing.assert_array_equal(memory.now, before)  # nothing yielded
     with pytest.raises(ValueError, match="read-only"):
         memory.now[0] = 1.0

@@ -8,21 +8,21 @@ import numpy as np
 import pytest
 
 from palpate.errors import UsageError
-from palpate.surrogates.plastic import Elements
-from palpate.surrogates.plastic.element_kernels import advance, free_step
+from palpate.surrogates.memories import IwanElements
+from palpate.surrogates.memories.iwan_elements import advance, free_step
 
-SLIDERS = Elements.sliders(
+SLIDERS = IwanElements.sliders(
     np.array([2.0, 3.0, 1.0]), np.array([math.inf, 0.1, 0.3]), np.array([0.0, 0.2, 0.0])
 )
-DASHPOTS = Elements.dashpots(np.array([5.0, 3.0, 2.0]), np.array([math.inf, 0.1, 2.0]))
+DASHPOTS = IwanElements.dashpots(np.array([5.0, 3.0, 2.0]), np.array([math.inf, 0.1, 2.0]))
 
 
-def force(elements: Elements, h: list[float], times: list[float] | None = None) -> np.ndarray:
+def force(elements: IwanElements, h: list[float], times: list[float] | None = None) -> np.ndarray:
     return elements.elongations(np.array(h), None if times is None else np.array(times)) @ elements.stiffness
 
 
 def test_a_slider_that_hardens_follows_the_return_mapping() -> None:
-    one = Elements.sliders(np.array([4.0]), np.array([0.1]), np.array([0.5]))
+    one = IwanElements.sliders(np.array([4.0]), np.array([0.1]), np.array([0.5]))
     # past yield the slope is k c/(1 + c); backwards it is k until −(y + c α), α = (0.4 − 0.1)/1.5
     alpha = 0.3 / 1.5
     loaded, back = 4.0 * (0.1 + 0.5 * alpha), 0.4 - 2 * (0.1 + 0.5 * alpha)
@@ -47,12 +47,12 @@ def test_a_held_stretch_relaxes_by_the_prony_series() -> None:
 
 def test_reloading_meets_the_virgin_curve_where_it_left_it() -> None:
     """Without hardening the memory of a smaller cycle is wiped out by a larger one (Masing's rule)."""
-    soft = Elements.sliders(np.array([2.0, 3.0, 1.0]), np.array([math.inf, 0.1, 0.3]), np.zeros(3))
+    soft = IwanElements.sliders(np.array([2.0, 3.0, 1.0]), np.array([math.inf, 0.1, 0.3]), np.zeros(3))
     assert force(soft, [0.5, 0.35, 0.5, 0.8])[-2:] == pytest.approx(force(soft, [0.5, 0.8]), rel=1e-12)
 
 
 @pytest.mark.parametrize("elements", [SLIDERS, DASHPOTS], ids=["slip", "relax"])
-def test_what_was_put_in_is_stored_or_lost_and_nothing_more(elements: Elements) -> None:
+def test_what_was_put_in_is_stored_or_lost_and_nothing_more(elements: IwanElements) -> None:
     """Σ ∫ f dh of a fine walk is the change of the stored energy and what was lost, which never falls."""
     rng = np.random.default_rng(3)
     e, alpha, ledger = np.zeros(3), np.zeros(3), np.zeros(4)
@@ -98,4 +98,4 @@ def test_a_free_step_ends_where_nothing_pulls() -> None:
 )
 def test_elements_without_meaning_are_refused(numbers: tuple[list[float], ...]) -> None:
     with pytest.raises(UsageError):
-        Elements(*map(np.array, numbers))
+        IwanElements(*map(np.array, numbers))

@@ -12,7 +12,8 @@ import pytest
 from allocated import kept_by
 from bent import CREEPS, REACH, YIELDS, D, body
 from palpate.errors import FileFormatError, UsageError
-from palpate.surrogates.plastic import Elements, HeldBody
+from palpate.surrogates.memories import IwanElements
+from palpate.surrogates.plastic import HeldBody
 
 
 def test_below_first_yield_the_force_is_the_gradient_of_the_elastic_energy() -> None:
@@ -76,7 +77,7 @@ def test_a_released_body_that_creeps_comes_back_in_time() -> None:
 
 
 @pytest.mark.parametrize("elements", [YIELDS, CREEPS], ids=["yields", "creeps"])
-def test_a_random_hand_gets_no_energy_out(elements: Elements) -> None:
+def test_a_random_hand_gets_no_energy_out(elements: IwanElements) -> None:
     rng, ev = np.random.default_rng(2), body(elements).evaluator()
     knots = np.append(0.0, rng.uniform(-0.5, 0.5, 39))
     way = np.interp(np.linspace(0, 39, 20_000), np.arange(40), knots)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from palpate.surrogates.relaxation import Branches, Memory, Patches
+from palpate.surrogates.memories import Patches, Relaxation
 
 TERMS = ((0.3, 0.1), (0.2, 2.0))
 RADIUS = 0.01
@@ -40,7 +40,8 @@ KINDS = ("scalar", "patches", "scalar behind a pad", "patches behind a pad")
 
 def remembering(kind):
     """A memory with or without patches, behind a pad or not."""
-    return Memory(Branches(TERMS, 2e-4 if "pad" in kind else 0.0), bed() if "patches" in kind else None)
+    pad, patches = 2e-4 if "pad" in kind else 0.0, bed() if "patches" in kind else None
+    return Relaxation(TERMS, pad, patches).start()
 
 
 def touching(x, y, z):

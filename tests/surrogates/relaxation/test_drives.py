@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.errors import UsageError
-from palpate.surrogates.relaxation import ramp, random_drive, sinusoid, step_hold
+from palpate.learning.relaxation import ramp, random_drive, sinusoid, step_hold
 
 TOUCH = (0.01, 0.02, 0.03)
 

@@ -9,7 +9,9 @@ from hypothesis import strategies as st
 from relaxing import KINDS, RADIUS, TERMS, TOUCH, along, bed, elastic, remembering, touching
 
 from palpate.errors import UsageError
-from palpate.surrogates.relaxation import Branches, Drive, Memory, course, ramp, random_drive, step_hold
+from palpate.learning.relaxation import Drive, ramp, random_drive, step_hold
+from palpate.surrogates.memories import Relaxation, course
+from remembering import press
 
 
 @pytest.fixture(scope="module", params=KINDS)
@@ -25,7 +27,7 @@ def test_an_instant_is_elastic(memory):
     memory.reset()
     place = touching(-0.001, -0.002, -0.004)
     energy, slope = elastic(place)
-    memory.step(place, energy, slope, 0.0)
+    press(memory, place, energy, slope, 0.0)
     np.testing.assert_allclose(memory.force, -slope, rtol=1e-12, atol=1e-15)
     assert memory.stored == pytest.approx(energy, rel=1e-12)
     assert memory.lost == pytest.approx(0.0, abs=1e-15 * energy)
@@ -34,20 +36,20 @@ def test_an_instant_is_elastic(memory):
 @pytest.mark.parametrize("patches", [None, bed()], ids=["scalar", "patches"])
 def test_a_held_force_relaxes_by_the_series_in_steps_of_any_length(patches):
     drive = step_hold(TOUCH, 0.004, [0.003, 0.1, 0.11, 1.0, 30.0])
-    force = led(Memory(Branches(TERMS), patches), drive).force
-    left = Branches(TERMS).relaxation(drive.times - drive.times[0])
+    force = led(Relaxation(TERMS, patches=patches).start(), drive).force
+    left = Relaxation(TERMS).relaxation(drive.times - drive.times[0])
     np.testing.assert_allclose(force[:, 2] / -elastic(drive.positions[0])[1][2], left, rtol=1e-5)
 
 
 def test_behind_a_pad_a_held_force_falls_as_the_branches_say():
     """To first order in the step over τ; half the step, half the deviation."""
-    branches, place = Branches(TERMS, pad=2e-4), touching(0, 0, -0.003)
+    branches, place = Relaxation(TERMS, pad=2e-4), touching(0, 0, -0.003)
     energy, slope = elastic(place)
     worst = []
     for dt in (0.002, 0.001):
         times = dt * np.arange(1, 1 + round(0.4 / dt))
-        memory = Memory(branches)
-        memory.step(place, energy, slope, 0.0)
+        memory = branches.start()
+        press(memory, place, energy, slope, 0.0)
         held = course(
             memory,
             times - dt,
@@ -62,8 +64,8 @@ def test_an_even_press_in_q_is_exact_in_one_step():
     """Taylor, Pister & Goudreau 1970: overstress γ a q after an even rise of q; here τ is 10 steps and one step."""
     energy, slope = elastic(touching(0, 0, -0.004))
     for terms in (((0.4, 1.0),), ((0.4, 10.0),)):
-        memory = Memory(Branches(terms))
-        memory.step(touching(0, 0, -0.004), energy, slope, 1.0)
+        memory = Relaxation(terms).start()
+        press(memory, touching(0, 0, -0.004), energy, slope, 1.0)
         x = 1.0 / terms[0][1]
         assert memory.force[2] / -slope[2] == pytest.approx(0.6 + 0.4 * (1 - np.exp(-x)) / x, rel=1e-12)
 
@@ -93,7 +95,7 @@ def test_no_motion_and_no_step_gains_energy(memory, motion):
     memory.reset()
     for sideways, depth, dt in motion:
         place = touching(sideways, 0.5 * sideways, -depth)
-        assert memory.step(place, *elastic(place), dt)
+        assert press(memory, place, *elastic(place), dt)
         assert memory.lost_in_step >= 0
         assert memory.stored >= -1e-18
         assert memory.work >= -1e-15
@@ -109,7 +111,7 @@ def test_the_force_is_minus_the_slope_of_the_stored_energy(memory):
 
     def stored(position):
         led(memory, drive)
-        memory.step(position, *elastic(position), 0.0)
+        press(memory, position, *elastic(position), 0.0)
         return memory.stored
 
     slope = [(stored(place + h * d) - stored(place - h * d)) / (2 * h) for d in np.eye(3)]
@@ -138,12 +140,12 @@ def test_tissue_does_not_stick_and_comes_back(memory):
     drive = step_hold(TOUCH, 0.005, [5.0])
     led(memory, drive)
     shallow = touching(0, 0, -0.0015)
-    memory.step(shallow, *elastic(shallow), 0.0)
+    press(memory, shallow, *elastic(shallow), 0.0)
     assert (memory.force == 0).all()
     assert memory.stored > 0
     for _ in range(1000):
-        memory.step(shallow, *elastic(shallow), 0.05)
-    relaxed = Branches(TERMS, memory.branches.pad).relaxation(1e9, elastic(shallow)[0])
+        press(memory, shallow, *elastic(shallow), 0.05)
+    relaxed = Relaxation(TERMS, memory.relaxation.pad).relaxation(1e9, elastic(shallow)[0])
     assert memory.force[2] == pytest.approx(float(relaxed) * -elastic(shallow)[1][2], rel=1e-3)
 
 
@@ -153,47 +155,47 @@ def test_fresh_material_comes_under_a_sliding_probe():
     Patterns Δ = 31 mm apart of width w = 3.5 mm overlap by exp(−Δ²/8w²) = 7e-5, of which half is remembered; the slope
     of that along x is Δ/4w² times as much, 1e-4 of the force.
     """
-    memory = Memory(Branches(TERMS), bed())
+    memory = Relaxation(TERMS, patches=bed()).start()
     led(memory, step_hold(touching(-0.012, 0, 0), 0.004, [20.0]))
     near, far = touching(-0.009, 0, -0.004), touching(0.019, 0, -0.004)
-    memory.step(near, *elastic(near), 0.0)
+    press(memory, near, *elastic(near), 0.0)
     assert memory.force[0] < -0.02 * memory.force[2]
-    memory.step(far, *elastic(far), 0.0)
+    press(memory, far, *elastic(far), 0.0)
     fresh = -elastic(far)[1]
     assert np.linalg.norm(memory.force - fresh) < 1e-3 * np.linalg.norm(fresh)
 
 
 def test_a_relaxed_slide_does_not_feel_the_patches():
     """Ripple of the normal force during a steady slide at 1 mm, patches 2.5 mm apart on a uniform body: below 1 %."""
-    memory = Memory(Branches(TERMS), bed(0.0025))
+    memory = Relaxation(TERMS, patches=bed(0.0025)).start()
     place = touching(-0.015, -0.0007, -0.001)
     energy, slope = elastic(touching(0, 0, -0.001))
     slope = slope * (0, 0, 1)
     ahead, force = np.array([1e-5, 0, 0]), []
     for k in range(3000):
-        assert memory.step(place + k * ahead, energy, slope, 0.001)
+        assert press(memory, place + k * ahead, energy, slope, 0.001)
         force.append(memory.force[2])
     steady = np.array(force[1500:])
     assert np.ptp(steady) < 0.02 * steady.mean()
 
 
 def test_faults_are_values():
-    memory = Memory(Branches(TERMS))
+    memory = Relaxation(TERMS).start()
     place = touching(0, 0, -0.004)
     energy, slope = elastic(place)
-    memory.step(place, energy, slope, 0.1)
+    press(memory, place, energy, slope, 0.1)
     before = memory.stored, memory.lost
     for bad in ((place * np.nan, energy, slope, 0.1), (place, np.inf, slope, 0.1), (place, -1.0, slope, 0.1)):
-        assert not memory.step(*bad)
+        assert not press(memory, *bad)
         assert (memory.force == 0).all()
         assert (memory.stored, memory.lost) == before
-    assert memory.step(place, energy, slope, 0.1)
+    assert press(memory, place, energy, slope, 0.1)
 
 
 def test_a_motion_that_is_none_is_refused():
     drive = ramp(TOUCH, 0.003, 1.0, 0.1)
     energies, slopes = along(drive)
-    memory = Memory(Branches(TERMS))
+    memory = Relaxation(TERMS).start()
     with pytest.raises(UsageError):
         course(memory, drive.times[::-1], drive.positions, energies, slopes)
     with pytest.raises(UsageError):
@@ -203,13 +205,13 @@ def test_a_motion_that_is_none_is_refused():
 
 
 def test_a_lifted_probe_feels_nothing():
-    memory = Memory(Branches(TERMS), bed())
+    memory = Relaxation(TERMS, patches=bed()).start()
     led(memory, step_hold(TOUCH, 0.005, [5.0]))
     away = touching(0, 0, 0.5 * RADIUS)
-    memory.step(away, 0.0, np.zeros(3), 0.01)
+    press(memory, away, 0.0, np.zeros(3), 0.01)
     assert (memory.force == 0).all()
     kept = memory.stored
-    memory.step(away, 0.0, np.zeros(3), 5.0)
+    press(memory, away, 0.0, np.zeros(3), 5.0)
     assert 0 < memory.stored < 0.2 * kept
 
 

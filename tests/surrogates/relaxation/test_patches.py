@@ -7,7 +7,7 @@ import pytest
 from relaxing import bed
 
 from palpate.errors import UsageError
-from palpate.surrogates.relaxation import Patches
+from palpate.surrogates.memories import Patches
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
 HALVES = np.array([[0, 1, 2], [0, 2, 3]])

@@ -1,16 +1,19 @@
-"""Branches on the elastic energy against the transient solve of the viscoelastic body itself."""
+"""Relaxation on the elastic energy against the transient solve of the viscoelastic body itself."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from relaxing import RADIUS, TERMS
 
+from palpate.learning.relaxation import Record, identify
 from palpate.physics.interactions import SphereProbe
 from palpate.physics.materials import NeoHookean, Viscoelastic
 from palpate.physics.shapes import Block
 from palpate.physics.solid import Body
-from palpate.surrogates.relaxation import Memory, Patches, Record, course, identify
+from palpate.surrogates.memories import Patches, course
 
 SIZE, DEPTH, HELD, SLID = (0.048, 0.048, 0.024), 0.003, 8, 2
 GEL = NeoHookean(young=9e3, poisson=0.45)
@@ -40,7 +43,7 @@ def test_held_and_slid_the_branches_follow_the_transient_solve():
     solved = [elastic.solve(place) for place in places]
     energies = np.array([one.potential_energy for one in solved])
     slopes = -np.array([one.response for one in solved])
-    branches = identify(Record(times[:HELD] - times[0], truth[:HELD, 2]), most=2).branches
+    branches = identify(Record(times[:HELD] - times[0], truth[:HELD, 2]), most=2).relaxation
     side, height = SIZE[1:]
     square = np.array([[0, 0, height], [side, 0, height], [side, side, height], [0, side, height]])
     patches = Patches.over(
@@ -54,8 +57,8 @@ def test_held_and_slid_the_branches_follow_the_transient_solve():
     def worst(force):
         return (np.linalg.norm(force - truth, axis=1) / np.linalg.norm(truth, axis=1))[HELD:].max()
 
-    felt = worst(course(Memory(branches, patches), times, places, energies, slopes).force)
-    scalar = worst(course(Memory(branches), times, places, energies, slopes).force)
+    felt = worst(course(replace(branches, patches=patches).start(), times, places, energies, slopes).force)
+    scalar = worst(course(branches.start(), times, places, energies, slopes).force)
     assert felt < 0.05
     assert worst(-slopes) > 3 * felt
     assert scalar > 3 * felt

@@ -204,7 +204,7 @@ class _Chooser:
 
     def _kernel(self) -> tuple[Metric, float]:
         """Return the kernel layer's metric and error, and take the input scales from which units start."""
-        found = []
+        found: list[Any] = []
         samples = min(len(self.split.X), round(_METRIC_SAMPLES * min(1.0, self.size)))
         for name in RADIAL_FUNCTIONS:
             likelihood = 80.0 * samples**3

@@ -14,7 +14,7 @@ from palpate.errors import UsageError
 from palpate.learning.correction.corrector import Corrector
 from palpate.learning.correction.measures import ForceError, felt_along, force_error
 from palpate.learning.correction.placing import placed
-from palpate.surrogates import TouchSurrogate
+from palpate.surrogates import LearntEnergy, Surrogate
 
 __all__ = ["Corrected", "correct", "judged"]
 
@@ -32,7 +32,7 @@ class Corrected:
 
     Attributes
     ----------
-    surrogate : TouchSurrogate
+    surrogate : Surrogate
         Its ``meta["correction"]`` holds counts, height and the warning, so a file goes on telling of it.
     before, after : ForceError
         Of the model and of the corrected surrogate on all measurements that were not outliers of both.
@@ -50,7 +50,7 @@ class Corrected:
         How many times the model's forces the measured ones are, least squares; not-a-number without contact.
     """
 
-    surrogate: TouchSurrogate
+    surrogate: Surrogate
     before: ForceError
     after: ForceError
     left_out: ForceError | None
@@ -119,13 +119,13 @@ class Corrected:
 
 
 def correct(
-    surrogate: TouchSurrogate, measured: Measured, *, parameters: Sequence[float] = (), **options: Any
+    surrogate: Surrogate, measured: Measured, *, parameters: Sequence[float] = (), **options: Any
 ) -> Corrected:
     """Correct a surrogate by a record of one specimen.
 
     Parameters
     ----------
-    surrogate : TouchSurrogate
+    surrogate : Surrogate
     measured : Measured
     parameters : sequence of p numbers
         The specimen's further inputs.
@@ -138,10 +138,11 @@ def correct(
         If nothing of the record teaches anything, or options do not fit.
     """
     options["parameters"] = parameters
-    own = surrogate.radius_input
-    radius = surrogate.radius if own is None else float(parameters[own - 3])
-    measured = placed(measured, surrogate.surface, radius)
     corrector = Corrector(surrogate, **options)
+    baseline = surrogate.energy.baseline
+    own, surface = baseline.radius_input, baseline.surface
+    assert surface is not None
+    measured = placed(measured, surface, baseline.radius if own is None else float(parameters[own - 3]))
     with _doubted(corrector, measured):
         _observed(corrector, measured, np.arange(len(measured)))
         left_out = _left_out(surrogate, measured, options)
@@ -176,7 +177,7 @@ def _judged(corrector: Corrector, measured: Measured, left_out: ForceError | Non
     done = Corrected(
         after,
         before,
-        force_error(after, X, force, along),
+        force_error(after.energy, X, force, along),
         left_out,
         counts,
         corrector.offset,
@@ -224,10 +225,10 @@ def _doubt(ratio: float) -> str:
     return ""
 
 
-def _warned(surrogate: TouchSurrogate, warning: str) -> TouchSurrogate:
-    """The surrogate, whose record repeats a warning."""
-    told = {**surrogate.meta["correction"], "warning": warning}
-    return replace(surrogate, meta={**surrogate.meta, "correction": told})
+def _warned(surrogate: Surrogate, warning: str) -> Surrogate:
+    """Return the body, whose record repeats a warning."""
+    record = {**surrogate.meta["correction"], "warning": warning}
+    return replace(surrogate, meta={**surrogate.meta, "correction": record})
 
 
 def _ratio(predicted: np.ndarray, measured: np.ndarray, along: np.ndarray) -> float:
@@ -237,7 +238,7 @@ def _ratio(predicted: np.ndarray, measured: np.ndarray, along: np.ndarray) -> fl
     return float((compared * measured).sum()) / size if size > 0 else np.nan
 
 
-def _left_out(surrogate: TouchSurrogate, measured: Measured, options: Mapping[str, Any]) -> ForceError | None:
+def _left_out(surrogate: Surrogate, measured: Measured, options: Mapping[str, Any]) -> ForceError | None:
     """Errors of every fifth measurement by a correction from the others."""
     if len(measured) < _FEWEST:
         return None
@@ -248,8 +249,8 @@ def _left_out(surrogate: TouchSurrogate, measured: Measured, options: Mapping[st
     for fold in range(_FOLDS):
         corrector = Corrector(surrogate, **options)
         _observed(corrector, measured, np.flatnonzero(turn != fold))
-        found, out = corrector.surrogate, turn == fold
-        predicted[out], depth[out] = found.force(X[out]), found.depth(X[out])
+        energy, out = corrector.surrogate.energy, turn == fold
+        predicted[out], depth[out] = energy.force(X[out]), energy.depth(X[out])
     return force_error((predicted, depth), X, force, measured.along)
 
 
@@ -258,6 +259,6 @@ def _observed(corrector: Corrector, measured: Measured, which: np.ndarray) -> No
         corrector.observe(measured.position[i], measured.force[i], along=measured.along[i])
 
 
-def _inputs(surrogate: TouchSurrogate, measured: Measured, parameters: np.ndarray) -> np.ndarray:
-    further = np.broadcast_to(parameters, (len(measured), len(surrogate.parameters)))
+def _inputs(body: Surrogate | LearntEnergy, measured: Measured, parameters: np.ndarray) -> np.ndarray:
+    further = np.broadcast_to(parameters, (len(measured), len(body.parameters)))
     return np.hstack([measured.position, further])

@@ -1,4 +1,4 @@
-"""A touch surrogate that follows a physical specimen: measured forces in, a corrected surrogate out.
+"""A pressed body that follows a physical specimen: measured forces in, a corrected surrogate out.
 
 corrector = Corrector(surrogate)
 event = corrector.observe(position, force)      # SI units, as often as the sensor speaks
@@ -21,7 +21,7 @@ from palpate.learning.correction.belief import Belief
 from palpate.learning.correction.prior import Discrepancy, extended, opened
 from palpate.learning.correction.touches import Noise, Touches
 from palpate.learning.correction.written import corrected
-from palpate.surrogates import TouchSurrogate
+from palpate.surrogates import ContactBaseline, Surrogate
 from palpate.units import bounds
 
 __all__ = ["Corrector", "Event", "Verdict"]
@@ -67,7 +67,8 @@ class Corrector:
 
     Parameters
     ----------
-    surrogate : TouchSurrogate
+    surrogate : Surrogate
+        A body that is pressed by a probe.
     parameters : sequence of p numbers
         The specimen's further inputs, where the surrogate has any.
     discrepancy : Discrepancy, optional
@@ -83,6 +84,10 @@ class Corrector:
     ----------
     counts : Counter
         Of the verdicts.
+    body : Surrogate
+        The body as it came.
+    model : LearntEnergy
+        Its energy, with the units by which it may change.
 
     Raises
     ------
@@ -92,7 +97,7 @@ class Corrector:
 
     def __init__(
         self,
-        surrogate: TouchSurrogate,
+        surrogate: Surrogate,
         *,
         parameters: Sequence[float] = (),
         discrepancy: Discrepancy = Discrepancy(),  # noqa: B008 - a frozen value
@@ -101,11 +106,11 @@ class Corrector:
         window: int = 500,
         memory: float | None = None,
     ) -> None:
-        if not isinstance(surrogate, TouchSurrogate):
+        if not (isinstance(surrogate, Surrogate) and isinstance(surrogate.energy.baseline, ContactBaseline)):
             raise UsageError(
-                f"A {type(surrogate).__name__} can't be corrected.",
-                why="Measured forces correct an energy of touch.",
-                fix="Pass `body.touch`, and put the result back by `body.felt_as(corrected)`.",
+                f"{surrogate!r:.60} can't be corrected.",
+                why="Measured forces correct a body that a probe presses.",
+                fix="Pass the body of a study of touches, as `palpate.load` reads it.",
             )
         p = np.array(parameters, dtype=np.float64)
         if p.shape != (len(surrogate.parameters),) or not np.isfinite(p).all():
@@ -120,7 +125,10 @@ class Corrector:
                 f"gate={gate}, window={window} and memory={memory} allow no correction.",
                 fix="Give positive numbers.",
             )
-        self.model, self.noise, self.gate = extended(surrogate, discrepancy), noise, gate
+        energy = (
+            surrogate.energy if "correction" in surrogate.meta else extended(surrogate.energy, discrepancy)
+        )
+        self.body, self.model, self.noise, self.gate = surrogate, energy, noise, gate
         self.counts: Counter[str] = Counter()
         self._may = opened(self.model, discrepancy)
         self._anchor = self._belief = Belief.standard(self._may.root.shape[1] + 1)
@@ -164,8 +172,8 @@ class Corrector:
         return self._may.expressed
 
     @property
-    def surrogate(self) -> TouchSurrogate:
-        """The corrected surrogate, all touches of the window taken again first.
+    def surrogate(self) -> Surrogate:
+        """The corrected body, all touches of the window taken again first.
 
         Raises
         ------
@@ -173,7 +181,7 @@ class Corrector:
             If the surface came to lie so high that the model's distance does not reach it.
         """
         self.settle()
-        return corrected(self.model, self._may, self._belief, self.counts)
+        return corrected(self.body, self.model, self._may, self._belief, self.counts)
 
     def observe(self, position: np.ndarray, force: np.ndarray, *, along: np.ndarray | None = None) -> Event:
         """Learn one measurement.
@@ -278,8 +286,7 @@ class Corrector:
     def _outside(self, x: np.ndarray, depth: float) -> bool:
         """Deeper than trained, or far beyond a range."""
         low, high = bounds(self.model.inputs)
-        going = self.model.continuation
-        assert going is not None
+        going = self.model.going
         wide = _BEYOND * going.widths
         return bool(depth > going.deepest or (x < low - wide).any() or (x > high + wide).any())
 

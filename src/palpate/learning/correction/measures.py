@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.format import share
-from palpate.surrogates import TouchSurrogate
+from palpate.surrogates import LearntEnergy
 
 __all__ = ["ForceError", "felt_along", "force_error"]
 
@@ -48,7 +48,7 @@ class ForceError:
 
 
 def force_error(
-    answer: TouchSurrogate | tuple[np.ndarray, np.ndarray],
+    answer: LearntEnergy | tuple[np.ndarray, np.ndarray],
     X: np.ndarray,
     force: np.ndarray,
     along: np.ndarray | None = None,

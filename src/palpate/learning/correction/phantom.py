@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.learning.correction.written import raised
-from palpate.surrogates import TouchSurrogate
+from palpate.surrogates import ContactBaseline, LearntEnergy
 
 __all__ = ["Phantom"]
 
@@ -24,7 +24,7 @@ class Phantom:
 
     Attributes
     ----------
-    model : TouchSurrogate
+    model : LearntEnergy
     factor : float
         m.
     layer : float
@@ -35,7 +35,7 @@ class Phantom:
         o, m.
     """
 
-    model: TouchSurrogate
+    model: LearntEnergy
     factor: float = 1.4
     layer: float = 0.3
     depth: float = 0.006
@@ -44,10 +44,12 @@ class Phantom:
 
     def force(self, X: np.ndarray) -> np.ndarray:
         """F (N, 3) at inputs X (N, n), without noise."""
-        surface = raised(self.model.surface, self.height, self.model.radius)
+        baseline = self.model.baseline
+        assert isinstance(baseline, ContactBaseline)
+        surface = raised(baseline.touched, self.height, baseline.radius)
         d, normal, _ = surface.at(np.ascontiguousarray(X[:, :3]))
-        s = self.model.radius - d
-        U0, first, _ = self.model.law.energy(s)
+        s = baseline.radius - d
+        U0, first, _ = baseline.law.energy(s)
         value, slope = self._factor(X)
         t = np.tanh((s - self.depth) / self.width)
         kappa = self.factor * np.exp(value + 0.5 * self.layer * (1.0 + t))

@@ -21,7 +21,7 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.network import Network
 from palpate.network.radial import radial
-from palpate.surrogates import TouchSurrogate
+from palpate.surrogates import LearntEnergy
 
 __all__ = ["Discrepancy", "Opened", "extended", "opened", "regressors"]
 
@@ -93,15 +93,12 @@ class Opened:
     expressed: float
 
 
-def extended(surrogate: TouchSurrogate, discrepancy: Discrepancy) -> TouchSurrogate:
-    """The same energy with broad units of weight zero, far from each other among the training inputs.
-
-    Only where something may vary, and not a second time.
-    """
-    net, points = surrogate.network, _points(surrogate)
+def extended(energy: LearntEnergy, discrepancy: Discrepancy) -> LearntEnergy:
+    """Return the same energy with broad units of weight zero, far from each other among the training inputs."""
+    net, points = energy.network, _points(energy)
     k, n = min(discrepancy.units, len(points)), len(net.inputs)
-    if not (k and discrepancy.varying) or "correction" in surrogate.meta:
-        return surrogate
+    if not (k and discrepancy.varying):
+        return energy
     own = np.zeros((net.units, n, n))
     own[:, : net.factors.shape[1]] = net.factors
     shifts = np.zeros((net.units, n))
@@ -113,13 +110,13 @@ def extended(surrogate: TouchSurrogate, discrepancy: Discrepancy) -> TouchSurrog
         shifts=np.concatenate([shifts, wide * points[:k]]),
         weights=np.hstack([net.weights, np.zeros((1, k))]),
     )
-    root = surrogate.root
+    root = energy.root
     if root is not None:
         root = np.vstack([root, np.zeros((k, root.shape[1]))])
-    return replace(surrogate, network=more, root=root)
+    return replace(energy, network=more, root=root)
 
 
-def opened(surrogate: TouchSurrogate, discrepancy: Discrepancy) -> Opened:
+def opened(energy: LearntEnergy, discrepancy: Discrepancy) -> Opened:
     """The posterior of the training, with the discrepancy added.
 
     Raises
@@ -127,14 +124,14 @@ def opened(surrogate: TouchSurrogate, discrepancy: Discrepancy) -> Opened:
     UsageError
         If nothing may change at all.
     """
-    net = surrogate.network
+    net = energy.network
     scale, rows = float(net.scaling.output_scale[0]), 1 + len(net.inputs) + net.units
-    parts = [np.zeros((rows, 0)) if surrogate.root is None else surrogate.root]
+    parts = [np.zeros((rows, 0)) if energy.root is None else energy.root]
     if discrepancy.constant:
         parts.append(np.eye(rows, 1) * discrepancy.constant / scale)
     expressed = 1.0
     if discrepancy.varying:
-        root, expressed = _slow(surrogate, discrepancy)
+        root, expressed = _slow(energy, discrepancy)
         parts.append(root / scale)
     root = np.hstack(parts)
     if not root.any() and not discrepancy.offset:
@@ -156,23 +153,23 @@ def regressors(net: Network, scaled: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return np.hstack([np.ones((N, 1)), scaled, g]), np.concatenate([tail, by], axis=2)
 
 
-def _slow(surrogate: TouchSurrogate, discrepancy: Discrepancy) -> tuple[np.ndarray, float]:
+def _slow(energy: LearntEnergy, discrepancy: Discrepancy) -> tuple[np.ndarray, float]:
     """Root (c, r) of the slowly varying change in units of ℓ, and the share of it that the network can express."""
-    points = _points(surrogate)
+    points = _points(energy)
     square = ((points[:, None] - points) ** 2).sum(axis=2)
     values, V = np.linalg.eigh(discrepancy.varying**2 * np.exp(-square / (2.0 * discrepancy.length**2)))
     keep = np.flatnonzero(values > _KEPT * values[-1])[-_MOST:]
     wanted = V[:, keep] * np.sqrt(values[keep])
-    R, _ = regressors(surrogate.network, points)
+    R, _ = regressors(energy.network, points)
     gram = R.T @ R
     found = np.linalg.solve(gram + _RIDGE * np.trace(gram) / len(gram) * np.eye(len(gram)), R.T @ wanted)
     missed = wanted - R @ found
     return found, float(1.0 - (missed**2).sum() / (wanted**2).sum())
 
 
-def _points(surrogate: TouchSurrogate) -> np.ndarray:
+def _points(energy: LearntEnergy) -> np.ndarray:
     """Scaled inputs (k, n) of the training, the first far from each other, and random ones where few are known."""
-    n, region = len(surrogate.inputs), surrogate.region
+    n, region = len(energy.inputs), energy.region
     known = np.zeros((0, n)) if region is None else region.points
     more = np.random.default_rng(0).uniform(-1.0, 1.0, (max(_POINTS - len(known), 0), n))
     return np.concatenate([known, more])

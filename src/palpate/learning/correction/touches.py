@@ -21,7 +21,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.learning.correction.prior import Opened, regressors
-from palpate.surrogates import ContactLaw, TouchSurrogate
+from palpate.surrogates import ContactBaseline, ContactLaw, LearntEnergy
 from palpate.surrogates.continuation import saturated
 from palpate.units import bounds
 
@@ -110,7 +110,7 @@ class Touches:
     @classmethod
     def of(
         cls,
-        surrogate: TouchSurrogate,
+        energy: LearntEnergy,
         may: Opened,
         X: np.ndarray,
         force: np.ndarray,
@@ -118,19 +118,19 @@ class Touches:
         noise: Noise,
     ) -> Touches:
         """At inputs X (N, n); `along` (N, 3) the unit vector of the only component measured, or zeros."""
-        net = surrogate.network
-        taken, slopes = _saturated(surrogate, X)
+        net, baseline = energy.network, energy.baseline
+        taken, slopes = _saturated(energy, X)
         r, by = regressors(net, net.scaling.scale_inputs(taken))
         by = by[:, :3] * (slopes / net.scaling.input_half[:3])[:, :, None]
         both = np.concatenate([r[:, None], by], axis=1)  # (N, 4, c)
         scale = float(net.scaling.output_scale[0])
         base = scale * both @ np.concatenate([net.tail[0], net.weights[0]])
         base[:, 0] += net.scaling.output_centre[0]
-        d, normal, _ = surrogate.surface.at(np.ascontiguousarray(X[:, :3]))
-        own = surrogate.radius_input
-        depth = (surrogate.radius if own is None else X[:, own]) - d
-        W = noise.whitening(force, surrogate.stiffness(X), along)
-        return cls(depth, normal, base, scale * both @ may.root, force.copy(), W, surrogate.law, may.offset)
+        assert isinstance(baseline, ContactBaseline)
+        _, normal, _ = baseline.touched.at(np.ascontiguousarray(X[:, :3]))
+        depth = baseline.coordinate(X)
+        W = noise.whitening(force, energy.stiffness(X), along)
+        return cls(depth, normal, base, scale * both @ may.root, force.copy(), W, baseline.law, may.offset)
 
     def __len__(self) -> int:
         return len(self.depth)
@@ -189,11 +189,10 @@ class Touches:
         return kappa * value, F, by
 
 
-def _saturated(surrogate: TouchSurrogate, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _saturated(energy: LearntEnergy, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Where ℓ is taken (N, n), and how that follows the centre (N, 3); no deeper than trained."""
-    low, high = bounds(surrogate.inputs)
-    going = surrogate.continuation
-    assert going is not None
+    low, high = bounds(energy.inputs)
+    going = energy.going
     taken, slopes = X.copy(), np.ones((len(X), 3))
     for i, j in zip(*np.nonzero((low > X) | (high < X)), strict=True):
         sign, edge = (-1.0, -low[j]) if X[i, j] < low[j] else (1.0, high[j])

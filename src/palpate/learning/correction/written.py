@@ -12,15 +12,15 @@ from palpate.errors import UsageError
 from palpate.learning.correction.belief import Belief
 from palpate.learning.correction.prior import Opened
 from palpate.network import Network
-from palpate.surrogates import Continuation, TouchedSurface, TouchSurrogate
+from palpate.surrogates import ContactBaseline, Continuation, LearntEnergy, Surrogate, TouchedSurface
 
 __all__ = ["corrected", "raised"]
 
 
 def corrected(
-    surrogate: TouchSurrogate, may: Opened, belief: Belief, counts: Mapping[str, int]
-) -> TouchSurrogate:
-    """The surrogate with the most probable weights and height, and the root of the weights' covariance.
+    body: Surrogate, energy: LearntEnergy, may: Opened, belief: Belief, counts: Mapping[str, int]
+) -> Surrogate:
+    """Return the body with the most probable weights and height, and the root of the weights' covariance.
 
     Its law, units, region and inputs are those of before. Where the height is still unsure, the deviation does not
     tell of it.
@@ -29,18 +29,17 @@ def corrected(
     root = may.root @ belief.root[:-1]
     if root.shape[1] > root.shape[0]:
         root = np.linalg.qr(root.T)[1].T
-    meta: dict[str, Any] = dict(surrogate.meta)
+    meta: dict[str, Any] = dict(body.meta)
     meta["correction"] = {"counts": dict(counts), "offset": height, "offset_deviation": sure}
-    going = surrogate.continuation
-    assert going is not None
-    moved = replace(
-        surrogate, network=_moved(surrogate.network, may.root @ belief.mean[:-1]), root=root, meta=meta
-    )
+    going, baseline = energy.going, energy.baseline
+    moved = replace(energy, network=_moved(energy.network, may.root @ belief.mean[:-1]), root=root)
     if not height:
-        return moved
+        return body.with_energy(moved, meta)
+    assert isinstance(baseline, ContactBaseline)
     # ℓ is to be taken where it was: the deepest trained place stays, and is `height` deeper now
     deeper = Continuation(going.widths, going.deepest + height, going.depth_width)
-    return replace(moved, surface=raised(surrogate.surface, height, _largest(surrogate)), continuation=deeper)
+    higher = replace(baseline, touched=raised(baseline.touched, height, _largest(energy)))
+    return body.with_energy(replace(moved, baseline=higher, continuation=deeper), meta)
 
 
 def raised(surface: TouchedSurface, height: float, radius: float) -> TouchedSurface:
@@ -60,9 +59,9 @@ def raised(surface: TouchedSurface, height: float, radius: float) -> TouchedSurf
     return surface.raised(height)
 
 
-def _largest(surrogate: TouchSurrogate) -> float:
-    own = surrogate.radius_input
-    return surrogate.radius if own is None else surrogate.inputs[own].high
+def _largest(energy: LearntEnergy) -> float:
+    own = energy.baseline.radius_input
+    return energy.baseline.radius if own is None else energy.inputs[own].high
 
 
 def _moved(net: Network, change: np.ndarray) -> Network:

@@ -1,17 +1,15 @@
-"""A touch surrogate from energies, forces and stiffnesses: everything observed is of one scalar, ℓ = ln(U/U₀).
+"""The energy of a body from solved energies, forces and stiffnesses: all that is observed is of one scalar, ℓ.
 
-samples          (U, F, ∂F/∂c) as values, slopes and curvatures of ℓ, each weighted to make its error relative
-columns          which solves lie over one place
-images           a body's symmetry, in scaled inputs
+energy_samples   (U, F, ∂F/∂x) as values, slopes and curvatures of ℓ, each weighted to make its error relative
+energy_images    a body's symmetry, in scaled inputs
 energy_problem   what the search needs of an energy: refinement, and errors of solves left out
 energy_search    kinds of units, growth, random starts, and the mean of the best networks
-laws             which contact law, and where it crosses over
 trust            the posterior of the linear weights, calibrated by what leaving solves out has shown
-written          what was found, as the parts of a surrogate
-learn_surrogate  all of it
+energy_export    the parts of an energy from what was found
+learn_energy     all of it, with the choice of a baseline
 """
 
-from palpate.learning.energy.learn_surrogate import LearntSurrogate, learn_surrogate
-from palpate.learning.energy.samples import EnergySamples
+from palpate.learning.energy.energy_samples import EnergySamples
+from palpate.learning.energy.learn_energy import EnergyHistory, learn_energy
 
-__all__ = ["EnergySamples", "LearntSurrogate", "learn_surrogate"]
+__all__ = ["EnergyHistory", "EnergySamples", "learn_energy"]

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from palpate.learning.energy.energy_samples import EnergySamples
 from palpate.learning.energy.energy_search import EnergyEnsemble
-from palpate.learning.energy.written import Solves
 from palpate.rbf.refinement.rows import Rows
 
 __all__ = ["Trust", "trust_of"]
@@ -26,12 +26,12 @@ _MOST = 0.98
 
 @dataclass(frozen=True, eq=False)
 class Trust:
-    """What leaving solves out has shown.
+    """The errors that leaving solves out has shown, and the posterior that covers them.
 
     Attributes
     ----------
     root : (c, z)
-        Of the covariance of the coefficients, tail first; calibrated. Zero for all units but the best network's.
+        Root of the covariance of the coefficients, tail first; calibrated. Zero for all units but the best network's.
     errors : (N,)
         Relative force error of each solve whose force is known, when it is left out.
     """
@@ -40,46 +40,46 @@ class Trust:
     errors: np.ndarray
 
 
-def trust_of(found: EnergyEnsemble, samples: Solves) -> Trust:
-    """From what a mean of networks misses of the solves that it was refined on, when they are left out."""
-    rows, fit, fold = found.left_out.rows, found.left_out.fit, found.left_out.together
-    missed, Q = found.left_out.errors @ rows.modes, fit.Q
-    to_force, at = _to_force(rows, samples), _slope_rows(rows)
-    errors, sizes = np.empty(len(at)), np.empty(len(at))
-    of_row = fold[rows.samples]
-    for one in np.unique(fold[[i for i, _ in at]]):
-        members = np.flatnonzero(of_row == one)
+def trust_of(ensemble: EnergyEnsemble, samples: EnergySamples) -> Trust:
+    """Return what a mean of networks misses of the solves that it was refined on, when they are left out."""
+    rows, fit, fold = ensemble.left_out.rows, ensemble.left_out.fit, ensemble.left_out.together
+    missed, Q = ensemble.left_out.errors @ rows.modes, fit.Q
+    to_force, solves = _to_force(rows, samples), _slope_rows(rows)
+    errors, sizes = np.empty(len(solves)), np.empty(len(solves))
+    fold_of_row = fold[rows.samples]
+    for left in np.unique(fold[[i for i, _ in solves]]):
+        members = np.flatnonzero(fold_of_row == left)
         values, V = np.linalg.eigh(Q[members] @ Q[members].T)
         values = np.clip(values, 0.0, _MOST)
         spread = V * np.sqrt(values / (1.0 - values))
-        for k, (i, first) in enumerate(at):
-            if fold[i] == one:
-                block = np.r_[i, first + np.arange(3)]
-                errors[k] = np.linalg.norm(to_force[k] @ missed[block, 0])
-                sizes[k] = np.linalg.norm(to_force[k] @ spread[np.searchsorted(members, block)])
+        for row, (i, first) in enumerate(solves):
+            if fold[i] == left:
+                block = np.r_[i, first + np.arange(samples.felt)]
+                errors[row] = np.linalg.norm(to_force[row] @ missed[block, 0])
+                sizes[row] = np.linalg.norm(to_force[row] @ spread[np.searchsorted(members, block)])
     groups = int(rows.groups.max()) + 1
     share = min(0.9 * (groups + 1) / groups, 1.0)
     ratio = float(np.quantile(errors / np.maximum(sizes, 1e-300), share)) / _NINE_TENTHS
     triangle = np.linalg.cholesky(fit.inverse + 1e-14 * np.trace(fit.inverse) * np.eye(len(fit.tau)))
-    others = np.zeros((len(found.coefficients) - len(triangle), triangle.shape[1]))
+    others = np.zeros((len(ensemble.coefficients) - len(triangle), triangle.shape[1]))
     return Trust(ratio * np.vstack([triangle, others]), errors)
 
 
 def _slope_rows(rows: Rows) -> list[tuple[int, int]]:
-    """Samples whose force is known, and the first row of each one's slopes: the first three are the force's."""
+    """Return the samples whose force is known, and the first row of each one's slopes: the first are the force's."""
     counts = (rows.slope_scale > 0).sum(axis=1)
     starts = len(rows.X) + np.cumsum(counts) - counts
     return [(int(i), int(start)) for i, start in zip(rows.sloped, starts, strict=True)]
 
 
-def _to_force(rows: Rows, samples: Solves) -> np.ndarray:
-    """(S, 3, 4): what errors of a solve's weighted value and slope rows make of its force, relative to its size."""
-    known = rows.sloped
-    force = samples.force[known, :3]
+def _to_force(rows: Rows, samples: EnergySamples) -> np.ndarray:
+    """Return (S, k, 1 + k): what errors of a solve's weighted rows make of its force, relative to it."""
+    known, k = rows.sloped, samples.felt
+    force = samples.force[known, :k]
     size = np.linalg.norm(force, axis=1)
-    found = np.zeros((len(known), 3, 4))
-    found[:, :, 0] = force / (size * rows.scale[known])[:, None]
-    half = samples.half[:3]
-    for i in range(3):
-        found[:, i, 1 + i] = -samples.energy[known] / (size * rows.slope_scale[:, i] * half[i])
-    return found
+    to_force = np.zeros((len(known), k, 1 + k))
+    to_force[:, :, 0] = force / (size * rows.scale[known])[:, None]
+    half = samples.half[:k]
+    for i in range(k):
+        to_force[:, i, 1 + i] = -samples.energy[known] / (size * rows.slope_scale[:, i] * half[i])
+    return to_force

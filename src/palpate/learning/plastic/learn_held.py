@@ -22,7 +22,8 @@ from palpate.format import share
 from palpate.learning.plastic.paths import HeldPath, HeldPaths
 from palpate.learning.structure import refined_network
 from palpate.network import Network
-from palpate.surrogates.plastic import Elements, HeldBody
+from palpate.surrogates.memories import IwanElements
+from palpate.surrogates.plastic import HeldBody
 from palpate.units import Quantity, Range
 
 __all__ = ["Fit", "learn_held"]
@@ -115,7 +116,7 @@ def _learn(
     rest[:, :2] = train.rest
     places = np.concatenate([path.place for path in train.paths])
 
-    def body(elements: Elements) -> HeldBody:
+    def body(elements: IwanElements) -> HeldBody:
         return HeldBody(
             name=name,
             stretch=stretch,
@@ -132,7 +133,7 @@ def _learn(
         )
 
     # the elements are fitted along the stretch as it is evaluated
-    bare = body(Elements.sliders(np.ones(1), np.full(1, np.inf), np.zeros(1)))
+    bare = body(IwanElements.sliders(np.ones(1), np.full(1, np.inf), np.zeros(1)))
     stretches = [bare.stretches(path.place) for path in train.paths]
     candidates = _times(train) if relaxes else _limits(max(float(np.abs(h).max()) for h, _ in stretches))
     elements, error = _fitted(train, stretches, candidates, relaxes)
@@ -220,11 +221,11 @@ def _times(train: HeldPaths) -> np.ndarray:
 
 def _fitted(
     train: HeldPaths, stretches: list[tuple[np.ndarray, np.ndarray]], candidates: np.ndarray, relaxes: bool
-) -> tuple[Elements, float]:
+) -> tuple[IwanElements, float]:
     from scipy.optimize import nnls
 
     limit, rise, time = candidates.T
-    all_of_them = Elements(np.ones(len(limit)), limit, rise, time)
+    all_of_them = IwanElements(np.ones(len(limit)), limit, rise, time)
     columns = [
         slope[:, None] * all_of_them.elongations(h, path.times if relaxes else None)
         for (h, slope), path in zip(stretches, train.paths, strict=True)
@@ -239,5 +240,5 @@ def _fitted(
             why="A body pulls back where it is led.",
             fix="Check the sign of the force: it is the load that holds the body there.",
         )
-    elements = Elements(k[used], limit[used], rise[used], time[used])
+    elements = IwanElements(k[used], limit[used], rise[used], time[used])
     return elements, float(rest / np.sqrt(len(P)) / largest)

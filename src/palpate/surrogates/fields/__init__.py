@@ -8,15 +8,12 @@
     field_kernels          the compiled loops
     field_evaluator        one touch at a time, without allocation
     surface_interpolation  from the nodes of one mesh of a surface to those of another
-    field_file             a field in a file
-    touched_body           an energy and its fields together
 """
 
 from palpate.surrogates.fields.depth_amplitude import DepthAmplitude
 from palpate.surrogates.fields.field_evaluator import FieldEvaluator
 from palpate.surrogates.fields.field_surrogate import FieldErrors, FieldSurrogate
 from palpate.surrogates.fields.local_mode import LocalMode, Variation
-from palpate.surrogates.fields.touched_body import TouchedBody
 
 __all__ = [
     "DepthAmplitude",
@@ -24,6 +21,5 @@ __all__ = [
     "FieldEvaluator",
     "FieldSurrogate",
     "LocalMode",
-    "TouchedBody",
     "Variation",
 ]

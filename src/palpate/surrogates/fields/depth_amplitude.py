@@ -2,7 +2,7 @@
 
 Far from the touched place a field goes with the force, and the force is the slope of the contact law: s² behind a
 soft pad, s^{3/2} on an elastic half-space (Johnson 1985, eq. 4.23), s²/(1 + s/a)^½ for both in series (see
-`palpate.surrogates.laws`). Under the probe the skin follows it: s. All are
+`palpate.surrogates.contact_law`). Under the probe the skin follows it: s. All are
 
     f = (s/s*)^p ((1 + s*/a)/(1 + s/a))^½        with a = ∞ for pure powers
 

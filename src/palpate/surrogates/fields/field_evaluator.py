@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.network.network_kernels import PRECISIONS, Precision
-from palpate.surrogates.arguments import NONE, touch_at
+from palpate.surrogates.arguments import NONE, place_at
 from palpate.surrogates.fields.field_kernels import FRAME, coefficients_into, field_into, profile_into
 from palpate.surrogates.fields.local_mode import OFFSETS
 
@@ -63,7 +63,7 @@ class FieldEvaluator:
         UsageError
             If there are not three coordinates and p parameters.
         """
-        position, parameters = touch_at(position, parameters, self._shape)
+        position, parameters = place_at(position, parameters, self._shape)
         return bool(coefficients_into(position, parameters, *self._first))
 
     def field(self) -> np.ndarray:

@@ -10,12 +10,10 @@ mode what moves with the probe. Without contact the field is y₀, exactly.
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -103,7 +101,7 @@ _ARRAYS = ("modes", "rest", "points", "mass")
 
 @dataclass(frozen=True, eq=False)
 class FieldSurrogate:
-    """A field as a value: `save` and `load` give it back bit for bit.
+    """A field as a value, kept in the file of its body.
 
     Attributes
     ----------
@@ -143,7 +141,7 @@ class FieldSurrogate:
     modes: np.ndarray
     rest: np.ndarray
     points: np.ndarray
-    triangles: np.ndarray
+    triangles: Annotated[np.ndarray, np.int64]
     mass: np.ndarray
     amplitude: DepthAmplitude
     surface: TouchedSurface
@@ -355,28 +353,3 @@ class FieldSurrogate:
     def evaluator(self, *, precision: Precision = "single") -> FieldEvaluator:
         """The allocation-free evaluator of a picture's path."""
         return FieldEvaluator(self, precision)
-
-    def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the field alone to one file; `TouchedBody` keeps it beside its energy.
-
-        Raises
-        ------
-        UsageError
-            If the file can't be written.
-        """
-        from palpate.surrogates.fields.field_file import save_field
-
-        return save_field(path, self)
-
-    @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> FieldSurrogate:
-        """Read a field back.
-
-        Raises
-        ------
-        FileFormatError
-            If the file is missing, corrupt, foreign or from a later version.
-        """
-        from palpate.surrogates.fields.field_file import load_field
-
-        return load_field(path)

@@ -23,6 +23,7 @@ the border.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -65,7 +66,7 @@ class Variation:
     """
 
     table: np.ndarray
-    powers: np.ndarray
+    powers: Annotated[np.ndarray, np.int64]
     axes: np.ndarray
     scales: np.ndarray
 

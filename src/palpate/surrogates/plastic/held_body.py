@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from palpate.network import Network
-from palpate.surrogates.plastic.elements import Elements
+from palpate.surrogates.memories.iwan_elements import IwanElements
 from palpate.surrogates.plastic.held_evaluator import HeldEvaluator
 from palpate.units import Range, bounds
 
@@ -44,7 +44,7 @@ class HeldBody:
         w in m, or w² in m² where both sides answer alike → ℓ, a pure number.
     shape : Network
         w in m and P in N → displacement in m of every mesh node, x and y in turn.
-    elements : Elements
+    elements : IwanElements
     mirrors : bool
         Whether both sides answer alike.
     rest : (node, 3)
@@ -65,7 +65,7 @@ class HeldBody:
     name: str
     stretch: Network
     shape: Network
-    elements: Elements
+    elements: IwanElements
     mirrors: bool
     rest: np.ndarray
     nodes_of_interest: np.ndarray

@@ -11,7 +11,7 @@ from numba import njit
 
 from palpate.errors import UsageError
 from palpate.network.network_kernels import value_and_jacobian_into, value_into
-from palpate.surrogates.plastic.element_kernels import advance, free_step
+from palpate.surrogates.memories.iwan_elements import advance, free_step
 
 if TYPE_CHECKING:
     from palpate.surrogates.plastic.held_body import HeldBody

@@ -10,7 +10,7 @@ import numpy as np
 
 from palpate.network import Archive, save_archive
 from palpate.surrogates.file_parts import read
-from palpate.surrogates.plastic.elements import Elements
+from palpate.surrogates.memories.iwan_elements import IwanElements
 
 if TYPE_CHECKING:
     from palpate.surrogates.plastic.held_body import HeldBody
@@ -56,6 +56,6 @@ def _held(archive: Archive) -> HeldBody:
     return HeldBody(
         stretch=archive.networks["stretch"],
         shape=archive.networks["shape"],
-        elements=Elements(*numbers),
+        elements=IwanElements(*numbers),
         **given,
     ).checked()

@@ -66,14 +66,9 @@ class Chapter:
         return follow_unseen(self.subject.body, self.subject.histories)
 
     @property
-    def energy(self) -> Any:
-        """The energy that answers the force of the model."""
-        return getattr(self.model, "touch", self.model)
-
-    @property
     def meta(self) -> Mapping[str, Any]:
         """Description that the model has of its making."""
-        meta: Mapping[str, Any] = getattr(self.energy, "meta", {})
+        meta: Mapping[str, Any] = getattr(self.model, "meta", {})
         return meta
 
     @property

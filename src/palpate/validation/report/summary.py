@@ -116,7 +116,7 @@ def _solved_by_load(chapter: Chapter) -> str:
 def _learnt(chapter: Chapter) -> str:
     v = chapter.validation
     if v.networks is None:
-        return f"{chapter.energy}.".replace("\n", "; ").replace("..", ".")
+        return f"{chapter.model}.".replace("\n", "; ").replace("..", ".")
     used = chapter.meta.get("refinement", {}).get("used")
     own, refined = v.networks.filter, v.networks.refined
     text = ""

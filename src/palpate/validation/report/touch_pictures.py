@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from palpate.format import share
-from palpate.surrogates import TouchSurrogate
+from palpate.surrogates import LearntEnergy, Surrogate, TouchedSurface
 from palpate.validation.figures.smoothness import Smoothness
 from palpate.validation.report.chapter import Chapter
 from palpate.validation.report.style import INK, Picture, figure, loads_map, picture, series
@@ -45,19 +46,25 @@ MARKED = 5
 
 def touch_pictures(chapter: Chapter, key: str) -> list[Picture]:
     """Draw the pictures of a body that is touched on a surface; none of other models."""
-    surrogate, test, v = chapter.energy, chapter.subject.solves, chapter.validation
+    model, test, v = chapter.model, chapter.subject.solves, chapter.validation
     samples = chapter.subject.samples
-    if test is None or samples is None or getattr(surrogate, "surface", None) is None:
+    if (
+        test is None
+        or samples is None
+        or not isinstance(model, Surrogate)
+        or model.energy.baseline.surface is None
+    ):
         return []
+    energy = model.energy
     off = "No touch was strong enough to judge in relative terms."
     if v.force.p95 is not None and v.force.max is not None:
         off = f"95 of 100 forces are within {share(v.force.p95)}, all within {share(v.force.max)}."
     smooth = "" if v.smoothness is None else _smooth(v.smoothness)
-    part = _part(surrogate)
+    part = _part(model.meta)
     trust = "Colour: standard deviation of the force that the surrogate states."
-    if surrogate.root is None:
+    if energy.root is None:
         trust = "The surrogate states no deviation."
-    if body := further(surrogate, deepest(surrogate, test.X)):
+    if body := further(energy, deepest(energy, test.X)):
         trust += f" Shown for {body}."
     return [
         picture(
@@ -65,7 +72,7 @@ def touch_pictures(chapter: Chapter, key: str) -> list[Picture]:
             "Force against depth",
             f"Size of the force on the probe of {chapter.name} against its depth, surrogate and finite elements. {off}",
             f"Lines into the body along its normal, through the deepest unseen solves. {off}{smooth}",
-            lambda: plot_curves(surrogate, test),
+            lambda: plot_curves(energy, test),
         ),
         picture(
             f"{key}-map",
@@ -73,14 +80,14 @@ def touch_pictures(chapter: Chapter, key: str) -> list[Picture]:
             f"Force error of {chapter.name} at each unseen solve, on the surface seen from outside. {off}",
             "One dot per unseen solve, where the probe touches; forces up to f₀ are judged against f₀. Numbers mark "
             f"the worst cases of the table. {off}{part}",
-            lambda: plot_errors(surrogate, test, samples),
+            lambda: plot_errors(energy, test, samples),
         ),
         picture(
             f"{key}-trust",
             "Where to trust it",
             f"Stated deviation of the force of {chapter.name} on the surface seen from outside, at two depths. {trust}",
             f"{trust} Hatched: outside what was trained. Dots: unseen solves.{part}",
-            lambda: plot_trust(surrogate, test),
+            lambda: plot_trust(energy, test),
         ),
     ]
 
@@ -92,9 +99,16 @@ def _smooth(smooth: Smoothness) -> str:
     )
 
 
-def _part(surrogate: TouchSurrogate) -> str:
+def _surface(energy: LearntEnergy) -> TouchedSurface:
+    """Return the touched surface of a body that has one."""
+    surface = energy.baseline.surface
+    assert surface is not None
+    return surface
+
+
+def _part(meta: Mapping[str, Any]) -> str:
     """Return that symmetry was used, where it was: the picture shows less than the body."""
-    solves, samples = surrogate.meta.get("solves", 0), surrogate.meta.get("samples", 0)
+    solves, samples = meta.get("solves", 0), meta.get("samples", 0)
     if not samples > solves:
         return ""
     return (
@@ -112,9 +126,9 @@ class View:
     out: np.ndarray
 
     @classmethod
-    def of(cls, surrogate: TouchSurrogate, X: np.ndarray) -> View:
+    def of(cls, energy: LearntEnergy, X: np.ndarray) -> View:
         """Return the view from where the touches X (N, n) come."""
-        out = surrogate.surface.at(X[:, :3])[1].mean(axis=0)
+        out = _surface(energy).at(X[:, :3])[1].mean(axis=0)
         length = float(np.linalg.norm(out))
         out = out / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
         # the axis that is most across becomes the page's, so that a flat block is seen as it is drawn
@@ -139,31 +153,31 @@ def _label(direction: np.ndarray, otherwise: str) -> str:
     return f"{'−' if direction[i] < 0 else ''}{AXES[i]} / mm"
 
 
-def deepest(surrogate: TouchSurrogate, X: np.ndarray) -> np.ndarray:
+def deepest(energy: LearntEnergy, X: np.ndarray) -> np.ndarray:
     """Return the inputs (n,) of the deepest of the touches X (N, n)."""
-    return np.asarray(X[int(np.argmax(surrogate.depth(X)))])
+    return np.asarray(X[int(np.argmax(energy.depth(X)))])
 
 
-def further(surrogate: TouchSurrogate, x: np.ndarray) -> str:
+def further(energy: LearntEnergy, x: np.ndarray) -> str:
     """Return the inputs beyond the place at x (n,), in words: which body of a family it is; empty for one body."""
-    named = zip(surrogate.parameters, x[3:], strict=True)
+    named = zip(energy.parameters, x[3:], strict=True)
     return ", ".join(f"{r.name} = {value:.4g} {r.unit}".rstrip() for r, value in named)
 
 
-def contact_points(surrogate: TouchSurrogate, X: np.ndarray) -> np.ndarray:
+def contact_points(energy: LearntEnergy, X: np.ndarray) -> np.ndarray:
     """Return points (N, 3) of the surface at rest nearest to the centres in X (N, n), m."""
-    d, slope, _ = surrogate.surface.at(X[:, :3])
+    d, slope, _ = _surface(energy).at(X[:, :3])
     return np.asarray(X[:, :3] - d[:, None] * slope)
 
 
 def at_depth(
-    surrogate: TouchSurrogate, view: View, places: np.ndarray, like: np.ndarray, depth: float
+    energy: LearntEnergy, view: View, places: np.ndarray, like: np.ndarray, depth: float
 ) -> np.ndarray:
     """Return inputs (N, n) that have the probe `depth` deep where it is seen at places (N, 2); not-a-number where none.
 
     Parameters
     ----------
-    surrogate : TouchSurrogate
+    energy : LearntEnergy
         Energy with a touched surface.
     view : View
         Directions in which the surface is seen.
@@ -180,10 +194,10 @@ def at_depth(
         + (like[:3] @ view.out) * np.ones((len(places), 1)) * view.out
     )
     for _ in range(60):
-        miss = surrogate.depth(X) - depth
-        slope = surrogate.surface.at(X[:, :3])[1] @ view.out
+        miss = energy.depth(X) - depth
+        slope = _surface(energy).at(X[:, :3])[1] @ view.out
         X[:, :3] += np.clip(miss / np.maximum(slope, 0.2), -0.005, 0.005)[:, None] * view.out
-    X[np.abs(surrogate.depth(X) - depth) > 1e-6] = np.nan
+    X[np.abs(energy.depth(X) - depth) > 1e-6] = np.nan
     return X
 
 
@@ -204,11 +218,15 @@ class Curve:
     rows: np.ndarray
 
 
-def curves(surrogate: TouchSurrogate, test: TouchSolves, most: int = LINES) -> list[Curve]:
+def curves(energy: LearntEnergy, test: TouchSolves, most: int = LINES) -> list[Curve]:
     """Return lines through deep solves far from each other, those first that have most solves on them."""
-    depth, X = surrogate.depth(test.X), test.X
-    radius = surrogate.radius if surrogate.radius_input is None else X[:, surrogate.radius_input].mean()
-    normals = surrogate.surface.at(X[:, :3])[1]
+    depth, X = energy.depth(test.X), test.X
+    radius = (
+        energy.baseline.radius
+        if energy.baseline.radius_input is None
+        else X[:, energy.baseline.radius_input].mean()
+    )
+    normals = _surface(energy).at(X[:, :3])[1]
     lines = {
         i: _on_line(X, i, normals[i], NEAR * radius) for i in np.argsort(-depth) if depth[i] > depth.max() / 2
     }
@@ -218,7 +236,7 @@ def curves(surrogate: TouchSurrogate, test: TouchSolves, most: int = LINES) -> l
             chosen.append(int(i))
         if len(chosen) == most:
             break
-    return [_curve(surrogate, X, i, normals[i], depth, lines[i]) for i in chosen]
+    return [_curve(energy, X, i, normals[i], depth, lines[i]) for i in chosen]
 
 
 def _on_line(X: np.ndarray, i: int, normal: np.ndarray, near: float) -> np.ndarray:
@@ -228,24 +246,24 @@ def _on_line(X: np.ndarray, i: int, normal: np.ndarray, near: float) -> np.ndarr
 
 
 def _curve(
-    surrogate: TouchSurrogate, X: np.ndarray, i: int, normal: np.ndarray, depth: np.ndarray, rows: np.ndarray
+    energy: LearntEnergy, X: np.ndarray, i: int, normal: np.ndarray, depth: np.ndarray, rows: np.ndarray
 ) -> Curve:
     line = np.repeat(X[i][None], 121, axis=0)
     line[:, :3] += np.linspace(0.0, 1.0, 121)[:, None] * depth[i] * normal
-    force = np.linalg.norm(surrogate.force(line), axis=1)
-    return Curve(surrogate.depth(line), force, rows[np.argsort(-depth[rows])])
+    force = np.linalg.norm(energy.force(line), axis=1)
+    return Curve(energy.depth(line), force, rows[np.argsort(-depth[rows])])
 
 
-def plot_curves(surrogate: TouchSurrogate, test: TouchSolves) -> Figure:
+def plot_curves(energy: LearntEnergy, test: TouchSolves) -> Figure:
     """Draw the size of the force against depth, lines of the surrogate and dots of finite elements."""
     fig, axes = figure(1, 1, size=(9.4, 3.6))
-    axis, drawn = axes[0, 0], curves(surrogate, test)
-    depth, size = surrogate.depth(test.X), np.linalg.norm(test.force, axis=1)
-    names = [r.name for r in surrogate.inputs[:3]]
+    axis, drawn = axes[0, 0], curves(energy, test)
+    depth, size = energy.depth(test.X), np.linalg.norm(test.force, axis=1)
+    names = [r.name for r in energy.inputs[:3]]
     for curve, style in zip(drawn, series(len(drawn)), strict=True):
         x = test.X[curve.rows[0]]
         place = ", ".join(f"{n} = {1e3 * v:.1f}" for n, v in zip(names, x[:3], strict=True)) + " mm"
-        label = "; ".join(filter(None, (place.replace("-", "−"), further(surrogate, x))))
+        label = "; ".join(filter(None, (place.replace("-", "−"), further(energy, x))))
         axis.plot(1e3 * curve.depth, curve.force, label=label, **style)
         axis.plot(1e3 * depth[curve.rows], size[curve.rows], "o", color=style["color"], markersize=4.5)
     axis.set_xlabel("depth of the probe into the surface at rest / mm")
@@ -260,12 +278,12 @@ def plot_curves(surrogate: TouchSurrogate, test: TouchSolves) -> Figure:
     return fig
 
 
-def plot_errors(surrogate: TouchSurrogate, test: TouchSolves, samples: ForceSamples) -> Figure:
+def plot_errors(energy: LearntEnergy, test: TouchSolves, samples: ForceSamples) -> Figure:
     """Draw one dot per unseen solve, where the probe touches: shallow third, middle, deep third side by side."""
     fig, axes = figure(1, 3, size=(9.4, 3.5), sharex=True, sharey=True)
     fig.set_layout_engine("compressed")
-    view = View.of(surrogate, test.X)
-    places, depth = 1e3 * view.flat(contact_points(surrogate, test.X)), surrogate.depth(test.X)
+    view = View.of(energy, test.X)
+    places, depth = 1e3 * view.flat(contact_points(energy, test.X)), energy.depth(test.X)
     against = np.where(samples.heavy, samples.relative, samples.error / samples.light)
     top = max(float(np.quantile(100 * against, 0.98)), 1e-6)
     rows = np.flatnonzero(samples.heavy)
@@ -298,21 +316,21 @@ def _marks(places: np.ndarray, worst: np.ndarray, some: np.ndarray) -> dict[tupl
     return found
 
 
-def plot_trust(surrogate: TouchSurrogate, test: TouchSolves) -> Figure:
+def plot_trust(energy: LearntEnergy, test: TouchSolves) -> Figure:
     """Draw the deviation of the force at half and at the full depth of the test; hatched where training ended.
 
     Of a family it is that of the body with the deepest touch.
     """
     fig, axes = figure(1, 2, size=(9.4, 3.7), sharex=True, sharey=True)
     fig.set_layout_engine("compressed")
-    view, depth = View.of(surrogate, test.X), surrogate.depth(test.X)
-    touched = view.flat(contact_points(surrogate, test.X[depth > 0]))
+    view, depth = View.of(energy, test.X), energy.depth(test.X)
+    touched = view.flat(contact_points(energy, test.X[depth > 0]))
     low, high = touched.min(axis=0), touched.max(axis=0)
     more = MARGIN * (high - low).max()
     sides = [np.linspace(a - more, b + more, GRID) for a, b in zip(low, high, strict=True)]
     places = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 2)
-    like, full = deepest(surrogate, test.X), 0.98 * float(depth.max())
-    found = [_trusted(surrogate, at_depth(surrogate, view, places, like, s)) for s in (full / 2, full)]
+    like, full = deepest(energy, test.X), 0.98 * float(depth.max())
+    found = [_trusted(energy, at_depth(energy, view, places, like, s)) for s in (full / 2, full)]
     trained = np.concatenate([d[i == 1] for d, i in found])
     top = 2 * float(trained.max()) if trained.size else 1.0  # far outside it grows without bound
     for axis, s, (deviation, inside) in zip(axes[0], (full / 2, full), found, strict=True):
@@ -327,13 +345,13 @@ def plot_trust(surrogate: TouchSurrogate, test: TouchSolves) -> Figure:
     return fig
 
 
-def _trusted(surrogate: TouchSurrogate, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _trusted(energy: LearntEnergy, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the deviation in per cent and whether trained, as grids; not-a-number where no probe can be so deep."""
     there = np.isfinite(X).all(axis=1)
     deviation, inside = np.full(len(X), np.nan), np.full(len(X), np.nan)
     if there.any():
-        inside[there] = surrogate.inside(X[there])
-        deviation[there] = 100 * surrogate.deviation(X[there]) if surrogate.root is not None else 0.0
+        inside[there] = energy.inside(X[there])
+        deviation[there] = 100 * energy.deviation(X[there]) if energy.root is not None else 0.0
     return deviation.reshape(GRID, GRID), inside.reshape(GRID, GRID)
 
 

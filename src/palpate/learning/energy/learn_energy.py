@@ -1,0 +1,210 @@
+"""From solves of a body to its energy: the baseline chosen, the network found, and what it is trusted with."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from palpate.errors import UsageError
+from palpate.format import share
+from palpate.learning.energy.energy_export import export_network, trained_region, training_meta
+from palpate.learning.energy.energy_images import images_of
+from palpate.learning.energy.energy_problem import EnergyProblem
+from palpate.learning.energy.energy_samples import EnergySamples
+from palpate.learning.energy.energy_search import search_energy
+from palpate.learning.energy.trust import trust_of
+from palpate.learning.search import Budget, Candidate, Search, Trial
+from palpate.learning.starts import random_units
+from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction
+from palpate.rbf.symmetric_units import Images
+from palpate.surrogates import Baseline, Continuation, LearntEnergy, Solves
+
+__all__ = ["EnergyHistory", "learn_energy"]
+
+_CHOICE_SHARE = 0.15  # of a limit on time
+_CHOICE_UNITS, _CHOICE_ITERATIONS = 3, 40
+_BETTER = 0.8  # of the error, for another baseline than the one kept in doubt
+_NEARLY = 0.9  # of the wanted depth: depth series are shifted at random and end just before it
+
+
+@dataclass(frozen=True, eq=False)
+class EnergyHistory:
+    """How an energy was found.
+
+    Attributes
+    ----------
+    trials : tuple of Trial
+        All networks that were tried, in order.
+    errors : (N,)
+        Relative force error of each solve in contact when it is left out.
+    loo : float
+        Of the mean of networks chosen: what it misses of solves left out, by closed form and refined again without
+        them, as a geometric mean.
+    meta : mapping
+        What the body's record tells of the training.
+    """
+
+    trials: tuple[Trial, ...]
+    errors: np.ndarray
+    loo: float
+    meta: dict[str, Any]
+
+    def __str__(self) -> str:
+        median, p95 = (share(float(np.quantile(self.errors, q))) for q in (0.5, 0.95))
+        return (
+            f"{self.meta['solves']} solves, {len(self.trials)} networks of the energy tried; a solve left out is "
+            f"missed by {median} of its force (median), {p95} (95th percentile)"
+        )
+
+    __repr__ = __str__
+
+
+def learn_energy(
+    solves: Solves,
+    baseline: Baseline,
+    *,
+    choose: bool = True,
+    units_max: int = 160,
+    networks: int = 12,
+    target: float = 1e-3,
+    effort: float = 1.0,
+    seconds: float | None = None,
+    workers: int | None = None,
+    deepest: float | None = None,
+    form: str = "auto",
+    radial: RadialFunction | Literal["auto"] = "auto",
+    seed: int = 0,
+) -> tuple[LearntEnergy, EnergyHistory]:
+    """Learn the energy of a body from solves.
+
+    Parameters
+    ----------
+    solves : Solves
+        Inputs, energies, forces and stiffnesses, and the body's symmetry.
+    baseline : Baseline
+        What of the energy is known beforehand.
+    choose : bool
+        Whether to choose among the baseline's `candidates`, such as contact laws; False takes it as it is.
+    units_max : int
+        Most units of one network; images count.
+    networks : int
+        How many at most make one energy, as their mean, and no more than 320 units do; one answers faster, several
+        miss less.
+    target : float
+        Leave-one-solve-out error at which no more units are added.
+    effort : float
+        Multiplies the counts of candidates and iterations of the search; 0.1 gives a quick look.
+    seconds : float, optional
+        Limit on time; by default none. A limit that ends the search early makes the result depend on the machine.
+    workers : int, optional
+        Processes that search at a time; one for each core by default, at most eight. The result is the same with any
+        number.
+    deepest : float, optional
+        Depth (m) that the solves were to reach, or that they did reach where they came less far than nine tenths of
+        it: beyond it nothing counts as trained, whatever the ranges say. By default they alone decide.
+    form : str
+        Form of a unit (see `palpate.rbf.unit_forms`), or "auto" to try several.
+    radial : {"gaussian", "inverse-multiquadric", "matern-5/2", "auto"}
+        Radial function of the units, or "auto" to try several.
+    seed : int
+        Decides the starts, and with them the result.
+
+    Returns
+    -------
+    LearntEnergy
+        The energy with its trained region, continuation and posterior.
+    EnergyHistory
+        How it was found.
+
+    Raises
+    ------
+    UsageError
+        If solves, symmetry or options do not fit.
+    """
+    budget = Budget.of(effort, seconds)
+    if not (units_max >= 0 and networks >= 1):
+        raise UsageError(
+            f"units_max={units_max} and networks={networks} allow no learning.", fix="Give positive numbers."
+        )
+    if radial != "auto" and radial not in get_args(RadialFunction):
+        raise UsageError(f"There is no radial function {radial!r}.", fix=f"Choose from {RADIAL_FUNCTIONS}.")
+    samples, images = EnergySamples.of(solves, baseline), images_of(solves, baseline)
+    with threadpool_limits(1):  # small matrices: more BLAS threads cost time and the bits of the result
+        trials: tuple[Trial, ...] = ()
+        if choose and len(baseline.candidates()) > 1:
+            part = budget.part(_CHOICE_SHARE)
+            baseline, trials = _choose_baseline(baseline.candidates(), samples, images, part, seed)
+        ensemble, further = search_energy(
+            _problem(samples, baseline, images),
+            form=form,
+            radial=radial,
+            units_max=units_max,
+            networks=networks,
+            target=target,
+            budget=budget,
+            workers=workers,
+            seed=seed,
+        )
+        trust = trust_of(ensemble, samples)
+    meta = training_meta(samples, ensemble, trust.errors)
+    network, root = export_network(ensemble, trust.root, samples, meta)
+    energy = LearntEnergy(
+        network,
+        baseline,
+        region=trained_region(samples, images),
+        continuation=Continuation.of(
+            solves.inputs,
+            deepest=_reached(samples.depth, deepest),
+            share=baseline.share,
+            felt=len(baseline.directions),
+        ),
+        root=root,
+    )
+    return energy, EnergyHistory((*trials, *further), trust.errors, ensemble.error, meta)
+
+
+def _problem(samples: EnergySamples, baseline: Baseline, images: Images | None) -> EnergyProblem:
+    finest = baseline.finest(samples.inputs)
+    return EnergyProblem(
+        samples.scaled,
+        samples.rows(baseline),
+        images,
+        ridge=baseline.ridge,
+        finest=None if finest is None else finest / samples.half,
+    )
+
+
+def _choose_baseline(
+    candidates: Sequence[Baseline], samples: EnergySamples, images: Images | None, budget: Budget, seed: int
+) -> tuple[Baseline, tuple[Trial, ...]]:
+    """Return the baseline of least leave-one-solve-out error with a network of three units.
+
+    All begin with the same units, and are judged in the same relative errors of energy, force and stiffness. The first
+    is kept unless another misses a fifth less: small networks judge coarsely.
+    """
+    errors: list[float] = []
+    trials: list[Trial] = []
+    for baseline in candidates:
+        problem = _problem(samples, baseline, images)
+        regressors = problem.regressors("rotated", "inverse-multiquadric")
+        count = min(_CHOICE_UNITS, problem.room(regressors))
+        units = random_units(regressors.form, problem.X, count, np.random.default_rng(seed))
+        search = Search(problem, budget)
+        search.try_all([Candidate(regressors, units, f"{baseline}")], budget.count(_CHOICE_ITERATIONS, 10))
+        errors.append(search.best.error)
+        trials += search.trials
+    least = int(np.argmin(errors))
+    return candidates[least if errors[least] < _BETTER * errors[0] else 0], tuple(trials)
+
+
+def _reached(depths: np.ndarray, wanted: float | None) -> float:
+    """Return the depth to which samples at `depths` (N,) teach; spread to the wanted one, they end just before it."""
+    if wanted is None:
+        return math.inf
+    own = float(depths.max())
+    return wanted if _NEARLY * wanted <= own <= wanted else own

@@ -1,0 +1,34 @@
+"""Baselines: what of an energy is known before anything is learnt, one file for each kind of interaction.
+
+baseline            the contract, and the registry by name
+contact_baseline    a sphere that presses a surface
+pad_baseline        a patch or node that is held and displaced
+constant_baseline   a constant, for several loads whose place of rest moves
+"""
+
+from palpate.surrogates.baselines.baseline import (
+    Baseline,
+    Solves,
+    baseline_class,
+    register_baseline,
+    registered_baselines,
+)
+from palpate.surrogates.baselines.constant_baseline import ConstantBaseline
+from palpate.surrogates.baselines.contact_baseline import ContactBaseline, depth_series
+from palpate.surrogates.baselines.pad_baseline import PadBaseline
+from palpate.surrogates.baselines.rest_stiffness import RestStiffness
+from palpate.surrogates.baselines.stiffening import Stiffening
+
+__all__ = [
+    "Baseline",
+    "ConstantBaseline",
+    "ContactBaseline",
+    "PadBaseline",
+    "RestStiffness",
+    "Solves",
+    "Stiffening",
+    "baseline_class",
+    "depth_series",
+    "register_baseline",
+    "registered_baselines",
+]

@@ -1,0 +1,155 @@
+"""Memory: what a body remembers of how it was touched, on top of its energy.
+
+All memories walk one signed amplitude q of the elastic energy, U = ½ q², and its slope ∇q by the place: the energy's
+kernels give both without dividing (`palpate.surrogates.energy_kernels`). A `Memory` is a frozen description that files
+hold; `start` makes the state of a body at rest, and `step` moves the hand and renews the force. Whatever its numbers, a
+memory gives back no more than was put in:
+
+    work of the hand = change of what is stored + what is lost        lost ≥ 0 in every step
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import ClassVar
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.network.codec import register_kind
+from palpate.surrogates.memories.patches import Patches
+
+__all__ = ["Memory", "MemoryState", "amplitudes", "register_memory"]
+
+STORED, LOST, WORK, STEP = range(4)  # places in the ledger
+
+
+class MemoryState(ABC):
+    """The state of a body that remembers; `step` allocates nothing.
+
+    Attributes
+    ----------
+    force : (3,)
+        On the hand, N; overwritten by each step.
+    """
+
+    force: np.ndarray
+    _ledger: np.ndarray
+
+    @property
+    def stored(self) -> float:
+        """Energy V that is stored, J: the most that the body can give back."""
+        return float(self._ledger[STORED])
+
+    @property
+    def lost(self) -> float:
+        """Energy turned into heat since the start, J."""
+        return float(self._ledger[LOST])
+
+    @property
+    def work(self) -> float:
+        """Work of the hand since the start, J: `stored` + `lost`."""
+        return float(self._ledger[WORK])
+
+    @property
+    def lost_in_step(self) -> float:
+        """Energy turned into heat in the last step, J; never negative."""
+        return float(self._ledger[STEP])
+
+    @abstractmethod
+    def reset(self) -> None:
+        """Forget everything: the body is as at the start, and nobody touches it."""
+
+    @abstractmethod
+    def step(self, position: np.ndarray, amplitude: float, slope: np.ndarray, dt: float) -> bool:
+        """Move the hand to a place within dt seconds and renew `force`.
+
+        Parameters
+        ----------
+        position : (3,) float64
+            The place at the end of the step, m.
+        amplitude : float
+            Signed amplitude q there, √J; 0 without contact.
+        slope : (3,) float64
+            Slope ∇q there, √J/m.
+        dt : float
+            Length of the step, s; 0 for an instant.
+
+        Returns
+        -------
+        bool
+            False if a number is not finite, or the amplitude can't be: the force is zero then and nothing has changed.
+        """
+
+
+class Memory(ABC):
+    """The law of a memory, as a value: a frozen dataclass.
+
+    Attributes
+    ----------
+    name : str
+        The name by which files find it.
+    keeps_prints : bool
+        Whether its state has ``now`` (n,), amplitudes of prints at ``points`` (n, 3) of the surface, m.
+    moves_rest : bool
+        Whether the body lies elsewhere after a touch: its state has ``release(dt)``, which returns the amplitude to
+        which a body moves that nobody holds.
+    """
+
+    name: ClassVar[str]
+    keeps_prints: ClassVar[bool] = False
+    moves_rest: ClassVar[bool] = False
+
+    @abstractmethod
+    def start(self) -> MemoryState:
+        """Return the state of a body that nothing has been done to."""
+
+    def spread(self, patches: Patches, spacing: float) -> Memory:
+        """Return the same memory, kept at places of the surface that are `spacing` (m) apart.
+
+        Raises
+        ------
+        UsageError
+            If it has no places, or they do not fit it.
+        """
+        del patches, spacing
+        raise UsageError(
+            f"A memory called {self.name!r} is not kept at places of a surface.",
+            fix="Give it without a spacing.",
+        )
+
+
+def register_memory(cls: type[Memory]) -> type[Memory]:
+    """Make a memory known by its name to files; also a decorator.
+
+    Parameters
+    ----------
+    cls : class
+        A frozen dataclass derived from `Memory`.
+
+    Raises
+    ------
+    UsageError
+        If it is no such class, has no name, or another one has it.
+    """
+    register_kind(Memory, cls)
+    return cls
+
+
+def amplitudes(energy: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return q = √(2U) (N,), √J, and ∇q (N, 3), √J/m, of energies U (N,), J, and their slopes ∇U (N, 3), N.
+
+    Raises
+    ------
+    UsageError
+        If an energy is negative.
+    """
+    U = np.asarray(energy, dtype=float)
+    if (U < 0).any():
+        raise UsageError(
+            f"Sample {int(np.argmax(U < 0))} has a negative energy.",
+            fix="Give energies less those of the body at rest.",
+        )
+    q = np.sqrt(2.0 * U)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return q, np.where(q[:, None] > 0, np.asarray(slope, dtype=float) / q[:, None], 0.0)

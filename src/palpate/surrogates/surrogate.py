@@ -1,0 +1,222 @@
+"""A learnt body: the energy that a hand feels, the fields that an eye sees, and the record of its making, in one value.
+
+This is what `palpate.learn` makes, what a file holds, and what everything downstream takes. What a body can do is asked
+of its parts: `energy.baseline` tells whether a hand presses it or holds it and where it is touched, `fields` what can
+be drawn.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.format import share
+from palpate.network.codec import load_value, save_value
+from palpate.surrogates.energy import LearntEnergy
+from palpate.surrogates.fields import FieldSurrogate
+from palpate.surrogates.memories import Memory, Patches
+from palpate.units import Range, bounds
+
+__all__ = ["KIND", "Surrogate", "correction_count", "correction_warning"]
+
+_SAMPLES = 4096  # of the trained ranges, for a typical press
+KIND = "surrogate"  # what the file's header calls it
+
+
+@dataclass(frozen=True, eq=False)
+class Surrogate:
+    """A learnt body as a value: `save` and `load` give it back bit for bit.
+
+    Attributes
+    ----------
+    energy : LearntEnergy
+        Energy, force and stiffness, and whether they may be trusted.
+    fields : mapping of name to FieldSurrogate
+        What is drawn of it, of the same touched surface and the same inputs; may be empty.
+    memory : Memory, optional
+        What it remembers of how it was touched, in the loop and on the page.
+    meta : mapping
+        JSON-able record: its name, what it was learnt from and how well, what it was corrected with. `__str__` tells of
+        ``solves``, ``samples`` and ``force_error`` (a mapping with ``median`` and ``p95``, relative) where they are
+        there.
+
+    Raises
+    ------
+    UsageError
+        If a field is of another surface or other inputs.
+    """
+
+    energy: LearntEnergy
+    fields: Mapping[str, FieldSurrogate] = field(default_factory=dict)
+    memory: Memory | None = None
+    meta: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "fields", dict(self.fields))
+        names = [(r.name, r.unit) for r in self.inputs]
+        for name, shown in self.fields.items():
+            if not self._touches(shown) or [(r.name, r.unit) for r in shown.inputs] != names:
+                raise UsageError(
+                    f"The field {name!r} is not of the body that is touched.",
+                    why="It has another touched surface, or other inputs.",
+                    fix="Learn energy and fields from the same solves, with the same TouchedSurface.",
+                )
+
+    def _touches(self, shown: FieldSurrogate) -> bool:
+        surface = self.energy.baseline.surface
+        if surface is None or shown.surface is surface:
+            return True
+        own, theirs = surface.arrays(), shown.surface.arrays()
+        return all(np.array_equal(theirs[k], own[k], equal_nan=True) for k in own)
+
+    def __str__(self) -> str:
+        head = f"Surrogate {self.name!r}: {', '.join(str(r) for r in self.inputs)}; {self.made_of}"
+        return "\n".join([head, *(f"  {shown}" for shown in self.fields.values())])
+
+    __repr__ = __str__
+
+    @property
+    def made_of(self) -> str:
+        """Baseline, units, training, correction and memory in words."""
+        return f"{self.energy}{_training(self.meta)}{self._remembers}"
+
+    @property
+    def _remembers(self) -> str:
+        return "" if self.memory is None else f"; {self.memory}"
+
+    @property
+    def name(self) -> str:
+        """The body's name; "body" where its record has none."""
+        return str(self.meta.get("name", "")) or "body"
+
+    @property
+    def inputs(self) -> tuple[Range, ...]:
+        """Names and trained ranges of all inputs: the felt coordinates (m), then the further ones."""
+        return self.energy.inputs
+
+    @property
+    def parameters(self) -> tuple[Range, ...]:
+        """The inputs that the hand does not supply."""
+        return self.energy.parameters
+
+    def with_energy(self, energy: LearntEnergy, meta: Mapping[str, Any] | None = None) -> Surrogate:
+        """Return the same fields with another energy, such as one that measured forces have corrected.
+
+        Where its surface lies higher or lower, the drawn body sinks from there.
+
+        Parameters
+        ----------
+        energy : LearntEnergy
+            Of the same inputs.
+        meta : mapping, optional
+            The new record; the old one by default.
+        """
+        surface, shown = energy.baseline.surface, dict(self.fields)
+        if surface is not None:
+            shown = {k: replace(v, surface=surface) for k, v in shown.items()}
+        return Surrogate(energy, shown, self.memory, self.meta if meta is None else meta)
+
+    def with_memory(self, memory: Memory | None, *, spacing: float | None = None) -> Surrogate:
+        """Return the same body with a memory, in the loop and on the page.
+
+        Parameters
+        ----------
+        memory : Memory, optional
+            A relaxation, of `palpate.learning.relaxation.identify` for example, or an indentation, of
+            `palpate.learning.plastic.learn_indentation`; None for a body that forgets.
+        spacing : float, optional
+            How far apart the places of the surface are that remember, m, a quarter of the probe's radius for example;
+            without it the memory is kept where it says, by default at one place that travels with the probe.
+
+        Raises
+        ------
+        UsageError
+            If the body has no drawn surface to keep a memory on, or the spacing does not fit the memory.
+        """
+        if memory is not None and spacing is not None:
+            memory = memory.spread(self._patches(spacing), spacing)
+        return replace(self, memory=memory)
+
+    def _patches(self, spacing: float) -> Patches:
+        """Return places of the touched surface, of the size that a typical press has."""
+        shown, baseline = next(iter(self.fields.values()), None), self.energy.baseline
+        if shown is None or baseline.surface is None:
+            raise UsageError(
+                "This body has no drawn surface to keep a memory on.",
+                why="Places that remember are laid out over the mesh of a field.",
+                fix="Learn it with its shape, or leave `spacing` out.",
+            )
+        corners = shown.triangles
+        if shown.local_mode is not None:
+            corners = corners[shown.touched[corners].all(axis=1)]
+        depth, energy = self._typical_press()
+        own = baseline.radius_input
+        radius = baseline.radius if own is None else (self.inputs[own].low + self.inputs[own].high) / 2.0
+        width = Patches.width_at(radius, depth)
+        return Patches.over(shown.points, corners, spacing, width=width, energy=energy)
+
+    def _typical_press(self) -> tuple[float, float]:
+        """Return half the deepest trained depth, m, and the energy of a press to about there, J."""
+        low, high = bounds(self.inputs)
+        X = np.random.default_rng(0).uniform(low, high, (_SAMPLES, len(low)))
+        X = X[self.energy.inside(X)]
+        s, deepest = self.energy.depth(X), self.energy.going.deepest
+        depth = (deepest if np.isfinite(deepest) else float(s.max())) / 2.0
+        near = int(np.argmin(np.abs(s - depth)))
+        return depth, float(self.energy.energy(X[near : near + 1])[0])
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write all of it to one file.
+
+        Raises
+        ------
+        UsageError
+            If the file can't be written.
+        """
+        return save_value(path, self, kind=KIND)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Surrogate:
+        """Read it back, bit for bit.
+
+        Raises
+        ------
+        FileFormatError
+            If the file is missing, corrupt, foreign or from a later version, or its parts do not fit.
+        """
+        return load_value(path, cls, kind=KIND, noun="a learnt body")
+
+
+def _training(meta: Mapping[str, Any]) -> str:
+    """Return in words what the record tells of training and correction."""
+    words = ""
+    if "solves" in meta:
+        words += f"; trained with {meta['solves']} solves"
+        if meta.get("samples", meta["solves"]) != meta["solves"]:
+            words += f" ({meta['samples']} samples by symmetry)"
+    error = meta.get("force_error")
+    if isinstance(error, Mapping) and {"median", "p95"} <= error.keys():
+        words += f"; force error {share(error['median'])} median, {share(error['p95'])} p95"
+    if (touches := correction_count(meta)) is not None:
+        words += f"; corrected by {touches} measured touches"
+        words += ", with a warning" if correction_warning(meta) else ""
+    return words
+
+
+def correction_count(meta: Mapping[str, Any]) -> int | None:
+    """Return how many measured touches have corrected a body; None for one as it was learnt."""
+    record = meta.get("correction")
+    counts = record.get("counts") if isinstance(record, Mapping) else None
+    return int(counts.get("learnt", 0)) if isinstance(counts, Mapping) else None
+
+
+def correction_warning(meta: Mapping[str, Any]) -> str:
+    """Return what was suspicious of the measurements that have corrected a body; "" if nothing was."""
+    record = meta.get("correction")
+    return str(record.get("warning", "")) if isinstance(record, Mapping) else ""

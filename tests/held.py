@@ -6,6 +6,7 @@ import numpy as np
 
 from models import linear_network
 from palpate.surrogates import LearntEnergy, PadBaseline, RestStiffness, Stiffening, Surrogate
+from palpate.surrogates.memories import IwanElements
 from palpate.units import Quantity, Range
 
 INPUTS = (
@@ -70,3 +71,17 @@ def pad() -> Surrogate:
 def pad_force(d: np.ndarray, p_x: float = 0.0) -> np.ndarray:
     """F of the pad displaced by d (3,), m, N."""
     return -np.exp(-10.0 * p_x) * PAD_SPRING @ d
+
+
+ROD_SPRING = 100.0  # N/m
+SLIP = 0.2  # √J, at which half of the rod's stiffness begins to slip
+
+
+def yielding_rod() -> Surrogate:
+    """A node that moves up and down on a spring, U = ½ K w²; half of the spring slips without hardening."""
+    inputs = [Range("w", -0.05, 0.05, "m")]
+    network = linear_network(inputs, [Quantity("ln U/U0")], np.zeros((1, 2)))
+    rest = RestStiffness.even(np.array([[ROD_SPRING]]), 0)
+    baseline = PadBaseline(rest, Stiffening.none(1), np.array([[0.0, -1.0, 0.0]]))
+    memory = IwanElements.sliders(np.array([0.5, 0.5]), np.array([np.inf, SLIP]), np.zeros(2))
+    return Surrogate(LearntEnergy(network, baseline), memory=memory, meta={"name": "yielding rod"})

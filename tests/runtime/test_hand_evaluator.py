@@ -9,7 +9,7 @@ from test_process import wait_for, watch
 import pressed
 from allocated import kept_by
 from bent import CREEPS, body
-from held import INPUTS, PAD_SPRING, pad, pad_force
+from held import INPUTS, PAD_SPRING, ROD_SPRING, SLIP, pad, pad_force, yielding_rod
 from models import spring_beam
 from palpate.runtime import LoopProcess, now
 from palpate.runtime.touchable import load_touchable, touchable
@@ -24,6 +24,7 @@ BODIES = {
     "probe": pressed.surrogate,
     "relaxing": lambda: pressed.surrogate(memory=Relaxation(((0.3, 0.05),))),
     "pad": pad,
+    "yielding rod": yielding_rod,
 }
 
 
@@ -83,6 +84,36 @@ def test_a_held_pad_stays_where_it_has_taken_hold():
     np.testing.assert_array_equal(felt(True, -0.015), first)
     assert not felt(False, -0.015).any()
     np.testing.assert_allclose(felt(True, -0.015), pad_force(d, -0.015), rtol=1e-12)
+
+
+def test_a_rod_that_yields_lies_where_nothing_pulls_and_is_taken_hold_of_there():
+    """Drawn to q₀ beyond the slip y and let go, its two springs balance at q = (q₀ − y)/2."""
+    model = touchable(yielding_rod())
+    assert not model.upright
+    answer, none = model.evaluator(), np.zeros(0)
+    answer.elapsed, far = 1e-3, 0.03
+    down = np.array([0.0, -1.0, 0.0])
+
+    def move(w: float | None) -> None:
+        position = np.zeros(3) if w is None else np.array([0.02, 0.0, 0.0]) + w * down
+        answer.place(position, holding=w is not None, believed=True)
+        answer(position, none)
+
+    for w in np.linspace(0.0, far, 31):
+        move(w)
+    root = np.sqrt(ROD_SPRING)
+    np.testing.assert_allclose(answer.force, -0.5 * root * (root * far + SLIP) * down, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(answer.contact, far * down, atol=1e-12)
+    move(None)
+    assert not answer.force.any()
+    lies = (root * far - SLIP) / 2 / root
+    np.testing.assert_allclose(answer.contact, lies * down, atol=1e-9)
+    move(-0.01)  # from elsewhere: no jump, and then a node that moves as the hand does
+    np.testing.assert_allclose(answer.contact, lies * down, atol=1e-9)
+    np.testing.assert_allclose(answer.force, 0.0, atol=1e-9)
+    move(-0.008)
+    np.testing.assert_allclose(answer.contact, (lies + 0.002) * down, atol=1e-9)
+    np.testing.assert_allclose(answer.force, -ROD_SPRING * 0.002 * down, rtol=1e-6, atol=1e-9)
 
 
 def test_a_pad_in_the_real_process(tmp_path):

@@ -25,6 +25,7 @@ __all__ = ["Elastic", "HandEvaluator"]
 
 # slope of d: 1 for a distance, measured 1.0004 at most where five bodies are pressed; behind flat ones it is 6 at s = 0
 _STEEP = 1.2
+_NEWTON, _AT_REST = 12, 1e-12  # steps to a moved rest, and the share of its amplitude to which it is found
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
 
@@ -97,14 +98,14 @@ class HandEvaluator:
     Parameters
     ----------
     elastic : Elastic
+        The answer of the body without a memory.
     memory : optional
         With ``force`` and ``step(position, amplitude, slope, dt)`` as `palpate.surrogates.memories.MemoryState` has
-        them. One with ``release(dt)`` and ``lies`` (3,) says where the body lies that nobody holds; one with ``now``
-        keeps prints.
+        them. One with ``release(dt)`` moves the rest of what nobody holds; one with ``now`` keeps prints.
     holds : bool
         Whether the hand holds a patch or a node, and doesn't move a free probe.
     directions : (k, 3)
-        The felt directions, unit vectors; used by a memory that lets a body lie elsewhere.
+        The felt directions, unit vectors; x, y and z unless given. A memory that moves the rest needs a single one.
     away, normal : (3,)
         See above; outer normal of the surface where a probe usually touches.
     inner : float
@@ -136,7 +137,11 @@ class HandEvaluator:
         self._normal = np.array([0.0, 0.0, 1.0]) if normal is None else normal
         self._inner, self._radius, self._radius_input = inner, radius, radius_input
         self._places, self._taken = places, np.zeros(0)
-        self._stays = memory if hasattr(memory, "release") else None
+        felt = np.eye(3) if directions is None else np.ascontiguousarray(directions, dtype=np.float64)
+        self._stays: Any = None
+        if hasattr(memory, "release"):
+            # an answer that knows itself where it lies, or a place that is sought along the one direction
+            self._stays = memory if hasattr(memory, "lies") else _MovingRest(elastic, memory, felt[0])
         self._prints = memory if hasattr(memory, "now") else None
         self.prints = np.zeros(0) if self._prints is None else self._prints.now
         self.force: np.ndarray = elastic.force if memory is None else memory.force
@@ -144,7 +149,6 @@ class HandEvaluator:
         self.contact: np.ndarray = getattr(elastic, "contact", np.zeros(3))
         self.loads: np.ndarray = getattr(elastic, "loads", np.zeros(0))
         self._grip, self._held = np.zeros(3), False
-        felt = np.eye(3) if directions is None else directions
         self._felt: list[list[float]] = (felt.T @ felt).tolist()
         self.inside, self.mirrored, self.let_go = True, False, False
         self.depth, self.stiffness, self.elapsed = -math.inf, 0.0, 0.0
@@ -182,7 +186,7 @@ class HandEvaluator:
 
     @property
     def grew(self) -> bool:
-        """Whether the last call made a print grow."""
+        """True where the last call made a print grow."""
         return self._prints is not None and self._prints.lost_in_step > 0.0
 
     def __call__(self, position: np.ndarray, parameters: np.ndarray) -> None:
@@ -191,7 +195,7 @@ class HandEvaluator:
         if self._places:
             parameters = self._where_taken(parameters)
         if self._stays is not None and not self._held:
-            good = self._stays.release(self.elapsed)
+            good = self._stays.release(self.elapsed, parameters)
         else:
             elastic(position, parameters)
             amplitude = elastic.amplitude
@@ -202,13 +206,23 @@ class HandEvaluator:
                     elastic.force[:] = 0.0
             good = memory is None or memory.step(position, amplitude, elastic.slope, self.elapsed)
         if self._follows:
-            self.contact[:] = position
+            stays = self._stays
+            self._project(position if stays is None or self._held else stays.lies)
+            if stays is not None:
+                stays.lies[:] = self.contact
         self.mirrored = elastic.mirrored if not self._follows else False
         self.inside = elastic.inside and not self.let_go
         self.depth = 0.0 if self.let_go else elastic.depth
         self.stiffness = _along(elastic.force, elastic.stiffness)
         if not good:
             self.force[:] = math.nan  # the loop makes a fault of it
+
+    def _project(self, position: np.ndarray) -> None:
+        """Take the part of a position along the felt directions as the contact."""
+        x, y, z = position.tolist()
+        for i in range(3):
+            row = self._felt[i]
+            self.contact[i] = row[0] * x + row[1] * y + row[2] * z
 
     def _where_taken(self, parameters: np.ndarray) -> np.ndarray:
         """The further inputs (p,), those of the place as they were when the hand took hold.
@@ -231,6 +245,37 @@ class HandEvaluator:
             self.let_go = True
 
 
+class _MovingRest:
+    """The rest of a node that a memory moves: where the amplitude is that at which nothing pulls.
+
+    Attributes
+    ----------
+    lies : (3,)
+        That place, m.
+    """
+
+    def __init__(self, elastic: Any, memory: Any, direction: np.ndarray) -> None:
+        self._elastic, self._memory, self._direction = elastic, memory, direction.tolist()
+        self.lies = np.zeros(3)
+
+    def release(self, dt: float, parameters: np.ndarray) -> bool:
+        """Let go of the node for dt seconds; find its place by Newton's method, as q grows along the direction."""
+        elastic, lies = self._elastic, self.lies
+        amplitude = self._memory.release(dt)
+        a, b, c = self._direction
+        for _ in range(_NEWTON):
+            elastic(lies, parameters)
+            rise = a * elastic.slope[0] + b * elastic.slope[1] + c * elastic.slope[2]
+            missing = amplitude - elastic.amplitude
+            if abs(missing) <= _AT_REST * abs(amplitude) or rise <= 0.0:
+                break
+            way = missing / rise
+            lies[0] += way * a
+            lies[1] += way * b
+            lies[2] += way * c
+        return math.isfinite(amplitude)
+
+
 @_jit
 def _along(force, stiffness) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
     size, total = 0.0, 0.0
@@ -243,7 +288,7 @@ def _along(force, stiffness) -> float:  # type: ignore[no-untyped-def]  # noqa: 
 
 @_jit
 def _behind(slope, normal) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
-    """Whether d climbs towards the back, and faster than a distance does."""
+    """Return whether d climbs towards the back, and faster than a distance does."""
     square, out = 0.0, 0.0
     for i in range(3):
         square += slope[i] * slope[i]

@@ -43,7 +43,7 @@ class BeamTouchable(Touchable):
 
     @property
     def stays(self) -> bool:
-        """Whether the body lies elsewhere after a touch, so that there is no swing back to rest."""
+        """True for a body that lies elsewhere after a touch, so that there is no swing back to rest."""
         return False
 
     @property
@@ -166,7 +166,7 @@ class _RodAnswer:
         """Lead the node to a position (3,), m, within dt seconds; False if that can't be answered."""
         return self._renewed(self._body.step(position, dt))
 
-    def release(self, dt: float) -> bool:
+    def release(self, dt: float, parameters: np.ndarray) -> bool:
         """Let go of the node for dt seconds."""
         return self._renewed(self._body.release(dt))
 

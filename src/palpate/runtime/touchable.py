@@ -44,9 +44,11 @@ class Touchable:
     Attributes
     ----------
     energy : LearntEnergy
+        What the hand feels: force and stiffness, depth, trained region.
     fields : mapping of name to FieldSurrogate
         What the eye sees; may be empty.
     name : str
+        Of the body, as pages and reports call it.
     memory : Memory, optional
         What it remembers of how it was touched.
     meta : mapping
@@ -66,7 +68,7 @@ class Touchable:
 
     @property
     def inputs(self) -> tuple[Range, ...]:
-        """Names and trained ranges of all inputs: the hand's three coordinates (m), then the further ones."""
+        """Names and trained ranges of all inputs: the felt coordinates (m), then the further ones."""
         return tuple(self.energy.inputs)
 
     @property
@@ -81,24 +83,29 @@ class Touchable:
 
     @property
     def holds(self) -> bool:
-        """Whether the hand holds a patch or a node of the body, and doesn't move a free probe."""
+        """True where the hand holds a patch or a node of the body, and doesn't move a free probe."""
         return bool(self.energy.baseline.holds)
 
     @property
     def upright(self) -> bool:
-        """Whether the body has z up, as solids have; a beam lies in the x–y plane, y up."""
-        return True
+        """True for z up, as solids have it; what is held within the x–y plane, as a beam is, has y up."""
+        return bool(self.energy.baseline.directions[:, 2].any())
 
     @property
     def is_line(self) -> bool:
-        """Whether the body is drawn as a line of nodes, of which a hand holds one."""
+        """True for a body that is drawn as a line of nodes, of which a hand holds one."""
         return False
 
     @property
     def radius_parameter(self) -> int | None:
-        """Which of the further inputs is the probe's radius; None where that is fixed."""
+        """Index of the probe's radius among the further inputs; None where that is fixed."""
         own = self.energy.baseline.radius_input
-        return None if own is None else own - 3
+        return None if own is None else own - self._felt
+
+    @property
+    def _felt(self) -> int:
+        """Number of the inputs that the hand supplies: three, or the directions in which it can move a node."""
+        return len(self.inputs) - len(self.parameters)
 
     @property
     def radius(self) -> float:
@@ -199,8 +206,9 @@ class Touchable:
 
     @cached_property
     def reach(self) -> float:
-        """How far from `home` the hand was in training, m."""
-        return float(np.linalg.norm(self.trained_inputs[:, :3] - self.home, axis=1).max())
+        """Largest distance from `home` to which the hand went in training, m."""
+        places = self.trained_inputs[:, : self._felt]
+        return float(np.linalg.norm(places if self.holds else places - self.home, axis=1).max())
 
     @property
     def indentation(self) -> Any:
@@ -213,7 +221,8 @@ class Touchable:
         if self.holds:
             # lengths among the further inputs of what is held say where it is held
             places = tuple(i for i, r in enumerate(self.parameters) if r.unit == "m")
-            return HandEvaluator(elastic, memory, holds=True, places=places)
+            directions = self.energy.baseline.directions
+            return HandEvaluator(elastic, memory, holds=True, directions=directions, places=places)
         return HandEvaluator(
             elastic,
             memory,

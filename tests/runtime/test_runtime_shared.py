@@ -74,7 +74,7 @@ def test_writer_that_died_writing_is_noticed(shared):
 
 
 def test_state_has_the_records_fields(shared):
-    assert [f.name for f in dataclasses.fields(State)] == [*STATE.names, "prints"]
+    assert [f.name for f in dataclasses.fields(State)] == [*STATE.names, "indentation"]
     state = shared.read_state()
     assert state.tick == 0
     assert state.grabbed is False
@@ -83,17 +83,17 @@ def test_state_has_the_records_fields(shared):
     assert not state.force.any(), "a state is a copy"
 
 
-def test_prints_travel_with_the_state(shared):
-    assert shared.read_state().prints.shape == (0,), "nothing has yielded"
+def test_indentations_travel_with_the_state(shared):
+    assert shared.read_state().indentation.shape == (0,), "nothing has yielded"
     loop = Shared.attach(shared.name)
     for amplitude in (np.array([0.5]), np.linspace(0, 1, MAX_PLACES)):
-        loop.prints.record["count"] = len(amplitude)
-        loop.prints.record["amplitude"][: len(amplitude)] = amplitude
-        loop.prints.publish(size_of(loop.prints.record))
-        kept = shared.read_state().prints
+        loop.indentation.record["count"] = len(amplitude)
+        loop.indentation.record["amplitude"][: len(amplitude)] = amplitude
+        loop.indentation.publish(size_of(loop.indentation.record))
+        kept = shared.read_state().indentation
         np.testing.assert_array_equal(kept, amplitude.astype("f4"))
-    loop.prints._sequence[()] += 1  # died writing: those before it stand
-    np.testing.assert_array_equal(shared.read_state().prints, kept)
+    loop.indentation._sequence[()] += 1  # died writing: those before it stand
+    np.testing.assert_array_equal(shared.read_state().indentation, kept)
     loop.close()
 
 

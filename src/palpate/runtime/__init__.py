@@ -1,6 +1,6 @@
 """In the hand: a real-time process that reads a device, evaluates the learnt body and sends a force back.
 
-    shared_state, publisher           state and prints out, commands in, through shared memory
+    shared_state, publisher           state and indentation out, commands in, through shared memory
     process, child                    LoopProcess: the parent's handle, and the process behind it
     loop                              one tick, as a list of stages
     realtime, loop_report             punctuality, and how well it was kept

@@ -92,7 +92,7 @@ class HandEvaluator:
         Since the call before, s, to be set ahead of each call where the body has a memory.
     away : (3,)
         Where a probe or a patch is that nobody holds, m.
-    prints : (n,)
+    indentation : (n,)
         Amplitude of the print at each place that keeps one, √J; empty for a body that keeps none.
 
     Parameters
@@ -101,7 +101,7 @@ class HandEvaluator:
         The answer of the body without a memory.
     memory : optional
         With ``force`` and ``step(position, amplitude, slope, dt)`` as `palpate.surrogates.memories.MemoryState` has
-        them. One with ``release(dt)`` moves the rest of what nobody holds; one with ``now`` keeps prints.
+        them. One with ``release(dt)`` moves the rest of what nobody holds; one with ``now`` keeps indentations.
     holds : bool
         Whether the hand holds a patch or a node, and doesn't move a free probe.
     directions : (k, 3)
@@ -142,8 +142,8 @@ class HandEvaluator:
         if hasattr(memory, "release"):
             # an answer that knows itself where it lies, or a place that is sought along the one direction
             self._stays = memory if hasattr(memory, "lies") else _MovingRest(elastic, memory, felt[0])
-        self._prints = memory if hasattr(memory, "now") else None
-        self.prints = np.zeros(0) if self._prints is None else self._prints.now
+        self._indentation = memory if hasattr(memory, "now") else None
+        self.indentation = np.zeros(0) if self._indentation is None else self._indentation.now
         self.force: np.ndarray = elastic.force if memory is None else memory.force
         self._follows = not hasattr(elastic, "contact")
         self.contact: np.ndarray = getattr(elastic, "contact", np.zeros(3))
@@ -186,8 +186,8 @@ class HandEvaluator:
 
     @property
     def grew(self) -> bool:
-        """True where the last call made a print grow."""
-        return self._prints is not None and self._prints.lost_in_step > 0.0
+        """True where the last call made an indentation grow."""
+        return self._indentation is not None and self._indentation.lost_in_step > 0.0
 
     def __call__(self, position: np.ndarray, parameters: np.ndarray) -> None:
         """Renew the attributes for a probe or a held place at `position` (3,), m, and the further inputs (p,)."""

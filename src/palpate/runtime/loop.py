@@ -71,8 +71,8 @@ class Loop:
     Raises
     ------
     UsageError
-        If the model has more inputs or keeps prints at more places than the shared memory carries, or the rate is out
-        of range.
+        If the model has more inputs, or keeps indentations at more places, than the shared memory carries, or the
+        rate is out of range.
     """
 
     def __init__(
@@ -97,9 +97,10 @@ class Loop:
                 fix="Learn it with fewer inputs.",
             )
         self.period = 1.0 / rate
-        if len(self.evaluator.prints) > MAX_PLACES:
+        if len(self.evaluator.indentation) > MAX_PLACES:
             raise UsageError(
-                f"The body keeps prints at {len(self.evaluator.prints)} places; the runtime carries {MAX_PLACES}.",
+                f"The body keeps indentations at {len(self.evaluator.indentation)} places; "
+                f"the runtime carries {MAX_PLACES}.",
                 fix="Save it with a larger spacing.",
             )
         self.out = Publisher(shared, len(self.evaluator.loads))

@@ -209,7 +209,7 @@ class LoopProcess:
         try:
             return self.shared.read_state()
         except DeviceError:  # killed while publishing
-            return State.of(self.shared.state.record, self.shared.prints.record)
+            return State.of(self.shared.state.record, self.shared.indentation.record)
 
     def report(self) -> LoopReport:
         """Return the report of the loop, so far or in all; what the system granted is known once it has stopped."""

@@ -1,4 +1,4 @@
-"""The loop's side of state and prints: the records are filled through views made once, then published."""
+"""The loop's side of state and indentations: the records are filled through views made once, then published."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ _EVERY = 100  # ticks between two updates of the rate: 10 Hz is what an eye can 
 
 
 class Publisher:
-    """Fills and publishes state and prints; the stages write to its views `hand`, `position` and `force` (3,)."""
+    """Fills and publishes state and indentations; the stages write to its views `hand`, `position` and `force` (3,)."""
 
     def __init__(self, shared: Shared, inputs: int) -> None:
         self._block, record = shared.state, shared.state.record
-        self._prints, self._amplitude = shared.prints, shared.prints.record["amplitude"]
+        self._indentation, self._amplitude = shared.indentation, shared.indentation.record["amplitude"]
         self._record = record
         self.hand, self.position, self.force = record["hand"], record["position"], record["force"]
         self._contact, self._loads = record["contact"], record["loads"][:inputs]
@@ -46,16 +46,16 @@ class Publisher:
         self._grabbed[()], self._stalled[()] = holding, late
 
     def answer(self, answer: HandEvaluator) -> None:
-        """Take over the learnt body's answer, and publish its prints where one has grown."""
+        """Take over the learnt body's answer, and publish its indentations where one has grown."""
         self._contact[:] = answer.contact
         self._loads[:] = answer.loads
         self._inside[()], self._mirrored[()] = answer.inside, answer.mirrored
         self._depth[()], self._stiffness[()], self._let_go[()] = answer.depth, answer.stiffness, answer.let_go
         if answer.grew:
-            count = len(answer.prints)
-            self._prints.record["count"] = count
-            self._amplitude[:count] = answer.prints
-            self._prints.publish(size_of(self._prints.record))
+            count = len(answer.indentation)
+            self._indentation.record["count"] = count
+            self._amplitude[:count] = answer.indentation
+            self._indentation.publish(size_of(self._indentation.record))
 
     def clamped(self, acted: bool) -> None:
         """Take over whether the force limit acted, and count it."""

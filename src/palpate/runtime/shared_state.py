@@ -1,8 +1,8 @@
-"""The memory that the real-time process shares with everyone else: state and prints out, commands in.
+"""The memory that the real-time process shares with everyone else: state and indentation out, commands in.
 
-Three records are shared: `STATE` is one tick of the loop, `PRINTS` the prints that stay on a body which yields, and
-`COMMAND` what the loop is asked to do. All of them live in one memory-mapped file, whose path is
-its name, each behind a sequence lock (`network.shared_memory`).
+Three records are shared: `STATE` is one tick of the loop, `INDENTATION` what stays pressed in a body that yields, and
+`COMMAND` what the loop is asked to do. All of them live in one memory-mapped file, whose path is its name, each behind
+a sequence lock (`network.shared_memory`).
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from palpate.runtime.loop_report import BINS, percentile
 
 __all__ = [
     "COMMAND",
+    "INDENTATION",
     "MAX_INPUTS",
     "MAX_PLACES",
-    "PRINTS",
     "STATE",
     "Block",
     "Shared",
@@ -75,7 +75,7 @@ STATE = np.dtype(
     align=True,
 )
 
-PRINTS = np.dtype(
+INDENTATION = np.dtype(
     [
         ("count", "i8"),  # places that keep a print; 0 where nothing has yielded
         ("amplitude", "f4", MAX_PLACES),  # √J, of the print at each
@@ -134,7 +134,7 @@ class State:
     max_force: float
     histogram: np.ndarray
     work_histogram: np.ndarray
-    prints: np.ndarray  # (n,) √J, of the print at each place; empty where nothing has yielded
+    indentation: np.ndarray  # (n,) √J, of the indentation at each place; empty where nothing has yielded
 
     @property
     def lateness_p50(self) -> float:
@@ -165,34 +165,36 @@ class State:
         return percentile(self.work_histogram, 0.99)
 
     @classmethod
-    def of(cls, record: np.ndarray, prints: np.ndarray) -> State:
-        """Copy records of dtype `STATE` and `PRINTS`, shape ()."""
+    def of(cls, record: np.ndarray, indentation: np.ndarray) -> State:
+        """Copy records of dtype `STATE` and `INDENTATION`, shape ()."""
         flags = {"mirrored", "inside", "let_go", "clamped", "grabbed", "stalled"}
         values: dict[str, Any] = {}
         for name in STATE.names or ():
             value = record[name]
             values[name] = value.copy() if value.ndim else bool(value) if name in flags else value.item()
-        return cls(**values, prints=prints["amplitude"][: prints["count"]].astype(float))
+        return cls(**values, indentation=indentation["amplitude"][: indentation["count"]].astype(float))
 
 
-def size_of(prints: np.ndarray) -> int:
-    """Return the bytes of a record of dtype `PRINTS` that hold something."""
-    return int(PRINTS.fields["amplitude"][1] + 4 * prints["count"])  # type: ignore[index]
+def size_of(indentation: np.ndarray) -> int:
+    """Return the bytes of a record of dtype `INDENTATION` that hold something."""
+    return int(INDENTATION.fields["amplitude"][1] + 4 * indentation["count"])  # type: ignore[index]
 
 
 now = time.perf_counter  # s; monotonic and the same for every process of the machine
 
 _PAGE = 4096
-_PRINTS = 3 * _PAGE  # behind header, state and command
-_SIZE = _PRINTS + -(-(PRINTS.itemsize + Block.HEADER) // _PAGE) * _PAGE
-_MAGIC = b"palpate runtime %08x\n" % zlib.crc32(repr((STATE.descr, COMMAND.descr, PRINTS.descr)).encode())
+_INDENTATION_AT = 3 * _PAGE  # behind header, state and command
+_SIZE = _INDENTATION_AT + -(-(INDENTATION.itemsize + Block.HEADER) // _PAGE) * _PAGE
+_MAGIC = b"palpate runtime %08x\n" % zlib.crc32(
+    repr((STATE.descr, COMMAND.descr, INDENTATION.descr)).encode()
+)
 
 
 class Shared:
-    """The blocks of state, prints and commands under one name.
+    """The blocks of state, indentation and commands under one name.
 
     `create` makes them (the parent: viewer or command line), `attach` joins them (the loop). The loop writes
-    `state` and `prints` and reads `command`; everybody else calls `read_state` and `write_command`.
+    `state` and `indentation` and reads `command`; everybody else calls `read_state` and `write_command`.
     """
 
     def __init__(self, name: str, memory: mmap.mmap) -> None:
@@ -201,8 +203,8 @@ class Shared:
         self._lock = threading.Lock()
         view = memoryview(memory)
         self.state = Block(view[_PAGE : 2 * _PAGE], STATE)
-        self.command = Block(view[2 * _PAGE : _PRINTS], COMMAND)
-        self.prints = Block(view[_PRINTS:], PRINTS)
+        self.command = Block(view[2 * _PAGE : _INDENTATION_AT], COMMAND)
+        self.indentation = Block(view[_INDENTATION_AT:], INDENTATION)
         view.release()
 
     @classmethod
@@ -226,7 +228,7 @@ class Shared:
         shared.command.record["parameters"] = np.nan
         shared.command.publish()
         shared.state.publish()
-        shared.prints.publish()
+        shared.indentation.publish()
         return shared
 
     @classmethod
@@ -278,8 +280,8 @@ class Shared:
                         fix="Start it again.",
                     )
                 time.sleep(0)
-            self.prints.fetch()  # in the midst of a write those before it stand
-            return State.of(self.state.record, self.prints.record)
+            self.indentation.fetch()  # in the midst of a write those before it stand
+            return State.of(self.state.record, self.indentation.record)
 
     def write_command(
         self,
@@ -334,7 +336,7 @@ class Shared:
         """Unmap; the name stays for others. Harmless when repeated."""
         self.state.release()
         self.command.release()
-        self.prints.release()
+        self.indentation.release()
         self._map.close()
 
     def unlink(self) -> None:

@@ -212,7 +212,7 @@ class Touchable:
 
     @property
     def indentation(self) -> Any:
-        """The law of the prints that it keeps; None for a body that keeps none."""
+        """The memory of its indentation; None for a body that keeps none."""
         return self.memory if self.memory is not None and self.memory.keeps_prints else None
 
     def evaluator(self) -> HandEvaluator:

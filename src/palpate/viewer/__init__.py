@@ -5,7 +5,7 @@
 `session`          the pages of one server: credits, frames, heartbeats
 `hand_lock`        which of several pages holds the hand
 `page_model`       a touchable body as its pages see it; drawn as a line
-`surface_drawing`  drawn as a surface; `surfaces`: its mesh; `prints`: what stays on it
+`surface_drawing`  drawn as a surface; `surfaces`: its mesh; `indentation_drawing`: what stays on it
 `messages`         every message between server and page, as dataclasses that generate the TypeScript
 `wire`             how those dataclasses become bytes; `typescript`: how they become TypeScript
 `body_viewer`      `show` and `BodyViewer`: the page of a solved body

@@ -110,7 +110,7 @@ class Frame(Binary):
     parameters: Annotated[np.ndarray, Wire("floats", "current values of the parameters")]
     contact: Annotated[
         Vec3,
-        Wire("vec3", "m, where a line's node is, as an offset from rest; else the foot of the touch at rest"),
+        Wire("vec3", "m, where a line's node is, as an offset from rest; else the contact point at rest"),
     ]
     normal: Annotated[Vec3, Wire("vec3", "of the surface there; zero where nothing touches")]
     depth: Annotated[
@@ -128,9 +128,9 @@ class Frame(Binary):
     coefficients: Annotated[
         np.ndarray, Wire("floats", "for each field its modes' coefficients and its local mode's profile")
     ]
-    prints: Annotated[
+    indentation: Annotated[
         np.ndarray,
-        Wire("floats", "m, how deep it stays pressed at each of Surface.printable; empty if nowhere"),
+        Wire("floats", "m, how deep it stays pressed at each of Surface.yielding; empty if nowhere"),
     ]
 
 
@@ -168,8 +168,8 @@ class Surface(Binary):
     creases: Annotated[np.ndarray, Wire("floats", "two points for each sharp edge")]
     fixed: Annotated[np.ndarray, Wire("floats", "two points for each edge around the fixed surfaces")]
     touchable: Annotated[np.ndarray, Wire("floats", "1 for each triangle that a hand may touch, else 0")]
-    printable: Annotated[
-        np.ndarray, Wire("floats", "points that keep prints; none where the body keeps none")
+    yielding: Annotated[
+        np.ndarray, Wire("floats", "points that keep indentations; none where the body keeps none")
     ]
     normals: Annotated[np.ndarray, Wire("floats", "outward unit normal of each of them")]
 
@@ -196,8 +196,8 @@ class Modes(Binary):
 
     KIND: ClassVar[int] = 6
 
-    reach: Annotated[float, Wire("f32", "m, of the local mode from its foot; 0 for none")]
-    rows: Annotated[int, Wire("u16", "splines of the distance from the foot; 0 for none")]
+    reach: Annotated[float, Wire("f32", "m, of the local mode from the contact point; 0 for none")]
+    rows: Annotated[int, Wire("u16", "splines of the distance from the contact point; 0 for none")]
     rest: Annotated[np.ndarray, Wire("floats", "components of each point")]
     modes: Annotated[np.ndarray, Wire("floats", "the same of each mode")]
     touched: Annotated[np.ndarray, Wire("floats", "points that the local mode may move")]
@@ -278,7 +278,7 @@ class Hello(Json):
     fields : quantities to colour by
         The first moves the surface where it has three components; none where the file holds no field.
     remembers : str
-        How the force relaxes, or prints stay, in words; empty where neither does.
+        How the force relaxes, or indentations stay, in words; empty where neither does.
     scale : float
         Body metres per metre of hand.
     workspace : float

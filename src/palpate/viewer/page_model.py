@@ -16,8 +16,8 @@ from palpate.runtime.safety import Fault
 from palpate.runtime.shared_state import State, now
 from palpate.runtime.touchable import Touchable
 from palpate.units import Range, bounds
+from palpate.viewer.indentation_drawing import yielding_in_words
 from palpate.viewer.messages import PROTOCOL, Frame, Hello, Line, Modes, RangeInfo, Surface, Vec3
-from palpate.viewer.prints import yielding_in_words
 from palpate.viewer.surface_drawing import SurfaceDrawing
 
 __all__ = ["LineDrawing", "PageModel", "swing", "vector"]
@@ -33,7 +33,7 @@ _NO_TOUCH: dict[str, Any] = {
     "drawn": 0.0,
     "displacement": np.zeros(0),
     "coefficients": np.zeros(0),
-    "prints": np.zeros(0),
+    "indentation": np.zeros(0),
 }
 
 

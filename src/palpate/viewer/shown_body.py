@@ -127,7 +127,7 @@ class ShownBody:
             creases=parts.creases.ravel(),
             fixed=parts.fixed.ravel(),
             touchable=np.zeros(0),
-            printable=np.zeros(0),
+            yielding=np.zeros(0),
             normals=np.zeros(0),
         )
 

@@ -16,8 +16,8 @@ import numpy as np
 from palpate.runtime.shared_state import State, now
 from palpate.runtime.touchable import Touchable
 from palpate.surrogates import FieldSurrogate
+from palpate.viewer.indentation_drawing import IndentationDrawing
 from palpate.viewer.messages import FieldInfo, Modes, Surface
-from palpate.viewer.prints import Prints
 from palpate.viewer.surfaces import relief, split, touchable_triangles
 
 __all__ = ["SurfaceDrawing"]
@@ -45,14 +45,14 @@ class SurfaceDrawing:
     def __init__(self, body: Touchable) -> None:
         self.body = body
         self.fields = _shown(body.fields)
-        self.surface, self.nodes, self._prints = self._at_rest()
+        self.surface, self.nodes, self._indentation = self._at_rest()
         self._evaluators = [field.evaluator() for field in self.fields]
         self._judge = body.energy.evaluator()
         self.infos = tuple(self._info(field) for field in self.fields)
         self._last, self._depth, self._released = body.home, 0.0, -math.inf
         self._normal = body.normal
 
-    def _at_rest(self) -> tuple[Surface, np.ndarray, Prints | None]:
+    def _at_rest(self) -> tuple[Surface, np.ndarray, IndentationDrawing | None]:
         if self.fields:
             points, triangles = self.fields[0].points, self.fields[0].triangles
             mark = touchable_triangles(self.body, self.fields[0])
@@ -60,24 +60,24 @@ class SurfaceDrawing:
             points, triangles = relief(self.body)
             mark = np.ones(len(triangles), bool)
         parts = split(points, triangles, np.zeros(len(triangles), bool))
-        printable = np.zeros(0, dtype=int)
-        if self._keeps_prints:  # on both sides of a sharp edge, or it would tear
-            printable = np.flatnonzero(np.isin(parts.nodes, parts.nodes[parts.triangles[mark > 0]]))
-        prints = Prints(self.body, points[parts.nodes[printable]]) if len(printable) else None
+        yielding = np.zeros(0, dtype=int)
+        if self._keeps_indentation:  # on both sides of a sharp edge, or it would tear
+            yielding = np.flatnonzero(np.isin(parts.nodes, parts.nodes[parts.triangles[mark > 0]]))
+        indentation = IndentationDrawing(self.body, points[parts.nodes[yielding]]) if len(yielding) else None
         surface = Surface(
             rest=points[parts.nodes].ravel(),
             triangles=parts.triangles.ravel(),
             creases=parts.creases.ravel(),
             fixed=np.zeros(0),
             touchable=mark,
-            printable=printable,
-            normals=np.zeros(0) if prints is None else prints.normals.ravel(),
+            yielding=yielding,
+            normals=np.zeros(0) if indentation is None else indentation.normals.ravel(),
         )
-        return surface, parts.nodes, prints
+        return surface, parts.nodes, indentation
 
     @property
-    def _keeps_prints(self) -> bool:
-        """True where prints stand at places; one that moves with the probe is nowhere when that is gone."""
+    def _keeps_indentation(self) -> bool:
+        """True where indentations stand at places; one that moves with the probe is nowhere when that is gone."""
         return self.body.indentation is not None and len(self.body.indentation.points) > 1
 
     def modes(self, index: int) -> Modes:
@@ -92,7 +92,7 @@ class SurfaceDrawing:
         )
 
     def frame(self, state: State, held: bool, parameters: np.ndarray) -> dict[str, Any]:
-        """Return the touch's part of a frame: the fields of `Frame` from `contact` to `prints`.
+        """Return the touch's part of a frame: the fields of `Frame` from `contact` to `indentation`.
 
         Parameters
         ----------
@@ -113,24 +113,24 @@ class SurfaceDrawing:
                 "contact": tuple(place.tolist()),
                 "normal": tuple(normal.tolist()),
             }
-        foot, coefficients = self._coefficients(
+        place, coefficients = self._coefficients(
             self._pressed(state) if touched else self._withdrawn(), parameters
         )
-        prints = np.zeros(0)
-        if self._prints is not None:
-            prints = self._prints.depths(state.prints)
-            coefficients *= 0.0 if foot is None else self._prints.elastic(foot, state.prints)
-        if foot is None:
-            return {"deviation": deviation, "coefficients": coefficients, "prints": prints}
+        indentation = np.zeros(0)
+        if self._indentation is not None:
+            indentation = self._indentation.depths(state.indentation)
+            coefficients *= 0.0 if place is None else self._indentation.elastic(place, state.indentation)
+        if place is None:
+            return {"deviation": deviation, "coefficients": coefficients, "indentation": indentation}
         if touched:
-            self._normal = foot[5:8].copy()
+            self._normal = place[5:8].copy()
         return {
             "deviation": deviation,
-            "drawn": float(foot[0]),
-            "contact": tuple(foot[2:5].tolist()),
-            "normal": tuple(foot[5:8].tolist()),
+            "drawn": float(place[0]),
+            "contact": tuple(place[2:5].tolist()),
+            "normal": tuple(place[5:8].tolist()),
             "coefficients": coefficients,
-            "prints": prints,
+            "indentation": indentation,
         }
 
     def _pressed(self, state: State) -> np.ndarray:
@@ -147,15 +147,15 @@ class SurfaceDrawing:
     def _coefficients(
         self, centre: np.ndarray, parameters: np.ndarray
     ) -> tuple[np.ndarray | None, np.ndarray]:
-        """Depth, growth, foot and normal (8,) where there is contact, and what the page sums each field up from."""
-        foot, parts = None, []
+        """Depth, growth, place and normal (8,) where there is contact, and what the page sums each field up from."""
+        place, parts = None, []
         for evaluator, field in zip(self._evaluators, self.fields, strict=True):
             if evaluator(centre, parameters):
-                foot = evaluator.place
+                place = evaluator.place
             parts.append(evaluator.coefficients)
             if field.local_mode is not None:
                 parts.append(evaluator.profile().ravel())
-        return foot, np.concatenate(parts) if parts else np.zeros(0)
+        return place, np.concatenate(parts) if parts else np.zeros(0)
 
     def _info(self, field: FieldSurrogate) -> FieldInfo:
         """Its range over the deepest trained touches, from zero where the values allow."""

@@ -2,7 +2,7 @@
 
 import type { Arrow } from "./arrow";
 import type { Connection } from "./connection";
-import { Field, Prints } from "./field";
+import { Field, Indentation } from "./field";
 import { PullHand } from "./hand";
 import type { Hand } from "./hand";
 import { choices, largest, legend, shares } from "./legend";
@@ -73,7 +73,7 @@ class PressedBody implements Body {
   readonly hand: PressHand;
   view: PressView | null = null;
   private fields: Field[] = [];
-  private prints: Prints | null = null;
+  private indentation: Indentation | null = null;
   private still = new Float32Array();
   private chosen = 0;
   private latest: Frame | null = null;
@@ -96,7 +96,7 @@ class PressedBody implements Body {
     const modes = await Promise.all(infos.map(async (_, i) => decodeModes(await get(`fields/${i}`))));
     this.fields = infos.map((info, i) => new Field(info, modes[i]!, surface.rest));
     this.still = new Float32Array(surface.rest.length);
-    this.prints = new Prints(surface);
+    this.indentation = new Indentation(surface);
     choices(infos, (index) => {
       this.chosen = index;
       legend(this.info);
@@ -144,7 +144,7 @@ class PressedBody implements Body {
     const first = fields[0];
     if (first?.info.components !== 3) this.still.fill(0);
     const moved = first?.info.components === 3 ? first.values : this.still;
-    this.prints?.into(moved, latest.prints);
+    this.indentation?.into(moved, latest.indentation);
     const values = fields[this.chosen]?.sizes() ?? this.still;
     const colours = info ? shares(info, values) : plain(this.still.length);
     document.documentElement.dataset["summed"] = String(performance.now() - began); // ms

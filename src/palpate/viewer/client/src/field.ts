@@ -75,12 +75,12 @@ export class Field {
   }
 }
 
-/** What stays pressed in a body that yields: depths along the normals of those points that may keep a print. */
-export class Prints {
+/** What stays pressed in a body that yields: depths along the normals of those points that may keep an indentation. */
+export class Indentation {
   private readonly points: Int32Array;
 
   constructor(private readonly surface: Surface) {
-    this.points = Int32Array.from(surface.printable);
+    this.points = Int32Array.from(surface.yielding);
   }
 
   /** Press displacements (x y z of each point, m) down by the depths (m) of a picture; empty where nothing stays. */

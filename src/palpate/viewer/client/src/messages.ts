@@ -150,7 +150,7 @@ export interface Frame {
   grabbed: boolean;
   /** the input is older than the loop allows */
   stalled: boolean;
-  /** m, where a line's node is, as an offset from rest; else the foot of the touch at rest */
+  /** m, where a line's node is, as an offset from rest; else the contact point at rest */
   contact: Vec3;
   /** of the surface there; zero where nothing touches */
   normal: Vec3;
@@ -168,8 +168,8 @@ export interface Frame {
   displacement: Float32Array;
   /** for each field its modes' coefficients and its local mode's profile */
   coefficients: Float32Array;
-  /** m, how deep it stays pressed at each of Surface.printable; empty if nowhere */
-  prints: Float32Array;
+  /** m, how deep it stays pressed at each of Surface.yielding; empty if nowhere */
+  indentation: Float32Array;
 }
 
 const FRAME_LAYOUT: Layout = [
@@ -202,7 +202,7 @@ const FRAME_LAYOUT: Layout = [
   ["parameters", "floats"],
   ["displacement", "floats"],
   ["coefficients", "floats"],
-  ["prints", "floats"],
+  ["indentation", "floats"],
 ];
 
 export const encodeFrame = (m: Frame): ArrayBuffer => encode(FRAME, FRAME_LAYOUT, m);
@@ -267,8 +267,8 @@ export interface Surface {
   fixed: Float32Array;
   /** 1 for each triangle that a hand may touch, else 0 */
   touchable: Float32Array;
-  /** points that keep prints; none where the body keeps none */
-  printable: Float32Array;
+  /** points that keep indentations; none where the body keeps none */
+  yielding: Float32Array;
   /** outward unit normal of each of them */
   normals: Float32Array;
 }
@@ -279,7 +279,7 @@ const SURFACE_LAYOUT: Layout = [
   ["creases", "floats"],
   ["fixed", "floats"],
   ["touchable", "floats"],
-  ["printable", "floats"],
+  ["yielding", "floats"],
   ["normals", "floats"],
 ];
 
@@ -320,9 +320,9 @@ export const MODES = 6;
 
 /** A field on a Surface's points, server to page: rest + coefficients · modes + the local mode of a profile. */
 export interface Modes {
-  /** m, of the local mode from its foot; 0 for none */
+  /** m, of the local mode from the contact point; 0 for none */
   reach: number;
-  /** splines of the distance from the foot; 0 for none */
+  /** splines of the distance from the contact point; 0 for none */
   rows: number;
   /** components of each point */
   rest: Float32Array;

@@ -132,7 +132,7 @@ function label(view: NonNullable<Body["view"]>, frame: Frame): void {
 /** True where two frames look different: a body at rest is not drawn again. */
 function changed(a: Frame, b: Frame | null): boolean {
   if (!b || a.grabbed !== b.grabbed) return true;
-  const parts = ["displacement", "coefficients", "prints", "contact", "force", "position", "parameters"] as const;
+  const parts = ["displacement", "coefficients", "indentation", "contact", "force", "position", "parameters"] as const;
   return parts.some((name) => {
     const [p, q]: ArrayLike<number>[] = [a[name], b[name]];
     return p!.length !== q!.length || Array.from(p!).some((x, i) => Math.abs(x - q![i]!) > SAME);

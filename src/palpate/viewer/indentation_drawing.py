@@ -1,10 +1,9 @@
-"""Prints as they are drawn: how deep a ball would rest on the body without a force, at each point of its skin.
+"""Indentations as they are drawn: how deep a ball would rest on the body without a force, at each point of its surface.
 
 At a point x of the touched surface with the normal n the places' amplitudes meet as p = Σ w_j(x) p_j, as they do under
-a probe (`palpate.surrogates.memories.indentation`), and the print's depth s is where the elastic amplitude √(2U) of a
-ball at x + (R − s) n is p: there the force vanishes. Around a ball at a depth d beyond that, print and the share
-1 − s/d of the
-elastic shape are drawn, which together touch it.
+a probe (`palpate.surrogates.memories.indentation`), and the depth s of the indentation is where the elastic amplitude
+√(2U) of a ball at x + (R − s) n is p: there the force vanishes. Around a ball at a depth d beyond that, the indentation
+and the share 1 − s/d of the elastic shape are drawn, which together touch it.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ import numpy as np
 
 from palpate.runtime.touchable import Touchable
 
-__all__ = ["Prints", "yielding_in_words"]
+__all__ = ["IndentationDrawing", "yielding_in_words"]
 
 LEVELS = 33  # depths at which amplitudes are tabulated
 BEYOND = 1.5  # the last one, over the deepest trained depth
@@ -24,21 +23,21 @@ class _Depths:
     """Depths at which an elastic body has given amplitudes; its further inputs stand in the middle of their ranges."""
 
     def __init__(self, body: Touchable) -> None:
-        self._touch, self._radius = body.energy, body.radius
+        self._energy, self._radius = body.energy, body.radius
         self._further = np.array([(r.low + r.high) / 2.0 for r in body.parameters])
         # denser towards the surface, where the amplitude rises as a power of the depth
         self._levels = BEYOND * body.deepest * np.linspace(0.0, 1.0, LEVELS) ** 2
 
-    def table(self, feet: np.ndarray, normals: np.ndarray) -> np.ndarray:
-        """√(2U) (m, LEVELS) above feet (m, 3) with their normals (m, 3), rising with the depth."""
+    def table(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """Return √(2U) (m, LEVELS) above points (m, 3) with their normals (m, 3), rising with the depth."""
         out = self._radius - self._levels
-        centres = (feet[:, None] + out[:, None] * normals[:, None]).reshape(-1, 3)
+        centres = (points[:, None] + out[:, None] * normals[:, None]).reshape(-1, 3)
         X = np.hstack([centres, np.tile(self._further, (len(centres), 1))])
-        found = np.sqrt(2.0 * np.maximum(self._touch.energy(X), 0.0)).reshape(-1, LEVELS)
-        return np.asarray(np.maximum.accumulate(found, axis=1))
+        amplitude = np.sqrt(2.0 * np.maximum(self._energy.energy(X), 0.0)).reshape(-1, LEVELS)
+        return np.asarray(np.maximum.accumulate(amplitude, axis=1))
 
-    def of(self, amplitude: np.ndarray, table: np.ndarray) -> np.ndarray:
-        """Depths (m,) at which rows of the table reach `amplitude` (m,); the last level where they don't."""
+    def at(self, amplitude: np.ndarray, table: np.ndarray) -> np.ndarray:
+        """Return the depths (m,) at which rows of the table reach `amplitude` (m,); the last level where they don't."""
         row = np.arange(len(table))
         k = np.clip((table < amplitude[:, None]).sum(axis=1) - 1, 0, LEVELS - 2)
         low, high = table[row, k], table[row, k + 1]
@@ -47,13 +46,13 @@ class _Depths:
         return np.asarray(np.where(amplitude > 0.0, depth, 0.0))
 
 
-class Prints:
-    """What stays on the skin of a body that yields.
+class IndentationDrawing:
+    """Indentations on the surface of a body that yields.
 
     Parameters
     ----------
     body : Touchable
-        One with dents that stand at places.
+        One whose memory keeps indentations at places.
     points : (m, 3)
         Of the touched surface at rest, m.
 
@@ -66,41 +65,41 @@ class Prints:
     def __init__(self, body: Touchable, points: np.ndarray) -> None:
         assert body.indentation is not None
         assert body.surface is not None
-        self._dents, self._depths = body.indentation, _Depths(body)
+        self._memory, self._depths = body.indentation, _Depths(body)
         slope = body.surface.at(points)[1]
         self.normals = slope / np.linalg.norm(slope, axis=1, keepdims=True)
         parts = np.array_split(points, max(1, -(-len(points) // AT_ONCE)))
-        self._shares = np.concatenate([self._dents.shares(part).astype(np.float32) for part in parts])
+        self._shares = np.concatenate([self._memory.shares(part).astype(np.float32) for part in parts])
         self._table = self._depths.table(points, self.normals)
         self._latest, self._drawn = np.zeros(0), np.zeros(0)
 
     def depths(self, amplitude: np.ndarray) -> np.ndarray:
-        """Depth (m,) of the print at each point, m, for amplitudes (n,) at the places, √J; (0,) without any."""
+        """Return the depth (m,) at each point, m, for amplitudes (n,) at the places, √J; (0,) without any."""
         if not np.array_equal(amplitude, self._latest):
             self._latest = amplitude
-            self._drawn = self._depths.of(self._shares @ amplitude.astype(np.float32), self._table)
+            self._drawn = self._depths.at(self._shares @ amplitude.astype(np.float32), self._table)
         return self._drawn
 
-    def under(self, foot: np.ndarray, normal: np.ndarray, amplitude: np.ndarray) -> float:
-        """The same at any one point (3,) with its normal (3,)."""
+    def under(self, contact: np.ndarray, normal: np.ndarray, amplitude: np.ndarray) -> float:
+        """Return the depth at any one point (3,) with its normal (3,), m."""
         if not len(amplitude):
             return 0.0
-        met = self._dents.shares(foot[None]) @ amplitude
-        return float(self._depths.of(met, self._depths.table(foot[None], normal[None]))[0])
+        met = self._memory.shares(contact[None]) @ amplitude
+        return float(self._depths.at(met, self._depths.table(contact[None], normal[None]))[0])
 
     def elastic(self, place: np.ndarray, amplitude: np.ndarray) -> float:
-        """Share of the elastic shape that is drawn on top of the print: none until the probe meets its bottom.
+        """Return the share of the elastic shape that is drawn on top: none until the probe meets the bottom.
 
-        `place` (8,) is a field's: depth in m, growth, foot in m, normal.
+        `place` (8,) is a field's: depth in m, growth, contact point in m, normal.
         """
         kept = self.under(place[2:5], place[5:8], amplitude)
         return max(0.0, 1.0 - kept / max(float(place[0]), 1e-12))
 
 
 def yielding_in_words(body: Touchable) -> str:
-    """From which depth in its middle a body yields; empty for one that doesn't."""
+    """Return from which depth in its middle a body yields, in words; empty for one that doesn't."""
     if body.indentation is None:
         return ""
-    depths, foot = _Depths(body), body.home - body.radius * body.normal
-    first = depths.of(body.indentation.reach[:1], depths.table(foot[None], body.normal[None]))[0]
-    return f"pressed deeper than {1e3 * first:.2g} mm it keeps a print"
+    depths, contact = _Depths(body), body.home - body.radius * body.normal
+    first = depths.at(body.indentation.reach[:1], depths.table(contact[None], body.normal[None]))[0]
+    return f"pressed deeper than {1e3 * first:.2g} mm it keeps an indentation"

@@ -19,9 +19,9 @@ from palpate.runtime.shared_state import MAX_PLACES, Shared
 from palpate.runtime.touchable import Touchable, load_touchable, touchable
 from palpate.surrogates import Surrogate
 from palpate.surrogates.memories import Indentation, Relaxation
+from palpate.viewer.indentation_drawing import IndentationDrawing
 from palpate.viewer.messages import Frame
 from palpate.viewer.page_model import PageModel
-from palpate.viewer.prints import Prints
 
 SPACING, NONE = 0.002, np.zeros(0)
 DRAWN = {
@@ -33,7 +33,7 @@ DRAWN = {
     "drawn",
     "displacement",
     "coefficients",
-    "prints",
+    "indentation",
 }
 LOOP = {
     f.name: (0.0, 0.0, 0.0) if f.name in {"position", "force"} else 0
@@ -133,47 +133,47 @@ def printed(file):
 
 def test_a_print_is_drawn_as_deep_as_a_ball_rests_on_it(printed):
     body, answer, line = printed
-    prints = Prints(body, line)
-    met = body.memory.shares(line) @ answer.prints
+    prints = IndentationDrawing(body, line)
+    met = body.indentation.shares(line) @ answer.indentation
     # U = A s³ exp(b x), so √(2U) = p at s = (p²/2A)^⅓ exp(−b x/3)
     rests = np.cbrt(met**2 / (2 * pressed.A)) * np.exp(-pressed.B * line[:, 0] / 3)
-    np.testing.assert_allclose(prints.depths(answer.prints), rests, atol=1e-5)
-    assert prints.under(line[20], np.array([0.0, 0.0, 1.0]), answer.prints) == pytest.approx(
+    np.testing.assert_allclose(prints.depths(answer.indentation), rests, atol=1e-5)
+    assert prints.under(line[20], np.array([0.0, 0.0, 1.0]), answer.indentation) == pytest.approx(
         rests[20], abs=1e-5
     )
     # half a millimetre and more in the middle, next to nothing a centimetre off
     assert rests[20] > 5e-4
-    assert prints.depths(answer.prints)[[10, 30]].max() < 0.03 * rests[20]
+    assert prints.depths(answer.indentation)[[10, 30]].max() < 0.03 * rests[20]
     # and the loop agrees that there is no force down to there
-    kept = answer.prints.copy()
+    kept = answer.indentation.copy()
     answer(above(rests[20] - 1e-6), NONE)
     assert not answer.force.any()
     answer(above(rests[20] + 1e-5), NONE)
     assert answer.force[2] > 0
-    np.testing.assert_array_equal(answer.prints, kept)
+    np.testing.assert_array_equal(answer.indentation, kept)
 
 
 def test_a_virgin_body_draws_no_print(file):
     body = load_touchable(file)
-    prints = Prints(body, np.zeros((1, 3)))
+    prints = IndentationDrawing(body, np.zeros((1, 3)))
     assert len(prints.depths(np.zeros(0))) == 0
     assert prints.under(np.zeros(3), np.array([0.0, 0.0, 1.0]), np.zeros(0)) == 0.0
-    assert not prints.depths(np.zeros(len(body.memory.points))).any()
+    assert not prints.depths(np.zeros(len(body.indentation.points))).any()
 
 
 def test_all_points_of_the_top_may_keep_a_print_and_no_others(file, dents, tmp_path):
     model = PageModel(load_touchable(file))
-    own, rest = model.surface.printable.astype(int), np.reshape(model.surface.rest, (-1, 3))
+    own, rest = model.surface.yielding.astype(int), np.reshape(model.surface.rest, (-1, 3))
     # those of the sides' upper rims too: they stand at the top's own border
     assert set(own) == set(np.flatnonzero(rest[:, 2] > -1e-9))
     normals = np.reshape(model.surface.normals, (-1, 3))
     np.testing.assert_allclose(normals, np.tile([0.0, 0.0, 1.0], (len(own), 1)), atol=1e-9)
     assert (
         model.hello(Shared.private().read_state(), 1e3).remembers
-        == "pressed deeper than 1 mm it keeps a print"
+        == "pressed deeper than 1 mm it keeps an indentation"
     )
     travelling = touched_slab().with_memory(dents).save(tmp_path / "one.palpate")
-    assert len(PageModel(load_touchable(travelling)).surface.printable) == 0
+    assert len(PageModel(load_touchable(travelling)).surface.yielding) == 0
 
 
 def test_print_and_elastic_shape_together_touch_the_ball(file):
@@ -190,27 +190,27 @@ def test_print_and_elastic_shape_together_touch_the_ball(file):
             return model.frame(LOOP, state, held, NONE), elastic.frame(LOOP, state, held, NONE)
 
         first, alone = picture(0.0005)
-        assert len(first.prints) == 0, "nothing has yielded yet"
+        assert len(first.indentation) == 0, "nothing has yielded yet"
         np.testing.assert_array_equal(first.coefficients, alone.coefficients)
         deep, alone = picture(0.004)
         middle = np.argmin(np.linalg.norm(_printable(model), axis=1))
-        kept = deep.prints[middle]
-        assert kept == deep.prints.max() > 5e-4
+        kept = deep.indentation[middle]
+        assert kept == deep.indentation.max() > 5e-4
         np.testing.assert_allclose(
             deep.coefficients, (1 - kept / 0.004) * alone.coefficients, rtol=1e-3, atol=1e-9
         )
         light, _ = picture(0.5 * kept)
         assert not light.coefficients.any(), "the ball is in the print and does not touch it"
-        np.testing.assert_array_equal(light.prints, deep.prints)
+        np.testing.assert_array_equal(light.indentation, deep.indentation)
         gone, _ = picture(0.004, held=False)
         time.sleep(0.5)
         gone, _ = picture(0.004, held=False)
         assert not gone.coefficients.any()
-        np.testing.assert_array_equal(gone.prints, deep.prints)
+        np.testing.assert_array_equal(gone.indentation, deep.indentation)
 
 
 def _printable(model):
-    return np.reshape(model.surface.rest, (-1, 3))[model.surface.printable.astype(int)]
+    return np.reshape(model.surface.rest, (-1, 3))[model.surface.yielding.astype(int)]
 
 
 def test_more_places_than_the_shared_memory_carries_are_refused(dents):

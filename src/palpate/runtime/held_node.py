@@ -32,6 +32,16 @@ class BeamTouchable(Touchable):
         return True
 
     @property
+    def surface(self) -> None:
+        """No probe touches the body."""
+        return
+
+    @property
+    def radius_parameter(self) -> None:
+        """No probe touches the body."""
+        return
+
+    @property
     def upright(self) -> bool:
         """The body lies in the x–y plane, y up."""
         return False

@@ -106,12 +106,11 @@ class SurfaceDrawing:
         touched = held and not state.let_go
         deviation = self._judge.trust(state.position, parameters) if touched else 0.0
         if self.body.holds:
-            place, normal = self.body.held_place(parameters), self.body.normal
             return {
                 "deviation": deviation,
                 "drawn": state.depth if held else 0.0,
-                "contact": tuple(place.tolist()),
-                "normal": tuple(normal.tolist()),
+                "contact": tuple(self.body.held_place(parameters).tolist()),
+                "normal": tuple(self.body.normal.tolist()),
             }
         place, coefficients = self._coefficients(
             self._pressed(state) if touched else self._withdrawn(), parameters

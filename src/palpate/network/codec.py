@@ -45,11 +45,8 @@ __all__ = ["decode", "encode", "load_value", "register_kind", "registered_kinds"
 
 T = TypeVar("T")
 _ALONE = "value"  # the name of what is stored where nothing contains it
-_LARGE, _WORTH, _PACKED = (
-    1_000_000,
-    0.75,
-    "packed",
-)  # bytes from which an array is packed, where that saves a quarter
+# an array of so many bytes or more is packed where that saves a quarter
+_LARGE, _WORTH, _PACKED = 50_000, 0.75, "packed"
 _KIND, _SAME = "class", "same as"  # neither can be the name of a field
 _NOT_FINITE = {"inf": math.inf, "-inf": -math.inf, "nan": math.nan}
 _kinds: dict[type, dict[str, type]] = {}

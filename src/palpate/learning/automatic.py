@@ -59,7 +59,7 @@ def automatic(
     weights: np.ndarray | None = None,
     **given: Any,
 ) -> Settings:
-    """Settings with which the filter reaches a target on these data, or comes as near as it can.
+    """Return settings with which the filter reaches a target on these data, or comes as near as it can.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def check_target(target: float) -> None:
 
 
 def ranges_of(X: np.ndarray, names: Sequence[str] | None = None) -> tuple[Range, ...]:
-    """Ranges that the samples X (N, n) span; an input that doesn't vary gets one of length 1 or more about it.
+    """Return ranges that the samples X (N, n) span; an input that doesn't vary gets one of length 1 or more about it.
 
     Raises
     ------
@@ -138,7 +138,7 @@ def ranges_of(X: np.ndarray, names: Sequence[str] | None = None) -> tuple[Range,
 def _ladder(
     xs: np.ndarray, ys: np.ndarray, target: float, seed: int, given: dict[str, Any]
 ) -> Iterator[Settings]:
-    """Settings from few units to many."""
+    """Yield settings from few units to many."""
     (N, n), m = xs.shape, ys.shape[1]
     spread = float(np.sqrt((ys**2).mean())) or 1.0
     noise = noise_variance(xs, ys, seed)
@@ -158,7 +158,7 @@ def _ladder(
 
 
 def _base(N: int, n: int, m: int, noisy: bool) -> Settings:
-    """What the data's shape decides."""
+    """Return the settings that the data's shape decides."""
     form = "axis-aligned" if n == 1 or n > 3 else "rotated"
     p = Settings(form=form).regressors(n).form.size
     units = int(np.clip((N * m - m * (1 + n)) / (m + p), 0, UNITS_MAX))
@@ -193,7 +193,7 @@ def _tried(
     seed: int,
     weights: np.ndarray | None,
 ) -> Settings:
-    """The first rung that meets the target on samples it hasn't seen, or the best of those tried."""
+    """Return the first rung that meets the target on samples it hasn't seen, or the best of those tried."""
     from palpate.learning.learn import learn  # which asks this module for settings
 
     judging = np.zeros(len(X), dtype=bool)

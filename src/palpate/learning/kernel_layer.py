@@ -36,11 +36,11 @@ class Metric:
     ridge: float
 
     def kernel(self, X: np.ndarray, Z: np.ndarray) -> np.ndarray:
-        """K (N, M) between X (N, n) and Z (M, n)."""
+        """Return K (N, M) between X (N, n) and Z (M, n)."""
         return np.asarray(radial(self.radial, _squares(X * self.scales, Z * self.scales))[0])
 
     def altered(self, scale: float, ridge: float) -> Metric:
-        """All scales and the ridge multiplied by two factors."""
+        """Return the metric with all scales and the ridge multiplied by two factors."""
         return replace(self, scales=self.scales * scale, ridge=self.ridge * ridge)
 
 
@@ -82,11 +82,11 @@ class KernelLayer:
         )
 
     def predict(self, X: np.ndarray) -> np.ndarray:
-        """Scaled outputs (N, k) at scaled inputs X (N, n)."""
+        """Return scaled outputs (N, k) at scaled inputs X (N, n)."""
         return np.asarray(_tail(X) @ self.tail + self.metric.kernel(X, self.centres) @ self.weights)
 
     def units(self) -> tuple[np.ndarray, np.ndarray]:
-        """Factors A (h, n, n) and shifts b (h, n) of the same network, unit by unit."""
+        """Return factors A (h, n, n) and shifts b (h, n) of the same network, unit by unit."""
         h, n = self.centres.shape
         A = np.zeros((h, n, n))
         A[:, np.arange(n), np.arange(n)] = self.metric.scales
@@ -96,7 +96,7 @@ class KernelLayer:
 def likely_metric(
     name: RadialFunction, X: np.ndarray, Y: np.ndarray, *, samples: int = 500, iterations: int = 40
 ) -> Metric:
-    """Scales and ridge of the largest likelihood on the first `samples` of X (N, n) and Y (N, k)."""
+    """Return scales and ridge of the largest likelihood on the first `samples` of X (N, n) and Y (N, k)."""
     X, Y = X[:samples], Y[:samples]
     one = _tail(X)
     Y = Y - one @ np.linalg.lstsq(one, Y, rcond=None)[0]
@@ -119,7 +119,7 @@ def likely_metric(
 def negative_likelihood(
     logs: np.ndarray, name: RadialFunction, X: np.ndarray, Y: np.ndarray
 ) -> tuple[float, np.ndarray]:
-    """L per number observed and its gradient by log s and log λ."""
+    """Return L per number observed and its gradient by log s and log λ."""
     (N, n), m = X.shape, Y.shape[1]
     Z, ridge = X * np.exp(logs[:n]), float(np.exp(logs[n]))
     C, slope, _ = radial(name, _squares(Z, Z))
@@ -148,7 +148,7 @@ def _tail(X: np.ndarray) -> np.ndarray:
 
 
 def _solved(C: np.ndarray, Y: np.ndarray) -> np.ndarray:
-    """C⁻¹ Y of a symmetric positive definite C, helped by jitter where rounding spoilt it."""
+    """Return C⁻¹ Y of a symmetric positive definite C, helped by jitter where rounding spoilt it."""
     jitter, size = 0.0, float(np.trace(C)) / len(C)
     while True:
         trial = C.copy(order="F")

@@ -1,4 +1,4 @@
-"""How noisy data are, told by neighbouring samples: no model is fitted.
+"""The noise of data from the differences of neighbouring samples: no model is fitted.
 
 A sample is compared with the value at its place of a plane through its nearest neighbours, Σ_j a_j y_j with
 Σ_j a_j = 1 and Σ_j a_j x_j = x. The noise adds σ² (1 + Σ_j a_j²) to the mean square of the difference; the map's
@@ -21,7 +21,7 @@ _MOST = 0.7  # of the differences of the nearest that must be noise: curvature b
 
 
 def noise_variance(X: np.ndarray, Y: np.ndarray, seed: int = 0) -> float:
-    """Variance σ² of the noise in Y (N, m) over X (N, n), mean of the outputs; 0 where none can be told.
+    """Return the variance σ² of the noise in Y (N, m) over X (N, n), mean of the outputs; 0 where none shows.
 
     Too few samples tell nothing, nor do samples so far apart that curvature hides the noise: then it is 0. A map
     that is no longer the same from one sample to the next can't be told from noise, and counts as noise.
@@ -40,7 +40,7 @@ def noise_variance(X: np.ndarray, Y: np.ndarray, seed: int = 0) -> float:
 
 
 def _differences(X: np.ndarray, Y: np.ndarray, rows: np.ndarray, near: np.ndarray) -> np.ndarray:
-    """Squared differences (S,), each worth σ² where there is no curvature, mean of the outputs."""
+    """Return squared differences (S,), each worth σ² where there is no curvature, mean of the outputs."""
     squared = np.empty(len(rows))
     for s, (i, j) in enumerate(zip(rows, near, strict=True)):
         basis = np.hstack([np.ones((len(j), 1)), X[j] - X[i]])
@@ -50,7 +50,7 @@ def _differences(X: np.ndarray, Y: np.ndarray, rows: np.ndarray, near: np.ndarra
 
 
 def _begin(reach: np.ndarray, found: np.ndarray) -> float:
-    """Where the line through mean differences begins, if surely above zero; never above the least of them."""
+    """Return where the line through mean differences begins, if surely above zero; never above the least of them."""
     line = np.vstack([np.ones_like(reach), reach / reach.max()]).T if reach.max() > 0 else None
     means = found.mean(axis=1)
     if line is None:  # all neighbours are duplicates: their difference is noise alone
@@ -64,7 +64,7 @@ def _begin(reach: np.ndarray, found: np.ndarray) -> float:
 
 
 def spacing(X: np.ndarray) -> float:
-    """Median distance of a sample to the nearest other one, 0 for one sample; duplicates don't count."""
+    """Return the median distance of a sample to the nearest other one, 0 for one sample; duplicates don't count."""
     X = np.unique(X, axis=0)
     if len(X) < 2:
         return 0.0

@@ -49,7 +49,7 @@ _LEAST = 0.1  # s that a refinement gets when time is over and nothing was found
 
 @dataclass(frozen=True)
 class Budget:
-    """How much a search may do.
+    """The work and the time that a search may take.
 
     Attributes
     ----------

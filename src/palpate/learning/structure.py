@@ -1,4 +1,4 @@
-"""How many units a refined network needs: forward growth and backward pruning by the leave-one-out error."""
+"""The number of units that a refined network needs: forward growth and backward pruning by the leave-one-out error."""
 
 from __future__ import annotations
 

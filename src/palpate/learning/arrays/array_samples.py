@@ -46,7 +46,7 @@ class Samples:
     def of(
         cls, X: Any, Y: Any, inputs: Sequence[Range] | None = None, outputs: Sequence[Quantity] | None = None
     ) -> Samples:
-        """From what a user has; see `palpate.fit`.
+        """Check what a user has; see `palpate.fit`.
 
         Raises
         ------
@@ -67,7 +67,7 @@ class Samples:
 
 @dataclass(frozen=True, eq=False)
 class ArrayProblem:
-    """What is to be learnt, in scaled inputs and latent outputs.
+    """The samples to learn from, in scaled inputs and latent outputs.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class ArrayProblem:
     def of(
         cls, X: np.ndarray, Y: np.ndarray, inputs: Sequence[Range], outputs: Sequence[Quantity]
     ) -> ArrayProblem:
-        """From X (N, n) and Y (N, m) in SI units.
+        """Scale X (N, n) and Y (N, m), which are in SI units.
 
         Raises
         ------
@@ -141,7 +141,7 @@ class ArrayProblem:
 
 
 def points(X: Any, inputs: Sequence[Range]) -> np.ndarray:
-    """Inputs (N, n) at which something is asked; of a single input (N,) will do.
+    """Return inputs (N, n) at which something is asked; of a single input (N,) will do.
 
     Raises
     ------
@@ -162,7 +162,7 @@ def points(X: Any, inputs: Sequence[Range]) -> np.ndarray:
 
 
 def constant(Y: np.ndarray) -> bool:
-    """Whether no column of Y (N, m) changes by more than rounding."""
+    """Return true where no column of Y (N, m) changes by more than rounding."""
     return not bool((np.ptp(Y, axis=0) > 1e-13 * np.abs(Y).max()).any())
 
 
@@ -189,7 +189,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _names(table: Any, letter: str) -> Any:
-    """Names for so many columns: the table's own where it has them, else x0, x1 and so on."""
+    """Return a function that names so many columns: the table's own where it has them, else x0, x1 and so on."""
     own = getattr(table, "columns", None)
 
     def of(count: int) -> list[str]:

@@ -1,4 +1,4 @@
-"""How far a chosen network may be off: widths that samples held out while choosing have set.
+"""The error to expect of a chosen network: widths that samples held out while choosing have set.
 
     σ_j(x)² = s_j² (1 + φ̃(x)ᵀ M φ̃(x)),   M = G Gᵀ,   coefficients = G Y
 
@@ -59,7 +59,7 @@ _ROUND_OFF = 1e-24  # mean square of scaled outputs
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What a network missed on samples that its weights had not seen.
+    """The errors of a network on samples that its weights had not seen.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Evidence:
 
     @classmethod
     def together(cls, parts: Sequence[Evidence], gain: float = 1.0) -> Evidence:
-        """Of several networks, whose average is expected to miss `gain` times as much."""
+        """Join the errors of several networks, whose mean is expected to miss `gain` times as much."""
         return cls(np.vstack([p.missed for p in parts]) * gain, np.concatenate([p.spread for p in parts]))
 
 
@@ -113,7 +113,7 @@ def mean_root(networks: Sequence[Refined], X: np.ndarray) -> np.ndarray:
 
 
 def kernel_covariance(layer: KernelLayer) -> np.ndarray:
-    """M (1 + n + h square) with which s² (1 + φ̃ᵀ M φ̃) is the Gaussian process's variance over 1 + λ."""
+    """Return M (1 + n + h square) with which s² (1 + φ̃ᵀ M φ̃) is the Gaussian process's variance over 1 + λ."""
     h, n = layer.centres.shape
     C, ridge = _kernel(layer)
     M = np.zeros((1 + n + h, 1 + n + h))
@@ -123,7 +123,7 @@ def kernel_covariance(layer: KernelLayer) -> np.ndarray:
 
 
 def kernel_spread(layer: KernelLayer, X: np.ndarray) -> np.ndarray:
-    """1 + φ̃ᵀ M φ̃ (N',) at X (N', n)."""
+    """Return 1 + φ̃ᵀ M φ̃ (N',) at X (N', n)."""
     C, ridge = _kernel(layer)
     k = layer.metric.kernel(X, layer.centres)
     return np.asarray(1.0 - (k * np.linalg.solve(C, k.T).T).sum(axis=1) / (1.0 + ridge))
@@ -132,7 +132,7 @@ def kernel_spread(layer: KernelLayer, X: np.ndarray) -> np.ndarray:
 def calibrated(
     network: Network, M: np.ndarray | None, evidence: Sequence[Evidence], level: float
 ) -> Uncertainty:
-    """The network's uncertainty, its widths set so that intervals of `level` hold what the evidence holds.
+    """Return the network's uncertainty, its widths set so that intervals of `level` hold what the evidence holds.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def calibrated(
 
 
 def _noise_and_factor(evidence: Evidence, level: float, *, constant: bool) -> tuple[np.ndarray, np.ndarray]:
-    """s_j² and what a normal law's width is to be multiplied by, each (m,)."""
+    """Return s_j² and what a normal law's width is to be multiplied by, each (m,)."""
     spread = np.ones_like(evidence.spread) if constant else evidence.spread
     squares = evidence.missed**2 / spread[:, None]
     noise = np.maximum(squares.mean(axis=0), _ROUND_OFF)
@@ -162,7 +162,7 @@ def _noise_and_factor(evidence: Evidence, level: float, *, constant: bool) -> tu
 
 
 def _quantiles(scores: np.ndarray, level: float) -> np.ndarray:
-    """What scores (N', m) stay below with probability `level`, (m,)."""
+    """Return what scores (N', m) stay below with probability `level`, (m,)."""
     count = len(scores)
     rank = math.ceil((count + 1) * level - 1e-9)
     if rank <= count:
@@ -176,7 +176,7 @@ def _rows(network: Refined, X: np.ndarray) -> np.ndarray:
 
 
 def _kernel(layer: KernelLayer) -> tuple[np.ndarray, float]:
-    """K + λ (h, h) between the centres, and λ."""
+    """Return K + λ (h, h) between the centres, and λ."""
     ridge = max(layer.metric.ridge, _KERNEL_RIDGE)
     C = layer.metric.kernel(layer.centres, layer.centres)
     C[np.diag_indices(len(C))] += ridge

@@ -187,11 +187,11 @@ class _Chooser:
                 self.work.spend((new.iterations - old.iterations + 1) * split.work(old))
                 if record:
                     self.ran.append(new)
-                    self.trials.append(self._told(new.trial))
+                    self.trials.append(self._scaled_trial(new.trial))
             results.append(old if new is None else new)
         return results
 
-    def _told(self, trial: Trial) -> Trial:
+    def _scaled_trial(self, trial: Trial) -> Trial:
         """Return a record with its error relative to the outputs' standard deviation."""
         return replace(trial, error=trial.error / self.problem.unit)
 
@@ -204,7 +204,7 @@ class _Chooser:
 
     def _kernel(self) -> tuple[Metric, float]:
         """Return the kernel layer's metric and error, and take the input scales from which units start."""
-        found: list[Any] = []
+        found: list[tuple[float, Metric]] = []
         samples = min(len(self.split.X), round(_METRIC_SAMPLES * min(1.0, self.size)))
         for name in RADIAL_FUNCTIONS:
             likelihood = 80.0 * samples**3
@@ -361,7 +361,9 @@ class _Chooser:
         error = expected_error(members, self.X)
         if len(members) > 1:
             units = len(members) * len(winner.theta)
-            self.trials.append(self._told(replace(winner.trial, start="mean", units=units, error=error)))
+            self.trials.append(
+                self._scaled_trial(replace(winner.trial, start="mean", units=units, error=error))
+            )
         return members, error
 
     def _fresh(self, like: Candidate) -> Fresh:

@@ -1,4 +1,4 @@
-"""What a choice came to: a network with the widths of its intervals and the region it was trained in."""
+"""The result of a fit: a network with the widths of its intervals and the region it was trained in."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Fitted:
     one_output: bool = False
 
     def predict(self, X: Any) -> np.ndarray:
-        """Outputs (N, m) at inputs X (N, n); (N,) where Y was.
+        """Return outputs (N, m) at inputs X (N, n); (N,) where Y was.
 
         Raises
         ------
@@ -69,7 +69,7 @@ class Fitted:
         return self._shaped(self.network.predict(points(X, self.network.inputs)))
 
     def deviation(self, X: Any) -> np.ndarray:
-        """Standard deviation (N, m) of what would be measured at X (N, n).
+        """Return the standard deviation (N, m) of what would be measured at X (N, n).
 
         Scaled so that ±1.64 of it hold nine in ten, whatever the law of the errors.
 
@@ -81,7 +81,7 @@ class Fitted:
         return self._shaped(self.uncertainty.deviation(points(X, self.network.inputs)))
 
     def interval(self, X: Any, level: float | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper bounds (N, m) for what would be measured at X (N, n), output by output.
+        """Return lower and upper bounds (N, m) for what would be measured at X (N, n), output by output.
 
         At the level that was calibrated for (the default) they hold about that share of unseen samples drawn like
         the training samples, whatever the law of the errors. Outside the trained region nothing is promised.
@@ -102,7 +102,7 @@ class Fitted:
         return self._shaped(low), self._shaped(high)
 
     def trusted(self, X: Any) -> np.ndarray:
-        """Whether each of X (N, n) is as near to a training sample as these are to each other, (N,) bool.
+        """Return which of X (N, n) are as near to a training sample as those are to each other, (N,) bool.
 
         Raises
         ------
@@ -184,7 +184,7 @@ class Fitted:
 
 
 def _restored(network: Network) -> Fitted:
-    """What `save` put into the network's extras and meta; whatever is wrong with these raises."""
+    """Return what `save` put into the network's extras and meta; whatever is wrong with these raises."""
     uncertainty, kept = Uncertainty.of(network), network.meta["choice"]
     if uncertainty is None:
         raise KeyError("uncertainty")

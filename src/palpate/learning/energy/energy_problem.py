@@ -80,7 +80,7 @@ def mean_error(rows: Rows, errors: np.ndarray) -> float:
 
 @dataclass(frozen=True, eq=False)
 class EnergyProblem:
-    """What networks of ℓ are learnt from.
+    """The rows that networks of ℓ are learnt from.
 
     Attributes
     ----------

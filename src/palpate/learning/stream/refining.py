@@ -28,7 +28,7 @@ _FILLED = 0.5  # unknowns per number in the reservoir up to which units are adde
 
 @dataclass(frozen=True)
 class Refining:
-    """How much refinement goes with a stream: one Levenberg–Marquardt iteration every so many observations.
+    """The refinement that goes with a stream: one Levenberg–Marquardt iteration every so many observations.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Refining:
 
 @dataclass(frozen=True, eq=False)
 class Progress:
-    """What the last iteration leaves to the next one.
+    """The state that one iteration leaves to the next.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ class Progress:
 def refined_state(
     state: State, kept: Reservoir, settings: Settings, refining: Refining, last: Progress
 ) -> tuple[State, Progress]:
-    """The state after one iteration on the reservoir, with the Gauss–Newton posterior, and what it achieved.
+    """Return the state after one iteration on the reservoir, with the Gauss–Newton posterior, and what it achieved.
 
     With a forgetting factor λ a sample of age a weighs λᵃ, as it does in the filter. Moved and new units
     replace the state's once they have less error on the judging samples; weights and tail are then fitted to all.
@@ -153,7 +153,7 @@ def _continued(
     coefficients: np.ndarray,
     progress: Progress,
 ) -> State:
-    """The filter's state with other parameters and their posterior."""
+    """Return the filter's state with other parameters and their posterior."""
     new = len(theta) - state.units
     refined = replace(_refined(state, settings, theta, coefficients), rms=progress.expected)
     found = posterior(
@@ -177,7 +177,7 @@ def _continued(
 
 
 def _judging(kept: Reservoir, weights: np.ndarray, refining: Refining) -> np.ndarray:
-    """Which retained samples (N,) judge: a place says nothing about when its sample came."""
+    """Return which retained samples (N,) judge: a place says nothing about when its sample came."""
     none = np.zeros(len(kept), bool)
     if not refining.judges or len(kept) < 2 * refining.judges:
         return none
@@ -199,7 +199,7 @@ def _rows(state: State, kept: Reservoir, settings: Settings, weights: np.ndarray
 def _error(
     rows: Rows, kept: Reservoir, judging: np.ndarray, weights: np.ndarray, theta: np.ndarray, fit: Fit
 ) -> float:
-    """Weighted RMS error per scaled output on the judging samples; 0 where there are none."""
+    """Return the weighted RMS error per scaled output on the judging samples; 0 where there are none."""
     if not judging.any():
         return 0.0
     X, w = kept.X[judging], weights[judging]
@@ -209,7 +209,7 @@ def _error(
 
 
 def _window_errors(state: State, settings: Settings) -> np.ndarray:
-    """Squared errors (≤ M,) over the window: growth must not be asked for by errors that are gone."""
+    """Return squared errors (≤ M,) over the window: growth must not be asked for by errors that are gone."""
     seen = state.memory[-settings.window :]
     X, Y = seen[:, : state.inputs], seen[:, state.inputs :]
     of = settings.regressors(state.inputs)
@@ -220,7 +220,7 @@ def _window_errors(state: State, settings: Settings) -> np.ndarray:
 def _start(
     state: State, kept: Reservoir, settings: Settings, refining: Refining, last: Progress
 ) -> tuple[np.ndarray, float, bool]:
-    """Units to iterate from, a damping, and whether they are new on trial.
+    """Return units to iterate from, a damping, and whether they are new on trial.
 
     They are those on trial; or, where growth is due, the state's and some more; or, after a trial that failed, all
     drawn anew in turns with the state's; or the state's.
@@ -238,7 +238,7 @@ def _start(
 
 
 def _growth(state: State, samples: int, settings: Settings, refining: Refining, last: Progress) -> int:
-    """How many units to add: none while the error is small enough, or where samples would not decide on them."""
+    """Return how many units to add: none while the error is small enough, or where samples would not decide on them."""
     h = state.units
     new = min(max(1, round(refining.share * h)), settings.units_max - h)
     if not refining.grows or new < 1:
@@ -252,7 +252,7 @@ def _growth(state: State, samples: int, settings: Settings, refining: Refining, 
 def _drawn(
     state: State, kept: Reservoir, settings: Settings, count: int, rng: np.random.Generator
 ) -> np.ndarray:
-    """Units (count, p) at samples drawn by squared error and distance from the others, about their spacing wide."""
+    """Return units (count, p) at samples drawn by squared error and distance from others, about their spacing wide."""
     of, X, n = settings.regressors(state.inputs), kept.X, state.inputs
     f = np.hstack([of.tail_rows(X), of.phi(X, state.theta)]) @ state.coefficients
     error = ((kept.Y - f) ** 2).sum(axis=1)

@@ -34,7 +34,10 @@ _KIND_ITERATIONS = 60
 _KIND_STARTS = 2
 _GROWN = 3  # kinds that grow
 _PATIENCE = 3  # sizes without a gain
-_RANDOM = 24  # further starts
+_RANDOM = (
+    24  # further starts, of up to so many solves as follow; of more they go with the root of their number
+)
+_SOLVES = 40
 _ROUNDS = (50, 100)  # iterations of these, the better half going on
 _SAME_KIND = 0.5  # share of them of the best one's kind, so that a mean has some to choose from
 _SPREAD = (0.7, 1.5)  # their sizes over that of the best
@@ -101,7 +104,7 @@ def search_energy(
     budget, pool = budget or Budget(), Pool(workers)
     search = Search(problem, budget.part(_SEARCH_SHARE), pool)
     _search_structure(search, form, radial, units_max, target, seed)
-    order = sorted(search.tried, key=lambda one: one.error)[: budget.count(_JUDGED, 2)]
+    order = sorted(search.tried, key=lambda one: one.error)[: budget.count(_JUDGED * _more(problem), 2)]
     judged = pool.map(partial(_judge, problem, budget.deadline), list(enumerate(order)))
     ensemble = mean_of(problem, [one for one in judged if one is not None], networks)
     return ensemble, search.trials
@@ -174,7 +177,7 @@ def _search_structure(
         return
     rng = np.random.default_rng([seed, len(found)])
     further = []
-    for _ in range(budget.count(_RANDOM, 0)):
+    for _ in range(budget.count(_RANDOM * _more(problem), 0)):
         another = found[int(rng.integers(min(3, len(found))))]
         regressors = (best if rng.random() < _SAME_KIND else another).regressors
         units = max(1, round(len(best.theta) * rng.uniform(*_SPREAD)))
@@ -210,6 +213,11 @@ class _Starts:
         self.drawn += 1
         rng = np.random.default_rng([self.seed, self.drawn])
         return random_units(regressors.form, self.problem.X, max(count, 0), rng, scatter=_SCATTER)
+
+
+def _more(problem: EnergyProblem) -> float:
+    """Return how many times more networks are worth trying than of few solves, which can't tell them apart."""
+    return max(1.0, math.sqrt(len(problem.X) / _SOLVES))
 
 
 def _kinds(

@@ -12,11 +12,11 @@ STIFFNESS = 20.0  # N/m
 class PlainAnswer:
     """F = −k x in every direction, with switches to misbehave."""
 
-    energy, depth, inside, mirrored = 0.0, 0.0, True, False
+    amplitude, depth, inside, mirrored = 0.0, 0.0, True, False
 
     def __init__(self, parameters):
         self.force, self.contact, self.loads = np.zeros(3), np.zeros(3), np.zeros(1)
-        self.stiffness = np.zeros((3, 3))
+        self.stiffness, self.slope = np.zeros((3, 3)), np.zeros(3)
         self.spring, self.poison, self.error = STIFFNESS, 0.0, None
         self.seen = np.full(parameters, np.nan)
 

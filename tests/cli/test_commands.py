@@ -89,6 +89,12 @@ def test_validate_keeps_its_limits_and_writes_the_report(palpate, carried_out):
     assert (carried_out / "small.html").read_text(encoding="utf-8").startswith("<!doctype html>")
 
 
+def test_a_model_file_is_judged_by_the_test_set_beside_it(palpate, carried_out):
+    answer = palpate("validate", carried_out / "small.palpate", "--no-report")
+    assert answer.code == 0, answer.err
+    assert "small on 8 unseen solves: every limit kept" in answer.out
+
+
 def test_results_go_to_stdout_and_progress_to_stderr(palpate, carried_out, tmp_path):
     shutil.copytree(carried_out, tmp_path / "s")
     answer = palpate("learn", tmp_path / "s" / "study.toml", "--json")

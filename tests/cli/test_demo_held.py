@@ -74,5 +74,7 @@ def test_a_body_with_memory_has_a_study_file(palpate, tmp_path: Path):
         answer = palpate(command, file)
         assert answer.code == 0, answer.err
     assert "1 histories" in answer.out
+    alone = palpate("validate", tmp_path / "rod.palpate", "--no-report")  # by the histories beside it
+    assert "rod on" in alone.out
     assert (tmp_path / "rod.html").exists()
     assert HeldBody.load(tmp_path / "rod.palpate").meta["runtime"]["rate"] == 1000.0

@@ -79,7 +79,7 @@ def test_what_can_not_be_judged_is_refused_with_a_way_out(palpate, folder):
     spring_beam().save(folder / "beam.palpate")
     answer = palpate("validate", folder / "beam.palpate")
     assert answer.code == 2
-    assert "palpate validate study.toml" in answer.err
+    assert "--test DATA.zarr" in answer.err
     surrogate().save(folder / "alone.palpate")
     answer = palpate("validate", folder / "alone.palpate")
     assert answer.code == 2

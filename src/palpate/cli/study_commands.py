@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from palpate.cli.console import Console
 from palpate.errors import AccuracyError, UsageError
-
-if TYPE_CHECKING:
-    from palpate.dataset import Dataset
 
 __all__ = ["is_archive", "learn_file", "sweep_file", "validate_model", "validate_study_file"]
 
@@ -18,7 +15,8 @@ _CORRECTED = (
     "Corrected by {} measured touches: it is of the specimen, and differs from solves of the model on purpose. "
     "`palpate correct` says how well it follows the specimen, on measurements that it left out."
 )
-FOLDERS = ("-test.zarr", "-random.zarr")
+TEST_SETS = ("-test.zarr", "-random.zarr", "-unseen.palpate")
+"""Ends of the names of test sets, which begin with the name of the model."""
 
 
 def sweep_file(study: Path, workers: int | None, console: Console) -> None:
@@ -122,7 +120,7 @@ def validate_model(
     path : Path
         Of the model.
     test, refined : Path, optional
-        Datasets of unseen solves, and of solves on a finer mesh; by default the test set beside the file.
+        Unseen solves or load histories, and solves on a finer mesh; by default the test set beside the file.
     report : bool
         Whether to write the report.
     console : Console
@@ -131,7 +129,7 @@ def validate_model(
     Raises
     ------
     UsageError
-        If the file can't be judged, or there is no test set.
+        If there is no test set, or it is of another body.
     AccuracyError
         If a limit is missed; everything has been printed and written then.
     """
@@ -140,22 +138,17 @@ def validate_model(
     from palpate.surrogates.surrogate import correction_count
     from palpate.validation import Chapter, validate, write_report
 
-    model: Any = load(path)
-    energy = getattr(model, "touch", model)
-    if not hasattr(energy, "stiffness"):
-        raise UsageError(
-            f"{path} holds a {type(model).__name__}, which is not judged by itself.",
-            why="A model whose networks answer by load, or that has a memory, is judged together with its study.",
-            fix="Give the study file: palpate validate study.toml. `palpate demo NAME` does all of a ready-made study.",
-        )
+    model = load(path)
     data, fine = _test_set(path, test), None if refined is None else Dataset.open(refined)
     validation = replace(validate(model, data, refined=fine), name=path.stem)
-    if touches := correction_count(energy.meta):
+    if touches := correction_count(model.meta):
         validation = replace(validation, notes=(*validation.notes, _CORRECTED.format(touches)))
     text, target = str(validation), path.with_suffix(".html") if report else None
     if target is not None:
-        origin: dict[str, Any] = {"settings": energy.meta, "provenance": data.provenance}
-        write_report(target, [Chapter(path.stem, model, data, validation, **origin)])
+        origin = getattr(data, "provenance", {})
+        write_report(
+            target, [Chapter(path.stem, model, data, validation, settings=model.meta, provenance=origin)]
+        )
         text += f"\nreport: {target}"
     console.result(text, validation.as_dict() | {"report": str(target) if target else None})
     try:
@@ -166,17 +159,17 @@ def validate_model(
         raise AccuracyError(error.what, why=error.why, fix=_CORRECTED.format(touches)) from None
 
 
-def _test_set(path: Path, test: Path | None) -> Dataset:
+def _test_set(path: Path, test: Path | None) -> Any:
+    """Return the dataset, or for a body with memory the load histories, that lies beside a model or was named."""
     from palpate.dataset import Dataset
+    from palpate.learning.plastic import HeldPaths
 
-    if test is not None:
-        return Dataset.open(test)
-    beside = [path.with_name(path.stem + end) for end in FOLDERS]
-    for folder in beside:
-        if folder.exists():
-            return Dataset.open(folder)
-    raise UsageError(
-        f"There are no solves to judge {path} by.",
-        why=f"Neither {beside[0].name} nor {beside[1].name} lies beside it.",
-        fix="Name a dataset of solves that it was not learnt from: --test DATA.zarr",
-    )
+    beside = [path.with_name(path.stem + end) for end in TEST_SETS]
+    found = test or next((file for file in beside if file.exists()), None)
+    if found is None:
+        raise UsageError(
+            f"There are no solves to judge {path} by.",
+            why=f"None of {', '.join(file.name for file in beside)} lies beside it.",
+            fix="Name a dataset of solves that it was not learnt from: --test DATA.zarr",
+        )
+    return HeldPaths.load(found) if found.suffix == ".palpate" else Dataset.open(found)

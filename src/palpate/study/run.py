@@ -279,32 +279,24 @@ def learn_study(
     surrogate, history
         What `palpate.learn` returns, and for a body with memory how well it fits.
     """
-    if not isinstance(train, Dataset):
-        model, history = learn_histories(study, train)
-    else:
-        model, history = learn_dataset(train, **_options(study, train, test, progress, log))
-    more: dict[str, Any] = {"name": study.name, "runtime": study.runtime.model_dump()}
     if isinstance(train, Dataset):
-        more["dataset"] = {**_meta(model).get("dataset", {}), "hash": train.hash}
-    return _with_meta(model, more), history
+        model, history = learn_dataset(train, **_options(study, train, test, progress, log))
+    else:
+        model, history = learn_histories(study, train)
+    return _with_meta(model, {"runtime": study.runtime.model_dump()}), history
 
 
 def _options(study: Study, train: Dataset, test: Any, progress: Any, log: Log) -> dict[str, Any]:
     """Return the options of `palpate.learn` for a study."""
-    options: dict[str, Any] = study.learning.options() if study.learning else {}
+    options: dict[str, Any] = {"name": study.name, **(study.learning.options() if study.learning else {})}
     if study.filter:
         watched = {"heldout": test, "progress": progress}
         form = {"settings": study.filter.build(len(train.ranges)), "passes": study.filter.passes}
-        return {**options, **form, **watched, "seed": study.filter.seed, "name": study.name}
-    if "shape" in options:
-        # shown on a mesh that is fine wherever the body is touched
-        options |= {"layout": study.problem(whole=True).layout, "log": log, "name": study.name}
-    return options
-
-
-def _meta(model: Any) -> Mapping[str, Any]:
-    meta: Mapping[str, Any] = model.meta
-    return meta
+        return {**options, **form, **watched, "seed": study.filter.seed}
+    if study.sweep and study.sweep.symmetric:
+        # shown on a mesh that is fine wherever the body is touched, not in the part that is solved alone
+        options["layout"] = study.problem(whole=True).layout
+    return {**options, "log": log}
 
 
 def _with_meta(model: Any, more: Mapping[str, Any]) -> Any:
@@ -340,7 +332,7 @@ def load_model(paths: Paths, train: Rows) -> tuple[Any, Any]:
         If it was learnt from other rows than these: rows that it has seen might be taken for unseen ones.
     """
     model = load(paths.model)
-    if isinstance(train, Dataset) and _meta(model).get("dataset", {}).get("hash") != train.hash:
+    if isinstance(train, Dataset) and model.meta.get("dataset", {}).get("hash") != train.hash:
         raise UsageError(
             f"{paths.model} was learnt from other solves than this study trains with.",
             why="The sweep or its split was changed since, and what is unseen here may have been seen there.",

@@ -12,6 +12,7 @@ import numpy as np
 
 from models import linear_network
 from palpate.dataset import Dataset, Layout, assemble, solid_fields
+from palpate.network import TrainedRegion
 from palpate.surrogates import (
     ContactBaseline,
     ContactLaw,
@@ -46,16 +47,21 @@ def face() -> TouchedSurface:
 
 
 def surrogate(
-    *, factor: float = 1.0, root: np.ndarray | None = None, memory: Any = None, meta: Any = None
+    *,
+    factor: float = 1.0,
+    root: np.ndarray | None = None,
+    region: TrainedRegion | None = None,
+    memory: Any = None,
+    meta: Any = None,
 ) -> Surrogate:
-    """The closed form as a learnt body, its energy times `factor`, with a memory and a record."""
+    """The closed form as a learnt body, its energy times `factor`, with where it was trained, a memory and a record."""
     tail = np.array([[np.log(factor * A), B * 0.02, 0.0, 0.0]])
     network = linear_network(list(INPUTS), [Quantity("ln U/U0")], tail)
     baseline, going = (
         ContactBaseline(ContactLaw("pad"), face(), RADIUS),
         Continuation.of(INPUTS, deepest=DEEPEST),
     )
-    energy = LearntEnergy(network, baseline, continuation=going, root=root)
+    energy = LearntEnergy(network, baseline, region=region, continuation=going, root=root)
     return Surrogate(energy, memory=memory, meta={"name": "slab"} | (meta or {}))
 
 

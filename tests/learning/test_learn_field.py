@@ -26,6 +26,7 @@ from palpate.learning.fields.fit_local_mode import (
     fit_local_mode,
 )
 from palpate.learning.fields.snapshots import Solves
+from palpate.network.codec import decode, encode
 from palpate.surrogates import TouchedSurface
 from palpate.surrogates.fields import DepthAmplitude, LocalMode, Variation
 from palpate.surrogates.fields.local_mode import design
@@ -344,7 +345,7 @@ def test_no_more_polynomials_than_eighty_four():
     assert (degrees(3)[0] == 0).all()
 
 
-def test_without_contact_nothing_moves_and_the_file_and_record_are_whole(face, tmp_path):
+def test_without_contact_nothing_moves_and_the_file_and_record_are_whole(face):
     points, triangles, surface = face
     X, column = columns(5)
     rng = np.random.default_rng(0)
@@ -355,7 +356,7 @@ def test_without_contact_nothing_moves_and_the_file_and_record_are_whole(face, t
     )  # fmt: skip
     F = learnt.field
     assert (F.values(np.array([[0.0, 0, RADIUS], [0, 0, 1.0]])) == 1.0).all()
-    again = type(F).load(F.save(tmp_path / "f.palpate"))
+    again = decode(type(F), encode(F, kind="field"))
     np.testing.assert_array_equal(again.values(X), F.values(X))
     assert again.meta["solves"] == 15
     assert again.meta["truncation"] == learnt.truncation

@@ -35,7 +35,7 @@ def run(name: str, folder: Path) -> str:
 
 def cantilever(text: str, folder: Path) -> None:
     assert "Dataset of 64 solves of Cantilever, all converged" in text
-    assert "beam on 16 unseen solves: every limit kept" in text
+    assert "body on 16 unseen solves: every limit kept" in text
     assert (folder / "beam.palpate").stat().st_size > 1000
     assert "http" not in text  # without a terminal nothing is served
 

@@ -22,7 +22,7 @@ BLOCKS = re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL)
 def test_the_program_that_writes_a_report_runs(tmp_path: Path) -> None:
     (program,) = (block for block in BLOCKS if "write_report(" in block)
     printed = run_program(program, tmp_path, 200)
-    assert "beam on 16 unseen solves: every limit kept" in printed
+    assert "body on 16 unseen solves: every limit kept" in printed
     assert "A cantilever of nylon (E = 2 GPa)" in (tmp_path / "beam.html").read_text(
         encoding="utf-8"
     ).replace("\N{NO-BREAK SPACE}", " ")

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from chromium_page import check_force, drag, let_go, number, settled, tip, vector
+from chromium_page import assert_no, check_force, drag, let_go, number, settled, tip, vector
 from playwright.sync_api import expect
 from websocket_page import client_of
 
@@ -120,7 +120,7 @@ def test_the_end_of_the_loop_is_shown_and_the_page_returns(visit, keep, complain
         page.wait_for_selector("html[data-tick][data-tip]")
         assert not page.evaluate("document.kept")
         page.context.close()
-    assert [c for c in complaints if "ERR_CONNECTION_REFUSED" not in c] == []
+    assert_no([c for c in complaints if "ERR_CONNECTION_REFUSED" not in c])
     complaints.clear()
 
 

@@ -26,9 +26,9 @@ from palpate.surrogates.baselines import registered_baselines
 __all__ = ["LearningHistory", "learn"]
 
 _SHOWN = {
-    "displacement": "m",
-    "von_mises": "Pa",
-}  # fields that are learnt where a dataset has them, and their units
+    "displacement": ("displacement", "m"),
+    "von_mises": ("von Mises stress", "Pa"),
+}  # fields that are learnt where a dataset has them, with what they are called and their units
 _FIELD_SHARE = 0.25  # of the energy's limit on time, for each field: most of a shape is found at once
 _PAD_UNITS, _PAD_NETWORKS = 192, 4  # of one network and of a mean, for a pad in five dimensions
 
@@ -70,7 +70,7 @@ class LearningHistory:
             size = (
                 f"{1e3 * missed:.2g} mm" if learnt.field.unit == "m" else f"{missed:.2g} {learnt.field.unit}"
             )
-            words += f"; {name.replace('_', ' ')}: {learnt.field.meta['modes']} modes, which miss {size}"
+            words += f"; {_SHOWN[name][0]}: {learnt.field.meta['modes']} modes, which miss {size}"
         return words
 
     __repr__ = __str__
@@ -166,7 +166,7 @@ def learn(
         assert known.learn_field is not None
         log("shape" if shown == "displacement" else "stress")
         left = limit(1.0 / (len(fields) - i))
-        learnt[shown] = known.learn_field(shown, _SHOWN[shown], searches | {"seconds": left})
+        learnt[shown] = known.learn_field(shown, _SHOWN[shown][1], searches | {"seconds": left})
     meta = {**found.meta, "name": name, "dataset": {"hash": train.ok.hash, "provenance": train.provenance}}
     surrogate = Surrogate(energy, {k: v.field for k, v in learnt.items()}, meta=meta)
     return surrogate, LearningHistory(found, solves, time.monotonic() - began, learnt)

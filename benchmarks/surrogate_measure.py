@@ -14,7 +14,7 @@ from benchmarks.surrogate_cases import Case
 from benchmarks.surrogate_rivals import RIVALS
 from benchmarks.surrogate_springs import counts, identified, some
 from palpate.learning.energy import learn_energy
-from palpate.surrogates import ContactBaseline, ContactLaw, LearntEnergy, Solves
+from palpate.surrogates import ContactBaseline, ContactLaw, Solves, Surrogate
 from palpate.validation import TouchFunction, TouchSolves
 from palpate.validation.figures.force import angles
 from palpate.validation.figures.loop_work import function_work
@@ -38,13 +38,13 @@ class Measured:
     case : Case
     rows : list of mappings
         One for each method and number of solves.
-    surrogates : mapping of int to LearntEnergy
+    surrogates : mapping of int to Surrogate
         Ours, by the number of solves.
     """
 
     case: Case
     rows: list[Row]
-    surrogates: dict[int, LearntEnergy]
+    surrogates: dict[int, Surrogate]
 
     def of(self, method: str, solves: int) -> Row | None:
         """A method's row at a number of solves."""
@@ -101,7 +101,7 @@ def _processor_time() -> float:
     return sum(os.times()[:4])
 
 
-def learnt(case: Case, size: int, effort: float) -> LearntEnergy:
+def learnt(case: Case, size: int, effort: float) -> Surrogate:
     """Our surrogate of so many solves."""
     training = case.training(size)
     solves = Solves(
@@ -115,7 +115,7 @@ def learnt(case: Case, size: int, effort: float) -> LearntEnergy:
     )
     law = ContactLaw("series", case.radius / 10.0)
     baseline = ContactBaseline(law, case.surface, case.radius)
-    return learn_energy(solves, baseline, effort=effort, seed=SEED)[0]
+    return Surrogate(learn_energy(solves, baseline, effort=effort, seed=SEED)[0], meta={"name": OURS})
 
 
 def errors(model: TouchFunction, test: TouchSolves) -> Row:
@@ -176,11 +176,11 @@ def _loops(model: TouchFunction, test: TouchSolves, loops: int) -> Row:
     )
 
 
-def _query(model: TouchFunction, ours: LearntEnergy | None, name: str, test: TouchSolves) -> float:
+def _query(model: TouchFunction, ours: Surrogate | None, name: str, test: TouchSolves) -> float:
     """CPU time in µs of one force at one place; of ours with the stiffness."""
     X = test.X[np.arange(QUERIES) % len(test)]
     if name == OURS and ours is not None:
-        evaluate = ours.evaluator()
+        evaluate = ours.energy.evaluator()
         pairs = [(x[:3].copy(), x[3:].copy()) for x in X]
         begun = time.process_time()
         for position, parameters in pairs:

@@ -64,7 +64,7 @@ def test_a_pushed_patch_resists_as_in_calculix(
 ):
     """A patch of 20 × 20 mm of the top is pushed down by a fifth of the height and aside; the bottom is fixed."""
     if points == 4:
-        monkeypatch.setattr(solid_energy, "rule_order", lambda *_: 2)
+        monkeypatch.setattr(solid_energy, "_rule_order", lambda *_: 2)
     problem = Body(Block(SIZE, element=0.012), law, formulation="displacement").problem(PUSH)
     solution, mesh = problem.solve(push), problem.mesh
     assert solution.converged, solution.message

@@ -25,6 +25,7 @@ from palpate.surrogates.fields.surface_interpolation import SurfaceInterpolation
 from palpate.sweeps import sweep
 from palpate.sweeps.plan import provenance
 from palpate.validation import validate
+from solved import solved
 
 RADIUS = 0.010
 
@@ -201,7 +202,7 @@ def test_a_body_is_learnt_judged_and_kept(tmp_path):
     body, probe = block()
     train, test = touches().take(np.arange(20)), touches().take(np.arange(20, 24))
     layout = body.problem(probe, element=0.006).layout
-    touch, history = pp.learn(train, layout=layout, effort=0.2, law=ContactLaw("pad"))
+    touch, history = pp.learn(train, layout=layout, effort=0.1, law=ContactLaw("pad"))
     assert isinstance(touch, Surrogate)
     assert isinstance(history, LearningHistory)
     judged = validate(touch, test)
@@ -272,12 +273,8 @@ def test_a_beam_is_still_learnt_as_a_beam():
 
 def test_a_family_of_bodies_is_learnt_as_one():
     """Elements of a body and of its family: modulus and probe's radius become inputs of what is touched."""
-    body, probe = block()
-    varied = (pp.Varied("young", 5e3, 15e3), pp.Varied("probe.radius", 0.009, 0.011))
-    family = pp.BodyFamily(body, varied)
-    small = family.problem(fundamental_part(body, probe), element=0.012)
-    data = sweep(small, samples=24, seed=2, workers=1, progress=False)
-    touch, _ = pp.learn(data, effort=0.4, shape=False)
+    data = solved("family")
+    touch, _ = pp.learn(data, effort=0.1, shape=False)
     assert [r.name for r in touch.energy.parameters] == ["young", "probe.radius"]
     assert touch.energy.baseline.radius_input == 4
     # what was solved is met, in force and in the slope of the energy by the modulus

@@ -32,6 +32,7 @@ from palpate.surrogates.fields import DepthAmplitude, LocalMode, Variation
 from palpate.surrogates.fields.local_mode import design
 from palpate.surrogates.fields.surface_interpolation import SurfaceInterpolation
 from palpate.units import Range
+from solved import solved
 
 RADIUS, DEEPEST = 0.010, 0.006
 BOX = [
@@ -383,16 +384,8 @@ def test_what_cannot_be_learnt_is_refused(face):
         learn_field(X + np.array([0, 0, 0.02]), values, **known)
 
 
-@pytest.mark.slow
-def test_a_pressed_block_is_seen_within_stated_errors(tmp_path):
-    import palpate as pp
-
-    body = pp.Body(pp.shapes.Block(size=(0.06, 0.06, 0.03)), pp.materials.NeoHookean(young=9e3, poisson=0.45))
-    probe = pp.SphereProbe(
-        radius=RADIUS, touches="top", depth=(0.0, DEEPEST), over=((0.02, 0.02), (0.04, 0.04))
-    )
-    problem = body.problem(probe, element=0.008)
-    data = pp.sweep(problem, samples=16, seed=0, workers=1, progress=False, path=tmp_path / "block.zarr").ok
+def test_a_pressed_block_is_seen_within_stated_errors():
+    data = solved("block").ok
     top = np.abs(data.rest[data.triangles][:, :, 2] - 0.03).max(axis=1) < 1e-9
     surface = TouchedSurface.of(data.rest, data.triangles[top], radius=RADIUS)
     train, test = data.take(np.arange(12)), data.take(np.arange(12, len(data)))

@@ -10,7 +10,7 @@ from palpate.physics.shapes import Block
 from palpate.physics.solid import Body
 from palpate.sweeps import sweep
 
-BODY = Body(Block(size=(0.06, 0.06, 0.03)), NeoHookean(young=9e3, poisson=0.45), fixed="bottom")
+BODY = Body(Block(size=(0.06, 0.06, 0.03), element=0.02), NeoHookean(young=9e3, poisson=0.45), fixed="bottom")
 PROBE = SphereProbe(radius=0.010, depth=(0.0, 0.006), over=((0.025, 0.025), (0.035, 0.035)))
 # coarse under the probe: what is tested are bits and labels
 PROBLEM = BODY.problem(PROBE, element=0.012)

@@ -24,7 +24,7 @@ def gel(poisson=0.45):
 
 def pressed(poisson=0.45, probe=PROBE, element=0.011, **options):
     """The problem of a sphere on a small block."""
-    return Body(Block(SIZE), gel(poisson), **options).problem(probe, element=element)
+    return Body(Block(SIZE, element=0.03), gel(poisson), **options).problem(probe, element=element)
 
 
 def above(depth, foot=FOOT):

@@ -170,7 +170,7 @@ def test_depths_on_a_dome_are_measured_to_the_round_surface():
 
 def test_a_viscoelastic_block_recovers_after_the_probe_has_gone():
     law = Viscoelastic(gel(), ((0.5, 1.0),))
-    problem = Body(Block(SIZE), law).problem(SphereProbe(SMALL), element=0.01)
+    problem = Body(Block(SIZE, element=0.02), law).problem(SphereProbe(SMALL), element=0.01)
     here = np.array([0.021, 0.019, 0.02 + SMALL])
     heights = [-0.002] * 3 + [0.001] * 5
     found = problem.open().march(
@@ -190,7 +190,7 @@ def test_a_viscoelastic_block_recovers_after_the_probe_has_gone():
 def test_a_plastic_block_keeps_a_dent():
     law = Plastic(LinearElastic(1e6, 0.35), LinearHardening(1e4, 2e4))
     probe = SphereProbe(SMALL, pad=1e8, stop=0.001)
-    problem = Body(Block(SIZE), law).problem(probe, element=0.01)
+    problem = Body(Block(SIZE, element=0.02), law).problem(probe, element=0.01)
     here = np.array([0.021, 0.019, 0.02 + SMALL])
     depths = (5e-4, 1e-3, -1e-4)
     found = problem.open().march([1.0, 2.0, 3.0], [here - [0, 0, depth] for depth in depths])
@@ -205,7 +205,9 @@ def test_a_plastic_block_keeps_a_dent():
 @pytest.mark.slow
 def test_layers_of_three_kinds_stand_on_each_other():
     """Elastic in mixed form, viscoelastic and plastic: the force relaxes, a dent stays, U is finite throughout."""
-    shape = LayeredBlock(extent=SIZE[:2], layers=(("skin", 0.004), ("fat", 0.006), ("base", 0.01)))
+    shape = LayeredBlock(
+        extent=SIZE[:2], element=0.02, layers=(("skin", 0.004), ("fat", 0.006), ("base", 0.01))
+    )
     laws = {
         "skin": Yeoh.with_poisson(0.49, c10=1.5e3, c20=100.0, c30=0.0),
         "fat": Viscoelastic(gel(0.49), ((0.5, 1.0),)),

@@ -21,7 +21,7 @@ MATRIX = np.array([[0.02, 0.01, 0.0], [0.0, -0.01, 0.004], [0.006, 0.0, 0.008]])
 
 
 def under_probe(material, **options):
-    return Body(Block(SIZE), material, **options).problem(PROBE, element=ELEMENT)
+    return Body(Block(SIZE, element=0.03), material, **options).problem(PROBE, element=ELEMENT)
 
 
 @pytest.mark.parametrize("poisson", [0.45, 0.5])

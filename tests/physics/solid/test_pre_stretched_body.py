@@ -21,7 +21,9 @@ GEL = NeoHookean(9e3, 0.3)
 
 
 def body(stretch_x, stretch_y=None, fixed=HELD):
-    return Body(Block((SIDE, SIDE, HEIGHT)), PreStretched(GEL, stretch_x, stretch_y), fixed=fixed)
+    return Body(
+        Block((SIDE, SIDE, HEIGHT), element=0.02), PreStretched(GEL, stretch_x, stretch_y), fixed=fixed
+    )
 
 
 def probe(**options):
@@ -81,7 +83,7 @@ def test_a_ball_feels_the_same_as_on_a_body_that_was_really_stretched():
     stretch, planes = 1.3, (roller("x_min", "x"), roller("y_min", "y"), roller("bottom", "z"))
     law = PreStretched(GEL, stretch)
     walls = (roller("x_max", "x"), roller("y_max", "y"))
-    tense = Body(Block((SIDE, SIDE, HEIGHT)), law, fixed=(), held=(*planes, *walls))
+    tense = Body(Block((SIDE, SIDE, HEIGHT), element=0.02), law, fixed=(), held=(*planes, *walls))
     real = drawn_out(stretch, law.stretches[2], planes)
     middle = SIDE / stretch / 2
     # the pad's stiffness counts by area of the undeformed surface
@@ -103,7 +105,11 @@ def test_a_ball_feels_the_same_as_on_a_body_that_was_really_stretched():
 
 def test_a_stretch_of_one_is_none():
     where = (0.031, 0.03, HEIGHT + RADIUS - 0.003)
-    plain = Body(Block((SIDE, SIDE, HEIGHT)), GEL, fixed=HELD).problem(probe(), element=0.012).solve(where)
+    plain = (
+        Body(Block((SIDE, SIDE, HEIGHT), element=0.02), GEL, fixed=HELD)
+        .problem(probe(), element=0.012)
+        .solve(where)
+    )
     found = body(1.0).problem(probe(), element=0.012).solve(where)
     np.testing.assert_allclose(found.response, plain.response, rtol=1e-6, atol=1e-9)
     assert found.potential_energy == pytest.approx(plain.potential_energy, rel=1e-8)

@@ -18,7 +18,7 @@ PLACE = above(0.003)
 
 
 def problem(material):
-    return Body(Block(SIZE), material).problem(PROBE, element=0.018)
+    return Body(Block(SIZE, element=0.03), material).problem(PROBE, element=0.018)
 
 
 @pytest.fixture(scope="module")

@@ -59,15 +59,13 @@ def test_the_commands_take_what_the_demo_left(palpate, folder, tmp_path):
 
     study = preset_study("block", quick=True)
     for path in folder.glob("block-quick*"):
-        if path.suffix != ".html":  # which `validate` is to write
-            (shutil.copytree if path.is_dir() else shutil.copy)(path, tmp_path / path.name)
+        (shutil.copytree if path.is_dir() else shutil.copy)(path, tmp_path / path.name)
     file = tmp_path / "study.toml"
     file.write_text(to_toml(study), encoding="utf-8")
     assert palpate("sweep", file).code == 0  # read, not solved again
-    judged = palpate("validate", file)
+    judged = palpate("validate", file, "--no-report")  # which the demo has written
     assert judged.code == 0, judged.out + judged.err
     assert "every limit kept" in judged.out
-    assert (tmp_path / "block-quick.html").exists()
     alone = palpate("validate", tmp_path / "block-quick.palpate", "--no-report")
     assert "Shape, mean distance of nodes" in alone.out
     file.write_text(to_toml(study).replace("9000.0 Pa", "8000.0 Pa"), encoding="utf-8")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -11,15 +10,8 @@ import pytest
 from palpate.study import Study, preset_study
 from palpate.study.run import Paths, carry_out, report_study
 from palpate.surrogates import Surrogate
-from palpate.sweeps import LocalCluster, local_cluster
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
-
-
-@pytest.fixture(scope="module")
-def workers() -> Iterator[LocalCluster]:
-    with local_cluster(2) as cluster:
-        yield cluster
 
 
 def small(name: str) -> Study:
@@ -30,9 +22,9 @@ def small(name: str) -> Study:
     changes: dict[str, dict[str, object]] = {
         "body": {"element": 1.5 * study.body.element},
         "interaction": {"depth": (3e-4, 0.0015)},
-        "sweep": {"samples": 6, "element": 1.7 * study.sweep.element},
+        "sweep": {"samples": 6, "element": 1.7 * study.sweep.element, "workers": 1},
         "test": {"samples": 1, "depths": 2},
-        "learning": {"effort": 0.1},
+        "learning": {"effort": 0.1, "workers": 1},
     }
     return study.model_copy(
         update={part: getattr(study, part).model_copy(update=new) for part, new in changes.items()}
@@ -41,12 +33,10 @@ def small(name: str) -> Study:
 
 # the block runs as a whole on the command line; dome, phantom and liver pass here too, and cost as much again each
 @pytest.mark.parametrize("name", ["layered"])
-def test_a_named_body_is_solved_learnt_judged_and_told(
-    name: str, workers: LocalCluster, tmp_path: Path
-) -> None:
+def test_a_named_body_is_solved_learnt_judged_and_told(name: str, tmp_path: Path) -> None:
     study = small(name)
     paths = Paths(tmp_path, study.name)
-    outcome = carry_out(study, paths, cluster=workers, progress=False)
+    outcome = carry_out(study, paths, progress=False)
     assert (len(outcome.train), len(outcome.test)) == (6, 1), "every solve converged"
     body = Surrogate.load(paths.model)
     felt = np.linalg.norm(outcome.train.force, axis=1)

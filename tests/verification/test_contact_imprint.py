@@ -67,7 +67,7 @@ def test_imprint_and_force_converge_with_the_elements(usual):
 def test_a_sphere_that_is_swallowed_is_never_an_answer():
     """A pad of 2e6 N/m³ without a stop lets the block close over the sphere at some depth of less than its diameter."""
     probe = SphereProbe(RADIUS, pad=2e6, stop=None, over=((0.049, 0.049), (0.051, 0.051)))
-    solver = Body(Block(SIZE), GEL).problem(probe, element=0.009).open()
+    solver = Body(Block(SIZE, element=0.03), GEL).problem(probe, element=0.009).open()
     found = [solver.solve(centre(0.05, 0.05, depth)) for depth in (0.004, 0.008, 0.011)]
     assert [one.converged for one in found] == [True, True, False]
     assert found[2].stop is Stop.THROUGH_SURFACE
@@ -83,6 +83,8 @@ def test_a_sphere_that_is_swallowed_is_never_an_answer():
 @pytest.mark.slow
 def test_with_a_stop_the_same_depth_has_an_answer():
     probe = SphereProbe(RADIUS, pad=2e6, stop=0.004, over=((0.049, 0.049), (0.051, 0.051)))
-    found = Body(Block(SIZE), GEL).problem(probe, element=0.009).solve(centre(0.05, 0.05, 0.011))
+    found = (
+        Body(Block(SIZE, element=0.03), GEL).problem(probe, element=0.009).solve(centre(0.05, 0.05, 0.011))
+    )
     assert found.converged, found.message
     assert found.penetration < 0.98 * 0.004

@@ -41,7 +41,9 @@ def sliding():
 )
 def solver(request):
     probe = SphereProbe(RADIUS, pad=PAD, stop=STOP, depth=(0.0, 0.006))
-    return Body(Block(SIZE), NeoHookean(9e3, request.param)).problem(probe, element=0.009).open()
+    return (
+        Body(Block(SIZE, element=0.03), NeoHookean(9e3, request.param)).problem(probe, element=0.009).open()
+    )
 
 
 def solved(solver, centres):

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.physics.beam.beam_presets import preset
-from palpate.surrogates import TouchModel
+from palpate.surrogates import Surrogate
 from palpate.units import Quantity, Range
 
 __all__ = ["BEAMS", "FEW", "Case", "Errors", "case", "touch_model"]
@@ -115,7 +115,7 @@ def case(beam: str, loads: int = 501) -> Case:
 
 
 @functools.cache
-def touch_model(beam: str, *, quick: bool = False) -> TouchModel:
+def touch_model(beam: str, *, quick: bool = False) -> Surrogate:
     """The beam as a body that can be touched: `palpate.sweep` and `palpate.learn` as a user calls them.
 
     `quick` takes few solves, one pass and a rough refinement.

@@ -24,7 +24,9 @@ from benchmarks.rivals import RIVALS
 from benchmarks.runner import main
 from benchmarks.table import Claim, Column, Table
 from palpate.network import Network, Scaling
-from palpate.surrogates import TouchModel
+from palpate.network.radial import radial
+from palpate.runtime.touchable import touchable
+from palpate.surrogates import NodeField, PadBaseline, Surrogate
 from palpate.units import Quantity, Range
 
 __all__ = ["NumpyNetwork", "interleaved", "tables"]
@@ -54,33 +56,42 @@ class NumpyNetwork:
 
 
 class NumpyTouch:
-    """What `TouchModel.evaluator()` does for one load across the beam, in plain NumPy.
+    """A tick's arithmetic for one load across the beam, in plain NumPy.
 
-    Projection of the hand on the load's direction with its mirror image, force network, limits, position of
-    the held node, reaction.
+    Projection of the hand on the load's direction, U = ½ K w² exp ℓ(w) and its slope, the load that holds the node
+    there, the mirror image of the shape, position of the held node, reaction.
     """
 
-    def __init__(self, model: TouchModel) -> None:
-        force, field = model.networks["force"], model.networks["field"]
-        self.direction = model.directions[0]
-        self.force, self.tip = NumpyNetwork(force), NumpyNetwork(field)
-        rows = slice(2 * model.touch_node, 2 * model.touch_node + 2)
+    def __init__(self, model: Surrogate) -> None:
+        field, baseline, network = model.fields["displacement"], model.energy.baseline, model.energy.network
+        assert isinstance(field, NodeField)
+        assert isinstance(baseline, PadBaseline)
+        s = network.scaling
+        self.direction, self.stiffness = baseline.axes[0], float(baseline.rest.coefficients[0, 0]) ** 2
+        self.factors, self.shifts = network.factors[:, 0, 0], network.shifts[:, 0]
+        self.weights, self.tail, self.radial = network.weights[0], network.tail[0], network.radial
+        self.scales = (s.input_centre[0], s.input_half[0], s.output_centre[0], s.output_scale[0])
+        self.tip = NumpyNetwork(field.network)
+        rows = slice(2 * field.held, 2 * field.held + 2)
         for name in ("c", "d"):
             setattr(self.tip, name, getattr(self.tip, name)[rows])
         self.tip.w = np.ascontiguousarray(self.tip.w[:, rows])
-        hand, load = force.inputs[0], model.inputs[0]
-        self.hand, self.load = (hand.low, hand.high), (load.low, load.high)
+        self.hand, self.load = model.inputs[0], field.inputs[0]
 
     def __call__(self, position: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
         """Force (3,) on the hand, position (2,) of the held node, and whether this is inside the range."""
-        h = float(self.direction @ position)
-        sign = -1.0 if h < 0 else 1.0
-        held = min(max(sign * h, self.hand[0]), self.hand[1])
-        load = min(max(float(self.force((held,))[0]), self.load[0]), self.load[1])
-        contact = self.tip((load,))
-        if sign < 0:
+        w = float(self.direction @ position)
+        centre, half, middle, scale = self.scales
+        x = (w - centre) / half
+        t = self.factors * x - self.shifts
+        phi, slope, _ = radial(self.radial, t * t)
+        value = middle + scale * (self.tail[0] + self.tail[1] * x + self.weights @ phi)
+        rise = scale / half * (self.tail[1] + self.weights @ (2.0 * slope * t * self.factors))
+        load = self.stiffness * math.exp(value) * (w + 0.5 * w * w * rise)
+        contact = self.tip((min(abs(load), self.load.high),))
+        if load < 0:
             contact = contact - 2 * (contact @ self.direction[:2]) * self.direction[:2]
-        return -sign * load * self.direction, contact, held == sign * h
+        return -load * self.direction, contact, self.hand.low <= w <= self.hand.high
 
 
 def tables(*, quick: bool = False) -> list[Table]:
@@ -144,11 +155,13 @@ def _network_query(network: Network) -> dict[str, Callable[[], Any]]:
     return {OURS: lambda: evaluator(x), NUMPY: lambda: plain(x)}
 
 
-def _touch_query(model: TouchModel) -> dict[str, Callable[[], Any]]:
-    evaluator, plain, none = model.evaluator(), NumpyTouch(model), np.zeros(0)
-    position = 0.4 * model.reach * model.directions[0]
+def _touch_query(model: Surrogate) -> dict[str, Callable[[], Any]]:
+    body, plain, none = touchable(model), NumpyTouch(model), np.zeros(0)
+    evaluator, position = body.evaluator(), 0.4 * body.reach * model.energy.baseline.directions[0]
     evaluator(position, none)
-    np.testing.assert_allclose(plain(position)[0], evaluator.force, rtol=0, atol=1e-10)
+    force, contact, _ = plain(position)
+    np.testing.assert_allclose(force, evaluator.force, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(contact, evaluator.contact[:2], rtol=0, atol=1e-9)
     return {OURS: lambda: evaluator(position, none), NUMPY: lambda: plain(position)}
 
 

@@ -20,15 +20,16 @@ touch, _ = pp.learn(
 )
 
 print(touch)
-print(f"virtual coupling: {1 / touch.compliance:.0f} N/m")
+print(f"virtual coupling: {1 / touch.energy.baseline.compliance:.0f} N/m")
 
-answer = touch.evaluator()
-for x, y in [(0.0, -0.2), (0.02, -0.2), (0.3, -0.2)]:
-    answer(np.array([x, y, 0.0]), np.zeros(0))
-    force, tip = answer.force, answer.contact
+hands = np.array([(0.0, -0.2), (0.02, -0.2), (0.3, -0.2)])  # m, along the two loads
+force, inside = touch.energy.force(hands), touch.energy.inside(hands)
+loads = -force @ touch.energy.baseline.directions.T  # what the hand pulls with
+tips = touch.fields["displacement"].values(loads)[:, -1]
+for (x, y), F, tip, good in zip(hands, force, tips, inside, strict=True):
     print(
-        f"hand at ({x:+.2f}, {y:+.2f}) m: force on it ({force[0]:+.2f}, {force[1]:+.2f}) N, "
-        f"tip at ({tip[0]:+.3f}, {tip[1]:+.3f}) m, {'inside' if answer.inside else 'outside'} the trained range"
+        f"hand at ({x:+.2f}, {y:+.2f}) m: force on it ({F[0]:+.2f}, {F[1]:+.2f}) N, "
+        f"tip at ({tip[0]:+.3f}, {tip[1]:+.3f}) m, {'inside' if good else 'outside'} the trained range"
     )
 
 print(pp.validate(touch, test))

@@ -12,12 +12,11 @@ data = pp.sweep(beam, pp.TipLoad(0.0, 5.0), samples=32, seed=0, workers=2)
 touch, _ = pp.learn(data, name="copper")
 path = touch.save("copper.palpate")
 
-answer = touch.evaluator()  # allocates nothing per call: what the loop uses
+answer = touch.energy.evaluator()  # allocates nothing per call: what the loop uses
 for millimetres in (-5, -10, -20, 20, -60):
     answer(np.array([0.0, millimetres / 1000, 0.0]), np.zeros(0))
-    side = " (mirrored)" if answer.mirrored else ""
-    edge = "" if answer.inside else " (beyond the trained range: held at its edge)"
-    print(f"tip at {millimetres:+4d} mm: {answer.force[1]:+.3f} N on the hand{side}{edge}")
+    edge = "" if answer.inside else " (beyond the trained range)"
+    print(f"tip at {millimetres:+4d} mm: {answer.force[1]:+.3f} N on the hand{edge}")
 
 with LoopProcess(path, device="stroke:amplitude=0.05,frequency=2") as loop:
     for _ in range(5):

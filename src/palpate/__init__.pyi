@@ -41,10 +41,8 @@ from .study import preset_study as preset_study
 from .study import read_study as read_study
 from .surrogates import Baseline as Baseline
 from .surrogates import Surrogate as Surrogate
-from .surrogates import TouchModel as TouchModel
 from .surrogates import load as load
 from .surrogates import register_baseline as register_baseline
-from .surrogates.plastic import HeldBody as HeldBody
 from .sweeps import ExternalProblem as ExternalProblem
 from .sweeps import Space as Space
 from .sweeps import local_cluster as local_cluster

@@ -14,7 +14,7 @@ import palpate as pp
 from models import spring_beam
 from palpate.dataset.measured import read_measured, write_measured
 from palpate.learning.correction import correct
-from palpate.learning.plastic.paths import HeldPath, HeldPaths
+from palpate.learning.plastic.load_histories import LoadHistories, LoadHistory
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import Surrogate
 from palpate.surrogates.memories import Relaxation
@@ -171,11 +171,11 @@ def test_a_network_alone_knows_its_ranges_and_no_deviation(palpate, fitted, tmp_
 
 
 def test_histories_of_a_held_body_say_what_they_are(palpate, tmp_path):
-    one = HeldPath(
+    one = LoadHistory(
         *np.array([[0.0, 1.0], [0.0, 0.01], [0.0, 2.0], [0.0, 0.01], [0.0, 0.0]]), np.zeros((2, 3, 2))
     )
-    path = HeldPaths(np.zeros((3, 2)), 2, np.array([0.0, 1.0]), (one,)).save(tmp_path / "paths.palpate")
-    assert "HeldPaths: 1 with 2 samples" in palpate("ask", path).out
+    path = LoadHistories(np.zeros((3, 2)), 2, np.array([0.0, 1.0]), (one,)).save(tmp_path / "paths.palpate")
+    assert "LoadHistories: 1 with 2 samples" in palpate("ask", path).out
     answer = palpate("ask", path, "--at", "0,0,0")
     assert (answer.code, "does not answer at a place" in answer.err) == (2, True)
 
@@ -199,12 +199,14 @@ def test_what_is_no_place_is_told_what_is(palpate, file, place):
     assert "--at" in answer.err
 
 
-def test_a_body_held_at_a_node_has_no_place_to_ask_at(palpate, tmp_path):
-    path = spring_beam().save(tmp_path / "beam.palpate")
-    assert "TouchModel" in palpate("ask", path).out
-    answer = palpate("ask", path, "--at", "0,0,0")
-    assert answer.code == 2
-    assert "palpate run" in answer.err
+def test_a_body_held_at_a_node_is_asked_at_its_displacement(palpate, tmp_path):
+    path = spring_beam(stiffness=20.0).save(tmp_path / "beam.palpate")
+    assert "displacement at 21 nodes" in palpate("ask", path).out
+    answer = palpate("ask", path, "--at", "0.1", "--json")
+    assert answer.code == 0, answer.err
+    (told,) = json.loads(answer.out)["answers"]
+    assert told["force"] == pytest.approx([0.0, 2.0, 0.0])
+    assert palpate("ask", path, "--at", "0,0,0").code == 2
 
 
 def test_a_missing_file_is_named(palpate, tmp_path):

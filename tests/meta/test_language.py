@@ -72,7 +72,15 @@ GIVEN_UP = {
 # A word of everyday English in the physics: the time in which a load rises to its size.
 ALLOWED = {("physics", "rise")}
 GIVEN_UP_CLASSES = {
-    *("ContactLaw", "GraspSurrogate", "HeldBody", "HeldPaths", "HeldStudy", "RestStiffness", "Stiffening"),
+    *(
+        "ContactLaw",
+        "GraspSurrogate",
+        "HeldBody",
+        "LoadHistories",
+        "HeldStudy",
+        "RestStiffness",
+        "Stiffening",
+    ),
     *("TouchModel", "TouchStudy", "TouchSurrogate", "TouchedBody"),
 }
 

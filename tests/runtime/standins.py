@@ -12,10 +12,10 @@ STIFFNESS = 20.0  # N/m
 class PlainAnswer:
     """F = −k x in every direction, with switches to misbehave."""
 
-    amplitude, depth, inside, mirrored = 0.0, 0.0, True, False
+    amplitude, depth, inside = 0.0, 0.0, True
 
     def __init__(self, parameters):
-        self.force, self.contact, self.loads = np.zeros(3), np.zeros(3), np.zeros(1)
+        self.force = np.zeros(3)
         self.stiffness, self.slope = np.zeros((3, 3)), np.zeros(3)
         self.spring, self.poison, self.error = STIFFNESS, 0.0, None
         self.seen = np.full(parameters, np.nan)
@@ -24,7 +24,6 @@ class PlainAnswer:
         if self.error is not None:
             raise self.error
         np.multiply(position, -self.spring, out=self.force)
-        self.contact[:] = position
         self.force[0] += self.poison
         self.seen[:] = parameters
 

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
-from palpate.learning import Refinement, hand_coordinates, learn_touch
+from palpate.learning import Refinement, hand_coordinates, learn_bent
 from palpate.physics import Circle, Rectangle, Section
 from palpate.study import Study, preset_names, preset_study, read_study, to_toml
 from palpate.study.run import split_rows
@@ -118,39 +118,35 @@ def test_datasets_of_different_bodies_are_not_put_together(solved):
 
 def test_networks_may_do_without_units(solved):
     _, grid, _, _ = solved
-    touch, _ = learn_touch(grid, refinement=Refinement(units_max=0))
-    assert {name: n.units for name, n in touch.networks.items() if name != "filter"} == {
-        "nodes": 0,
-        "field": 0,
-        "force": 0,
-    }
+    touch = learn_bent(grid, effort=0.1, refinement=Refinement(units_max=0)).surrogate
+    fields = {name: field.network.units for name, field in touch.fields.items() if name != "filter"}
+    assert fields == {"nodes": 0, "displacement": 0}
 
 
 def test_too_few_solves_are_refused(solved):
     _, grid, _, _ = solved
     with pytest.raises(UsageError, match="too few"):
-        learn_touch(grid.take([0, 1, 2]))
+        learn_bent(grid.take([0, 1, 2]))
 
 
 def test_a_coupling_that_holds_nothing_is_refused(solved):
-    _, grid, _, _ = solved
+    _, _, _, sobol = solved
     with pytest.raises(UsageError, match="holds nothing"):
-        learn_touch(grid, coupling=0.0)
+        learn_bent(sobol, passes=1, refinement=Refinement(samples=0, units_max=1, starts=1), coupling=0.0)
 
 
 def test_two_loads_get_a_coupling_and_the_answer_leads_back_to_the_hand(solved):
     _, _, _, sobol = solved
-    touch, _ = learn_touch(
-        sobol, passes=1, refinement=Refinement(samples=0, units_max=8, target=1e-3, starts=1)
+    few = Refinement(samples=0, units_max=8, target=1e-3, starts=1)
+    touch = learn_bent(sobol, passes=1, refinement=few, effort=0.2).surrogate
+    compliance, field = touch.energy.baseline.compliance, touch.fields["displacement"]
+    assert compliance > 0
+    hand, directions = (
+        hand_coordinates(sobol, field.held, (0, 1), compliance),
+        touch.energy.baseline.directions,
     )
-    assert touch.compliance > 0
-    hand = hand_coordinates(sobol, touch.touch_node, touch.touched, touch.compliance)
-    evaluator = touch.evaluator()
-    for h, P in zip(hand[:10], sobol.X[:10], strict=True):
-        evaluator(h @ touch.directions)
-        np.testing.assert_allclose(evaluator.force, -P @ touch.directions, atol=0.2)
-        np.testing.assert_allclose(
-            evaluator.contact + touch.compliance * evaluator.loads @ touch.directions,
-            h @ touch.directions,
-            atol=0.05,
-        )
+    force = touch.energy.force(hand)
+    np.testing.assert_allclose(force, -sobol.X @ directions, atol=0.2)
+    loads = -force @ directions.T
+    contact = field.values(loads)[:, field.held]
+    np.testing.assert_allclose(contact + compliance * loads @ directions, hand @ directions, atol=0.05)

@@ -1,4 +1,4 @@
-"""Bodies that answer linearly, made by formula, with datasets and touch models that fit them exactly.
+"""Bodies that answer linearly, made by formula, with datasets and surrogates that fit them exactly.
 
 Errors put into a model are then known in closed form.
 """
@@ -6,15 +6,16 @@ Errors put into a model are then known in closed form.
 from __future__ import annotations
 
 import copy
+import dataclasses
 from typing import Any
 
 import numpy as np
 
-from models import linear_network
+from models import linear_network, planar_field, spring_energy
 from palpate.dataset import Dataset, Layout, assemble
 from palpate.learning import History
 from palpate.network import Network
-from palpate.surrogates import TouchModel
+from palpate.surrogates import LearntEnergy, NodeField, Surrogate
 from palpate.units import Quantity, Range
 
 PLACES = np.linspace(0.0, 1.0, 6)
@@ -58,28 +59,30 @@ def tip_data(X: np.ndarray | None = None, name: str = "P", scale: float = 1.0) -
 
 
 def tip_model(
-    *, shift: float = 0.0, slope: float = 0.0, force: float = 1.0, scale: float = 1.0, name: str = "P"
-) -> TouchModel:
+    *,
+    shift: float = 0.0,
+    slope: float = 0.0,
+    force: float = 1.0,
+    scale: float = 1.0,
+    name: str = "P",
+    low: float = 0.0,
+) -> Surrogate:
     """The exact model of `tip_data`, with errors put into it.
 
     Its nodes are off by shift + slope · ξ with the scaled load ξ in [−1, 1]; its force by the factor `force`.
     """
-    loads = [Range(name, 0.0, 5.0, "N")]
-    half = scale * COMPLIANCE * 2.5
-    fall = -half * PLACES**2
-    nodes = np.stack([fall[1:] + shift, fall[1:] + slope], axis=1)
-    field = np.zeros((12, 2))
-    field[1::2] = fall[:, None]
+    loads = [Range(name, low, 5.0, "N")]
+    middle, half = (5.0 + low) / 2, (5.0 - low) / 2
+    fall = -scale * COMPLIANCE * PLACES**2
+    nodes = np.stack([middle * fall[1:] + shift, half * fall[1:] + slope], axis=1)
+    whole = np.zeros((12, 2))
+    whole[1::2] = np.outer(fall, [middle, half])
     outputs = [Quantity(f"u_y at {x:g} m", "m") for x in PLACES[1:]]
     names = [Quantity(f"u_{c} at {x:g} m", "m") for x in PLACES for c in "xy"]
-    travel = [Range("h", 0.0, 2 * half, "m")]
-    networks = {
-        "nodes": linear_network(loads, outputs, nodes),
-        "filter": linear_network(loads, outputs, nodes),
-        "field": linear_network(loads, names, field),
-        "force": linear_network(travel, [Quantity(name, "N")], np.full((1, 2), 2.5 * force)),
-    }
-    return _model(networks, (0,), np.array([[0.0, -1.0, 0.0]]), 2 * half)
+    asked = linear_network(loads, outputs, nodes)
+    travel = scale * COMPLIANCE
+    energy = spring_energy(force / travel, [Range(f"h along {name}", low * travel, 5.0 * travel, "m")])
+    return _model(energy, linear_network(loads, names, whole), asked, asked)
 
 
 PLANE = [Range("P_x", -4.0, 4.0, "N"), Range("P_y", -4.0, 4.0, "N")]
@@ -91,39 +94,37 @@ def plane_data(X: np.ndarray | None = None) -> Dataset:
     return dataset(X, PLANE, [(1.0, 0.0), (0.0, 1.0)], [5, 5])
 
 
-def plane_model(turn: np.ndarray | None = None) -> TouchModel:
-    """The exact model of `plane_data`, its loads multiplied by the matrix `turn` (2, 2)."""
+def plane_model(turn: np.ndarray | None = None) -> Surrogate:
+    """The exact model of `plane_data`, its loads multiplied by the positive definite matrix `turn` (2, 2)."""
     reach = 4.0 * COMPLIANCE
-    pull = 4.0 * (np.eye(2) if turn is None else turn)
     shape = np.kron((PLACES**2)[:, None], reach * np.eye(2))
     names = [Quantity(f"u_{c} at {x:g} m", "m") for x in PLACES for c in "xy"]
     hand = [Range("h_x", -reach, reach, "m"), Range("h_y", -reach, reach, "m")]
-    networks = {
-        "nodes": linear_network(PLANE, names[2:], np.hstack([np.zeros((10, 1)), shape[2:]])),
-        "field": linear_network(PLANE, names, np.hstack([np.zeros((12, 1)), shape])),
-        "force": linear_network(hand, [Quantity("P", "N")] * 2, np.hstack([np.zeros((2, 1)), pull])),
-    }
-    return _model(networks, (0, 1), np.eye(3)[:2], reach)
-
-
-def _model(
-    networks: dict[str, Network], touched: tuple[int, ...], directions: np.ndarray, reach: float
-) -> TouchModel:
-    return TouchModel(
-        name="rubber",
-        networks=networks,
-        rest=np.hstack([REST, np.zeros((6, 1))]),
-        nodes_of_interest=np.arange(6),
-        touch_node=5,
-        touched=touched,
-        directions=directions,
-        compliance=0.0,
-        mirrors=False,
-        reach=reach,
-        stiffness_max=1 / COMPLIANCE,
-        radius=0.005,
-        meta={"refinement": {"used": 26}, "settings": {"window": 50}},
+    stiffness = (np.eye(2) if turn is None else turn) / COMPLIANCE
+    return _model(
+        spring_energy(stiffness, hand, np.eye(3)[:2]),
+        linear_network(PLANE, names, np.hstack([np.zeros((12, 1)), shape])),
+        linear_network(PLANE, names[2:], np.hstack([np.zeros((10, 1)), shape[2:]])),
     )
+
+
+def _model(energy: LearntEnergy, whole: Network, nodes: Network, own: Network | None = None) -> Surrogate:
+    points = np.hstack([REST, np.zeros((6, 1))])
+    common = {"touched": np.arange(len(energy.inputs)), "of_interest": np.arange(6)}
+    fields = {"displacement": planar_field("displacement", whole, points, **common)}
+    for name, network in (("nodes", nodes), ("filter", own)):
+        if network is not None:
+            components = range(2) if len(network.outputs) == 10 else (1,)
+            columns = np.array([(node, c) for node in range(1, 6) for c in components])
+            fields[name] = NodeField(name, "m", network, columns, points, 5, **common)
+    meta = {"name": "rubber", "refinement": {"used": 26}, "settings": {"window": 50}}
+    return Surrogate(energy, fields, meta=meta)
+
+
+def with_network(model: Surrogate, name: str, network: Network) -> Surrogate:
+    """The same body, one of whose fields has another network."""
+    changed = dataclasses.replace(model.fields[name], network=network)
+    return dataclasses.replace(model, fields={**model.fields, name: changed})
 
 
 def history(heldout: tuple[float, ...] = (1e-1, 1e-2, 2e-2, 1e-3)) -> History:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from linear_bodies import history, nonsense, plane_data, plane_model, tip_data, tip_model
+from linear_bodies import history, nonsense, plane_data, plane_model, tip_data, tip_model, with_network
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from palpate.errors import UsageError
@@ -181,8 +181,7 @@ def test_the_same_data_give_the_same_page(tmp_path: Path) -> None:
 def test_a_network_that_answers_nonsense_can_be_reported(tmp_path: Path) -> None:
     """Not-a-number at every node: the page comes, and says that a limit was missed."""
     touch, data = tip_model(), tip_data()
-    broken = {**touch.networks, "nodes": nonsense(touch.networks["nodes"])}
-    touch = dataclasses.replace(touch, networks=broken)
+    touch = with_network(touch, "nodes", nonsense(touch.fields["nodes"].network))
     validation = validate(touch, data, limits=Limits())
     page = write_report(tmp_path / "nan.html", [chapter(model=touch, validation=validation)])
     assert "not a number" in page.read_text(encoding="utf-8")

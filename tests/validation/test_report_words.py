@@ -9,11 +9,20 @@ from typing import Any
 
 import numpy as np
 import pytest
-from linear_bodies import COMPLIANCE, dataset, history, plane_data, plane_model, tip_data, tip_model
+from linear_bodies import (
+    COMPLIANCE,
+    dataset,
+    history,
+    plane_data,
+    plane_model,
+    tip_data,
+    tip_model,
+    with_network,
+)
 
 from palpate.dataset import Dataset
 from palpate.learning import Settings
-from palpate.surrogates import TouchModel
+from palpate.surrogates import Surrogate
 from palpate.units import Range
 from palpate.validation import Chapter, Limits, validate
 from palpate.validation.limits import CRITERIA
@@ -31,23 +40,27 @@ def provenance(**body: Any) -> dict[str, Any]:
     return {"problem": {"body": {"type": "Cantilever", "length": 0.15, **body}}}
 
 
-def told(touch: TouchModel, data: Dataset, **limits: Any) -> Chapter:
+def told(touch: Surrogate, data: Dataset, **limits: Any) -> Chapter:
     validation = validate(touch, data, limits=Limits(**limits))
     return Chapter("beam", touch, data, validation, train=data, history=history())
 
 
-def with_units(touch: TouchModel, **units: int) -> TouchModel:
+def with_units(touch: Surrogate, **units: int) -> Surrogate:
     """The same answers from networks of other sizes."""
-    networks = dict(touch.networks)
     for key, number in units.items():
-        net, n = networks[key], len(networks[key].inputs)
-        networks[key] = dataclasses.replace(
+        net = touch.energy.network if key == "energy" else touch.fields[key].network
+        n = len(net.inputs)
+        sized = dataclasses.replace(
             net,
             factors=np.ones((number, n, n)),
             shifts=np.zeros((number, n)),
             weights=np.zeros((len(net.outputs), number)),
         )
-    return dataclasses.replace(touch, networks=networks)
+        if key == "energy":
+            touch = touch.with_energy(dataclasses.replace(touch.energy, network=sized))
+        else:
+            touch = with_network(touch, key, sized)
+    return touch
 
 
 def test_a_body_is_named_by_all_that_decides_its_answer() -> None:
@@ -84,22 +97,22 @@ def test_a_large_strain_is_warned_of() -> None:
 
 
 def test_networks_are_told_apart_by_name_and_units() -> None:
-    touch = with_units(tip_model(), nodes=2, field=3, force=5, filter=4)
+    touch = with_units(tip_model(), nodes=2, displacement=3, energy=5, filter=4)
     assert [(name, units) for name, _, units in network_rows(touch)] == [
         ("nodes", "2"),
-        ("field", "3"),
-        ("force", "5"),
+        ("displacement", "3"),
+        ("energy", "5"),
         ("filter", "4"),
     ]
     captions = " ".join(p.caption for p in pictures(told(touch, tip_data()), "c"))
-    assert "network “field”, 3 units" in captions
-    assert "network “force”, 5 units" in captions
-    assert [row[0] for row in network_rows(plane_model())] == ["nodes", "field", "force"]
+    assert "network “displacement”, 3 units" in captions
+    assert "network “energy”, 5 units" in captions
+    assert [row[0] for row in network_rows(plane_model())] == ["nodes", "displacement", "energy"]
 
 
 def test_a_refinement_that_harms_is_told() -> None:
     good, bad = tip_model(), tip_model(shift=1e-3)
-    touch = dataclasses.replace(bad, networks={**bad.networks, "filter": good.networks["filter"]})
+    touch = with_network(bad, "filter", good.fields["filter"].network)
     chapter = told(touch, tip_data(), rmse=1e-4)
     assert "The refined network is worse than the sequential filter: RMSE 1 mm" in story(chapter).learnt
     assert any("worse than the sequential filter" in note for note in chapter.validation.notes)
@@ -114,7 +127,7 @@ def test_a_two_sided_force_keeps_its_sign() -> None:
     """A spring of 1/COMPLIANCE through the origin: a straight line, not a V."""
     loads = [Range("P", -5.0, 5.0, "N")]
     data = dataset(np.linspace(-5.0, 5.0, 41)[:, None], loads, [(0.0, -1.0)], [5])
-    touch = two_sided()
+    touch = tip_model(low=-5.0)
     figure = plot_force(touch, data, Subject.of(touch, data).samples)
     for line in figure.axes[0].lines:
         x, y = np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
@@ -122,22 +135,6 @@ def test_a_two_sided_force_keeps_its_sign() -> None:
         assert y == pytest.approx(1e-3 * x / COMPLIANCE, abs=1e-9)
     assert figure.axes[0].get_xlabel() == "displacement along P (down) / mm"
     assert figure.axes[0].get_ylabel() == "force on the hand against P (up) / N"
-
-
-def two_sided() -> TouchModel:
-    """The model of a tip load of -5 … 5 N."""
-    touch = tip_model()
-    half, loads = 5.0 * COMPLIANCE, (Range("P", -5.0, 5.0, "N"),)
-    networks = {}
-    for key, net in touch.networks.items():
-        inputs = (Range("h", -half, half, "m"),) if key == "force" else loads
-        # twice the range about zero: no constant, twice the slope
-        tail = np.stack([np.zeros(len(net.tail)), 2 * net.tail[:, 1]], axis=1)
-        scaling = dataclasses.replace(
-            net.scaling, input_centre=np.zeros(1), input_half=np.array([inputs[0].high])
-        )
-        networks[key] = dataclasses.replace(net, inputs=inputs, tail=tail, scaling=scaling)
-    return dataclasses.replace(touch, networks=networks)
 
 
 @pytest.mark.parametrize(
@@ -154,12 +151,11 @@ def test_directions_have_names(direction: tuple[float, float, float], words: str
 
 
 def test_positions_that_count_as_outside_are_explained() -> None:
-    data = tip_data()
-    soft = tip_model(force=1.01)  # 1 % too much force: beyond the load's range near its end
-    note = next(n for n in validate(soft, data).notes if "outside" in n)
-    assert re.match(r"\d of 41 hand positions count as outside .* although their loads are inside", note)
-    assert "0.1 % of a load's range" in note
-    assert "of the reach" not in note
+    data, model = tip_data(), tip_model()
+    short = dataclasses.replace(model.energy.network, inputs=(Range("h along P", 0.0, 0.2, "m"),))
+    narrow = model.with_energy(dataclasses.replace(model.energy, network=short))
+    note = next(n for n in validate(narrow, data).notes if "outside" in n)
+    assert re.match(r"8 of 41 hand positions count as outside .* although their loads are inside", note)
     far = next(n for n in validate(plane_model(), plane_data(np.full((4, 2), 4.5))).notes if "outside" in n)
     assert far == "4 of 4 hand positions count as outside the trained range."
 

@@ -11,11 +11,12 @@ from hypothesis import strategies as st
 from linear_bodies import COMPLIANCE, plane_data, plane_model, tip_data, tip_model
 
 from palpate.units import Range
-from palpate.validation import validate
-from palpate.validation.figures.by_load import loop_work, work_around
+from palpate.validation import TouchFunction, TouchSolves, Validation, validate
 from palpate.validation.figures.stiffness import curve_slope
 from palpate.validation.limits import FORCE_JND
 from palpate.validation.worst import outer_part
+from pressed import INPUTS, places
+from pressed import force as force_of
 
 FULL = 5.0 * COMPLIANCE  # tip deflection at 5 N
 
@@ -107,16 +108,24 @@ def test_half_a_newton_is_the_most_that_counts_as_light() -> None:
     assert ForceSamples(sizes, sizes, sizes, np.ones(2, dtype=bool)).light == 0.5
 
 
+def turned(matrix: np.ndarray) -> Validation:
+    """What is said of a model whose forces are those of the solves times a matrix (3, 3)."""
+    X = places()
+    model = TouchFunction("turned", INPUTS, lambda X: force_of(X) @ matrix.T)
+    return validate(model, TouchSolves(X, force_of(X)))
+
+
 @pytest.mark.parametrize("degrees", [1e-5, 3.0, 90.0, 180.0])
 def test_a_turned_force_is_off_by_that_angle(degrees: float) -> None:
     c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
-    force = validate(plane_model(np.array([[c, -s], [s, c]])), plane_data()).force
+    # the solved forces lie in the x–z plane, and so does the turn
+    force = turned(np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])).force
     assert force.direction_p95 == pytest.approx(degrees, rel=1e-6)
     assert force.median == pytest.approx(2 * math.sin(math.radians(degrees) / 2), rel=1e-6)
 
 
 def test_no_force_at_all_is_as_wrong_as_the_opposite_one() -> None:
-    assert validate(plane_model(np.zeros((2, 2))), plane_data()).force.direction_p95 == pytest.approx(180.0)
+    assert turned(np.zeros((3, 3))).force.direction_p95 == pytest.approx(180.0)
 
 
 def test_stiffness_too_small_by_a_factor() -> None:
@@ -149,33 +158,12 @@ def test_stiffness_of_scattered_loads_is_left_out_with_a_reason() -> None:
     assert "stiffness_p95" not in {c.criterion.key for c in v.checks}
 
 
-@settings(max_examples=20, deadline=None)
-@given(skew=st.floats(-5.0, 5.0), seed=st.integers(0, 10**6))
-def test_work_around_a_loop_is_the_curl_times_its_area(skew: float, seed: int) -> None:
-    """Loads (I + s J) h / C with J the quarter turn have the curl 2 s / C, and the hand feels their opposite."""
-    corners = np.zeros((4, 3))
-    corners[:, :2] = np.random.default_rng(seed).uniform(-0.02, 0.02, (4, 2))
-    evaluate = plane_model(np.eye(2) + skew * np.array([[0.0, -1.0], [1.0, 0.0]])).evaluator()
-    found = work_around(evaluate, corners, np.empty(0))
-    x, y = corners[:, 0], corners[:, 1]
-    area = 0.5 * float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
-    assert found is not None
-    assert found[0] == pytest.approx(-2 * skew / COMPLIANCE * area, abs=1e-12)
-
-
 def test_the_gradient_of_an_energy_does_no_work_around_loops() -> None:
     v = validate(plane_model(np.array([[1.0, 0.3], [0.3, 1.2]])), plane_data())
     assert v.loops is not None
     assert v.loops.loops == 100
     assert v.loops.max < 1e-12
     assert v.loops.energy > 0
-
-
-def test_loops_that_leave_the_trained_region_are_left_out() -> None:
-    far = np.array([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0], [0.0, 10.0, 0.0]])
-    assert work_around(plane_model().evaluator(), far, np.empty(0)) is None
-    outside = np.array([[10.0, 0.0], [0.0, 10.0], [10.0, 10.0]])
-    assert "too few loops" in str(loop_work(plane_model(), plane_data(), outside, loops=3))
 
 
 def test_one_touched_load_needs_no_loops() -> None:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
+from models import DOWN, planar_field
 from palpate.network import Network, Scaling
-from palpate.surrogates import TouchModel
+from palpate.surrogates import LearntEnergy, PadBaseline, RestStiffness, Stiffening, Surrogate
 from palpate.units import Quantity, Range
 
 LOAD = 5.0  # N
@@ -49,28 +52,28 @@ def fitted(inputs: list[Range], outputs: list[Quantity], X: np.ndarray, Y: np.nd
     )
 
 
-def arc_beam(nodes: int = 21) -> TouchModel:
+def arc_beam(nodes: int = 21) -> Surrogate:
     """A 1 m rod, bent to a circular arc in proportion to a tip load of 0 … 5 N downwards."""
-    rest = np.zeros((nodes, 3))
-    rest[:, 0] = np.linspace(0.0, 1.0, nodes)
+    points = np.zeros((nodes, 3))
+    points[:, 0] = np.linspace(0.0, 1.0, nodes)
     load = np.linspace(0.0, LOAD, 101)[:, None]
-    shapes = arc(BEND * load[:, 0] / LOAD, rest[:, 0])
-    drop = -shapes[:, -1, 1:]
+    shapes = arc(BEND * load[:, 0] / LOAD, points[:, 0])
+    drop, top = -shapes[:, -1, 1], float(-shapes[-1, -1, 1])
     names = [Quantity(f"u_{c} at node {i}", "m") for i in range(nodes) for c in "xy"]
-    field = fitted([Range("tip force", 0.0, LOAD, "N")], names, load, shapes.reshape(101, -1))
-    force = fitted([Range("h", 0.0, float(drop[-1, 0]), "m")], [Quantity("tip force", "N")], drop, load)
-    return TouchModel(
-        name="rod",
-        networks={"nodes": field, "field": field, "force": force},
-        rest=rest,
-        nodes_of_interest=np.arange(0, nodes, (nodes - 1) // 5),
-        touch_node=nodes - 1,
-        touched=(0,),
-        directions=np.array([[0.0, -1.0, 0.0]]),
-        compliance=0.0,
-        mirrors=True,
-        reach=float(np.linalg.norm(shapes[-1, -1])),
-        stiffness_max=float(np.max(np.diff(load[:, 0]) / np.diff(drop[:, 0]))),
-        radius=0.005,
-        meta=META,
-    )
+    network = fitted([Range("tip force", 0.0, LOAD, "N")], names, load, shapes.reshape(101, -1))
+    interest = np.arange(0, nodes, (nodes - 1) // 5)
+    field = planar_field("displacement", network, points, mirror=DOWN[0], of_interest=interest)
+    # ln of the energy ∫P dw over ½ K w², on both sides
+    work = np.concatenate([[0.0], np.cumsum((load[1:, 0] + load[:-1, 0]) / 2 * np.diff(drop))])
+    K = load[1, 0] / drop[1]
+    ratio = np.log(work[2:] / (0.5 * K * drop[2:] ** 2))
+    w, ratio = np.concatenate([-drop[:1:-1], drop[2:]]), np.concatenate([ratio[::-1], ratio])
+    flat = fitted([Range("h", -top, top, "m")], [Quantity("ℓ", "")], w[:, None], ratio[:, None])
+    baseline = PadBaseline(RestStiffness.even(np.array([[K]])), Stiffening.none(1), axes=DOWN)
+    return Surrogate(LearntEnergy(flat, baseline), {"displacement": field}, meta={"name": "rod", **META})
+
+
+def one_sided(rod: Surrogate) -> Surrogate:
+    """The same body, whose drawing knows one sign of the load."""
+    field = dataclasses.replace(rod.fields["displacement"], mirror=None)
+    return dataclasses.replace(rod, fields={"displacement": field})

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page
 
-from palpate.surrogates import TouchModel
+from palpate.runtime.touchable import touchable
+from palpate.surrogates import Surrogate
 from palpate.viewer import Viewer
 
 ARGUMENTS = [
@@ -96,12 +97,14 @@ def drag(page: Page, dx: float, dy: float, steps: int = 6) -> None:
         page.mouse.move(x + dx * i / steps, y + dy * i / steps)
 
 
-def check_force(model: TouchModel, shown: dict[str, Any], parameters: np.ndarray) -> None:
+def check_force(model: Surrogate, shown: dict[str, Any], parameters: np.ndarray) -> None:
     """The numbers on the page are the network's own answer at the hand shown."""
-    evaluator = model.evaluator()
-    evaluator(vector(shown["data"], "position"), parameters)
+    body, position = touchable(model), vector(shown["data"], "position")
+    evaluator = body.evaluator()
+    evaluator.place(position, holding=True, believed=True)
+    evaluator(position, parameters)
     # three decimals on the page, and a position rounded to 32 bits at the largest stiffness
-    slack = 0.5e-3 + 1e-6 + model.reach * 2**-23 * model.stiffness_max
+    slack = 0.5e-3 + 1e-6 + body.reach * 2**-23 * body.stiffness_max
     force = [number(shown["text"][f"force-{c}"]) for c in "xy"]
     assert np.allclose(force, evaluator.force[:2], rtol=0, atol=slack)
     assert number(shown["text"]["force-norm"]) == pytest.approx(np.linalg.norm(evaluator.force), abs=slack)

@@ -12,17 +12,17 @@ from bodies import arc_beam
 from chromium_page import ARGUMENTS, assert_no, open_page, settled
 from playwright.sync_api import Browser, Page, sync_playwright
 
-from palpate.surrogates import TouchModel
+from palpate.surrogates import Surrogate
 from palpate.viewer import Viewer, page_model
 
 
 @pytest.fixture(scope="session")
-def rod() -> TouchModel:
+def rod() -> Surrogate:
     return arc_beam()
 
 
 @pytest.fixture(scope="package")  # its loop runs at 1 kHz: not beside other folders' tests
-def viewer(rod: TouchModel) -> Iterator[Viewer]:
+def viewer(rod: Surrogate) -> Iterator[Viewer]:
     with Viewer(rod, port=0) as running:
         yield running
 

@@ -12,13 +12,14 @@ from chromium_page import READ, check_force, drag, let_go, number, settled, tip,
 from playwright.sync_api import Page
 from test_messages import WRITTEN, sample
 
-from palpate.surrogates import TouchModel
+from palpate.runtime.touchable import touchable
+from palpate.surrogates import Surrogate
 from palpate.viewer import Viewer, typescript
 
 pytestmark = pytest.mark.timeout(120)
 
 
-def test_mouse_pulls_and_the_force_is_the_networks(page: Page, keep, rod: TouchModel):
+def test_mouse_pulls_and_the_force_is_the_networks(page: Page, keep, rod: Surrogate):
     assert number(page.inner_text("#force-norm")) == 0.0
     keep(page, "rest")
     y = tip(page)[1]
@@ -32,10 +33,10 @@ def test_mouse_pulls_and_the_force_is_the_networks(page: Page, keep, rod: TouchM
     page.mouse.up()
     released = settled(page, "free")
     assert number(released["text"]["force-norm"]) == 0.0
-    assert vector(released["data"], "contact") == pytest.approx(0.0, abs=1e-4 * rod.reach)
+    assert vector(released["data"], "contact") == pytest.approx(0.0, abs=1e-4 * touchable(rod).reach)
 
 
-def test_pulling_beyond_the_trained_range_is_flagged(page: Page, keep, rod: TouchModel):
+def test_pulling_beyond_the_trained_range_is_flagged(page: Page, keep, rod: Surrogate):
     drag(page, -40, 250)
     shown = settled(page, "outside")
     keep(page, "outside")
@@ -45,13 +46,15 @@ def test_pulling_beyond_the_trained_range_is_flagged(page: Page, keep, rod: Touc
     assert let_go(page)["flags"] == ["free"]
 
 
-def test_arrow_keys_pull_and_escape_lets_go(page: Page, rod: TouchModel):
+def test_arrow_keys_pull_and_escape_lets_go(page: Page, rod: Surrogate):
     page.focus("#view")
     for _ in range(15):
         page.keyboard.press("ArrowDown")
     shown = settled(page, "inside")
-    start = rod.displacement(np.zeros(1))[rod.touch_node, 1]  # the network's own rest is not quite 0
-    wanted = start - 15 * 0.02 * rod.reach
+    start = rod.fields["displacement"].values(np.zeros((1, 1)))[
+        0, -1, 1
+    ]  # the network's own rest is not quite 0
+    wanted = start - 15 * 0.02 * touchable(rod).reach
     assert vector(shown["data"], "position")[1] == pytest.approx(wanted, rel=2**-22)
     check_force(rod, shown, np.zeros(0))
     page.keyboard.press("Escape")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import os
 import signal
 import threading
@@ -15,15 +14,16 @@ from chromium_page import assert_no, check_force, drag, let_go, number, settled,
 from playwright.sync_api import expect
 from websocket_page import client_of
 
-from models import linear_network, spring_beam
-from palpate.surrogates import TouchModel
+from models import DOWN, linear_network, planar_field, spring_beam
+from palpate.runtime.touchable import touchable
+from palpate.surrogates import ConstantBaseline, LearntEnergy, Surrogate
 from palpate.units import Quantity, Range
 from palpate.viewer import Viewer, hand_lock
 
 pytestmark = pytest.mark.timeout(120)
 
 
-def test_a_finger_pulls(visit, keep, viewer: Viewer, rod: TouchModel):
+def test_a_finger_pulls(visit, keep, viewer: Viewer, rod: Surrogate):
     page = visit(viewer, viewport={"width": 390, "height": 780}, has_touch=True, is_mobile=True)
     touch = page.context.new_cdp_session(page)
     x, y = tip(page)
@@ -72,9 +72,9 @@ def held_elsewhere(viewer: Viewer, y: float) -> Iterator[None]:
             other.join()
 
 
-def test_the_second_page_watches(visit, keep, viewer: Viewer, rod: TouchModel):
+def test_the_second_page_watches(visit, keep, viewer: Viewer, rod: Surrogate):
     page = visit(viewer)
-    y = -0.4 * rod.reach
+    y = -0.4 * touchable(rod).reach
 
     def check_watching() -> None:
         shown = settled(page, "watching")
@@ -92,7 +92,7 @@ def test_the_second_page_watches(visit, keep, viewer: Viewer, rod: TouchModel):
 
 
 @pytest.mark.slow
-def test_the_end_of_the_loop_is_shown_and_the_page_returns(visit, keep, complaints, rod: TouchModel):
+def test_the_end_of_the_loop_is_shown_and_the_page_returns(visit, keep, complaints, rod: Surrogate):
     with Viewer(rod, port=0) as viewer:
         page = visit(viewer)
         drag(page, -20, 100)
@@ -124,19 +124,21 @@ def test_the_end_of_the_loop_is_shown_and_the_page_returns(visit, keep, complain
     complaints.clear()
 
 
-def stiff_with_two_loads() -> TouchModel:
-    """A stiff spring beam (31 mm of 1 m) with a second load, not the hand's, that moves tip and force."""
+def stiff_with_two_loads() -> Surrogate:
+    """A stiff beam (31 mm of 1 m) with a second load, not the hand's, that moves tip and force."""
     beam = spring_beam(160.0)
-    inputs = [*beam.inputs, Range("force at midspan", -2.0, 2.0, "N")]
-    names = [Quantity(f"u_{c} at node {i}", "m") for i in range(21) for c in "xy"]
-    tail = np.hstack([beam.networks["field"].tail, np.zeros((42, 1))])
-    tail[1::2, 2] = -0.0025 * beam.rest[:, 0]
-    force = linear_network(
-        [*beam.networks["force"].inputs, inputs[1]], [Quantity("tip", "N")], np.array([[2.5, 2.5, -0.4]])
+    field = beam.fields["displacement"]
+    inputs = [*field.inputs, Range("force at midspan", -2.0, 2.0, "N")]
+    tail = np.hstack([field.network.tail, np.zeros((42, 1))])
+    tail[1::2, 2] = -0.0025 * field.points[:, 0]
+    shown = planar_field(
+        "displacement", linear_network(inputs, list(field.network.outputs), tail), field.points
     )
-    field = linear_network(inputs, names, tail)
-    networks = {"nodes": field, "field": field, "force": force}
-    return dataclasses.replace(beam, name="two loads", networks=networks, mirrors=False)
+    # U + U₀ = U₀ exp ℓ with ℓ = 40 w + 0.05 p: pulled from the start, the more the further
+    hand = [Range("h", 0.0, 0.03125, "m"), inputs[1]]
+    flat = linear_network(hand, [Quantity("ℓ", "")], np.array([[0.625, 0.625, 0.1]]))
+    energy = LearntEnergy(flat, ConstantBaseline(0.03, DOWN))
+    return Surrogate(energy, {"displacement": shown}, meta={"name": "two loads"})
 
 
 def test_a_load_that_the_hand_does_not_supply_and_a_small_displacement(visit, keep):

@@ -7,7 +7,7 @@ import socket
 import pytest
 
 from palpate.errors import PortInUseError, UsageError
-from palpate.surrogates import TouchModel
+from palpate.surrogates import Surrogate
 from palpate.viewer import Viewer, free_port
 from palpate.viewer.web_server import listen
 
@@ -44,7 +44,7 @@ def test_no_such_port(port: int):
         listen(port)
 
 
-def test_a_viewer_on_a_busy_port(rod: TouchModel, taken: int):
+def test_a_viewer_on_a_busy_port(rod: Surrogate, taken: int):
     with Viewer(rod, port=taken) as moved:
         assert moved.port != taken
         assert f":{moved.port}/" in moved.url

@@ -13,7 +13,7 @@ import httpx
 import pytest
 
 from palpate.errors import FileFormatError, PortInUseError, UsageError
-from palpate.surrogates import TouchModel
+from palpate.surrogates import Surrogate
 from palpate.viewer import Viewer
 
 SCRIPT = """
@@ -25,7 +25,7 @@ print("ended in good order", flush=True)
 
 
 @pytest.fixture
-def script(rod: TouchModel, tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
+def script(rod: Surrogate, tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
     """A program without a main guard, on standard input, in a process group of its own."""
     path = rod.save(tmp_path / "rod.palpate")
     with subprocess.Popen(
@@ -62,7 +62,7 @@ def test_serve_ends_in_good_order(script: subprocess.Popen[str], number: signal.
         httpx.get(url)
 
 
-def test_stopping_twice_and_a_model_in_memory(rod: TouchModel):
+def test_stopping_twice_and_a_model_in_memory(rod: Surrogate):
     viewer = Viewer(rod, port=0).start()
     assert httpx.get(viewer.url).headers["content-type"].startswith("text/html")
     viewer.stop()
@@ -79,12 +79,12 @@ def test_a_corrupt_file_is_said_to_be_one(tmp_path: Path):
         Viewer(path, port=0)
 
 
-def test_an_unknown_device_is_a_usage_error(rod: TouchModel):
+def test_an_unknown_device_is_a_usage_error(rod: Surrogate):
     with pytest.raises(UsageError, match="gloves"):
         Viewer(rod, port=0, device="gloves").start()
 
 
-def test_after_a_failed_start_nothing_is_left(rod: TouchModel):
+def test_after_a_failed_start_nothing_is_left(rod: Surrogate):
     with Viewer(rod, port=0) as first:
         second = Viewer(rod, port=first.port, strict_port=True)
         with pytest.raises(PortInUseError):

@@ -13,7 +13,8 @@ import pytest
 from websocket_page import Client, client_of
 from websockets.exceptions import ConnectionClosed
 
-from palpate.surrogates import TouchModel
+from palpate.runtime.touchable import touchable
+from palpate.surrogates import Surrogate
 from palpate.viewer import Viewer
 from palpate.viewer.messages import Frame, Hold, Loop, Notice
 from palpate.viewer.session import MOST_CREDITS
@@ -74,22 +75,23 @@ def test_credits_do_not_pile_up(viewer: Viewer):
         assert MOST_CREDITS <= frames <= 2 * MOST_CREDITS
 
 
-def test_force_and_shape_are_the_models_own(viewer: Viewer, rod: TouchModel):
-    y = -0.4 * rod.reach
+def test_force_and_shape_are_the_models_own(viewer: Viewer, rod: Surrogate):
+    y = -0.4 * touchable(rod).reach
     with client_of(viewer) as client:
         frame = held(client, y)
-    evaluator = rod.evaluator()
-    evaluator(np.array(frame.position), np.zeros(0))
+    evaluator, position = touchable(rod).evaluator(), np.array(frame.position)
+    evaluator.place(position, holding=True, believed=True)
+    evaluator(position, np.zeros(0))
     # positions travel in 32 bits: half an ulp of y at the largest stiffness
-    slack = abs(y) * 2**-24 * rod.stiffness_max
+    slack = abs(y) * 2**-24 * touchable(rod).stiffness_max
     assert np.allclose(frame.force, evaluator.force, rtol=2**-23, atol=slack)
     assert np.allclose(frame.contact, evaluator.contact, rtol=2**-23, atol=1e-7)
-    shape = rod.displacement(evaluator.loads).astype("f4")
+    shape = rod.fields["displacement"].values(evaluator.loads)[0].astype("f4")
     assert np.allclose(frame.displacement, shape.ravel(), rtol=0, atol=1e-6)
     assert frame.inside
 
 
-def test_two_clients_one_hand(viewer: Viewer, rod: TouchModel):
+def test_two_clients_one_hand(viewer: Viewer, rod: Surrogate):
     with client_of(viewer) as first, client_of(viewer) as second:
         held(first, -0.1)
         second.hand(0.0, -0.5)
@@ -145,7 +147,7 @@ def test_bytes_that_are_no_message_end_the_conversation(viewer: Viewer):
             assert caught.value.rcvd.code == 1003
 
 
-def test_a_target_that_is_no_number_gives_zero_force_and_a_fault(rod: TouchModel):
+def test_a_target_that_is_no_number_gives_zero_force_and_a_fault(rod: Surrogate):
     with Viewer(rod, port=0) as viewer, client_of(viewer) as client:
         before = held(client, -0.3).faults
         frame = hold(client, math.nan, seconds=0.3)
@@ -156,7 +158,7 @@ def test_a_target_that_is_no_number_gives_zero_force_and_a_fault(rod: TouchModel
         assert math.hypot(*held(client, -0.3).force) > 0.5  # and is forgiven afterwards
 
 
-def test_the_end_of_the_loop_is_told_and_the_force_is_zero(rod: TouchModel, caplog: pytest.LogCaptureFixture):
+def test_the_end_of_the_loop_is_told_and_the_force_is_zero(rod: Surrogate, caplog: pytest.LogCaptureFixture):
     with Viewer(rod, port=0) as viewer, client_of(viewer) as client:
         held(client, -0.3)
         os.kill(viewer.loop.pid, signal.SIGKILL)
@@ -170,7 +172,7 @@ def test_the_end_of_the_loop_is_told_and_the_force_is_zero(rod: TouchModel, capl
     assert "real-time process has ended" in caplog.text
 
 
-def test_a_standing_loop_is_noticed(rod: TouchModel):
+def test_a_standing_loop_is_noticed(rod: Surrogate):
     with Viewer(rod, port=0) as viewer, client_of(viewer) as client:
         held(client, -0.3)
         os.kill(viewer.loop.pid, signal.SIGSTOP)
@@ -182,7 +184,7 @@ def test_a_standing_loop_is_noticed(rod: TouchModel):
 
 
 def test_a_loop_that_stands_in_the_midst_of_a_tick_is_frozen_too(
-    rod: TouchModel, monkeypatch: pytest.MonkeyPatch
+    rod: Surrogate, monkeypatch: pytest.MonkeyPatch
 ):
     with Viewer(rod, port=0) as viewer, client_of(viewer) as client:
         held(client, -0.3)

@@ -13,7 +13,7 @@ from palpate.cli.answer_at_place import Answer, outside, predictions
 from palpate.cli.console import Console
 from palpate.errors import FileFormatError, UsageError
 from palpate.learning import Fitted
-from palpate.learning.plastic.paths import KIND, HeldPaths
+from palpate.learning.plastic.load_histories import KIND, LoadHistories
 from palpate.network import Archive, Network, load_archive
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import LearntEnergy, Surrogate, load
@@ -65,7 +65,7 @@ def _read(path: Path) -> Any:
     """Return the content of a file of any kind."""
     kind = load_archive(path).kind
     if kind == KIND:
-        return HeldPaths.load(path)
+        return LoadHistories.load(path)
     if kind != Archive.kind:
         return load(path)
     try:
@@ -76,7 +76,7 @@ def _read(path: Path) -> Any:
 
 def _inputs(asked: Any) -> tuple[Range, ...]:
     """Return the ranges of the n inputs; none of histories."""
-    if isinstance(asked, HeldPaths):
+    if isinstance(asked, LoadHistories):
         return ()
     return tuple(asked.network.inputs if isinstance(asked, Fitted) else asked.inputs)
 

@@ -162,7 +162,7 @@ def validate_model(
 def _test_set(path: Path, test: Path | None) -> Any:
     """Return the dataset, or for a body with memory the load histories, that lies beside a model or was named."""
     from palpate.dataset import Dataset
-    from palpate.learning.plastic import HeldPaths
+    from palpate.learning.plastic import LoadHistories
 
     beside = [path.with_name(path.stem + end) for end in TEST_SETS]
     found = test or next((file for file in beside if file.exists()), None)
@@ -172,4 +172,4 @@ def _test_set(path: Path, test: Path | None) -> Any:
             why=f"None of {', '.join(file.name for file in beside)} lies beside it.",
             fix="Name a dataset of solves that it was not learnt from: --test DATA.zarr",
         )
-    return HeldPaths.load(found) if found.suffix == ".palpate" else Dataset.open(found)
+    return LoadHistories.load(found) if found.suffix == ".palpate" else Dataset.open(found)

@@ -6,7 +6,7 @@ pool         processes that search; ensemble, folds, starts and kernel_layer are
 structure    growth and pruning around the refinement
 arrays       a network from samples alone; automatic: the filter's thresholds from a target
 stream       learning while it runs: a learner, samples retained, bounded refinement
-touch        a dataset of beam loads made into a body that can be touched
+bent_body    a dataset of loads and deflections made into a body that a hand holds at one node
 energy       the energy of a body from solved energies, forces and stiffnesses
 pressed_solves, pad_solves   what a dataset knows of a body that a probe presses, or a pad holds
 pad_fit      the baseline of a body that is held by a pad
@@ -20,6 +20,7 @@ learn_dataset  `palpate.learn`: a dataset made into a body that is felt and seen
 from palpate.learning.arrays.fit import fit
 from palpate.learning.arrays.fitted import Fitted
 from palpate.learning.automatic import automatic
+from palpate.learning.bent_body import FEWEST, Refinement, hand_coordinates, learn_bent, node_outputs
 from palpate.learning.energy import EnergyHistory, learn_energy
 from palpate.learning.learn import Learned, freeze, learn
 from palpate.learning.learn_dataset import LearningHistory
@@ -31,7 +32,6 @@ from palpate.learning.stream.learner import Learner
 from palpate.learning.stream.refining import Refining
 from palpate.learning.stream.reservoir import Reservoir
 from palpate.learning.structure import grow, prune, refined_network
-from palpate.learning.touch import FEWEST, Refinement, hand_coordinates, learn_touch, node_outputs
 from palpate.rbf.filter.observation import Observation
 from palpate.rbf.filter.settings import PRESETS, Settings, default, founding, recommended
 from palpate.rbf.filter.state import State, initial
@@ -68,9 +68,9 @@ __all__ = [
     "hand_coordinates",
     "initial",
     "learn",
+    "learn_bent",
     "learn_dataset",
     "learn_energy",
-    "learn_touch",
     "node_outputs",
     "observe",
     "posterior",

@@ -13,13 +13,14 @@ from typing import Any
 from palpate.dataset import Dataset, Layout
 from palpate.errors import UsageError
 from palpate.format import share
+from palpate.learning.bent_body import learn_bent
 from palpate.learning.energy import EnergyHistory, learn_energy
 from palpate.learning.fields import LearntField, learn_snapshots, lumped_mass
+from palpate.learning.learning_history import History
 from palpate.learning.pad_fit import fit_pad
 from palpate.learning.pad_solves import is_padded, pad_solves
 from palpate.learning.pressed_solves import PressedSolves, is_pressed
 from palpate.learning.search import Budget
-from palpate.learning.touch import learn_touch
 from palpate.surrogates import Baseline, ContactLaw, Solves, Surrogate
 from palpate.surrogates.baselines import registered_baselines
 
@@ -49,12 +50,15 @@ class LearningHistory:
         Number of solves that were learnt from.
     seconds : float
         How long it took, s.
+    filter : History, optional
+        Record of the sequential filter, of a body that loads bend.
     """
 
     energy: EnergyHistory
     solves: int
     seconds: float
     fields: Mapping[str, LearntField] = field(default_factory=dict)
+    filter: History | None = None
 
     def __str__(self) -> str:
         tried = len(self.energy.trials)
@@ -124,7 +128,8 @@ def learn(
     **options
         Further ones of `palpate.learning.energy.learn_energy`, such as ``units_max``, ``target`` and ``networks``. Of a
         pressed body also ``law``, a contact law that is taken as it is, or ``length``, a guess of the depth at which
-        pad and body cross, m; of a held one those of `palpate.learning.fit_pad`.
+        pad and body cross, m; of a held one those of `palpate.learning.fit_pad`; of one that loads
+        bend those of `palpate.learning.learn_bent`.
 
     Returns
     -------
@@ -145,10 +150,15 @@ def learn(
             fix="Pass what `palpate.sweep` returns; for arrays X and Y use `palpate.fit`.",
         )
     if "input_node" in train:
-        return learn_touch(train, name=name, seed=seed, **options)  # type: ignore[return-value]
+        began = time.monotonic()
+        bent = learn_bent(
+            train, name=name, effort=effort, seconds=seconds, workers=workers, seed=seed, **options
+        )
+        spent = time.monotonic() - began
+        return bent.surrogate, LearningHistory(bent.energy, len(train.ok), spent, filter=bent.filter.history)
     budget, began = Budget.of(effort, seconds), time.monotonic()
     known = _recognise(train, layout, options)
-    searches: dict[str, Any] = {"effort": effort, "workers": workers, "seed": seed}
+    common: dict[str, Any] = {"effort": effort, "workers": workers, "seed": seed}
     fields = [name for name in _SHOWN if shape and name in train and known.learn_field is not None]
 
     def limit(share: float) -> float | None:
@@ -159,14 +169,14 @@ def learn(
     log(f"energy of {solves} solves")
     first = limit(1.0 / (1.0 + _FIELD_SHARE * len(fields)))
     energy, found = learn_energy(
-        known.solves, known.baseline, **(searches | {"seconds": first} | dict(known.options))
+        known.solves, known.baseline, **(common | {"seconds": first} | dict(known.options))
     )
     learnt: dict[str, LearntField] = {}
     for i, shown in enumerate(fields):
         assert known.learn_field is not None
         log("shape" if shown == "displacement" else "stress")
         left = limit(1.0 / (len(fields) - i))
-        learnt[shown] = known.learn_field(shown, _SHOWN[shown][1], searches | {"seconds": left})
+        learnt[shown] = known.learn_field(shown, _SHOWN[shown][1], common | {"seconds": left})
     meta = {**found.meta, "name": name, "dataset": {"hash": train.ok.hash, "provenance": train.provenance}}
     surrogate = Surrogate(energy, {k: v.field for k, v in learnt.items()}, meta=meta)
     return surrogate, LearningHistory(found, solves, time.monotonic() - began, learnt)

@@ -40,10 +40,8 @@ __all__ = [
 
 _READERS = {
     "networks": "palpate.Network.load or palpate.Fitted.load",
-    "touch": "palpate.TouchModel.load",
     "surrogate": "palpate.load",
-    "held-body": "palpate.HeldBody.load",
-    "held-paths": "palpate.learning.plastic.HeldPaths.load",
+    "held-paths": "palpate.learning.plastic.LoadHistories.load",
 }
 """The function that reads a file of each kind, for the message where it is given to another."""
 _PARTS = ("factors", "shifts", "weights", "tail")
@@ -123,7 +121,7 @@ def load_archive(path: str | os.PathLike[str], *, kind: str | None = None) -> Ar
     if kind is not None and container.kind != kind:
         raise FileFormatError(
             f"{path} holds {container.kind!r}; {kind!r} is needed here.",
-            why="What was learnt of a beam, of a pressed or held body and of arrays are files of different kinds.",
+            why="A learnt body, networks of arrays and load histories are files of different kinds.",
             fix=f"Read it with {_READERS.get(container.kind, 'what wrote it')}, or give a file of the other kind.",
         )
     try:

@@ -21,11 +21,12 @@ from typing import Any, Protocol
 import numpy as np
 from numba import njit
 
+from palpate.surrogates.moving_rest import MovingRest
+
 __all__ = ["Elastic", "HandEvaluator"]
 
 # slope of d: 1 for a distance, measured 1.0004 at most where five bodies are pressed; behind flat ones it is 6 at s = 0
 _STEEP = 1.2
-_NEWTON, _AT_REST = 12, 1e-12  # steps to a moved rest, and the share of its amplitude to which it is found
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
 
@@ -76,11 +77,9 @@ class HandEvaluator:
     contact : (3,)
         The probe's centre, or the offset of the held place from its rest position, m.
     loads : (n,)
-        The loads that hold the body there, N, where it is learnt by loads; otherwise none.
+        The inputs of the field at its nodes there, such as the loads that hold the body, N; otherwise none.
     inside : bool
         Within the trained region.
-    mirrored : bool
-        Answered by symmetry.
     let_go : bool
         Whether the body has let go of a probe that is still in it.
     depth : float
@@ -114,6 +113,8 @@ class HandEvaluator:
         Of the probe, m, unless it is among the further inputs.
     radius_input : int, optional
         Which of the further inputs is the probe's radius.
+    node : NodeEvaluator, optional
+        Of a body drawn by its nodes: tells where the held node is.
     places : tuple of int
         Further inputs that a hand which holds can't change: those that say where it has taken hold.
     """
@@ -130,6 +131,7 @@ class HandEvaluator:
         inner: float = math.inf,
         radius: float = 0.0,
         radius_input: int | None = None,
+        node: Any = None,
         places: tuple[int, ...] = (),
     ) -> None:
         self._elastic, self._memory, self._holds = elastic, memory, holds
@@ -140,17 +142,16 @@ class HandEvaluator:
         felt = np.eye(3) if directions is None else np.ascontiguousarray(directions, dtype=np.float64)
         self._stays: Any = None
         if hasattr(memory, "release"):
-            # an answer that knows itself where it lies, or a place that is sought along the one direction
-            self._stays = memory if hasattr(memory, "lies") else _MovingRest(elastic, memory, felt[0])
+            self._stays = MovingRest(elastic, memory, felt[0])
         self._indentation = memory if hasattr(memory, "now") else None
         self.indentation = np.zeros(0) if self._indentation is None else self._indentation.now
         self.force: np.ndarray = elastic.force if memory is None else memory.force
-        self._follows = not hasattr(elastic, "contact")
-        self.contact: np.ndarray = getattr(elastic, "contact", np.zeros(3))
-        self.loads: np.ndarray = getattr(elastic, "loads", np.zeros(0))
+        self._node, self._place = node, np.zeros(3)
+        self.contact: np.ndarray = self._place if node is None else node.value
+        self.loads: np.ndarray = np.zeros(0) if node is None else node.inputs
         self._grip, self._held = np.zeros(3), False
         self._felt: list[list[float]] = (felt.T @ felt).tolist()
-        self.inside, self.mirrored, self.let_go = True, False, False
+        self.inside, self.let_go = True, False
         self.depth, self.stiffness, self.elapsed = -math.inf, 0.0, 0.0
         _along(elastic.force, elastic.stiffness)  # compile now, not in the loop
         _behind(self._normal, self._normal)
@@ -175,7 +176,7 @@ class HandEvaluator:
                 position[:] = self.away
             return
         if not self._held:
-            position[:] = self.contact
+            position[:] = stays.lies
             return
         x, y, z = position.tolist()
         for i in range(3):
@@ -205,12 +206,12 @@ class HandEvaluator:
                     amplitude = 0.0
                     elastic.force[:] = 0.0
             good = memory is None or memory.step(position, amplitude, elastic.slope, self.elapsed)
-        if self._follows:
-            stays = self._stays
-            self._project(position if stays is None or self._held else stays.lies)
-            if stays is not None:
-                stays.lies[:] = self.contact
-        self.mirrored = elastic.mirrored if not self._follows else False
+        stays = self._stays
+        self._project(position if stays is None or self._held else stays.lies)
+        if stays is not None:
+            stays.lies[:] = self._place
+        if self._node is not None:
+            self._node(self._place, self.force, parameters)
         self.inside = elastic.inside and not self.let_go
         self.depth = 0.0 if self.let_go else elastic.depth
         self.stiffness = _along(elastic.force, elastic.stiffness)
@@ -218,11 +219,11 @@ class HandEvaluator:
             self.force[:] = math.nan  # the loop makes a fault of it
 
     def _project(self, position: np.ndarray) -> None:
-        """Take the part of a position along the felt directions as the contact."""
+        """Take the part of a position along the felt directions as the place."""
         x, y, z = position.tolist()
         for i in range(3):
             row = self._felt[i]
-            self.contact[i] = row[0] * x + row[1] * y + row[2] * z
+            self._place[i] = row[0] * x + row[1] * y + row[2] * z
 
     def _where_taken(self, parameters: np.ndarray) -> np.ndarray:
         """The further inputs (p,), those of the place as they were when the hand took hold.
@@ -243,37 +244,6 @@ class HandEvaluator:
             self.let_go = False
         elif depth > self._inner + radius or _behind(self._elastic.outward, self._normal):
             self.let_go = True
-
-
-class _MovingRest:
-    """The rest of a node that a memory moves: where the amplitude is that at which nothing pulls.
-
-    Attributes
-    ----------
-    lies : (3,)
-        That place, m.
-    """
-
-    def __init__(self, elastic: Any, memory: Any, direction: np.ndarray) -> None:
-        self._elastic, self._memory, self._direction = elastic, memory, direction.tolist()
-        self.lies = np.zeros(3)
-
-    def release(self, dt: float, parameters: np.ndarray) -> bool:
-        """Let go of the node for dt seconds; find its place by Newton's method, as q grows along the direction."""
-        elastic, lies = self._elastic, self.lies
-        amplitude = self._memory.release(dt)
-        a, b, c = self._direction
-        for _ in range(_NEWTON):
-            elastic(lies, parameters)
-            rise = a * elastic.slope[0] + b * elastic.slope[1] + c * elastic.slope[2]
-            missing = amplitude - elastic.amplitude
-            if abs(missing) <= _AT_REST * abs(amplitude) or rise <= 0.0:
-                break
-            way = missing / rise
-            lies[0] += way * a
-            lies[1] += way * b
-            lies[2] += way * c
-        return math.isfinite(amplitude)
 
 
 @_jit

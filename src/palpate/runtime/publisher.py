@@ -27,7 +27,7 @@ class Publisher:
         self._depth, self._stiffness = record["depth"], record["stiffness"]
         self._let_go = record["let_go"]
         self._tick, self._time = record["tick"], record["time"]
-        self._inside, self._mirrored = record["inside"], record["mirrored"]
+        self._inside = record["inside"]
         self._grabbed, self._stalled, self._clamped = record["grabbed"], record["stalled"], record["clamped"]
         self._fault, self._lateness, self._work = record["fault"], record["lateness"], record["work"]
         self._late, self._worked = Histogram(record["histogram"]), Histogram(record["work_histogram"])
@@ -49,7 +49,7 @@ class Publisher:
         """Take over the learnt body's answer, and publish its indentations where one has grown."""
         self._contact[:] = answer.contact
         self._loads[:] = answer.loads
-        self._inside[()], self._mirrored[()] = answer.inside, answer.mirrored
+        self._inside[()] = answer.inside
         self._depth[()], self._stiffness[()], self._let_go[()] = answer.depth, answer.stiffness, answer.let_go
         if answer.grew:
             count = len(answer.indentation)

@@ -51,7 +51,6 @@ STATE = np.dtype(
         ("depth", "f8"),  # m, of a probe in the surface at rest; 0 for a body held at a node
         ("stiffness", "f8"),  # N/m, felt along the force in body metres; 0 where it isn't known
         ("loads", "f8", MAX_INPUTS),  # N, the loads that hold the body there
-        ("mirrored", "u1"),
         ("inside", "u1"),  # within the trained range
         ("let_go", "u1"),  # the body has let go of a probe that is too deep in it
         ("clamped", "u1"),  # the force limit acted
@@ -114,7 +113,6 @@ class State:
     depth: float
     stiffness: float
     loads: np.ndarray
-    mirrored: bool
     inside: bool
     let_go: bool
     clamped: bool
@@ -167,7 +165,7 @@ class State:
     @classmethod
     def of(cls, record: np.ndarray, indentation: np.ndarray) -> State:
         """Copy records of dtype `STATE` and `INDENTATION`, shape ()."""
-        flags = {"mirrored", "inside", "let_go", "clamped", "grabbed", "stalled"}
+        flags = {"inside", "let_go", "clamped", "grabbed", "stalled"}
         values: dict[str, Any] = {}
         for name in STATE.names or ():
             value = record[name]

@@ -9,31 +9,31 @@ first contact. What a hand holds is displaced by the hand from its rest position
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
 from palpate.errors import UsageError
 from palpate.runtime.hand_evaluator import HandEvaluator
 from palpate.runtime.workspace import Workspace
-from palpate.surrogates import FieldSurrogate, Surrogate, TouchedSurface, TouchModel, load
+from palpate.surrogates import FieldSurrogate, NodeField, Surrogate, TouchedSurface, load
 from palpate.surrogates.memories import Memory
-from palpate.surrogates.plastic import HeldBody
+from palpate.surrogates.moving_rest import follow
 from palpate.surrogates.surrogate import correction_count, correction_warning
 from palpate.units import Range, bounds
 
-__all__ = ["Learnt", "Touchable", "load_touchable", "touchable"]
-
-Learnt: TypeAlias = TouchModel | HeldBody | Surrogate
+__all__ = ["Touchable", "load_touchable", "touchable"]
 
 _SAMPLES = 4096  # of the trained ranges, for what is largest there
 _SHARE = 0.75  # of the deepest trained depth: how deep a scripted stroke goes
+_WAY, _PAUSE = 9, 0.1  # places on the way to an end, and the time from one to the next, s
 _SLIVER = 1e-3  # of the deepest depth: shallower is no press
 
 
@@ -45,7 +45,7 @@ class Touchable:
     ----------
     energy : LearntEnergy
         What the hand feels: force and stiffness, depth, trained region.
-    fields : mapping of name to FieldSurrogate
+    fields : mapping of name to FieldSurrogate or NodeField
         What the eye sees; may be empty.
     name : str
         Of the body, as pages and reports call it.
@@ -56,7 +56,7 @@ class Touchable:
     """
 
     energy: Any
-    fields: Mapping[str, FieldSurrogate] = field(default_factory=dict)
+    fields: Mapping[str, FieldSurrogate | NodeField] = field(default_factory=dict)
     name: str = "body"
     memory: Memory | None = None
     meta: Mapping[str, Any] = field(default_factory=dict)
@@ -92,9 +92,15 @@ class Touchable:
         return bool(self.energy.baseline.directions[:, 2].any())
 
     @property
-    def is_line(self) -> bool:
-        """True for a body that is drawn as a line of nodes, of which a hand holds one."""
-        return False
+    def line(self) -> NodeField | None:
+        """The displacement of a body that is drawn as a line of nodes, of which a hand holds one; otherwise None."""
+        shown = self.fields.get("displacement")
+        return shown if isinstance(shown, NodeField) else None
+
+    @property
+    def stays(self) -> bool:
+        """True for a body that lies elsewhere after a touch, so that there is no swing back to rest."""
+        return self.memory is not None and self.memory.moves_rest
 
     @property
     def radius_parameter(self) -> int | None:
@@ -113,6 +119,8 @@ class Touchable:
         if self.radius_parameter is not None:
             own = self.parameters[self.radius_parameter]
             return (own.low + own.high) / 2.0
+        if self.line is not None:
+            return self.line.radius
         return self.reach / 2.0 if self.holds else float(self.energy.baseline.radius)
 
     @cached_property
@@ -131,6 +139,8 @@ class Touchable:
         if region is not None:
             scaling = self.energy.network.scaling
             X = np.vstack([X, scaling.input_centre + scaling.input_half * region.points])
+        if self.holds:  # what is held is stiffest and goes farthest at the ends
+            X = np.vstack([X, list(itertools.product(*((r.low, r.high) for r in self.inputs)))])
         depth = self.depth(X)
         felt = X[self.energy.inside(X) & (depth > _SLIVER * max(depth.max(), 0.0)) & (depth > 0.0)]
         if not len(felt):
@@ -222,7 +232,8 @@ class Touchable:
             # lengths among the further inputs of what is held say where it is held
             places = tuple(i for i, r in enumerate(self.parameters) if r.unit == "m")
             directions = self.energy.baseline.directions
-            return HandEvaluator(elastic, memory, holds=True, directions=directions, places=places)
+            node = None if self.line is None else self.line.node(directions)
+            return HandEvaluator(elastic, memory, holds=True, directions=directions, node=node, places=places)
         return HandEvaluator(
             elastic,
             memory,
@@ -233,6 +244,39 @@ class Touchable:
             radius=self.energy.baseline.radius,
             radius_input=self.radius_parameter,
         )
+
+    @cached_property
+    def travel(self) -> np.ndarray:
+        """Lower and upper corner (2, 3) of the box in which the held node of a line moves, offsets from rest, m.
+
+        The box is taken over both ends and the middle of every load's range: bodies bend farthest at the ends, and
+        reach farthest along their axis near the middle of a range of both signs. A body that mirrors goes as far
+        against its load. One that lies elsewhere after a touch is led to both ends of its place, and let go there.
+        """
+        line = self.line
+        if line is None:
+            return np.zeros((2, 3))
+        if self.stays:
+            offsets = self._led_to_ends(line)
+        else:
+            ends = [(-r.high if line.mirror is not None else r.low, r.high) for r in line.inputs]
+            lattice = np.array(list(itertools.product(*((a, (a + b) / 2.0, b) for a, b in ends))))
+            offsets = np.vstack([line.values(lattice)[:, line.held], np.zeros(3)])
+            if line.mirror is not None:
+                half = line.values(lattice / 2.0)[:, line.held]
+                offsets = np.vstack([offsets, half])
+        return np.array([offsets.min(axis=0), offsets.max(axis=0)])
+
+    def _led_to_ends(self, line: NodeField) -> np.ndarray:
+        """Return offsets (N, 3) of the held node, m, led from rest to both ends of its place and let go there."""
+        direction, ends, offsets = self.energy.baseline.directions[0], self.inputs[0], []
+        for end in (ends.low, ends.high):
+            way = np.linspace(0.0, end, _WAY)
+            led = follow(self.energy, self.memory, way[:, None], _PAUSE * np.arange(_WAY))
+            places = np.append(way, led.rest @ direction)
+            pulls = np.append(-led.force @ direction, 0.0)
+            offsets.append(line.values(np.stack([places, pulls], axis=1))[:, line.held])
+        return np.concatenate(offsets)
 
     def workspace(self, radius: float) -> Workspace:
         """Return how a hand's workspace of `radius` (m) lies about the body.
@@ -264,22 +308,16 @@ class Touchable:
         return {"amplitude": _SHARE * self.deepest / scale, "x": x, "y": z, "z": -y}
 
 
-def touchable(model: Learnt, name: str = "") -> Touchable:
+def touchable(model: Surrogate, name: str = "") -> Touchable:
     """Return a learnt body as a hand finds it.
 
     Parameters
     ----------
-    model : learnt body
-        Anything that `palpate.load` reads and that gives a force.
+    model : Surrogate
+        The learnt body.
     name : str
         Its name where its own record has none.
     """
-    from palpate.runtime.held_node import BeamTouchable, RodTouchable
-
-    if isinstance(model, HeldBody):
-        return RodTouchable(model, {}, model.name, None, model.meta)
-    if isinstance(model, TouchModel):
-        return BeamTouchable(model, {}, model.name, None, model.meta)
     known = str(model.meta.get("name", "")) or name or "body"
     if (touches := correction_count(model.meta)) is not None:
         known += f", corrected by {touches} touches" + (

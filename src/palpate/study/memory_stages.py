@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.learning.plastic import HeldPaths, lead_held, lead_twin, learn_held
+from palpate.learning.plastic import LoadHistories, learn_with_memory, solve_elastic, solve_histories
 from palpate.physics import Cantilever, LinearElastic, TipLoad
 from palpate.physics.materials.plastic import Plastic
 from palpate.physics.materials.viscous import Viscoelastic
@@ -20,7 +20,7 @@ TEST_SEED = 1000  # between the seeds of the histories to learn from and of thos
 BEYOND = 1.05  # how far the elastic body goes over the learnt histories, for those that go farther
 
 
-def sweep_histories(study: Study, problem: Any) -> tuple[HeldPaths, HeldPaths]:
+def sweep_histories(study: Study, problem: Any) -> tuple[LoadHistories, LoadHistories]:
     """Return histories to learn from, drawn to the ends of the load, and even ones for testing."""
     assert study.memory is not None
     load, creeps = _load_of(study), isinstance(study.body.build().material, Viscoelastic)
@@ -31,19 +31,19 @@ def sweep_histories(study: Study, problem: Any) -> tuple[HeldPaths, HeldPaths]:
         "step": study.memory.step,
     }
     seed = study.memory.seed
-    train = lead_held(problem, count=study.memory.histories, seed=seed, **common)
-    test = lead_held(problem, count=study.memory.unseen, seed=seed + TEST_SEED, outward=0.0, **common)
+    train = solve_histories(problem, count=study.memory.histories, seed=seed, **common)
+    test = solve_histories(problem, count=study.memory.unseen, seed=seed + TEST_SEED, outward=0.0, **common)
     return train, test
 
 
-def learn_histories(study: Study, train: HeldPaths) -> tuple[Any, Any]:
+def learn_histories(study: Study, train: LoadHistories) -> tuple[Any, Any]:
     """Learn a body with memory; the same body without its memory is solved here."""
     body: Any = study.body.build()
     load = _load_of(study)
     elastic = _elastic(body).problem(TipLoad(0.0, load.high, direction=load.direction, name=load.name))
     reach = BEYOND * max(float(np.abs(path.place).max()) for path in train.paths)
-    twin = lead_twin(elastic, reach=reach, load=load.high)
-    return learn_held(train, twin, relaxes=isinstance(body.material, Viscoelastic), name=study.name)
+    same = solve_elastic(elastic, reach=reach, load=load.high)
+    return learn_with_memory(train, same, relaxes=isinstance(body.material, Viscoelastic), name=study.name)
 
 
 def _load_of(study: Study) -> LoadRecord:

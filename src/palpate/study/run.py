@@ -22,7 +22,7 @@ from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.learning import History, Settings, founding, learn_dataset, node_outputs
 from palpate.learning import learn as learn_samples
-from palpate.learning.plastic import HeldPaths
+from palpate.learning.plastic import LoadHistories
 from palpate.study.memory_stages import learn_histories, sweep_histories
 from palpate.study.study import Study
 from palpate.surrogates.loading import load
@@ -45,7 +45,7 @@ __all__ = [
 ]
 
 Log = Callable[[str], None]
-Rows: TypeAlias = Dataset | HeldPaths
+Rows: TypeAlias = Dataset | LoadHistories
 """What was solved: a dataset, or the histories of a body with memory."""
 
 
@@ -131,7 +131,7 @@ class Outcome:
             test=self.test,
             validation=self.validation,
             train=self.train,
-            history=self.history,
+            history=_filter_of(self.history),
             rivals=self.rivals,
             settings=self.study.model_dump(mode="json", exclude_none=True),
             timings=self.timings,
@@ -194,7 +194,7 @@ def load_data(study: Study, paths: Paths) -> tuple[Rows, Rows]:
         If the files are of another body or of other loads: the study was changed since they were solved.
     """
     if study.sweep is None or study.test is None:
-        return HeldPaths.load(paths.histories), HeldPaths.load(paths.unseen_histories)
+        return LoadHistories.load(paths.histories), LoadHistories.load(paths.unseen_histories)
     problem = study.problem()
     # compared as the file has it: tuples are lists there
     wanted = json.loads(json.dumps(problem.describe()))
@@ -286,6 +286,12 @@ def learn_study(
     return _with_meta(model, {"runtime": study.runtime.model_dump()}), history
 
 
+def _filter_of(history: Any) -> History | None:
+    """Return the record of the sequential filter, where one ran."""
+    own = getattr(history, "filter", history)
+    return own if isinstance(own, History) else None
+
+
 def _options(study: Study, train: Dataset, test: Any, progress: Any, log: Log) -> dict[str, Any]:
     """Return the options of `palpate.learn` for a study."""
     options: dict[str, Any] = {"name": study.name, **(study.learning.options() if study.learning else {})}
@@ -307,8 +313,7 @@ def _with_meta(model: Any, more: Mapping[str, Any]) -> Any:
 def validate_study(study: Study, model: Any, test: Rows, history: Any = None) -> Validation:
     """Judge what was learnt by solves that it has never seen, by the study's targets."""
     assert study.target is not None  # every kind of study has one
-    watched = history if isinstance(history, History) else None
-    return validate(model, test, history=watched, limits=study.target.limits())
+    return validate(model, test, history=_filter_of(history), limits=study.target.limits())
 
 
 def with_validation(model: Any, validation: Validation) -> Any:
@@ -319,8 +324,8 @@ def with_validation(model: Any, validation: Validation) -> Any:
 def save_model(paths: Paths, model: Any, history: Any) -> None:
     """Write what was learnt, and the record of its filter where there is one."""
     model.save(paths.model)
-    if isinstance(history, History):
-        history.save(paths.history)
+    if (own := _filter_of(history)) is not None:
+        own.save(paths.history)
 
 
 def load_model(paths: Paths, train: Rows) -> tuple[Any, Any]:
@@ -398,8 +403,8 @@ def carry_out(
     model = with_validation(model, validation)
     save_model(paths, model, history)
     others: dict[str, Any] = {}
-    if rivals and study.filter:
-        others = timed("founding form", lambda: _rivals(study, train, test, history.passes))
+    if rivals and (own := _filter_of(history)) is not None:
+        others = timed("founding form", lambda: _rivals(study, train, test, own.passes))
     return Outcome(study, model, train, test, validation, history, others, timings)
 
 

@@ -12,7 +12,7 @@
     field                what the eye sees of it: displacement, stress, stretch on its surface
     surface              how far a point is from a touched surface
     relaxation, plastic  memory on top of an energy
-    touch                a beam, held at one node: drag in, force out
+    moving_rest          where a body lies that a memory moves; its answer along a history
 """
 
 from palpate.surrogates.baselines import (
@@ -30,11 +30,11 @@ from palpate.surrogates.continuation import Continuation
 from palpate.surrogates.energy import LearntEnergy
 from palpate.surrogates.energy_evaluator import EnergyEvaluator
 from palpate.surrogates.energy_kernels import Compiled
-from palpate.surrogates.fields import FieldEvaluator, FieldSurrogate
+from palpate.surrogates.fields import FieldEvaluator, FieldSurrogate, NodeField
 from palpate.surrogates.loading import load
+from palpate.surrogates.moving_rest import Followed
 from palpate.surrogates.surface import TouchedSurface
 from palpate.surrogates.surrogate import Surrogate
-from palpate.surrogates.touch import TouchEvaluator, TouchModel
 
 __all__ = [
     "Baseline",
@@ -46,14 +46,14 @@ __all__ = [
     "EnergyEvaluator",
     "FieldEvaluator",
     "FieldSurrogate",
+    "Followed",
     "LearntEnergy",
+    "NodeField",
     "PadBaseline",
     "RestStiffness",
     "Solves",
     "Stiffening",
     "Surrogate",
-    "TouchEvaluator",
-    "TouchModel",
     "TouchedSurface",
     "load",
     "register_baseline",

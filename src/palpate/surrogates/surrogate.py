@@ -19,8 +19,9 @@ from palpate.errors import UsageError
 from palpate.format import share
 from palpate.network.codec import load_value, save_value
 from palpate.surrogates.energy import LearntEnergy
-from palpate.surrogates.fields import FieldSurrogate
+from palpate.surrogates.fields import FieldSurrogate, NodeField
 from palpate.surrogates.memories import Memory, Patches
+from palpate.surrogates.moving_rest import Followed, follow
 from palpate.units import Range, bounds
 
 __all__ = ["KIND", "Surrogate", "correction_count", "correction_warning"]
@@ -37,8 +38,8 @@ class Surrogate:
     ----------
     energy : LearntEnergy
         Energy, force and stiffness, and whether they may be trusted.
-    fields : mapping of name to FieldSurrogate
-        What is drawn of it, of the same touched surface and the same inputs; may be empty.
+    fields : mapping of name to FieldSurrogate or NodeField
+        What is drawn of it: fields of the same touched surface and the same inputs, or of nodes; may be empty.
     memory : Memory, optional
         What it remembers of how it was touched, in the loop and on the page.
     meta : mapping
@@ -53,27 +54,19 @@ class Surrogate:
     """
 
     energy: LearntEnergy
-    fields: Mapping[str, FieldSurrogate] = field(default_factory=dict)
+    fields: Mapping[str, FieldSurrogate | NodeField] = field(default_factory=dict)
     memory: Memory | None = None
     meta: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "fields", dict(self.fields))
-        names = [(r.name, r.unit) for r in self.inputs]
         for name, shown in self.fields.items():
-            if not self._touches(shown) or [(r.name, r.unit) for r in shown.inputs] != names:
+            if fault := shown.fault_beside(self.energy):
                 raise UsageError(
                     f"The field {name!r} is not of the body that is touched.",
-                    why="It has another touched surface, or other inputs.",
+                    why=f"Beside this energy, {fault}.",
                     fix="Learn energy and fields from the same solves, with the same TouchedSurface.",
                 )
-
-    def _touches(self, shown: FieldSurrogate) -> bool:
-        surface = self.energy.baseline.surface
-        if surface is None or shown.surface is surface:
-            return True
-        own, theirs = surface.arrays(), shown.surface.arrays()
-        return all(np.array_equal(theirs[k], own[k], equal_nan=True) for k in own)
 
     def __str__(self) -> str:
         head = f"Surrogate {self.name!r}: {', '.join(str(r) for r in self.inputs)}; {self.made_of}"
@@ -119,7 +112,10 @@ class Surrogate:
         """
         surface, shown = energy.baseline.surface, dict(self.fields)
         if surface is not None:
-            shown = {k: replace(v, surface=surface) for k, v in shown.items()}
+            shown = {
+                k: replace(v, surface=surface) if isinstance(v, FieldSurrogate) else v
+                for k, v in shown.items()
+            }
         return Surrogate(energy, shown, self.memory, self.meta if meta is None else meta)
 
     def with_memory(self, memory: Memory | None, *, spacing: float | None = None) -> Surrogate:
@@ -143,10 +139,27 @@ class Surrogate:
             memory = memory.spread(self._patches(spacing), spacing)
         return replace(self, memory=memory)
 
+    def follow(self, X: np.ndarray, times: np.ndarray | None = None) -> Followed:
+        """Return what the body answers along a history that begins before anything was done to it.
+
+        Parameters
+        ----------
+        X : (N, n)
+            The body's inputs, the felt coordinates (m) first; between two rows it is led evenly.
+        times : (N,), optional
+            When it is at each row, s, ascending from 0; a body that relaxes needs them.
+
+        Raises
+        ------
+        UsageError
+            If the rows have another number of inputs, or the times don't fit.
+        """
+        return follow(self.energy, self.memory, X, times)
+
     def _patches(self, spacing: float) -> Patches:
         """Return places of the touched surface, of the size that a typical press has."""
         shown, baseline = next(iter(self.fields.values()), None), self.energy.baseline
-        if shown is None or baseline.surface is None:
+        if not isinstance(shown, FieldSurrogate) or baseline.surface is None:
             raise UsageError(
                 "This body has no drawn surface to keep a memory on.",
                 why="Places that remember are laid out over the mesh of a field.",

@@ -14,18 +14,16 @@ import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
-from palpate.format import count, share
+from palpate.format import count
 from palpate.learning import History
-from palpate.learning.plastic import HeldPaths
-from palpate.learning.touch import hand_coordinates
-from palpate.surrogates import LearntEnergy, Surrogate, TouchModel
+from palpate.learning.bent_body import hand_coordinates
+from palpate.learning.plastic import LoadHistories
+from palpate.surrogates import LearntEnergy, NodeField, Surrogate
 from palpate.surrogates.fields.field_surrogate import FieldSurrogate
-from palpate.surrogates.plastic import HeldBody
-from palpate.surrogates.touch import SLACK
 from palpate.units import Range, bounds
 from palpate.validation.unseen_solves import ForceSamples, TouchFunction, TouchSolves
 
-__all__ = ["Subject", "hand_positions"]
+__all__ = ["Subject", "hand_inputs", "line_of"]
 
 SEEN = 1e-9  # in scaled inputs: a solve this near to one that was trained on is no test
 RADIUS = 1e-9  # relative: radii that are the same
@@ -55,7 +53,7 @@ class Subject:
         The unseen rows of a dataset, with displacements.
     field : FieldSurrogate, optional
         The displacement that is shown.
-    loads : TouchModel, optional
+    loads : Surrogate, optional
         Networks that answer by load.
     body, histories : optional
         A body with memory and unseen histories of it.
@@ -80,9 +78,9 @@ class Subject:
     solves: TouchSolves | None = None
     data: Dataset | None = None
     field: FieldSurrogate | None = None
-    loads: TouchModel | None = None
-    body: HeldBody | None = None
-    histories: HeldPaths | None = None
+    loads: Surrogate | None = None
+    body: Surrogate | None = None
+    histories: LoadHistories | None = None
     history: History | None = None
     refined: TouchSolves | None = None
     strokes: Sequence[TouchSolves] = ()
@@ -107,11 +105,12 @@ class Subject:
         UsageError
             If the solves are of another body, or of no use as a test.
         """
-        if isinstance(model, HeldBody):
-            if not isinstance(test, HeldPaths):
+        line = line_of(model)
+        if line is not None and model.memory is not None:
+            if not isinstance(test, LoadHistories):
                 raise UsageError(
                     f"A body with memory is judged by load histories, not by {type(test).__name__} {test!r:.60}.",
-                    fix="Give load histories that it was not learnt from: HeldPaths.load(path).",
+                    fix="Give load histories that it was not learnt from: LoadHistories.load(path).",
                 )
             return cls(model.name, 0, np.empty((0, 1)), (), body=model, histories=test)
         if not isinstance(test, Dataset | TouchSolves):
@@ -119,13 +118,13 @@ class Subject:
                 f"A model is judged by solves, not by {type(test).__name__} {test!r:.60}.",
                 fix="Give what `palpate.sweep` returned, `Dataset.open(path)`, or TouchSolves of arrays.",
             )
-        if isinstance(model, TouchModel):
+        if line is not None:
             if not isinstance(test, Dataset) or refined is not None or strokes:
                 raise UsageError(
-                    "A model whose networks answer by load is judged by a dataset of its study alone.",
+                    "A body that loads bend is judged by a dataset of its study alone.",
                     fix="Give a Dataset, without `refined` and `strokes`.",
                 )
-            return _by_load(model, test.ok, history, seed)
+            return _by_load(model, line, test.ok, history, seed)
         if history is not None:
             raise UsageError("The model of an energy has no history of a filter.", fix="Leave `history` out.")
         return _by_place(model, test, refined, strokes, seed)
@@ -135,7 +134,8 @@ def _by_place(
     model: Any, test: Dataset | TouchSolves, refined: Any, strokes: Sequence[TouchSolves], seed: int
 ) -> Subject:
     """Return a model whose force is a function of place."""
-    field = model.fields.get("displacement") if isinstance(model, Surrogate) else None
+    shown = model.fields.get("displacement") if isinstance(model, Surrogate) else None
+    field = shown if isinstance(shown, FieldSurrogate) else None
     energy = model.energy if isinstance(model, Surrogate) else None
     function = TouchFunction.of(model)
     _refuse_radius(energy, test)
@@ -222,75 +222,75 @@ def _notes(samples: ForceSamples, seen: int) -> list[str]:
     return found
 
 
-def _by_load(touch: TouchModel, test: Dataset, history: History | None, seed: int) -> Subject:
-    """Return a model whose networks answer by load: the hand is put where each solve has it."""
-    _refuse_other_body(touch, test)
-    touched = list(touch.touched)
-    others = [i for i in range(len(test.ranges)) if i not in touch.touched]
-    hand = hand_coordinates(test, touch.touch_node, touch.touched, touch.compliance)
-    evaluate = touch.evaluator()
-    answer, inside = np.empty((len(test), 3)), np.empty(len(test), dtype=bool)
-    places = hand_positions(touch, hand)
-    for i, (place, x) in enumerate(zip(places, test.X, strict=True)):
-        evaluate(place, np.ascontiguousarray(x[others]))
-        answer[i], inside[i] = evaluate.force, evaluate.inside
-    samples = ForceSamples(hand, -test.X[:, touched] @ touch.directions, answer, inside)
-    turning = len(touch.touched) > 1
+def line_of(model: Any) -> NodeField | None:
+    """Return the displacement of a body that is drawn as a line of nodes; None of any other."""
+    shown = model.fields.get("displacement") if isinstance(model, Surrogate) else None
+    return shown if isinstance(shown, NodeField) else None
+
+
+def _by_load(
+    model: Surrogate, field: NodeField, test: Dataset, history: History | None, seed: int
+) -> Subject:
+    """Return a body that loads bend: the hand is put where each solve has it."""
+    _refuse_other_body(model, field, test)
+    X = hand_inputs(model, field, test)
+    directions, touched = model.energy.baseline.directions, list(field.touched)
+    inside = model.energy.inside(X)
+    samples = ForceSamples(
+        X[:, : len(touched)], -test.X[:, touched] @ directions, model.energy.force(X), inside
+    )
+    turning = len(touched) > 1
     notes = [] if turning else ["Direction is not judged: the hand feels one direction only."]
     if outside := int((~inside).sum()):
-        notes.append(_outside(touch, test, outside))
+        notes.append(_outside(field, test, outside))
     return Subject(
-        touch.name,
+        model.name,
         len(test),
         test.X,
         test.ranges,
         samples=samples,
-        units=touch.networks["force"].units,
+        units=model.energy.network.units,
         turning=turning,
         data=test,
-        loads=touch,
+        loads=model,
         history=history,
         seed=seed,
         notes=tuple(notes),
     )
 
 
-def hand_positions(touch: TouchModel, hand: np.ndarray) -> np.ndarray:
-    """Return positions (N, 3) whose components along the touched loads are `hand` (N, k), m."""
-    return np.ascontiguousarray(hand @ np.linalg.pinv(touch.directions).T)
+def hand_inputs(model: Surrogate, field: NodeField, data: Dataset) -> np.ndarray:
+    """Return the energy's inputs (N, n) where each solve has the hand: its place (m), then the loads elsewhere (N)."""
+    compliance = getattr(model.energy.baseline, "compliance", 0.0)
+    hand = hand_coordinates(data, field.held, tuple(field.touched.tolist()), compliance)
+    return np.hstack([hand, data.X[:, list(field.further)]])
 
 
-def _outside(touch: TouchModel, test: Dataset, number: int) -> str:
+def _outside(field: NodeField, test: Dataset, number: int) -> str:
     """Return how many hand positions count as outside, and why they do where their loads are inside."""
     text = f"{number} of {len(test)} hand positions count as outside the trained range"
-    low, high = bounds(touch.inputs)
+    low, high = bounds(field.inputs)
     if not np.array_equal(np.clip(test.X, low, high), test.X):
         return f"{text}."
-    slack = f"{share(SLACK)} of a load's range"
-    if touch.compliance > 0:
-        slack += ", or the hand by more than 1 % of the reach"
-    return (
-        f"{text} although their loads are inside: at the border of the trained travel, or where the answer misses "
-        f"the load by more than {slack}."
-    )
+    return f"{text} although their loads are inside: they are at its border, or in no training solve's neighbourhood."
 
 
-def _refuse_other_body(touch: TouchModel, data: Dataset) -> None:
+def _refuse_other_body(model: Surrogate, field: NodeField, data: Dataset) -> None:
     if not len(data):
         raise UsageError(
             "There is no converged solve to test with.",
             why="The test set is empty, or each of its solves failed.",
             fix="Sweep some samples that training leaves out.",
         )
-    theirs, own = [(r.name, r.unit) for r in data.ranges], [(r.name, r.unit) for r in touch.inputs]
+    theirs, own = [(r.name, r.unit) for r in data.ranges], [(r.name, r.unit) for r in field.inputs]
     if theirs != own:
         raise UsageError(
             f"The dataset's inputs are {', '.join(n for n, _ in theirs)}; "
-            f"{touch.name} takes {', '.join(n for n, _ in own)}.",
+            f"{model.name} takes {', '.join(n for n, _ in own)}.",
             fix="Test with solves of the study that the model was learnt from.",
         )
-    if data.rest.shape != touch.rest[:, :2].shape or not np.allclose(data.rest, touch.rest[:, :2]):
+    if data.rest.shape != field.points[:, :2].shape or not np.allclose(data.rest, field.points[:, :2]):
         raise UsageError(
-            f"The dataset's {len(data.rest)} nodes are not the {len(touch.rest)} nodes of {touch.name}.",
+            f"The dataset's {len(data.rest)} nodes are not the {len(field.points)} nodes of {model.name}.",
             fix="Test with solves of the study that the model was learnt from.",
         )

@@ -15,6 +15,7 @@ import numpy as np
 from palpate.runtime.safety import Fault
 from palpate.runtime.shared_state import State, now
 from palpate.runtime.touchable import Touchable
+from palpate.surrogates import NodeField
 from palpate.units import Range, bounds
 from palpate.viewer.indentation_drawing import yielding_in_words
 from palpate.viewer.messages import PROTOCOL, Frame, Hello, Line, Modes, RangeInfo, Surface, Vec3
@@ -51,7 +52,7 @@ class PageModel:
     def __init__(self, body: Touchable) -> None:
         self.body = body
         self._drawing: LineDrawing | SurfaceDrawing = (
-            LineDrawing(body) if body.is_line else SurfaceDrawing(body)
+            SurfaceDrawing(body) if body.line is None else LineDrawing(body, body.line)
         )
         self.surface: Surface | None = getattr(self._drawing, "surface", None)
 
@@ -90,7 +91,7 @@ class PageModel:
             centre=vector(body.home),
             line=self._drawing.line if isinstance(self._drawing, LineDrawing) else None,
             fields=self._drawing.infos,
-            remembers="" if body.is_line else yielding_in_words(body) or str(body.memory or ""),
+            remembers="" if body.line is not None else yielding_in_words(body) or str(body.memory or ""),
             scale=state.scale,
             workspace=state.radius,
             max_force=state.max_force,
@@ -130,20 +131,19 @@ class LineDrawing:
 
     infos = ()
 
-    def __init__(self, body: Any) -> None:
-        self._body, self._model = body, body.energy
-        self._low, self._high = bounds(body.inputs)
-        self._loads = np.zeros(len(body.inputs))
-        self._mirrored, self._released = False, -math.inf
+    def __init__(self, body: Touchable, field: NodeField) -> None:
+        self._body, self._field = body, field
+        self._low, self._high = bounds(field.inputs)
+        self._loads, self._released = np.zeros(len(field.inputs)), -math.inf
 
     @property
     def line(self) -> Line:
         """The line at rest."""
-        model = self._model
+        field = self._field
         return Line(
-            rest=tuple(vector(node) for node in model.rest),
-            touch_node=model.touch_node,
-            nodes_of_interest=tuple(int(i) for i in model.nodes_of_interest),
+            rest=tuple(vector(node) for node in field.points),
+            touch_node=field.held,
+            nodes_of_interest=tuple(int(i) for i in field.of_interest),
             travel=tuple(vector(corner) for corner in self._body.travel),
         )
 
@@ -151,31 +151,28 @@ class LineDrawing:
         """Return the shape's part of a frame; see `PageModel.frame`."""
         loads, contact = state.loads[: len(self._loads)], state.contact
         if self._body.stays:
-            displacement = self._model.displacement(loads)
+            displacement = self._field.values(loads)[0]
         elif held:
-            displacement = self.held(loads, state.mirrored, now())
+            displacement = self.held(loads, now())
         else:
             displacement = self.free(parameters, now())
-            contact = displacement[self._model.touch_node]
+            contact = displacement[self._field.held]
         return {"contact": vector(contact), "displacement": displacement}
 
-    def held(self, loads: np.ndarray, mirrored: bool, at: float) -> np.ndarray:
+    def held(self, loads: np.ndarray, at: float) -> np.ndarray:
         """Return the displacement (N, 3) under the published loads (n,) at time `at` (s), while a hand holds, m."""
-        self._loads, self._mirrored, self._released = loads.copy(), mirrored, at
-        return np.asarray(self._model.displacement(loads, mirrored=mirrored))
+        self._loads, self._released = loads.copy(), at
+        return np.asarray(self._field.values(loads)[0])
 
     def free(self, parameters: np.ndarray, at: float) -> np.ndarray:
         """Return the displacement (N, 3) at time `at` (s) without a hand, under the untouched loads (p,) alone, m."""
-        share = swing(at - self._released)
-        loads, mirrored = self._loads.copy(), self._mirrored
-        touched = np.array(self._model.touched, dtype=np.int64)
-        loads[np.setdiff1d(np.arange(self._low.size), touched)] = parameters
-        if share < 0.0 and self._model.mirrors:
-            share, mirrored = -share, not mirrored
+        field, loads = self._field, self._loads.copy()
+        loads[list(field.further)] = parameters
         # a one-sided load of a body that doesn't mirror stops at its end of the range
-        driven = np.clip(share * loads, np.minimum(self._low, 0.0), self._high)
-        loads[touched] = driven[touched]
-        return np.asarray(self._model.displacement(loads, mirrored=mirrored))
+        low = -self._high if field.mirror is not None else np.minimum(self._low, 0.0)
+        driven = np.clip(swing(at - self._released) * loads, low, self._high)
+        loads[field.touched] = driven[field.touched]
+        return np.asarray(field.values(loads)[0])
 
 
 def swing(elapsed: float) -> float:

@@ -23,7 +23,8 @@ from starlette.responses import Response
 from starlette.routing import Route, WebSocketRoute
 
 from palpate.runtime import LoopProcess
-from palpate.runtime.touchable import Learnt, load_touchable, touchable
+from palpate.runtime.touchable import load_touchable, touchable
+from palpate.surrogates import Surrogate
 from palpate.viewer.page_model import PageModel
 from palpate.viewer.session import Session
 from palpate.viewer.web_server import LocalServer, local_application, wait_until_interrupted
@@ -99,7 +100,7 @@ class Viewer(LocalServer):
 
     def __init__(
         self,
-        model: Learnt | str | os.PathLike[str],
+        model: Surrogate | str | os.PathLike[str],
         *,
         port: int = 8080,
         host: str = "127.0.0.1",
@@ -134,7 +135,7 @@ class Viewer(LocalServer):
 
 
 def serve(
-    model: Learnt | str | os.PathLike[str],
+    model: Surrogate | str | os.PathLike[str],
     *,
     port: int = 8080,
     host: str = "127.0.0.1",

@@ -15,7 +15,7 @@ import numpy as np
 
 from palpate.runtime.shared_state import State, now
 from palpate.runtime.touchable import Touchable
-from palpate.surrogates import FieldSurrogate
+from palpate.surrogates import FieldSurrogate, NodeField
 from palpate.viewer.indentation_drawing import IndentationDrawing
 from palpate.viewer.messages import FieldInfo, Modes, Surface
 from palpate.viewer.surfaces import relief, split, touchable_triangles
@@ -170,9 +170,10 @@ class SurfaceDrawing:
         )
 
 
-def _shown(fields: Mapping[str, FieldSurrogate]) -> tuple[FieldSurrogate, ...]:
+def _shown(fields: Mapping[str, FieldSurrogate | NodeField]) -> tuple[FieldSurrogate, ...]:
     """Return the fields on one set of nodes, the displacement first."""
-    moves = [field for field in fields.values() if field.rest.shape[1] == 3 and field.unit == "m"]
-    ordered = [*moves[:1], *(field for field in fields.values() if field not in moves[:1])]
+    on_surface = [field for field in fields.values() if isinstance(field, FieldSurrogate)]
+    moves = [field for field in on_surface if field.rest.shape[1] == 3 and field.unit == "m"]
+    ordered = [*moves[:1], *(field for field in on_surface if field not in moves[:1])]
     first = ordered[0].points if ordered else np.zeros((0, 3))
     return tuple(field for field in ordered if np.array_equal(field.points, first))

@@ -28,9 +28,9 @@ from palpate.rbf.refinement.rows import Rows
 from palpate.rbf.regressors import Regressors
 from palpate.rbf.symmetric_units import Images, SymmetricRegressors
 
-__all__ = ["EnergyProblem", "LeftOut"]
+__all__ = ["TOLERANCE", "EnergyProblem", "LeftOut"]
 
-_TOLERANCE = 1e-5
+TOLERANCE = 1e-5  # relative; of data that bear noise
 _RIDGE = 3e-6  # with 1e-10 some networks bend wildly between solves, with 1e-4 all miss more
 _MOST = 0.98  # leverage; what a solve decides alone is judged by fifty times its residual
 _ALL_OVER = 8.0  # times the finest: a unit that is nowhere wider stands on one solve
@@ -94,6 +94,8 @@ class EnergyProblem:
         A penalty on weights.
     finest : (n,) array, optional
         Of scaled inputs, the shortest way over which a unit may change, 0 where that is any; None where all are.
+    tolerance : float
+        Relative gain per step of the refinement below which it ends.
     """
 
     X: np.ndarray
@@ -101,6 +103,7 @@ class EnergyProblem:
     images: Images | None
     ridge: float = _RIDGE
     finest: np.ndarray | None = None
+    tolerance: float = TOLERANCE
 
     def regressors(self, form: str, radial: RadialFunction) -> Regressors:
         """Return the regressors of a form, with their images where there is a symmetry."""
@@ -151,7 +154,7 @@ class EnergyProblem:
             ridge=self.ridge,
             iterations=iterations,
             seconds=seconds,
-            tolerance=_TOLERANCE,
+            tolerance=self.tolerance,
         )
 
     def narrow_units(self, network: Refined) -> np.ndarray:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -14,7 +15,7 @@ from palpate.errors import UsageError
 from palpate.format import share
 from palpate.learning.energy.energy_export import export_network, trained_region, training_meta
 from palpate.learning.energy.energy_images import images_of
-from palpate.learning.energy.energy_problem import EnergyProblem
+from palpate.learning.energy.energy_problem import TOLERANCE, EnergyProblem
 from palpate.learning.energy.energy_samples import EnergySamples
 from palpate.learning.energy.energy_search import search_energy
 from palpate.learning.energy.trust import trust_of
@@ -78,6 +79,8 @@ def learn_energy(
     deepest: float | None = None,
     form: str = "auto",
     radial: RadialFunction | Literal["auto"] = "auto",
+    ridge: float | None = None,
+    tolerance: float = TOLERANCE,
     seed: int = 0,
 ) -> tuple[LearntEnergy, EnergyHistory]:
     """Learn the energy of a body from solves.
@@ -111,6 +114,10 @@ def learn_energy(
         Form of a unit (see `palpate.rbf.unit_forms`), or "auto" to try several.
     radial : {"gaussian", "inverse-multiquadric", "matern-5/2", "auto"}
         Radial function of the units, or "auto" to try several.
+    ridge : float, optional
+        Penalty on the network's squared weights, by the noise of the solves; by default the baseline's.
+    tolerance : float
+        Relative gain per step of the refinement below which it ends; smaller for solves that bear no noise.
     seed : int
         Decides the starts, and with them the result.
 
@@ -134,13 +141,15 @@ def learn_energy(
     if radial != "auto" and radial not in get_args(RadialFunction):
         raise UsageError(f"There is no radial function {radial!r}.", fix=f"Choose from {RADIAL_FUNCTIONS}.")
     samples, images = EnergySamples.of(solves, baseline), images_of(solves, baseline)
+
+    problem_of = partial(_problem, samples, images, ridge, tolerance)
     with threadpool_limits(1):  # small matrices: more BLAS threads cost time and the bits of the result
         trials: tuple[Trial, ...] = ()
         if choose and len(baseline.candidates()) > 1:
             part = budget.part(_CHOICE_SHARE)
-            baseline, trials = _choose_baseline(baseline.candidates(), samples, images, part, seed)
+            baseline, trials = _choose_baseline(baseline.candidates(), problem_of, part, seed)
         ensemble, further = search_energy(
-            _problem(samples, baseline, images),
+            problem_of(baseline),
             form=form,
             radial=radial,
             units_max=units_max,
@@ -168,19 +177,25 @@ def learn_energy(
     return energy, EnergyHistory((*trials, *further), trust.errors, ensemble.error, meta)
 
 
-def _problem(samples: EnergySamples, baseline: Baseline, images: Images | None) -> EnergyProblem:
+def _problem(
+    samples: EnergySamples, images: Images | None, ridge: float | None, tolerance: float, baseline: Baseline
+) -> EnergyProblem:
     finest = baseline.finest(samples.inputs)
     return EnergyProblem(
         samples.scaled,
         samples.rows(baseline),
         images,
-        ridge=baseline.ridge,
+        ridge=baseline.ridge if ridge is None else ridge,
         finest=None if finest is None else finest / samples.half,
+        tolerance=tolerance,
     )
 
 
 def _choose_baseline(
-    candidates: Sequence[Baseline], samples: EnergySamples, images: Images | None, budget: Budget, seed: int
+    candidates: Sequence[Baseline],
+    problem_of: Callable[[Baseline], EnergyProblem],
+    budget: Budget,
+    seed: int,
 ) -> tuple[Baseline, tuple[Trial, ...]]:
     """Return the baseline of least leave-one-solve-out error with a network of three units.
 
@@ -190,7 +205,7 @@ def _choose_baseline(
     errors: list[float] = []
     trials: list[Trial] = []
     for baseline in candidates:
-        problem = _problem(samples, baseline, images)
+        problem = problem_of(baseline)
         regressors = problem.regressors("rotated", "inverse-multiquadric")
         count = min(_CHOICE_UNITS, problem.room(regressors))
         units = random_units(regressors.form, problem.X, count, np.random.default_rng(seed))

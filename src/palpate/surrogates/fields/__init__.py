@@ -1,9 +1,10 @@
-"""Fields on a body's surface under a touch, for the eye: modes whose coefficients are learnt.
+"""Fields of a body under a touch, for the eye: on a surface, modes whose coefficients are learnt.
 
 ::
 
     field_surrogate        FieldSurrogate, the whole of it, and its errors
     depth_amplitude        how a field grows with depth
+    node_field             NodeField, at the nodes of a body that loads bend
     local_mode             the part that moves with the probe, and its variation from place to place
     field_kernels          the compiled loops
     field_evaluator        one touch at a time, without allocation
@@ -14,6 +15,7 @@ from palpate.surrogates.fields.depth_amplitude import DepthAmplitude
 from palpate.surrogates.fields.field_evaluator import FieldEvaluator
 from palpate.surrogates.fields.field_surrogate import FieldErrors, FieldSurrogate
 from palpate.surrogates.fields.local_mode import LocalMode, Variation
+from palpate.surrogates.fields.node_field import NodeEvaluator, NodeField
 
 __all__ = [
     "DepthAmplitude",
@@ -21,5 +23,7 @@ __all__ = [
     "FieldEvaluator",
     "FieldSurrogate",
     "LocalMode",
+    "NodeEvaluator",
+    "NodeField",
     "Variation",
 ]

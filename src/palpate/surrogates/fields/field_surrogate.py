@@ -13,7 +13,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
@@ -30,6 +30,9 @@ from palpate.surrogates.fields.local_mode import LocalMode
 from palpate.surrogates.fields.surface_interpolation import SurfaceInterpolation, node_normals
 from palpate.surrogates.surface import TouchedSurface
 from palpate.units import Range, bounds
+
+if TYPE_CHECKING:
+    from palpate.surrogates.energy import LearntEnergy
 
 __all__ = [
     "FieldErrors",
@@ -225,6 +228,16 @@ class FieldSurrogate:
     def inputs(self) -> tuple[Range, ...]:
         """Names and trained ranges of all inputs: the centre's coordinates (m), then the further ones."""
         return self.network.inputs
+
+    def fault_beside(self, energy: LearntEnergy) -> str:
+        """Return what does not fit the energy of the same body; "" if all does."""
+        surface, own = energy.baseline.surface, self.surface.arrays()
+        if surface is not None and self.surface is not surface:
+            theirs = surface.arrays()
+            if not all(np.array_equal(theirs[k], own[k], equal_nan=True) for k in own):
+                return "it has another touched surface"
+        names = [(r.name, r.unit) for r in self.inputs]
+        return "" if names == [(r.name, r.unit) for r in energy.inputs] else "it has other inputs"
 
     @cached_property
     def touched(self) -> np.ndarray:

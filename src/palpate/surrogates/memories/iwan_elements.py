@@ -207,18 +207,18 @@ class IwanElements(Memory):
     def __str__(self) -> str:
         slip, relax = int(np.isfinite(self.limit).sum()), int(np.isfinite(self.time).sum())
         kinds = [f"{slip} that slip" if slip else "", f"{relax} that relax" if relax else ""]
-        return f"{len(self)} springs of {self.total:.4g} N/m in all, " + (
+        return f"{len(self)} springs, " + (
             " and ".join(kind for kind in kinds if kind) or "none with a memory"
         )
 
     @property
     def total(self) -> float:
-        """K = Σ k_i in N/m: the virgin body's stiffness against the stretch."""
+        """Σ k_i: the virgin body's share of its elastic stiffness, 1 where the elements add up to it."""
         return float(self.stiffness.sum())
 
     @property
     def first_slip(self) -> float:
-        """Stretch in m of a virgin body at which something slips."""
+        """Amplitude of a virgin body at which something slips, √J."""
         return float(self.limit.min())
 
     def compiled(self) -> tuple[np.ndarray, ...]:
@@ -226,9 +226,9 @@ class IwanElements(Memory):
         return self.stiffness, self.limit, self.rise, self.time
 
     def elongations(self, stretch: np.ndarray, times: np.ndarray | None = None) -> np.ndarray:
-        """e (N, n) in m along a history h (N,) in m that starts from rest; times (N,) in s if something relaxes.
+        """Return e (N, n), √J, along a history of q (N,), √J, from rest; times (N,) in s if something relaxes.
 
-        Between two samples h changes evenly.
+        Between two samples q changes evenly.
 
         Raises
         ------

@@ -1,7 +1,6 @@
-"""Figures of a body whose networks answer by load: a beam that the hand holds at a node.
+"""Figures of a body that loads bend: a beam that the hand holds at a node.
 
-Its shape, its nodes and its force are networks of their own, so that each is judged by itself, and closed paths of the
-hand are watched, since the force is not the gradient of an energy.
+Its shape and its nodes are networks of their own, so that each is judged by itself, beside the force of its energy.
 """
 
 from __future__ import annotations
@@ -14,14 +13,15 @@ import numpy as np
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.format import count, length, plain, scientific
-from palpate.learning.touch import node_outputs
+from palpate.learning import node_outputs
 from palpate.network import Network
-from palpate.surrogates import TouchEvaluator, TouchModel
+from palpate.surrogates import NodeField, Surrogate
 from palpate.validation.figures.displayed_shape import ShapeErrors
 from palpate.validation.figures.figure import Figure, Measured
-from palpate.validation.figures.loop_work import LoopWork
+from palpate.validation.figures.loop_work import LoopWork, function_work
 from palpate.validation.figures.stiffness import StiffnessErrors, curve_slope
-from palpate.validation.subject import Subject, hand_positions
+from palpate.validation.subject import Subject, hand_inputs
+from palpate.validation.unseen_solves import TouchFunction, TouchSolves
 from palpate.validation.worst import Worst, outer_part
 
 __all__ = [
@@ -29,7 +29,6 @@ __all__ = [
     "NetworkErrors",
     "OutputError",
     "OutputErrors",
-    "loop_work",
     "network_outputs",
     "node_truth",
     "output_errors",
@@ -37,16 +36,12 @@ __all__ = [
     "shape_by_load",
     "stiffness_by_load",
     "stiffness_errors",
-    "work_around",
     "work_by_load",
     "worse_than_filter",
 ]
 
 NETWORKS = {"refined": "nodes", "filter": "filter"}
-"""Networks for the nodes' displacements: what they are called here and in a `TouchModel`."""
-
-LOOPS = 100
-PANELS, ORDER = 6, 8  # panels per edge; Gauss–Legendre points per panel
+"""Networks for the nodes' displacements: what they are called here and among a body's fields."""
 
 
 @dataclass(frozen=True)
@@ -186,14 +181,14 @@ class NetworkErrors(Figure):
 
 def network_outputs(subject: Subject) -> NetworkErrors | None:
     """Return the errors of the networks for the nodes' displacements, where the model has them."""
-    touch, test = subject.loads, subject.data
-    if touch is None or test is None:
+    model, test = subject.loads, subject.data
+    if model is None or test is None:
         return None
-    truth = node_truth(touch, test)
+    truth = node_truth(model, test)
     errors = {
-        label: output_errors(touch.networks[key], test.X, truth)
+        label: output_errors(model.fields[key].network, test.X, truth)
         for label, key in NETWORKS.items()
-        if key in touch.networks
+        if key in model.fields
     }
     watched = subject.history
     regression = watched.regression if watched is not None and math.isfinite(watched.regression) else None
@@ -202,11 +197,11 @@ def network_outputs(subject: Subject) -> NetworkErrors | None:
 
 def shape_by_load(subject: Subject) -> ShapeErrors | None:
     """Return the errors of the shape, where a network answers it by load."""
-    touch, test = subject.loads, subject.data
-    if touch is None or test is None:
+    model, test = subject.loads, subject.data
+    if model is None or test is None:
         return None
     solved = test.displacement[:, :, :2]
-    error = np.linalg.norm(predicted_field(touch, test.X) - solved, axis=2)
+    error = np.linalg.norm(predicted_field(model, test.X) - solved, axis=2)
     sample, node = (int(i) for i in np.unravel_index(np.argmax(error), error.shape))
     place = f"the node at {test.rest[node, 0]:g} m"
     return ShapeErrors(
@@ -219,16 +214,27 @@ def shape_by_load(subject: Subject) -> ShapeErrors | None:
 
 def stiffness_by_load(subject: Subject) -> StiffnessErrors | str | None:
     """Return the errors of the stiffness along a curve of loads, or the reason why there are none."""
-    if subject.loads is None or subject.data is None or subject.samples is None:
+    if subject.loads is None or subject.data is None:
         return None
-    return stiffness_errors(subject.loads, subject.data, subject.samples.hand)
+    return stiffness_errors(subject.loads, subject.data)
 
 
 def work_by_load(subject: Subject) -> LoopWork | str | None:
-    """Return the work around closed paths inside the trained region, or the reason why there is none."""
-    if subject.loads is None or subject.data is None or subject.samples is None:
+    """Return the work around closed paths between places of the test, or the reason why there is none."""
+    model, test, samples = subject.loads, subject.data, subject.samples
+    if model is None or test is None or samples is None:
         return None
-    return loop_work(subject.loads, subject.data, subject.samples.hand, seed=subject.seed)
+    D, energy = model.energy.baseline.directions, model.energy
+    if len(D) == 1:
+        return "Work around closed paths is zero by construction: the hand moves along one coordinate."
+
+    def force(X: np.ndarray) -> np.ndarray:
+        """Return the force (N, 3) at places in space (m) and loads elsewhere (N)."""
+        return np.asarray(energy.force(np.hstack([X[:, :3] @ D.T, X[:, 3:]])))
+
+    inputs = hand_inputs(model, _line_of(model), test)
+    solves = TouchSolves(np.hstack([samples.hand @ D, inputs[:, len(D) :]]), samples.truth)
+    return function_work(TouchFunction(model.name, energy.inputs, force), solves, seed=subject.seed)
 
 
 def worse_than_filter(networks: NetworkErrors) -> str | None:
@@ -242,7 +248,7 @@ def worse_than_filter(networks: NetworkErrors) -> str | None:
     )
 
 
-def node_truth(touch: TouchModel, data: Dataset) -> np.ndarray:
+def node_truth(model: Surrogate, data: Dataset) -> np.ndarray:
     """Return what the network of the nodes should answer for a dataset, (N, m) in m.
 
     Raises
@@ -251,125 +257,52 @@ def node_truth(touch: TouchModel, data: Dataset) -> np.ndarray:
         If the dataset does not fit the model, or is empty.
     """
     quantities, columns = node_outputs(data)
-    found, wanted = [q.name for q in quantities], [q.name for q in touch.networks["nodes"].outputs]
+    found, wanted = [q.name for q in quantities], [q.name for q in model.fields["nodes"].network.outputs]
     if found != wanted:
         raise UsageError(
-            f"The dataset moves {', '.join(found) or 'nothing'}; {touch.name} answers {', '.join(wanted)}.",
+            f"The dataset moves {', '.join(found) or 'nothing'}; {model.name} answers {', '.join(wanted)}.",
             why="Its nodes of interest or the directions of its loads are others.",
             fix="Test with solves of the study that the model was learnt from.",
         )
     return np.stack([data.displacement[:, node, axis] for node, axis in columns], axis=1)
 
 
-def predicted_field(touch: TouchModel, X: np.ndarray) -> np.ndarray:
+def predicted_field(model: Surrogate, X: np.ndarray) -> np.ndarray:
     """Return the displacement (N, nodes, 2) of the mesh nodes under loads X (N, n), m."""
-    return touch.networks["field"].predict(X).reshape(len(X), -1, 2)
+    return _line_of(model).values(X)[:, :, :2]
 
 
-def stiffness_errors(touch: TouchModel, test: Dataset, hand: np.ndarray) -> StiffnessErrors | str:
+def stiffness_errors(model: Surrogate, test: Dataset) -> StiffnessErrors | str:
     """Return the errors of the stiffness, or the reason why none can be derived.
 
     Parameters
     ----------
-    touch : TouchModel
-        Model whose networks answer by load.
+    model : Surrogate
+        Body that loads bend.
     test : Dataset
         Converged unseen solves.
-    hand : (N, k)
-        Coordinates of the hand, m.
     """
     if len(test.ranges) > 1:
         return (
             "Stiffness is not judged: solves scattered over several loads have no curve to take a slope of."
         )
-    curve = curve_slope(test.X[:, 0], hand[:, 0])
+    X = hand_inputs(model, _line_of(model), test)
+    curve = curve_slope(test.X[:, 0], X[:, 0])
     if curve is None:
         return "Stiffness is not judged: the test loads lie too far apart to take a slope from."
     rows, slope = curve
-    truth = 1.0 / slope
-    force = touch.networks["force"]
-    answer = np.array([force.jacobian(hand[i])[0, 0] for i in rows])
+    truth, D = 1.0 / slope, model.energy.baseline.directions[0]
+    answer = -np.einsum("nij,i,j->n", model.energy.stiffness(X[rows]), D, D)
     error = np.abs(answer - truth) / np.abs(truth)
     i = int(np.argmax(error))
     worst = Worst.of(error[i], test.X[rows[i]], test.ranges)
     return StiffnessErrors(float(np.median(error)), float(np.quantile(error, 0.95)), worst)
 
 
-def loop_work(
-    touch: TouchModel, test: Dataset, hand: np.ndarray, *, loops: int = LOOPS, seed: int = 0
-) -> LoopWork | str:
-    """Return the work around random triangles to pentagons between places where test solves have the hand.
-
-    Loops that leave the trained region are left out: there the force is held at its limits on purpose.
-
-    Parameters
-    ----------
-    touch : TouchModel
-        Model whose networks answer by load.
-    test : Dataset
-        Converged unseen solves.
-    hand : (N, k)
-        Coordinates of the hand, m.
-    loops, seed : int
-        Number of polygons, and the seed that decides them.
-
-    Returns
-    -------
-    LoopWork, or the reason why there is none
-    """
-    if len(touch.touched) == 1:
-        return "Work around closed paths is zero by construction: the hand moves along one coordinate."
-    others = [i for i in range(len(test.ranges)) if i not in touch.touched]
-    evaluate, rng = touch.evaluator(), np.random.default_rng(seed)
-    places, found = hand_positions(touch, hand), []
-    for _ in range(50 * loops):
-        rows = rng.choice(len(hand), min(len(hand), int(rng.integers(3, 6))), replace=False)
-        work = work_around(evaluate, places[rows], np.ascontiguousarray(test.X[rows[0], others]))
-        if work is not None:
-            found.append(work)
-        if len(found) == loops:
-            break
-    if len(found) < 10:
-        return "Work around closed paths is not judged: too few loops stay inside the trained region."
-    net, energy = np.abs([f[0] for f in found]), np.array([f[1] for f in found])
-    ratio = np.divide(net, energy, out=np.zeros_like(net), where=energy > 0)  # no force, no work
-    p95 = float(np.quantile(ratio, 0.95))
-    return LoopWork(len(found), float(np.median(ratio)), p95, float(ratio.max()), float(np.median(energy)))
-
-
-def work_around(
-    evaluate: TouchEvaluator, corners: np.ndarray, parameters: np.ndarray, panels: int = PANELS
-) -> tuple[float, float] | None:
-    """Return the net work ∮F·dx and energy ½∮|F·dx| around a polygon in J; None where it leaves the trained region.
-
-    Parameters
-    ----------
-    evaluate : TouchEvaluator
-        Evaluator of the model, asked point by point.
-    corners : (c, 3)
-        Hand positions, m; the last one leads back to the first.
-    parameters : (p,)
-        Loads that the hand does not supply, N.
-    panels : int
-        Pieces of each edge, with an 8-point Gauss–Legendre rule on each.
-    """
-    at, weight = _rule(panels)
-    net = energy = 0.0
-    for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        for t, w in zip(at, weight, strict=True):
-            evaluate(a + t * (b - a), parameters)
-            if not evaluate.inside:
-                return None
-            power = w * float(evaluate.force @ (b - a))
-            net, energy = net + power, energy + abs(power) / 2
-    return net, energy
-
-
-def _rule(panels: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return points in [0, 1] and weights of the composite rule."""
-    x, w = np.polynomial.legendre.leggauss(ORDER)
-    at = (np.arange(panels)[:, None] + (x + 1) / 2).ravel() / panels
-    return at, np.tile(w / 2, panels) / panels
+def _line_of(model: Surrogate) -> NodeField:
+    field = model.fields["displacement"]
+    assert isinstance(field, NodeField)  # the subject's own check
+    return field
 
 
 def _line(label: str, e: OutputErrors) -> str:

@@ -13,10 +13,10 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.format import length, plain, share
-from palpate.learning.plastic import HeldPath, HeldPaths
-from palpate.surrogates.plastic import HeldBody
+from palpate.learning.plastic import LoadHistories, LoadHistory
+from palpate.surrogates import NodeField, Surrogate
 from palpate.validation.figures.figure import Figure, Measured
-from palpate.validation.subject import Subject
+from palpate.validation.subject import Subject, line_of
 
 __all__ = ["Followed", "HistoryErrors", "follow_unseen", "history_following"]
 
@@ -25,11 +25,11 @@ UNLOADED = 1e-9  # of the largest force: what is less is round-off
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """One unseen history, followed by the body and by its elastic twin.
+    """One unseen history, followed by the body and by the same body without its memory.
 
     Attributes
     ----------
-    path : HeldPath
+    path : LoadHistory
         What was solved.
     force, stored, lost : (N,)
         Of the body, N and J.
@@ -41,7 +41,7 @@ class Followed:
         Where the body stays when it is let go at the end, m; None if the history doesn't end without load.
     """
 
-    path: HeldPath
+    path: LoadHistory
     force: np.ndarray
     stored: np.ndarray
     lost: np.ndarray
@@ -172,7 +172,7 @@ def history_following(subject: Subject) -> HistoryErrors | None:
     )
 
 
-def follow_unseen(body: HeldBody, test: HeldPaths) -> list[Followed]:
+def follow_unseen(body: Surrogate, test: LoadHistories) -> list[Followed]:
     """Return a body led along each history.
 
     Raises
@@ -182,29 +182,31 @@ def follow_unseen(body: HeldBody, test: HeldPaths) -> list[Followed]:
     """
     if not test.paths:
         raise UsageError("There is no history to test with.", fix="Lead the body through some.")
-    if test.rest.shape != body.rest[:, :2].shape or not np.allclose(test.rest, body.rest[:, :2]):
+    field = line_of(body)
+    assert field is not None  # the subject's own check
+    if test.rest.shape != field.points[:, :2].shape or not np.allclose(test.rest, field.points[:, :2]):
         raise UsageError(
-            f"The histories' {len(test.rest)} nodes are not the {len(body.rest)} nodes of {body.name}.",
+            f"The histories' {len(test.rest)} nodes are not the {len(field.points)} nodes of {body.name}.",
             fix="Test with histories of the body that it was learnt from.",
         )
-    return [_followed(body, path) for path in test.paths]
+    return [_followed(body, field, path) for path in test.paths]
 
 
-def _followed(body: HeldBody, path: HeldPath) -> Followed:
-    evaluator, position = body.evaluator(), np.zeros(3)
-    out, shape = np.zeros((3, len(path))), np.zeros((len(path), len(body.rest)))
-    for i, (w, dt) in enumerate(zip(path.place, np.diff(path.times, prepend=0.0), strict=True)):
-        position[:] = w * body.directions[0]
-        evaluator.step(position, float(dt))
-        out[:, i] = evaluator.loads[1], evaluator.stored, evaluator.lost
-        seen = body.displacement(evaluator.loads)[:, :2]
-        shape[i] = np.linalg.norm(seen - path.displacement[i], axis=1)
-    residual = None
-    if abs(path.force[-1]) <= UNLOADED * np.abs(path.force).max():
-        evaluator.release(0.0)
-        residual = float(evaluator.loads[0])
-    h, slope = body.stretches(path.place)
-    return Followed(path, out[0], out[1], out[2], body.elements.total * h * slope, shape, residual)
+def _followed(body: Surrogate, field: NodeField, path: LoadHistory) -> Followed:
+    direction, places = body.energy.baseline.directions[0], path.place[:, None]
+    answer = body.follow(places, path.times)
+    force = -answer.force @ direction
+    shown = field.values(np.stack([path.place, force], axis=1))[:, :, :2]
+    ends = abs(path.force[-1]) <= UNLOADED * np.abs(path.force).max()
+    return Followed(
+        path,
+        force,
+        answer.stored,
+        answer.lost,
+        elastic=-body.energy.force(places) @ direction,
+        shape=np.linalg.norm(shown - path.displacement, axis=2),
+        residual=float(answer.rest @ direction) if ends else None,
+    )
 
 
 def _gives(one: Followed) -> np.ndarray:

@@ -132,6 +132,8 @@ def function_work(
         return f"Work around {name} is not judged: too few loops touch the body."
     work = work_of_polygons(model.force, corners)
     rows = work.energy > GRAZING * np.median(work.energy)
+    if int(rows.sum()) < 10:
+        return f"Work around {name} is not judged: the places of the test lie too near to each other."
     net, energy = np.abs(work.net[rows]), work.energy[rows]
     ratio = net / energy
     kind = BorderLoopWork if border else LoopWork

@@ -1,4 +1,4 @@
-"""Pictures of a body whose networks answer by load: shapes, errors at the nodes, growth, and the force on the hand."""
+"""Pictures of a body that loads bend: shapes, errors at the nodes, growth, and the force on the hand."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.format import count, length, plain
-from palpate.surrogates import TouchModel
+from palpate.surrogates import NodeField, Surrogate
 from palpate.units import bounds
 from palpate.validation.figures.by_load import predicted_field
 from palpate.validation.report.chapter import Chapter
@@ -29,7 +29,6 @@ from palpate.validation.report.style import (
     loads_map,
     picture,
 )
-from palpate.validation.subject import hand_positions
 from palpate.validation.unseen_solves import ForceSamples
 
 if TYPE_CHECKING:
@@ -47,17 +46,17 @@ FLAT = 0.2  # shapes flatter than this are drawn with exaggerated heights
 
 
 def load_pictures(chapter: Chapter, key: str) -> list[Picture]:
-    """Draw the pictures of networks that answer by load; none of other models."""
-    v, touch, data = chapter.validation, chapter.subject.loads, chapter.subject.data
-    if touch is None or data is None or v.networks is None:
+    """Draw the pictures of a body that loads bend; none of other bodies."""
+    v, model, data = chapter.validation, chapter.subject.loads, chapter.subject.data
+    if model is None or data is None or v.networks is None:
         return []
-    made = [_shapes(chapter, touch, data, key), error_picture(chapter, touch, data, key)]
+    made = [_shapes(chapter, model, data, key), error_picture(chapter, model, data, key)]
     if chapter.history is not None:
         made.append(growth_picture(chapter, key))
-    return [*made, _force(chapter, touch, data, key), outer_picture(chapter, key)]
+    return [*made, _force(chapter, model, data, key), outer_picture(chapter, key)]
 
 
-def _shapes(chapter: Chapter, touch: TouchModel, data: Dataset, key: str) -> Picture:
+def _shapes(chapter: Chapter, model: Surrogate, data: Dataset, key: str) -> Picture:
     field = chapter.validation.shape
     _, colour = colour_of_load(data)
     alike = f"Left and right differ by {length(field.mean)} on average and {length(field.max)} at most."
@@ -67,13 +66,13 @@ def _shapes(chapter: Chapter, touch: TouchModel, data: Dataset, key: str) -> Pic
         f"Two panels with the deflected shapes of {chapter.name} under {count(len(data), 'load')}: finite elements on "
         f"the left, the network on the right. {alike}",
         f"All {len(data)} unseen loads, coloured by {colour.split(' / ')[0]}; on the right the "
-        f"{units_of(touch, 'field')}. Dots mark the nodes of interest, the "
+        f"{units_of(model, 'displacement')}. Dots mark the nodes of interest, the "
         f"dashed line the body at rest. {alike}",
-        lambda: plot_shapes(touch, data),
+        lambda: plot_shapes(model, data),
     )
 
 
-def _force(chapter: Chapter, touch: TouchModel, data: Dataset, key: str) -> Picture:
+def _force(chapter: Chapter, model: Surrogate, data: Dataset, key: str) -> Picture:
     samples, force = chapter.subject.samples, chapter.validation.force
     assert samples is not None  # a model whose networks answer by load answers a force
     what = "against the hand's displacement"
@@ -83,9 +82,8 @@ def _force(chapter: Chapter, touch: TouchModel, data: Dataset, key: str) -> Pict
         f"{key}-force",
         "Force on the hand",
         f"Force on the hand {what}, for {chapter.name}, up to {plain(force.largest, 3)} N.",
-        f"The force {what}: {units_of(touch, 'force')}, asked through the evaluator that runs at 1 kHz."
-        f"{_signs(chapter)}",
-        lambda: plot_force(touch, data, samples),
+        f"The force {what}: {units_of(model, 'energy')}, as it is felt at 1 kHz.{_signs(chapter)}",
+        lambda: plot_force(model, data, samples),
     )
 
 
@@ -98,13 +96,13 @@ def _signs(chapter: Chapter) -> str:
     return f"{text} At no force the body hangs under its own weight." if weight else text
 
 
-def plot_shapes(touch: TouchModel, data: Dataset) -> Figure:
+def plot_shapes(model: Surrogate, data: Dataset) -> Figure:
     """Draw the shapes of every solve in `data`, finite elements on the left and the field network on the right.
 
     Parameters
     ----------
-    touch : TouchModel
-        Model whose networks answer by load.
+    model : Surrogate
+        Body that loads bend.
     data : Dataset
         Converged solves.
     """
@@ -114,11 +112,11 @@ def plot_shapes(touch: TouchModel, data: Dataset) -> Figure:
     shade, label = colour_of_load(data)
     order = np.argsort(shade)[::-1]
     colour = ScalarMappable(Normalize(0.0 if shade.min() >= 0 else shade.min(), shade.max()), loads_map())
-    shapes = (data.displacement[:, :, :2], predicted_field(touch, data.X))
+    shapes = (data.displacement[:, :, :2], predicted_field(model, data.X))
     fig, axes = figure(1, 2, size=_size(data), sharex=True, sharey=True)
     names = (
         f"Finite elements, {len(data)} solves",
-        units_of(touch, "field").capitalize(),
+        units_of(model, "displacement").capitalize(),
     )
     for axis, shape, name in zip(axes[0], shapes, names, strict=True):
         _draw_shapes(axis, data, shape, order, colour.to_rgba(shade), name)
@@ -175,38 +173,38 @@ def _draw_shapes(axis, data, shape, order, colours, name) -> None:  # type: igno
     axis.label_outer()
 
 
-def plot_force(touch: TouchModel, data: Dataset, samples: ForceSamples) -> Figure:
+def plot_force(model: Surrogate, data: Dataset, samples: ForceSamples) -> Figure:
     """Draw the force against the hand's displacement, both with their sign, for one load; a parity plot for several."""
     fig, axes = figure(1, 1, size=(4.6, 3.4))
     if len(data.ranges) == 1:
-        _draw_curve(axes[0, 0], touch, samples)
+        _draw_curve(axes[0, 0], model, samples)
     else:
-        _draw_parity(axes[0, 0], touch, samples)
+        _draw_parity(axes[0, 0], model, samples)
     return fig
 
 
-def _draw_curve(axis: Any, touch: TouchModel, samples: ForceSamples) -> None:
-    reach = touch.networks["force"].inputs[0]
-    along = np.linspace(reach.low, reach.high, 200)
-    evaluate, force = touch.evaluator(), []
-    for place in hand_positions(touch, along[:, None]):
-        evaluate(place, np.empty(0))
-        force.append(-float(touch.directions[0] @ evaluate.force))
+def _draw_curve(axis: Any, model: Surrogate, samples: ForceSamples) -> None:
+    reach, direction = model.energy.inputs[0], model.energy.baseline.directions[0]
+    low = max(
+        reach.low, min(0.0, float(samples.hand.min()))
+    )  # the other side is a mirror image where none was solved
+    along = np.linspace(low, reach.high, 200)
+    force = -model.energy.force(along[:, None]) @ direction
     order = np.argsort(samples.hand[:, 0])
     some = order[np.unique(np.linspace(0, order.size - 1, 28).astype(int))]
     axis.plot(1e3 * along, force, color=BLUE, label="network", zorder=1)
     axis.plot(
         1e3 * samples.hand[some, 0],
-        -samples.truth[some] @ touch.directions[0],
+        -samples.truth[some] @ direction,
         "o",
         color=ORANGE,
         markersize=4,
         label="finite elements, unseen",
         zorder=2,
     )
-    name, along_load = touch.inputs[touch.touched[0]].name, touch.directions[0]
-    axis.set_xlabel(f"displacement along {name} ({heading(along_load)}) / mm")
-    axis.set_ylabel(f"force on the hand against {name} ({heading(-along_load)}) / N")
+    name = model.fields["displacement"].inputs[0].name
+    axis.set_xlabel(f"displacement along {name} ({heading(direction)}) / mm")
+    axis.set_ylabel(f"force on the hand against {name} ({heading(-direction)}) / N")
     axis.legend(loc="best")
 
 
@@ -218,11 +216,13 @@ def heading(direction: np.ndarray) -> str:
     return f"direction {direction[0]:.2g}, {direction[1]:.2g}".replace("-", "−")
 
 
-def _draw_parity(axis: Any, touch: TouchModel, samples: ForceSamples) -> None:
-    truth, answer = -samples.truth @ touch.directions.T, -samples.answer @ touch.directions.T
+def _draw_parity(axis: Any, model: Surrogate, samples: ForceSamples) -> None:
+    directions, field = model.energy.baseline.directions, model.fields["displacement"]
+    assert isinstance(field, NodeField)
+    truth, answer = -samples.truth @ directions.T, -samples.answer @ directions.T
     ends = np.array([min(truth.min(), answer.min()), max(truth.max(), answer.max())])
     axis.plot(ends, ends, color=INK, alpha=0.5, linewidth=1.0, label="the same")
-    for i, load in enumerate(touch.touched):
+    for i, load in enumerate(field.touched):
         axis.plot(
             truth[:, i],
             answer[:, i],
@@ -231,7 +231,7 @@ def _draw_parity(axis: Any, touch: TouchModel, samples: ForceSamples) -> None:
             markersize=3.6,
             markeredgewidth=0,
             alpha=0.85,
-            label=touch.inputs[load].name,
+            label=field.inputs[load].name,
         )
     axis.set_xlabel("finite elements, unseen / N")
     axis.set_ylabel("network / N")

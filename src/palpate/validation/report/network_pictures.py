@@ -11,7 +11,7 @@ from palpate.dataset import Dataset
 from palpate.format import count, length, plain, scientific
 from palpate.learning import History
 from palpate.learning.learning_history import draw_passes, draw_units
-from palpate.surrogates import TouchModel
+from palpate.surrogates import Surrogate
 from palpate.validation.figures.by_load import NETWORKS, NetworkErrors, node_truth
 from palpate.validation.report.chapter import Chapter
 from palpate.validation.report.style import (
@@ -45,8 +45,8 @@ __all__ = [
 
 ROLES = {
     "nodes": "loads → the displacements asked for",
-    "field": "loads → the whole shape, for the eye",
-    "force": "where the hand is → the force, for the hand",
+    "displacement": "loads → the whole shape, for the eye",
+    "energy": "where the hand is → the energy, whose slope is the force on the hand",
     "filter": "the sequential network before refinement, kept to be compared with nodes",
 }
 """Purpose of each network."""
@@ -55,7 +55,7 @@ TITLES = {"filter": "Sequential filter", "refined": "Refined network"}
 OWN = "this filter"
 
 
-def error_picture(chapter: Chapter, touch: TouchModel, data: Dataset, key: str) -> Picture:
+def error_picture(chapter: Chapter, model: Surrogate, data: Dataset, key: str) -> Picture:
     """Draw the error at each node against load."""
     v = chapter.validation
     refined, own = v.networks.refined, v.networks.filter
@@ -71,7 +71,7 @@ def error_picture(chapter: Chapter, touch: TouchModel, data: Dataset, key: str) 
         "Error at each node against load",
         f"Error at each node of {chapter.name} against load, on a logarithmic axis. {text}",
         text + dips,
-        lambda: plot_node_errors(touch, data, limit),
+        lambda: plot_node_errors(model, data, limit),
     )
 
 
@@ -134,55 +134,59 @@ def outer_picture(chapter: Chapter, key: str) -> Picture:
     )
 
 
-def network_rows(touch: TouchModel) -> list[tuple[str, str, str]]:
+def network_rows(model: Surrogate) -> list[tuple[str, str, str]]:
     """Return name, purpose and number of units of each network, in the order of `ROLES`."""
-    return [(k, role, str(touch.networks[k].units)) for k, role in ROLES.items() if k in touch.networks]
+    own = {key: field.network.units for key, field in model.fields.items()} | {
+        "energy": model.energy.network.units
+    }
+    return [(k, role, str(own[k])) for k, role in ROLES.items() if k in own]
 
 
-def units_of(touch: TouchModel, key: str) -> str:
+def units_of(model: Surrogate, key: str) -> str:
     """Return one network by its name with its number of units, for titles and captions."""
-    return f"network “{key}”, {count(touch.networks[key].units, 'unit')}"
+    network = model.energy.network if key == "energy" else model.fields[key].network
+    return f"network “{key}”, {count(network.units, 'unit')}"
 
 
-def node_errors(touch: TouchModel, data: Dataset, label: str) -> tuple[list[str], np.ndarray]:
+def node_errors(model: Surrogate, data: Dataset, label: str) -> tuple[list[str], np.ndarray]:
     """Return the names of the nodes, and the length of each one's error (N, nodes) in m.
 
     Parameters
     ----------
-    touch : TouchModel
-        Model whose networks answer by load.
+    model : Surrogate
+        Body that loads bend.
     data : Dataset
         Converged solves.
     label : "refined" or "filter"
         The refined network, or that of the sequential filter.
     """
-    network = touch.networks[NETWORKS[label]]
-    error = network.predict(data.X) - node_truth(touch, data)
+    network = model.fields[NETWORKS[label]].network
+    error = network.predict(data.X) - node_truth(model, data)
     places = [q.name.partition(" at ")[2] or q.name for q in network.outputs]
     names = list(dict.fromkeys(places))
     columns = [[i for i, place in enumerate(places) if place == name] for name in names]
     return names, np.stack([np.linalg.norm(error[:, c], axis=1) for c in columns], axis=1)
 
 
-def plot_node_errors(touch: TouchModel, data: Dataset, limit: float | None = None) -> Figure:
+def plot_node_errors(model: Surrogate, data: Dataset, limit: float | None = None) -> Figure:
     """Draw one column of panels per network, one row per input; error on a logarithmic axis.
 
     Parameters
     ----------
-    touch : TouchModel
-        Model whose networks answer by load.
+    model : Surrogate
+        Body that loads bend.
     data : Dataset
         Converged solves that the networks have never seen.
     limit : float, optional
         RMSE asked of the refined network in m, drawn across its panels.
     """
-    labels = [k for k in TITLES if NETWORKS[k] in touch.networks]
+    labels = [k for k in TITLES if NETWORKS[k] in model.fields]
     rows = len(data.ranges)
     height = 3.3 if rows == 1 else 0.7 + 2.1 * rows
     fig, axes = figure(rows, len(labels), size=(9.4, height), sharey=True, sharex="row")
     values = []
     for column, label in enumerate(labels):
-        names, error = node_errors(touch, data, label)
+        names, error = node_errors(model, data, label)
         values.append(error)
         for row, axis in enumerate(axes[:, column]):
             _draw_errors(axis, data.X[:, row], names, error, lines=rows == 1)
@@ -190,7 +194,7 @@ def plot_node_errors(touch: TouchModel, data: Dataset, limit: float | None = Non
             if limit is not None and label == "refined":
                 axis.axhline(limit, color=INK, linewidth=0.9, linestyle=(0, (2, 2)))
                 _note(axis, "RMSE asked", limit)
-        axes[0, column].set_title(f"{TITLES[label]}: {units_of(touch, NETWORKS[label])}")
+        axes[0, column].set_title(f"{TITLES[label]}: {units_of(model, NETWORKS[label])}")
     for axis in axes[:, 0]:
         axis.set_ylabel("|error| / m")
     tidy_log(axes[0, 0], [*values, np.array([limit or 0.0])])

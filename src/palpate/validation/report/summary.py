@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -10,6 +11,7 @@ from palpate.validation.figures.by_load import worse_than_filter
 from palpate.validation.figures.history_following import HistoryErrors
 from palpate.validation.report.body_words import body_words, strain_words
 from palpate.validation.report.chapter import Chapter
+from palpate.validation.subject import line_of
 from palpate.validation.validate import Validation
 
 __all__ = ["Fact", "Story", "felt", "story"]
@@ -56,7 +58,9 @@ def story(chapter: Chapter) -> Story:
 
 def _facts(chapter: Chapter) -> Iterator[Fact]:
     v, subject = chapter.validation, chapter.subject
-    if reach := getattr(chapter.model, "reach", None):
+    if (line := line_of(chapter.model)) is not None:
+        ends = chapter.model.energy.inputs[: len(line.touched)]
+        reach = math.hypot(*(max(abs(r.low), abs(r.high)) for r in ends))
         yield Fact(length(reach), "farthest trained displacement of the held node")
     if subject.function is not None and subject.function.depth is not None:
         depth = float(subject.function.depth(subject.X).max())

@@ -10,106 +10,113 @@ import pytest
 
 from palpate.errors import FileFormatError, UsageError
 from palpate.learning.plastic import (
-    HeldPath,
-    HeldPaths,
+    LoadHistories,
+    LoadHistory,
     Press,
-    learn_held,
     learn_indentation,
+    learn_with_memory,
     random_times,
     random_turns,
 )
-from palpate.learning.plastic.learn_held import HIGHEST, LIMITS, LOWEST, PER_DECADE
+from palpate.learning.plastic.learn_with_memory import HIGHEST, LIMITS, LOWEST, PER_DECADE
 from palpate.surrogates.memories import Indentation, IwanElements
 from remembering import press
 
 YIELDS = IwanElements.sliders(
-    np.array([15.0, 60.0, 40.0]), np.array([math.inf, 0.083, 0.21]), np.array([0.0, 0.1, 0.0])
+    np.array([15.0, 60.0, 40.0]) / 115.0,
+    np.array([math.inf, 0.083, 0.21]) * math.sqrt(115.0),
+    np.array([0.0, 0.1, 0.0]),
 )
-CREEPS = IwanElements.dashpots(np.array([60.0, 25.0, 20.0]), np.array([math.inf, 0.1, 2.0]))
+CREEPS = IwanElements.dashpots(np.array([60.0, 25.0, 20.0]) / 105.0, np.array([math.inf, 0.1, 2.0]))
+K = {id(YIELDS): 115.0, id(CREEPS): 105.0}  # N/m, of the body at rest
 
 
-def stretch(w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """h = w exp(w²/4) and its slope."""
-    return w * np.exp(w * w / 4), (1 + w * w / 2) * np.exp(w * w / 4)
+def amplitude(w: np.ndarray, K: float) -> tuple[np.ndarray, np.ndarray]:
+    """q = √K w exp(w²/4), √J, and its slope."""
+    return math.sqrt(K) * w * np.exp(w * w / 4), math.sqrt(K) * (1 + w * w / 2) * np.exp(w * w / 4)
 
 
-def path(elements: IwanElements, w: np.ndarray, times: np.ndarray | None = None) -> HeldPath:
-    h, slope = stretch(w)
-    force = slope * (elements.elongations(h, times) @ elements.stiffness)
+def path(
+    elements: IwanElements, w: np.ndarray, times: np.ndarray | None = None, stiffness: float | None = None
+) -> LoadHistory:
+    q, slope = amplitude(w, K[id(elements)] if stiffness is None else stiffness)
+    force = slope * (elements.elongations(q, times) @ elements.stiffness)
     shape = np.zeros((len(w), 2, 2))
     shape[:, 1, 1] = -w
     nothing = np.zeros(len(w))
     clock = np.arange(1.0, 1.0 + len(w)) if times is None else times
-    return HeldPath(clock, w, force, elements.total * h * h / 2, nothing, shape)
+    return LoadHistory(clock, w, force, q * q / 2, nothing, shape)
 
 
-def paths(*several: HeldPath) -> HeldPaths:
-    return HeldPaths(
+def paths(*several: LoadHistory) -> LoadHistories:
+    return LoadHistories(
         np.array([[0.0, 0], [1.0, 0]]), 1, np.array([0.0, -1.0]), several, nodes_of_interest=(1,)
     )
 
 
-def twin(elements: IwanElements) -> HeldPath:
-    spring = IwanElements.sliders(np.array([elements.total]), np.array([math.inf]), np.zeros(1))
-    return path(spring, np.linspace(0.02, 0.55, 30))
+def elastic(elements: IwanElements) -> LoadHistory:
+    """The same body without its memory."""
+    spring = IwanElements.sliders(np.ones(1), np.array([math.inf]), np.zeros(1))
+    return path(spring, np.linspace(0.02, 0.55, 30), stiffness=K[id(elements)])
 
 
 def test_sliders_are_found_to_the_grid_and_answer_unseen_histories() -> None:
     rng = np.random.default_rng(4)
 
-    def walk(outward: float) -> HeldPath:
+    def walk(outward: float) -> LoadHistory:
         return path(YIELDS, random_turns(rng, -0.5, 0.5, turns=6, step=0.02, outward=outward))
 
-    body, fit = learn_held(paths(walk(3.0), walk(3.0), walk(3.0)), twin(YIELDS))
+    body, fit = learn_with_memory(paths(walk(3.0), walk(3.0), walk(3.0)), elastic(YIELDS))
     # a limit between two of the grid is at most half their distance from one of them
     half = 0.5 * ((HIGHEST / LOWEST) ** (1 / (LIMITS - 1)) - 1)
-    worst = half * float(np.sum(YIELDS.stiffness[1:] * YIELDS.limit[1:]) * stretch(np.array([0.5]))[1][0])
+    slope = amplitude(np.array([0.5]), 115.0)[1][0]
+    worst = half * float(np.sum(YIELDS.stiffness[1:] * YIELDS.limit[1:]) * slope)
     for unseen in (walk(0.0), walk(0.0)):
-        force, stored, lost = body.follow(unseen.place)
-        assert np.abs(force - unseen.force).max() < worst
-        assert stored.min() >= 0
-        assert (np.diff(lost) >= 0).all()
-    assert body.elements.total == pytest.approx(YIELDS.total, rel=0.01)
-    assert fit.stretch_error < 1e-3
+        led = body.follow(unseen.place[:, None])
+        assert np.abs(led.force[:, 1] - unseen.force).max() < worst
+        assert led.stored.min() >= 0
+        assert (np.diff(led.lost) >= 0).all()
+    assert body.memory.total == pytest.approx(1.0, rel=0.01)
+    assert fit.elastic_error < 1e-3
     assert "elements" in str(fit)
 
 
 def test_dashpots_are_found_to_the_grid() -> None:
     rng = np.random.default_rng(6)
 
-    def drive() -> HeldPath:
+    def drive() -> LoadHistory:
         times, w = random_times(rng, -0.5, 0.5, span=8.0, step=0.04)
         return path(CREEPS, w, times)
 
-    body, _ = learn_held(paths(drive(), drive()), twin(CREEPS), relaxes=True)
+    body, _ = learn_with_memory(paths(drive(), drive()), elastic(CREEPS), relaxes=True)
     unseen = drive()
-    force = body.follow(unseen.place, unseen.times)[0]
+    force = body.follow(unseen.place[:, None], unseen.times).force[:, 1]
     # two exponentials of the grid stand for one between them: to the square of half their distance
     half = 0.5 * math.log(10) / PER_DECADE
     assert np.abs(force - unseen.force).max() < half**2 * np.abs(unseen.force).max()
-    relaxed = body.elements.stiffness[np.isinf(body.elements.time)].sum() / body.elements.total
+    relaxed = body.memory.stiffness[np.isinf(body.memory.time)].sum() / body.memory.total
     assert relaxed == pytest.approx(60 / 105, abs=0.02)
 
 
 def test_histories_come_back_from_their_file(tmp_path: Path) -> None:
     some = paths(path(YIELDS, np.array([0.1, 0.3])), path(YIELDS, np.array([0.2, -0.1, 0.0])))
-    found = HeldPaths.load(some.save(tmp_path / "some.palpate"))
+    found = LoadHistories.load(some.save(tmp_path / "some.palpate"))
     assert str(found) == str(some)
     for one, other in zip(some.paths, found.paths, strict=True):
         np.testing.assert_array_equal(one.force, other.force)
         np.testing.assert_array_equal(one.displacement, other.displacement)
     with pytest.raises(FileFormatError):
-        HeldPaths.load(tmp_path / "none.palpate")
+        LoadHistories.load(tmp_path / "none.palpate")
 
 
 def test_histories_that_fit_nothing_are_refused() -> None:
     good = path(YIELDS, np.array([0.1, 0.3]))
     with pytest.raises(UsageError, match="no history"):
-        HeldPath(good.times[::-1], good.place, good.force, good.stored, good.lost, good.displacement)
-    with pytest.raises(UsageError, match="twin was led"):
-        learn_held(paths(path(YIELDS, np.array([0.1, 0.9]))), twin(YIELDS))
+        LoadHistory(good.times[::-1], good.place, good.force, good.stored, good.lost, good.displacement)
+    with pytest.raises(UsageError, match="elastic body was led"):
+        learn_with_memory(paths(path(YIELDS, np.array([0.1, 0.9]))), elastic(YIELDS))
     with pytest.raises(UsageError, match="too few"):
-        learn_held(paths(), twin(YIELDS))
+        learn_with_memory(paths(), elastic(YIELDS))
 
 
 def test_the_tables_of_a_dent_come_back() -> None:

@@ -13,14 +13,14 @@ import numpy as np
 from palpate.errors import FileFormatError, UsageError
 from palpate.network import Archive, load_archive, save_archive
 
-__all__ = ["HeldPath", "HeldPaths", "Marches", "follow_loads"]
+__all__ = ["LoadHistories", "LoadHistory", "Marches", "follow_loads"]
 
 KIND = "held-paths"
 _COLUMNS = ("times", "place", "force", "stored", "lost")
 
 
 @dataclass(frozen=True, eq=False)
-class HeldPath:
+class LoadHistory:
     """One history, from the virgin body at time 0; between two samples it goes evenly.
 
     Attributes
@@ -72,8 +72,8 @@ class Marches(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class HeldPaths:
-    """HeldPaths of one body held at one node.
+class LoadHistories:
+    """LoadHistories of one body held at one node.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class HeldPaths:
         The held one.
     direction : (2,)
         Unit direction of the load.
-    paths : tuple of HeldPath
+    paths : tuple of LoadHistory
     radius : float
         Half the height of the section, m, for the picture.
     nodes_of_interest : tuple of int
@@ -92,7 +92,7 @@ class HeldPaths:
     rest: np.ndarray
     node: int
     direction: np.ndarray
-    paths: tuple[HeldPath, ...]
+    paths: tuple[LoadHistory, ...]
     radius: float = 0.005
     nodes_of_interest: tuple[int, ...] = ()
 
@@ -101,16 +101,18 @@ class HeldPaths:
 
     def __str__(self) -> str:
         if not self.paths:
-            return "HeldPaths: none"
+            return "LoadHistories: none"
         reach = max(float(np.abs(path.place).max()) for path in self.paths)
         force = max(float(np.abs(path.force).max()) for path in self.paths)
         samples = sum(map(len, self.paths))
-        return f"HeldPaths: {len(self)} with {samples} samples, to {reach:.4g} m and {force:.4g} N"
+        return f"LoadHistories: {len(self)} with {samples} samples, to {reach:.4g} m and {force:.4g} N"
 
-    def take(self, rows: Sequence[int]) -> HeldPaths:
+    def take(self, rows: Sequence[int]) -> LoadHistories:
         """Some of the histories."""
         chosen = tuple(self.paths[i] for i in rows)
-        return HeldPaths(self.rest, self.node, self.direction, chosen, self.radius, self.nodes_of_interest)
+        return LoadHistories(
+            self.rest, self.node, self.direction, chosen, self.radius, self.nodes_of_interest
+        )
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write them to one file.
@@ -129,7 +131,7 @@ class HeldPaths:
         return save_archive(path, Archive({}, arrays, meta, KIND))
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> HeldPaths:
+    def load(cls, path: str | os.PathLike[str]) -> LoadHistories:
         """Read them back, bit for bit.
 
         Raises
@@ -142,7 +144,7 @@ class HeldPaths:
             arrays, meta = archive.arrays, archive.meta
             ends = np.cumsum(arrays["lengths"])[:-1]
             columns = [np.split(arrays[name], ends) for name in (*_COLUMNS, "displacement")]
-            paths = tuple(HeldPath(*parts) for parts in zip(*columns, strict=True))
+            paths = tuple(LoadHistory(*parts) for parts in zip(*columns, strict=True))
             interest = tuple(int(i) for i in meta["of_interest"])
             return cls(
                 arrays["rest"],
@@ -158,7 +160,7 @@ class HeldPaths:
 
 def follow_loads(
     problem: Marches, node: int, direction: np.ndarray, loads: np.ndarray, times: np.ndarray | None = None
-) -> HeldPath:
+) -> LoadHistory:
     """Lead a body through loads, from its virgin state.
 
     Parameters
@@ -187,7 +189,7 @@ def follow_loads(
             "The first load of a history has no answer.", why=answers[0].message, fix="Begin with less."
         )
     shapes = np.array([one.displacement[:, :2] for one in answers[:good]])
-    return HeldPath(
+    return LoadHistory(
         times=np.arange(1.0, 1.0 + good) if times is None else np.asarray(times, dtype=float)[:good],
         place=shapes[:, node] @ np.asarray(direction, dtype=float),
         force=loads[:good],

@@ -9,16 +9,16 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.learning.plastic.drives import held_loads, load_unload_reload, random_times, random_turns
-from palpate.learning.plastic.paths import HeldPath, HeldPaths, follow_loads
+from palpate.learning.plastic.load_histories import LoadHistories, LoadHistory, follow_loads
 
-__all__ = ["HeldProblem", "lead_held", "lead_twin"]
+__all__ = ["HistoryProblem", "solve_elastic", "solve_histories"]
 
 SAMPLES = 20  # of the way from no load to the largest: a step of a history at most
-TWIN = 30  # samples of the elastic twin
+ELASTIC = 30  # samples of the elastic body
 RAISES = 12  # of its load by half, until it reaches as far
 
 
-class HeldProblem(Protocol):
+class HistoryProblem(Protocol):
     """A body with one load that can be led through histories; `palpate.physics.beam.BeamProblem` is one.
 
     Attributes
@@ -50,8 +50,8 @@ class HeldProblem(Protocol):
         """Answers along a history of loads."""
 
 
-def lead_held(
-    problem: HeldProblem,
+def solve_histories(
+    problem: HistoryProblem,
     *,
     low: float,
     high: float,
@@ -63,7 +63,7 @@ def lead_held(
     step: float = 0.05,
     radius: float = 0.005,
     progress: Callable[[int, int], None] | None = None,
-) -> HeldPaths:
+) -> LoadHistories:
     """Lead a body through random histories.
 
     One that yields: each third one loads, unloads a part of the way and loads further; the others turn at random.
@@ -71,7 +71,7 @@ def lead_held(
 
     Parameters
     ----------
-    problem : HeldProblem
+    problem : HistoryProblem
     low, high : float
         Range of the load, N.
     count : int
@@ -92,7 +92,7 @@ def lead_held(
         If the problem has not one load.
     """
     node, direction = _held(problem)
-    rng, paths = np.random.default_rng(seed), list[HeldPath]()
+    rng, paths = np.random.default_rng(seed), list[LoadHistory]()
     largest = max(-low, high)
     for i in range(count):
         times: np.ndarray | None = None
@@ -108,11 +108,11 @@ def lead_held(
         if progress is not None:
             progress(i + 1, count)
     interest = tuple(int(k) for k in np.flatnonzero(problem.of_interest))
-    return HeldPaths(np.asarray(problem.rest), node, direction, tuple(paths), radius, interest)
+    return LoadHistories(np.asarray(problem.rest), node, direction, tuple(paths), radius, interest)
 
 
-def lead_twin(problem: HeldProblem, *, reach: float, load: float) -> HeldPath:
-    """Load the elastic twin until it has gone as far as `reach`, m, beginning with `load`, N.
+def solve_elastic(problem: HistoryProblem, *, reach: float, load: float) -> LoadHistory:
+    """Load the elastic body until it has gone as far as `reach`, m, beginning with `load`, N.
 
     Raises
     ------
@@ -121,18 +121,18 @@ def lead_twin(problem: HeldProblem, *, reach: float, load: float) -> HeldPath:
     """
     node, direction = _held(problem)
     for _ in range(RAISES):
-        path = follow_loads(problem, node, direction, np.linspace(load / TWIN, load, TWIN))
+        path = follow_loads(problem, node, direction, np.linspace(load / ELASTIC, load, ELASTIC))
         if path.place[-1] >= reach:
             return path
         load *= 1.5
     raise UsageError(
-        f"The elastic twin went to {path.place[-1]:.4g} m under {load / 1.5:.4g} N.",
+        f"The elastic body went to {path.place[-1]:.4g} m under {load / 1.5:.4g} N.",
         why=f"The histories go to {reach:.4g} m.",
         fix="Check that it is the same body without its memory.",
     )
 
 
-def _held(problem: HeldProblem) -> tuple[int, np.ndarray]:
+def _held(problem: HistoryProblem) -> tuple[int, np.ndarray]:
     if len(set(problem.load_nodes)) != 1 or len(set(problem.load_directions)) != 1:
         raise UsageError(
             f"The loads act on nodes {problem.load_nodes} along {problem.load_directions}.",

@@ -52,7 +52,7 @@ def two_loads(text: str, folder: Path) -> None:
         for hand, force, tip in zip(row[0:2], row[2:4], row[4:6], strict=True):
             assert force == pytest.approx(-coupling * (hand - tip), abs=0.02 + 0.001 * coupling)
     assert text.count("inside the trained range") == 2
-    assert text.count("outside the trained range") == 1
+    assert text.count(" m, outside the trained range") == 1
 
 
 def own_beam(text: str, folder: Path) -> None:
@@ -83,7 +83,9 @@ def program(text: str, folder: Path) -> None:
     # 3EI w/L³ for a small deflection
     stiffness = 3 * 110e9 * 3.14159265 * 0.005**4 / 4
     assert down == pytest.approx(0.02 * stiffness, rel=2e-3)
-    assert "+5.000 N on the hand (beyond the trained range" in text
+    # twice as far as trained: the energy goes on, and says that it was not solved there
+    beyond = float(re.search(r"-60 mm: (\S+) N on the hand \(beyond the trained range\)", text)[1])
+    assert beyond == pytest.approx(0.06 * stiffness, rel=0.05)
     ticks = [int(t) for t in re.findall(r"tick +(\d+)", text)]
     assert ticks == sorted(set(ticks))
     assert len(ticks) == 5

@@ -25,10 +25,11 @@ The type decides what is read, so nothing in a file can choose a class that its 
 
 from __future__ import annotations
 
+import importlib
 import math
 import os
 import types
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -41,15 +42,29 @@ from palpate.network.archive import Archive, load_archive, save_archive
 from palpate.network.network import Network
 from palpate.network.packing import pack, unpack
 
-__all__ = ["decode", "encode", "load_value", "register_kind", "registered_kinds", "save_value"]
+__all__ = [
+    "decode",
+    "encode",
+    "import_when_needed",
+    "load_value",
+    "outside_modules",
+    "register_kind",
+    "registered_kinds",
+    "save_value",
+]
 
 T = TypeVar("T")
 _ALONE = "value"  # the name of what is stored where nothing contains it
 # an array of so many bytes or more is packed where that saves a quarter
 _LARGE, _WORTH, _PACKED = 50_000, 0.75, "packed"
 _KIND, _SAME = "class", "same as"  # neither can be the name of a field
+_IMPORT = (
+    "Import the module that registers it first. The real-time process can import modules only: there the class stands "
+    "in a file of its own, not in the script that is run."
+)
 _NOT_FINITE = {"inf": math.inf, "-inf": -math.inf, "nan": math.nan}
 _kinds: dict[type, dict[str, type]] = {}
+_not_imported: list[str] = []
 _forms: dict[Any, Any] = {}
 
 
@@ -90,6 +105,23 @@ def register_kind(base: type, kind: type, name: str | None = None) -> None:
 def registered_kinds(base: type) -> Mapping[str, type]:
     """The dataclasses, by name, that may stand where a field is declared as `base`."""
     return dict(_kinds.get(base, {}))
+
+
+def outside_modules() -> tuple[str, ...]:
+    """Return the modules outside palpate, by name, whose classes are registered; a script itself is none."""
+    names = dict.fromkeys(kind.__module__ for kinds in _kinds.values() for kind in kinds.values())
+    return tuple(name for name in names if name.partition(".")[0] not in {"palpate", "__main__"})
+
+
+def import_when_needed(modules: Iterable[str]) -> None:
+    """Let files of kinds that this process does not know import these modules, one after the other.
+
+    Parameters
+    ----------
+    modules : iterable of str
+        Such as `outside_modules` of the process that started this one.
+    """
+    _not_imported.extend(modules)
 
 
 def encode(value: object, *, kind: str) -> Archive:
@@ -171,8 +203,12 @@ def load_value(path: str | os.PathLike[str], cls: type[T], *, kind: str, noun: s
         raise FileFormatError(
             f"{path} does not describe {noun}.",
             why=f"{type(error).__name__}: {error}",
-            fix="Copy the file again, or learn it anew.",
+            fix=_IMPORT if isinstance(error, _UnknownKind) else "Copy the file again, or learn it anew.",
         ) from error
+
+
+class _UnknownKind(ValueError):
+    """A file holds a kind that no module has registered."""
 
 
 @dataclass
@@ -400,8 +436,11 @@ class _Choice:
             if type(value) not in kinds.values():
                 raise TypeError(f"{stored[_SAME]} is a {type(value).__name__}, not one of {', '.join(kinds)}")
             return value
+        while stored[_KIND] not in kinds and _not_imported:
+            importlib.import_module(_not_imported.pop(0))
+            kinds = self._kinds()
         if stored[_KIND] not in kinds:
-            raise ValueError(f"{path} is a {stored[_KIND]!r:.40}; known here: {', '.join(kinds) or 'none'}")
+            raise _UnknownKind(f"{path} is a {stored[_KIND]!r:.40}; known here: {', '.join(kinds) or 'none'}")
         return _form(kinds[stored[_KIND]]).read({k: v for k, v in stored.items() if k != _KIND}, path, parts)
 
     def _kinds(self) -> Mapping[str, type]:

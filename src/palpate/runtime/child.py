@@ -16,6 +16,7 @@ import threading
 from collections.abc import Callable, Sequence
 
 from palpate.errors import PalpateError
+from palpate.network.codec import import_when_needed
 from palpate.runtime.devices import device_named
 from palpate.runtime.loop import Loop, rehearsal
 from palpate.runtime.realtime import obtain
@@ -50,6 +51,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--radius", type=float, required=True, help="workspace, m")
     parser.add_argument("--max-force", type=float, required=True, help="N")
     parser.add_argument("--slew", type=float, default=0.0, help="N/s; 0: full force in 20 ms")
+    parser.add_argument(
+        "--module", action="append", default=[], help="imported for a file of an unknown kind"
+    )
     return parser
 
 
@@ -57,6 +61,7 @@ def _run(options: argparse.Namespace) -> int:
     shared = Shared.attach(options.state)
     shared.unlink()  # both sides have it: from here on no kind of death can leave it behind
     orphaned = _watch_parent()
+    import_when_needed(options.module)
     model = load_touchable(options.model)
     device = device_named(options.device, shared.command)
     workspace = model.workspace(options.radius)

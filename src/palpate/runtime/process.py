@@ -17,6 +17,7 @@ from types import TracebackType
 from typing import Any, Self, TypeVar
 
 from palpate.errors import DeviceError, UsageError
+from palpate.network.codec import outside_modules
 from palpate.processes import helper_environment
 from palpate.runtime.devices import device_traits
 from palpate.runtime.loop_report import LoopReport
@@ -109,9 +110,15 @@ class LoopProcess:
         return self
 
     def _popen(self) -> subprocess.Popen[str]:
+        modules = (f"--module={name}" for name in outside_modules())
         try:
             return subprocess.Popen(
-                [sys.executable, "-m", "palpate.runtime", *self._arguments, f"--state={self.shared.name}"],
+                [
+                    *(sys.executable, "-m", "palpate.runtime"),
+                    *self._arguments,
+                    f"--state={self.shared.name}",
+                    *modules,
+                ],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=self._stderr,

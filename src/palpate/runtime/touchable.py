@@ -115,13 +115,19 @@ class Touchable:
 
     @property
     def radius(self) -> float:
-        """Radius of the probe, m; the middle of its range where it is an input. Of what is held, a size to draw."""
+        """Radius of the probe, m; the middle of its range where it is an input.
+
+        Of what is held, and of a probe that has none, a size to draw.
+        """
         if self.radius_parameter is not None:
             own = self.parameters[self.radius_parameter]
             return (own.low + own.high) / 2.0
         if self.line is not None:
             return self.line.radius
-        return self.reach / 2.0 if self.holds else float(self.energy.baseline.radius)
+        radius = float(self.energy.baseline.radius)
+        if math.isfinite(radius):
+            return radius
+        return self.reach / 2.0 if self.holds else self.deepest
 
     @cached_property
     def trained_inputs(self) -> np.ndarray:

@@ -28,7 +28,9 @@ What the kernels take:
 from __future__ import annotations
 
 import math
+import zlib
 from collections.abc import Callable
+from pathlib import Path
 from types import FunctionType
 from typing import Any, NamedTuple
 
@@ -323,13 +325,14 @@ _entries: dict[tuple[Any, ...], Entry] = {}
 def entry_of(compiled: Compiled) -> Entry:
     """Return the compiled functions for the kernels of a baseline, made on first use.
 
-    Numba finds them in its cache by their names, which tell the baseline's; its kernels stand in their globals.
+    Numba finds them in its cache by their names, which tell the baseline's kernels; these stand in their globals. So
+    the names hold a checksum of the kernels' sources: a changed kernel must not answer as it did before.
     """
     hooks = (compiled.kernel, *compiled[2:])
     if hooks not in _entries:
         first = compiled.enter or compiled.kernel
         assert first is not None
-        name = f"{first.__module__}.{first.__name__}".replace(".", "_")
+        name = f"{first.__module__}.{first.__name__}_{_checksum(hooks)}".replace(".", "_")
         enter = compiled.enter or _bound(_plain_enter, name, {"baseline_kernel": compiled.kernel})
         one = _bound(
             _one,
@@ -343,6 +346,15 @@ def entry_of(compiled: Compiled) -> Entry:
         )
         _entries[hooks] = Entry(one, _bound(_rows, name, {"answer_one": one}))
     return _entries[hooks]
+
+
+def _checksum(hooks: tuple[Any, ...]) -> str:
+    """Return a checksum of the files that hold kernels, or of their code where it stands in no file."""
+    total = 0
+    for code in (getattr(hook, "py_func", hook).__code__ for hook in hooks if hook is not None):
+        path = Path(code.co_filename)
+        total = zlib.crc32(path.read_bytes() if path.is_file() else code.co_code, total)
+    return f"{total:08x}"
 
 
 def _bound(template: Callable[..., Any], name: str, hooks: dict[str, Any]) -> Callable[..., Any]:

@@ -83,7 +83,7 @@ class PageModel:
             inputs=_ranges(body.inputs),
             parameters=_ranges(body.parameters),
             holds=body.holds,
-            radius=body.radius if math.isfinite(body.radius) else body.deepest,
+            radius=body.radius,
             radius_parameter=-1 if body.radius_parameter is None else body.radius_parameter,
             deepest=body.deepest,
             force_max=body.force_max,

@@ -7,11 +7,11 @@ import time
 import numpy as np
 import pytest
 from chromium_page import drag, number, settled, tip, vector
-from websocket_page import Client, client_of
 
 from bent import REACH, D, body
 from palpate.viewer import Viewer
 from palpate.viewer.messages import Frame
+from websocket_page import Client, client_of
 
 pytestmark = pytest.mark.timeout(120)
 

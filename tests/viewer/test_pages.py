@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 from chromium_page import assert_no, check_force, drag, let_go, number, settled, tip, vector
 from playwright.sync_api import expect
-from websocket_page import client_of
 
 from models import DOWN, linear_network, planar_field, spring_beam
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import ConstantBaseline, LearntEnergy, Surrogate
 from palpate.units import Quantity, Range
 from palpate.viewer import Viewer, hand_lock
+from websocket_page import client_of
 
 pytestmark = pytest.mark.timeout(120)
 

@@ -10,7 +10,6 @@ import time
 
 import numpy as np
 import pytest
-from websocket_page import Client, client_of
 from websockets.exceptions import ConnectionClosed
 
 from palpate.runtime.touchable import touchable
@@ -18,6 +17,7 @@ from palpate.surrogates import Surrogate
 from palpate.viewer import Viewer
 from palpate.viewer.messages import Frame, Hold, Loop, Notice
 from palpate.viewer.session import MOST_CREDITS
+from websocket_page import Client, client_of
 
 pytestmark = pytest.mark.timeout(60)
 

@@ -28,6 +28,11 @@ class Client:
         assert isinstance(data, bytes)
         return Frame.unpack(data)
 
+    def next_frame(self) -> Frame:
+        """The next frame, asked for."""
+        self.grant(1)
+        return self.frame()
+
     def hand(self, x: float = 0.0, y: float = 0.0, *, grabbed: bool = True, hidden: bool = False) -> None:
         """Hold the tip at an offset of x, y body metres."""
         target = (x / self.hello.scale, y / self.hello.scale, 0.0)

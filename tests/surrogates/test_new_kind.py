@@ -41,9 +41,6 @@ class SpringBed(pp.Baseline):
     stiffness: float
     meets: float
 
-    def __str__(self):
-        return f"bed of springs, {self.stiffness:.4g} N/m in all"
-
     def compiled(self):
         return Compiled(even_bed, (self.stiffness, self.meets))
 
@@ -109,12 +106,12 @@ def test_it_goes_all_the_way(solves, body, tmp_path):
     judged = pp.validate(pp.load(file), solves[1])
     judged.raise_if_failed()
     chapter = Chapter("bed", body, solves[1], judged)
-    assert "bed of springs" in pp.write_report(tmp_path / "bed.html", [chapter]).read_text(encoding="utf-8")
+    assert "SpringBed(stiffness=" in pp.write_report(tmp_path / "bed.html", [chapter]).read_text(encoding="utf-8")
     with (
         Viewer(file, port=0, device="stroke:frequency=2,amplitude=0.02") as viewer,
         client_of(viewer) as page,
     ):
-        frames = [_next(page) for _ in range(100)]
+        frames = [page.next_frame() for _ in range(100)]
         drawn = Surface.unpack(httpx.get(viewer.url + "surface").content)
     deep = max(frames, key=lambda frame: frame.depth)
     assert deep.depth > 0.003
@@ -122,8 +119,3 @@ def test_it_goes_all_the_way(solves, body, tmp_path):
     np.testing.assert_allclose(deep.force, body.energy.force(np.array([deep.position]))[0], atol=1e-4)
     assert len(drawn.triangles)
     assert (page.hello.name, page.hello.holds) == ("bed", False)
-
-
-def _next(page):
-    page.grant(1)
-    return page.frame()

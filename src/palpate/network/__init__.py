@@ -11,7 +11,8 @@ Nothing here knows of training.
 """
 
 from palpate.network.archive import Archive, load_archive, save_archive
-from palpate.network.codec import decode, encode, load_value, register_kind, save_value
+from palpate.network.codec import decode, encode, load_value, save_value
+from palpate.network.kinds import register_kind
 from palpate.network.network import Evaluator, Network, Scaling
 from palpate.network.publication import Publisher, Subscriber
 from palpate.network.region import TrainedRegion

@@ -25,11 +25,10 @@ The type decides what is read, so nothing in a file can choose a class that its 
 
 from __future__ import annotations
 
-import importlib
 import math
 import os
 import types
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -39,89 +38,25 @@ import numpy as np
 
 from palpate.errors import FileFormatError, UsageError
 from palpate.network.archive import Archive, load_archive, save_archive
+from palpate.network.kinds import (
+    UnknownKindError,
+    import_next,
+    registered_kinds,
+    registrations,
+    same_class,
+)
 from palpate.network.network import Network
 from palpate.network.packing import pack, unpack
 
-__all__ = [
-    "decode",
-    "encode",
-    "import_when_needed",
-    "load_value",
-    "outside_modules",
-    "register_kind",
-    "registered_kinds",
-    "save_value",
-]
+__all__ = ["decode", "encode", "load_value", "save_value"]
 
 T = TypeVar("T")
 _ALONE = "value"  # the name of what is stored where nothing contains it
 # an array of so many bytes or more is packed where that saves a quarter
 _LARGE, _WORTH, _PACKED = 50_000, 0.75, "packed"
 _KIND, _SAME = "class", "same as"  # neither can be the name of a field
-_IMPORT = (
-    "Import the module that registers it first. The real-time process can import modules only: there the class stands "
-    "in a file of its own, not in the script that is run."
-)
 _NOT_FINITE = {"inf": math.inf, "-inf": -math.inf, "nan": math.nan}
-_kinds: dict[type, dict[str, type]] = {}
-_not_imported: list[str] = []
 _forms: dict[Any, Any] = {}
-
-
-def register_kind(base: type, kind: type, name: str | None = None) -> None:
-    """Let fields declared as `base` hold a `kind`, stored under a name.
-
-    Parameters
-    ----------
-    base : type
-        The base class or protocol that fields are annotated with.
-    kind : type
-        A dataclass of its own fields.
-    name : str, optional
-        What files call it; by default its class attribute ``name``.
-
-    Raises
-    ------
-    UsageError
-        If it is no dataclass, has no name, or another one has the name.
-    """
-    name = getattr(kind, "name", None) if name is None else name
-    if not (is_dataclass(kind) and isinstance(name, str)):
-        raise UsageError(
-            f"{kind.__name__} can't stand for {base.__name__} in files.",
-            why="A file stores it field by field, under its name.",
-            fix="Make it a frozen dataclass with a class attribute `name`.",
-        )
-    names = _kinds.setdefault(base, {})
-    if _identity(names.get(name, kind)) != _identity(kind):  # a module may be imported anew
-        raise UsageError(
-            f"There is already a {base.__name__} called {name!r}, {names[name].__qualname__}.",
-            fix="Give the new one another name: files tell them apart by it.",
-        )
-    names[name] = kind
-    _forms.clear()  # a base may have been taken for a plain dataclass
-
-
-def registered_kinds(base: type) -> Mapping[str, type]:
-    """The dataclasses, by name, that may stand where a field is declared as `base`."""
-    return dict(_kinds.get(base, {}))
-
-
-def outside_modules() -> tuple[str, ...]:
-    """Return the modules outside palpate, by name, whose classes are registered; a script itself is none."""
-    names = dict.fromkeys(kind.__module__ for kinds in _kinds.values() for kind in kinds.values())
-    return tuple(name for name in names if name.partition(".")[0] not in {"palpate", "__main__"})
-
-
-def import_when_needed(modules: Iterable[str]) -> None:
-    """Let files of kinds that this process does not know import these modules, one after the other.
-
-    Parameters
-    ----------
-    modules : iterable of str
-        Such as `outside_modules` of the process that started this one.
-    """
-    _not_imported.extend(modules)
 
 
 def encode(value: object, *, kind: str) -> Archive:
@@ -203,12 +138,10 @@ def load_value(path: str | os.PathLike[str], cls: type[T], *, kind: str, noun: s
         raise FileFormatError(
             f"{path} does not describe {noun}.",
             why=f"{type(error).__name__}: {error}",
-            fix=_IMPORT if isinstance(error, _UnknownKind) else "Copy the file again, or learn it anew.",
+            fix=error.fix
+            if isinstance(error, UnknownKindError)
+            else "Copy the file again, or learn it anew.",
         ) from error
-
-
-class _UnknownKind(ValueError):
-    """A file holds a kind that no module has registered."""
 
 
 @dataclass
@@ -420,7 +353,7 @@ class _Choice:
 
     def write(self, value: Any, path: str, parts: _Parts) -> dict[str, Any]:
         for name, kind in self._kinds().items():
-            if _identity(kind) == _identity(type(value)):
+            if same_class(kind, type(value)):
                 described = _form(type(value)).write(value, path, parts)
                 return described if described.keys() == {_SAME} else {_KIND: name, **described}
         raise _refused(
@@ -436,22 +369,24 @@ class _Choice:
             if type(value) not in kinds.values():
                 raise TypeError(f"{stored[_SAME]} is a {type(value).__name__}, not one of {', '.join(kinds)}")
             return value
-        while stored[_KIND] not in kinds and _not_imported:
-            importlib.import_module(_not_imported.pop(0))
+        while stored[_KIND] not in kinds and import_next():
             kinds = self._kinds()
         if stored[_KIND] not in kinds:
-            raise _UnknownKind(f"{path} is a {stored[_KIND]!r:.40}; known here: {', '.join(kinds) or 'none'}")
+            raise UnknownKindError(
+                f"{path} is a {stored[_KIND]!r:.40}; known here: {', '.join(kinds) or 'none'}"
+            )
         return _form(kinds[stored[_KIND]]).read({k: v for k, v in stored.items() if k != _KIND}, path, parts)
 
     def _kinds(self) -> Mapping[str, type]:
-        return {m.__name__: m for m in self.members} if self.base is None else _kinds.get(self.base, {})
+        return {m.__name__: m for m in self.members} if self.base is None else registered_kinds(self.base)
 
 
 def _form(hint: Any) -> _Form:
     """The form of a type, made once."""
-    form: _Form | None = _forms.get(hint)
+    key = hint, registrations()  # a base may have been taken for a plain dataclass before
+    form: _Form | None = _forms.get(key)
     if form is None:
-        form = _forms[hint] = _form_of_new(hint)
+        form = _forms[key] = _form_of_new(hint)
     return form
 
 
@@ -467,7 +402,7 @@ def _form_of_new(hint: Any) -> _Form:
     }
     if hint in simple:
         return simple[hint]
-    if is_dataclass(hint) and isinstance(hint, type) and hint not in _kinds:
+    if is_dataclass(hint) and isinstance(hint, type) and not registered_kinds(hint):
         hints = get_type_hints(hint, include_extras=True)
         return _Record(hint, {f.name: _form(hints[f.name]) for f in fields(hint) if f.init})
     if isinstance(hint, type) and get_origin(hint) is None:
@@ -495,10 +430,6 @@ def _compound(hint: Any, origin: Any, own: tuple[Any, ...]) -> _Form:
         f"A field of type {hint} can't be stored in a file.",
         fix="Use one of the types that palpate.network.codec lists.",
     )
-
-
-def _identity(kind: type) -> tuple[str, str]:
-    return kind.__module__, kind.__qualname__
 
 
 def _join(path: str, name: object) -> str:

@@ -16,7 +16,7 @@ import threading
 from collections.abc import Callable, Sequence
 
 from palpate.errors import PalpateError
-from palpate.network.codec import import_when_needed
+from palpate.network.kinds import import_when_needed
 from palpate.runtime.devices import device_named
 from palpate.runtime.loop import Loop, rehearsal
 from palpate.runtime.realtime import obtain

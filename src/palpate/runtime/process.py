@@ -17,7 +17,7 @@ from types import TracebackType
 from typing import Any, Self, TypeVar
 
 from palpate.errors import DeviceError, UsageError
-from palpate.network.codec import outside_modules
+from palpate.network.kinds import outside_modules
 from palpate.processes import helper_environment
 from palpate.runtime.devices import device_traits
 from palpate.runtime.loop_report import LoopReport

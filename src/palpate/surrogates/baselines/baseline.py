@@ -25,7 +25,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.network.codec import register_kind
+from palpate.network.kinds import register_kind
 from palpate.surrogates.energy_kernels import GRADIENT, HESSIAN, SMALL, VECTORS, Compiled
 from palpate.surrogates.surface import TouchedSurface
 from palpate.units import Range

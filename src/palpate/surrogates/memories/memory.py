@@ -16,7 +16,7 @@ from typing import ClassVar
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.network.codec import register_kind
+from palpate.network.kinds import register_kind
 from palpate.surrogates.memories.patches import Patches
 
 __all__ = ["Memory", "MemoryState", "amplitudes", "register_memory"]

@@ -105,12 +105,10 @@ def test_it_goes_all_the_way(solves, body, tmp_path):
     file = body.save(tmp_path / "bed.palpate")
     judged = pp.validate(pp.load(file), solves[1])
     judged.raise_if_failed()
-    chapter = Chapter("bed", body, solves[1], judged)
-    assert "SpringBed(stiffness=" in pp.write_report(tmp_path / "bed.html", [chapter]).read_text(encoding="utf-8")
-    with (
-        Viewer(file, port=0, device="stroke:frequency=2,amplitude=0.02") as viewer,
-        client_of(viewer) as page,
-    ):
+    report = pp.write_report(tmp_path / "bed.html", [Chapter("bed", body, solves[1], judged)])
+    assert "SpringBed(stiffness=" in report.read_text("utf-8")
+    stroke = "stroke:frequency=2,amplitude=0.02"
+    with Viewer(file, port=0, device=stroke) as viewer, client_of(viewer) as page:
         frames = [page.next_frame() for _ in range(100)]
         drawn = Surface.unpack(httpx.get(viewer.url + "surface").content)
     deep = max(frames, key=lambda frame: frame.depth)

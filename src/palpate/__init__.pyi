@@ -12,6 +12,7 @@ from .learning import Refinement as Refinement
 from .learning import Settings as Settings
 from .learning import fit as fit
 from .learning.learn_dataset import learn as learn
+from .learning.loading import load as load
 from .network import Network as Network
 from .physics import Body as Body
 from .physics import BodyFamily as BodyFamily
@@ -41,7 +42,6 @@ from .study import preset_study as preset_study
 from .study import read_study as read_study
 from .surrogates import Baseline as Baseline
 from .surrogates import Surrogate as Surrogate
-from .surrogates import load as load
 from .surrogates import register_baseline as register_baseline
 from .sweeps import ExternalProblem as ExternalProblem
 from .sweeps import Space as Space

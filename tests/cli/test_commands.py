@@ -13,9 +13,9 @@ import pytest
 
 from palpate import __version__
 from palpate.dataset import Dataset
+from palpate.learning.loading import load
 from palpate.physics.advice import advise
 from palpate.study import Study, preset_names, preset_study, read_study
-from palpate.surrogates import load
 
 from .conftest import SMALL
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from palpate.learning.loading import load
 from palpate.learning.plastic import LoadHistories
-from palpate.surrogates import load
 
 
 # forty seconds on two free cores; a busy machine is no failure

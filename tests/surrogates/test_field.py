@@ -13,6 +13,7 @@ from touch_made import DEEPEST, PROBE, RADIUS, SOFT, around_points, ball, inside
 
 from palpate.errors import UsageError
 from palpate.learning.correction.written import raised
+from palpate.learning.loading import load
 from palpate.network import Archive
 from palpate.network.codec import decode, encode
 from palpate.runtime.touchable import touchable
@@ -20,7 +21,6 @@ from palpate.surrogates import FieldSurrogate, Surrogate
 from palpate.surrogates.fields import DepthAmplitude, LocalMode, Variation
 from palpate.surrogates.fields.depth_amplitude import AMPLITUDES
 from palpate.surrogates.fields.local_mode import products
-from palpate.surrogates.loading import load
 
 
 def by_formula(F: FieldSurrogate, x: np.ndarray) -> np.ndarray:

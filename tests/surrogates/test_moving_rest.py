@@ -9,8 +9,9 @@ import pytest
 
 from bent import CREEPS, REACH, STIFFNESS, YIELDS, D, body
 from palpate.errors import UsageError
+from palpate.learning.loading import load
 from palpate.runtime.touchable import touchable
-from palpate.surrogates import Surrogate, load
+from palpate.surrogates import Surrogate
 from palpate.surrogates.memories import IwanElements
 from palpate.surrogates.moving_rest import MovingRest
 

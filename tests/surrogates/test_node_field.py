@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from models import DOWN, linear_network, planar_field, spring_beam, spring_energy
 from palpate.errors import UsageError
+from palpate.learning.loading import load
 from palpate.runtime.touchable import touchable
-from palpate.surrogates import ConstantBaseline, LearntEnergy, NodeField, Surrogate, load
+from palpate.surrogates import ConstantBaseline, LearntEnergy, NodeField, Surrogate
 from palpate.units import Quantity, Range
 
 NONE = np.zeros(0)

@@ -13,8 +13,9 @@ from touch_made import PROBE, SOFT, around_points, plane, touch_energy
 
 from held import INPUTS
 from palpate.errors import FileFormatError, UsageError
+from palpate.learning.loading import load
 from palpate.network import Archive, load_archive, save_archive
-from palpate.surrogates import ContactLaw, Surrogate, load
+from palpate.surrogates import ContactLaw, Surrogate
 
 
 def body(**more) -> Surrogate:

@@ -11,12 +11,13 @@ import numpy as np
 
 from palpate.cli.answer_at_place import Answer, outside, predictions
 from palpate.cli.console import Console
-from palpate.errors import FileFormatError, UsageError
+from palpate.errors import UsageError
 from palpate.learning import Fitted
-from palpate.learning.plastic.load_histories import KIND, LoadHistories
-from palpate.network import Archive, Network, load_archive
+from palpate.learning.loading import load
+from palpate.learning.plastic.load_histories import LoadHistories
+from palpate.network import Network
 from palpate.runtime.touchable import touchable
-from palpate.surrogates import LearntEnergy, Surrogate, load
+from palpate.surrogates import LearntEnergy, Surrogate
 from palpate.surrogates.surrogate import correction_warning
 from palpate.units import Range
 
@@ -35,7 +36,7 @@ def ask(model: Path, at: Sequence[str], console: Console) -> None:
     UsageError
         If a place is not as many numbers as there are inputs, or what the file holds has no answer to a place.
     """
-    contents = _read(model)
+    contents = load(model)
     what, inputs = type(contents).__name__, _inputs(contents)
     if not at:
         ranges = [{"name": r.name, "low": r.low, "high": r.high, "unit": r.unit} for r in inputs]
@@ -59,19 +60,6 @@ def ask(model: Path, at: Sequence[str], console: Console) -> None:
         )
     content = {"model": str(model), "answers": [one.as_dict(inputs) for one in answers]}
     console.result("\n".join(words), content | _as_field(_warning(contents)))
-
-
-def _read(path: Path) -> Any:
-    """Return the content of a file of any kind."""
-    kind = load_archive(path).kind
-    if kind == KIND:
-        return LoadHistories.load(path)
-    if kind != Archive.kind:
-        return load(path)
-    try:
-        return Fitted.load(path)
-    except FileFormatError:
-        return Network.load(path)
 
 
 def _inputs(asked: Any) -> tuple[Range, ...]:

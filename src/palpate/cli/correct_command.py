@@ -15,7 +15,6 @@ from palpate.dataset.measured import Measured, lines_of, listening, measurements
 from palpate.errors import AccuracyError, UsageError
 from palpate.learning.correction import Corrected, Corrector, Discrepancy, Noise, correct, judged
 from palpate.surrogates import Surrogate
-from palpate.surrogates.loading import load
 from palpate.units import to_si
 
 __all__ = ["Source", "correct_model"]
@@ -72,8 +71,8 @@ def correct_model(
     AccuracyError
         If the forces have another sign, or may have another unit, than the model's; everything has been written then.
     """
-    body = load(model)
-    if not isinstance(body, Surrogate) or body.energy.baseline.holds:
+    body = Surrogate.load(model)
+    if body.energy.baseline.holds:
         raise UsageError(
             f"{model} holds no body that is pressed.",
             why="Measured forces correct what a probe presses.",

@@ -134,11 +134,11 @@ def validate_model(
         If a limit is missed; everything has been printed and written then.
     """
     from palpate.dataset import Dataset
-    from palpate.surrogates.loading import load
+    from palpate.surrogates import Surrogate
     from palpate.surrogates.surrogate import correction_count
     from palpate.validation import Chapter, validate, write_report
 
-    model = load(path)
+    model = Surrogate.load(path)
     data, fine = _test_set(path, test), None if refined is None else Dataset.open(refined)
     validation = replace(validate(model, data, refined=fine), name=path.stem)
     if touches := correction_count(model.meta):

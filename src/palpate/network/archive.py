@@ -38,12 +38,6 @@ __all__ = [
     "save_archive",
 ]
 
-_READERS = {
-    "networks": "palpate.Network.load or palpate.Fitted.load",
-    "surrogate": "palpate.load",
-    "held-paths": "palpate.learning.plastic.LoadHistories.load",
-}
-"""The function that reads a file of each kind, for the message where it is given to another."""
 _PARTS = ("factors", "shifts", "weights", "tail")
 _SCALES = ("input_centre", "input_half", "output_centre", "output_scale")
 _EXTRA = "extra/"
@@ -122,7 +116,7 @@ def load_archive(path: str | os.PathLike[str], *, kind: str | None = None) -> Ar
         raise FileFormatError(
             f"{path} holds {container.kind!r}; {kind!r} is needed here.",
             why="A learnt body, networks of arrays and load histories are files of different kinds.",
-            fix=f"Read it with {_READERS.get(container.kind, 'what wrote it')}, or give a file of the other kind.",
+            fix="Read it with palpate.load, or give a file of the other kind.",
         )
     try:
         return _archive(container)

@@ -23,7 +23,7 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.runtime.hand_evaluator import HandEvaluator
 from palpate.runtime.workspace import Workspace
-from palpate.surrogates import FieldSurrogate, NodeField, Surrogate, TouchedSurface, load
+from palpate.surrogates import FieldSurrogate, NodeField, Surrogate, TouchedSurface
 from palpate.surrogates.memories import Memory
 from palpate.surrogates.moving_rest import follow
 from palpate.surrogates.surrogate import correction_count, correction_warning
@@ -346,4 +346,4 @@ def load_touchable(path: str | os.PathLike[str]) -> Touchable:
         If the file is missing, corrupt, foreign, or of something that no hand can be laid on.
     """
     path = Path(path)
-    return touchable(load(path), path.stem)
+    return touchable(Surrogate.load(path), path.stem)

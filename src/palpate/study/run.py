@@ -25,7 +25,7 @@ from palpate.learning import learn as learn_samples
 from palpate.learning.plastic import LoadHistories
 from palpate.study.memory_stages import learn_histories, sweep_histories
 from palpate.study.study import Study
-from palpate.surrogates.loading import load
+from palpate.surrogates import Surrogate
 from palpate.sweeps import sweep
 from palpate.validation import Chapter, Validation, validate, write_report
 
@@ -336,7 +336,7 @@ def load_model(paths: Paths, train: Rows) -> tuple[Any, Any]:
     UsageError
         If it was learnt from other rows than these: rows that it has seen might be taken for unseen ones.
     """
-    model = load(paths.model)
+    model = Surrogate.load(paths.model)
     if isinstance(train, Dataset) and model.meta.get("dataset", {}).get("hash") != train.hash:
         raise UsageError(
             f"{paths.model} was learnt from other solves than this study trains with.",

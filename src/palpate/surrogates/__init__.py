@@ -31,7 +31,6 @@ from palpate.surrogates.energy import LearntEnergy
 from palpate.surrogates.energy_evaluator import EnergyEvaluator
 from palpate.surrogates.energy_kernels import Compiled
 from palpate.surrogates.fields import FieldEvaluator, FieldSurrogate, NodeField
-from palpate.surrogates.loading import load
 from palpate.surrogates.moving_rest import Followed
 from palpate.surrogates.surface import TouchedSurface
 from palpate.surrogates.surrogate import Surrogate
@@ -55,6 +54,5 @@ __all__ = [
     "Stiffening",
     "Surrogate",
     "TouchedSurface",
-    "load",
     "register_baseline",
 ]

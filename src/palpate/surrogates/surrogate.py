@@ -15,8 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from palpate.errors import UsageError
+from palpate.errors import FileFormatError, UsageError
 from palpate.format import share
+from palpate.network import load_archive
 from palpate.network.codec import load_value, save_value
 from palpate.surrogates.energy import LearntEnergy
 from palpate.surrogates.fields import FieldSurrogate, NodeField
@@ -28,6 +29,14 @@ __all__ = ["KIND", "Surrogate", "correction_count", "correction_warning"]
 
 _SAMPLES = 4096  # of the trained ranges, for a typical press
 KIND = "surrogate"  # what the file's header calls it
+_FORMER = (
+    "touch",
+    "held-body",
+    "touched-body",
+    "touch-surrogate",
+    "grasp-surrogate",
+    "field-surrogate",
+)  # of 0.1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,8 +210,14 @@ class Surrogate:
         Raises
         ------
         FileFormatError
-            If the file is missing, corrupt, foreign or from a later version, or its parts do not fit.
+            If the file is missing, corrupt, foreign, from a later version or from 0.1.0, or its parts do not fit.
         """
+        if load_archive(path).kind in _FORMER:
+            raise FileFormatError(
+                f"{path} was written by palpate 0.1.0, which had a file of its own for each kind of body.",
+                why="A learnt body is one kind of file now.",
+                fix="Learn it again from its solves: `palpate learn STUDY.toml`, or pp.learn(data)[0].save(file).",
+            )
         return load_value(path, cls, kind=KIND, noun="a learnt body")
 
 

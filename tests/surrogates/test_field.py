@@ -12,7 +12,7 @@ from field_made import field, grid
 from touch_made import DEEPEST, PROBE, RADIUS, SOFT, around_points, ball, inside_points, touch_energy
 
 from palpate.errors import UsageError
-from palpate.learning.correction.written import raised
+from palpate.learning.correction.corrected_surrogate import raise_surface
 from palpate.learning.loading import load
 from palpate.network import Archive
 from palpate.network.codec import decode, encode
@@ -242,7 +242,7 @@ def test_a_body_keeps_energy_and_fields_in_one_file_with_one_surface(tmp_path):
 
 def test_a_body_with_a_corrected_energy_is_drawn_on_its_surface(tmp_path):
     S, F = touch_energy(), {"displacement": field()}
-    moved = raised(S.baseline.surface, 1e-4, RADIUS)
+    moved = raise_surface(S.baseline.surface, 1e-4, RADIUS)
     meta = {"correction": {"counts": {"learnt": 40, "outlier": 2}}}
     energy = dataclasses.replace(S, baseline=dataclasses.replace(S.baseline, touched=moved))
     body = Surrogate(S, F).with_energy(energy, meta)

@@ -13,7 +13,14 @@ import numpy as np
 from palpate.cli.console import Console
 from palpate.dataset.measured import Measured, lines_of, listening, measurements, read_measured
 from palpate.errors import AccuracyError, UsageError
-from palpate.learning.correction import Corrected, Corrector, Discrepancy, Noise, correct, judged
+from palpate.learning.correction import (
+    Correction,
+    Corrector,
+    Discrepancy,
+    Noise,
+    correct,
+    summarise_correction,
+)
 from palpate.surrogates import Surrogate
 from palpate.units import to_si
 
@@ -106,7 +113,7 @@ def correct_model(
         )
 
 
-def _streamed(corrector: Corrector, source: Source, console: Console) -> Corrected:
+def _streamed(corrector: Corrector, source: Source, console: Console) -> Correction:
     def say(port: int) -> None:
         # whoever feeds it must know the port, with --json too
         print(f"listening on 127.0.0.1:{port}", file=sys.stderr, flush=True)  # noqa: T201
@@ -126,7 +133,7 @@ def _streamed(corrector: Corrector, source: Source, console: Console) -> Correct
     return _learnt(corrector, measurements(lines_of(stream, source.stall, ended), answer), console)
 
 
-def _learnt(corrector: Corrector, lines: Iterable[Measured], console: Console) -> Corrected:
+def _learnt(corrector: Corrector, lines: Iterable[Measured], console: Console) -> Correction:
     rows = []
     for i, one in enumerate(lines, 1):
         corrector.observe(one.position[0], one.force[0], along=one.along[0])
@@ -141,7 +148,7 @@ def _learnt(corrector: Corrector, lines: Iterable[Measured], console: Console) -
         )
     fields = ("position", "force", "along", "depth", "time")
     record = Measured(*(np.concatenate([getattr(r, name) for r in rows]) for name in fields))
-    return judged(corrector, record)
+    return summarise_correction(corrector, record)
 
 
 def _parameters(surrogate: Surrogate, words: Sequence[str]) -> list[float]:

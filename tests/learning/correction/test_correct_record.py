@@ -8,7 +8,7 @@ from correction_made import RADIUS, model, scaled, touches
 
 from palpate.dataset.measured import Measured
 from palpate.errors import UsageError
-from palpate.learning.correction import Phantom, correct, force_error, placed
+from palpate.learning.correction import Phantom, correct, force_error, probe_positions
 from palpate.surrogates import Surrogate
 
 
@@ -24,7 +24,9 @@ def pressed(place, direction, depths, forces):
 
 def test_depths_are_counted_from_first_touch_along_the_direction():
     S, tilt = model(), np.array([0.3, 0.0, -1.0])
-    found = placed(pressed([0.004, -0.002, 0.0], tilt, [0.0, 0.002], [0.0, 1.0]), S.baseline.touched, RADIUS)
+    found = probe_positions(
+        pressed([0.004, -0.002, 0.0], tilt, [0.0, 0.002], [0.0, 1.0]), S.baseline.touched, RADIUS
+    )
     unit = tilt / np.linalg.norm(tilt)
     # a sphere that moves along `unit` towards the plane z = 0 touches it when its centre is at z = R
     np.testing.assert_allclose(found.position[0, 2], RADIUS, atol=1e-12)
@@ -32,9 +34,9 @@ def test_depths_are_counted_from_first_touch_along_the_direction():
     back = found.position[0] - [0.004, -0.002, 0.0]
     np.testing.assert_allclose(np.cross(back, unit), 0.0, atol=1e-15)
     assert not found.pressed
-    assert placed(found, S.baseline.touched, RADIUS) is found
+    assert probe_positions(found, S.baseline.touched, RADIUS) is found
     with pytest.raises(UsageError, match="does not meet"):
-        placed(pressed([0.0, 0.0, 0.2], [0, 0, 1], [0.0], [0.0]), S.baseline.touched, RADIUS)
+        probe_positions(pressed([0.0, 0.0, 0.2], [0, 0, 1], [0.0], [0.0]), S.baseline.touched, RADIUS)
 
 
 def test_depths_and_normal_forces_alone_correct_a_surrogate():

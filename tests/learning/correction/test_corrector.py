@@ -10,9 +10,9 @@ from correction_made import BOX, DEEPEST, MODULUS, RADIUS, corrector_of, model, 
 
 from palpate.errors import UsageError
 from palpate.learning.correction import Corrector, Discrepancy, Noise, Phantom, force_error
-from palpate.learning.correction.prior import opened
+from palpate.learning.correction.corrected_surrogate import corrected_surrogate, raise_surface
+from palpate.learning.correction.prior import specimen_prior
 from palpate.learning.correction.touches import Touches
-from palpate.learning.correction.written import corrected, raised
 from palpate.surrogates import Surrogate
 from palpate.units import bounds
 
@@ -28,12 +28,12 @@ def fed(corrector, X, F):
 
 def test_rows_are_derivatives_of_the_force_and_the_force_is_the_written_surrogates():
     S = model(extra=[MODULUS])
-    may = opened(S, Discrepancy())
+    prior = specimen_prior(S, Discrepancy())
     X = touches(30, extra=[MODULUS])
     ones = np.zeros((30, 3))
-    measured = Touches.of(S, may, X, ones, ones, Noise(1.0, 0.0))
+    measured = Touches.of(S, prior, X, ones, ones, Noise(1.0, 0.0))
     rng = np.random.default_rng(2)
-    theta = 0.3 * rng.normal(size=may.root.shape[1] + 1)
+    theta = 0.3 * rng.normal(size=prior.root.shape[1] + 1)
     rows = measured.rows(theta)
     direction = rng.normal(size=theta.size)
     h = 1e-6
@@ -47,7 +47,7 @@ def test_rows_are_derivatives_of_the_force_and_the_force_is_the_written_surrogat
         def spread(index):
             return 1.0
 
-    written = corrected(Surrogate(S), S, may, At, {}).energy
+    written = corrected_surrogate(Surrogate(S), S, prior, At, {}).energy
     np.testing.assert_allclose(measured.forces(theta), written.force(X), rtol=1e-9, atol=1e-12)
 
 
@@ -55,11 +55,11 @@ def test_a_raised_surface_is_nearer_by_its_height_everywhere():
     S, h = model(), 3e-4
     X = touches(50)
     d, g, _ = S.baseline.touched.at(X[:, :3])
-    up, h_g, _ = raised(S.baseline.touched, h, RADIUS).at(X[:, :3])
+    up, h_g, _ = raise_surface(S.baseline.touched, h, RADIUS).at(X[:, :3])
     np.testing.assert_allclose(d - up, h, atol=1e-15)
     np.testing.assert_allclose(g, h_g, atol=1e-12)
     with pytest.raises(UsageError, match="can't be raised"):
-        raised(S.baseline.touched, 0.005, RADIUS)
+        raise_surface(S.baseline.touched, 0.005, RADIUS)
 
 
 @pytest.mark.parametrize("factor", [0.5, 1.4, 2.5])
@@ -80,7 +80,7 @@ def test_a_constant_factor_is_found_to_within_the_bound_of_the_noise(factor):
         found = corrector.surrogate.energy.network.tail[0, 0] - S.network.tail[0, 0]
         errors.append((0.5 * found - np.log(factor)) / bound)
         expected = 1.0 / np.hypot(1.0 / ONLY_FACTOR.constant, 1.0 / bound)  # prior and data
-        deviation = ONLY_FACTOR.constant * corrector.belief.spread(0)
+        deviation = ONLY_FACTOR.constant * corrector.posterior.spread(0)
         assert deviation == pytest.approx(expected, rel=0.05)  # the rows are where θ is, not at the truth
     # a sum of 40 squares of unit normals is within 17 … 74 but for one time in a thousand
     assert 17 < np.sum(np.square(errors)) < 74
@@ -91,7 +91,7 @@ def test_height_and_factor_are_told_apart():
     S = model(certain=True)
     higher = dataclasses.replace(
         scaled(S, 1.3),
-        baseline=dataclasses.replace(S.baseline, touched=raised(S.baseline.touched, 3e-4, RADIUS)),
+        baseline=dataclasses.replace(S.baseline, touched=raise_surface(S.baseline.touched, 3e-4, RADIUS)),
         continuation=dataclasses.replace(S.continuation, deepest=DEEPEST + 3e-4),
     )
     X = touches(60, 3)
@@ -108,7 +108,7 @@ def test_height_and_factor_are_told_apart():
     deep = np.array([[0.0, 0.0, -0.006], [0.03, 0.0, 0.002]])
     ratio = found.energy(deep) / found.baseline.law.energy(found.depth(deep))[0]
     before = S.energy(deep) / S.baseline.law.energy(S.depth(deep))[0]
-    log_factor = corrector.belief.mean[0] * 0.5
+    log_factor = corrector.posterior.mean[0] * 0.5
     np.testing.assert_allclose(ratio / before, np.exp(log_factor), rtol=1e-9)
 
 
@@ -122,7 +122,7 @@ def test_the_order_of_a_record_does_not_matter():
     np.testing.assert_allclose(
         one.surrogate.energy.force(test), other.surrogate.energy.force(test), rtol=1e-5, atol=1e-7
     )
-    np.testing.assert_allclose(one.belief.covariance, other.belief.covariance, atol=1e-5)
+    np.testing.assert_allclose(one.posterior.covariance, other.posterior.covariance, atol=1e-5)
 
 
 def test_a_specimen_with_a_stiffer_layer_is_followed_and_the_deviation_shrinks_where_it_was_measured():
@@ -222,7 +222,7 @@ def test_noise_larger_than_said_is_noticed_and_the_deviation_widened():
     corrector = fed(corrector_of(S, discrepancy=ONLY_FACTOR, noise=QUIET), X, F)
     found = corrector.surrogate.energy
     # 300 sizes of three normals: their median is within a twentieth of 1.538 (four deviations)
-    assert corrector.strain == pytest.approx(4.0, rel=0.1)
+    assert corrector.noise_inflation == pytest.approx(4.0, rel=0.1)
     assert corrector.counts["outlier"] == 0
     bound = 0.02 / np.sqrt((F**2).sum())
     assert found.deviation(X)[0] == pytest.approx(bound, rel=0.1)
@@ -267,7 +267,7 @@ def test_a_memory_follows_a_specimen_that_softens():
     true = scaled(S, 1.1).force(test)
     assert force_error(forgetful.surrogate.energy, test, true).median < 0.02
     assert force_error(kept.surrogate.energy, test, true).median > 0.04
-    assert (np.linalg.eigvalsh(forgetful.belief.covariance) > 0).all()
+    assert (np.linalg.eigvalsh(forgetful.posterior.covariance) > 0).all()
 
 
 def test_a_member_of_a_family_needs_its_parameters():

@@ -1,32 +1,36 @@
-"""A touch surrogate corrected by what a sensor measures on a physical specimen.
+"""A surrogate of a pressed body, corrected by forces that a sensor measures on a physical specimen.
 
-prior      how a specimen may differ            touches    measured forces and their rows
-belief     the filter, in square roots          corrector  the object that observes
-written    belief → corrected surrogate         placing    depths at a place → positions
-measures   errors before and after              correct    a whole record at once
-phantom    a specimen made by formula
+prior                how a specimen may differ from the model
+touches              measured forces and their rows
+specimen_posterior   the filter, in square roots
+corrector            the object that observes
+corrected_surrogate  posterior → corrected surrogate
+probe_positions      depths at a place → positions
+measures             errors before and after
+correct              a whole record at once
+phantom              a specimen made by formula
 """
 
-from palpate.learning.correction.belief import Belief
-from palpate.learning.correction.correct import Corrected, correct, judged
+from palpate.learning.correction.correct import Correction, correct, summarise_correction
 from palpate.learning.correction.corrector import Corrector, Event
 from palpate.learning.correction.measures import ForceError, force_error
 from palpate.learning.correction.phantom import Phantom
-from palpate.learning.correction.placing import placed
 from palpate.learning.correction.prior import Discrepancy
+from palpate.learning.correction.probe_positions import probe_positions
+from palpate.learning.correction.specimen_posterior import SpecimenPosterior
 from palpate.learning.correction.touches import Noise
 
 __all__ = [
-    "Belief",
-    "Corrected",
+    "Correction",
     "Corrector",
     "Discrepancy",
     "Event",
     "ForceError",
     "Noise",
     "Phantom",
+    "SpecimenPosterior",
     "correct",
     "force_error",
-    "judged",
-    "placed",
+    "probe_positions",
+    "summarise_correction",
 ]

@@ -1,4 +1,4 @@
-"""A whole record of measurements at once, and what it brought."""
+"""Correction by a whole record of measurements at once, and a summary of it."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from palpate.dataset.measured import Measured
 from palpate.errors import UsageError
 from palpate.learning.correction.corrector import Corrector
 from palpate.learning.correction.measures import ForceError, felt_along, force_error
-from palpate.learning.correction.placing import placed
+from palpate.learning.correction.probe_positions import probe_positions
 from palpate.surrogates import LearntEnergy, Surrogate
 
-__all__ = ["Corrected", "correct", "judged"]
+__all__ = ["Correction", "correct", "summarise_correction"]
 
 _FOLDS = 5
 _FEWEST = 10  # touches that are enough to leave some of them out
 _SURPRISE = 5.0  # one in 1.7 million of a Gaussian's numbers is as far
-_STRAINED = 3.0
+_MOST_INFLATED = 3.0
 _STRANGE = 0.3  # of the touches: as many outliers are no outliers
 _RATIO = 4.0  # specimens are two or three times as stiff; pounds or kilograms for newtons make 4.4 and 9.8
 
 
 @dataclass(frozen=True, eq=False)
-class Corrected:
+class Correction:
     """A corrected surrogate, and errors of the measured forces.
 
     Attributes
     ----------
     surrogate : Surrogate
-        Its ``meta["correction"]`` holds counts, height and the warning, so a file goes on telling of it.
+        Its ``meta["correction"]`` holds counts, height and the warning, so a file keeps them.
     before, after : ForceError
         Of the model and of the corrected surrogate on all measurements that were not outliers of both.
     left_out : ForceError, optional
@@ -44,7 +44,7 @@ class Corrected:
         Height of the specimen's surface over the model's and its standard deviation, m.
     surprise : float
         Largest change, in standard deviations of the discrepancy.
-    strain : float
+    noise_inflation : float
         How many times larger the noise is than was said.
     ratio : float
         How many times the model's forces the measured ones are, least squares; not-a-number without contact.
@@ -57,17 +57,17 @@ class Corrected:
     counts: Mapping[str, int]
     offset: tuple[float, float]
     surprise: float
-    strain: float
+    noise_inflation: float
     ratio: float
 
     @property
     def doubtful(self) -> bool:
-        """Whether the forces can hardly be this body's: they have another sign, or may have another unit."""
+        """True where the forces can hardly be this body's: they have another sign, or may have another unit."""
         return bool(_doubt(self.ratio))
 
     @property
     def warning(self) -> str:
-        """What is suspicious, in words; "" if nothing is."""
+        """Text on what is suspicious; "" if nothing is."""
         if self.doubtful:
             return _doubt(self.ratio)
         out, learnt = self.counts.get("outlier", 0), self.counts.get("learnt", 0)
@@ -76,10 +76,10 @@ class Corrected:
                 f"{out} of {out + learnt} touches are outliers: units, frame or probe may be others than the "
                 "model's, or the specimen differs by more than the discrepancy allows."
             )
-        if self.strain > _STRAINED:
+        if self.noise_inflation > _MOST_INFLATED:
             return (
-                f"Forces scatter {self.strain:.1f} times as much as the noise: positions may be off, the body be "
-                "viscous or slip, or vary on shorter lengths than the discrepancy; the deviation has been widened."
+                f"Forces scatter {self.noise_inflation:.1f} times as much as the noise: positions may be off, the body "
+                "be viscous or slip, or vary on shorter lengths than the discrepancy; the deviation has been widened."
             )
         if self.surprise > _SURPRISE:
             return (
@@ -112,7 +112,7 @@ class Corrected:
             "after": self.after.as_dict(),
             "left_out": None if self.left_out is None else self.left_out.as_dict(),
             "surprise": self.surprise,
-            "strain": self.strain,
+            "noise_inflation": self.noise_inflation,
             "ratio": self.ratio,
             "offset": {"value": self.offset[0], "deviation": self.offset[1]},
         }
@@ -120,13 +120,15 @@ class Corrected:
 
 def correct(
     surrogate: Surrogate, measured: Measured, *, parameters: Sequence[float] = (), **options: Any
-) -> Corrected:
+) -> Correction:
     """Correct a surrogate by a record of one specimen.
 
     Parameters
     ----------
     surrogate : Surrogate
+        A body that is pressed by a probe.
     measured : Measured
+        Positions or depths of the probe and its forces, as `read_measured` reads them.
     parameters : sequence of p numbers
         The specimen's further inputs.
     **options
@@ -142,15 +144,28 @@ def correct(
     baseline = surrogate.energy.baseline
     own, surface = baseline.radius_input, baseline.surface
     assert surface is not None
-    measured = placed(measured, surface, baseline.radius if own is None else float(parameters[own - 3]))
+    measured = probe_positions(
+        measured, surface, baseline.radius if own is None else float(parameters[own - 3])
+    )
     with _doubted(corrector, measured):
         _observed(corrector, measured, np.arange(len(measured)))
         left_out = _left_out(surrogate, measured, options)
-    return judged(corrector, measured, left_out=left_out)
+    return summarise_correction(corrector, measured, left_out=left_out)
 
 
-def judged(corrector: Corrector, measured: Measured, left_out: ForceError | None = None) -> Corrected:
-    """What a corrector has made of measurements.
+def summarise_correction(
+    corrector: Corrector, measured: Measured, left_out: ForceError | None = None
+) -> Correction:
+    """Summarise what a corrector learnt from measurements.
+
+    Parameters
+    ----------
+    corrector : Corrector
+        After it has observed them.
+    measured : Measured
+        The measurements, by whose forces the errors before and after are taken.
+    left_out : ForceError, optional
+        Error of measurements that a correction did not know, where one was computed.
 
     Raises
     ------
@@ -158,10 +173,10 @@ def judged(corrector: Corrector, measured: Measured, left_out: ForceError | None
         If it has learnt nothing.
     """
     with _doubted(corrector, measured):
-        return _judged(corrector, measured, left_out)
+        return _summary(corrector, measured, left_out)
 
 
-def _judged(corrector: Corrector, measured: Measured, left_out: ForceError | None) -> Corrected:
+def _summary(corrector: Corrector, measured: Measured, left_out: ForceError | None) -> Correction:
     after = corrector.surrogate
     counts = {verdict: n for verdict, n in corrector.counts.items() if n}
     if not counts.get("learnt"):
@@ -172,9 +187,9 @@ def _judged(corrector: Corrector, measured: Measured, left_out: ForceError | Non
             fix="Check the frame, the units, the forces' sign, the probe's radius and the surface's height.",
         )
     X, force, along = _usable(corrector, measured)
-    surprise = float(np.abs(corrector.belief.mean).max())
+    surprise = float(np.abs(corrector.posterior.mean).max())
     before = force_error(corrector.model, X, force, along)
-    done = Corrected(
+    done = Correction(
         after,
         before,
         force_error(after.energy, X, force, along),
@@ -182,7 +197,7 @@ def _judged(corrector: Corrector, measured: Measured, left_out: ForceError | Non
         counts,
         corrector.offset,
         surprise,
-        corrector.strain,
+        corrector.noise_inflation,
         _ratio(corrector.model.force(X), force, along),
     )
     return replace(done, surrogate=_warned(after, done.warning)) if done.warning else done
@@ -211,7 +226,7 @@ def _doubted(corrector: Corrector, measured: Measured) -> Iterator[None]:
 
 
 def _doubt(ratio: float) -> str:
-    """What is wrong with forces that are so many times the model's, in words; "" where they may be a specimen's."""
+    """Say what is wrong with forces that are so many times the model's; "" where they may be a specimen's."""
     if ratio < 0:
         return (
             "Measured forces point against the model's: they are to be those on the probe, which a body pushes "

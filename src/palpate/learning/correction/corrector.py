@@ -17,10 +17,10 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from palpate.errors import UsageError
-from palpate.learning.correction.belief import Belief
-from palpate.learning.correction.prior import Discrepancy, extended, opened
+from palpate.learning.correction.corrected_surrogate import corrected_surrogate
+from palpate.learning.correction.prior import Discrepancy, add_broad_units, specimen_prior
+from palpate.learning.correction.specimen_posterior import SpecimenPosterior
 from palpate.learning.correction.touches import Noise, Touches
-from palpate.learning.correction.written import corrected
 from palpate.surrogates import ContactBaseline, Surrogate
 from palpate.units import bounds
 
@@ -31,13 +31,13 @@ _FREE = 4.0  # deviations of the surface's height: farther above it nothing is t
 _BEYOND = 0.25  # of the width over which ℓ is followed beyond a range
 _ENOUGH = 30  # touches from which it is judged how far the noise is larger than was said
 _MEDIANS = (0.674, 1.538)  # of the size of one and of three standard normal numbers
-_STRAINED = 20.0  # at most: what is farther off is no noise
+_MOST_INFLATED = 20.0  # at most: what is farther off is no noise
 _ROUNDS = 6  # of looking again which touches are outliers
 
 
 @dataclass(frozen=True)
 class Event:
-    """What became of one measurement.
+    """The fate of one measurement.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Corrector:
     """An extended Kalman filter on the linear weights of ℓ and the height of the surface.
 
     The prior is the posterior of the training with the discrepancy added. The last `window` touches are kept; when
-    they are complete, and whenever the surrogate is asked for, all of them are taken again from what was believed
+    they are complete, and whenever the surrogate is asked for, all of them are taken again from the posterior
     before them, with rows at the most probable θ and outliers judged anew: within a window the result does not
     depend on the order of the touches. With forgetting nothing is taken again.
 
@@ -72,11 +72,14 @@ class Corrector:
     parameters : sequence of p numbers
         The specimen's further inputs, where the surrogate has any.
     discrepancy : Discrepancy, optional
+        How far a specimen may differ from the model.
     noise : Noise, optional
+        Standard deviations of the measured forces and positions.
     gate : float
         Touches farther than so many standard deviations from what is expected are outliers. Of three Gaussian
         components one in 65,000 is farther than five.
     window : int
+        Touches that are kept and taken again together.
     memory : float, optional
         Touches after which 1 − 1/e of the certainty is forgotten; None keeps all.
 
@@ -126,14 +129,16 @@ class Corrector:
                 fix="Give positive numbers.",
             )
         energy = (
-            surrogate.energy if "correction" in surrogate.meta else extended(surrogate.energy, discrepancy)
+            surrogate.energy
+            if "correction" in surrogate.meta
+            else add_broad_units(surrogate.energy, discrepancy)
         )
         self.body, self.model, self.noise, self.gate = surrogate, energy, noise, gate
         self.counts: Counter[str] = Counter()
-        self._may = opened(self.model, discrepancy)
-        self._anchor = self._belief = Belief.standard(self._may.root.shape[1] + 1)
+        self._prior = specimen_prior(self.model, discrepancy)
+        self._anchor = self._posterior = SpecimenPosterior.standard(self._prior.root.shape[1] + 1)
         self._parameters, self._window, self._memory = p, window, memory
-        self._strain = self._strain_before = 1.0  # now, and when the window began
+        self._noise_inflation = self._inflation_before = 1.0  # now, and when the window began
         self._seen: list[Touches] = []
         self._learnt: list[bool] = []
 
@@ -143,15 +148,15 @@ class Corrector:
         return f"Corrector: {said}; surface {1e3 * height:+.2f} ± {1e3 * sure:.2f} mm"
 
     @property
-    def belief(self) -> Belief:
-        """Of θ (see `touches`): the weights' standard normal numbers, then the height's."""
-        return self._belief
+    def posterior(self) -> SpecimenPosterior:
+        """Posterior of θ (see `touches`): the weights' standard normal numbers, then the height's."""
+        return self._posterior
 
     @property
     def offset(self) -> tuple[float, float]:
         """Height of the specimen's surface over the model's and its standard deviation, m."""
-        scale = self._may.offset
-        return scale * float(self._belief.mean[-1]), scale * self._belief.spread(-1)
+        scale = self._prior.offset
+        return scale * float(self._posterior.mean[-1]), scale * self._posterior.spread(-1)
 
     @property
     def parameters(self) -> np.ndarray:
@@ -159,17 +164,17 @@ class Corrector:
         return self._parameters
 
     @property
-    def strain(self) -> float:
-        """How many times larger the noise is than was said, by the residuals of the last window; 1 at least.
+    def noise_inflation(self) -> float:
+        """Factor by which the noise is larger than was said, by the residuals of the last window; 1 at least.
 
         What no change of the weights explains counts as noise: then the posterior covers it.
         """
-        return self._strain
+        return self._noise_inflation
 
     @property
     def expressed(self) -> float:
         """Share of the slowly varying change that the network can follow."""
-        return self._may.expressed
+        return self._prior.expressed
 
     @property
     def surrogate(self) -> Surrogate:
@@ -181,7 +186,7 @@ class Corrector:
             If the surface came to lie so high that the model's distance does not reach it.
         """
         self.settle()
-        return corrected(self.body, self.model, self._may, self._belief, self.counts)
+        return corrected_surrogate(self.body, self.model, self._prior, self._posterior, self.counts)
 
     def observe(self, position: np.ndarray, force: np.ndarray, *, along: np.ndarray | None = None) -> Event:
         """Learn one measurement.
@@ -217,9 +222,9 @@ class Corrector:
         everything = Touches.joined(self._seen)
         with threadpool_limits(1), np.errstate(over="ignore", invalid="ignore"):
             learnt = self._in_doubt(everything)
-            everything = everything.weighted(np.full(len(everything), self._strain**-2))
+            everything = everything.weighted(np.full(len(everything), self._noise_inflation**-2))
             for _ in range(_ROUNDS):
-                self._belief = self._anchor.learnt(everything.take(learnt))
+                self._posterior = self._anchor.update_by_touches(everything.take(learnt))
                 near = self._distances(everything, learnt) <= self.gate
                 if (near == learnt).all():
                     break
@@ -230,18 +235,22 @@ class Corrector:
         self._learnt = learnt.tolist()
 
     def _in_doubt(self, touches: Touches) -> np.ndarray:
-        """Which touches (N,) are no outliers, judged from all of them with less weight for the far ones (Huber 1964).
+        """Return a mask (N,) of touches that are no outliers, by all of them with less weight for the far ones.
 
-        So the choice does not depend on which came first.
+        (Huber 1964.) So the choice does not depend on which came first.
         """
-        self._strain = self._strain_before  # taken again, the same window gives the same
+        self._noise_inflation = self._inflation_before  # taken again, the same window gives the same
         weights, everyone = np.ones(len(touches)), np.ones(len(touches), bool)
         for _ in range(_ROUNDS):
-            self._belief = self._anchor.learnt(touches.weighted(weights / self._strain**2))
-            far = self._distances(touches.weighted(np.full(len(touches), self._strain**-2)), everyone)
+            self._posterior = self._anchor.update_by_touches(
+                touches.weighted(weights / self._noise_inflation**2)
+            )
+            far = self._distances(
+                touches.weighted(np.full(len(touches), self._noise_inflation**-2)), everyone
+            )
             if len(touches) >= _ENOUGH:
                 ratio = np.median(far / np.where(touches.single, *_MEDIANS))
-                self._strain = min(max(1.0, self._strain * float(ratio)), _STRAINED)
+                self._noise_inflation = min(max(1.0, self._noise_inflation * float(ratio)), _MOST_INFLATED)
             weights = np.minimum(1.0, self.gate / np.maximum(far, 1e-12))
         return np.asarray(far <= self.gate)
 
@@ -250,10 +259,10 @@ class Corrector:
         if not np.isfinite([c, F, along]).all():
             return Event("not finite", nothing)
         X = np.concatenate([c, self._parameters])[None]
-        said = Touches.of(self.model, self._may, X, F[None], along[None], self.noise)
-        touch = said.weighted(np.full(1, self._strain**-2))
+        said = Touches.of(self.model, self._prior, X, F[None], along[None], self.noise)
+        touch = said.weighted(np.full(1, self._noise_inflation**-2))
         with np.errstate(over="ignore", invalid="ignore"):
-            predicted = touch.forces(self._belief.mean)[0]
+            predicted = touch.forces(self._posterior.mean)[0]
             height, sure = self.offset
             free = touch.depth[0] + height <= -_FREE * sure
             if not free and self._outside(X[0], touch.depth[0]):
@@ -265,9 +274,9 @@ class Corrector:
                 return Event("outlier", predicted, distance)
             if free:
                 return Event("no contact", predicted, distance)
-            self._belief = self._belief.learnt(touch)
+            self._posterior = self._posterior.update_by_touches(touch)
             if self._memory is not None:
-                self._belief = self._belief.loosened(-math.expm1(-1.0 / self._memory))
+                self._posterior = self._posterior.forget(-math.expm1(-1.0 / self._memory))
         self._keep(said, learnt=True)
         return Event("learnt", predicted, distance)
 
@@ -280,20 +289,20 @@ class Corrector:
             self.counts["learnt" if learnt else "outlier"] += 1  # this one is counted after it has been kept
             self.settle()
             self.counts["learnt" if learnt else "outlier"] -= 1
-            self._anchor, self._seen, self._learnt = self._belief, [], []
-            self._strain_before = self._strain
+            self._anchor, self._seen, self._learnt = self._posterior, [], []
+            self._inflation_before = self._noise_inflation
 
     def _outside(self, x: np.ndarray, depth: float) -> bool:
-        """Deeper than trained, or far beyond a range."""
+        """Return True where the probe is deeper than trained, or far beyond a range."""
         low, high = bounds(self.model.inputs)
         going = self.model.going
         wide = _BEYOND * going.widths
         return bool(depth > going.deepest or (x < low - wide).any() or (x > high + wide).any())
 
     def _distances(self, touches: Touches, learnt: np.ndarray) -> np.ndarray:
-        """Mahalanobis distances (N,) of measured from expected forces; of those learnt without their own part."""
-        r = touches.residuals(self._belief.mean)
-        J = touches.rows(self._belief.mean, self._belief.spread(-1)) @ self._belief.root
+        """Return Mahalanobis distances (N,) of measured from expected forces; touches learnt lose their own part."""
+        r = touches.residuals(self._posterior.mean)
+        J = touches.rows(self._posterior.mean, self._posterior.spread(-1)) @ self._posterior.root
         own = J @ J.transpose(0, 2, 1)
         # a touch that was learnt has a residual of variance I − J S⁺S⁺ᵀJᵀ
         S = np.eye(3) + np.where(learnt, -1.0, 1.0)[:, None, None] * own

@@ -1,4 +1,4 @@
-"""How far forces are off: before, after, and on measurements that were left out."""
+"""Errors of forces: before, after, and on measurements that were left out."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class ForceError:
         )
 
     def as_dict(self) -> dict[str, float]:
-        """The same, by name."""
+        """Return the errors by name."""
         return dict(vars(self))
 
 
@@ -53,9 +53,18 @@ def force_error(
     force: np.ndarray,
     along: np.ndarray | None = None,
 ) -> ForceError:
-    """Of a surrogate, or of forces (N, 3) and depths (N,), at inputs X (N, n), with measured forces (N, 3) in N.
+    """Return the errors of predicted forces at the places of measured ones.
 
-    `along` as in `Corrector.observe`.
+    Parameters
+    ----------
+    answer : LearntEnergy, or a pair of arrays
+        The energy that is asked, or its forces (N, 3) in N and depths (N,) in m.
+    X : (N, n)
+        Inputs, SI units.
+    force : (N, 3)
+        Measured forces, N.
+    along : (N, 3), optional
+        Unit vectors of the only components measured, zeros where all three are, as in `Corrector.observe`.
     """
     predicted, depth = answer if isinstance(answer, tuple) else (answer.force(X), answer.depth(X))
     measured = np.asarray(force)
@@ -76,7 +85,7 @@ def force_error(
 
 
 def felt_along(force: np.ndarray, along: np.ndarray) -> np.ndarray:
-    """What of forces (N, 3) was measured: where `along` (N, 3) has a direction, the part along it, else all."""
+    """Return the measured part of forces (N, 3): that along `along` (N, 3) where it has a direction, else all."""
     one = along.any(axis=1, keepdims=True)
     return np.asarray(np.where(one, (force * along).sum(axis=1, keepdims=True) * along, force))
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.learning.correction.written import raised
+from palpate.learning.correction.corrected_surrogate import raise_surface
 from palpate.surrogates import ContactBaseline, LearntEnergy
 
 __all__ = ["Phantom"]
@@ -25,6 +25,7 @@ class Phantom:
     Attributes
     ----------
     model : LearntEnergy
+        The energy that the specimen differs from.
     factor : float
         m.
     layer : float
@@ -43,10 +44,10 @@ class Phantom:
     height: float = 3e-4
 
     def force(self, X: np.ndarray) -> np.ndarray:
-        """F (N, 3) at inputs X (N, n), without noise."""
+        """Return forces F (N, 3) in N at inputs X (N, n), without noise."""
         baseline = self.model.baseline
         assert isinstance(baseline, ContactBaseline)
-        surface = raised(baseline.touched, self.height, baseline.radius)
+        surface = raise_surface(baseline.touched, self.height, baseline.radius)
         d, normal, _ = surface.at(np.ascontiguousarray(X[:, :3]))
         s = baseline.radius - d
         U0, first, _ = baseline.law.energy(s)
@@ -60,7 +61,7 @@ class Phantom:
     def measured(
         self, X: np.ndarray, noise: float, rng: np.random.Generator, relative: float = 0.0
     ) -> np.ndarray:
-        """The same with Gaussian noise (N, and relative to the force's size) in each component."""
+        """Return forces with Gaussian noise (N, and relative to the force's size) in each component."""
         F = self.force(X)
         size = np.sqrt(noise**2 + (relative * np.linalg.norm(F, axis=1)) ** 2)
         return np.asarray(F + size[:, None] * rng.standard_normal(F.shape))

@@ -1,4 +1,4 @@
-"""How a specimen may differ from the model, before it has been touched.
+"""The prior of a specimen: its differences from the model before it has been touched.
 
 Its energy is U₀(s + o) exp(ℓ + δ): δ(x) a change of ln κ, o a height of its surface over the model's (m). A priori
 
@@ -23,7 +23,7 @@ from palpate.network import Network
 from palpate.network.radial import radial
 from palpate.surrogates import LearntEnergy
 
-__all__ = ["Discrepancy", "Opened", "extended", "opened", "regressors"]
+__all__ = ["Discrepancy", "SpecimenPrior", "add_broad_units", "regressors", "specimen_prior"]
 
 _KEPT = 1e-5  # of the largest variance: directions of the slow change below it are left out
 _MOST = 80  # such directions
@@ -75,15 +75,15 @@ class Discrepancy:
 
 
 @dataclass(frozen=True, eq=False)
-class Opened:
-    """What may change, as independent standard normal numbers.
+class SpecimenPrior:
+    """The changes that a specimen may show, as independent standard normal numbers.
 
     Attributes
     ----------
     root : (1 + n + h, z)
-        What each of z numbers does to the network's tail and weights, in its scaled output.
+        Change of the network's tail and weights, in its scaled output, by each of z numbers.
     offset : float
-        What a last number does to the surface's height, m.
+        Change of the surface's height by a last number, m.
     expressed : float
         Share of the slow change's variance that tail and units can follow.
     """
@@ -93,7 +93,7 @@ class Opened:
     expressed: float
 
 
-def extended(energy: LearntEnergy, discrepancy: Discrepancy) -> LearntEnergy:
+def add_broad_units(energy: LearntEnergy, discrepancy: Discrepancy) -> LearntEnergy:
     """Return the same energy with broad units of weight zero, far from each other among the training inputs."""
     net, points = energy.network, _points(energy)
     k, n = min(discrepancy.units, len(points)), len(net.inputs)
@@ -116,8 +116,8 @@ def extended(energy: LearntEnergy, discrepancy: Discrepancy) -> LearntEnergy:
     return replace(energy, network=more, root=root)
 
 
-def opened(energy: LearntEnergy, discrepancy: Discrepancy) -> Opened:
-    """The posterior of the training, with the discrepancy added.
+def specimen_prior(energy: LearntEnergy, discrepancy: Discrepancy) -> SpecimenPrior:
+    """Return the posterior of the training with the discrepancy added: the prior of a specimen.
 
     Raises
     ------
@@ -139,7 +139,7 @@ def opened(energy: LearntEnergy, discrepancy: Discrepancy) -> Opened:
             "A surrogate without posterior and a discrepancy of zero leave nothing to correct.",
             fix="Give one of the discrepancy's deviations a positive size.",
         )
-    return Opened(root, discrepancy.offset, expressed)
+    return SpecimenPrior(root, discrepancy.offset, expressed)
 
 
 def regressors(net: Network, scaled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.learning.correction.prior import Opened, regressors
+from palpate.learning.correction.prior import SpecimenPrior, regressors
 from palpate.surrogates import ContactBaseline, ContactLaw, LearntEnergy
 from palpate.surrogates.continuation import saturated
 from palpate.units import bounds
@@ -93,7 +93,9 @@ class Touches:
     measured : (N, 3)
         Forces, N.
     whitening : (N, 3, 3)
+        W of the noise: W (measured − F) has unit variance.
     law : ContactLaw
+        U₀ and its derivatives by the depth.
     offset : float
         σ_o, m.
     """
@@ -111,13 +113,13 @@ class Touches:
     def of(
         cls,
         energy: LearntEnergy,
-        may: Opened,
+        prior: SpecimenPrior,
         X: np.ndarray,
         force: np.ndarray,
         along: np.ndarray,
         noise: Noise,
     ) -> Touches:
-        """At inputs X (N, n); `along` (N, 3) the unit vector of the only component measured, or zeros."""
+        """Return touches at inputs X (N, n); `along` (N, 3) as in `Corrector.observe`."""
         net, baseline = energy.network, energy.baseline
         taken, slopes = _saturated(energy, X)
         r, by = regressors(net, net.scaling.scale_inputs(taken))
@@ -130,28 +132,30 @@ class Touches:
         _, normal, _ = baseline.touched.at(np.ascontiguousarray(X[:, :3]))
         depth = baseline.coordinate(X)
         W = noise.whitening(force, energy.stiffness(X), along)
-        return cls(depth, normal, base, scale * both @ may.root, force.copy(), W, baseline.law, may.offset)
+        return cls(
+            depth, normal, base, scale * both @ prior.root, force.copy(), W, baseline.law, prior.offset
+        )
 
     def __len__(self) -> int:
         return len(self.depth)
 
     @property
     def single(self) -> np.ndarray:
-        """Which (N,) are of one component only."""
+        """Mask (N,) of the touches with one measured component."""
         return np.asarray(~self.whitening[:, 1:].any(axis=(1, 2)))
 
     def take(self, which: np.ndarray) -> Touches:
-        """Some of them, by index or mask."""
+        """Return some of the touches, by index or mask."""
         parts: dict[str, Any] = {name: getattr(self, name)[which] for name in _ARRAYS}
         return replace(self, **parts)
 
     def weighted(self, weights: np.ndarray) -> Touches:
-        """The same, each counting as `weights` (N,) touches."""
+        """Return the touches, each counting as `weights` (N,) of them."""
         return replace(self, whitening=np.sqrt(weights)[:, None, None] * self.whitening)
 
     @classmethod
     def joined(cls, touches: Sequence[Touches]) -> Touches:
-        """All of them as one."""
+        """Return all touches of a sequence as one."""
         parts: dict[str, Any] = {
             name: np.concatenate([getattr(t, name) for t in touches]) for name in _ARRAYS
         }

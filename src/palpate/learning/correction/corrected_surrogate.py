@@ -1,4 +1,4 @@
-"""What is believed of a specimen, written into a touch surrogate of the same kind."""
+"""The surrogate of a specimen: the model with the posterior written into its weights and its surface."""
 
 from __future__ import annotations
 
@@ -9,41 +9,45 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.learning.correction.belief import Belief
-from palpate.learning.correction.prior import Opened
+from palpate.learning.correction.prior import SpecimenPrior
+from palpate.learning.correction.specimen_posterior import SpecimenPosterior
 from palpate.network import Network
 from palpate.surrogates import ContactBaseline, Continuation, LearntEnergy, Surrogate, TouchedSurface
 
-__all__ = ["corrected", "raised"]
+__all__ = ["corrected_surrogate", "raise_surface"]
 
 
-def corrected(
-    body: Surrogate, energy: LearntEnergy, may: Opened, belief: Belief, counts: Mapping[str, int]
+def corrected_surrogate(
+    body: Surrogate,
+    energy: LearntEnergy,
+    prior: SpecimenPrior,
+    posterior: SpecimenPosterior,
+    counts: Mapping[str, int],
 ) -> Surrogate:
     """Return the body with the most probable weights and height, and the root of the weights' covariance.
 
     Its law, units, region and inputs are those of before. Where the height is still unsure, the deviation does not
-    tell of it.
+    include that.
     """
-    height, sure = may.offset * float(belief.mean[-1]), may.offset * belief.spread(-1)
-    root = may.root @ belief.root[:-1]
+    height, sure = prior.offset * float(posterior.mean[-1]), prior.offset * posterior.spread(-1)
+    root = prior.root @ posterior.root[:-1]
     if root.shape[1] > root.shape[0]:
         root = np.linalg.qr(root.T)[1].T
     meta: dict[str, Any] = dict(body.meta)
     meta["correction"] = {"counts": dict(counts), "offset": height, "offset_deviation": sure}
     going, baseline = energy.going, energy.baseline
-    moved = replace(energy, network=_moved(energy.network, may.root @ belief.mean[:-1]), root=root)
+    moved = replace(energy, network=_moved(energy.network, prior.root @ posterior.mean[:-1]), root=root)
     if not height:
         return body.with_energy(moved, meta)
     assert isinstance(baseline, ContactBaseline)
     # ℓ is to be taken where it was: the deepest trained place stays, and is `height` deeper now
     deeper = Continuation(going.widths, going.deepest + height, going.depth_width)
-    higher = replace(baseline, touched=raised(baseline.touched, height, _largest(energy)))
+    higher = replace(baseline, touched=raise_surface(baseline.touched, height, _largest(energy)))
     return body.with_energy(replace(moved, baseline=higher, continuation=deeper), meta)
 
 
-def raised(surface: TouchedSurface, height: float, radius: float) -> TouchedSurface:
-    """The surface of distance d − height (m): higher everywhere along its normal.
+def raise_surface(surface: TouchedSurface, height: float, radius: float) -> TouchedSurface:
+    """Return the surface of distance d − height (m): higher everywhere along its normal.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""From depths pressed at a place to positions of the probe's centre."""
+"""Positions of the probe's centre, from depths pressed at a place."""
 
 from __future__ import annotations
 
@@ -8,13 +8,15 @@ from palpate.dataset.measured import Measured
 from palpate.errors import UsageError
 from palpate.surrogates import TouchedSurface
 
-__all__ = ["placed"]
+__all__ = ["probe_positions"]
 
 _STEPS, _HALVINGS = 64, 60
 
 
-def placed(measured: Measured, surface: TouchedSurface, radius: float) -> Measured:
-    """Depths of 0 are where the rigid probe, moved through the place along the direction, first meets the surface.
+def probe_positions(measured: Measured, surface: TouchedSurface, radius: float) -> Measured:
+    """Return the record with positions in place of depths.
+
+    A depth of 0 is where the rigid probe, moved through the place along the direction, first meets the surface.
 
     Records of positions come back as they are.
 

@@ -1,4 +1,4 @@
-"""What is believed of θ: a mean and a root of its covariance, and how measurements change it.
+"""The posterior of θ: a mean and a root of its covariance, changed by measurements.
 
 A measurement of linear rows H, whitened, changes the covariance P = S Sᵀ to S (I + JᵀJ)⁻¹ Sᵀ with J = H S. In roots
 that is S L⁻ᵀ, L Lᵀ = I + JᵀJ, or for one row after the other (Potter 1963; Bierman 1977, section II.3)
@@ -18,7 +18,7 @@ import numpy as np
 
 from palpate.learning.correction.touches import Touches
 
-__all__ = ["Belief"]
+__all__ = ["SpecimenPosterior"]
 
 _ITERATIONS = 30
 _HALVINGS = 12
@@ -26,12 +26,13 @@ _STILL = 1e-8  # a step of so many prior deviations ends the iteration
 
 
 @dataclass(frozen=True, eq=False)
-class Belief:
-    """A normal distribution of q numbers.
+class SpecimenPosterior:
+    """A normal distribution of q numbers: the differences of a specimen from its model.
 
     Attributes
     ----------
     mean : (q,)
+        The most probable θ.
     root : (q, q)
         S; the covariance is S Sᵀ.
     """
@@ -40,8 +41,8 @@ class Belief:
     root: np.ndarray
 
     @classmethod
-    def standard(cls, size: int) -> Belief:
-        """Independent, of mean zero and unit variance."""
+    def standard(cls, size: int) -> SpecimenPosterior:
+        """Return independent numbers of mean zero and unit variance: the prior."""
         return cls(np.zeros(size), np.eye(size))
 
     @property
@@ -53,8 +54,8 @@ class Belief:
         """Standard deviation of one number."""
         return float(np.linalg.norm(self.root[index]))
 
-    def updated(self, rows: np.ndarray, residual: np.ndarray) -> Belief:
-        """After linear measurements of unit noise.
+    def update(self, rows: np.ndarray, residual: np.ndarray) -> SpecimenPosterior:
+        """Return the posterior after linear measurements of unit noise.
 
         Parameters
         ----------
@@ -65,10 +66,10 @@ class Belief:
         """
         J = rows @ self.root
         u = _newton(J, residual, np.zeros(len(self.mean)))
-        return Belief(self.mean + self.root @ u, _shrunk(self.root, J))
+        return SpecimenPosterior(self.mean + self.root @ u, _shrunk(self.root, J))
 
-    def learnt(self, touches: Touches) -> Belief:
-        """After touches: most probable θ, and the covariance there."""
+    def update_by_touches(self, touches: Touches) -> SpecimenPosterior:
+        """Return the posterior after touches: the most probable θ, and the covariance there."""
         u, theta = np.zeros(len(self.mean)), self.mean
         r = touches.residuals(theta).ravel()
         for _ in range(_ITERATIONS):
@@ -79,12 +80,12 @@ class Belief:
             if moved <= _STILL:
                 break
         J = touches.rows(theta).reshape(-1, len(theta)) @ self.root
-        return Belief(theta, _shrunk(self.root, J))
+        return SpecimenPosterior(theta, _shrunk(self.root, J))
 
-    def loosened(self, share: float) -> Belief:
-        """A share of the covariance goes back to the standard one, so that it never exceeds it."""
+    def forget(self, share: float) -> SpecimenPosterior:
+        """Return the posterior with a share of the standard covariance, which it never exceeds."""
         P = (1.0 - share) * self.covariance + share * np.eye(len(self.mean))
-        return Belief(self.mean, np.linalg.cholesky(P))
+        return SpecimenPosterior(self.mean, np.linalg.cholesky(P))
 
 
 def _newton(J: np.ndarray, r: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -96,13 +97,13 @@ def _newton(J: np.ndarray, r: np.ndarray, u: np.ndarray) -> np.ndarray:
 
 
 def _shortened(
-    belief: Belief, touches: Touches, u: np.ndarray, step: np.ndarray, r: np.ndarray
+    posterior: SpecimenPosterior, touches: Touches, u: np.ndarray, step: np.ndarray, r: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """The step, halved until the cost falls: new u, residual, and the size of what was moved (0 if nothing helps)."""
     cost, share = u @ u + r @ r, 1.0
     for _ in range(_HALVINGS):
         new = u + share * step
-        found = touches.residuals(belief.mean + belief.root @ new).ravel()
+        found = touches.residuals(posterior.mean + posterior.root @ new).ravel()
         if new @ new + found @ found <= cost:
             return new, found, share * float(np.linalg.norm(step))
         share /= 2.0

@@ -52,8 +52,8 @@ __all__ = ["decode", "encode", "load_value", "save_value"]
 
 T = TypeVar("T")
 _ALONE = "value"  # the name of what is stored where nothing contains it
-# an array of so many bytes or more is packed where that saves a quarter
-_LARGE, _WORTH, _PACKED = 50_000, 0.75, "packed"
+# an array of so many bytes or more is packed where that saves a tenth
+_LARGE, _WORTH, _PACKED = 50_000, 0.9, "packed"
 _KIND, _SAME = "class", "same as"  # neither can be the name of a field
 _NOT_FINITE = {"inf": math.inf, "-inf": -math.inf, "nan": math.nan}
 _forms: dict[Any, Any] = {}

@@ -1,7 +1,7 @@
 """The checklist of learnt bodies: what every baseline and every memory must keep, whatever was learnt.
 
-`CHECKS` are of a body without a memory, `MEMORY_CHECKS` of one with a memory; each takes an `Example`. A new kind of
-baseline or memory is entered in `test_contract.py`, or runs them itself as `test_new_kind.py` does.
+`CHECKS` are of a body without a memory, `MEMORY_CHECKS` of one with a memory; each takes an `Example` and an empty
+folder. A baseline or memory of palpate's is entered in `test_contract.py`; another one runs them as `test_new_kind.py`.
 """
 
 from __future__ import annotations
@@ -10,11 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pytest
 from touch_made import differences
 
 import palpate as pp
 from allocated import kept_by
 from palpate.runtime.touchable import touchable
+from palpate.surrogates.memories import MemoryState
 from palpate.units import bounds
 
 STEP = 2e-5  # m, of differences
@@ -71,6 +73,10 @@ def exactly_nothing_at_rest(example: Example, folder: Path) -> None:
     if energy.root is not None:
         assert not energy.deviation(example.rest).any()
     assert np.isfinite(energy.stiffness(example.rest)).all()
+    answer, place = touchable(example.body).evaluator(), np.full(3, 1e-3)
+    answer.place(place, holding=False, believed=True)
+    answer(place, np.array([(r.low + r.high) / 2 for r in example.body.parameters]))
+    assert not answer.force.any()
 
 
 def force_and_stiffness_are_derivatives_of_the_energy(example: Example, folder: Path) -> None:
@@ -100,16 +106,20 @@ def no_closed_path_yields_work(example: Example, folder: Path) -> None:
 
 
 def closed_path(example: Example, pieces: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return inputs (N, n) along a closed path of the hand and its tangents (N, k) times Gauss's weights."""
+    """Return inputs (N, n) along a closed path of the hand, and its tangents (N, k) times Gauss's weights."""
+    t, w = np.polynomial.legendre.leggauss(6)
+    place, tangent = path(example, (2 * np.pi / pieces * (np.arange(pieces)[:, None] + (1 + t) / 2)).ravel())
+    return place, tangent * np.tile(np.pi / pieces * w, pieces)[:, None]
+
+
+def path(example: Example, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return inputs (N, n) and tangents (N, k) at times t (N,) of a path of period 2π that leaves the ranges."""
     low, high = bounds(example.body.inputs)
     k, middle, half = example.felt, (low + high) / 2, (high - low) / 2
-    t, w = np.polynomial.legendre.leggauss(6)
-    t = (2 * np.pi / pieces * (np.arange(pieces)[:, None] + (1 + t) / 2)).ravel()
     many, turned = np.array([1, 2, 1])[:k], np.array([0.0, 0.7, 1.9])[:k]
     X = np.tile(middle, (len(t), 1))
     X[:, :k] += 1.4 * half[:k] * np.sin(many * t[:, None] + turned)
-    tangent = 1.4 * half[:k] * many * np.cos(many * t[:, None] + turned)
-    return X, tangent * np.tile(np.pi / pieces * w, pieces)[:, None]
+    return X, 1.4 * half[:k] * many * np.cos(many * t[:, None] + turned)
 
 
 def a_file_gives_the_same_bits(example: Example, folder: Path) -> None:
@@ -133,10 +143,16 @@ def a_file_gives_the_same_bits(example: Example, folder: Path) -> None:
 
 def one_place_at_a_time_is_the_same_and_allocates_nothing(example: Example, folder: Path) -> None:
     energy, X, k = example.body.energy, example.around(100), example.felt
-    evaluate = energy.evaluator()
+    evaluate, size = energy.evaluator(), np.abs(energy.force(X)).max()
+    sign = energy.baseline.amplitude
     for x in X:
         evaluate(x[:k] @ energy.baseline.directions, x[k:])
-        row = x[None]
+        row, q = x[None], evaluate.amplitude
+        np.testing.assert_allclose(0.5 * q * q, 0.0 if sign == "none" else evaluate.energy, rtol=1e-12)
+        np.testing.assert_allclose(
+            -q * evaluate.slope, 0.0 * q if sign == "none" else evaluate.force, atol=1e-10 * size
+        )
+        assert q >= 0.0 or sign == "signed"
         np.testing.assert_array_equal(evaluate.force, energy.force(row)[0])
         np.testing.assert_array_equal(evaluate.stiffness, energy.stiffness(row)[0])
         assert (evaluate.energy, evaluate.depth) == (energy.energy(row)[0], energy.depth(row)[0])
@@ -185,4 +201,101 @@ CHECKS = (
     a_file_gives_the_same_bits,
     one_place_at_a_time_is_the_same_and_allocates_nothing,
     inside_is_told_from_outside,
+)
+
+
+def led(example: Example, state: MemoryState, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Lead a memory twice around the path in three seconds, in so many steps.
+
+    Returns forces (N, 3), and what is stored, lost, given by the hand and lost in the step (N, 4).
+    """
+    energy, k = example.body.energy, example.felt
+    X, evaluate = path(example, np.linspace(0.0, 4.0 * np.pi, count))[0], energy.evaluator()
+    force, ledger = np.empty((count, 3)), np.empty((count, 4))
+    for i, (place, further) in enumerate(
+        zip(X[:, :k] @ energy.baseline.directions, X[:, k:].copy(), strict=True)
+    ):
+        evaluate(place, further)
+        assert state.step(place, evaluate.amplitude, evaluate.slope, 3.0 / count)
+        force[i] = state.force
+        ledger[i] = state.stored, state.lost, state.work, state.lost_in_step
+    return force, ledger
+
+
+def a_memory_gives_back_no_more_than_was_put_in(example: Example, folder: Path) -> None:
+    _, ledger = led(example, example.body.memory.start(), 1000)
+    stored, lost, work, at_once = ledger.T
+    size = np.ptp(work)
+    assert stored.max() > 0
+    assert lost[-1] > 0.01 * stored.max()
+    assert (stored >= 0).all()
+    assert (at_once >= 0).all()
+    np.testing.assert_allclose(np.diff(lost), at_once[1:], atol=1e-12 * size)
+    np.testing.assert_allclose(work, stored + lost, atol=1e-12 * size)
+    # the work is that of the forces, by their trapezoids, to first order in the step at least
+    coarse, fine = (
+        _work_missed(example, *led(example, example.body.memory.start(), n)) for n in (1500, 3000)
+    )
+    assert fine < 0.6 * coarse
+    assert fine < 0.01
+
+
+def _work_missed(example: Example, force: np.ndarray, ledger: np.ndarray) -> float:
+    """Return how far the work of the forces (N, 3) is from the ledger's, relative to the largest change of that."""
+    place = path(example, np.linspace(0.0, 4.0 * np.pi, len(force)))[0][:, : example.felt]
+    along = np.diff(place @ example.body.energy.baseline.directions, axis=0)
+    by_force = -np.cumsum((along * (force[1:] + force[:-1]) / 2).sum(axis=1))
+    return float(np.abs(ledger[1:, 2] - ledger[0, 2] - by_force).max() / np.ptp(ledger[:, 2]))
+
+
+def a_memory_without_a_past_answers_elastically(example: Example, folder: Path) -> None:
+    """At a press that is light and sudden."""
+    energy, X = example.body.energy, example.around(400)
+    U = energy.energy(X)
+    for x in X[(U > 0) & (0.03 * U.max() > U)][:20]:
+        evaluate, state, k = energy.evaluator(), example.body.memory.start(), example.felt
+        place = x[:k] @ energy.baseline.directions
+        evaluate(place, x[k:])
+        assert state.step(place, evaluate.amplitude, evaluate.slope, 0.0)
+        np.testing.assert_allclose(
+            state.force, evaluate.force, rtol=1e-9, atol=1e-9 * np.abs(evaluate.force).max()
+        )
+        assert state.stored == pytest.approx(evaluate.energy, rel=1e-9)
+
+
+def a_memory_starts_anew_from_a_file_and_after_a_reset(example: Example, folder: Path) -> None:
+    body = example.body
+    again = pp.load(body.save(folder / "body.palpate"))
+    assert str(again.memory) == str(body.memory)
+    state = again.memory.start()
+    first = led(example, body.memory.start(), 200)
+    for _ in range(2):
+        for one, other in zip(led(example, state, 200), first, strict=True):
+            np.testing.assert_array_equal(one, other)
+        state.reset()
+
+
+def a_memory_ignores_what_is_not_finite(example: Example, folder: Path) -> None:
+    energy, k, state = example.body.energy, example.felt, example.body.memory.start()
+    led(example, state, 100)
+    evaluate, x = energy.evaluator(), path(example, np.array([1.0]))[0][0]
+    place = x[:k] @ energy.baseline.directions
+    evaluate(place, x[k:])
+    stored = state.stored
+    assert not state.step(place, np.nan, evaluate.slope, 1e-3)
+    assert not state.force.any()
+    assert state.stored == stored
+    assert state.step(place, evaluate.amplitude, evaluate.slope, 1e-3)
+
+
+def a_tick_with_a_memory_allocates_nothing(example: Example, folder: Path) -> None:
+    require_no_allocation(example)
+
+
+MEMORY_CHECKS = (
+    a_memory_gives_back_no_more_than_was_put_in,
+    a_memory_without_a_past_answers_elastically,
+    a_memory_starts_anew_from_a_file_and_after_a_reset,
+    a_memory_ignores_what_is_not_finite,
+    a_tick_with_a_memory_allocates_nothing,
 )

@@ -131,6 +131,13 @@ def test_a_file_with_a_valid_checksum_and_parts_that_do_not_fit_is_refused(tmp_p
         Surrogate.load(tmp_path / "s.palpate")
 
 
+def test_a_file_of_an_unknown_kind_says_what_to_import(tmp_path):
+    archive = load_archive(body().save(tmp_path / "s.palpate"))
+    save_archive(tmp_path / "s.palpate", _changed(archive, "another baseline"))
+    with pytest.raises(FileFormatError, match="Import the module that registers it"):
+        Surrogate.load(tmp_path / "s.palpate")
+
+
 def test_settings_that_json_does_not_know_are_refused(tmp_path):
     with pytest.raises(UsageError, match=r"[Ss]ettings"):
         dataclasses.replace(body(), meta={"plane": plane()}).save(tmp_path / "s.palpate")

@@ -59,7 +59,7 @@ class Surrogate:
     Raises
     ------
     UsageError
-        If a field is of another surface or other inputs.
+        If a field is of another surface or other inputs, or the memory can't walk the energy's amplitude.
     """
 
     energy: LearntEnergy
@@ -76,6 +76,13 @@ class Surrogate:
                     why=f"Beside this energy, {fault}.",
                     fix="Learn energy and fields from the same solves, with the same TouchedSurface.",
                 )
+        sign = self.energy.baseline.amplitude
+        if self.memory is not None and sign not in self.memory.walks:
+            raise UsageError(
+                f"The memory {self.memory.name!r} does not fit the baseline {self.energy.baseline.name!r}.",
+                why=f"It walks an amplitude that is {' or '.join(sorted(self.memory.walks))}; here that is {sign}.",
+                fix="Leave the memory out, or give one that walks such an amplitude.",
+            )
 
     def __str__(self) -> str:
         head = f"Surrogate {self.name!r}: {', '.join(str(r) for r in self.inputs)}; {self.made_of}"

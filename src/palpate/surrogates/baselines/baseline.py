@@ -27,6 +27,7 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.network.kinds import register_kind
 from palpate.surrogates.energy_kernels import GRADIENT, HESSIAN, SMALL, VECTORS, Compiled
+from palpate.surrogates.memories import Amplitude
 from palpate.surrogates.surface import TouchedSurface
 from palpate.units import Range
 
@@ -123,6 +124,15 @@ class Baseline(ABC):
     def radius_input(self) -> int | None:
         """The input that is the probe's radius; None where none is."""
         return None
+
+    @property
+    def amplitude(self) -> Amplitude:
+        """Sign of the amplitude q that memories walk, U = ½ q².
+
+        "positive" where q is √(2 U), "signed" where it changes its sign with the place, as along one direction, and
+        "none" where the energy has no place of rest to count q from.
+        """
+        return "positive"
 
     @property
     def offset(self) -> float:

@@ -22,6 +22,7 @@ from palpate.checks import own_arrays
 from palpate.errors import UsageError
 from palpate.surrogates.baselines.baseline import Baseline, register_baseline
 from palpate.surrogates.energy_kernels import GRADIENT, HESSIAN, ROOT, VECTORS, Compiled
+from palpate.surrogates.memories import Amplitude
 from palpate.units import Range
 
 __all__ = ["ConstantBaseline"]
@@ -75,6 +76,11 @@ class ConstantBaseline(Baseline):
     def directions(self) -> np.ndarray:
         """Unit directions D (k, 3) of the felt coordinates."""
         return self.axes
+
+    @property
+    def amplitude(self) -> Amplitude:
+        """None: where the body rests depends on its other loads."""
+        return "none"
 
     @property
     def offset(self) -> float:

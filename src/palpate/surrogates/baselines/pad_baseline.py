@@ -24,6 +24,7 @@ from palpate.surrogates.baselines.constant_baseline import require_axes
 from palpate.surrogates.baselines.rest_stiffness import RestStiffness, entries, monomials, root_at
 from palpate.surrogates.baselines.stiffening import Stiffening, stiffening_into
 from palpate.surrogates.energy_kernels import GRADIENT, HESSIAN, OTHER, ROOT, SURFACE, VECTORS, Compiled
+from palpate.surrogates.memories import Amplitude
 from palpate.units import Range, bounds
 
 __all__ = ["PadBaseline"]
@@ -68,6 +69,11 @@ class PadBaseline(Baseline):
     def directions(self) -> np.ndarray:
         """Unit directions D (k, 3) of the felt coordinates."""
         return self.axes
+
+    @property
+    def amplitude(self) -> Amplitude:
+        """Signed along one direction; of several, √(2 U)."""
+        return "signed" if len(self.axes) == 1 else "positive"
 
     def fault(self, inputs: tuple[Range, ...]) -> str:
         """Return what does not fit the network's inputs; "" if all does."""

@@ -35,7 +35,7 @@ from numba import njit
 
 from palpate.checks import own_arrays
 from palpate.errors import UsageError
-from palpate.surrogates.memories.memory import Memory, MemoryState, register_memory
+from palpate.surrogates.memories.memory import Amplitude, Memory, MemoryState, register_memory
 
 __all__ = ["IwanElements", "IwanMemento", "IwanState"]
 
@@ -164,6 +164,7 @@ class IwanElements(Memory):
     """
 
     name: ClassVar[str] = "iwan-elements"
+    walks: ClassVar[frozenset[Amplitude]] = frozenset({"signed"})
     moves_rest: ClassVar[bool] = True
 
     stiffness: np.ndarray

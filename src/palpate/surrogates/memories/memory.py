@@ -11,7 +11,7 @@ memory gives back no more than was put in:
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar
+from typing import ClassVar, Literal, TypeAlias
 
 import numpy as np
 
@@ -19,7 +19,9 @@ from palpate.errors import UsageError
 from palpate.network.kinds import register_kind
 from palpate.surrogates.memories.patches import Patches
 
-__all__ = ["Memory", "MemoryState", "amplitudes", "register_memory"]
+__all__ = ["Amplitude", "Memory", "MemoryState", "amplitudes", "register_memory"]
+
+Amplitude: TypeAlias = Literal["none", "positive", "signed"]
 
 STORED, LOST, WORK, STEP = range(4)  # places in the ledger
 
@@ -89,6 +91,8 @@ class Memory(ABC):
     ----------
     name : str
         The name by which files find it.
+    walks : set of str
+        Signs of the amplitude that it can walk, see `palpate.surrogates.Baseline.amplitude`.
     keeps_prints : bool
         Whether its state has ``now`` (n,), amplitudes of prints at ``points`` (n, 3) of the surface, m.
     moves_rest : bool
@@ -97,6 +101,7 @@ class Memory(ABC):
     """
 
     name: ClassVar[str]
+    walks: ClassVar[frozenset[Amplitude]] = frozenset({"positive"})
     keeps_prints: ClassVar[bool] = False
     moves_rest: ClassVar[bool] = False
 

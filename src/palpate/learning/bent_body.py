@@ -59,7 +59,7 @@ _TARGET, _RIDGE, _TOLERANCE = 1e-9, 1e-13, 1e-9  # solves of beams carry no nois
 
 @dataclass(frozen=True)
 class Refinement:
-    """How the sequential filter's answer is refined.
+    """Settings of the refinement of what the sequential filter has found.
 
     Attributes
     ----------

@@ -38,7 +38,7 @@ Log = Callable[[str], None]
 
 @dataclass(frozen=True, eq=False)
 class LearningHistory:
-    """How a body was learnt.
+    """Record of the learning of a body.
 
     Attributes
     ----------

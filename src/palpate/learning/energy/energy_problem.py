@@ -51,6 +51,7 @@ class LeftOut:
     Attributes
     ----------
     rows : Rows
+        Rows of the least-squares problem.
     fit : Fit
         Of all of them.
     errors : (R, 1) array

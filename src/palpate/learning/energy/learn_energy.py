@@ -35,7 +35,7 @@ _NEARLY = 0.9  # of the wanted depth: depth series are shifted at random and end
 
 @dataclass(frozen=True, eq=False)
 class EnergyHistory:
-    """How an energy was found.
+    """Record of the search for an energy.
 
     Attributes
     ----------

@@ -12,7 +12,7 @@ __all__ = ["held_loads", "load_unload_reload", "random_times", "random_turns"]
 def random_turns(
     rng: np.random.Generator, low: float, high: float, *, turns: int = 6, step: float, outward: float = 0.0
 ) -> np.ndarray:
-    """Loads (N,) in N that go to and fro between random turning points, in steps of `step` N at most, back to 0.
+    """Return loads (N,) in N that go to and fro between random turning points, in steps of `step` N at most, back to 0.
 
     The points are even over the range; `outward` above 0 draws them to its ends, where a body yields most.
     """
@@ -22,7 +22,7 @@ def random_turns(
 
 
 def load_unload_reload(rng: np.random.Generator, low: float, high: float, *, step: float) -> np.ndarray:
-    """Loads (N,) in N: to a peak, back a part of the way, further than before, and off."""
+    """Return loads (N,) in N: to a peak, back a part of the way, further than before, and off."""
     end = high if low >= 0 or rng.random() < 0.5 else low
     peak = end * rng.uniform(0.5, 1.0)
     back, further = peak * rng.uniform(0.0, 0.8), peak + (end - peak) * rng.random()
@@ -30,7 +30,7 @@ def load_unload_reload(rng: np.random.Generator, low: float, high: float, *, ste
 
 
 def even_steps(knots: np.ndarray, step: float) -> np.ndarray:
-    """From 0 through the knots (k,) in even steps no longer than `step`."""
+    """Return the way from 0 through the knots (k,) in even steps no longer than `step`."""
     ends = np.concatenate([[0.0], knots])
     legs = [
         np.linspace(a, b, max(2, int(np.ceil(abs(b - a) / step))) + 1)[1:]
@@ -42,7 +42,7 @@ def even_steps(knots: np.ndarray, step: float) -> np.ndarray:
 def random_times(
     rng: np.random.Generator, low: float, high: float, *, span: float, step: float, slowest: float = 3.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Times (N,) in s, in steps of `step`, and loads (N,) in N.
+    """Return times (N,) in s, in steps of `step`, and loads (N,) in N.
 
     Even ramps between random loads that take 0.05 s to `slowest` seconds, every third one a hold, none at the start.
     """
@@ -55,8 +55,8 @@ def random_times(
     return times, np.interp(times, knots_t, knots_p)
 
 
-def held_loads(size: float, *, rise: float, span: float, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Times (N,) in s and loads (N,) in N: put on within `rise`, held to `span`, times growing geometrically."""
-    on = np.linspace(0.0, rise, 6)[1:]
-    times = np.concatenate([on, rise + np.geomspace(rise / 2, span - rise, count)])
-    return times, size * np.minimum(times / rise, 1.0)
+def held_loads(size: float, *, ramp: float, span: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return times (N,) in s and loads (N,) in N: put on within `ramp`, held to `span`, times growing geometrically."""
+    on = np.linspace(0.0, ramp, 6)[1:]
+    times = np.concatenate([on, ramp + np.geomspace(ramp / 2, span - ramp, count)])
+    return times, size * np.minimum(times / ramp, 1.0)

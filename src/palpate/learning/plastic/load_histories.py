@@ -73,7 +73,7 @@ class Marches(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class LoadHistories:
-    """LoadHistories of one body held at one node.
+    """Load histories of one body held at one node.
 
     Attributes
     ----------
@@ -84,9 +84,11 @@ class LoadHistories:
     direction : (2,)
         Unit direction of the load.
     paths : tuple of LoadHistory
+        The histories, each from the virgin body.
     radius : float
         Half the height of the section, m, for the picture.
     nodes_of_interest : tuple of int
+        Mesh nodes that the study asks for.
     """
 
     rest: np.ndarray
@@ -168,7 +170,9 @@ def follow_loads(
     problem : Marches
         With one load, at the node and in the direction.
     node : int
+        The held mesh node.
     direction : (2,)
+        Unit direction of its load.
     loads : (N,)
         N; where a solve fails the history ends.
     times : (N,), optional

@@ -26,8 +26,11 @@ class HistoryProblem(Protocol):
     rest : (node, 2)
         Mesh nodes, m.
     of_interest : (node,) bool
+        Mask of the nodes that the study asks for.
     load_nodes : sequence of int
+        The node that each load acts on.
     load_directions : sequence of pairs
+        Unit direction of each load.
     """
 
     @property
@@ -72,11 +75,15 @@ def solve_histories(
     Parameters
     ----------
     problem : HistoryProblem
+        The body under one load.
     low, high : float
         Range of the load, N.
     count : int
+        Number of histories.
     seed : int
+        Decides the random loads.
     relaxes : bool
+        Whether the body creeps with time; else it yields.
     outward : float
         How much turning points are drawn to the ends; 0 for those to be judged by.
     span, step : float
@@ -97,7 +104,7 @@ def solve_histories(
     for i in range(count):
         times: np.ndarray | None = None
         if relaxes and i == 0 and outward > 0:
-            times, loads = held_loads(largest, rise=step, span=span, count=40)
+            times, loads = held_loads(largest, ramp=step, span=span, count=40)
         elif relaxes:
             times, loads = random_times(rng, low, high, span=span, step=step)
         elif i % 3 == 0:

@@ -123,7 +123,8 @@ def with_memory(body, memory) -> Example:
 def test_each_registered_kind_has_an_example():
     ours = {cls for cls in registered_baselines() if cls.__module__.startswith("palpate.")}
     assert ours == {type(body().body.energy.baseline) for body in BODIES}
-    assert set(registered_kinds(Memory).values()) == {type(memory(1.0)) for memory in MEMORIES}
+    ours = {cls for cls in registered_kinds(Memory).values() if cls.__module__.startswith("palpate.")}
+    assert ours == {type(memory(1.0)) for memory in MEMORIES}
 
 
 @pytest.mark.parametrize("body", BODIES, ids=named)

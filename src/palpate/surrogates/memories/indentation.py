@@ -281,10 +281,10 @@ class IndentationState(MemoryState):
     """
 
     def __init__(self, indentation: Indentation) -> None:
+        super().__init__()
         n = len(indentation.points)
-        self.indentation, self.force = indentation, np.zeros(3)
+        self.indentation = indentation
         self.points = indentation.points
-        self._ledger = np.zeros(4)
         self._depths = np.zeros(n)
         self.now = self._depths.view()
         self.now.flags.writeable = False
@@ -316,8 +316,8 @@ class IndentationState(MemoryState):
 
     def reset(self) -> None:
         """Back to the virgin body, the probe outside."""
-        for array in (self._depths, self._ledger, self.force):
-            array[...] = 0.0
+        super().reset()
+        self._depths[:] = 0.0
 
     def step(self, position: np.ndarray, amplitude: float, slope: np.ndarray, dt: float) -> bool:
         """Move the probe to a place and renew `force`; see `MemoryState.step`. Yielding knows no time."""

@@ -291,10 +291,11 @@ class IwanState(MemoryState):
     """
 
     def __init__(self, elements: IwanElements) -> None:
+        super().__init__()
         n = len(elements)
-        self.elements, self.force, self.amplitude = elements, np.zeros(3), 0.0
+        self.elements, self.amplitude = elements, 0.0
         self._state = (np.zeros(n), np.zeros(n))
-        self._ledger, self._constants = np.zeros(4), elements.compiled()
+        self._constants = elements.compiled()
         self.step(np.zeros(3), 0.0, np.zeros(3), 0.0)  # compile now, not in the loop
         self.release(0.0)
         self.reset()
@@ -304,7 +305,8 @@ class IwanState(MemoryState):
 
     def reset(self) -> None:
         """Go back to the virgin body."""
-        for array in (*self._state, self._ledger, self.force):
+        super().reset()
+        for array in self._state:
             array[...] = 0.0
         self.amplitude = 0.0
 

@@ -29,6 +29,9 @@ STORED, LOST, WORK, STEP = range(4)  # places in the ledger
 class MemoryState(ABC):
     """The state of a body that remembers; `step` allocates nothing.
 
+    A state begins at rest, with `force` and a ledger of zeros; each step renews the force and enters its energies with
+    `book`, from which the work of the hand follows.
+
     Attributes
     ----------
     force : (3,)
@@ -37,6 +40,24 @@ class MemoryState(ABC):
 
     force: np.ndarray
     _ledger: np.ndarray
+
+    def __init__(self) -> None:
+        self.force, self._ledger = np.zeros(3), np.zeros(4)
+
+    def book(self, stored: float, lost: float) -> None:
+        """Enter the energies of a step.
+
+        Parameters
+        ----------
+        stored : float
+            What is stored after it, J.
+        lost : float
+            What was turned into heat during it, J, not negative.
+        """
+        ledger = self._ledger
+        ledger[WORK] += stored - ledger[STORED] + lost
+        ledger[STORED], ledger[STEP] = stored, lost
+        ledger[LOST] += lost
 
     @property
     def stored(self) -> float:
@@ -60,7 +81,9 @@ class MemoryState(ABC):
 
     @abstractmethod
     def reset(self) -> None:
-        """Forget everything: the body is as at the start, and nobody touches it."""
+        """Forget everything: the body is as at the start, and nobody touches it. Here: no force, an empty ledger."""
+        self.force[:] = 0.0
+        self._ledger[:] = 0.0
 
     @abstractmethod
     def step(self, position: np.ndarray, amplitude: float, slope: np.ndarray, dt: float) -> bool:

@@ -199,11 +199,11 @@ class RelaxationState(MemoryState):
     """
 
     def __init__(self, relaxation: Relaxation) -> None:
+        super().__init__()
         patches = relaxation.patches or Patches.single()
         shares, times, pad = relaxation.compiled()
         count, n = len(patches), len(shares)
         self.relaxation, self.patches = relaxation, patches
-        self.force, self._ledger = np.zeros(3), np.zeros(4)
         # amplitudes asked, remembered, whether there are any, and the last q
         self._state = (np.zeros(count), np.zeros((count, n)), np.zeros(count, dtype=np.bool_), np.zeros(1))
         self._work = (np.zeros(count), np.zeros(4), np.zeros(2), np.zeros((3, n)))
@@ -217,7 +217,8 @@ class RelaxationState(MemoryState):
 
     def reset(self) -> None:
         """Forget everything: the probe is outside, the body at rest."""
-        for array in (*self._state, self._ledger, self.force):
+        super().reset()
+        for array in self._state:
             array[...] = 0
 
     def step(self, position: np.ndarray, amplitude: float, slope: np.ndarray, dt: float) -> bool:

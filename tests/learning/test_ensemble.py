@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.learning.energy.energy_problem import EnergyProblem, mean_error
-from palpate.learning.energy.energy_search import judge, mean_of
+from palpate.learning.energy.energy_search import best_mean, score
 from palpate.learning.search import Candidate, Search
 from palpate.learning.starts import random_units
 
@@ -44,18 +44,18 @@ def search():
 
 @pytest.fixture(scope="module")
 def networks(search):
-    return [judge(search.problem, candidate) for candidate in search.tried]
+    return [score(search.problem, candidate) for candidate in search.tried]
 
 
 @pytest.fixture(scope="module")
 def mean(search, networks):
     """The mean of so many of the networks that misses least."""
-    return lambda most, **options: mean_of(search.problem, networks, most, **options)
+    return lambda most, **options: best_mean(search.problem, networks, most, **options)
 
 
 def alone(search, one):
     """Error of one judged network."""
-    return mean_of(search.problem, [one], 1).error
+    return best_mean(search.problem, [one], 1).error
 
 
 def answers(found, X):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.learning.energy.energy_problem import EnergyProblem
-from palpate.learning.energy.energy_search import judge, mean_of
+from palpate.learning.energy.energy_search import best_mean, score
 from palpate.learning.folds import fold_numbers, held_out
 from palpate.learning.search import Candidate, Search
 from palpate.learning.starts import random_units
@@ -115,7 +115,7 @@ def test_errors_are_as_large_as_at_places_never_seen():
     search.try_all(
         [Candidate(of, random_units(of.form, X, 9, rng, scatter=0.05), "random") for _ in range(4)], 40
     )
-    found = mean_of(problem, [judge(problem, one) for one in search.tried], 4)
+    found = best_mean(problem, [score(problem, one) for one in search.tried], 4)
     rows = found.left_out.rows
     values = found.left_out.errors[:40] @ rows.modes / rows.scale[:, None]
     new = places(400, 1)

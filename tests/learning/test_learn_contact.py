@@ -9,7 +9,7 @@ from palpate.errors import UsageError
 from palpate.learning.energy import EnergySamples, learn_energy
 from palpate.learning.energy.energy_images import images_of
 from palpate.learning.energy.energy_problem import EnergyProblem
-from palpate.learning.energy.energy_search import judge, mean_of
+from palpate.learning.energy.energy_search import best_mean, score
 from palpate.learning.energy.trust import trust_of
 from palpate.learning.search import Candidate, Search
 from palpate.learning.starts import random_units
@@ -145,7 +145,7 @@ def test_the_posterior_covers_nine_tenths_of_what_is_missed_when_left_out(surfac
     theta = np.array([of.form.unit(samples.scaled[i], 0.8) for i in range(3)])
     tried = problem.evaluate(Candidate(of, theta, "test"), 2)
     network = tried.network
-    found = mean_of(problem, [judge(problem, tried)], 1)
+    found = best_mean(problem, [score(problem, tried)], 1)
     trust, left = trust_of(found, samples), found.left_out
     rows, A = left.rows, left.rows.matrix(network.theta)
     penalty = np.diag(np.r_[np.zeros(of.tail_size), np.full(3, problem.ridge * rows.total)])

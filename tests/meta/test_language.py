@@ -10,80 +10,70 @@ from pathlib import Path
 import pytest
 from sources import FUNCTIONS, ROOT, files, package_of, tree
 
-# Packages that are not yet done; each list only gets shorter.
-WITHOUT_SUBJECT = {
-    "learning",
-    "surrogates",
-}
-BARE_PARAMETERS = {
-    "learning",
-    "surrogates",
-}
-OLD_TERMS = {
-    "learning",
-    "surrogates",
+# Files that are not yet done; the list only gets shorter.
+UNFINISHED = {
+    "learning/energy/energy_problem.py",
+    "learning/energy/learn_energy.py",
+    "learning/learn_dataset.py",
+    "learning/plastic/drives.py",
 }
 
 CLAUSE = re.compile(r"(What|Whether|How|Of|The same)\b")
 
 # Terms of earlier versions: docs/concepts/glossary.md has those that took their place.
 GIVEN_UP = {
-    *(
-        "belief",
-        "carrying",
-        "comb",
-        "committee",
-        "crew",
-        "dent",
-        "dents",
-        "dimple",
-        "dimples",
-        "entered",
-        "exhibit",
-    ),
-    *(
-        "exhibits",
-        "foot",
-        "footprint",
-        "gauge",
-        "judged",
-        "needle",
-        "needles",
-        "nudge",
-        "nudged",
-        "parted",
-        "parting",
-    ),
-    *(
-        "prints",
-        "race",
-        "relapse",
-        "rise",
-        "searcher",
-        "skins",
-        "sought",
-        "swept",
-        "told",
-        "travelling",
-        "twin",
-        "twins",
-    ),
+    "belief",
+    "carrying",
+    "comb",
+    "committee",
+    "crew",
+    "dent",
+    "dents",
+    "dimple",
+    "dimples",
+    "entered",
+    "exhibit",
+    "exhibits",
+    "foot",
+    "footprint",
+    "gauge",
+    "judged",
+    "needle",
+    "needles",
+    "nudge",
+    "nudged",
+    "parted",
+    "parting",
+    "prints",
+    "race",
+    "relapse",
+    "rise",
+    "searcher",
+    "skins",
+    "sought",
+    "swept",
+    "told",
+    "travelling",
+    "twin",
+    "twins",
 }
-# A word of everyday English in the physics: the time in which a load rises to its size.
-ALLOWED = {("physics", "rise")}
+# A word of everyday English where it is the time in which a load or a press rises to its size.
+ALLOWED = {("physics", "rise"), ("learning", "rise")}
 GIVEN_UP_CLASSES = {
-    *(
-        "ContactLaw",
-        "GraspSurrogate",
-        "HeldBody",
-        "HeldPath",
-        "HeldPaths",
-        "HeldStudy",
-        "RestStiffness",
-        "Stiffening",
-    ),
-    *("TouchModel", "TouchStudy", "TouchSurrogate", "TouchedBody"),
+    "GraspSurrogate",
+    "HeldBody",
+    "HeldPath",
+    "HeldPaths",
+    "HeldStudy",
+    "TouchModel",
+    "TouchStudy",
+    "TouchSurrogate",
+    "TouchedBody",
 }
+
+
+def _finished(package: str) -> list[Path]:
+    return [file for file in files() if package_of(file) == package and file.as_posix() not in UNFINISHED]
 
 
 def documented(file: Path) -> Iterator[tuple[str, ast.AST, str]]:
@@ -93,12 +83,11 @@ def documented(file: Path) -> Iterator[tuple[str, ast.AST, str]]:
             yield f"{file}:{getattr(node, 'name', '')}", node, doc
 
 
-@pytest.mark.parametrize("package", sorted({package_of(file) for file in files()} - WITHOUT_SUBJECT))
+@pytest.mark.parametrize("package", sorted({package_of(file) for file in files()}))
 def test_docstrings_begin_with_their_subject(package):
     clauses = [
         f"{where}: {doc.splitlines()[0]}"
-        for file in files()
-        if package_of(file) == package
+        for file in _finished(package)
         for where, _, doc in documented(file)
         if CLAUSE.match(doc)
     ]
@@ -118,12 +107,11 @@ def entries_without_text(doc: str) -> list[str]:
     return bare
 
 
-@pytest.mark.parametrize("package", sorted({package_of(file) for file in files()} - BARE_PARAMETERS))
+@pytest.mark.parametrize("package", sorted({package_of(file) for file in files()}))
 def test_parameters_say_more_than_their_type(package):
     bare = [
         f"{where}: {entry}"
-        for file in files()
-        if package_of(file) == package
+        for file in _finished(package)
         for where, node, doc in documented(file)
         if not getattr(node, "name", "").startswith("_")
         for entry in entries_without_text(doc)
@@ -143,12 +131,11 @@ def names_in(file: Path) -> Iterator[str]:
             yield node.target.id
 
 
-@pytest.mark.parametrize("package", sorted({package_of(file) for file in files()} - OLD_TERMS))
+@pytest.mark.parametrize("package", sorted({package_of(file) for file in files()}))
 def test_terms_given_up_are_gone(package):
     old = sorted(
         f"{file}: {name}"
-        for file in files()
-        if package_of(file) == package
+        for file in _finished(package)
         for name in set(names_in(file))
         if (package, name) not in ALLOWED
         and (

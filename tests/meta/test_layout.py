@@ -13,7 +13,7 @@ import sys
 from collections.abc import Iterator
 
 import pytest
-from sources import FUNCTIONS, PACKAGE, ROOT, body_without_docstring, files, package_of, text, tree
+from sources import FUNCTIONS, PACKAGE, ROOT, body_without_docstring, files, text, tree
 
 import palpate
 
@@ -64,8 +64,8 @@ def test_heavy_packages_wait_until_they_are_needed(code, absent):
     assert done.stdout.strip() == "[]"
 
 
-# Packages whose files still wait for a name of their own, or lie too deep; it only gets shorter.
-UNFINISHED = {"learning", "surrogates"}
+# Files whose public functions are not yet all listed; it only gets shorter.
+UNFINISHED = {"learning/energy/energy_problem.py", "learning/plastic/drives.py"}
 LONGEST_FILE, LONGEST_FUNCTION, SHORT_FILE = 500, 50, 60
 SHARE_OF_SHORT_FILES = 0.08
 
@@ -96,13 +96,13 @@ def test_functions_stay_short():
 def test_a_file_name_occurs_once():
     places = collections.defaultdict(list)
     for file in files():
-        if not file.name.startswith("__") and package_of(file) not in UNFINISHED:
+        if not file.name.startswith("__"):
             places[file.name].append(str(file))
     assert {name: there for name, there in places.items() if len(there) > 1} == {}, "go to file must find one"
 
 
 def test_folders_are_two_deep_at_most():
-    deep = [str(file) for file in files() if len(file.parts) > 3 and package_of(file) not in UNFINISHED]
+    deep = [str(file) for file in files() if len(file.parts) > 3]
     assert deep == []
 
 
@@ -123,7 +123,8 @@ def test_public_functions_and_classes_are_listed():
             and not any(".command(" in ast.unparse(decorator) for decorator in node.decorator_list)
         }
         public = {name for name in defined if not name.startswith("_")}
-        if not public <= listed and not file.name.startswith("__") and package_of(file) not in UNFINISHED:
+        finished = file.as_posix() not in UNFINISHED
+        if finished and not public <= listed and not file.name.startswith("__"):
             unlisted[str(file)] = sorted(public - listed)
     assert unlisted == {}
 

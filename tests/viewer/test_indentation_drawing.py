@@ -60,7 +60,7 @@ def test_the_file_tells_of_prints_and_where_they_can_stay(file, dents):
     body = load_touchable(file)
     assert isinstance(body, Touchable)
     found = body.memory
-    for name in ("dent", "reach", "stiffening"):
+    for name in ("residual", "reach", "stiffening"):
         np.testing.assert_array_equal(getattr(found, name), getattr(dents, name))
     assert found.width == SPACING
     # places on the top, some two millimetres apart
@@ -96,7 +96,7 @@ def test_without_spacing_the_print_travels(dents, tmp_path):
 
 
 def test_a_print_must_be_as_wide_as_places_are_apart(dents):
-    single = Indentation.single(dents.dent, dents.reach, dents.stiffening)
+    single = Indentation.single(dents.residual, dents.reach, dents.stiffening)
     with pytest.raises(UsageError, match="do not fit places"):
         touched_slab().with_memory(single, spacing=SPACING)
     body = touched_slab().with_memory(dataclasses.replace(single, width=0.003), spacing=SPACING)

@@ -64,7 +64,9 @@ def automatic(
     Parameters
     ----------
     X : (N, n)
+        Inputs of the samples, SI units.
     Y : (N, m)
+        Outputs of the samples, SI units.
     inputs : n ranges, optional
         Of the data if left out.
     target : float

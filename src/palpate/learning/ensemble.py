@@ -16,7 +16,7 @@ import numpy as np
 from palpate.rbf.refinement.refine import Refined
 from palpate.rbf.regressors import Regressors
 
-__all__ = ["Ensemble", "Judged", "select_members"]
+__all__ = ["Ensemble", "ScoredNetwork", "select_members"]
 
 _AS_GOOD = 1.1  # the error of samples left out flatters the one network that it has chosen
 
@@ -67,12 +67,13 @@ class Ensemble:
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
-    """A network and what it misses of samples left out, judged in one or several ways.
+class ScoredNetwork:
+    """A network and its errors at samples left out, computed in one or several ways.
 
     Attributes
     ----------
     network : Refined
+        In scaled quantities.
     misses : tuple of arrays
         For each way the error of every row; the mean of networks misses the mean of these.
     """
@@ -82,12 +83,12 @@ class Judged:
 
 
 def select_members(
-    judged: Sequence[Judged],
+    networks: Sequence[ScoredNetwork],
     measure: Callable[[tuple[np.ndarray, ...]], float],
     *,
     most: int,
     units: int,
-) -> tuple[tuple[Judged, ...], tuple[np.ndarray, ...]]:
+) -> tuple[tuple[ScoredNetwork, ...], tuple[np.ndarray, ...]]:
     """Return the networks of one kind whose mean misses least, and what that mean misses.
 
     To the best network of a kind is added, one after another, the one with which the mean misses least (Caruana,
@@ -96,14 +97,15 @@ def select_members(
 
     Parameters
     ----------
-    judged : sequence of Judged
+    networks : sequence of ScoredNetwork
+        Those to choose from, of any kinds.
     measure : callable
         Returns the error of what a network misses.
     most, units : int
         Most members, and most units of all of them, images counted.
     """
-    kinds: dict[tuple[str, str], list[Judged]] = defaultdict(list)
-    for one in judged:
+    kinds: dict[tuple[str, str], list[ScoredNetwork]] = defaultdict(list)
+    for one in networks:
         kinds[one.network.regressors.form.name, one.network.regressors.radial].append(one)
     chains = [_means(list(kind), measure, most, units) for kind in kinds.values()]
     least, k = min((min(error for *_, error in chain), k) for k, chain in enumerate(chains))
@@ -111,11 +113,11 @@ def select_members(
     return members, misses
 
 
-_Mean = tuple[tuple[Judged, ...], tuple[np.ndarray, ...], float]
+_Mean = tuple[tuple[ScoredNetwork, ...], tuple[np.ndarray, ...], float]
 
 
 def _means(
-    pool: list[Judged], measure: Callable[[tuple[np.ndarray, ...]], float], most: int, units: int
+    pool: list[ScoredNetwork], measure: Callable[[tuple[np.ndarray, ...]], float], most: int, units: int
 ) -> list[_Mean]:
     """Return the means of 1, 2, … networks of a kind, each with what it misses and its error."""
     copies = pool[0].network.regressors.copies

@@ -19,7 +19,7 @@ from scipy.optimize import minimize
 
 from palpate.network.radial import RadialFunction, radial
 
-__all__ = ["CENTRES_MAX", "KernelLayer", "Metric", "likely_metric"]
+__all__ = ["CENTRES_MAX", "KernelLayer", "Metric", "likely_metric", "negative_likelihood"]
 
 _SCALES = (np.log(1e-3), np.log(30.0))
 _RIDGES = (np.log(1e-11), np.log(10.0))
@@ -51,9 +51,13 @@ class KernelLayer:
     Attributes
     ----------
     metric : Metric
+        The kernel: its radial function, widths and ridge.
     centres : (h, n)
+        Scaled inputs of the samples that carry a unit.
     weights : (h, k)
+        Weights of the units for k outputs.
     tail : (1 + n, k)
+        Coefficients of one and of the inputs.
     """
 
     metric: Metric

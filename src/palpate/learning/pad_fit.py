@@ -155,7 +155,7 @@ class _Search:
 
     @cache  # noqa: B019 - lives as long as the search for one law
     def of_degree(self, degree: int) -> _Search:
-        """The same for P of another degree."""
+        """Return the fit for P of another degree."""
         other = copy.copy(self)
         other._set(degree)
         return other

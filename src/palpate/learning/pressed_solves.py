@@ -57,6 +57,7 @@ class PressedSolves:
     inputs : n ranges
         Those of the data, widened to all mirror images.
     surface : TouchedSurface
+        The surface that the probe touches, with its signed distance.
     points, triangles : (P, 3), (t, 3) arrays
         The body's whole surface, of a mesh that is fine wherever it is touched.
     matrices, about : (k, 3, 3), (3,) arrays
@@ -182,7 +183,7 @@ def _deepest(probe: Mapping[str, Any]) -> float:
 
 
 def _inner(deepest: float, radius: float) -> float:
-    """How deep the probe's centre may go before the distance ends, m: the probe is twice as deep there as trained."""
+    """Return the depth in m at which the distance ends: the probe's centre is twice as deep there as trained."""
     return max(1.5 * radius, 2.0 * deepest - radius)
 
 

@@ -162,6 +162,7 @@ class Trial:
     start : str
         Where its units came from: "kind", "grown", "random", "at solves", ….
     form, radial : str
+        Form and radial function of its units.
     units : int
         Number of units; with a symmetry, of orbits.
     error : float
@@ -190,6 +191,7 @@ class Candidate:
     Attributes
     ----------
     regressors : Regressors
+        The kind of the units, and the tail.
     theta : (h, p) array
         The units now.
     start : str
@@ -197,6 +199,7 @@ class Candidate:
     error : float
         By which candidates are compared; infinite before a candidate was evaluated.
     network : Refined or None
+        The network after refinement; None before a candidate was evaluated.
     iterations : int
         Spent so far.
     seconds : float
@@ -244,7 +247,9 @@ class Search:
     Attributes
     ----------
     problem : Searchable
+        The problem, which evaluates candidates.
     budget : Budget
+        Effort, and the limit on time.
     pool : Pool, optional
         Processes that evaluate candidates; this one alone if left out.
     tried : list of Candidate

@@ -27,10 +27,13 @@ def random_units(
     Parameters
     ----------
     form : Form
+        The form of the units.
     X : (N, n) array
         Scaled inputs.
     count : int
+        Number of units.
     rng : Generator
+        Draws places, widths and directions.
     widths : (float, float)
         Least and largest width, of a uniform logarithm, in scaled inputs.
     scatter : float
@@ -66,11 +69,13 @@ def units_at_errors(
     Parameters
     ----------
     form : Form
+        The form of the units.
     X : (N, n) array
         Scaled inputs.
     error : (N,) array
         Squared error at each; it counts times the squared distance to the nearest new unit.
     widths : (k,) array
+        Width of each new unit, in scaled inputs.
     spacing : float
         Distance beyond which there is no gain.
     seeds : k ints, optional

@@ -63,6 +63,7 @@ def refined_network(
     Y : (N, m)
         Outputs in SI units.
     inputs, outputs : sequences of n ranges and m quantities
+        Names, units and ranges of the columns of X, names and units of those of Y.
     target : float
         Leave-one-out error wanted, relative to the largest deviation of any output from its mean.
     units_max : int
@@ -76,7 +77,9 @@ def refined_network(
     form : str
         Of a unit: isotropic, axis-aligned, rotated, rank-1, … (see `palpate.rbf.forms`).
     radial : {"gaussian", "inverse-multiquadric", "matern-5/2"}
+        Radial function of the units.
     tail : {"affine", "constant", "none"}
+        Polynomial part beside the units.
 
     Returns
     -------

@@ -229,7 +229,7 @@ class Touchable:
     @property
     def indentation(self) -> Any:
         """The memory of its indentation; None for a body that keeps none."""
-        return self.memory if self.memory is not None and self.memory.keeps_prints else None
+        return self.memory if self.memory is not None and self.memory.keeps_indentation else None
 
     def evaluator(self) -> HandEvaluator:
         """Return the allocation-free evaluator of the 1 kHz path."""

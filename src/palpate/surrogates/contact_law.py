@@ -79,6 +79,7 @@ class ContactLaw:
     Attributes
     ----------
     name : {"square", "hertz", "pad", "series"}
+        ½ s², s^{5/2}, s³, or s³/(1 + s/a)^½.
     length : float
         a in m, of the law "series" only; infinite for the others.
 

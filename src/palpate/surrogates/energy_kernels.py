@@ -58,6 +58,7 @@ __all__ = [
     "SURFACE",
     "VECTORS",
     "Compiled",
+    "Entry",
     "covariances_into",
     "entry_of",
     "trust_at",
@@ -185,7 +186,7 @@ def _assemble(answer, kappa, base, small) -> None:
 
 @_jit
 def _near(x, points, radius, last) -> bool:
-    """Whether a trained point is within the radius; hands move little: the search begins where it last ended."""
+    """Return True where a trained point is within the radius; the search begins where it last ended."""
     S = points.shape[0]
     bound, start = radius * radius * (1.0 + _SLACK), int(last[0])
     for k in range(S):
@@ -201,7 +202,7 @@ def _near(x, points, radius, last) -> bool:
 
 @_jit
 def _inside(lines, limits, s, numbers, points, scales, small) -> bool:
-    """Whether x (line 0) is in its ranges, no deeper than trained, and near a training input; line 1 is lost."""
+    """Return True where x (line 0) is in its ranges, as deep as trained, and near a training input; line 1 is lost."""
     if s > numbers[_DEEPEST] * (1.0 + _SLACK):
         return False
     for i in range(lines.shape[1]):

@@ -52,11 +52,11 @@ class MovingRest:
         a, b, c = self._direction
         for _ in range(_NEWTON):
             elastic(lies, parameters)
-            rise = a * elastic.slope[0] + b * elastic.slope[1] + c * elastic.slope[2]
+            steepness = a * elastic.slope[0] + b * elastic.slope[1] + c * elastic.slope[2]
             missing = amplitude - elastic.amplitude
-            if abs(missing) <= _AT_REST * abs(amplitude) or rise <= 0.0:
+            if abs(missing) <= _AT_REST * abs(amplitude) or steepness <= 0.0:
                 break
-            way = missing / rise
+            way = missing / steepness
             lies[0] += way * a
             lies[1] += way * b
             lies[2] += way * c

@@ -134,5 +134,5 @@ def test_the_tables_of_a_dent_come_back() -> None:
     found, error = learn_indentation([Press(energy, slope, force)], knots=2)
     assert error < 1e-6
     np.testing.assert_allclose(found.reach, made.reach, rtol=1e-4)
-    np.testing.assert_allclose(found.dent, made.dent, atol=1e-4)
+    np.testing.assert_allclose(found.residual, made.residual, atol=1e-4)
     np.testing.assert_allclose(found.stiffening, made.stiffening, rtol=1e-3)

@@ -140,7 +140,7 @@ def test_a_random_drive_never_gives_energy() -> None:
 
 
 @pytest.mark.parametrize(
-    ("dent", "reach", "kappa"),
+    ("residual", "reach", "kappa"),
     [
         (P + 0.1, Q, KAPPA),
         (P, P, KAPPA),
@@ -150,10 +150,10 @@ def test_a_random_drive_never_gives_energy() -> None:
     ],
 )
 def test_tables_that_promise_nothing_are_refused(
-    dent: np.ndarray, reach: np.ndarray, kappa: np.ndarray
+    residual: np.ndarray, reach: np.ndarray, kappa: np.ndarray
 ) -> None:
     with pytest.raises(UsageError):
-        Indentation(dent, reach, kappa, PLACES, 0.7)
+        Indentation(residual, reach, kappa, PLACES, 0.7)
 
 
 def test_what_is_not_finite_changes_nothing() -> None:

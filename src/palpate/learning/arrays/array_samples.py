@@ -31,7 +31,9 @@ class Samples:
     Attributes
     ----------
     X, Y : (N, n), (N, m)
+        Inputs and outputs of N samples, SI units.
     inputs, outputs : n ranges, m quantities
+        Names, units and ranges of the columns of X, names and units of those of Y.
     one_output : bool
         Whether Y came as (N,).
     """
@@ -72,6 +74,7 @@ class ArrayProblem:
     Attributes
     ----------
     inputs, outputs : tuples of n ranges and m quantities
+        As the samples declare them.
     X : (N, n)
         Scaled to [−1, 1] over the declared ranges.
     Y : (N, k)

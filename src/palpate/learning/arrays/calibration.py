@@ -137,11 +137,13 @@ def calibrated(
     Parameters
     ----------
     network : Network
+        The network whose intervals are wanted.
     M : (c, c), optional
         Covariance of tail and weights over s²; none where widths are to be the same everywhere.
     evidence : sequence of Evidence
         Of m outputs; where there are several, the widest counts, output by output.
     level : float
+        Share of unseen samples that an interval is to hold, between 0 and 1.
     """
     found = [_noise_and_factor(one, level, constant=M is None) for one in evidence]
     noise, factor = np.array([n for n, _ in found]), np.array([f for _, f in found])
@@ -214,13 +216,13 @@ class Finish:
         name = form or mean.regressors.form.name
         return self._fitted(arrays, mean.regressors.radial, name, error, M, evidence)
 
-    def kernel_network(self, layer: KernelLayer, judged: KernelLayer, error: float) -> Fitted:
-        """Return the result for a kernel layer; `judged` is one that has not seen the samples held out."""
+    def kernel_network(self, layer: KernelLayer, test_layer: KernelLayer, error: float) -> Fitted:
+        """Return the result for a kernel layer; `test_layer` is one that has not seen the samples held out."""
         held = self.split.unseen[0]
         M, spread = None, np.ones(len(held))
         if len(layer.centres) <= LARGEST:
-            M, spread = kernel_covariance(layer), kernel_spread(judged, held)
-        evidence = [Evidence(self._missed(judged.predict(held), self.split), spread)]
+            M, spread = kernel_covariance(layer), kernel_spread(test_layer, held)
+        evidence = [Evidence(self._missed(test_layer.predict(held), self.split), spread)]
         arrays = (*layer.units(), layer.weights, layer.tail)
         return self._fitted(arrays, layer.metric.radial, "kernel layer", error, M, evidence)
 

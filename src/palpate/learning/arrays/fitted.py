@@ -27,15 +27,19 @@ class Fitted:
     Attributes
     ----------
     network : Network
+        In SI units, as it answers.
     form : str
         Of its units: rank-1, rank-2, rotated, axis-aligned; kernel layer; or affine, without units.
     radial : str
+        Radial function of its units.
     units : int
+        Number of units.
     heldout : float
         Error on held-out samples relative to the outputs' standard deviation, before the weights saw them.
     trials : tuple of Trial
         The candidates, each with its error on held-out samples.
     seconds : float
+        Time that the fit took, s.
     uncertainty : Uncertainty
         Of the network.
     region : TrainedRegion
@@ -89,6 +93,7 @@ class Fitted:
         Parameters
         ----------
         X : (N, n)
+            Inputs, SI units; (N,) for a single input.
         level : float, optional
             Another one stretches the widths by a normal law.
 

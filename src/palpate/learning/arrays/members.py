@@ -36,6 +36,7 @@ class Member:
     Attributes
     ----------
     network : Refined
+        In scaled inputs and latent outputs.
     error : float
         Per scaled output on the held-out samples, before the weights saw them.
     before : Refined, optional
@@ -93,6 +94,7 @@ class Fresh:
     Attributes
     ----------
     like : Candidate
+        The network that was found: its kind and its number of units are taken.
     scales : (n,) array
         Of first units.
     deadline : float

@@ -92,7 +92,7 @@ class EnergySamples:
 
     @property
     def moved(self) -> np.ndarray:
-        """Whether (N,) each solve is away from rest, and so has an energy."""
+        """Mask (N,) of the solves that are away from rest, and so have an energy."""
         return np.asarray(self.energy > 0)
 
     @property

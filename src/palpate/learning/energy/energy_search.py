@@ -17,14 +17,14 @@ from typing import Literal
 import numpy as np
 
 from palpate.learning.energy.energy_problem import EnergyProblem, LeftOut, mean_error
-from palpate.learning.ensemble import Ensemble, Judged, select_members
+from palpate.learning.ensemble import Ensemble, ScoredNetwork, select_members
 from palpate.learning.pool import Pool
 from palpate.learning.search import Budget, Candidate, Search, Trial, sizes
 from palpate.learning.starts import random_units
 from palpate.network.radial import RadialFunction
 from palpate.rbf.regressors import Regressors
 
-__all__ = ["EnergyEnsemble", "search_energy"]
+__all__ = ["EnergyEnsemble", "best_mean", "score", "search_energy"]
 
 _FORMS = ("rotated", "axis-aligned", "rank-2")  # the last for more inputs than the position
 _RADIALS: tuple[RadialFunction, ...] = ("inverse-multiquadric", "matern-5/2", "gaussian")
@@ -80,9 +80,11 @@ def search_energy(
     Parameters
     ----------
     problem : EnergyProblem
+        The solves with their weights, and the baseline whose factor is learnt.
     form : str
         Of a unit, or "auto".
     radial : {"gaussian", "inverse-multiquadric", "matern-5/2", "auto"}
+        Radial function of the units; "auto" compares all three.
     units_max : int
         Most units of one network; images count.
     networks : int
@@ -105,41 +107,43 @@ def search_energy(
     search = Search(problem, budget.part(_SEARCH_SHARE), pool)
     _search_structure(search, form, radial, units_max, target, seed)
     order = sorted(search.tried, key=lambda one: one.error)[: budget.count(_JUDGED * _more(problem), 2)]
-    judged = pool.map(partial(_judge, problem, budget.deadline), list(enumerate(order)))
-    ensemble = mean_of(problem, [one for one in judged if one is not None], networks)
+    scored = pool.map(partial(_score_in_time, problem, budget.deadline), list(enumerate(order)))
+    ensemble = best_mean(problem, [one for one in scored if one is not None], networks)
     return ensemble, search.trials
 
 
-def mean_of(
-    problem: EnergyProblem, judged: Sequence[Judged], most: int, units: int = _UNITS
+def best_mean(
+    problem: EnergyProblem, scored: Sequence[ScoredNetwork], most: int, units: int = _UNITS
 ) -> EnergyEnsemble:
-    """Return the mean of at most so many judged networks, of no more than so many units, that misses least."""
-    rows = problem.fitted(judged[0].network)[0]
+    """Return the mean of at most so many scored networks, of no more than so many units, that misses least."""
+    rows = problem.fitted(scored[0].network)[0]
 
     def error(misses: tuple[np.ndarray, ...]) -> float:
         return math.sqrt(math.prod(mean_error(rows, miss) for miss in misses))
 
-    members, misses = select_members(judged, error, most=most, units=units)
+    members, misses = select_members(scored, error, most=most, units=units)
     best = members[0].network
     rows, fit = problem.fitted(best)
     left_out = LeftOut(rows, fit, misses[0], problem.folds(rows.groups))
     return EnergyEnsemble(tuple(one.network for one in members), left_out, error(misses))
 
 
-def judge(problem: EnergyProblem, candidate: Candidate, seconds: float | None = None) -> Judged:
+def score(problem: EnergyProblem, candidate: Candidate, seconds: float | None = None) -> ScoredNetwork:
     """Return a candidate's network with what it misses: refined again without each fold, and by the closed form."""
     assert candidate.network is not None
     again = problem.cross_validate(candidate.network, seconds=seconds)
-    return Judged(candidate.network, (again.errors, candidate.detail))
+    return ScoredNetwork(candidate.network, (again.errors, candidate.detail))
 
 
-def _judge(problem: EnergyProblem, deadline: float, numbered: tuple[int, Candidate]) -> Judged | None:
-    """Return a candidate judged; nothing where the time is over, but for the first."""
+def _score_in_time(
+    problem: EnergyProblem, deadline: float, numbered: tuple[int, Candidate]
+) -> ScoredNetwork | None:
+    """Return a candidate's network with its errors; None where the time is over, but for the first."""
     number, candidate = numbered
     if math.isinf(deadline):
-        return judge(problem, candidate)
+        return score(problem, candidate)
     left = deadline - time.monotonic()
-    return judge(problem, candidate, max(left, 0.1)) if left > 0 or number == 0 else None
+    return score(problem, candidate, max(left, 0.1)) if left > 0 or number == 0 else None
 
 
 def _search_structure(

@@ -40,7 +40,9 @@ def lumped_mass(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     points : (nodes, 3)
+        Corners of the triangles, m.
     triangles : (t, 3) int
+        Nodes of each triangle of the surface.
 
     Raises
     ------
@@ -239,12 +241,12 @@ def best_decomposition(
 
     every = border_widths(solves)
     both = [of(names[-1], within) for within in every[: None if moving else 1]]
-    first = _chosen(both)
+    first = _least_error(both)
     within = every[both.index(first)]
-    even = _chosen([first, *(of(name, within) for name in names[:-1])])
+    even = _least_error([first, *(of(name, within) for name in names[:-1])])
     return _best_of_both(solves, even, tolerance, most)
 
 
-def _chosen(parted: list[Decomposition]) -> Decomposition:
-    """The one that misses least of solves left out."""
-    return parted[0] if len(parted) == 1 else min(parted, key=lambda one: one.missed)
+def _least_error(decompositions: list[Decomposition]) -> Decomposition:
+    """Return the decomposition that misses least of solves left out."""
+    return decompositions[0] if len(decompositions) == 1 else min(decompositions, key=lambda one: one.missed)

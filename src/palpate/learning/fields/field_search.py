@@ -57,27 +57,27 @@ class Coefficients:
         Scaled inputs.
     along : (N, k) array
         a, coefficients in the field's unit.
-    rise : (N,) array
-        f > 0.
+    amplitude : (N,) array
+        f > 0, depth amplitude of each solve.
     groups : (N,) int array
         Solves that are left out together.
     """
 
     X: np.ndarray
     along: np.ndarray
-    rise: np.ndarray
+    amplitude: np.ndarray
     groups: np.ndarray
 
     @property
     def scale(self) -> float:
         """Root mean square of b, in the field's unit."""
-        b = self.along / self.rise[:, None]
-        return max(float(np.sqrt((self.rise**2 @ b**2).sum() / (self.rise**2).sum())), 1e-300)
+        b = self.along / self.amplitude[:, None]
+        return max(float(np.sqrt((self.amplitude**2 @ b**2).sum() / (self.amplitude**2).sum())), 1e-300)
 
     @property
     def targets(self) -> np.ndarray:
         """b over its scale (N, k)."""
-        return np.asarray(self.along / self.rise[:, None] / self.scale)
+        return np.asarray(self.along / self.amplitude[:, None] / self.scale)
 
     def evaluate(self, candidate: Candidate, iterations: int, seconds: float | None = None) -> Candidate:
         """Refine a candidate's units; its error is the leave-one-out error of the closed form."""
@@ -117,7 +117,7 @@ class Coefficients:
             answered = answers(~out, out)
             if answered is None:
                 return float("inf")
-            errors = answered * (self.scale * self.rise[out])[:, None] - self.along[out]
+            errors = answered * (self.scale * self.amplitude[out])[:, None] - self.along[out]
             total += float((errors**2).sum())
         return float(np.sqrt(total / len(self.X)))
 
@@ -131,7 +131,7 @@ class Coefficients:
     ) -> Refined:
         return refine(
             *(self.X[kept], self.targets[kept], theta, regressors),
-            weights=self.rise[kept] ** 2,
+            weights=self.amplitude[kept] ** 2,
             groups=self.groups[kept],
             ridge=_RIDGE,
             iterations=iterations,
@@ -151,6 +151,7 @@ class LayerAtSolves:
     error : float
         Root mean square over surface and solves of what is missed of groups left out; infinite for one group.
     trials : tuple of Trial
+        Records of the layers that were compared.
     """
 
     layer: KernelLayer

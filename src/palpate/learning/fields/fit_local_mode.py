@@ -116,10 +116,10 @@ def _regressors(
     local_mode: LocalMode, solves: Solves, amplitude: DepthAmplitude
 ) -> Iterator[tuple[int, int, np.ndarray, np.ndarray]]:
     """Yield for each solve snapshots and row, nodes in reach (rows,), regressors (rows · components, table.size)."""
-    feet, normals = solves.feet
+    contact_points, normals = solves.contact_points
     touched = [local_mode.touches(solves.surface, one.points) for one in solves.snapshots]
-    for (k, i), foot, n, s in zip(solves.rows(), feet, normals, solves.depth, strict=True):
-        offset = (solves.snapshots[k].points - foot) / local_mode.reach
+    for (k, i), contact_point, n, s in zip(solves.rows(), contact_points, normals, solves.depth, strict=True):
+        offset = (solves.snapshots[k].points - contact_point) / local_mode.reach
         distance = np.sqrt((offset**2).sum(axis=1))
         rows = np.flatnonzero(touched[k] & (distance < 1.0))
         shares = np.full(len(rows), min(s / amplitude.deepest, 1.0))
@@ -147,7 +147,7 @@ _GAIN = 0.8  # of the squares in reach that are missed of columns left out: more
 
 @dataclass(frozen=True, eq=False)
 class VariationRegressors:
-    """Regressors of N solves, parted into nodes' and touches'.
+    """Regressors of N solves, separate for nodes and touches.
 
     Attributes
     ----------
@@ -158,6 +158,7 @@ class VariationRegressors:
     touches : (N, q, m)
         f times products of splines in s and polynomials.
     shape : (r, components)
+        Number of splines in ρ, and of the field's components.
     """
 
     nodes: list[np.ndarray]
@@ -181,17 +182,20 @@ def fit_variation(
     Parameters
     ----------
     solves : Solves
+        The solves in contact from which it is learnt.
     remainder : list of (N, P, components) arrays
         Fields of the snapshots, less what the local mode gives.
     local_mode : LocalMode
+        The mode that is to vary from place to place.
     amplitude : DepthAmplitude
+        The growth f(s) of the field with depth.
     """
     parts = fold_masks(solves.groups, FOLDS)
     if len(parts) < 2:
         return None
-    feet, normals = solves.feet
+    contact_points, normals = solves.contact_points
     axes = directions(normals)
-    told = np.hstack([feet @ axes.T, solves.X[:, 3:]])
+    told = np.hstack([contact_points @ axes.T, solves.X[:, 3:]])
     low, high = told.min(axis=0), told.max(axis=0)
     scales = np.array([(low + high) / 2, np.maximum((high - low) / 2, 1e-9)])
     powers = degrees(told.shape[1])
@@ -228,9 +232,9 @@ def _variation_regressors(
 ) -> VariationRegressors:
     r, components = blank.table.shape[2], blank.table.shape[4]
     touched = [np.flatnonzero(local_mode.touches(solves.surface, one.points)) for one in solves.snapshots]
-    feet, nodes, near = solves.feet[0], [], []
-    for (k, _), foot in zip(solves.rows(), feet, strict=True):
-        offset = (solves.snapshots[k].points[touched[k]] - foot) / local_mode.reach
+    contact_points, nodes, near = solves.contact_points[0], [], []
+    for (k, _), contact_point in zip(solves.rows(), contact_points, strict=True):
+        offset = (solves.snapshots[k].points[touched[k]] - contact_point) / local_mode.reach
         distance = np.linalg.norm(offset, axis=1)
         some = np.flatnonzero(distance < 1.0)
         B = design(distance[some] * (r - 3), r)
@@ -238,7 +242,7 @@ def _variation_regressors(
         nodes.append(touched[k][some])
         near.append((B[:, :, None] * around[:, None, :]).reshape(len(some), -1))
     in_depth = design(np.minimum(solves.depth / amplitude.deepest, 1.0) * (_IN_DEPTH - 3), _IN_DEPTH)
-    in_place = polynomials(blank.variables(feet, solves.X[:, 3:]), blank.powers)
+    in_place = polynomials(blank.variables(contact_points, solves.X[:, 3:]), blank.powers)
     touches = amplitude.at(solves.depth)[:, None, None] * in_depth[:, :, None] * in_place[:, None, :]
     return VariationRegressors(nodes, near, touches, (r, components))
 

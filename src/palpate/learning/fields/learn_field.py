@@ -40,6 +40,7 @@ class LearntField:
     Attributes
     ----------
     field : FieldSurrogate
+        The surrogate, to be asked and kept.
     trials : tuple of Trial
         Networks that were tried.
     truncation : float
@@ -216,16 +217,19 @@ def learn_field(
     values : (N, nodes, components)
         The field at the nodes; (N, nodes) for one component.
     inputs : n ranges
+        Names, units and ranges of the columns of X.
     points : (nodes, 3)
         At rest, m.
     triangles : (t, 3)
         Of the surface, in these nodes.
     surface : TouchedSurface
+        The surface that the probe touches, with its signed distance.
     radius : float
         Of the probe, m; where it is an input, a usual one, by which the moving part is as wide.
     radius_input : int, optional
         The input, 3 or later, that is the probe's radius.
     name, unit : str
+        Name and SI unit of the field, such as "displacement" and "m".
     rest : (nodes, components), optional
         The field without contact; zero by default. A largest stretch rests at one.
     mass : (nodes,), optional
@@ -234,6 +238,7 @@ def learn_field(
         Of the modes: root mean square over surface and solves that they may miss, in the field's unit; half a
         percent of the field's own by default.
     modes_max : int
+        Most modes, however much they miss.
     moving : bool
         Whether a part that travels with the probe is taken out first.
     amplitude : {"auto", "linear", "hertz", "square", "series"}
@@ -243,6 +248,7 @@ def learn_field(
     groups : (N,) int, optional
         Solves of one group, such as a column, are left out together.
     units_max : int
+        Most units of the small network.
     effort : float
         Multiplies the iterations of the search of a small network, which is taken where it misses less than a unit at
         every solve; 0.1 gives a quick look.
@@ -253,6 +259,7 @@ def learn_field(
         Processes that search at a time; one for each core by default, at most eight. The result is the same with any
         number.
     seed : int
+        Decides the starts of the search.
 
     Returns
     -------

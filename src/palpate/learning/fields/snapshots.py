@@ -39,6 +39,7 @@ class Snapshots:
     mass : (P,)
         Share of the surface that each node stands for.
     triangles : (t, 3) int
+        Nodes of each triangle of the surface.
     """
 
     X: np.ndarray
@@ -56,8 +57,11 @@ class Solves:
     Attributes
     ----------
     snapshots : tuple of Snapshots
+        One for each mesh that solves were made on.
     inputs : n ranges
+        Names, units and ranges of the inputs.
     surface : TouchedSurface
+        The surface that the probe touches.
     radius : float
         Of the probe, m; where it is an input, a usual one.
     points, triangles, mass : (nodes, 3), (t, 3), (nodes,) arrays
@@ -152,7 +156,7 @@ class Solves:
         return self.surface.depth(np.ascontiguousarray(self.X[:, :3]), radius)
 
     @cached_property
-    def feet(self) -> tuple[np.ndarray, np.ndarray]:
+    def contact_points(self) -> tuple[np.ndarray, np.ndarray]:
         """Touched places at rest and normals there, each (N, 3)."""
         C = np.ascontiguousarray(self.X[:, :3])
         d, normals, _ = self.surface.at(C)
@@ -193,7 +197,7 @@ class Solves:
 
     def _touches(self, amplitude: DepthAmplitude) -> list[np.ndarray]:
         """Return s, f, contact point, normal and further inputs of the snapshots, each (N, 8 + p)."""
-        known = (self.depth[:, None], amplitude.at(self.depth)[:, None], *self.feet, self.X[:, 3:])
+        known = (self.depth[:, None], amplitude.at(self.depth)[:, None], *self.contact_points, self.X[:, 3:])
         return self._split(np.hstack(known))
 
     def remainder(self, local_mode: LocalMode | None, amplitude: DepthAmplitude) -> np.ndarray:

@@ -1,10 +1,9 @@
-"""From presses at one place to the tables of a dent.
+"""The tables of an indentation, learnt from presses at one place.
 
 With the elastic answer known, U and ∇U at the same positions, a press at one place is a sequence of amplitudes
-asked, q = √(2U), and felt, a = q F·(−∇U)/|∇U|². `Indentation` says a = κ(p) (q − p)₊, with p the dent that the
-largest q so far left. First yield, the shares dp/dQ between knots and κ at the knots are found by least squares on the
-force
-(Branch, Coleman & Li 1999), within bounds that keep what `Indentation` promises.
+asked, q = √(2U), and felt, a = q F·(−∇U)/|∇U|². `Indentation` says a = κ(p) (q − p)₊, with p the residual
+amplitude that the largest q so far left. First yield, the shares dp/dQ between knots and κ at the knots are found by
+least squares on the force (Branch, Coleman & Li 1999), within bounds that keep what `Indentation` promises.
 """
 
 from __future__ import annotations
@@ -20,8 +19,8 @@ from palpate.surrogates.memories import Indentation
 __all__ = ["Press", "learn_indentation"]
 
 KNOTS = 4  # beyond first yield
-LEAST_SHARE, MOST_SHARE = 1e-3, 0.999  # of dp/dQ: a dent grows, and the elastic part doesn't shrink
-SOFTEST, STIFFEST = 0.5, 2.0  # κ: the print of a sphere makes contact at most √2 times stiffer
+LEAST_SHARE, MOST_SHARE = 1e-3, 0.999  # of dp/dQ: an indentation grows, and the elastic part doesn't shrink
+SOFTEST, STIFFEST = 0.5, 2.0  # κ: the indentation of a sphere makes contact at most √2 times stiffer
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,16 +70,16 @@ def learn_indentation(
     width: float = 1.0,
     knots: int = KNOTS,
 ) -> tuple[Indentation, float]:
-    """Learn how a body dents.
+    """Learn how a body yields under a probe.
 
     Parameters
     ----------
     presses : sequence of Press
         With unloading from several depths.
     points : (n, 3), optional
-        Where dents are kept, m; by default one dent that travels with the probe.
+        Where indentations are kept, m; by default one that moves with the probe.
     width : float
-        Of a dent's weights, m; for a sphere of radius R pressed to the depth s about ½ √(R s), half the
+        Of an indentation's weights, m; for a sphere of radius R pressed to the depth s about ½ √(R s), half the
         radius of contact.
     knots : int
         Of the tables beyond first yield.
@@ -100,7 +99,7 @@ def learn_indentation(
     samples = sum(int((press.energy > 0).sum()) for press in presses)
     if samples < 2 * knots + 2:
         raise UsageError(
-            f"{samples} samples in contact are too few for a dent of {knots} knots.",
+            f"{samples} samples in contact are too few for an indentation of {knots} knots.",
             fix="Press deeper and unload, or ask for fewer knots.",
         )
     top = max(float(press.asked.max()) for press in presses)
@@ -122,18 +121,18 @@ def learn_indentation(
     fits = [least_squares(misses, start, bounds=(low, high)) for start in starts]
     best = min(fits, key=lambda fit: float(fit.cost))
     place = np.zeros((1, 3)) if points is None else points
-    dents = Indentation(*_tables(best.x, top, knots), place, width)
-    return dents, float(np.sqrt(np.mean(best.fun**2)))
+    indentation = Indentation(*_tables(best.x, top, knots), place, width)
+    return indentation, float(np.sqrt(np.mean(best.fun**2)))
 
 
 def _tables(x: np.ndarray, top: float, knots: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """p, Q and κ at the knots, of the share of first yield, the slopes dp/dQ and κ."""
     reach = np.linspace(x[0], 1.0, knots + 1) * top
-    dent = np.concatenate([[0.0], np.cumsum(x[1 : 1 + knots] * np.diff(reach))])
-    return dent, reach, np.concatenate([[1.0], x[1 + knots :]])
+    residual = np.concatenate([[0.0], np.cumsum(x[1 : 1 + knots] * np.diff(reach))])
+    return residual, reach, np.concatenate([[1.0], x[1 + knots :]])
 
 
-def _felt(asked: np.ndarray, dent: np.ndarray, reach: np.ndarray, table: np.ndarray) -> np.ndarray:
+def _felt(asked: np.ndarray, residual: np.ndarray, reach: np.ndarray, table: np.ndarray) -> np.ndarray:
     """a along a press at one place: the largest q so far decides p."""
-    p = np.interp(np.maximum.accumulate(asked), reach, dent)
-    return np.asarray(np.interp(p, dent, table) * np.maximum(asked - p, 0.0))
+    p = np.interp(np.maximum.accumulate(asked), reach, residual)
+    return np.asarray(np.interp(p, residual, table) * np.maximum(asked - p, 0.0))

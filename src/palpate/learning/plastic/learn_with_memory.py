@@ -5,8 +5,8 @@ direction with a network. Along a history of q the elongation of any one element
 
     P_t = q'(w_t) Σ k_i e_i(t)
 
-is linear in the unit stiffnesses. So a dictionary is laid out, of limits and rises or of relaxation times on a grid,
-and the k_i are its non-negative least squares (Lawson & Hanson 1974): a convex problem with one answer, which is
+is linear in the unit stiffnesses. So a dictionary of limits and hardenings, or of relaxation times, is laid out on a
+grid, and the k_i are its non-negative least squares (Lawson & Hanson 1974): a convex problem with one answer, which is
 sparse. No start, no iteration count and no seed decide it.
 """
 
@@ -39,7 +39,8 @@ __all__ = ["MemoryFit", "learn_with_memory"]
 
 LIMITS = 32  # of the grid, geometric: neighbours differ by a tenth
 LOWEST, HIGHEST = 0.04, 1.0  # its ends over the largest amplitude
-RISES = (0.0, 0.03, 0.1, 0.3, 1.0)  # none, and half-decades: a metal's section hardens by a few per cent of K
+# none, and half-decades: a metal's section hardens by a few per cent of K
+HARDENINGS = (0.0, 0.03, 0.1, 0.3, 1.0)
 PER_DECADE = 6  # relaxation times; neighbours a factor of 1.5 apart can hardly be told from one
 NEGLIGIBLE = 1e-5  # of the stiffness: less can't be felt
 SHAPES = 240  # samples that the displacement is learnt from
@@ -235,9 +236,9 @@ def _shape(train: LoadHistories, mirrors: bool, seed: int) -> tuple[NodeField, f
 
 
 def _limits(reach: float) -> np.ndarray:
-    """Return (y, c, τ) of each candidate (n, 3): a spring, and all limits with all rises."""
+    """Return (y, c, τ) of each candidate (n, 3): a spring, and all limits with all hardenings."""
     limits = np.geomspace(LOWEST, HIGHEST, LIMITS) * reach
-    grid = [(limit, rise, np.inf) for limit in limits for rise in RISES]
+    grid = [(limit, hardening, np.inf) for limit in limits for hardening in HARDENINGS]
     return np.array([(np.inf, 0.0, np.inf), *grid])
 
 
@@ -260,8 +261,8 @@ def _fitted(
 ) -> tuple[IwanElements, float]:
     from scipy.optimize import nnls
 
-    limit, rise, time = candidates.T
-    all_of_them = IwanElements(np.ones(len(limit)), limit, rise, time)
+    limit, hardening, time = candidates.T
+    all_of_them = IwanElements(np.ones(len(limit)), limit, hardening, time)
     columns = [
         slope[:, None] * all_of_them.elongations(q, path.times if relaxes else None)
         for (q, slope), path in zip(amplitudes, train.paths, strict=True)
@@ -276,5 +277,5 @@ def _fitted(
             why="A body pulls back where it is led.",
             fix="Check the sign of the force: it is the load that holds the body there.",
         )
-    elements = IwanElements(k[used], limit[used], rise[used], time[used])
+    elements = IwanElements(k[used], limit[used], hardening[used], time[used])
     return elements, float(rest / np.sqrt(len(P)) / largest)

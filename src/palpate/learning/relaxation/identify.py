@@ -44,6 +44,7 @@ class Identified:
     Attributes
     ----------
     relaxation : Relaxation
+        The branches that were found.
     shares_error, times_error : (n,)
         Standard errors of γ_i and of τ_i in s.
     noise : float
@@ -70,6 +71,7 @@ def identify(record: Record, *, most: int = MOST) -> Identified:
     Parameters
     ----------
     record : Record
+        Force against time after the press.
     most : int
         Largest number of branches, 1 to 3.
 
@@ -91,7 +93,7 @@ def identify(record: Record, *, most: int = MOST) -> Identified:
     best = min(scores, key=lambda n: scores[n])
     log_times = fits[best]
     assert log_times is not None
-    return _told(record, np.sort(log_times), scores)
+    return _estimate(record, np.sort(log_times), scores)
 
 
 def identify_behind_pad(records: Sequence[Record], *, most: int = MOST) -> Identified:
@@ -211,7 +213,7 @@ def _amplitudes(record: Record, log_times: np.ndarray) -> np.ndarray:
 
 
 def _rest(record: Record, log_times: np.ndarray) -> np.ndarray:
-    """What the best amplitudes leave, (N,), N."""
+    """Return the residual force (N,) of the best amplitudes, N."""
     return np.asarray(record.forces - _basis(record, log_times) @ _amplitudes(record, log_times))
 
 
@@ -235,8 +237,8 @@ def _score(record: Record, log_times: np.ndarray) -> float:
     return count * float(np.log(square)) + (2 * len(log_times) + 1) * float(np.log(count))
 
 
-def _told(record: Record, log_times: np.ndarray, scores: Mapping[int, float]) -> Identified:
-    """Standard errors by the linearised model; raises where a time isn't told."""
+def _estimate(record: Record, log_times: np.ndarray, scores: Mapping[int, float]) -> Identified:
+    """Return the relaxation with standard errors by the linearised model; raise where a time is unsure."""
     A, rest, n = _amplitudes(record, log_times), _rest(record, log_times), len(log_times)
     whole = A.sum()
     noise = float(np.sqrt(rest @ rest / (len(rest) - 2 * n - 1)))
@@ -247,12 +249,12 @@ def _told(record: Record, log_times: np.ndarray, scores: Mapping[int, float]) ->
     shares_error = np.sqrt(np.diag(by_amplitude @ covariance[: n + 1, : n + 1] @ by_amplitude.T))
     relative = np.sqrt(np.diag(covariance)[n + 1 :])
     times = np.exp(log_times)
-    _require_told(record, times, relative)
+    _require_known_times(record, times, relative)
     relaxation = Relaxation(tuple(zip(shares.tolist(), times.tolist(), strict=True)))
     return Identified(relaxation, shares_error, times * relative, noise / whole, scores)
 
 
-def _require_told(record: Record, times: np.ndarray, relative: np.ndarray) -> None:
+def _require_known_times(record: Record, times: np.ndarray, relative: np.ndarray) -> None:
     unsure = np.flatnonzero(relative > UNSURE)
     if len(unsure):
         worst = unsure[-1]

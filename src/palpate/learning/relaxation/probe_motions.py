@@ -31,6 +31,7 @@ class Drive:
     Attributes
     ----------
     name : str
+        Name of the motion, for tables and pictures.
     times : (N,)
         Ascending, s; the probe comes to its first position from outside.
     positions : (N, 3)
@@ -145,6 +146,7 @@ def random_drive(
     seconds, dt : float
         Length and sampling step, s.
     seed : int
+        Decides phases and frequencies.
     band : float
         Highest frequency, Hz.
     lifted : float

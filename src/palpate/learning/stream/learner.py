@@ -56,6 +56,7 @@ class Learner:
     Parameters
     ----------
     inputs : sequence of n ranges
+        Names, units and ranges of the inputs; the ranges scale them.
     outputs : sequence of m quantities or ranges
         If all of them are ranges, these scale them.
     settings : Settings, optional

@@ -26,6 +26,7 @@ class OutputScaling:
     Attributes
     ----------
     scaling : Scaling
+        Centres and scales of inputs and outputs.
     directions : (m, r), optional
         Orthonormal; the filter's outputs are the scaled ones along them.
     """

@@ -84,6 +84,7 @@ class Progress:
     Attributes
     ----------
     damping : float
+        Levenberg–Marquardt damping of the next step.
     gain : float
         By how much it lowered the cost, relative; 0 before the first.
     rms : float

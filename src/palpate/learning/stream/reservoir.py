@@ -32,7 +32,9 @@ class Reservoir:
     inputs, outputs : int
         n and m.
     keeping : {"uniform", "fading", "latest"}
+        The rule that decides which samples stay, see above.
     seed : int
+        Decides the random choices.
 
     Raises
     ------

@@ -141,7 +141,7 @@ class Baseline(ABC):
 
     @property
     def inner(self) -> float:
-        """How far inside the touched surface the probe's centre may go before the body lets go, m."""
+        """Depth of the probe's centre inside the touched surface at which the body lets go, m."""
         return math.inf
 
     def fault(self, inputs: tuple[Range, ...]) -> str:

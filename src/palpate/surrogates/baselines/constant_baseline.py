@@ -25,7 +25,7 @@ from palpate.surrogates.energy_kernels import GRADIENT, HESSIAN, ROOT, VECTORS, 
 from palpate.surrogates.memories import Amplitude
 from palpate.units import Range
 
-__all__ = ["ConstantBaseline"]
+__all__ = ["ConstantBaseline", "require_axes"]
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
 

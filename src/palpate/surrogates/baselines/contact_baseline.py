@@ -37,7 +37,7 @@ from palpate.surrogates.energy_kernels import (
 from palpate.surrogates.surface import TouchedSurface, distance_into
 from palpate.units import Range
 
-__all__ = ["ContactBaseline"]
+__all__ = ["ContactBaseline", "depth_series"]
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
 
@@ -101,7 +101,7 @@ class ContactBaseline(Baseline):
 
     @property
     def inner(self) -> float:
-        """How far inside the touched surface the probe's centre may go before the body lets go, m."""
+        """Depth of the probe's centre inside the touched surface at which the body lets go, m."""
         return float(self.touched.inner)
 
     def fault(self, inputs: tuple[Range, ...]) -> str:

@@ -56,7 +56,9 @@ class Stiffening:
     Attributes
     ----------
     coefficients : (m,)
+        c_m of each monomial.
     exponents : (m, n) int
+        e_mi, powers of the n scaled inputs in each monomial; their sum is at most five.
 
     Raises
     ------

@@ -84,7 +84,7 @@ class FieldEvaluator:
 
     @property
     def place(self) -> np.ndarray:
-        """Where the last call was (8 + p,): depth s (m), f, foot (m), normal, parameters; but for s zero in the air."""
+        """Place of the last call (8 + p,): depth s (m), f, contact point (m), normal, parameters; in air only s."""
         return self._place
 
     @property

@@ -230,10 +230,11 @@ def moving_values(
     Parameters
     ----------
     local_mode : LocalMode
+        The mode that moves with the probe.
     deepest : float
         s* of the amplitude, m.
     touches : (N, 8 + p)
-        Depth s (m), f, foot (m), normal, further inputs.
+        Depth s (m), f, contact point (m), normal, further inputs.
     points : (P, 3)
         At rest, m.
     """

@@ -63,6 +63,7 @@ class FieldErrors:
     mass : (nodes,)
         Shares of the surface.
     unit : str
+        SI unit of the field.
     """
 
     truncation: np.ndarray
@@ -109,6 +110,7 @@ class FieldSurrogate:
     Attributes
     ----------
     name, unit : str
+        Name and SI unit of the field.
     network : Network
         b of (c_x, c_y, c_z, …), k outputs in the field's unit; its inputs' ranges are the trained ones.
     modes : (k, nodes, components)
@@ -122,11 +124,15 @@ class FieldSurrogate:
     mass : (nodes,)
         Share of the surface that each node stands for; they add up to one.
     amplitude : DepthAmplitude
+        f(s), the growth of the field with depth.
     surface : TouchedSurface
+        The surface that the probe touches, with its signed distance.
     radius : float
         R of the probe, m; not used where `radius_input` says which input it is.
     local_mode : LocalMode, optional
+        The part that moves with the probe; by default there is none.
     radius_input : int, optional
+        The input, 3 or later, that is the probe's radius; by default it is no input.
     continuation : Continuation, optional
         How far b is followed beyond its training; of the network's ranges and the amplitude's depth unless given.
     meta : mapping
@@ -312,9 +318,11 @@ class FieldSurrogate:
         Parameters
         ----------
         X : (N, n)
+            Inputs: centre of the probe (m), then further inputs.
         points : (P, 3)
             At rest, m.
         triangles : (t, 3) int
+            Nodes of each triangle of that mesh.
         """
         if points.shape == self.points.shape and np.allclose(points, self.points, rtol=0, atol=1e-9):
             return self.values(X)

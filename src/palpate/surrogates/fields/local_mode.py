@@ -55,9 +55,9 @@ class Variation:
     powers : (m, v) int
         Degree of each polynomial in each of the v variables.
     axes : (a, 3)
-        Directions in which the foot is told.
+        Directions along which the contact point is measured.
     scales : (2, v)
-        Centre and half of the range of the foot along the axes (m) and of the further inputs.
+        Centre and half of the range of the contact point along the axes (m) and of the further inputs.
 
     Raises
     ------

@@ -26,7 +26,9 @@ class SurfaceInterpolation:
     Attributes
     ----------
     nodes : (Q, k) array of int
+        Nodes that each place takes its value from.
     weights : (Q, k) array
+        Share of each of them; a row adds up to one.
     """
 
     nodes: np.ndarray

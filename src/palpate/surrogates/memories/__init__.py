@@ -2,7 +2,7 @@
 
 memory          the contract: a signed amplitude and its slope in, a force out
 relaxation      forces that fall while they are held, on patches of the surface
-indentation     prints that stay where it was pressed
+indentation     depths that stay where it was pressed
 iwan_elements   a held body that stays bent, or creeps
 patches         places of the touched surface
 """

@@ -1,24 +1,24 @@
-"""Indentation: a body that yields where it is pressed, and keeps the print.
+"""Indentation: a body that yields where it is pressed, and keeps the shape of it.
 
-The elastic energy U = ½ q² at the probe's centre c asks the amplitude q. The dent has an amplitude
-p, and the body answers as an elastic one of another size from where the dent ends,
+The elastic energy U = ½ q² at the probe's centre c asks the amplitude q. The indentation has a residual amplitude
+p, and the body answers as an elastic one of another size from where the indentation ends,
 
     V = ½ κ(p) (q − p)₊²        F = −∂V/∂c
 
-so the force vanishes at q = p, which is the residual depth, and comes back on the way by which it went. The dent
+so the force vanishes at q = p, which is the residual depth, and comes back on the way by which it went. The indentation
 grows where q would pass Q(p): pressing goes along the virgin curve q = Q(p). Both Q and κ are tables over p, with Q(0)
-the first yield, Q rising and κ(0) = 1. κ ≠ 1 says by how much stiffer the wider print makes the contact.
+the first yield, Q rising and κ(0) = 1. κ ≠ 1 says by how much stiffer the wider contact is.
 
-**Places.** Indentation p_j stand at points x_j of the touched surface, and the probe meets their mean
+**Places.** Amplitudes p_j stand at points x_j of the touched surface, and the probe meets their mean
 
     p(c) = Σ w_j(c) p_j        w_j ∝ exp(−|c − x_j|²/2w²),  Σ w_j = 1
 
-A dent left behind stays; a probe beside it meets a part of it, and is drawn along the slope of p. Growth shares
+An indentation left behind stays; a probe beside it meets a part of it, and is drawn along the slope of p. Growth shares
 itself out by the same weights, ṗ_j = λ w_j.
 
-**Passive.** V ≥ 0; at kept dents F is the gradient of V, so a closed path that nothing yields on takes nothing. Growth
+**Passive.** V ≥ 0; at kept p_j F is the gradient of V, so a closed path that nothing yields on takes nothing. Growth
 lowers V: dV = (∂V/∂p) Σ w_j dp_j, with Σ w_j dp_j = Σ w_j² dλ ≥ 0 and −∂V/∂p = κ (q − p) − ½ κ′ (q − p)² > 0, which
-`Indentation` demands of its tables wherever q ≤ Q(p). A step moves the probe at once at kept dents, and lets the dents
+`Indentation` demands of its tables wherever q ≤ Q(p). A step moves the probe at once at kept p_j, and lets them
 grow at a kept probe, to Q(p) = q in closed form, so it is stable at any length; what V loses then is booked as lost.
 That is of first order in the step, while the forces of a straight press don't depend on the step at all.
 """
@@ -74,32 +74,32 @@ def _piece(x, knots):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
 
 
 @_jit
-def _stiffening(p, dent, table):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def _stiffening(p, residual, table):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """κ and κ′ at p."""
-    if p >= dent[-1]:
+    if p >= residual[-1]:
         return table[-1], 0.0
-    i = _piece(p, dent)
-    slope = (table[i + 1] - table[i]) / (dent[i + 1] - dent[i])
-    return table[i] + slope * (p - dent[i]), slope
+    i = _piece(p, residual)
+    slope = (table[i + 1] - table[i]) / (residual[i + 1] - residual[i])
+    return table[i] + slope * (p - residual[i]), slope
 
 
 @_jit
-def _dent_of(q, dent, reach):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def _virgin_residual(q, residual, reach):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """p on the virgin curve: Q(p) = q; never beyond q itself, also where the last piece goes on."""
     if q <= reach[0]:
         return 0.0
     i = _piece(q, reach)
-    p = dent[i] + (dent[i + 1] - dent[i]) * (q - reach[i]) / (reach[i + 1] - reach[i])
+    p = residual[i] + (residual[i + 1] - residual[i]) * (q - reach[i]) / (reach[i + 1] - reach[i])
     if q > reach[-1]:
-        p = min(p, q - (reach[-1] - dent[-1]))  # the elastic part doesn't shrink
+        p = min(p, q - (reach[-1] - residual[-1]))  # the elastic part doesn't shrink
     return p
 
 
 @_jit
-def _stored(q, p, dent, table):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def _stored(q, p, residual, table):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """V, J."""
     over = max(q - p, 0.0)
-    return 0.5 * _stiffening(p, dent, table)[0] * over * over
+    return 0.5 * _stiffening(p, residual, table)[0] * over * over
 
 
 @_jit
@@ -112,9 +112,9 @@ def _met(weights, depths):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN2
 
 
 @_jit
-def _grow(q, p, weights, depths, dent, reach):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
-    """Let the dents grow until Q(p) = q; returns the p that the probe meets."""
-    wanted = _dent_of(q, dent, reach)
+def _grow(q, p, weights, depths, residual, reach):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    """Let the indentation grow until Q(p) = q; return the p that the probe meets."""
+    wanted = _virgin_residual(q, residual, reach)
     if wanted <= p:
         return p
     squares = 0.0
@@ -126,10 +126,10 @@ def _grow(q, p, weights, depths, dent, reach):  # type: ignore[no-untyped-def]  
 
 
 @_jit
-def step_into(centre, q, slope, force, ledger, depths, work, constants) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def _step_into(centre, q, slope, force, ledger, depths, work, constants) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Take one step; see `IndentationState.step`."""
     weights, mean, along = work
-    dent, reach, table, points, width = constants
+    residual, reach, table, points, width = constants
     force[:] = 0.0
     total = q
     for a in range(3):
@@ -138,9 +138,9 @@ def step_into(centre, q, slope, force, ledger, depths, work, constants) -> bool:
         return False
     _weights_into(centre, points, width[0], weights, mean)
     p = _met(weights, depths)
-    moved = _stored(q, p, dent, table)
-    p = _grow(q, p, weights, depths, dent, reach)
-    stored = _stored(q, p, dent, table)
+    moved = _stored(q, p, residual, table)
+    p = _grow(q, p, weights, depths, residual, reach)
+    stored = _stored(q, p, residual, table)
     lost = max(moved - stored, 0.0)
     ledger[2] += stored - ledger[0] + lost
     ledger[0] = stored
@@ -148,14 +148,14 @@ def step_into(centre, q, slope, force, ledger, depths, work, constants) -> bool:
     ledger[3] = lost
     if q <= p:
         return True
-    kappa, rise = _stiffening(p, dent, table)
+    kappa, kappa_slope = _stiffening(p, residual, table)
     # ∇p = Σ p_j w_j (x_j − x̄)/w²
     along[:] = 0.0
     for j in range(weights.size):
         for a in range(3):
             along[a] += depths[j] * weights[j] * (points[j, a] - mean[a]) / (width[0] * width[0])
     over = q - p
-    driving = kappa * over - 0.5 * rise * over * over
+    driving = kappa * over - 0.5 * kappa_slope * over * over
     for a in range(3):
         force[a] = -kappa * over * slope[a] + driving * along[a]
     return True
@@ -164,17 +164,17 @@ def step_into(centre, q, slope, force, ledger, depths, work, constants) -> bool:
 @register_memory
 @dataclass(frozen=True, eq=False)
 class Indentation(Memory):
-    """The law by which a body yields under a probe, and the places that keep its prints.
+    """The law by which a body yields under a probe, and the places where indentations stay.
 
     Attributes
     ----------
-    dent : (m,)
+    residual : (m,)
         p at the knots in √J, ascending from 0; between them the tables are straight, beyond the last they go on along
         the last piece.
     reach : (m,)
-        Q there in √J: amplitude at which the dent is that large. Rising, above `dent`.
+        Q there in √J: amplitude at which the residual is that large. Rising, above `residual`.
     stiffening : (m,)
-        κ there, 1 at the first; beyond the last knot it stays.
+        κ there, a pure number, 1 at the first; beyond the last knot it stays.
     points : (n, 3)
         Places in m.
     width : float
@@ -183,32 +183,33 @@ class Indentation(Memory):
     Raises
     ------
     UsageError
-        If the tables are not such, or would let a growing dent give energy back.
+        If the tables are not such, or would let a growing indentation give energy back.
     """
 
     name: ClassVar[str] = "indentation"
-    keeps_prints: ClassVar[bool] = True
+    keeps_indentation: ClassVar[bool] = True
 
-    dent: np.ndarray
+    residual: np.ndarray
     reach: np.ndarray
     stiffening: np.ndarray
     points: np.ndarray
     width: float
 
     def __post_init__(self) -> None:
-        own_arrays(self, "dent", "reach", "stiffening", "points")
-        p, Q, k = self.dent, self.reach, self.stiffening
+        own_arrays(self, "residual", "reach", "stiffening", "points")
+        p, Q, k = self.residual, self.reach, self.stiffening
         shaped = p.ndim == 1 and len(p) > 1 and Q.shape == k.shape == p.shape
-        placed = (
+        at_places = (
             self.points.ndim == 2 and self.points.shape[1] == 3 and len(self.points) > 0 and self.width > 0
         )
-        sound = shaped and placed and all(np.isfinite(a).all() for a in (p, Q, k, self.points))
+        sound = shaped and at_places and all(np.isfinite(a).all() for a in (p, Q, k, self.points))
         sound = (
             sound and p[0] == 0 and bool((np.diff(p) > 0).all() and (np.diff(Q) > 0).all() and (p < Q).all())
         )
         if not (sound and k[0] == 1 and (k > 0).all()):
             raise UsageError(
-                f"These are no tables of a dent: p {p}, Q {Q}, κ {k}, at {self.points.shape}, width {self.width}.",
+                f"These are no tables of an indentation: p {p}, Q {Q}, κ {k}, "
+                f"at {self.points.shape}, width {self.width}.",
                 why="p rises from 0, Q rises above it, κ is positive and 1 at first; places are (n, 3).",
                 fix="Learn them by `palpate.learning.plastic.learn_indentation`.",
             )
@@ -217,28 +218,28 @@ class Indentation(Memory):
         widest = np.maximum((Q - p)[:-1], (Q - p)[1:])
         if not (np.minimum(k[:-1], k[1:]) > 0.5 * slopes * widest).all():
             raise UsageError(
-                "A dent that grows would give energy back.",
+                "An indentation that grows would give energy back.",
                 why=f"κ rises too fast: {k} over {p}.",
                 fix="Take fewer knots, or a κ that rises by less.",
             )
 
     def __str__(self) -> str:
         return (
-            f"yields from {self.reach[0]:.3g} √J on, dents to {self.dent[-1]:.3g} √J at {len(self.points)} places, "
+            f"yields from {self.reach[0]:.3g} √J on, to {self.residual[-1]:.3g} √J at {len(self.points)} places, "
             f"stiffer by {share(self.stiffening[-1] - 1)}"
         )
 
     @classmethod
-    def single(cls, dent: np.ndarray, reach: np.ndarray, stiffening: np.ndarray) -> Indentation:
-        """Return one dent that travels with the probe: for a body pressed at one place."""
-        return cls(dent, reach, stiffening, np.zeros((1, 3)), 1.0)
+    def single(cls, residual: np.ndarray, reach: np.ndarray, stiffening: np.ndarray) -> Indentation:
+        """Return one indentation that moves with the probe: for a body pressed at one place."""
+        return cls(residual, reach, stiffening, np.zeros((1, 3)), 1.0)
 
     def start(self) -> IndentationState:
         """Return the state of a virgin body."""
         return IndentationState(self)
 
     def spread(self, patches: Patches, spacing: float) -> Indentation:
-        """Return the same law with prints at places of the surface.
+        """Return the law with indentations at places of the surface.
 
         Raises
         ------
@@ -247,7 +248,7 @@ class Indentation(Memory):
         """
         if not 0.3 * spacing <= self.width <= 30 * spacing:
             raise UsageError(
-                f"Prints of width {self.width:g} m do not fit places {spacing:g} m apart.",
+                f"Indentations of width {self.width:g} m do not fit places {spacing:g} m apart.",
                 why="Narrower ones would fall between the places, wider ones would be felt everywhere.",
                 fix="Give a `width` of about half the radius of contact, ½ √(R s), and a spacing of that size.",
             )
@@ -261,11 +262,11 @@ class Indentation(Memory):
 
     def compiled(self) -> tuple[np.ndarray, ...]:
         """(p, Q, κ, points, width), as the kernels take them."""
-        return self.dent, self.reach, self.stiffening, self.points, np.array([self.width])
+        return self.residual, self.reach, self.stiffening, self.points, np.array([self.width])
 
 
 class IndentationState(MemoryState):
-    """The state of a body that keeps dents; `step` allocates nothing.
+    """The state of a body that keeps indentations; `step` allocates nothing.
 
     Attributes
     ----------
@@ -300,14 +301,14 @@ class IndentationState(MemoryState):
 
     @property
     def depths(self) -> np.ndarray:
-        """p_j (n,) in √J, a copy; setting it goes back to that print, the probe outside."""
+        """p_j (n,) in √J, a copy; setting it goes back to that state, the probe outside."""
         return np.array(self._depths)
 
     @depths.setter
     def depths(self, depths: np.ndarray) -> None:
         if np.shape(depths) != self._depths.shape or not (np.asarray(depths) >= 0).all():
             raise UsageError(
-                f"Depths of shape {np.shape(depths)} are no print of this body.",
+                f"Depths of shape {np.shape(depths)} are no indentation of this body.",
                 fix=f"Give {self._depths.size} numbers that are not negative.",
             )
         self._depths[:] = depths
@@ -323,4 +324,4 @@ class IndentationState(MemoryState):
         """Move the probe to a place and renew `force`; see `MemoryState.step`. Yielding knows no time."""
         del dt
         own = self.force, self._ledger, self._depths, self._work, self._constants
-        return bool(step_into(position, amplitude, slope, *own))
+        return bool(_step_into(position, amplitude, slope, *own))

@@ -37,7 +37,7 @@ from palpate.checks import own_arrays
 from palpate.errors import UsageError
 from palpate.surrogates.memories.memory import Amplitude, Memory, MemoryState, register_memory
 
-__all__ = ["IwanElements", "IwanMemento", "IwanState"]
+__all__ = ["IwanElements", "IwanMemento", "IwanState", "advance", "free_step"]
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
 _HALVINGS = 80  # of the search for the free state: to the last bit of any bracket
@@ -76,7 +76,7 @@ def _lost(e, alpha, slip, dh, dt, k, y, c, tau):  # type: ignore[no-untyped-def]
 
 
 @_jit
-def pull_after(dh, dt, e, alpha, k, y, c, tau) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def _pull_after(dh, dt, e, alpha, k, y, c, tau) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Σ k e, N, after an even step that is not taken."""
     pull = 0.0
     for i in range(k.size):
@@ -110,16 +110,16 @@ def free_step(dt, e, alpha, k, y, c, tau) -> float:  # type: ignore[no-untyped-d
     # by then every spring pushes the other way; one that relaxes meanwhile may need more
     low, high = -reach, reach
     for _ in range(_HALVINGS):
-        if pull_after(low, dt, e, alpha, k, y, c, tau) <= 0.0:
+        if _pull_after(low, dt, e, alpha, k, y, c, tau) <= 0.0:
             break
         low *= 2.0
     for _ in range(_HALVINGS):
-        if pull_after(high, dt, e, alpha, k, y, c, tau) >= 0.0:
+        if _pull_after(high, dt, e, alpha, k, y, c, tau) >= 0.0:
             break
         high *= 2.0
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        if pull_after(middle, dt, e, alpha, k, y, c, tau) > 0.0:
+        if _pull_after(middle, dt, e, alpha, k, y, c, tau) > 0.0:
             high = middle
         else:
             low = middle
@@ -127,7 +127,7 @@ def free_step(dt, e, alpha, k, y, c, tau) -> float:  # type: ignore[no-untyped-d
 
 
 @_jit
-def follow(stretch, steps, k, y, c, tau) -> np.ndarray:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def _follow(stretch, steps, k, y, c, tau) -> np.ndarray:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Elongations (N, n) along a history."""
     e, alpha, out = np.zeros(k.size), np.zeros(k.size), np.zeros((stretch.size, k.size))
     last = 0.0
@@ -152,7 +152,7 @@ class IwanElements(Memory):
         k_i, shares of the unit stiffness in q, positive.
     limit : (n,)
         y_i, the elongation at which it first slips, √J; infinite for springs and dashpots.
-    rise : (n,)
+    hardening : (n,)
         c_i, by how much the limit grows for each √J of slip; a pure number.
     time : (n,)
         τ_i, s; infinite for springs and sliders.
@@ -169,36 +169,36 @@ class IwanElements(Memory):
 
     stiffness: np.ndarray
     limit: np.ndarray
-    rise: np.ndarray
+    hardening: np.ndarray
     time: np.ndarray
 
     def __post_init__(self) -> None:
-        own_arrays(self, "stiffness", "limit", "rise", "time")
+        own_arrays(self, "stiffness", "limit", "hardening", "time")
         n = self.stiffness.shape
-        shaped = len(n) == 1 and n[0] > 0 and self.limit.shape == self.rise.shape == self.time.shape == n
+        shaped = len(n) == 1 and n[0] > 0 and self.limit.shape == self.hardening.shape == self.time.shape == n
         sound = shaped and bool(
             (np.isfinite(self.stiffness) & (self.stiffness > 0)).all()
-            and (np.isfinite(self.rise) & (self.rise >= 0)).all()
+            and (np.isfinite(self.hardening) & (self.hardening >= 0)).all()
             and (self.limit > 0).all()
             and (self.time > 0).all()
             and (np.isinf(self.limit) | np.isinf(self.time)).all()
         )
         if not sound:
             raise UsageError(
-                f"These are no elements: stiffness {self.stiffness}, limit {self.limit}, rise {self.rise}, "
+                f"These are no elements: stiffness {self.stiffness}, limit {self.limit}, hardening {self.hardening}, "
                 f"time {self.time}.",
                 why="Each needs a positive stiffness, and a positive limit or a positive time or neither.",
                 fix="Use infinity for a limit or a time that an element hasn't.",
             )
 
     @classmethod
-    def sliders(cls, stiffness: np.ndarray, limit: np.ndarray, rise: np.ndarray) -> IwanElements:
-        """Springs that slip; those of infinite limit don't."""
-        return cls(stiffness, limit, rise, np.full(len(np.atleast_1d(stiffness)), math.inf))
+    def sliders(cls, stiffness: np.ndarray, limit: np.ndarray, hardening: np.ndarray) -> IwanElements:
+        """Return springs that slip; those of infinite limit don't."""
+        return cls(stiffness, limit, hardening, np.full(len(np.atleast_1d(stiffness)), math.inf))
 
     @classmethod
     def dashpots(cls, stiffness: np.ndarray, time: np.ndarray) -> IwanElements:
-        """Springs that relax; those of infinite time don't."""
+        """Return springs that relax; those of infinite time don't."""
         n = len(np.atleast_1d(stiffness))
         return cls(stiffness, np.full(n, math.inf), np.zeros(n), time)
 
@@ -224,7 +224,7 @@ class IwanElements(Memory):
 
     def compiled(self) -> tuple[np.ndarray, ...]:
         """(k, y, c, τ), as the kernels take them."""
-        return self.stiffness, self.limit, self.rise, self.time
+        return self.stiffness, self.limit, self.hardening, self.time
 
     def elongations(self, stretch: np.ndarray, times: np.ndarray | None = None) -> np.ndarray:
         """Return e (N, n), √J, along a history of q (N,), √J, from rest; times (N,) in s if something relaxes.
@@ -249,7 +249,7 @@ class IwanElements(Memory):
                 f"Times of shape {np.shape(times)} don't fit a history of shape {stretch.shape}.",
                 fix="Give one time in s for each sample, ascending from 0.",
             )
-        return np.asarray(follow(stretch, steps, *self.compiled()))
+        return np.asarray(_follow(stretch, steps, *self.compiled()))
 
     def start(self) -> IwanState:
         """Return the state of a virgin body."""

@@ -116,16 +116,16 @@ class Memory(ABC):
         The name by which files find it.
     walks : set of str
         Signs of the amplitude that it can walk, see `palpate.surrogates.Baseline.amplitude`.
-    keeps_prints : bool
-        Whether its state has ``now`` (n,), amplitudes of prints at ``points`` (n, 3) of the surface, m.
+    keeps_indentation : bool
+        True where its state has ``now`` (n,), residual amplitudes at ``points`` (n, 3) of the surface, m.
     moves_rest : bool
-        Whether the body lies elsewhere after a touch: its state has ``release(dt)``, which returns the amplitude to
+        True where the body lies elsewhere after a touch: its state has ``release(dt)``, which returns the amplitude to
         which a body moves that nobody holds.
     """
 
     name: ClassVar[str]
     walks: ClassVar[frozenset[Amplitude]] = frozenset({"positive"})
-    keeps_prints: ClassVar[bool] = False
+    keeps_indentation: ClassVar[bool] = False
     moves_rest: ClassVar[bool] = False
 
     @abstractmethod

@@ -4,7 +4,7 @@ At a probe's centre c, patch j at x_j carries the share σ_j of the elastic ener
 
     σ_j = exp(−|x_j − c|²/2w²) / Σ_k exp(−|x_k − c|²/2w²)        Σ σ_j = 1
 
-On a plane the distance of c from it cancels, and σ is a Gaussian of width w about the foot point. It widens with the
+On a plane the distance of c from it cancels, and σ is a Gaussian of width w about the contact point. It widens with the
 area of contact. A sphere of radius R at depth s touches a Hertzian body over a radius a = √(R s), and a little less
 than half of it follows transient solves best; with U ~ s³ for the pad in front
 

@@ -1,4 +1,4 @@
-"""Coarse triangles bulged into the surface that they stand for, then parted finely.
+"""Coarse triangles bulged into the surface that they stand for, then divided finely.
 
 A triangle with normals at its corners is a cubic patch (curved PN triangle: Vlachos, Peters, Boyd & Mitchell 2001,
 "Curved PN triangles"). Along borders and creases the patch follows the curve through its neighbouring edges

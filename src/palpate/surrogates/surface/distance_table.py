@@ -51,6 +51,7 @@ class DistanceTable:
     Attributes
     ----------
     frame, coefficients, profile : arrays
+        Grid and spline coefficients, and the profile of a flat surface.
     error : float
         Largest deviation from the measured distance at check points, in m.
     """

@@ -1,8 +1,8 @@
 """Signed distance to a curved surface, measured point by point: what a smooth field is made of.
 
-**On a smooth piece** the foot on the nearest small triangle is lifted to the curved surface, by the height of the
-paraboloid with the corners' normals, ½ Σ λ_i λ_j (n_j − n_i)·(x_j − x_i) over the edges; d is the distance along the
-normal there.
+**On a smooth piece** the contact point on the nearest small triangle is lifted to the curved surface, by the height of
+the paraboloid with the corners' normals, ½ Σ λ_i λ_j (n_j − n_i)·(x_j − x_i) over the edges; d is the distance along
+the normal there.
 
 **Beyond a crease or the border**, d is the distance to that line.
 
@@ -56,7 +56,7 @@ __all__ = [
     "MeasuredDistance",
 ]
 
-# the foot lies on a smooth piece, on a line, or on a border with a shoulder; below the border; behind the body
+# the contact point lies on a smooth piece, on a line, or on a border with a shoulder; below the border; behind the body
 PLAIN, ROUNDED, ROLLED, BRIDGED, BEHIND = 0, 1, 2, 3, 4
 TURN = 2.0  # of the radius: how far it takes to turn back behind
 START, FINISH = 0.5, 0.85  # of the radius: where the bridge below the border begins and ends
@@ -155,18 +155,18 @@ def _bridge(r: float) -> float:
 
 
 @_jit
-def _lifted_into(corners: np.ndarray, normals: np.ndarray, foot: np.ndarray, v: np.ndarray) -> float:
-    """Put the normal at the foot into v (3,); the height of the curved surface above it."""
+def _lifted_into(corners: np.ndarray, normals: np.ndarray, weights: np.ndarray, v: np.ndarray) -> float:
+    """Put the normal at the contact point into v (3,); the height of the curved surface above it."""
     height = 0.0
     for i in range(3):
         j = (i + 1) % 3
         turn = 0.0
         for x in range(3):
             turn += (normals[j, x] - normals[i, x]) * (corners[j, x] - corners[i, x])
-        height += 0.5 * foot[i] * foot[j] * turn
+        height += 0.5 * weights[i] * weights[j] * turn
     length = 0.0
     for x in range(3):
-        v[x] = foot[0] * normals[0, x] + foot[1] * normals[1, x] + foot[2] * normals[2, x]
+        v[x] = weights[0] * normals[0, x] + weights[1] * normals[1, x] + weights[2] * normals[2, x]
         length += v[x] * v[x]
     length = np.sqrt(length)
     for x in range(3):
@@ -223,14 +223,16 @@ def _within(d: float, square: float, radius: float) -> tuple[float, int]:
 
 
 @_jit
-def _over(c: np.ndarray, foot: np.ndarray, corners: np.ndarray, outward: np.ndarray, height: float) -> float:
-    """Height of c over the tangent plane of the line that its foot is on; `height` where that has no direction."""
+def _over(
+    c: np.ndarray, weights: np.ndarray, corners: np.ndarray, outward: np.ndarray, height: float
+) -> float:
+    """Height of c over the tangent plane of the line of its contact point; `height` where that has no direction."""
     facing = outward[0] ** 2 + outward[1] ** 2 + outward[2] ** 2
     if facing == 0.0:
         return height
     found = 0.0
     for x in range(3):
-        at = foot[0] * corners[0, x] + foot[1] * corners[1, x] + foot[2] * corners[2, x]
+        at = weights[0] * corners[0, x] + weights[1] * corners[1, x] + weights[2] * corners[2, x]
         found += (c[x] - at) * outward[x]
     return float(found / np.sqrt(facing))
 
@@ -259,18 +261,18 @@ def _measure_into(
 ) -> None:
     """Fill distances (N,) and kinds (N,) at places (N, 3)."""
     end = behind + TURN * radius
-    waiting, foot, trial, n = np.empty(DEEP, np.int64), np.empty(3), np.empty(3), np.empty(3)
+    waiting, weights, trial, n = np.empty(DEEP, np.int64), np.empty(3), np.empty(3), np.empty(3)
     t = 0
     for k in range(places.shape[0]):
         c = places[k]
-        _, t, where = nearest_into(c[0], c[1], c[2], t, discs, corners, waiting, foot, trial)
+        _, t, where = nearest_into(c[0], c[1], c[2], t, discs, corners, waiting, weights, trial)
         row = rows[t, where]
-        lift = _lifted_into(corners[t], normals[t], foot, n)
+        lift = _lifted_into(corners[t], normals[t], weights, n)
         if feature_kinds[row] != SMOOTH:
             lift = 0.0
         height, r = 0.0, 0.0
         for x in range(3):
-            at = foot[0] * corners[t, 0, x] + foot[1] * corners[t, 1, x] + foot[2] * corners[t, 2, x]
+            at = weights[0] * corners[t, 0, x] + weights[1] * corners[t, 1, x] + weights[2] * corners[t, 2, x]
             v = c[x] - at - lift * n[x]
             height += v * n[x]
             r += v * v
@@ -280,7 +282,7 @@ def _measure_into(
             if abs(height) < RESOLVED * r:
                 height = np.copysign(RESOLVED * r, height)
         else:
-            height = _over(c, foot, corners[t], outward[row], height)
+            height = _over(c, weights, corners[t], outward[row], height)
         if kind == SHARP:
             distances[k], kinds[k] = np.copysign(r, height), ROUNDED
         else:
@@ -315,11 +317,11 @@ def _outline_into(
     feature_kinds: np.ndarray,
     border: np.ndarray,
 ) -> None:
-    waiting, foot, trial = np.empty(DEEP, np.int64), np.empty(3), np.empty(3)
+    waiting, weights, trial = np.empty(DEEP, np.int64), np.empty(3), np.empty(3)
     t = 0
     for k in range(places.shape[0]):
         c = places[k]
-        _, t, where = nearest_into(c[0], c[1], c[2], t, discs, corners, waiting, foot, trial)
+        _, t, where = nearest_into(c[0], c[1], c[2], t, discs, corners, waiting, weights, trial)
         inside[k] = feature_kinds[rows[t, where]] == SMOOTH
         distances[k] = np.sqrt(_to_border(c, border))
 

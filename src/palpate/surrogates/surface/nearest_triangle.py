@@ -90,8 +90,8 @@ def _edge(dx: float, dy: float, dz: float, ux: float, uy: float, uz: float) -> t
 
 
 @_jit
-def _foot_into(
-    corners: np.ndarray, i: int, x: float, y: float, z: float, foot: np.ndarray
+def _nearest_point_into(
+    corners: np.ndarray, i: int, x: float, y: float, z: float, weights: np.ndarray
 ) -> tuple[float, int]:
     """Fill the weights (3,) of the nearest point of triangle i; square of the distance, and where on it.
 
@@ -108,7 +108,7 @@ def _foot_into(
     third = ((uy * pz - uz * py) * nx + (uz * px - ux * pz) * ny + (ux * py - uy * px) * nz) / square
     if second > 0 and third > 0 and second + third < 1:
         height = px * nx + py * ny + pz * nz
-        foot[0], foot[1], foot[2] = 1.0 - second - third, second, third
+        weights[0], weights[1], weights[2] = 1.0 - second - third, second, third
         return height * height / square, 0
     k = 0
     t, best = _edge(px, py, pz, ux, uy, uz)
@@ -119,8 +119,8 @@ def _foot_into(
     if d < best:
         k, t, best = 2, s, d
     after = k + 1 if k < 2 else 0
-    foot[0] = foot[1] = foot[2] = 0.0
-    foot[k], foot[after] = 1.0 - t, t
+    weights[0] = weights[1] = weights[2] = 0.0
+    weights[k], weights[after] = 1.0 - t, t
     if t == 0.0:
         return best, 4 + k
     return best, 4 + after if t == 1.0 else 1 + k
@@ -135,10 +135,10 @@ def nearest_into(
     discs: np.ndarray,
     corners: np.ndarray,
     waiting: np.ndarray,
-    foot: np.ndarray,
+    weights: np.ndarray,
     trial: np.ndarray,
 ) -> tuple[float, int, int]:
-    """Nearest triangle to a point: square of the distance, its number, and where on it (as `_foot_into`).
+    """Nearest triangle to a point: square of the distance, its number, and where on it (as `_nearest_point_into`).
 
     Parameters
     ----------
@@ -146,11 +146,11 @@ def nearest_into(
         A triangle that may be near.
     waiting : (DEEP,) int array
         Scratch.
-    foot, trial : (3,) arrays
+    weights, trial : (3,) arrays
         The nearest point's weights; scratch.
     """
     leaves = discs.shape[0] // 2
-    best, place = _foot_into(corners, guess, x, y, z, foot)
+    best, place = _nearest_point_into(corners, guess, x, y, z, weights)
     which, top = guess, 1
     waiting[0] = 1
     while top > 0:
@@ -170,8 +170,8 @@ def nearest_into(
             continue
         own = disc - leaves
         for t in range(own * corners.shape[0] // leaves, (own + 1) * corners.shape[0] // leaves):
-            d, where = _foot_into(corners, t, x, y, z, trial)
+            d, where = _nearest_point_into(corners, t, x, y, z, trial)
             if d < best:
                 best, which, place = d, t, where
-                foot[0], foot[1], foot[2] = trial[0], trial[1], trial[2]
+                weights[0], weights[1], weights[2] = trial[0], trial[1], trial[2]
     return best, which, place

@@ -150,11 +150,13 @@ class HandEvaluator:
         self.contact: np.ndarray = self._place if node is None else node.value
         self.loads: np.ndarray = np.zeros(0) if node is None else node.inputs
         self._grip, self._held = np.zeros(3), False
-        self._felt: list[list[float]] = (felt.T @ felt).tolist()
+        self._onto = np.ascontiguousarray(felt.T @ felt)
+        self._felt: list[list[float]] = self._onto.tolist()
         self.inside, self.let_go = True, False
         self.depth, self.stiffness, self.elapsed = -math.inf, 0.0, 0.0
         _along(elastic.force, elastic.stiffness)  # compile now, not in the loop
         _behind(self._normal, self._normal)
+        _project(self._place, self._onto, self._place.copy())
 
     def place(self, position: np.ndarray, *, holding: bool, believed: bool) -> None:
         """Turn the hand's place (3,), m, into that of the probe or of what it holds.
@@ -207,7 +209,7 @@ class HandEvaluator:
                     elastic.force[:] = 0.0
             good = memory is None or memory.step(position, amplitude, elastic.slope, self.elapsed)
         stays = self._stays
-        self._project(position if stays is None or self._held else stays.lies)
+        _project(position if stays is None or self._held else stays.lies, self._onto, self._place)
         if stays is not None:
             stays.lies[:] = self._place
         if self._node is not None:
@@ -217,13 +219,6 @@ class HandEvaluator:
         self.stiffness = _along(elastic.force, elastic.stiffness)
         if not good:
             self.force[:] = math.nan  # the loop makes a fault of it
-
-    def _project(self, position: np.ndarray) -> None:
-        """Take the part of a position along the felt directions as the place."""
-        x, y, z = position.tolist()
-        for i in range(3):
-            row = self._felt[i]
-            self._place[i] = row[0] * x + row[1] * y + row[2] * z
 
     def _where_taken(self, parameters: np.ndarray) -> np.ndarray:
         """The further inputs (p,), those of the place as they were when the hand took hold.
@@ -244,6 +239,13 @@ class HandEvaluator:
             self.let_go = False
         elif depth > self._inner + radius or _behind(self._elastic.outward, self._normal):
             self.let_go = True
+
+
+@_jit
+def _project(position, onto, place) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """Fill the part of a position along the felt directions into `place`."""
+    for i in range(3):
+        place[i] = onto[i, 0] * position[0] + onto[i, 1] * position[1] + onto[i, 2] * position[2]
 
 
 @_jit

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
+from numba import njit
 
 from palpate.checks import own_arrays
 from palpate.errors import UsageError
@@ -177,15 +178,21 @@ class NodeEvaluator:
     def __init__(self, whole: NodeField, directions: np.ndarray) -> None:
         own = [i for i, node in enumerate(whole.columns[:, 0]) if node == whole.held]
         self.value, self.inputs = np.zeros(3), np.zeros(len(whole.inputs))
-        self._components = [int(c) for c in whole.columns[own, 1]]
-        self._net = whole.network.select(own).compiled() if own else None
-        self._low, self._high = (part.tolist() for part in bounds(whole.inputs))
-        self._mirror = None if whole.mirror is None else whole.mirror.tolist()
-        self._directions = directions.tolist()
-        self._touched, self._further = whole.touched.tolist(), whole.further
-        self._by_place = whole.asked_by == "place and load"
-        self._x, self._y = np.zeros(len(whole.inputs)), np.zeros(len(own))
-        self(np.zeros(3), np.zeros(3), np.zeros(len(self._further)))  # compile now, not in the loop
+        low, high = bounds(whole.inputs)
+        mirror = np.zeros(3) if whole.mirror is None else whole.mirror
+        self._asked = (
+            np.ascontiguousarray(directions, dtype=np.float64),
+            whole.touched,
+            np.array(whole.further, dtype=np.int64),
+            whole.asked_by == "place and load",
+        )
+        self._limits = (low, high, np.ascontiguousarray(mirror, dtype=np.float64), whole.mirror is not None)
+        self._answer = (np.zeros(len(whole.inputs)), np.zeros(len(own)), whole.columns[own, 1].copy())
+        # a node that no output tells of stays where it is: the net of another one is asked, and nothing is taken of it
+        self._net = whole.network.select(own or [0]).compiled()
+        if not own:
+            self._answer = (self._answer[0], np.zeros(1), np.full(1, -1, dtype=np.int64))
+        self(np.zeros(3), np.zeros(3), np.zeros(len(whole.further)))  # compile now, not in the loop
 
     def __call__(self, position: np.ndarray, force: np.ndarray, parameters: np.ndarray) -> None:
         """Renew the attributes.
@@ -199,29 +206,41 @@ class NodeEvaluator:
         parameters : (p,)
             The loads that the hand does not supply, N.
         """
-        inputs = self.inputs
-        for a, (x, y, z) in enumerate(self._directions):
-            inputs[self._touched[a]] = -(x * force[0] + y * force[1] + z * force[2])
-            if self._by_place:
-                inputs[a] = x * position[0] + y * position[1] + z * position[2]
-        for b, i in enumerate(self._further):
-            inputs[i] = parameters[b]
-        self._evaluate()
+        _ask(position, force, parameters, self.inputs, *self._asked)
+        _node_into(self.inputs, self.value, *self._limits, *self._answer, *self._net)
 
-    def _evaluate(self) -> None:
-        x, mirrored = self._x, self._mirror is not None and self.inputs[0] < 0.0
-        for i in range(x.size):
-            asked = -self.inputs[i] if mirrored else self.inputs[i]
-            x[i] = min(max(asked, self._low[i]), self._high[i])
-        self.value[:] = 0.0
-        if self._net is None:
-            return
-        value_into(x, self._y, *self._net)
-        for i, component in enumerate(self._components):
-            self.value[component] = self._y[i]
-        if mirrored and self._mirror is not None:
-            a, b, c = self._mirror
-            along = 2.0 * (a * self.value[0] + b * self.value[1] + c * self.value[2])
-            self.value[0] -= along * a
-            self.value[1] -= along * b
-            self.value[2] -= along * c
+
+_jit = njit(cache=True, nogil=True, error_model="numpy")
+
+
+@_jit
+def _ask(position, force, parameters, inputs, directions, touched, further, by_place) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """Fill the field's inputs: what the hand pulls with, the loads elsewhere, and its place where that is asked."""
+    for a in range(touched.size):
+        pull, place = 0.0, 0.0
+        for i in range(3):
+            pull -= directions[a, i] * force[i]
+            place += directions[a, i] * position[i]
+        inputs[touched[a]] = pull
+        if by_place:
+            inputs[a] = place
+    for b in range(further.size):
+        inputs[further[b]] = parameters[b]
+
+
+@_jit
+def _node_into(inputs, value, low, high, mirror, mirrors, x, y, components, *net) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN002
+    """Fill the held node's value at inputs (n,), those beyond the trained ranges at their edge."""
+    other = mirrors and inputs[0] < 0.0
+    for i in range(x.size):
+        asked = -inputs[i] if other else inputs[i]
+        x[i] = asked if math.isnan(asked) else min(max(asked, low[i]), high[i])
+    value[:] = 0.0
+    value_into(x, y, *net)
+    for i in range(components.size):
+        if components[i] >= 0:
+            value[components[i]] = y[i]
+    if other:
+        along = 2.0 * (mirror[0] * value[0] + mirror[1] * value[1] + mirror[2] * value[2])
+        for i in range(3):
+            value[i] -= along * mirror[i]

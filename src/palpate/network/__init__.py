@@ -3,7 +3,7 @@
     network                          the value, its scaling, and its evaluator of one point at a time
     radial, network_kernels          radial functions, and the compiled loops behind the evaluation
     archive, container, soundness    kept in a file, and read back with suspicion
-    codec                            … and so is any frozen dataclass
+    codec, kinds                     … and so is any frozen dataclass; which ones may stand for a base class
     publication, shared_memory       published to other processes, who never wait
     uncertainty, region              how far it may be off, and where it was trained
 

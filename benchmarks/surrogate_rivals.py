@@ -26,7 +26,7 @@ Rival = Callable[[Case, Training], TouchFunction]
 STEP = 1e-6  # m: of the differences that give a stiffness where a rival has no derivative
 ROWS = 1000  # queries at a time: matrices against thousands of samples
 LIKELY = 400  # samples by which a kernel's lengths are found
-SAME_PLACE = 3e-4  # m: footprints nearer to each other are one
+SAME_PLACE = 3e-4  # m: places nearer to each other are one
 STEPS = 2000  # of a perceptron's L-BFGS
 
 
@@ -123,7 +123,7 @@ def function(case: Case, name: str, force: Predictor) -> TouchFunction:
 def linear_in_depth(case: Case, training: Training) -> TouchFunction:
     """The force of a linear-elastic body: k(x, y) times the depth, k (3,) from the shallowest third of the depths.
 
-    Each footprint's k is a least-squares fit through zero; between footprints it is interpolated as by `cubic_rbf`.
+    Each place's k is a least-squares fit through zero; between places it is interpolated as by `cubic_rbf`.
     """
     from scipy.linalg import lstsq
 
@@ -147,7 +147,7 @@ def linear_in_depth(case: Case, training: Training) -> TouchFunction:
 
 
 def _places(feet: np.ndarray) -> np.ndarray:
-    """Number (N,) of the place that each footprint is at: on a curved body those of one column differ a little."""
+    """Number (N,) of the place of each touch: on a curved body those of one column differ a little."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
@@ -158,7 +158,7 @@ def _places(feet: np.ndarray) -> np.ndarray:
 
 
 def _feet(case: Case, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Footprints in the plane with the further inputs (N, n − 1), and depths (N,) in m."""
+    """Places in the plane with the further inputs (N, n − 1), and depths (N,) in m."""
     d, gradient, _ = case.surface.at(X[:, :3])
     foot = X[:, :3] - d[:, None] * gradient
     return np.hstack([foot[:, :2], X[:, 3:]]), case.radius - d

@@ -144,7 +144,7 @@ def _rival_table(result: Measured, beside: list[dict[str, Any]], size: int, mark
                 f"{row['asked']} of the test"
                 for row in beside
             ),
-            "force linear in depth: per footprint from the shallowest third of the depths",
+            "force linear in depth: per place from the shallowest third of the depths",
             "no row for POD + RBF: of the force it is the RBF, and the file holds no displacement fields"
             if "displacement_mm" not in result.case.arrays
             else "POD + RBF of the displacement stands in a table of its own; of the force it is the RBF",
@@ -220,8 +220,8 @@ def _domain(case: Case) -> str:
     spans = [f"{np.min(d):.2g} to {np.max(d):.3g} mm deep" for d in depths]
     columns = [len(np.unique(case.arrays["column"][case.rows(role)])) for role in ("train", "test")]
     return (
-        f"training footprints: {columns[0]} of a scrambled Sobol sequence over the surface{_denser(case)}, depths "
-        f"evenly spaced and shifted, {spans[0]}; test: {columns[1]} other footprints, depths uniform at random, "
+        f"training places: {columns[0]} of a scrambled Sobol sequence over the surface{_denser(case)}, depths "
+        f"evenly spaced and shifted, {spans[0]}; test: {columns[1]} other places, depths uniform at random, "
         f"{spans[1]}"
     )
 

@@ -1,6 +1,6 @@
 """Make the data of the surrogates' benchmark by finite elements: ``python -m benchmarks.touch_data STUDY --out FILE``.
 
-Positions come in columns, each a footprint and its depths from shallow to deep. Training columns follow a scrambled
+Positions come in columns, each a place and its depths from shallow to deep. Training columns follow a scrambled
 Sobol sequence (Owen 1998) with evenly spaced, shifted depths; test columns another one, their depths at random.
 "refined" solves the test's positions again with elements of half the size. The file is written after each column; a
 run that was interrupted goes on where it was. ``--join`` puts parts and roles into the one file that is kept.
@@ -32,7 +32,7 @@ PER_ROW = ("inputs", "energy", "force", "stiffness", "beside", "column", "role",
 
 @dataclass(frozen=True)
 class Column:
-    """Solves above one footprint.
+    """Solves above one place.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ def columns_of(study: TouchStudy, count: int, depths: int, seed: int, role: str)
         found.append(Column(len(found), foot, normal, d, values, _turn(study, unit[row, 1])))
         if len(found) == count:
             return found
-    raise RuntimeError(f"only {len(found)} of {count} footprints lie on the surface")
+    raise RuntimeError(f"only {len(found)} of {count} places lie on the surface")
 
 
 def _turn(study: TouchStudy, share: float) -> np.ndarray:
@@ -91,7 +91,7 @@ def _turn(study: TouchStudy, share: float) -> np.ndarray:
 
 
 def _feet(study: TouchStudy, unit: np.ndarray) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
-    """Row of `unit` (N, 2), footprint and normal (3,) of those that lie in the study's part of the surface."""
+    """Row of `unit` (N, 2), place and normal (3,) of those that lie in the study's part of the surface."""
     geometry = study.body().geometry
     patch = surface_of(geometry, study.touches, study.probe.refinements(geometry))
     low, high = (corner[:2] for corner in (study.over if study.over is not None else patch.box))

@@ -22,7 +22,7 @@ __all__ = ["STUDIES", "TouchStudy"]
 RADIUS, PAD, STIFF_PAD, STOP = 0.01, 2e6, 2e7, 0.004
 POISSON = 0.45
 LEAST = 2e-4  # m: depths begin here, where the force is a thousandth of the largest
-CLEAR = 0.012  # m of a named surface around a footprint: half the widest contact
+CLEAR = 0.012  # m of a named surface around a place: half the widest contact
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class TouchStudy:
     depth : float
         Largest, in m.
     over : pair of corners, optional
-        Box of the footprints in m; without it all of the surface that is `CLEAR` of its rim.
+        Box of the places in m; without it all of the surface that is `CLEAR` of its rim.
     pad : float
         In N/m³.
     symmetry : str
@@ -46,10 +46,10 @@ class TouchStudy:
     about : (2,) tuple
         Where the axis of symmetry stands, in m.
     to_edges : bool
-        Whether `over` ends at edges of the body: training footprints are then denser there, where the body gives way
+        Whether `over` ends at edges of the body: training places are then denser there, where the body gives way
         within a few mm (by the sine, as Chebyshev's points are).
     within : float
-        Farthest footprint from that axis, in m.
+        Farthest place from that axis, in m.
     inputs : tuple of Varied
         Beyond the position: properties of the materials.
     element : float, optional

@@ -147,7 +147,7 @@ def _notes(ours: Swept, rivals: dict[str, Any], points: np.ndarray) -> tuple[str
     checks = ours.checks
     total = ours.counts("iterations") + ours.counts("chords") + 1
     return (
-        "block 100 × 100 × 50 mm, neo-Hookean, E = 9 kPa, ν = 0.45, bottom fixed; R = 10 mm, footprint 40 × 40 mm, "
+        "block 100 × 100 × 50 mm, neo-Hookean, E = 9 kPa, ν = 0.45, bottom fixed; R = 10 mm, probe over 40 × 40 mm, "
         "depth up to 15 mm, pad 2e6 N/m³ with a stop at 4 mm; "
         f"{ours.solutions[0].state.size} unknowns; `design({len(points)}, seed=0)`",
         "a tangent is assembled and factorised; a chord step takes a residual and a back-substitution with the last "

@@ -79,7 +79,7 @@ def tables(*, quick: bool = False) -> list[Table]:
                 "2, 4, 6 mm in the middle of the block, one after the other, with the "
                 "tangents for the stiffness",
                 "memory is the largest resident size of a process that does nothing else; ν = 0.45 in displacement "
-                "form, 0.499 in mixed form; the mesh of the whole footprint, elements elsewhere up to "
+                "form, 0.499 in mixed form; the mesh that is fine under all of it, elements elsewhere up to "
                 f"{COARSE:g} times as large",
             ),
         )

@@ -64,8 +64,8 @@ def _imprint_table(quick: bool) -> Table:
         ),
         notes=(
             f"sliding {1e3 * SLIDE:.0f} mm along x in steps of a third of a millimetre across the middle of the block, "
-            "off its planes of symmetry; 5 mm is the default mesh of the whole footprint, the others are fine along "
-            "the path only",
+            "off its planes of symmetry; 5 mm is the default mesh that is fine under all of it, the others are fine "
+            "along the path only",
             "ripple: standard deviation about a parabola (F_z, stiffness) or a cubic (F_x), over the mean; largest: "
             "the largest deviation instead",
         ),

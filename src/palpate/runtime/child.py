@@ -44,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser("python -m palpate.runtime", description="The 1 kHz loop of palpate.")
-    parser.add_argument("model", help="touch model or touched body, a .palpate file")
+    parser.add_argument("model", help="surrogate, a .palpate file")
     parser.add_argument("--state", required=True, help="name of the shared memory")
     parser.add_argument("--device", default="page", help="name, or name:key=value,key=value")
     parser.add_argument("--rate", type=float, default=1000.0, help="Hz")

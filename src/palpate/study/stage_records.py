@@ -79,10 +79,10 @@ class PadSweepRecord(_SweepRecord):
 
 
 class ProbeSweepRecord(_SweepRecord):
-    """Touches that are solved: columns into the body, each from shallow to deep."""
+    """Touches that are solved: depth series, each from shallow to deep."""
 
     samples: int = Field(40, ge=FEWEST, description="number of solves")
-    depths: int = Field(5, ge=1, description="solves in a column")
+    depths: int = Field(5, ge=1, description="solves in a depth series")
     symmetric: bool = Field(True, description="solve a part only, where mirror images give the rest")
     element: Metres | None = Field(
         None,
@@ -92,9 +92,9 @@ class ProbeSweepRecord(_SweepRecord):
     )
 
     @model_validator(mode="after")
-    def _whole_columns(self) -> ProbeSweepRecord:
+    def _whole_series(self) -> ProbeSweepRecord:
         if self.depths > self.samples:
-            raise ValueError(f"{self.samples} solves make no column of {self.depths}")
+            raise ValueError(f"{self.samples} solves make no depth series of {self.depths}")
         return self
 
     def arguments(self, problem: Any) -> dict[str, Any]:
@@ -127,12 +127,12 @@ class PadTestRecord(Record):
 
 
 class ProbeTestRecord(Record):
-    """Touches that the network never sees, in columns of their own."""
+    """Touches that the network never sees, in depth series of their own."""
 
     every: ClassVar[int] = 0
     samples: int = Field(200, ge=1, description="number of solves")
-    depths: int = Field(4, ge=1, description="solves in a column")
-    seed: int = Field(7, ge=0, description="decides where the columns are")
+    depths: int = Field(4, ge=1, description="solves in a depth series")
+    seed: int = Field(7, ge=0, description="decides where the series are")
 
     def arguments(self, problem: Any) -> dict[str, Any] | None:
         """Return the arguments of `palpate.sweep` that say where to test."""

@@ -80,7 +80,9 @@ def refined(c: Case, solves: int, seed: int) -> tuple[Network, float]:
     X, Y = c.few(solves)
     found = learn(X, Y, c.inputs, c.outputs, passes=PASSES, seed=seed)
     known = found.state.theta
-    network = refined_network(X, Y, c.inputs, c.outputs, units_max=UNITS_MAX, seed=seed, known=known)[0]
+    network = refined_network(X, Y, c.inputs, c.outputs, units_max=UNITS_MAX, seed=seed, filter_units=known)[
+        0
+    ]
     return network, time.process_time() - began
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from laws.beams import INPUT, OUTPUTS, stiffening
 from palpate.learning import refine, refined_network
-from palpate.learning.starts import placed
+from palpate.learning.starts import units_at_residuals
 from palpate.learning.structure import grow, prune
 from palpate.rbf.forms import unit_form
 from palpate.rbf.regressors import Regressors
@@ -94,7 +94,7 @@ def test_growth_has_room_for_what_slopes_decide_as_well():
 def test_new_units_stand_where_the_error_is():
     X, Y = bumps(200)
     found = refine(X, Y, np.zeros((0, 3)), Regressors(unit_form("isotropic", 2)))
-    new = placed(X, Y, found, 3)[:, :2]
+    new = units_at_residuals(X, Y, found, 3)[:, :2]
     error = ((Y - found.predict(X)) ** 2).sum(axis=1)
     np.testing.assert_array_equal(new[0], X[error.argmax()])
     assert min(np.linalg.norm(new[i] - new[j]) for i in range(3) for j in range(i)) > 0.1

@@ -266,13 +266,13 @@ def _fields(
         "starts": refinement.starts,
         "seed": seed,
     }
-    known = _known(sequential, settings)
+    filter_units = _filter_units(sequential, settings)
     nodes, refined, _ = refined_network(
-        data.X, _columns(data, columns), data.ranges, outputs, known=known, **options
+        data.X, _columns(data, columns), data.ranges, outputs, filter_units=filter_units, **options
     )
     names = [Quantity(f"u_{c} at {x:g} m", "m") for x in data.rest[:, 0] for c in "xy"]
     planar = data.displacement[:, :, :2].reshape(len(data), -1)
-    whole = refined_network(data.X, planar, data.ranges, names, known=refined.theta, **options)[0]
+    whole = refined_network(data.X, planar, data.ranges, names, filter_units=refined.theta, **options)[0]
     everywhere = [(node, component) for node in range(len(data.rest)) for component in range(2)]
     held, touched = _touched(data)
     body = data.provenance.get("problem", {}).get("body", {})
@@ -357,7 +357,7 @@ def _refuse_still(rows: np.ndarray, data: Dataset) -> None:
         )
 
 
-def _known(sequential: Learned, settings: Settings) -> np.ndarray | None:
+def _filter_units(sequential: Learned, settings: Settings) -> np.ndarray | None:
     """Return the filter's units as axis-aligned ones, where they have centres."""
     state = sequential.state
     if settings.form not in {"isotropic", "axis-aligned", "rotated"}:

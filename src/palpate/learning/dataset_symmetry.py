@@ -14,8 +14,8 @@ __all__ = ["declared_symmetry", "widen_ranges"]
 
 def declared_symmetry(data: Dataset) -> tuple[np.ndarray, np.ndarray]:
     """Isometries (k, 3, 3) by a dataset's provenance, the identity among them, and the point (3,) that stays, m."""
-    told = data.provenance.get("symmetry") or {"about": [0.0, 0.0, 0.0], "isometries": [np.eye(3).tolist()]}
-    return np.array(told["isometries"], dtype=float), np.array(told["about"], dtype=float)
+    record = data.provenance.get("symmetry") or {"about": [0.0, 0.0, 0.0], "isometries": [np.eye(3).tolist()]}
+    return np.array(record["isometries"], dtype=float), np.array(record["about"], dtype=float)
 
 
 def widen_ranges(ranges: tuple[Range, ...], matrices: np.ndarray, about: np.ndarray) -> tuple[Range, ...]:

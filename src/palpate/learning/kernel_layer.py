@@ -108,7 +108,7 @@ def likely_metric(
     start = np.r_[np.full(n, -0.5 * np.log(n)), np.log(1e-5)]
     if not np.any(Y) or len(X) < n + 3:
         return Metric(name, np.exp(start[:n]), 1e-8)
-    found = minimize(
+    optimum = minimize(
         negative_likelihood,
         start,
         args=(name, X, Y),
@@ -117,7 +117,7 @@ def likely_metric(
         bounds=[_SCALES] * n + [_RIDGES],
         options={"maxiter": iterations},
     )
-    return Metric(name, np.exp(found.x[:n]), float(np.exp(found.x[n])))
+    return Metric(name, np.exp(optimum.x[:n]), float(np.exp(optimum.x[n])))
 
 
 def negative_likelihood(

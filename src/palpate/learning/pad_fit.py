@@ -175,9 +175,9 @@ class _Search:
             rows = samples.rows(_baseline(self._rest(unknowns), len(samples.inputs)))
             return np.concatenate([_solved(columns, rows)[1], _FIRST * (unknowns - theta) / size])
 
-        found = least_squares(missed, theta, x_scale=size, max_nfev=rounds, ftol=1e-6, xtol=1e-8).x
-        rest = self._rest(found)
-        return _Fit(rest, found, _solved(columns, samples.rows(_baseline(rest, len(samples.inputs))))[0])
+        solution = least_squares(missed, theta, x_scale=size, max_nfev=rounds, ftol=1e-6, xtol=1e-8).x
+        rest = self._rest(solution)
+        return _Fit(rest, solution, _solved(columns, samples.rows(_baseline(rest, len(samples.inputs))))[0])
 
     def left_out(self, samples: EnergySamples, start: np.ndarray, rounds: int = 4) -> float:
         """Root of the mean over solves of the weighted squares that they miss when left out, a fifth at a time."""

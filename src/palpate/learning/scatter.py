@@ -32,11 +32,11 @@ def noise_variance(X: np.ndarray, Y: np.ndarray, seed: int = 0) -> float:
         return 0.0
     rows = np.random.default_rng(seed).permutation(N)[:_ASKED]
     distance, near = _nearest(X, X[rows], max(sizes) + 1)
-    found, reach = np.empty((len(sizes), len(rows))), np.empty(len(sizes))
+    differences, reach = np.empty((len(sizes), len(rows))), np.empty(len(sizes))
     for i, k in enumerate(sizes):
-        found[i] = _differences(X, Y, rows, near[:, 1 : k + 1])
+        differences[i] = _differences(X, Y, rows, near[:, 1 : k + 1])
         reach[i] = (distance[:, k] ** 4).mean()
-    return _begin(reach, found)
+    return _begin(reach, differences)
 
 
 def _differences(X: np.ndarray, Y: np.ndarray, rows: np.ndarray, near: np.ndarray) -> np.ndarray:
@@ -49,16 +49,16 @@ def _differences(X: np.ndarray, Y: np.ndarray, rows: np.ndarray, near: np.ndarra
     return squared
 
 
-def _begin(reach: np.ndarray, found: np.ndarray) -> float:
+def _begin(reach: np.ndarray, differences: np.ndarray) -> float:
     """Return where the line through mean differences begins, if surely above zero; never above the least of them."""
     line = np.vstack([np.ones_like(reach), reach / reach.max()]).T if reach.max() > 0 else None
-    means = found.mean(axis=1)
+    means = differences.mean(axis=1)
     if line is None:  # all neighbours are duplicates: their difference is noise alone
         return float(means.min())
     weights = np.linalg.pinv(line)[0]
     begin = float(weights @ means)
     # the same samples are asked at each size, so their own beginnings scatter as the mean's does
-    error = float((weights @ found).std() / np.sqrt(found.shape[1]))
+    error = float((weights @ differences).std() / np.sqrt(differences.shape[1]))
     least = float(means.min())
     return min(begin, least) if begin > max(_SURE * error, _MOST * least) else 0.0
 

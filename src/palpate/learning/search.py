@@ -281,8 +281,8 @@ class Search:
         if not self.tried and waiting and self.budget.over:
             first = _evaluated(self.problem, iterations, -math.inf, waiting[0], _LEAST)
             done, waiting = [] if first is None else [first], []
-        found = evaluate_all(self.problem, waiting, iterations, self.budget.deadline, self.pool)
-        done += [one for one in found if one is not None]
+        evaluated = evaluate_all(self.problem, waiting, iterations, self.budget.deadline, self.pool)
+        done += [one for one in evaluated if one is not None]
         self.tried += done
         return done
 
@@ -344,12 +344,12 @@ class Search:
                 best.error <= target or self.budget.over or (patience is not None and idle >= patience)
             ):
                 break
-            found = self.try_all(starts(units, best), iterations)
-            if not found:
+            results = self.try_all(starts(units, best), iterations)
+            if not results:
                 break
-            winner = min(found, key=_error)
+            winner = min(results, key=_error)
             if judge is not None:
-                self.tried = [one for one in self.tried if one not in found]
+                self.tried = [one for one in self.tried if one not in results]
                 winner = judge(winner)
                 self.tried.append(winner)
             idle = 0 if best is None or winner.error < gain * best.error else idle + 1
@@ -383,8 +383,8 @@ def _evaluated(
     if left <= 0:
         return None
     seconds = least if least else None if math.isinf(left) else left
-    found = problem.evaluate(candidate, iterations, seconds)
-    return replace(found, seconds=candidate.seconds + time.monotonic() - began)
+    result = problem.evaluate(candidate, iterations, seconds)
+    return replace(result, seconds=candidate.seconds + time.monotonic() - began)
 
 
 def _error(candidate: Candidate) -> float:

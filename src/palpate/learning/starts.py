@@ -10,7 +10,7 @@ import numpy as np
 from palpate.rbf.forms import Form
 from palpate.rbf.refinement.refine import Refined
 
-__all__ = ["placed", "random_units", "spread", "units_at_errors"]
+__all__ = ["random_units", "spread", "units_at_errors", "units_at_residuals"]
 
 
 def random_units(
@@ -45,7 +45,9 @@ def random_units(
     return np.array(units).reshape(count, form.size)
 
 
-def placed(X: np.ndarray, Y: np.ndarray, network: Refined, count: int, seed: int = 0) -> np.ndarray:
+def units_at_residuals(
+    X: np.ndarray, Y: np.ndarray, network: Refined, count: int, seed: int = 0
+) -> np.ndarray:
     """Return units (count, p) where a network's error is large and other units are far, as wide as their spacing."""
     form, h = network.regressors.form, len(network.theta) + count
     error = ((Y - network.predict(X)) ** 2).sum(axis=1)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from palpate.learning.search import Candidate, Search, Trial, sizes
-from palpate.learning.starts import placed, spread
+from palpate.learning.starts import spread, units_at_residuals
 from palpate.network import Network, Scaling
 from palpate.network.radial import RadialFunction
 from palpate.rbf.forms import unit_form
@@ -47,7 +47,7 @@ def refined_network(
     units_max: int = 6,
     starts: int = 6,
     seed: int = 0,
-    known: np.ndarray | None = None,
+    filter_units: np.ndarray | None = None,
     form: str = "axis-aligned",
     radial: RadialFunction = "gaussian",
     tail: Tail = "affine",
@@ -72,7 +72,7 @@ def refined_network(
         Starts per size; the cost has many minima.
     seed : int
         Decides the starts.
-    known : (h, p), optional
+    filter_units : (h, p), optional
         Scaled units of this form that the sequential filter found; they are one of the starts.
     form : str
         Of a unit: isotropic, axis-aligned, rotated, rank-1, … (see `palpate.rbf.forms`).
@@ -103,7 +103,7 @@ def refined_network(
 
     def begin(h: int, best: Candidate | None) -> Iterator[Candidate]:
         network = None if best is None else best.network
-        for theta in _starts(xs, ys, h, starts, seed, known, regressors, network):
+        for theta in _starts(xs, ys, h, starts, seed, filter_units, regressors, network):
             yield Candidate(regressors, theta, "spread")
 
     none = search.grow(lambda *_: [Candidate(regressors, _none(regressors), "tail")], [0], 0, judge=judge)
@@ -172,7 +172,7 @@ def grow(
             -1
         ].network  # not the best: a size that gains nothing may be on the way to one that does
         assert last is not None
-        new = placed(X, Y, last, units - len(last.theta), seed)
+        new = units_at_residuals(X, Y, last, units - len(last.theta), seed)
         yield Candidate(regressors, np.vstack([last.theta, new]), "grown")
 
     search.grow(more, ladder, 0, begin=begun, target=target)
@@ -231,7 +231,7 @@ def _starts(
     h: int,
     count: int,
     seed: int,
-    known: np.ndarray | None,
+    filter_units: np.ndarray | None,
     regressors: Regressors,
     best: Refined | None,
 ) -> Iterator[np.ndarray]:
@@ -239,10 +239,10 @@ def _starts(
     f = regressors.form
     rng = np.random.default_rng((seed, h))
     spacing = 2.0 / h ** (1.0 / f.inputs)
-    if known is not None and len(known) >= h:
-        yield known[spread(f.centres(known), h)]
+    if filter_units is not None and len(filter_units) >= h:
+        yield filter_units[spread(f.centres(filter_units), h)]
     if best is not None and 0 < len(best.theta) < h:
-        yield np.vstack([best.theta, placed(xs, ys, best, h - len(best.theta), seed)])
+        yield np.vstack([best.theta, units_at_residuals(xs, ys, best, h - len(best.theta), seed)])
     for i in range(count):
         rows = spread(xs, h) if i % 2 == 0 else rng.choice(len(xs), h, replace=False)
         width = spacing * (0.75, 1.0, 1.5, 0.5, 2.0, 1.25)[i % 6]

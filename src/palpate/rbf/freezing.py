@@ -62,14 +62,14 @@ def freeze_refined(
 ) -> Network:
     """A refinement as a network value; `scaling` is what it was refined in."""
     # JSON has no infinity
-    told = {
+    record = {
         "loo": found.loo if math.isfinite(found.loo) else None,
         "condition": found.condition,
         "refined": True,
     }
     return frozen(
         *(found.regressors, found.theta, found.coefficients, inputs, outputs, scaling),
-        meta={**told, **(meta or {})},
+        meta={**record, **(meta or {})},
     )
 
 

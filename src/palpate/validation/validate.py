@@ -97,7 +97,7 @@ class Validation:
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything as plain data for a JSON file; values that are not finite become null."""
-        judged = [
+        checks = [
             {
                 "name": c.criterion.key,
                 "measured": c.measured,
@@ -110,7 +110,7 @@ class Validation:
             for c in self.checks
         ]
         data = {"passed": self.passed, "name": self.name, "samples": self.samples, "notes": self.notes}
-        plain: dict[str, Any] = _plain({**data, **self.figures, "checks": judged})
+        plain: dict[str, Any] = _plain({**data, **self.figures, "checks": checks})
         return plain
 
     def summary(self) -> dict[str, Any]:

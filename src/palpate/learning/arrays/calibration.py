@@ -145,8 +145,8 @@ def calibrated(
     level : float
         Share of unseen samples that an interval is to hold, between 0 and 1.
     """
-    found = [_noise_and_factor(one, level, constant=M is None) for one in evidence]
-    noise, factor = np.array([n for n, _ in found]), np.array([f for _, f in found])
+    pairs = [_noise_and_factor(one, level, constant=M is None) for one in evidence]
+    noise, factor = np.array([n for n, _ in pairs]), np.array([f for _, f in pairs])
     widest = (noise * factor**2).argmax(axis=0)[None]
     noise, factor = (np.take_along_axis(a, widest, axis=0)[0] for a in (noise, factor))
     M = np.zeros((0, 0)) if M is None else M
@@ -226,11 +226,11 @@ class Finish:
         arrays = (*layer.units(), layer.weights, layer.tail)
         return self._fitted(arrays, layer.metric.radial, "kernel layer", error, M, evidence)
 
-    def evidence(self, found: Refined, split: HeldOut) -> Evidence:
+    def evidence(self, network: Refined, split: HeldOut) -> Evidence:
         """Return what a network that learnt from a split's samples misses on those held out."""
         held = split.unseen[0]
-        root = regressor_root(found, split.X)
-        return Evidence(self._missed(found.predict(held), split), spread_of(found, root, held))
+        root = regressor_root(network, split.X)
+        return Evidence(self._missed(network.predict(held), split), spread_of(network, root, held))
 
     def _own(self, members: Sequence[Member], error: float) -> Evidence:
         """Return each member's held-out errors, less by what their mean is expected to gain."""

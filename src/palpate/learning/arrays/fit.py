@@ -180,9 +180,9 @@ class _Chooser:
         most = min(iterations, int(self.work.left / max(each, 1.0)))
         if most < 1:
             return list(candidates)
-        found = evaluate_all(split, candidates, most, self.budget.deadline, self.pool)
+        evaluated = evaluate_all(split, candidates, most, self.budget.deadline, self.pool)
         results = []
-        for old, new in zip(candidates, found, strict=True):
+        for old, new in zip(candidates, evaluated, strict=True):
             if new is not None:
                 self.work.spend((new.iterations - old.iterations + 1) * split.work(old))
                 if record:
@@ -199,23 +199,23 @@ class _Chooser:
         """Return an affine function without units, and its error."""
         form = unit_form("axis-aligned", self.X.shape[1])
         regressors, none = Regressors(form, "gaussian"), np.zeros((0, form.size))
-        found = refine(self.split.X[:ROWS], self.split.Y[:ROWS], none, regressors, heldout=self.split.unseen)
-        return Candidate(regressors, none, "affine", found.heldout, found)
+        affine = refine(self.split.X[:ROWS], self.split.Y[:ROWS], none, regressors, heldout=self.split.unseen)
+        return Candidate(regressors, none, "affine", affine.heldout, affine)
 
     def _kernel(self) -> tuple[Metric, float]:
         """Return the kernel layer's metric and error, and take the input scales from which units start."""
-        found: list[tuple[float, Metric]] = []
+        errors: list[tuple[float, Metric]] = []
         samples = min(len(self.split.X), round(_METRIC_SAMPLES * min(1.0, self.size)))
         for name in RADIAL_FUNCTIONS:
             likelihood = 80.0 * samples**3
-            if found and self.work.left < 2.0 * likelihood:  # a limit on time is near
+            if errors and self.work.left < 2.0 * likelihood:  # a limit on time is near
                 break
             metric = likely_metric(name, self.split.X, self.split.Y, samples=samples)
             self.work.spend(likelihood)
-            found.append((self._kernel_error(metric), metric))
+            errors.append((self._kernel_error(metric), metric))
             if name == "inverse-multiquadric":
                 self.scales = metric.scales
-        error, best = min(found, key=lambda pair: pair[0])
+        error, best = min(errors, key=lambda pair: pair[0])
         # the likelihood was of a part of the samples: more of them may want another width
         for scale, ridge in ((1.25, 1.0), (0.8, 1.0), (1.0, 0.1), (1.0, 10.0)):
             other = best.altered(scale, ridge)
@@ -251,8 +251,8 @@ class _Chooser:
         some = self._kernel_rows(0.1, len(self.X))
         rows = np.sort(np.random.default_rng(self.seed).permutation(len(self.X))[:some])
         judging = self._kernel_rows(0.03, len(self.split.X))
-        judged = self._layer(metric, self.split.X[:judging], self.split.Y[:judging])
-        return self.finish.kernel_network(self._layer(metric, self.X[rows], self.Y[rows]), judged, error)
+        test_layer = self._layer(metric, self.split.X[:judging], self.split.Y[:judging])
+        return self.finish.kernel_network(self._layer(metric, self.X[rows], self.Y[rows]), test_layer, error)
 
     def _forms(self, mark: float) -> tuple[Candidate, Candidate]:
         """Return the form that does best, at full size if a look needs less, and it before its last run."""
@@ -344,11 +344,11 @@ class _Chooser:
 
     def _rivals(self, winner: Candidate) -> list[Candidate]:
         """Return the best of three other pairs of form and radial function, if they are not far behind."""
-        found: dict[tuple[str, str], Candidate] = {}
+        kinds: dict[tuple[str, str], Candidate] = {}
         for one in sorted(self.ran, key=_error):
             if one.error < 2.5 * winner.error:
-                found.setdefault(one.kind, one)
-        return [one for kind, one in found.items() if kind != winner.kind][:3]
+                kinds.setdefault(one.kind, one)
+        return [one for kind, one in kinds.items() if kind != winner.kind][:3]
 
     def _mean(self, winner: Candidate) -> tuple[list[Member], float]:
         """Return the winner, others of its kind from other starts and folds, and the error to expect."""
@@ -371,10 +371,10 @@ class _Chooser:
 
     def _refined_afresh(self, fresh: Fresh, splits: Sequence[HeldOut]) -> list[Candidate | None]:
         seeds = [self.seed + k for k in range(1, len(splits) + 1)]
-        found = self.pool.map(fresh.refined, list(zip(splits, seeds, strict=True)))
-        for split, one in zip(splits, found, strict=True):
+        networks = self.pool.map(fresh.refined, list(zip(splits, seeds, strict=True)))
+        for split, one in zip(splits, networks, strict=True):
             self.work.spend(split.work(fresh.like) * one.iterations if one else 0.0)
-        return found
+        return networks
 
     def _member(self, one: Candidate, split: HeldOut) -> Member:
         assert one.network is not None
@@ -392,11 +392,11 @@ class _Chooser:
             HeldOut.of(self.X, self.Y, share=1.0 / _MEMBERS, seed=self.seed, fold=k) for k in range(_MEMBERS)
         ]
         parts = [HeldOut.of(whole.X, whole.Y, share=self.share, seed=self.seed) for whole in wholes]
-        found = self._refined_afresh(fresh, parts)
+        networks = self._refined_afresh(fresh, parts)
         if self.budget.over:  # cut short, they would say too much
             return ()
         evidence = []
-        for whole, one in zip(wholes, found, strict=True):
+        for whole, one in zip(wholes, networks, strict=True):
             if one is None or one.network is None:
                 return ()
             evidence.append(self.finish.evidence(refit_weights(one.network, whole.X, whole.Y, RIDGE), whole))

@@ -162,14 +162,14 @@ def _slow(energy: LearntEnergy, discrepancy: Discrepancy) -> tuple[np.ndarray, f
     wanted = V[:, keep] * np.sqrt(values[keep])
     R, _ = regressors(energy.network, points)
     gram = R.T @ R
-    found = np.linalg.solve(gram + _RIDGE * np.trace(gram) / len(gram) * np.eye(len(gram)), R.T @ wanted)
-    missed = wanted - R @ found
-    return found, float(1.0 - (missed**2).sum() / (wanted**2).sum())
+    root = np.linalg.solve(gram + _RIDGE * np.trace(gram) / len(gram) * np.eye(len(gram)), R.T @ wanted)
+    missed = wanted - R @ root
+    return root, float(1.0 - (missed**2).sum() / (wanted**2).sum())
 
 
 def _points(energy: LearntEnergy) -> np.ndarray:
     """Scaled inputs (k, n) of the training, the first far from each other, and random ones where few are known."""
     n, region = len(energy.inputs), energy.region
-    known = np.zeros((0, n)) if region is None else region.points
-    more = np.random.default_rng(0).uniform(-1.0, 1.0, (max(_POINTS - len(known), 0), n))
-    return np.concatenate([known, more])
+    trained = np.zeros((0, n)) if region is None else region.points
+    more = np.random.default_rng(0).uniform(-1.0, 1.0, (max(_POINTS - len(trained), 0), n))
+    return np.concatenate([trained, more])

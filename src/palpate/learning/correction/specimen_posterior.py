@@ -103,9 +103,9 @@ def _shortened(
     cost, share = u @ u + r @ r, 1.0
     for _ in range(_HALVINGS):
         new = u + share * step
-        found = touches.residuals(posterior.mean + posterior.root @ new).ravel()
-        if new @ new + found @ found <= cost:
-            return new, found, share * float(np.linalg.norm(step))
+        residual = touches.residuals(posterior.mean + posterior.root @ new).ravel()
+        if new @ new + residual @ residual <= cost:
+            return new, residual, share * float(np.linalg.norm(step))
         share /= 2.0
     return u, r, 0.0
 

@@ -116,9 +116,9 @@ class EnergySamples:
         """Return ℓ (N, 1), its slopes (N, 1, n) and curvatures (N, 1, n(n+1)/2) by scaled inputs; unknown ones zero."""
         half, moved = self.half, self.moved
         i, j = pairs(len(half))
-        known, first, second = baseline.logarithm(self.X, self.inputs)
+        baseline_log, first, second = baseline.logarithm(self.X, self.inputs)
         with np.errstate(divide="ignore", invalid="ignore"):
-            value = np.log(self.energy) - known
+            value = np.log(self.energy) - baseline_log
             g = -self.force / self.energy[:, None]
             H = -self.stiffness / self.energy[:, None, None] - g[:, :, None] * g[:, None]
             slopes, bends = (g - first) * half, (H - second) * half[:, None] * half

@@ -41,7 +41,7 @@ _SOLVES = 40
 _ROUNDS = (50, 100)  # iterations of these, the better half going on
 _SAME_KIND = 0.5  # share of them of the best one's kind, so that a mean has some to choose from
 _SPREAD = (0.7, 1.5)  # their sizes over that of the best
-_JUDGED = 20  # networks
+_CROSS_VALIDATED = 20  # networks
 _UNITS = 320  # of a mean, images counted: a query costs about 25 ns for each
 _SCATTER = 0.05  # of random units about the solves, in scaled inputs
 _SEARCH_SHARE = 0.65  # of a limit on time; the rest is for judging
@@ -106,7 +106,9 @@ def search_energy(
     budget, pool = budget or Budget(), Pool(workers)
     search = Search(problem, budget.part(_SEARCH_SHARE), pool)
     _search_structure(search, form, radial, units_max, target, seed)
-    order = sorted(search.tried, key=lambda one: one.error)[: budget.count(_JUDGED * _more(problem), 2)]
+    order = sorted(search.tried, key=lambda one: one.error)[
+        : budget.count(_CROSS_VALIDATED * _more(problem), 2)
+    ]
     scored = pool.map(partial(_score_in_time, problem, budget.deadline), list(enumerate(order)))
     ensemble = best_mean(problem, [one for one in scored if one is not None], networks)
     return ensemble, search.trials
@@ -159,14 +161,14 @@ def _search_structure(
     assert isinstance(problem, EnergyProblem)
     starts = _Starts(problem, units_max, seed)
     kinds = [problem.regressors(*kind) for kind in _kinds(form, radial, problem.X.shape[1])]
-    found = search.try_all(
+    best_of_kinds = search.try_all(
         (starts.random(kind, _FIRST, "kind") for kind in kinds for _ in range(_KIND_STARTS)),
         budget.count(_KIND_ITERATIONS, 10),
     )
-    found.sort(key=lambda one: one.error)
-    found = list({one.kind: one for one in reversed(found)}.values())[::-1]
+    best_of_kinds.sort(key=lambda one: one.error)
+    best_of_kinds = list({one.kind: one for one in reversed(best_of_kinds)}.values())[::-1]
     iterations = budget.count(_ITERATIONS, 10)
-    for one in found[:_GROWN]:
+    for one in best_of_kinds[:_GROWN]:
         ladder = sizes(max(len(one.theta), 2), starts.most(one.regressors))
         search.grow(
             partial(starts.grown, one.regressors),
@@ -179,10 +181,10 @@ def _search_structure(
     best = search.best
     if best.error <= target or not len(best.theta):
         return
-    rng = np.random.default_rng([seed, len(found)])
+    rng = np.random.default_rng([seed, len(best_of_kinds)])
     further = []
     for _ in range(budget.count(_RANDOM * _more(problem), 0)):
-        another = found[int(rng.integers(min(3, len(found))))]
+        another = best_of_kinds[int(rng.integers(min(3, len(best_of_kinds))))]
         regressors = (best if rng.random() < _SAME_KIND else another).regressors
         units = max(1, round(len(best.theta) * rng.uniform(*_SPREAD)))
         further.append(starts.random(regressors, units, "random"))

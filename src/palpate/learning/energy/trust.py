@@ -74,12 +74,12 @@ def _slope_rows(rows: Rows) -> list[tuple[int, int]]:
 
 def _to_force(rows: Rows, samples: EnergySamples) -> np.ndarray:
     """Return (S, k, 1 + k): what errors of a solve's weighted rows make of its force, relative to it."""
-    known, k = rows.sloped, samples.felt
-    force = samples.force[known, :k]
+    rows_with_force, k = rows.sloped, samples.felt
+    force = samples.force[rows_with_force, :k]
     size = np.linalg.norm(force, axis=1)
-    to_force = np.zeros((len(known), k, 1 + k))
-    to_force[:, :, 0] = force / (size * rows.scale[known])[:, None]
+    to_force = np.zeros((len(rows_with_force), k, 1 + k))
+    to_force[:, :, 0] = force / (size * rows.scale[rows_with_force])[:, None]
     half = samples.half[:k]
     for i in range(k):
-        to_force[:, i, 1 + i] = -samples.energy[known] / (size * rows.slope_scale[:, i] * half[i])
+        to_force[:, i, 1 + i] = -samples.energy[rows_with_force] / (size * rows.slope_scale[:, i] * half[i])
     return to_force

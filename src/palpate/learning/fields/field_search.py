@@ -171,7 +171,7 @@ def layer_at_solves(
 ) -> LayerAtSolves:
     """Return the layer of the radial function that misses least of solves left out."""
     b = problem.targets
-    found: list[tuple[float, Metric]] = []
+    errors: list[tuple[float, Metric]] = []
     trials: list[Trial] = []
     for name in radials:
         began = time.monotonic()
@@ -181,9 +181,9 @@ def layer_at_solves(
             return KernelLayer.fit(metric, problem.X[kept], b[kept]).predict(problem.X[out])
 
         error = problem.left_out(answers)
-        found.append((error, metric))
+        errors.append((error, metric))
         trials.append(Trial("at solves", "axis-aligned", name, len(b), error, time.monotonic() - began))
-    error, metric = min(found, key=lambda pair: pair[0])
+    error, metric = min(errors, key=lambda pair: pair[0])
     return LayerAtSolves(KernelLayer.fit(metric, problem.X, b), error, tuple(trials))
 
 

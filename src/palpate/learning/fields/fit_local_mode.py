@@ -195,17 +195,17 @@ def fit_variation(
         return None
     contact_points, normals = solves.contact_points
     axes = directions(normals)
-    told = np.hstack([contact_points @ axes.T, solves.X[:, 3:]])
-    low, high = told.min(axis=0), told.max(axis=0)
+    variables = np.hstack([contact_points @ axes.T, solves.X[:, 3:]])
+    low, high = variables.min(axis=0), variables.max(axis=0)
     scales = np.array([(low + high) / 2, np.maximum((high - low) / 2, 1e-9)])
-    powers = degrees(told.shape[1])
+    powers = degrees(variables.shape[1])
     empty = np.zeros((_IN_DEPTH, len(powers), local_mode.table.shape[1], OFFSETS, solves.components))
     regressors = _variation_regressors(Variation(empty, powers, axes, scales), local_mode, amplitude, solves)
     fit = _Fit(regressors, solves, remainder, powers.sum(axis=1))
     base, missed = _best_base(fit, parts)
     if missed > _GAIN:
         return None
-    return Variation(fit.table(base, np.arange(len(told))), powers, axes, scales)
+    return Variation(fit.table(base, np.arange(len(variables))), powers, axes, scales)
 
 
 def directions(normals: np.ndarray) -> np.ndarray:
@@ -285,9 +285,9 @@ class _Fit:
         """Coefficients (q, m, r, 4, components) from solves (rows,)."""
         size = base ** (-self._total / 2.0)
         touches = (self._regressors.touches[rows] * size).reshape(len(rows), -1)
-        found = by_conjugate_gradients(self._grams[rows], touches, self._sides[rows])
+        solution = by_conjugate_gradients(self._grams[rows], touches, self._sides[rows])
         (r, components), (q, m) = self._regressors.shape, self._regressors.touches.shape[1:]
-        free = np.einsum("kl,flc->fkc", self._prior, found).reshape(q, m, r, OFFSETS, components)
+        free = np.einsum("kl,flc->fkc", self._prior, solution).reshape(q, m, r, OFFSETS, components)
         return np.asarray(free * size[None, :, None, None, None])
 
 

@@ -100,8 +100,8 @@ def learn_snapshots(
             f"modes_max={modes_max}, units_max={units_max}, radius={radius} allow no learning.",
             fix="Give positive numbers.",
         )
-    known = (inputs, surface, radius, points, triangles, mass, radius_input)
-    solves = Solves.of(snapshots, *known).touching
+    context = (inputs, surface, radius, points, triangles, mass, radius_input)
+    solves = Solves.of(snapshots, *context).touching
     tolerance = _TOLERANCE * solves.size if tolerance is None else tolerance
     length = radius / 10.0 if length is None else length
     with threadpool_limits(1):  # small matrices: more BLAS threads cost time and the bits of the result
@@ -143,13 +143,13 @@ def _learnt(
     """The coefficients' network, its left-out error and what was tried: a unit at each solve, or a few that move."""
     whole = layer_at_solves(best.problem)
     target = 0.1 * best.truncation
-    found, error, trials = search_coefficients(
+    network_of_b, error, trials = search_coefficients(
         best.problem, units_max=units_max, budget=budget, target=target, seed=seed, workers=workers
     )
     names, scaling = _outputs(best, inputs)
     if whole.error < error:
         return whole.network(inputs, names, scaling), whole.error, (*whole.trials, *trials)
-    network = replace(freeze_refined(found, inputs, names, scaling), meta={})
+    network = replace(freeze_refined(network_of_b, inputs, names, scaling), meta={})
     return network, error, (*whole.trials, *trials)
 
 
@@ -178,8 +178,8 @@ def learn_displacement(data: Dataset, **options: Any) -> LearntField:
     """
     data = data.ok
     nodes, triangles = np.unique(data.triangles, return_inverse=True)
-    known = {"inputs": data.ranges, "points": data.rest[nodes], "triangles": triangles.reshape(-1, 3)}
-    return learn_field(data.X, data.displacement[:, nodes], **(known | options))
+    context = {"inputs": data.ranges, "points": data.rest[nodes], "triangles": triangles.reshape(-1, 3)}
+    return learn_field(data.X, data.displacement[:, nodes], **(context | options))
 
 
 def learn_field(

@@ -102,8 +102,8 @@ class Solves:
             else SurfaceInterpolation.of(one.points, one.triangles, points, facing)
             for one in snapshots
         )
-        known = (surface, radius, points, triangles, mass, radius_input)
-        return cls(tuple(snapshots), tuple(inputs), *known, interpolations)
+        context = (surface, radius, points, triangles, mass, radius_input)
+        return cls(tuple(snapshots), tuple(inputs), *context, interpolations)
 
     @property
     def touching(self) -> Solves:
@@ -197,8 +197,13 @@ class Solves:
 
     def _touches(self, amplitude: DepthAmplitude) -> list[np.ndarray]:
         """Return s, f, contact point, normal and further inputs of the snapshots, each (N, 8 + p)."""
-        known = (self.depth[:, None], amplitude.at(self.depth)[:, None], *self.contact_points, self.X[:, 3:])
-        return self._split(np.hstack(known))
+        columns = (
+            self.depth[:, None],
+            amplitude.at(self.depth)[:, None],
+            *self.contact_points,
+            self.X[:, 3:],
+        )
+        return self._split(np.hstack(columns))
 
     def remainder(self, local_mode: LocalMode | None, amplitude: DepthAmplitude) -> np.ndarray:
         """Return the rest that a local mode leaves of the fields at the nodes that are shown, (N, nodes, components).

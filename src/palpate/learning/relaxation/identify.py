@@ -136,9 +136,9 @@ def identify_behind_pad(records: Sequence[Record], *, most: int = MOST) -> Ident
     relaxation = _relaxation_of(x, n)
     order = np.argsort(relaxation.times)
     shares, times = np.array(relaxation.shares)[order], np.array(relaxation.times)[order]
-    found = Relaxation(tuple(zip(shares.tolist(), times.tolist(), strict=True)), relaxation.pad)
+    behind_pad = Relaxation(tuple(zip(shares.tolist(), times.tolist(), strict=True)), relaxation.pad)
     return Identified(
-        found, (shares * error[:n])[order], times * error[n : 2 * n][order], noise, deepest.scores
+        behind_pad, (shares * error[:n])[order], times * error[n : 2 * n][order], noise, deepest.scores
     )
 
 

@@ -202,11 +202,11 @@ def _along(name: str, times: np.ndarray, depths: np.ndarray, touch: Vector, inwa
 
 
 def _unit(vector: Vector) -> np.ndarray:
-    found = np.asarray(vector, dtype=float)
-    length = np.linalg.norm(found)
-    if found.shape != (3,) or not 0 < length < np.inf:
+    direction = np.asarray(vector, dtype=float)
+    length = np.linalg.norm(direction)
+    if direction.shape != (3,) or not 0 < length < np.inf:
         raise UsageError(f"{vector!r} is no direction.", fix="Give a vector (3,) that isn't zero.")
-    return np.asarray(found / length)
+    return np.asarray(direction / length)
 
 
 def _tangents(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

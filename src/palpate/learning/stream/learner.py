@@ -344,9 +344,9 @@ def _skip(units: int, why: str) -> Event:
 def _fits(observation: Observation, n: int, m: int) -> bool:
     """True where an observation's arrays are those of n inputs and m outputs."""
     fits = observation.x.shape == (n,) and observation.y.shape == (m,)
-    for known, weight, q in (
+    for derivative, weight, q in (
         (observation.slopes, observation.slope_weight, n),
         (observation.curvatures, observation.curvature_weight, n * (n + 1) // 2),
     ):
-        fits = fits and (known is None or known.shape == (m, q)) and np.shape(weight) in {(), (q,)}
+        fits = fits and (derivative is None or derivative.shape == (m, q)) and np.shape(weight) in {(), (q,)}
     return fits

@@ -121,23 +121,23 @@ def refined_state(
     penalty = max(refining.ridge, 1e-30)
     rows = _rows(state, kept, settings, np.where(judging, 0.0, weights))
     start, damping, new = _start(state, kept, settings, refining, last)
-    found = levenberg_step(rows, start, penalty * rows.total, damping=damping, tries=refining.tries)
+    step = levenberg_step(rows, start, penalty * rows.total, damping=damping, tries=refining.tries)
     before = _error(
         rows, kept, judging, weights, state.theta, project(rows, state.theta, penalty * rows.total)
     )
-    after = _error(rows, kept, judging, weights, found.theta, found.fit)
+    after = _error(rows, kept, judging, weights, step.theta, step.fit)
     better = not after > before
-    theta = found.theta if better else state.theta
+    theta = step.theta if better else state.theta
     everything = _rows(state, kept, settings, weights)
     fit = project(everything, theta, penalty * everything.total)
     squares = float((fit.residual[: len(everything.X)] ** 2).sum())
     rms = float(np.sqrt(squares / (everything.total * state.outputs)))
     progress = Progress(
-        damping=found.damping,
-        gain=found.gain,
+        damping=step.damping,
+        gain=step.gain,
         rms=rms,
         expected=min(before, after) if judging.any() else rms,
-        scout=None if better else found.theta,
+        scout=None if better else step.theta,
         since=0 if better else 1 if new else last.since + 1,
         failed=0 if better else last.failed + (new and last.since > 0),
     )
@@ -157,7 +157,7 @@ def _continued(
     """Return the filter's state with other parameters and their posterior."""
     new = len(theta) - state.units
     refined = replace(_refined(state, settings, theta, coefficients), rms=progress.expected)
-    found = posterior(
+    posterior_of_units = posterior(
         *(refined, kept.X, settings),
         modes=state.modes,
         weights=weights,
@@ -168,11 +168,11 @@ def _continued(
         state,
         coefficients=coefficients,
         theta=theta,
-        covariance=found.covariance,
-        places=found.places,
+        covariance=posterior_of_units.covariance,
+        places=posterior_of_units.places,
         silent=np.append(state.silent, np.zeros(new, np.int64)),
         innovation=min(state.innovation, progress.expected**2),
-        mode_coefficients=found.mode_coefficients,
+        mode_coefficients=posterior_of_units.mode_coefficients,
     )
     return replace(state, errors=_window_errors(state, settings))
 
@@ -189,12 +189,12 @@ def _judging(kept: Reservoir, weights: np.ndarray, refining: Refining) -> np.nda
 
 def _rows(state: State, kept: Reservoir, settings: Settings, weights: np.ndarray) -> Rows:
     of = settings.regressors(state.inputs)
-    known: dict[str, Any] = {}
+    derivatives: dict[str, Any] = {}
     if kept.slopes is not None:
-        known |= {"slopes": kept.slopes, "slope_weight": kept.slope_weights}
+        derivatives |= {"slopes": kept.slopes, "slope_weight": kept.slope_weights}
     if kept.curvatures is not None:
-        known |= {"curvatures": kept.curvatures, "curvature_weight": kept.curvature_weights}
-    return Rows.of(of, kept.X, kept.Y, weights=weights, **known)
+        derivatives |= {"curvatures": kept.curvatures, "curvature_weight": kept.curvature_weights}
+    return Rows.of(of, kept.X, kept.Y, weights=weights, **derivatives)
 
 
 def _error(

@@ -285,13 +285,13 @@ def _result(rows: Rows, point: _Point, count: int, done: bool, error: float) -> 
     reduced = errors_without_each_unit(rows, fit, len(point.theta), shared=even, most=_MOST_LEVERAGE)
     F = rows.matrix(point.theta)
     squares = float((fit.residual[: len(rows.X)] ** 2).sum())
-    judged = float(np.sqrt((missed**2).sum() / (rows.total * m)))
+    test_error = float(np.sqrt((missed**2).sum() / (rows.total * m)))
     return Refined(
         rows.regressors,
         point.theta,
         fit.coefficients @ rows.modes,
         float(np.sqrt(squares / (rows.total * m))),
-        judged if judges else float("inf"),
+        test_error if judges else float("inf"),
         float(np.linalg.cond(F)) if F.size else 1.0,
         count,
         done,

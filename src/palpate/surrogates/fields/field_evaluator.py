@@ -48,8 +48,8 @@ class FieldEvaluator:
         self._profile = np.zeros((table.shape[1], OFFSETS, surrogate.rest.shape[1]))
         self._second: tuple[Any, ...] = (self._profile, self._place, deepest, table, *others)
         line = np.zeros(self._profile[0].size)
-        known = (self._flat, self._z, self._place, np.ascontiguousarray(rows), self._profile, line)
-        self._third: tuple[Any, ...] = (*known, *surrogate.moving_arguments())
+        arguments = (self._flat, self._z, self._place, np.ascontiguousarray(rows), self._profile, line)
+        self._third: tuple[Any, ...] = (*arguments, *surrogate.moving_arguments())
         self._shape = (n - 3,)
         low = np.array([r.low for r in surrogate.inputs])
         self(low[:3], low[3:])  # compile now, not in the loop

@@ -218,8 +218,8 @@ def profile_arguments(local_mode: LocalMode | None, deepest: float) -> tuple[Any
         return deepest, table, *none, np.zeros((0, 2)), np.zeros(4)
     q, m = own.table.shape[:2]
     degrees = np.zeros((own.powers.shape[1], max(int(own.powers.max(initial=0)), 1) + 1))
-    known = (own.table.reshape(q * m, -1), own.powers, own.axes, own.scales)
-    return deepest, table, *known, degrees, np.zeros(4 + 5 * m)
+    arguments = (own.table.reshape(q * m, -1), own.powers, own.axes, own.scales)
+    return deepest, table, *arguments, degrees, np.zeros(4 + 5 * m)
 
 
 def moving_values(
@@ -239,11 +239,11 @@ def moving_values(
         At rest, m.
     """
     components = 1 if len(local_mode.table) == 1 else 3
-    known = profile_arguments(local_mode, deepest)
+    arguments = profile_arguments(local_mode, deepest)
     profile = np.zeros((local_mode.table.shape[1], OFFSETS, components))
     out, line = np.zeros((len(touches), len(points), components)), np.zeros(OFFSETS * components)
     points, every = np.ascontiguousarray(points), np.arange(len(points))
     for touch, values in zip(np.ascontiguousarray(touches), out, strict=True):
-        profile_into(profile, touch, *known)
+        profile_into(profile, touch, *arguments)
         moving_into(values.reshape(-1), touch, profile, line, local_mode.reach, every, points)
     return out

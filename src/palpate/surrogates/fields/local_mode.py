@@ -86,14 +86,14 @@ class Variation:
             return False
         shapes = table.shape[1] == len(powers) and table.shape[3] == OFFSETS and axes.shape[1] == 3
         sizes = min(table.shape[0], table.shape[2]) >= 4 and table.shape[4] in (1, 3)
-        known = np.isfinite(table).all() and np.isfinite(axes).all() and np.isfinite(scales).all()
+        finite = np.isfinite(table).all() and np.isfinite(axes).all() and np.isfinite(scales).all()
         signs = (scales[1] > 0).all() and (powers >= 0).all() and len(axes) <= powers.shape[1]
-        return bool(shapes and sizes and known and signs)
+        return bool(shapes and sizes and finite and signs)
 
     def variables(self, feet: np.ndarray, parameters: np.ndarray) -> np.ndarray:
         """Scaled variables (N, v) of feet (N, 3) in m and further inputs (N, p)."""
-        told = np.hstack([feet @ self.axes.T, parameters])
-        return np.asarray(np.clip((told - self.scales[0]) / self.scales[1], -1.0, 1.0))
+        variables = np.hstack([feet @ self.axes.T, parameters])
+        return np.asarray(np.clip((variables - self.scales[0]) / self.scales[1], -1.0, 1.0))
 
 
 def polynomials(variables: np.ndarray, powers: np.ndarray) -> np.ndarray:

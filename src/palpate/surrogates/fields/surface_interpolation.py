@@ -66,13 +66,13 @@ def _neighbours(
     points: np.ndarray, normals: np.ndarray, places: np.ndarray, facing: np.ndarray, count: int
 ) -> np.ndarray:
     """The nearest nodes (Q, count) of each place; those that face another way count as farther."""
-    found = np.empty((len(places), count), dtype=np.int64)
+    nearest = np.empty((len(places), count), dtype=np.int64)
     for i, (place, normal) in enumerate(zip(places, facing, strict=True)):
         square = ((points - place) ** 2).sum(axis=1)
         around = np.partition(square, count - 1)[count - 1]
         square = square + FACING * around * ((normals - normal) ** 2).sum(axis=1)
-        found[i] = np.argpartition(square, count - 1)[:count]
-    return found
+        nearest[i] = np.argpartition(square, count - 1)[:count]
+    return nearest
 
 
 def _weights(offsets: np.ndarray, facing: np.ndarray) -> np.ndarray:

@@ -134,15 +134,15 @@ def _sprinkled(corners: np.ndarray, distance: float) -> np.ndarray:
     """Centroids (K, 3) of the triangles (t, 3, 3), each split evenly until its sides are below a distance."""
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     parts = np.maximum(1, np.ceil(sides / distance)).astype(int)
-    found = []
+    pieces = []
     for n in np.unique(parts):
         i, j = np.nonzero(np.add.outer(np.arange(n), np.arange(n)) < n)
         up = np.stack([i + 1 / 3, j + 1 / 3], axis=1)
         down = up[i + j < n - 1] + 1 / 3
         weights = np.concatenate([up, down]) / n
         whole = np.concatenate([weights, 1 - weights.sum(axis=1, keepdims=True)], axis=1)
-        found.append(np.einsum("kc,tcx->tkx", whole, corners[parts == n]).reshape(-1, 3))
-    return np.concatenate(found)
+        pieces.append(np.einsum("kc,tcx->tkx", whole, corners[parts == n]).reshape(-1, 3))
+    return np.concatenate(pieces)
 
 
 def _means(points: np.ndarray, size: float) -> np.ndarray:

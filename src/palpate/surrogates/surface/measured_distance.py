@@ -230,11 +230,11 @@ def _over(
     facing = outward[0] ** 2 + outward[1] ** 2 + outward[2] ** 2
     if facing == 0.0:
         return height
-    found = 0.0
+    product = 0.0
     for x in range(3):
         at = weights[0] * corners[0, x] + weights[1] * corners[1, x] + weights[2] * corners[2, x]
-        found += (c[x] - at) * outward[x]
-    return float(found / np.sqrt(facing))
+        product += (c[x] - at) * outward[x]
+    return float(product / np.sqrt(facing))
 
 
 @_jit
@@ -339,7 +339,7 @@ def _profile_into(
     end = behind + TURN * radius
     for k in range(a.size):
         r = np.hypot(max(a[k], 0.0), z[k])
-        found = _about_border(a[k] <= 0.0, z[k], r, a[k] * a[k], radius, shoulder)
-        distances[k], kinds[k] = found
+        distance_and_kind = _about_border(a[k] <= 0.0, z[k], r, a[k] * a[k], radius, shoulder)
+        distances[k], kinds[k] = distance_and_kind
         if z[k] < 0.0 and r > behind:
             distances[k], kinds[k] = _turned(distances[k], r, behind, end), BEHIND

@@ -235,15 +235,15 @@ def _fitted(
     order = np.argsort(pieces.ravel(), kind="stable")
     begin = np.searchsorted(pieces.ravel()[order], np.arange(pieces.max() + 2))
     fans = [order[begin[k] : begin[k + 1]] for k in range(len(begin) - 1)]
-    found = []
+    fitted = []
     for piece in chosen.tolist():
         vertex = mesh.triangles.ravel()[fans[piece][0]]
         ring = np.unique(pieces[fans[piece] // 3])
         near = np.unique(mesh.triangles[np.concatenate([fans[k] for k in ring]) // 3])
         normal = _paraboloid(mesh.points[near[near != vertex]] - mesh.points[vertex], normals[piece])
         if normal @ normals[piece] > FARTHEST:
-            found.append((piece, normal))
-    return found
+            fitted.append((piece, normal))
+    return fitted
 
 
 def _paraboloid(around: np.ndarray, normal: np.ndarray) -> np.ndarray:

@@ -97,11 +97,11 @@ def flat(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str
 
 def sources(validations: Sequence[Validation]) -> list[tuple[str, str]]:
     """Return what was judged anywhere, and where its threshold comes from."""
-    judged = {c.criterion.key: c.criterion for v in validations for c in v.checks}
+    criteria = {c.criterion.key: c.criterion for v in validations for c in v.checks}
     known = [c.key for c in CRITERIA]
     # in the order of the table of limits, then those of a kind's own
-    keys = [k for k in known if k in judged] + [k for k in judged if k not in known]
-    return [(judged[k].label, judged[k].source) for k in keys]
+    keys = [k for k in known if k in criteria] + [k for k in criteria if k not in known]
+    return [(criteria[k].label, criteria[k].source) for k in keys]
 
 
 def _text(value: Any) -> str:

@@ -17,7 +17,7 @@ from palpate.learning.arrays.array_samples import constant
 from palpate.learning.arrays.calibration import Evidence, calibrated, regressor_root, spread_of
 from palpate.learning.arrays.fit import fit as fit_arrays
 from palpate.learning.search import Budget, Candidate, Trial
-from palpate.learning.starts import placed
+from palpate.learning.starts import units_at_residuals
 from palpate.network import Scaling, Uncertainty
 from palpate.network.radial import RADIAL_FUNCTIONS
 from palpate.rbf.forms import unit_form
@@ -180,7 +180,7 @@ class RBFNetworkRegressor(RadialRegressor):
                 break
             # where a size brought nothing, the next one sets out from the same units with one more
             h = len(best.theta)
-            new = placed(xs, ys, best, min(max(1, h // 4) + worse, most - h), seed)
+            new = units_at_residuals(xs, ys, best, min(max(1, h // 4) + worse, most - h), seed)
             now = fit(
                 xs,
                 ys,

@@ -24,7 +24,7 @@ from palpate.learning.search import Budget
 from palpate.surrogates import Baseline, ContactLaw, Solves, Surrogate
 from palpate.surrogates.baselines import registered_baselines
 
-__all__ = ["LearningHistory", "learn"]
+__all__ = ["LearningHistory", "filter_record", "learn"]
 
 _SHOWN = {
     "displacement": ("displacement", "m"),
@@ -78,6 +78,18 @@ class LearningHistory:
         return words
 
     __repr__ = __str__
+
+
+def filter_record(history: Any) -> History | None:
+    """Return the record of the sequential filter in what a learner returned, where one ran.
+
+    Parameters
+    ----------
+    history : LearningHistory or History
+        What `palpate.learn` or a sequential learner returned beside the model; of anything else there is none.
+    """
+    own = history.filter if isinstance(history, LearningHistory) else history
+    return own if isinstance(own, History) else None
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,6 +22,7 @@ from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.learning import History, Settings, founding, learn_dataset, node_outputs
 from palpate.learning import learn as learn_samples
+from palpate.learning.learn_dataset import filter_record
 from palpate.learning.plastic import LoadHistories
 from palpate.study.memory_stages import learn_histories, sweep_histories
 from palpate.study.study import Study
@@ -131,7 +132,7 @@ class Outcome:
             test=self.test,
             validation=self.validation,
             train=self.train,
-            history=_filter_of(self.history),
+            history=self.history,
             rivals=self.rivals,
             settings=self.study.model_dump(mode="json", exclude_none=True),
             timings=self.timings,
@@ -286,12 +287,6 @@ def learn_study(
     return _with_meta(model, {"runtime": study.runtime.model_dump()}), history
 
 
-def _filter_of(history: Any) -> History | None:
-    """Return the record of the sequential filter, where one ran."""
-    own = getattr(history, "filter", history)
-    return own if isinstance(own, History) else None
-
-
 def _options(study: Study, train: Dataset, test: Any, progress: Any, log: Log) -> dict[str, Any]:
     """Return the options of `palpate.learn` for a study."""
     options: dict[str, Any] = {"name": study.name, **(study.learning.options() if study.learning else {})}
@@ -313,7 +308,7 @@ def _with_meta(model: Any, more: Mapping[str, Any]) -> Any:
 def validate_study(study: Study, model: Any, test: Rows, history: Any = None) -> Validation:
     """Judge what was learnt by solves that it has never seen, by the study's targets."""
     assert study.target is not None  # every kind of study has one
-    return validate(model, test, history=_filter_of(history), limits=study.target.limits())
+    return validate(model, test, history=filter_record(history), limits=study.target.limits())
 
 
 def with_validation(model: Any, validation: Validation) -> Any:
@@ -324,7 +319,7 @@ def with_validation(model: Any, validation: Validation) -> Any:
 def save_model(paths: Paths, model: Any, history: Any) -> None:
     """Write what was learnt, and the record of its filter where there is one."""
     model.save(paths.model)
-    if (own := _filter_of(history)) is not None:
+    if (own := filter_record(history)) is not None:
         own.save(paths.history)
 
 
@@ -403,7 +398,7 @@ def carry_out(
     model = with_validation(model, validation)
     save_model(paths, model, history)
     others: dict[str, Any] = {}
-    if rivals and (own := _filter_of(history)) is not None:
+    if rivals and (own := filter_record(history)) is not None:
         others = timed("founding form", lambda: _rivals(study, train, test, own.passes))
     return Outcome(study, model, train, test, validation, history, others, timings)
 

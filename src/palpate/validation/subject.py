@@ -17,6 +17,7 @@ from palpate.errors import UsageError
 from palpate.format import count
 from palpate.learning import History
 from palpate.learning.bent_body import hand_coordinates
+from palpate.learning.learn_dataset import LearningHistory, filter_record
 from palpate.learning.plastic import LoadHistories
 from palpate.surrogates import LearntEnergy, NodeField, Surrogate
 from palpate.surrogates.fields.field_surrogate import FieldSurrogate
@@ -93,7 +94,7 @@ class Subject:
         model: Any,
         test: Any,
         *,
-        history: History | None = None,
+        history: History | LearningHistory | None = None,
         refined: Dataset | TouchSolves | None = None,
         strokes: Sequence[TouchSolves] = (),
         seed: int = 0,
@@ -124,8 +125,8 @@ class Subject:
                     "A body that loads bend is judged by a dataset of its study alone.",
                     fix="Give a Dataset, without `refined` and `strokes`.",
                 )
-            return _by_load(model, line, test.ok, history, seed)
-        if history is not None:
+            return _by_load(model, line, test.ok, filter_record(history), seed)
+        if filter_record(history) is not None:
             raise UsageError("The model of an energy has no history of a filter.", fix="Leave `history` out.")
         return _by_place(model, test, refined, strokes, seed)
 

@@ -14,6 +14,7 @@ from palpate.dataset import Dataset
 from palpate.errors import AccuracyError
 from palpate.format import criterion_figure
 from palpate.learning import History
+from palpate.learning.learn_dataset import LearningHistory
 from palpate.validation.figures import FIGURES
 from palpate.validation.figures.figure import Figure
 from palpate.validation.limits import CRITERIA, Check, Limits
@@ -157,7 +158,7 @@ def validate(
     model: Any,
     test: Any,
     *,
-    history: History | None = None,
+    history: History | LearningHistory | None = None,
     refined: Dataset | TouchSolves | None = None,
     strokes: Sequence[TouchSolves] = (),
     limits: Limits | None = None,
@@ -172,8 +173,9 @@ def validate(
     test : Dataset, TouchSolves or load histories
         Rows that did not converge, or that the model was trained on, are left out. `TouchSolves` holds arrays. A body
         with memory is judged by load histories.
-    history : History, optional
-        Record of the sequential filter, where there was one; its held-out error tells whether it was stable.
+    history : LearningHistory or History, optional
+        What `palpate.learn` returned beside the model, or the record of a sequential filter alone: its held-out
+        error tells whether the filter was stable.
     refined : Dataset or TouchSolves, optional
         Some of the places solved with half the element size, at least 20: they give the mesh's own error.
     strokes : sequence of TouchSolves, optional

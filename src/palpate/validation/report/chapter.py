@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+from palpate.learning import History
+from palpate.learning.learn_dataset import filter_record
 from palpate.validation.figures.history_following import Followed, follow_unseen
 from palpate.validation.subject import Subject
 from palpate.validation.validate import Validation
@@ -30,8 +32,8 @@ class Chapter:
         Of `model` on `test`.
     train : Dataset or load histories, optional
         Solves that were learnt from.
-    history : optional
-        Record of the sequential filter, where there was one, or of another search.
+    history : LearningHistory or History, optional
+        What `palpate.learn` returned beside the model, or the record of a sequential filter alone.
     rivals : mapping of str to History, optional
         Other runs to draw beside it, for example the founding form with tightened thresholds.
     settings : mapping, optional
@@ -52,6 +54,11 @@ class Chapter:
     settings: Mapping[str, Any] = field(default_factory=dict)
     timings: Mapping[str, float] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def filter(self) -> History | None:
+        """Record of the sequential filter, where one ran."""
+        return filter_record(self.history)
 
     @cached_property
     def subject(self) -> Subject:

@@ -51,8 +51,8 @@ def load_pictures(chapter: Chapter, key: str) -> list[Picture]:
     if model is None or data is None or v.networks is None:
         return []
     made = [_shapes(chapter, model, data, key), error_picture(chapter, model, data, key)]
-    if chapter.history is not None:
-        made.append(growth_picture(chapter, key))
+    if (filtered := chapter.filter) is not None:
+        made.append(growth_picture(chapter, filtered, key))
     return [*made, _force(chapter, model, data, key), outer_picture(chapter, key)]
 
 

@@ -75,9 +75,8 @@ def error_picture(chapter: Chapter, model: Surrogate, data: Dataset, key: str) -
     )
 
 
-def growth_picture(chapter: Chapter, key: str) -> Picture:
+def growth_picture(chapter: Chapter, h: History, key: str) -> Picture:
     """Draw the growth and pruning of the sequential filter."""
-    h: History = chapter.history
     text = _grown(h) + _compared(chapter.rivals)
     return picture(
         f"{key}-growth",

@@ -124,10 +124,10 @@ def _learnt(chapter: Chapter) -> str:
     used = chapter.meta.get("refinement", {}).get("used")
     own, refined = v.networks.filter, v.networks.refined
     text = ""
-    if own is not None and chapter.history is not None:
+    if own is not None and chapter.filter is not None:
         text = (
-            f"A sequential filter met the solves one at a time, {count(chapter.history.units.size, 'observation')} in "
-            f"{count(chapter.history.passes, 'pass', 'passes')}, ended with {count(own.units, 'unit')} and came within "
+            f"A sequential filter met the solves one at a time, {count(chapter.filter.units.size, 'observation')} in "
+            f"{count(chapter.filter.passes, 'pass', 'passes')}, ended with {count(own.units, 'unit')} and came within "
             f"{length(own.rmse)} (root mean square). "
         )
     solves = f" from {count(used, 'solve')}" if isinstance(used, int) else ""

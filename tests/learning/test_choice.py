@@ -7,9 +7,11 @@ import pytest
 
 from palpate.errors import UsageError
 from palpate.learning.arrays.fit import fit
+from palpate.learning.arrays.fit_notes import wild_rows
 from palpate.learning.arrays.held_out import HeldOut, carry, start_units
-from palpate.learning.arrays.members import Member, expected_error, refit_weights
+from palpate.learning.arrays.members import Crossed, refit_weights
 from palpate.learning.ensemble import Ensemble
+from palpate.learning.folds import fold_masks, near_places
 from palpate.learning.kernel_layer import KernelLayer, Metric, likely_metric, negative_likelihood
 from palpate.learning.search import Candidate
 from palpate.network.radial import RADIAL_FUNCTIONS
@@ -198,15 +200,14 @@ def test_an_ensemble_is_the_mean_of_its_members_and_errs_no_more_than_they_on_av
         split = HeldOut.of(xs, ys, share=0.2, seed=0, fold=k)
         assert len(split.X) + len(split.unseen[0]) == 120
         found = split.evaluate(split.enter("rotated", 90, np.ones(3), k), 20)
-        members.append(Member(refit_weights(found.network, xs, ys, 1e-10), found.error))
-    mean = Ensemble(tuple(member.network for member in members))
+        members.append(refit_weights(found.network, xs, ys, 1e-10))
+    mean = Ensemble(tuple(members))
     (A, b), (weights, tail) = mean.regressors.form.factors(mean.theta), mean.weights_and_tail
     v = np.einsum("kri,ni->nkr", A, xt) - b
     together = 1 / np.sqrt(1 + (v * v).sum(axis=2)) @ weights + np.c_[np.ones(len(xt)), xt] @ tail
-    np.testing.assert_allclose(together, np.mean([m.network.predict(xt) for m in members], axis=0), rtol=1e-9)
-    squares = np.mean([((m.network.predict(xt) - yt) ** 2).mean() for m in members])
+    np.testing.assert_allclose(together, np.mean([m.predict(xt) for m in members], axis=0), rtol=1e-9)
+    squares = np.mean([((m.predict(xt) - yt) ** 2).mean() for m in members])
     assert ((together - yt) ** 2).mean() <= squares
-    assert expected_error(members, xs) <= np.sqrt(np.mean([m.error**2 for m in members]))
 
 
 def test_what_is_handed_over_is_about_as_good_as_the_best_that_was_tried():
@@ -217,3 +218,60 @@ def test_what_is_handed_over_is_about_as_good_as_the_best_that_was_tried():
     Z = np.random.default_rng(1).uniform(-1, 1, (500, 2))
     error = np.sqrt(((found.network.predict(Z) - np.sin(Z)) ** 2).mean()) / np.sin(Z).std()
     assert error < 5.0 * min(trial.error for trial in found.trials)
+
+
+class Offset:
+    """A network whose every answer is off by so much."""
+
+    def __init__(self, off: float) -> None:
+        self.off = off
+
+    def predict(self, X: np.ndarray) -> np.ndarray:
+        return np.full((len(X), 1), self.off)
+
+
+def crossed(offsets: list[float], samples: int = 50) -> Crossed:
+    """Two rounds of five folds over outputs that are zero; round k's networks are off by the k-th half of these."""
+    X = np.random.default_rng(0).uniform(-1, 1, (samples, 2))
+    masks = np.concatenate([fold_masks(np.arange(samples), 5, seed=k) for k in (0, 1)])
+    networks = tuple(map(Offset, offsets))
+    return Crossed(networks, masks, np.repeat([0, 1], 5), X, np.zeros((samples, 1)))
+
+
+def test_the_error_of_a_mean_is_measured_where_its_networks_had_not_learnt():
+    """Networks off by 3 and −1: pairs miss 1, half their squared distance is 8, a mean of ten misses less of it."""
+    both = crossed([3.0] * 5 + [-1.0] * 5)
+    assert both.judged.all()
+    np.testing.assert_allclose(both.missed, -1.0)
+    # 1 − (½ − 1/10) 8 is below one half of the pairs' square: no more than that is believed
+    assert both.error == pytest.approx(np.sqrt(0.5))
+    near = crossed([1.1] * 5 + [0.9] * 5)
+    assert near.error == pytest.approx(np.sqrt(1.0 - 0.4 * 0.5 * 0.2**2))
+
+
+def test_a_network_that_was_caught_elsewhere_is_left_out():
+    offsets = [0.01, -0.01, 0.0, 0.02, -0.02, 0.01, -0.01, 5.0, 0.01, 0.0]
+    whole = crossed(offsets)
+    kept = whole.without_strays()
+    assert [network.off for network in kept.networks] == [o for o in offsets if o < 1]
+    assert kept.judged.all()
+    assert kept.error < 0.1 * whole.error
+
+
+@pytest.mark.parametrize("inputs", [1, 3])
+def test_near_copies_are_one_place(inputs):
+    rng = np.random.default_rng(0)
+    X = rng.uniform(-1, 1, (60, inputs)) if inputs > 1 else np.linspace(-1, 1, 60)[:, None]
+    star = np.concatenate([X + 1e-4 * e for e in np.vstack([np.zeros(inputs), np.eye(inputs)])])
+    places = near_places(star).reshape(-1, 60)
+    assert (places == places[0]).all()
+    assert len(np.unique(places)) == len(np.unique(near_places(X)))
+    assert len(np.unique(near_places(X))) >= 57  # scattered places and grids are no copies
+
+
+def test_wild_samples_are_told_and_corners_are_not():
+    missed = np.random.default_rng(0).normal(size=(200, 1)) * 0.05
+    assert not len(wild_rows(missed))
+    missed[17] = 3.0
+    assert wild_rows(missed).tolist() == [17]
+    assert not len(wild_rows(1e-3 * missed))  # far beyond the others, but small beside the outputs

@@ -3,8 +3,45 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
 
-__all__ = ["fold_masks", "fold_numbers", "held_out"]
+__all__ = ["fold_masks", "fold_numbers", "held_out", "near_places"]
+
+_NEIGHBOURS = 10  # away: how far places are from each other, whatever copies there are of each
+_NEAR = (
+    0.05  # of that distance: copies of one place, such as a stand's returns or a star of finite differences
+)
+_SOME = 1000  # samples tell the typical distance
+
+
+def near_places(X: np.ndarray) -> np.ndarray:
+    """Return the number (N,) of each sample's place; copies, exact or nearly, are at one place.
+
+    Samples are nearly copies where they are twenty times nearer to each other than a tenth neighbour typically is.
+
+    Parameters
+    ----------
+    X : (N, n) array
+        Scaled inputs.
+    """
+    exact, own = np.unique(X, axis=0, return_inverse=True)
+    neighbours = min(_NEIGHBOURS, len(exact) // 4)
+    if neighbours < 1:
+        return np.asarray(own.ravel())
+    some = exact[np.linspace(0, len(exact) - 1, min(len(exact), _SOME)).astype(int)]
+    far = np.asarray(KDTree(exact).query(some, neighbours + 1)[0])[:, -1]
+    reach = _NEAR * float(np.median(far))
+    if reach <= 0.0:
+        return np.asarray(own.ravel())
+    # what is in one cell is near: so pairs are sought among cells, however many copies a place has
+    cells = np.floor(exact * (np.sqrt(exact.shape[1]) / reach))
+    _, first, cell = np.unique(cells, axis=0, return_index=True, return_inverse=True)
+    pairs = KDTree(exact[first]).query_pairs(reach, output_type="ndarray")
+    ones = np.ones(len(pairs), dtype=bool)
+    graph = coo_array((ones, (pairs[:, 0], pairs[:, 1])), shape=(len(first), len(first)))
+    return np.asarray(connected_components(graph, directed=False)[1][cell.ravel()][own.ravel()])
 
 
 def fold_numbers(groups: np.ndarray, folds: int, *, seed: int = 0) -> np.ndarray:
@@ -25,21 +62,21 @@ def fold_numbers(groups: np.ndarray, folds: int, *, seed: int = 0) -> np.ndarray
     return np.asarray(order[own.ravel()] % folds)
 
 
-def fold_masks(groups: np.ndarray, folds: int) -> list[np.ndarray]:
+def fold_masks(groups: np.ndarray, folds: int, *, seed: int = 0) -> list[np.ndarray]:
     """Return for each fold the mask (N,) of its samples; see `fold_numbers`."""
-    fold = fold_numbers(groups, folds)
+    fold = fold_numbers(groups, folds, seed=seed)
     return [fold == k for k in range(int(fold.max()) + 1)]
 
 
-def held_out(X: np.ndarray, share: float, *, seed: int, fold: int = 0) -> tuple[np.ndarray, np.ndarray]:
+def held_out(places: np.ndarray, share: float, *, seed: int, fold: int = 0) -> tuple[np.ndarray, np.ndarray]:
     """Split samples in two: indices (N,) to learn from, in a random order, and a mask of those to judge by.
 
     Samples at one place stay together, as far as two parts can be made: a copy of what was learnt judges nothing.
 
     Parameters
     ----------
-    X : (N, n) array
-        Inputs.
+    places : (N,) array
+        Number of each sample's place; see `near_places`.
     share : float
         Of the places to judge by.
     seed : int
@@ -47,15 +84,10 @@ def held_out(X: np.ndarray, share: float, *, seed: int, fold: int = 0) -> tuple[
     fold : int
         Number of the share of that shuffle; folds beyond the last begin again.
     """
-    order = np.random.default_rng(seed).permutation(len(X))
-    place = np.unique(X, axis=0, return_inverse=True)[1].ravel()
-    copies = place.max() + 1 < len(X)
-    if copies:
-        shuffled = place[order]
-        places = shuffled[np.sort(np.unique(shuffled, return_index=True)[1])]
-    else:
-        places, place = order, np.arange(len(X))
-    count = max(1 if copies else 2, round(share * len(places)))
-    first = (fold * count) % max(1, len(places) - count + 1)
-    held = np.isin(place, places[first : first + count])
+    order = np.random.default_rng(seed).permutation(len(places))
+    shuffled = places[order]
+    dealt = shuffled[np.sort(np.unique(shuffled, return_index=True)[1])]
+    count = max(1 if len(dealt) < len(places) else 2, round(share * len(dealt)))
+    first = (fold * count) % max(1, len(dealt) - count + 1)
+    held = np.isin(places, dealt[first : first + count])
     return order[~held[order]], held

@@ -23,6 +23,7 @@ __all__ = ["CENTRES_MAX", "KernelLayer", "Metric", "likely_metric", "negative_li
 
 _SCALES = (np.log(1e-3), np.log(30.0))
 _RIDGES = (np.log(1e-11), np.log(10.0))
+STARTS = (1e-5, 0.1)  # ridges from which the likelihood is climbed
 CENTRES_MAX = 2000
 """Samples that become centres; the others are then fitted in least squares."""
 
@@ -105,19 +106,25 @@ def likely_metric(
     one = _tail(X)
     Y = Y - one @ np.linalg.lstsq(one, Y, rcond=None)[0]
     n = X.shape[1]
-    start = np.r_[np.full(n, -0.5 * np.log(n)), np.log(1e-5)]
+    scales = np.full(n, -0.5 * np.log(n))
     if not np.any(Y) or len(X) < n + 3:
-        return Metric(name, np.exp(start[:n]), 1e-8)
-    optimum = minimize(
-        negative_likelihood,
-        start,
-        args=(name, X, Y),
-        jac=True,
-        method="L-BFGS-B",
-        bounds=[_SCALES] * n + [_RIDGES],
-        options={"maxiter": iterations},
-    )
-    return Metric(name, np.exp(optimum.x[:n]), float(np.exp(optimum.x[n])))
+        return Metric(name, np.exp(scales), 1e-8)
+    # noise has two explanations, and from one start only the interpolating one is found (Rasmussen & Williams 2006,
+    # section 5.4.1)
+    optima = [
+        minimize(
+            negative_likelihood,
+            np.r_[scales, np.log(ridge)],
+            args=(name, X, Y),
+            jac=True,
+            method="L-BFGS-B",
+            bounds=[_SCALES] * n + [_RIDGES],
+            options={"maxiter": iterations},
+        )
+        for ridge in STARTS
+    ]
+    best = min(optima, key=lambda one: float(one.fun))
+    return Metric(name, np.exp(best.x[:n]), float(np.exp(best.x[n])))
 
 
 def negative_likelihood(

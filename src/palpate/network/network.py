@@ -57,12 +57,15 @@ class Scaling:
     output_scale: np.ndarray
 
     @classmethod
-    def of(cls, inputs: Sequence[Range], Y: np.ndarray, *, scale: float | None = None) -> Scaling:
-        """Scaling from declared ranges and training outputs Y (N, m), one scale for all of them."""
+    def of(
+        cls, inputs: Sequence[Range], Y: np.ndarray, *, scale: float | np.ndarray | None = None
+    ) -> Scaling:
+        """Scaling from declared ranges and training outputs Y (N, m), one scale for all of them or one each."""
         low, high = bounds(inputs)
         centre = Y.mean(axis=0)
         size = scale if scale is not None else float(np.abs(Y - centre).max())
-        return cls((low + high) / 2, (high - low) / 2, centre, np.full(Y.shape[1], size if size > 0 else 1.0))
+        sizes = np.broadcast_to(np.where(np.asarray(size) > 0, size, 1.0), Y.shape[1:]).astype(float)
+        return cls((low + high) / 2, (high - low) / 2, centre, sizes)
 
     def scale_inputs(self, X: np.ndarray) -> np.ndarray:
         """Physical inputs (…, n) to scaled ones."""

@@ -82,7 +82,7 @@ class ArrayProblem:
     basis : (k, m)
         Orthonormal.
     scaling : Scaling
-        Outputs by the standard deviation of all of them together.
+        Outputs by the standard deviation of all of one unit together.
     record : mapping
         Of the samples in SI units, for the network's `meta`.
     """
@@ -109,7 +109,7 @@ class ArrayProblem:
         X, Y, _, _, _ = samples(X, Y, inputs=len(inputs), outputs=len(outputs), fewest=FEWEST)
         spread = spread_of(Y)
         constant = not np.ptp(Y, axis=0).any() or spread <= 1e-13 * float(np.abs(Y).max())
-        scaling = Scaling.of(inputs, Y, scale=1.0 if constant else spread)
+        scaling = Scaling.of(inputs, Y, scale=1.0 if constant else _scales(Y, outputs))
         latent, basis = leading_modes(
             np.zeros_like(Y) if constant else scaling.scale_outputs(Y), most=_MODES_MAX
         )
@@ -141,6 +141,15 @@ class ArrayProblem:
         if m <= k:  # as many modes as outputs: no need of them
             return Network(self.inputs, self.outputs, A, b, basis @ W, basis @ T, self.scaling, meta, radial)
         return Network(self.inputs, self.outputs, A, b, W, T, self.scaling, meta, radial, basis)
+
+
+def _scales(Y: np.ndarray, outputs: Sequence[Quantity]) -> float | np.ndarray:
+    """Return the outputs' scale: their common spread, or where their units differ that of each unit (m,)."""
+    units = [q.unit for q in outputs]
+    if len(set(units)) == 1:
+        return float(spread_of(Y))
+    spread = {unit: float(spread_of(Y[:, [u == unit for u in units]])) for unit in set(units)}
+    return np.array([spread[unit] or 1.0 for unit in units])
 
 
 def points(X: Any, inputs: Sequence[Range]) -> np.ndarray:

@@ -8,10 +8,9 @@ were held out: of n scores |y − f|/σ of networks whose weights had not seen t
 (conformal prediction by a split or by folds: Vovk, Gammerman & Shafer 2005; Barber, Candès, Ramdas & Tibshirani
 2021). Where n is too small for that level, it is Student's quantile with n degrees of freedom.
 
-The scores are not quite those of the final network. Its form and size were chosen by these samples, which makes
-the widths narrower than they should be; its weights then learn from these samples too, which makes it better than
-the widths say. Of few samples the first weighs more. There networks of the same kind are learnt again, each without
-a fold of which it then has seen nothing, and what those miss on their folds counts where it is more.
+What is handed over is the mean of networks each of which was learnt without a fold, and the scores are of those that
+had not seen a sample, reckoned down to the mean of all (`members`). Where the work suffices for one network only, its
+weights learn from the held-out samples after those have set the widths: its form and size were chosen by them too.
 """
 
 from __future__ import annotations
@@ -19,16 +18,17 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import NormalDist
 
 import numpy as np
 from scipy.special import stdtrit
 
 from palpate.learning.arrays.array_samples import ArrayProblem, Samples
+from palpate.learning.arrays.fit_notes import notes_on
 from palpate.learning.arrays.fitted import Fitted
 from palpate.learning.arrays.held_out import HeldOut
-from palpate.learning.arrays.members import ROWS, Member
+from palpate.learning.arrays.members import ROWS, Crossed
 from palpate.learning.ensemble import Ensemble
 from palpate.learning.kernel_layer import KernelLayer
 from palpate.learning.search import Trial
@@ -191,56 +191,83 @@ class Finish:
 
     samples: Samples
     problem: ArrayProblem
-    split: HeldOut
     trials: Sequence[Trial]
     began: float
     seed: int
     level: float
+    places: np.ndarray
+    scales: np.ndarray
 
     def network(
-        self,
-        members: Sequence[Member],
-        error: float,
-        *,
-        form: str | None = None,
-        evidence: Sequence[Evidence] = (),
+        self, network: Refined, split: HeldOut, error: float, *, before: Refined, form: str | None = None
     ) -> Fitted:
-        """Return the result for one network or the mean of several; what they missed sets the intervals."""
-        mean = Ensemble(tuple(member.network for member in members))
-        evidence = [self._own(members, error), *evidence]
+        """Return the result for one network; what it missed, before its weights saw it, sets the intervals."""
+        held = split.unseen[0]
+        root = regressor_root(before, split.X)
+        evidence = Evidence(self._missed(before.predict(held), split.held), spread_of(before, root, held))
+        return self._of(Ensemble((network,)), error, evidence, split.held, form)
+
+    def crossed(self, crossed: Crossed) -> Fitted:
+        """Return the result for the mean of networks learnt crosswise, each judged by what it had not seen."""
+
+        def spread(network: Refined, unseen: np.ndarray, X: np.ndarray) -> np.ndarray:
+            if len(network.coefficients) > LARGEST:
+                return np.ones(len(X))
+            return spread_of(network, regressor_root(network, self.problem.X[~unseen]), X)
+
+        judged = crossed.judged
+        missed = self._missed(crossed.Y[judged] - crossed.missed, judged)
+        evidence = Evidence(missed * crossed.gain, crossed.spread(spread))
+        return self._of(Ensemble(crossed.networks), crossed.error, evidence, judged, None)
+
+    def _of(
+        self, mean: Ensemble, error: float, evidence: Evidence, judged: np.ndarray, form: str | None
+    ) -> Fitted:
         M = None
         if sum(len(network.coefficients) for network in mean.members) <= LARGEST:
             root = mean_root(mean.members, self.problem.X)
             M = root @ root.T
         arrays = (*mean.regressors.form.factors(mean.theta), *mean.weights_and_tail)
-        name = form or mean.regressors.form.name
-        return self._fitted(arrays, mean.regressors.radial, name, error, M, evidence)
+        name, radial = form or mean.regressors.form.name, mean.regressors.radial
+        members = [
+            (*member.regressors.form.factors(member.theta), member.weights, member.tail)
+            for member in mean.members
+        ]
+        rows = np.flatnonzero(judged)
+        return self._fitted(
+            arrays, radial, name, error, M, evidence, rows, members if len(members) > 1 else ()
+        )
 
-    def kernel_network(self, layer: KernelLayer, test_layer: KernelLayer, error: float) -> Fitted:
-        """Return the result for a kernel layer; `test_layer` is one that has not seen the samples held out."""
-        held = self.split.unseen[0]
-        M, spread = None, np.ones(len(held))
-        if len(layer.centres) <= LARGEST:
-            M, spread = kernel_covariance(layer), kernel_spread(test_layer, held)
-        evidence = [Evidence(self._missed(test_layer.predict(held), self.split), spread)]
+    def kernel_network(
+        self, layer: KernelLayer, test_layers: Sequence[tuple[KernelLayer, np.ndarray]], error: float
+    ) -> Fitted:
+        """Return the result for a kernel layer.
+
+        Parameters
+        ----------
+        layer : KernelLayer
+            The layer of all samples.
+        test_layers : sequence of (KernelLayer, mask)
+            Layers of the same metric, and the samples (N,) that each has not seen.
+        error : float
+            Error to expect per latent output.
+        """
+        M, small = None, len(layer.centres) <= LARGEST
+        if small:
+            M = kernel_covariance(layer)
+        parts = []
+        for other, unseen in test_layers:
+            held = self.problem.X[unseen]
+            spread = kernel_spread(other, held) if small else np.ones(len(held))
+            parts.append(Evidence(self._missed(other.predict(held), unseen), spread))
         arrays = (*layer.units(), layer.weights, layer.tail)
-        return self._fitted(arrays, layer.metric.radial, "kernel layer", error, M, evidence)
+        evidence = Evidence.together(parts)
+        rows = np.concatenate([np.flatnonzero(unseen) for _, unseen in test_layers])
+        return self._fitted(arrays, layer.metric.radial, "kernel layer", error, M, evidence, rows)
 
-    def evidence(self, network: Refined, split: HeldOut) -> Evidence:
-        """Return what a network that learnt from a split's samples misses on those held out."""
-        held = split.unseen[0]
-        root = regressor_root(network, split.X)
-        return Evidence(self._missed(network.predict(held), split), spread_of(network, root, held))
-
-    def _own(self, members: Sequence[Member], error: float) -> Evidence:
-        """Return each member's held-out errors, less by what their mean is expected to gain."""
-        single = float(np.sqrt(np.mean([member.error**2 for member in members])))
-        parts = [self.evidence(m.before, m.split) for m in members if m.before and m.split]
-        return Evidence.together(parts, min(1.0, error / max(single, 1e-300)))
-
-    def _missed(self, latent: np.ndarray, split: HeldOut) -> np.ndarray:
-        """Return errors (N', m) in scaled outputs of latent ones (N', k) at the held-out samples."""
-        wanted = self.problem.scaling.scale_outputs(self.samples.Y[split.held])
+    def _missed(self, latent: np.ndarray, held: np.ndarray) -> np.ndarray:
+        """Return errors (N', m) in scaled outputs of latent ones (N', k) at samples of a mask (N,)."""
+        wanted = self.problem.scaling.scale_outputs(self.samples.Y[held])
         return np.asarray(wanted - latent @ self.problem.basis)
 
     def _fitted(
@@ -250,11 +277,13 @@ class Finish:
         form: str,
         error: float,
         M: np.ndarray | None,
-        evidence: Sequence[Evidence],
+        evidence: Evidence,
+        rows: np.ndarray,
+        members: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = (),
     ) -> Fitted:
         heldout = float(error / self.problem.unit)
         network = self.problem.network(*arrays, radial, heldout=heldout)
-        return Fitted(
+        fitted = Fitted(
             network,
             form,
             radial,
@@ -262,8 +291,11 @@ class Finish:
             heldout,
             tuple(self.trials),
             time.monotonic() - self.began,
-            calibrated(network, M, evidence, self.level),
-            TrainedRegion.of(self.problem.X),
+            calibrated(network, M, [evidence], self.level),
+            TrainedRegion.of(self.problem.X, groups=self.places),
             self.level,
             self.samples.one_output,
+            tuple(self.problem.network(*one, radial, heldout=heldout) for one in members),
         )
+        notes = notes_on(self.samples, self.problem, fitted, evidence.missed, rows, self.scales)
+        return replace(fitted, notes=notes)

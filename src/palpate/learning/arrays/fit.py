@@ -2,8 +2,8 @@
 
 No form wins everywhere: ridges follow targets made of plane waves, rotated units those made of bumps, and a kernel
 layer whatever has no small structure. So a kernel layer sets the mark; every form is refined a little, and the best go
-on with more units, more samples and more iterations (see `held_out`). What work is left goes to a mean of several of
-the winner's kind, where that is worth more (see `members`).
+on with more units, more samples and more iterations (see `held_out`). Half of the work goes to networks of the winner's
+kind that are learnt crosswise: their mean is handed over, its error measured where they had not learnt (see `members`).
 
 Work is counted in multiplications, so the seed decides the result; a limit on time only ends the search early.
 """
@@ -12,25 +12,22 @@ from __future__ import annotations
 
 import math
 import time
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from palpate.learning.arrays.array_samples import ArrayProblem, Samples, check_search
-from palpate.learning.arrays.calibration import Evidence, Finish
+from palpate.learning.arrays.calibration import Finish
+from palpate.learning.arrays.fit_notes import IDLE, FitWarning
 from palpate.learning.arrays.fitted import Fitted
 from palpate.learning.arrays.held_out import RIDGE, HeldOut, carry, forms_for
-from palpate.learning.arrays.members import (
-    LOOK_SAMPLES,
-    ROWS,
-    Fresh,
-    Member,
-    expected_error,
-    refit_weights,
-)
-from palpate.learning.kernel_layer import CENTRES_MAX, KernelLayer, Metric, likely_metric
+from palpate.learning.arrays.members import LOOK_SAMPLES, ROWS, Crossed, Fresh, refit_weights
+from palpate.learning.folds import fold_masks, near_places
+from palpate.learning.kernel_layer import CENTRES_MAX, STARTS, KernelLayer, Metric, likely_metric
 from palpate.learning.pool import Pool
 from palpate.learning.search import Budget, Candidate, Trial, Work, evaluate_all
 from palpate.network.radial import RADIAL_FUNCTIONS
@@ -46,11 +43,12 @@ _SECONDS = 30.0  # that the default effort is made for: a shorter limit plans fo
 _NUMBERS = 1500  # unknowns in the units of a full-size candidate at the default effort
 _SMALL = 600  # and of one that is only looked at
 _METRIC_SAMPLES = 500  # for the likelihood
-_MEMBERS = 5
-_CROSSED_BELOW = 500  # samples: intervals then rest on networks of their own
+_FOLDS, _ROUNDS = 5, 2  # of the networks learnt crosswise
+_LAYER_FOLDS = 10  # of a kernel layer: its final one learns from all samples, and fewer would say too much
+_CROSSED_SHARE = 0.5  # of all work, for these
+_BEATEN = 1.3  # times the kernel layer's error: a mean of ten may still miss less
 _BEHIND = 1.2  # times the best error: too far for another ten iterations
 _ROUND_OFF = 1e-9  # of the outputs: nobody asks for less
-_ASTRAY = 3.0  # times the best member's error: not of its kind
 _HOPELESS = 3.0  # times the kernel layer's error after the first stages: no refinement will make up for that
 
 
@@ -102,10 +100,9 @@ def fit(
 
     Notes
     -----
-    A fifth of the samples (15 % of a thousand and more) is held out to choose by, and its errors, before any
-    weights saw it, set the intervals' widths. Then the weights are fitted to all samples: no sample is lost to the
-    calibration, and its guarantee is approximate (see `palpate.learning.arrays.calibration`). Below 500 samples,
-    where the effort allows, networks learnt without a fold are judged on it too, and the wider widths count.
+    A fifth of the samples (15 % of a thousand and more) is held out to choose by. Then ten networks, or five, are
+    learnt each without a fifth of the samples, and their mean is handed over: error and intervals are those of the
+    networks that had not seen a sample (see `palpate.learning.arrays.calibration`).
 
     Raises
     ------
@@ -123,7 +120,11 @@ def fit(
         # fitting to all samples and freezing come after the search
         budget = Budget(min(budget.effort, seconds / _SECONDS), began + 0.85 * seconds)
     with threadpool_limits(1):  # small matrices: threads would cost more than they bring
-        return _Chooser(samples, began, budget, Pool(workers), seed, target, level).chosen()
+        fitted = _Chooser(samples, began, budget, Pool(workers), seed, target, level).chosen()
+    for note in fitted.notes:
+        if not note.startswith(IDLE):
+            warnings.warn(note, FitWarning, stacklevel=2)
+    return fitted
 
 
 class _Chooser:
@@ -148,17 +149,20 @@ class _Chooser:
         self.work = Work(self.total, budget.deadline)
         self.size = min(2.0, math.sqrt(budget.effort))
         self.share = 0.15 if len(self.X) >= 1000 else 0.2
-        self.split = HeldOut.of(self.X, self.Y, share=self.share, seed=seed)
-        self.scales = np.ones(self.X.shape[1])
+        self.places = near_places(self.X)
+        self.split = self._fold(0)
+        self.scales, self.known_scales = np.ones(self.X.shape[1]), False
         self.centres = int(np.clip((0.15 * self.total) ** (1 / 3), 300, CENTRES_MAX))
         self.trials: list[Trial] = []
-        self.finish = Finish(samples, problem, self.split, self.trials, began, seed, level)
         self.ran: list[Candidate] = []
+        # for the networks learnt crosswise
+        self.reserve = _CROSSED_SHARE * self.total
+        self._finish = partial(Finish, samples, problem, self.trials, began, seed, level, self.places)
 
     def chosen(self) -> Fitted:
         tail = self._tail()
         if tail.error <= self.target:
-            return self.finish.network([self._member(tail, self.split)], tail.error, form="affine")
+            return self._single(tail, form="affine")
         metric, mark = self._kernel()
         winner = self._radials(*self._forms(mark))
         if winner.theta.size < 0.6 * _NUMBERS * self.size:
@@ -167,17 +171,28 @@ class _Chooser:
             return self._kernel_network(metric, mark)
         if winner.error > self.target:
             winner = self._run([winner], round(120 * self.size), self.split)[0]
-        if winner.network is None or winner.error > max(mark, self.target):
+        if winner.network is None or winner.error > max(_BEATEN * mark, self.target):
             return self._kernel_network(metric, mark)
-        members, error = self._finalists(winner)
-        return self.finish.network(members, error, evidence=self._crossed(winner))
+        self.reserve = 0.0
+        crossed = self._finalist(winner)
+        if crossed is None:
+            return self._kernel_network(metric, mark) if winner.error > mark else self._single(winner)
+        if len(self.X) <= self.centres and crossed.error > self.target:
+            layers, error = self._crossed_layers(metric)
+            if error < crossed.error:
+                return self._finished.kernel_network(self._layer(metric, self.X, self.Y), layers, error)
+        return self._finished.crossed(crossed)
+
+    @property
+    def _finished(self) -> Finish:
+        return self._finish(self.scales if self.known_scales else np.ones(0))
 
     def _run(
         self, candidates: Sequence[Candidate], iterations: int, split: HeldOut, *, record: bool = True
     ) -> list[Candidate]:
         """Return the candidates after so many more iterations at most, as they were where no work is left."""
         each = sum(split.work(candidate) for candidate in candidates)
-        most = min(iterations, int(self.work.left / max(each, 1.0)))
+        most = min(iterations, int((self.work.left - self.reserve) / max(each, 1.0)))
         if most < 1:
             return list(candidates)
         evaluated = evaluate_all(split, candidates, most, self.budget.deadline, self.pool)
@@ -207,19 +222,19 @@ class _Chooser:
         errors: list[tuple[float, Metric]] = []
         samples = min(len(self.split.X), round(_METRIC_SAMPLES * min(1.0, self.size)))
         for name in RADIAL_FUNCTIONS:
-            likelihood = 80.0 * samples**3
-            if errors and self.work.left < 2.0 * likelihood:  # a limit on time is near
+            likelihood = len(STARTS) * 80.0 * samples**3
+            if errors and self.work.left - self.reserve < 2.0 * likelihood:  # a limit on time is near
                 break
             metric = likely_metric(name, self.split.X, self.split.Y, samples=samples)
             self.work.spend(likelihood)
             errors.append((self._kernel_error(metric), metric))
             if name == "inverse-multiquadric":
-                self.scales = metric.scales
+                self.scales, self.known_scales = metric.scales, True
         error, best = min(errors, key=lambda pair: pair[0])
         # the likelihood was of a part of the samples: more of them may want another width
         for scale, ridge in ((1.25, 1.0), (0.8, 1.0), (1.0, 0.1), (1.0, 10.0)):
             other = best.altered(scale, ridge)
-            if self.work.left > 0.8 * self.total and not self.budget.over:
+            if self.work.left > 0.7 * self.total and not self.budget.over:
                 trial = self._kernel_error(other)
                 if trial < error:
                     error, best = trial, other
@@ -248,11 +263,25 @@ class _Chooser:
         return KernelLayer.fit(metric, X, Y, seed=self.seed, most=self.centres)
 
     def _kernel_network(self, metric: Metric, error: float) -> Fitted:
+        if len(self.X) <= self.centres:
+            layers, error = self._crossed_layers(metric)
+            return self._finished.kernel_network(self._layer(metric, self.X, self.Y), layers, error)
         some = self._kernel_rows(0.1, len(self.X))
         rows = np.sort(np.random.default_rng(self.seed).permutation(len(self.X))[:some])
         judging = self._kernel_rows(0.03, len(self.split.X))
-        test_layer = self._layer(metric, self.split.X[:judging], self.split.Y[:judging])
-        return self.finish.kernel_network(self._layer(metric, self.X[rows], self.Y[rows]), test_layer, error)
+        judged = self._layer(metric, self.split.X[:judging], self.split.Y[:judging])
+        layer = self._layer(metric, self.X[rows], self.Y[rows])
+        return self._finished.kernel_network(layer, [(judged, self.split.held)], error)
+
+    def _crossed_layers(self, metric: Metric) -> tuple[list[tuple[KernelLayer, np.ndarray]], float]:
+        """Return layers that had not seen a fold each, with those folds, and what they miss there."""
+        layers, squares = [], 0.0
+        for unseen in fold_masks(self.places, _LAYER_FOLDS):
+            layer = self._layer(metric, self.X[~unseen], self.Y[~unseen])
+            squares += float(((layer.predict(self.X[unseen]) - self.Y[unseen]) ** 2).sum())
+            self.work.spend(float((~unseen).sum()) ** 3)
+            layers.append((layer, unseen))
+        return layers, math.sqrt(squares / self.Y.size)
 
     def _forms(self, mark: float) -> tuple[Candidate, Candidate]:
         """Return the form that does best, at full size if a look needs less, and it before its last run."""
@@ -296,7 +325,7 @@ class _Chooser:
         return close[int(np.argmin(squares))]
 
     def _fold(self, k: int) -> HeldOut:
-        return HeldOut.of(self.X, self.Y, share=self.share, seed=self.seed, fold=k)
+        return HeldOut.of(self.X, self.Y, share=self.share, seed=self.seed, fold=k, places=self.places)
 
     def _radials(self, winner: Candidate, before: Candidate) -> Candidate:
         """Return the same units with the best radial function; those not far behind go on to all samples."""
@@ -321,26 +350,16 @@ class _Chooser:
             tried += self._run([fresh], max(30, winner.iterations), self.split)
         return _best_of(tried)
 
-    def _finalists(self, winner: Candidate) -> tuple[list[Member], float]:
-        """Return the members of the best mean and its error: the winner's, or a rival's if work allows."""
-        best = self._mean(winner)
-        if len(best[0]) == _MEMBERS:
-            for rival in self._rivals(winner):
-                if self.work.left < 2.0 * _MEMBERS * self._fresh(rival).work(self.split):
-                    break
-                other = self._mean(self._run([rival], rival.iterations, self.split, record=False)[0])
-                if len(other[0]) == _MEMBERS and other[1] < best[1]:
-                    best = other
-        members, error = best
-        least = min(member.error for member in members)
-        # folds differ, but not so much: such a member was caught in another minimum, and would spoil the mean
-        near = [member for member in members if member.error <= _ASTRAY * least]
-        if len(near) < len(members):
-            members, error = near, expected_error(near, self.X)
-        single = float(np.sqrt(np.mean([member.error**2 for member in members])))
-        if len(members) == 1 or error > 0.9 * single:
-            return members[:1], single
-        return members, error
+    def _finalist(self, winner: Candidate) -> Crossed | None:
+        """Return the networks of the best kind, learnt crosswise: the winner's, or a rival's if work allows."""
+        best = self._crossed(winner)
+        for rival in self._rivals(winner) if best is not None else ():
+            if self.work.left < 1.3 * _ROUNDS * _FOLDS * self._fresh(rival).work(self.split):
+                break
+            other = self._crossed(self._run([rival], rival.iterations, self.split, record=False)[0])
+            if other is not None and best is not None and other.error < best.error:
+                best = other
+        return best
 
     def _rivals(self, winner: Candidate) -> list[Candidate]:
         """Return the best of three other pairs of form and radial function, if they are not far behind."""
@@ -350,21 +369,37 @@ class _Chooser:
                 kinds.setdefault(one.kind, one)
         return [one for kind, one in kinds.items() if kind != winner.kind][:3]
 
-    def _mean(self, winner: Candidate) -> tuple[list[Member], float]:
-        """Return the winner, others of its kind from other starts and folds, and the error to expect."""
-        members, fresh = [self._member(winner, self.split)], self._fresh(winner)
-        more = int(np.clip(self.work.left / (1.3 * fresh.work(self.split)), 0, _MEMBERS - 1))
-        splits = [self._fold(k) for k in range(1, more + 1)]
-        for split, one in zip(splits, self._refined_afresh(fresh, splits), strict=True):
-            if one is not None:
-                members.append(self._member(one, split))
-        error = expected_error(members, self.X)
-        if len(members) > 1:
-            units = len(members) * len(winner.theta)
-            self.trials.append(
-                self._scaled_trial(replace(winner.trial, start="mean", units=units, error=error))
-            )
-        return members, error
+    def _crossed(self, winner: Candidate) -> Crossed | None:
+        """Return networks of the winner's kind, each learnt without a fold; nothing where the work does not suffice.
+
+        Each stops by other samples than those that it is judged by: on a handful the best iterate is there by luck.
+        """
+        fresh = self._fresh(winner)
+        rounds = min(_ROUNDS, int(self.work.left / (1.1 * _FOLDS * fresh.work(self.split))))
+        if rounds < 1:
+            return None
+        masks = [
+            (k, mask) for k in range(rounds) for mask in fold_masks(self.places, _FOLDS, seed=self.seed + k)
+        ]
+        wholes = [
+            HeldOut.without(self.X, self.Y, mask, seed=self.seed + i) for i, (_, mask) in enumerate(masks)
+        ]
+        parts = [HeldOut.of(whole.X, whole.Y, share=self.share, seed=self.seed) for whole in wholes]
+        networks, unseen, own = [], [], []
+        candidates = self._refined_afresh(fresh, parts)
+        for (k, mask), whole, one in zip(masks, wholes, candidates, strict=True):
+            if one is not None and one.network is not None:
+                networks.append(refit_weights(one.network, whole.X, whole.Y, RIDGE))
+                unseen.append(mask)
+                own.append(k)
+        if len(networks) < _FOLDS:  # a limit on time
+            return None
+        crossed = Crossed(tuple(networks), np.array(unseen), np.array(own), self.X, self.Y).without_strays()
+        units = sum(len(network.theta) for network in crossed.networks)
+        self.trials.append(
+            self._scaled_trial(replace(winner.trial, start="mean", units=units, error=crossed.error))
+        )
+        return crossed
 
     def _fresh(self, like: Candidate) -> Fresh:
         return Fresh(like, self.scales, self.budget.deadline)
@@ -376,31 +411,10 @@ class _Chooser:
             self.work.spend(split.work(fresh.like) * one.iterations if one else 0.0)
         return networks
 
-    def _member(self, one: Candidate, split: HeldOut) -> Member:
+    def _single(self, one: Candidate, form: str | None = None) -> Fitted:
         assert one.network is not None
-        return Member(refit_weights(one.network, self.X, self.Y, RIDGE), one.error, one.network, split)
-
-    def _crossed(self, winner: Candidate) -> Sequence[Evidence]:
-        """Return what networks of the winner's kind miss on folds of which they have seen nothing; of few samples only.
-
-        Each stops by other samples than those that it is judged by: on a handful the best iterate is there by luck.
-        """
-        fresh = self._fresh(winner)
-        if len(self.X) >= _CROSSED_BELOW or self.work.left < _MEMBERS * fresh.work(self.split):
-            return ()
-        wholes = [
-            HeldOut.of(self.X, self.Y, share=1.0 / _MEMBERS, seed=self.seed, fold=k) for k in range(_MEMBERS)
-        ]
-        parts = [HeldOut.of(whole.X, whole.Y, share=self.share, seed=self.seed) for whole in wholes]
-        networks = self._refined_afresh(fresh, parts)
-        if self.budget.over:  # cut short, they would say too much
-            return ()
-        evidence = []
-        for whole, one in zip(wholes, networks, strict=True):
-            if one is None or one.network is None:
-                return ()
-            evidence.append(self.finish.evidence(refit_weights(one.network, whole.X, whole.Y, RIDGE), whole))
-        return (Evidence.together(evidence),)
+        network = refit_weights(one.network, self.X, self.Y, RIDGE)
+        return self._finished.network(network, self.split, one.error, before=one.network, form=form)
 
 
 def _best_of(candidates: Sequence[Candidate]) -> Candidate:

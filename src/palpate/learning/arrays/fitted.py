@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from palpate.network.uncertainty import Uncertainty
 __all__ = ["Fitted"]
 
 _SHOWN = 5  # of what was tried
+_ASTRAY = 3.0  # calibrated deviations that members may be apart where they are trusted
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +50,10 @@ class Fitted:
         For which the intervals were calibrated.
     one_output : bool
         Whether the outputs came as (N,), and so go.
+    members : tuple of Network
+        The networks whose mean answers; none where one alone does.
+    notes : tuple of str
+        What must be known of it, such as inputs that hardly matter.
     """
 
     network: Network
@@ -61,6 +67,8 @@ class Fitted:
     region: TrainedRegion
     level: float = 0.9
     one_output: bool = False
+    members: tuple[Network, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def predict(self, X: Any) -> np.ndarray:
         """Return outputs (N, m) at inputs X (N, n); (N,) where Y was.
@@ -82,7 +90,17 @@ class Fitted:
         UsageError
             If X has the wrong shape.
         """
-        return self._shaped(self.uncertainty.deviation(points(X, self.network.inputs)))
+        return self._shaped(self._deviation(points(X, self.network.inputs)))
+
+    def _deviation(self, X: np.ndarray) -> np.ndarray:
+        """Return the calibrated deviation (N, m); the members' disagreement where that is more."""
+        return np.asarray(np.maximum(self.uncertainty.deviation(X), self.disagreement(X)))
+
+    def disagreement(self, X: np.ndarray) -> np.ndarray:
+        """Return the standard deviation (N, m) of the members' answers at X (N, n); zero for a single network."""
+        if not self.members:
+            return np.zeros((len(X), len(self.network.outputs)))
+        return np.asarray(np.std([member.predict(X) for member in self.members], axis=0))
 
     def interval(self, X: Any, level: float | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Return lower and upper bounds (N, m) for what would be measured at X (N, n), output by output.
@@ -103,11 +121,17 @@ class Fitted:
             If X has the wrong shape, or the level is no probability.
         """
         level = self.level if level is None else level
-        low, high = self.uncertainty.interval(points(X, self.network.inputs), level)
-        return self._shaped(low), self._shaped(high)
+        X = points(X, self.network.inputs)
+        low, high = self.uncertainty.interval(X, level)
+        half, middle = (high - low) / 2.0, (high + low) / 2.0
+        half = np.maximum(half, NormalDist().inv_cdf((1.0 + level) / 2.0) * self.disagreement(X))
+        return self._shaped(middle - half), self._shaped(middle + half)
 
     def trusted(self, X: Any) -> np.ndarray:
-        """Return which of X (N, n) are as near to a training sample as those are to each other, (N,) bool.
+        """Return which of X (N, n) are like the training samples, (N,) bool.
+
+        They are as near to a sample as those are to each other, and the networks whose mean answers agree there to
+        three standard deviations.
 
         Raises
         ------
@@ -116,8 +140,9 @@ class Fitted:
         """
         X = points(X, self.network.inputs)
         far = self.region.distances(self.network.scaling.scale_inputs(X))
+        agree = (self.disagreement(X) <= _ASTRAY * self.uncertainty.deviation(X)).all(axis=1)
         # written so that a point that is not a number is not trusted
-        return np.asarray(far <= self.region.radius)
+        return np.asarray((far <= self.region.radius) & agree)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the network with its uncertainty and region to a network file.
@@ -132,7 +157,11 @@ class Fitted:
         """
         network = self.uncertainty.attached()
         region = {"region_points": self.region.points, "region_radius": np.array([self.region.radius])}
+        if self.members:
+            region["member_units"] = np.array([float(member.units) for member in self.members])
+            region["member_tails"] = np.stack([member.tail for member in self.members])
         kept = {
+            "notes": list(self.notes),
             "form": self.form,
             "heldout": self.heldout,
             "level": self.level,
@@ -176,6 +205,7 @@ class Fitted:
             f"Fitted: {n} input{'s' * (n > 1)} → {m} output{'s' * (m > 1)}, {what}",
             f"  held-out error {self.heldout:.1e} of the outputs' spread; intervals of {self.level:.0%}",
         ]
+        lines += [f"  {note}" for note in self.notes]
         if self.trials:
             best: dict[str, float] = {}
             for trial in sorted(self.trials, key=lambda trial: trial.error):
@@ -208,4 +238,27 @@ def _restored(network: Network) -> Fitted:
         region,
         float(kept["level"]),
         bool(kept["one_output"]) and len(network.outputs) == 1,
+        _members(network),
+        tuple(str(note) for note in kept.get("notes", ())),
+    )
+
+
+def _members(network: Network) -> tuple[Network, ...]:
+    """Return the networks of whose units and tails a mean was made."""
+    if "member_units" not in network.extras:
+        return ()
+    tails, counts = network.extras["member_tails"], network.extras["member_units"].astype(int)
+    ends = np.cumsum(counts)
+    if ends[-1] != network.units or tails.shape != (len(counts), *network.tail.shape):
+        raise ValueError("members of another network")
+    return tuple(
+        replace(
+            network,
+            factors=network.factors[end - count : end],
+            shifts=network.shifts[end - count : end],
+            weights=network.weights[:, end - count : end] * len(counts),
+            tail=tail,
+            extras={},
+        )
+        for end, count, tail in zip(ends, counts, tails, strict=True)
     )

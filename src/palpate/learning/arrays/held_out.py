@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.learning.folds import held_out
+from palpate.learning.folds import held_out, near_places
 from palpate.learning.search import Candidate, iteration_work
 from palpate.network.radial import RadialFunction
 from palpate.rbf.forms import Centred, Form, unit_form
@@ -51,9 +51,26 @@ class HeldOut:
     partial: bool = False
 
     @classmethod
-    def of(cls, X: np.ndarray, Y: np.ndarray, *, share: float, seed: int, fold: int = 0) -> HeldOut:
+    def of(
+        cls,
+        X: np.ndarray,
+        Y: np.ndarray,
+        *,
+        share: float,
+        seed: int,
+        fold: int = 0,
+        places: np.ndarray | None = None,
+    ) -> HeldOut:
         """Hold out the fold-th share of a shuffle that the seed decides; see `palpate.learning.folds.held_out`."""
-        kept, held = held_out(X, share, seed=seed, fold=fold)
+        places = near_places(X) if places is None else places
+        kept, held = held_out(places, share, seed=seed, fold=fold)
+        return cls(X[kept], Y[kept], (X[held], Y[held]), held)
+
+    @classmethod
+    def without(cls, X: np.ndarray, Y: np.ndarray, held: np.ndarray, *, seed: int) -> HeldOut:
+        """Hold out a mask (N,) of samples; the others are in an order that the seed decides."""
+        order = np.random.default_rng(seed).permutation(len(X))
+        kept = order[~held[order]]
         return cls(X[kept], Y[kept], (X[held], Y[held]), held)
 
     def first(self, count: int) -> HeldOut:

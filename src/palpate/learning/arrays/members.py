@@ -1,16 +1,25 @@
-"""Networks of one kind from several starts and folds, and what their mean is expected to miss.
+"""Networks of one kind learnt crosswise: what their mean misses is measured where none of those asked had learnt.
 
-The squared error of a mean is the mean squared error less the members' spread about it (Krogh & Vedelsby 1995, eq. 6).
-The spread needs no outputs, so what a mean would gain is known before it is believed.
+In each round the samples are dealt into five folds, and five networks each learn without one of them. So each sample
+is unseen by one network of each round; of two rounds there are ten networks, whose mean is handed over. With f₁ and f₂
+unseen at a sample, and M networks in all,
+
+    E₂ = mean (y − ½(f₁ + f₂))²     v = mean ½(f₁ − f₂)²     E = max(E₂ − (½ − 1/M) v, ½ E₂)
+
+is the squared error of the mean: a mean of M misses less than one of two by the spread of the two (Krogh & Vedelsby
+1995, eq. 6), where the spread counts at samples that neither has seen (Breiman 1996), not between samples, where
+networks that diverge would be rewarded.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from palpate.learning.arrays.held_out import RIDGE, HeldOut, carry
 from palpate.learning.search import Candidate
@@ -18,7 +27,7 @@ from palpate.rbf.refinement.projection import project
 from palpate.rbf.refinement.refine import Refined, refine
 from palpate.rbf.refinement.rows import Rows
 
-__all__ = ["ROWS", "Fresh", "Member", "expected_error", "refit_weights"]
+__all__ = ["LOOK_SAMPLES", "ROWS", "Crossed", "Fresh", "refit_weights"]
 
 ROWS = 4000
 """Samples by which a ridge is chosen and a covariance is made; more would say the same and take longer."""
@@ -26,29 +35,99 @@ ROWS = 4000
 LOOK_SAMPLES = 1000
 """Samples from which a start is refined before it sees all of them."""
 
+_ASTRAY = 3.0  # times what the median network is away from the others: not of their kind
 _RIDGES = tuple(10.0**k for k in range(-13, -2))
 
 
 @dataclass(frozen=True, eq=False)
-class Member:
-    """A refined network whose weights were fitted to all samples, and its error on the ones it was judged by.
+class Crossed:
+    """Networks of one kind, each with weights from the samples that it may know, in scaled inputs and latent outputs.
 
     Attributes
     ----------
-    network : Refined
-        In scaled inputs and latent outputs.
-    error : float
-        Per scaled output on the held-out samples, before the weights saw them.
-    before : Refined, optional
-        The same before the weights saw them.
-    split : HeldOut, optional
-        Which samples these are.
+    networks : tuple of K Refined
+        Members of the mean.
+    unseen : (K, N) bool array
+        Samples that each one has not seen, neither its units nor its weights.
+    rounds : (K,) int array
+        The round of each network; in one round a sample is unseen by one network at most.
+    X, Y : (N, n) and (N, k) arrays
+        All samples.
     """
 
-    network: Refined
-    error: float
-    before: Refined | None = None
-    split: HeldOut | None = None
+    networks: tuple[Refined, ...]
+    unseen: np.ndarray
+    rounds: np.ndarray
+    X: np.ndarray
+    Y: np.ndarray
+
+    @cached_property
+    def _answers(self) -> np.ndarray:
+        """Answers (R, N, k) of each round's networks at samples unseen by them; not-a-number where there is none."""
+        out = np.full((int(self.rounds.max()) + 1, *self.Y.shape), np.nan)
+        for network, unseen, k in zip(self.networks, self.unseen, self.rounds, strict=True):
+            out[k, unseen] = network.predict(self.X[unseen])
+        return out
+
+    @cached_property
+    def judged(self) -> np.ndarray:
+        """Mask (N,) of the samples that some network has not seen."""
+        return np.asarray(self.unseen.any(axis=0))
+
+    @cached_property
+    def missed(self) -> np.ndarray:
+        """What the mean of the networks that had not seen a judged sample misses there, (J, k)."""
+        return np.asarray(self.Y[self.judged] - np.nanmean(self._answers[:, self.judged], axis=0))
+
+    @cached_property
+    def gain(self) -> float:
+        """Error to expect of the mean of all networks, over that of the mean of those that had not seen a sample."""
+        both = np.isfinite(self._answers).all(axis=(0, 2))
+        if len(self._answers) < 2 or not both.any():
+            return 1.0
+        pair = self._answers[:, both]
+        square = float(((self.Y[both] - pair.mean(axis=0)) ** 2).mean())
+        apart = float((0.5 * (pair[0] - pair[1]) ** 2).mean())
+        less = square - (0.5 - 1.0 / len(self.networks)) * apart
+        return float(np.sqrt(max(less, 0.5 * square) / max(square, 1e-300)))
+
+    @property
+    def error(self) -> float:
+        """Error to expect of the mean of all, root mean square per latent output."""
+        return self.gain * float(np.sqrt((self.missed**2).mean()))
+
+    def spread(self, spread_of: Callable[[Refined, np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
+        """Return at the judged samples (J,) the mean spread of the networks that had not seen them.
+
+        Parameters
+        ----------
+        spread_of : callable
+            Spread (M,) of a network at inputs (M, n), of the mask (N,) of the samples that it had not seen.
+        """
+        total, count = np.zeros(len(self.X)), np.zeros(len(self.X))
+        for network, unseen in zip(self.networks, self.unseen, strict=True):
+            total[unseen] += spread_of(network, unseen, self.X[unseen])
+            count[unseen] += 1.0
+        return np.asarray((total / np.maximum(count, 1.0))[self.judged])
+
+    def without_strays(self) -> Crossed:
+        """Return the networks that agree with the others between the samples.
+
+        Left out is one whose distance from the pointwise median is, at one in a hundred places half way from a sample
+        to another near it, above three times what it is for the median network: one that was caught elsewhere.
+        """
+        tree = KDTree(self.X[: 2 * ROWS])
+        some = self.X[:ROWS]
+        near = np.asarray(tree.query(some, min(4, len(tree.data)))[1])[:, -1]
+        between = 0.5 * (some + tree.data[near])
+        answers = np.array([network.predict(between) for network in self.networks])
+        apart = np.sqrt(((answers - np.median(answers, axis=0)) ** 2).mean(axis=2))
+        far = np.quantile(apart, 0.99, axis=1)
+        kept = np.flatnonzero(far <= _ASTRAY * np.median(far))
+        if len(kept) in (0, len(self.networks)):
+            return self
+        networks = tuple(self.networks[i] for i in kept)
+        return replace(self, networks=networks, unseen=self.unseen[kept], rounds=self.rounds[kept])
 
 
 def refit_weights(network: Refined, X: np.ndarray, Y: np.ndarray, ridge: float = RIDGE) -> Refined:
@@ -72,19 +151,6 @@ def refit_weights(network: Refined, X: np.ndarray, Y: np.ndarray, ridge: float =
     problem = Rows.of(network.regressors, X, Y)
     solution = project(problem, network.theta, chosen * problem.total)
     return replace(best, coefficients=solution.coefficients @ problem.modes)
-
-
-def expected_error(members: Sequence[Member], X: np.ndarray) -> float:
-    """Return the error per scaled output to expect of the members' mean, from their spread between the samples X.
-
-    At the samples themselves they agree more than elsewhere; so the columns of X (N, n) are shuffled.
-    """
-    X = np.random.default_rng(0).permuted(X[:ROWS], axis=0)
-    answers = np.array([member.network.predict(X) for member in members])
-    spread = float(((answers - answers.mean(axis=0)) ** 2).mean())
-    single = float(np.mean([member.error**2 for member in members]))
-    # members judged on different samples agree only on average: no gain beyond √K is believed
-    return float(np.sqrt(max(single - spread, single / len(members))))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,95 @@
+"""What a user must be told of a fit: that nothing was learnt, that a sample is wild, that an output was passed over."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from palpate.format import share
+
+if TYPE_CHECKING:
+    from palpate.learning.arrays.array_samples import ArrayProblem, Samples
+    from palpate.learning.arrays.fitted import Fitted
+
+__all__ = ["IDLE", "FitWarning", "notes_on", "wild_rows"]
+
+
+class FitWarning(UserWarning):
+    """A network was learnt, but something of it must be known: `Fitted.notes` says what."""
+
+
+_NO_BETTER = (
+    0.95  # of the outputs' standard deviation: a network that misses so much says no more than their mean
+)
+_WILD = 12.0  # robust standard deviations: once in 10³² samples of a normal law
+_GROSS = 0.5  # of the outputs' spread: what misses less is a corner that is hard to learn
+_FEW = 0.02  # of the samples may be called wild; where more are, their law has long tails
+_SMALL = 1e-3  # of the largest output's spread: learnt to the large ones' scale it is as good as not learnt
+_IRRELEVANT = 0.02  # of the largest scale of an input
+_LISTED = 5
+IDLE = "Inputs that hardly matter:"  # not worth a warning
+
+
+def notes_on(
+    samples: Samples,
+    problem: ArrayProblem,
+    fitted: Fitted,
+    missed: np.ndarray,
+    rows: np.ndarray,
+    scales: np.ndarray,
+) -> tuple[str, ...]:
+    """Return what a user must be told, a sentence or two each.
+
+    Parameters
+    ----------
+    samples, problem : Samples, ArrayProblem
+        What was learnt from.
+    fitted : Fitted
+        What was learnt; its `heldout` counts.
+    missed, rows : (J, m) and (J,)
+        Errors at unseen samples in scaled outputs, and which samples these are.
+    scales : (n,)
+        By how much each scaled input matters, as the likelihood of a kernel says.
+    """
+    notes = []
+    if fitted.heldout > _NO_BETTER:
+        notes.append(
+            f"The network predicts no better than the outputs' mean: its held-out error is {share(fitted.heldout)} of "
+            "their spread. The inputs may not decide the outputs, or too few samples show how."
+        )
+    wild = np.sort(rows[wild_rows(missed)])
+    if len(wild):
+        listed = ", ".join(map(str, wild[:_LISTED])) + (", …" if len(wild) > _LISTED else "")
+        notes.append(
+            f"{len(wild)} of {len(samples.X)} samples are far from what the others say: row {listed}. A wrong number "
+            "there spoils the network and widens its intervals: check them, or leave them out."
+        )
+    notes += _passed_over(samples, problem)
+    if len(scales) > 1 and fitted.units and scales.max() > 0:
+        idle = [r.name for r, s in zip(samples.inputs, scales, strict=True) if s < _IRRELEVANT * scales.max()]
+        if idle:
+            notes.append(f"{IDLE} {', '.join(idle)}.")
+    return tuple(notes)
+
+
+def wild_rows(missed: np.ndarray) -> np.ndarray:
+    """Return which rows of errors (J, m) at unseen samples are wild beside all others."""
+    size = np.abs(missed)
+    typical = np.median(size, axis=0) / 0.6745
+    with np.errstate(divide="ignore", invalid="ignore"):
+        off = np.where((typical > 0) & (size > _GROSS), size / typical, 0.0).max(axis=1)
+    rows = np.flatnonzero(off > _WILD)
+    return rows if len(rows) <= max(1, _FEW * len(missed)) else np.zeros(0, dtype=int)
+
+
+def _passed_over(samples: Samples, problem: ArrayProblem) -> list[str]:
+    """Return a sentence for outputs that are small beside the scale to which they are learnt."""
+    spread = samples.Y.std(axis=0) / problem.scaling.output_scale
+    small = [q.name for q, s in zip(samples.outputs, spread, strict=True) if 0 < s < _SMALL * spread.max()]
+    if not small or len(small) > len(spread) / 2:
+        return []
+    return [
+        f"Outputs small beside the others are as good as not learnt: {', '.join(small[:_LISTED])}. Outputs of other "
+        "units are learnt to a scale of their own: declare them, outputs=[palpate.Quantity(name, unit), …]."
+    ]

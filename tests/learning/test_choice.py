@@ -7,7 +7,7 @@ import pytest
 
 from palpate.errors import UsageError
 from palpate.learning.arrays.fit import fit
-from palpate.learning.arrays.fit_notes import wild_rows
+from palpate.learning.arrays.fit_notes import FitWarning, wild_rows
 from palpate.learning.arrays.held_out import HeldOut, carry, start_units
 from palpate.learning.arrays.members import Crossed, refit_weights
 from palpate.learning.ensemble import Ensemble
@@ -96,7 +96,8 @@ def test_seed_decides_everything():
 def test_noise_is_not_learnt():
     X, _, X_test, _ = samples(ridges)
     noise = np.random.default_rng(5).normal(size=(len(X), 4))
-    found = fit(X, noise, INPUTS, OUTPUTS, effort=0.1)
+    with pytest.warns(FitWarning, match="no better than the outputs' mean"):
+        found = fit(X, noise, INPUTS, OUTPUTS, effort=0.1)
     assert found.heldout > 0.8
     assert np.sqrt((found.network.predict(X_test) ** 2).mean()) < 0.6
 
@@ -241,7 +242,7 @@ def crossed(offsets: list[float], samples: int = 50) -> Crossed:
 def test_the_error_of_a_mean_is_measured_where_its_networks_had_not_learnt():
     """Networks off by 3 and −1: pairs miss 1, half their squared distance is 8, a mean of ten misses less of it."""
     both = crossed([3.0] * 5 + [-1.0] * 5)
-    assert both.judged.all()
+    assert both.tested.all()
     np.testing.assert_allclose(both.missed, -1.0)
     # 1 − (½ − 1/10) 8 is below one half of the pairs' square: no more than that is believed
     assert both.error == pytest.approx(np.sqrt(0.5))
@@ -254,7 +255,7 @@ def test_a_network_that_was_caught_elsewhere_is_left_out():
     whole = crossed(offsets)
     kept = whole.without_strays()
     assert [network.off for network in kept.networks] == [o for o in offsets if o < 1]
-    assert kept.judged.all()
+    assert kept.tested.all()
     assert kept.error < 0.1 * whole.error
 
 

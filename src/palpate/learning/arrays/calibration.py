@@ -215,13 +215,13 @@ class Finish:
                 return np.ones(len(X))
             return spread_of(network, regressor_root(network, self.problem.X[~unseen]), X)
 
-        judged = crossed.judged
-        missed = self._missed(crossed.Y[judged] - crossed.missed, judged)
+        tested = crossed.tested
+        missed = self._missed(crossed.Y[tested] - crossed.missed, tested)
         evidence = Evidence(missed * crossed.gain, crossed.spread(spread))
-        return self._of(Ensemble(crossed.networks), crossed.error, evidence, judged, None)
+        return self._of(Ensemble(crossed.networks), crossed.error, evidence, tested, None)
 
     def _of(
-        self, mean: Ensemble, error: float, evidence: Evidence, judged: np.ndarray, form: str | None
+        self, mean: Ensemble, error: float, evidence: Evidence, tested: np.ndarray, form: str | None
     ) -> Fitted:
         M = None
         if sum(len(network.coefficients) for network in mean.members) <= LARGEST:
@@ -233,7 +233,7 @@ class Finish:
             (*member.regressors.form.factors(member.theta), member.weights, member.tail)
             for member in mean.members
         ]
-        rows = np.flatnonzero(judged)
+        rows = np.flatnonzero(tested)
         return self._fitted(
             arrays, radial, name, error, M, evidence, rows, members if len(members) > 1 else ()
         )

@@ -269,9 +269,9 @@ class _Chooser:
         some = self._kernel_rows(0.1, len(self.X))
         rows = np.sort(np.random.default_rng(self.seed).permutation(len(self.X))[:some])
         judging = self._kernel_rows(0.03, len(self.split.X))
-        judged = self._layer(metric, self.split.X[:judging], self.split.Y[:judging])
+        test_layer = self._layer(metric, self.split.X[:judging], self.split.Y[:judging])
         layer = self._layer(metric, self.X[rows], self.Y[rows])
-        return self._finished.kernel_network(layer, [(judged, self.split.held)], error)
+        return self._finished.kernel_network(layer, [(test_layer, self.split.held)], error)
 
     def _crossed_layers(self, metric: Metric) -> tuple[list[tuple[KernelLayer, np.ndarray]], float]:
         """Return layers that had not seen a fold each, with those folds, and what they miss there."""

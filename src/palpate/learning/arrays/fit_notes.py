@@ -1,4 +1,4 @@
-"""What a user must be told of a fit: that nothing was learnt, that a sample is wild, that an output was passed over."""
+"""Notes that a user must have of a fit: that nothing was learnt, that a sample is wild, that an output was passed over."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ _NO_BETTER = (
 _WILD = 12.0  # robust standard deviations: once in 10³² samples of a normal law
 _GROSS = 0.5  # of the outputs' spread: what misses less is a corner that is hard to learn
 _FEW = 0.02  # of the samples may be called wild; where more are, their law has long tails
+_ENOUGH = 50  # errors: among fewer a corner that is hard to learn looks wild
 _SMALL = 1e-3  # of the largest output's spread: learnt to the large ones' scale it is as good as not learnt
 _IRRELEVANT = 0.02  # of the largest scale of an input
 _LISTED = 5
@@ -75,6 +76,8 @@ def notes_on(
 
 def wild_rows(missed: np.ndarray) -> np.ndarray:
     """Return which rows of errors (J, m) at unseen samples are wild beside all others."""
+    if len(missed) < _ENOUGH:
+        return np.zeros(0, dtype=int)
     size = np.abs(missed)
     typical = np.median(size, axis=0) / 0.6745
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -86,7 +89,12 @@ def wild_rows(missed: np.ndarray) -> np.ndarray:
 def _passed_over(samples: Samples, problem: ArrayProblem) -> list[str]:
     """Return a sentence for outputs that are small beside the scale to which they are learnt."""
     spread = samples.Y.std(axis=0) / problem.scaling.output_scale
-    small = [q.name for q, s in zip(samples.outputs, spread, strict=True) if 0 < s < _SMALL * spread.max()]
+    varied = np.ptp(samples.Y, axis=0) > 1e-12 * np.abs(samples.Y).max(axis=0)  # not by round-off alone
+    small = [
+        q.name
+        for q, few in zip(samples.outputs, varied & (spread < _SMALL * spread.max()), strict=True)
+        if few
+    ]
     if not small or len(small) > len(spread) / 2:
         return []
     return [

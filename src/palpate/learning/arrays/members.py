@@ -70,14 +70,14 @@ class Crossed:
         return out
 
     @cached_property
-    def judged(self) -> np.ndarray:
+    def tested(self) -> np.ndarray:
         """Mask (N,) of the samples that some network has not seen."""
         return np.asarray(self.unseen.any(axis=0))
 
     @cached_property
     def missed(self) -> np.ndarray:
-        """What the mean of the networks that had not seen a judged sample misses there, (J, k)."""
-        return np.asarray(self.Y[self.judged] - np.nanmean(self._answers[:, self.judged], axis=0))
+        """Error (J, k), at each tested sample, of the mean of the networks that had not seen it."""
+        return np.asarray(self.Y[self.tested] - np.nanmean(self._answers[:, self.tested], axis=0))
 
     @cached_property
     def gain(self) -> float:
@@ -97,7 +97,7 @@ class Crossed:
         return self.gain * float(np.sqrt((self.missed**2).mean()))
 
     def spread(self, spread_of: Callable[[Refined, np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
-        """Return at the judged samples (J,) the mean spread of the networks that had not seen them.
+        """Return at the tested samples (J,) the mean spread of the networks that had not seen them.
 
         Parameters
         ----------
@@ -108,7 +108,7 @@ class Crossed:
         for network, unseen in zip(self.networks, self.unseen, strict=True):
             total[unseen] += spread_of(network, unseen, self.X[unseen])
             count[unseen] += 1.0
-        return np.asarray((total / np.maximum(count, 1.0))[self.judged])
+        return np.asarray((total / np.maximum(count, 1.0))[self.tested])
 
     def without_strays(self) -> Crossed:
         """Return the networks that agree with the others between the samples.

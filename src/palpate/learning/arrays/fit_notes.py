@@ -1,4 +1,4 @@
-"""Notes that a user must have of a fit: that nothing was learnt, that a sample is wild, that an output was passed over."""
+"""Notes on a fit that its user must have: nothing learnt, a wild sample, an output passed over, idle inputs."""
 
 from __future__ import annotations
 

@@ -9,7 +9,8 @@
     │   └── PortInUseError       2   the address is taken by another server
     ├── SolverError              3   a finite-element solve, or too many of a sweep's, did not converge
     ├── AccuracyError            1   the network misses the accuracy that was asked of it
-    └── DeviceError              3   a haptic device or the real-time process failed to start or vanished
+    ├── DeviceError              3   a haptic device or the real-time process failed to start or vanished
+    └── ResourceError            3   room on a disk, memory or a scheduler is missing, or a place is write-protected
 
 Each says *what* happened, *why* (as far as known) and *what to do*. Inside the 1 kHz loop nothing raises:
 there a failure is a value (a fault code) and a force of zero.
@@ -25,6 +26,7 @@ __all__ = [
     "FileFormatError",
     "PalpateError",
     "PortInUseError",
+    "ResourceError",
     "SolverError",
     "StudyError",
     "UsageError",
@@ -94,5 +96,11 @@ class AccuracyError(PalpateError):
 
 class DeviceError(PalpateError):
     """A haptic device or the real-time process failed to start or vanished."""
+
+    exit_code = 3
+
+
+class ResourceError(PalpateError):
+    """The machine lacks what the work needs: room on a disk, the right to write, memory, a scheduler."""
 
     exit_code = 3

@@ -19,13 +19,17 @@ from palpate.units import Range
 class Spring:
     """One node on a spring of 2 N/m; it misbehaves where told to.
 
-    raises, dies, fails: inputs at which the solver raises, takes its process down, or does not converge.
+    raises, dies, aborts, hangs, fails, lies: inputs at which the solver raises, ends its process with code 3, by a
+    signal, never ends, does not converge, or claims so without a number.
     log: a folder that gets one file per solve.
     """
 
     raises: tuple[float, ...] = ()
     dies: tuple[float, ...] = ()
+    aborts: tuple[float, ...] = ()
+    hangs: tuple[float, ...] = ()
     fails: tuple[float, ...] = ()
+    lies: tuple[float, ...] = ()
     log: str = ""
     seconds: float = 0.0
     ranges: tuple[Range, ...] = (Range("P", 0.0, 10.0, "N"),)
@@ -57,7 +61,11 @@ class SpringSolver:
         if force in self.problem.raises:
             raise ZeroDivisionError(f"no answer at {force:g}")
         if force in self.problem.dies:
-            os._exit(1)
+            os._exit(3)
+        if force in self.problem.aborts:
+            os.abort()
+        if force in self.problem.hangs:
+            never_end()
         stop = Stop.UNSTABLE if force in self.problem.fails else Stop.CONVERGED
         u = force / 2
         return Solution(
@@ -67,5 +75,10 @@ class SpringSolver:
             displacement=np.array([[0.0, -u, 0.0]]),
             root_reaction=np.array([0.0, force, force]),
             strain_energy=u * u,
-            potential_energy=-u * u,
+            potential_energy=np.nan if force in self.problem.lies else -u * u,
         )
+
+
+def never_end():
+    while True:
+        sum(range(1000))

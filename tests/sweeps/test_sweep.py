@@ -12,7 +12,7 @@ from sweep_problems import Spring
 from palpate.dataset import Dataset
 from palpate.errors import FileFormatError, SolverError, UsageError
 from palpate.physics import Cantilever, Circle, LinearElastic, TipLoad, preset
-from palpate.sweeps import local_cluster, sweep
+from palpate.sweeps import sweep
 from palpate.sweeps.sweep import reporter
 
 BODY = Cantilever(1.0, Circle(0.005), LinearElastic(2e9, 0.43), elements=5)
@@ -69,15 +69,6 @@ def test_failures_are_rows(cluster):
     np.testing.assert_array_equal(data.ok.displacement[:, 0, 1], -np.delete(points, [2, 5]) / 2)
     assert "unstable" in data.data["message"].values[2]
     assert "ZeroDivisionError: no answer at 5" in data.data["message"].values[5]
-
-
-def test_a_sample_that_kills_its_worker_is_a_row():
-    with local_cluster(2) as mortal:
-        before = mortal.process_ids
-        data = sweep(Spring(dies=(4.0,)), points=np.arange(8.0), cluster=mortal)
-        assert mortal.process_ids != before
-    np.testing.assert_array_equal(np.flatnonzero(~data.converged), [4])
-    assert "died" in data.data["message"].values[4]
 
 
 def test_too_many_failures_raise_with_examples(cluster):

@@ -5,7 +5,9 @@ Heavy packages are imported only by the command that needs them.
 
 from __future__ import annotations
 
+import signal
 import sys
+import threading
 from pathlib import Path
 from typing import Annotated
 
@@ -13,6 +15,8 @@ import typer
 
 from palpate.cli.console import Console, advice_in_words
 from palpate.errors import AccuracyError, PalpateError, UsageError
+from palpate.files import explain_system_error, write_file
+from palpate.processes import CASE_LIMIT, end_by_sigterm
 
 __all__ = ["app", "main"]
 
@@ -32,6 +36,13 @@ ModelFile = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="Print the results as one JSON object.")]
 Workers = Annotated[
     int | None, typer.Option(min=1, help="Number of worker processes. Default: one per core.")
+]
+CaseLimit = Annotated[
+    float,
+    typer.Option(
+        min=0.1,
+        help="Seconds after which a single solve has failed. It costs that solve; the sweep goes on.",
+    ),
 ]
 Port = Annotated[
     int | None,
@@ -73,6 +84,7 @@ def demo(
         typer.Option("--quick", help="Use coarse elements and few solves. This takes less than two minutes."),
     ] = False,
     workers: Workers = None,
+    case_limit: CaseLimit = CASE_LIMIT,
     port: Port = None,
     browser: Browser = True,
     as_json: Json = False,
@@ -81,7 +93,8 @@ def demo(
     from palpate.cli.demo_command import run_demo
 
     console = Console(as_json)
-    models = run_demo(names or ["beam-copper", "beam-nylon"], folder, workers, console, quick=quick)
+    names = names or ["beam-copper", "beam-nylon"]
+    models = run_demo(names, folder, workers, console, quick=quick, case_limit=case_limit)
     if view and not as_json:
         if sys.stdout.isatty():
             _serve(models[-1], port=port, browser=browser)
@@ -117,10 +130,7 @@ def init(
         return
     if path.exists() and not force:
         raise UsageError(f"{path} exists already.", fix="Choose another name, or replace it with --force.")
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise UsageError(f"Could not write {path}.", why=str(error)) from error
+    write_file(path, text)
     typer.echo(f"{path}: a study called {record.name}. Next: palpate sweep {path}")
 
 
@@ -133,11 +143,16 @@ def schema() -> None:
 
 
 @app.command()
-def sweep(study: StudyFile = STUDY, workers: Workers = None, as_json: Json = False) -> None:
+def sweep(
+    study: StudyFile = STUDY,
+    workers: Workers = None,
+    case_limit: CaseLimit = CASE_LIMIT,
+    as_json: Json = False,
+) -> None:
     """Solve the finite-element model of a study over its ranges. An interrupted sweep continues where it stopped."""
     from palpate.cli.study_commands import sweep_file
 
-    sweep_file(study, workers, Console(as_json))
+    sweep_file(study, workers, Console(as_json), case_limit=case_limit)
 
 
 @app.command()
@@ -339,6 +354,11 @@ def _serve(model: Path, *, port: int | None, browser: bool, strict_port: bool = 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; an error that palpate foresaw ends with its exit code and without a traceback."""
     words = sys.argv[1:] if arguments is None else arguments
+    if (
+        signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+        and threading.current_thread() is threading.main_thread()
+    ):
+        signal.signal(signal.SIGTERM, end_by_sigterm)  # temporary folders are removed on the way
     try:
         with advice_in_words():
             app(words, standalone_mode=True)
@@ -348,6 +368,10 @@ def main(arguments: list[str] | None = None) -> None:
     except PalpateError as error:
         Console(as_json="--json" in words).error(error)
         sys.exit(error.exit_code)
+    except (OSError, MemoryError) as error:  # 1, which Python would end with, says that a target was missed
+        known = explain_system_error(f"palpate {words[0] if words else ''} could not go on.", error)
+        Console(as_json="--json" in words).error(known)
+        sys.exit(known.exit_code)
     except SystemExit as end:
         if end.code == _INTERRUPTED:  # as which Typer ends by Ctrl-C, without a word
             kept = (

@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from palpate.cli.console import Console
-from palpate.errors import AccuracyError, UsageError
+from palpate.errors import AccuracyError
+from palpate.files import system_errors
+from palpate.processes import CASE_LIMIT
 from palpate.study import Study, preset_study
 from palpate.study.run import Outcome, Paths, carry_out, report_study
 from palpate.sweeps import LocalCluster, local_cluster
@@ -16,7 +18,13 @@ __all__ = ["run_demo"]
 
 
 def run_demo(
-    names: Sequence[str], folder: Path, workers: int | None, console: Console, *, quick: bool = False
+    names: Sequence[str],
+    folder: Path,
+    workers: int | None,
+    console: Console,
+    *,
+    quick: bool = False,
+    case_limit: float = CASE_LIMIT,
 ) -> list[Path]:
     """Carry out studies one after the other on one cluster, and report on all of them together.
 
@@ -31,14 +39,12 @@ def run_demo(
         After everything is written, if a study missed its target.
     """
     studies = [preset_study(name, quick=quick).with_workers(workers) for name in names]
-    try:
+    with system_errors(f"The folder {folder} could not be made."):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UsageError(f"Could not make the folder {folder}.", why=str(error)) from error
     began = time.perf_counter()
     console.say("Starting workers …")
     with local_cluster(workers) as cluster:
-        outcomes = [_carry_out(study, folder, cluster, console) for study in studies]
+        outcomes = [_carry_out(study, folder, cluster, console, case_limit) for study in studies]
     console.say("report …")
     # one study's has its name, as `palpate validate` writes it, so that the next demo leaves it alone
     name = studies[0].name if len(studies) == 1 else "report"
@@ -49,12 +55,15 @@ def run_demo(
     return [Paths(folder, study.name).model for study in studies]
 
 
-def _carry_out(study: Study, folder: Path, cluster: LocalCluster, console: Console) -> Outcome:
+def _carry_out(
+    study: Study, folder: Path, cluster: LocalCluster, console: Console, case_limit: float
+) -> Outcome:
     return carry_out(
         study,
         Paths(folder, study.name),
         cluster=cluster,
         progress=not console.as_json,
+        case_limit=case_limit,
         log=lambda stage: console.say(f"{study.name}: {stage} …"),
     )
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from palpate.cli.console import Console
 from palpate.errors import AccuracyError, UsageError
+from palpate.processes import CASE_LIMIT
 
 __all__ = ["is_archive", "learn_file", "sweep_file", "validate_model", "validate_study_file"]
 
@@ -19,7 +20,7 @@ TEST_SETS = ("-test.zarr", "-random.zarr", "-unseen.palpate")
 """Ends of the names of test sets, which begin with the name of the model."""
 
 
-def sweep_file(study: Path, workers: int | None, console: Console) -> None:
+def sweep_file(study: Path, workers: int | None, console: Console, *, case_limit: float = CASE_LIMIT) -> None:
     """Solve what a study file describes, and print where the solves are."""
     from palpate.study import read_study
     from palpate.study.run import Paths, sweep_study
@@ -28,7 +29,7 @@ def sweep_file(study: Path, workers: int | None, console: Console) -> None:
     paths = Paths(study.parent, record.name)
     if paths.data.with_name(paths.data.name + ".parts").exists():
         console.say(f"Going on with the interrupted sweep in {paths.data} …")
-    data, further = sweep_study(record, paths, progress=not console.as_json)
+    data, further = sweep_study(record, paths, progress=not console.as_json, case_limit=case_limit)
     target, other = (
         (paths.data, paths.random) if record.memory is None else (paths.histories, paths.unseen_histories)
     )

@@ -24,6 +24,7 @@ from palpate.learning import History, Settings, founding, learn_dataset, node_ou
 from palpate.learning import learn as learn_samples
 from palpate.learning.learn_dataset import filter_record
 from palpate.learning.plastic import LoadHistories
+from palpate.processes import CASE_LIMIT
 from palpate.study.memory_stages import learn_histories, sweep_histories
 from palpate.study.study import Study
 from palpate.surrogates import Surrogate
@@ -140,7 +141,12 @@ class Outcome:
 
 
 def sweep_study(
-    study: Study, paths: Paths | None = None, *, cluster: Any = None, progress: Any = True
+    study: Study,
+    paths: Paths | None = None,
+    *,
+    cluster: Any = None,
+    progress: Any = True,
+    case_limit: float = CASE_LIMIT,
 ) -> tuple[Rows, Rows | None]:
     """Solve the study's design, and what is solved for testing only.
 
@@ -154,6 +160,8 @@ def sweep_study(
         A running `local_cluster`, to share between studies; by default processes of the sweep's own.
     progress : bool or callable
         A bar on standard error; or a function (done, total).
+    case_limit : float
+        Time in s after which a single solve has failed.
 
     Returns
     -------
@@ -178,6 +186,7 @@ def sweep_study(
         "cluster": cluster if cluster is not None else study.sweep.scheduler,
         "workers": study.sweep.workers,
         "progress": progress,
+        "case_limit": case_limit,
     }
     data = sweep(problem, path=paths.data if paths else None, **study.sweep.arguments(problem), **common)
     further = study.test.arguments(problem)
@@ -364,6 +373,7 @@ def carry_out(
     progress: Any = True,
     log: Log = lambda _: None,
     rivals: bool = True,
+    case_limit: float = CASE_LIMIT,
 ) -> Outcome:
     """Carry out a study up to its validation and write its datasets, model and history.
 
@@ -381,6 +391,8 @@ def carry_out(
         Gets one line when a stage begins.
     rivals : bool
         Whether to run the founding form of the filter beside ours, where there is a filter.
+    case_limit : float
+        Time in s after which a single solve of the sweep has failed.
     """
     timings: dict[str, float] = {}
 
@@ -391,7 +403,8 @@ def carry_out(
         timings[stage] = time.perf_counter() - began
         return result
 
-    data, further = timed("sweep", lambda: sweep_study(study, paths, cluster=cluster, progress=progress))
+    sweeping = {"cluster": cluster, "progress": progress, "case_limit": case_limit}
+    data, further = timed("sweep", lambda: sweep_study(study, paths, **sweeping))
     train, test = split_rows(study, data, further)
     model, history = timed("learn and refine", lambda: learn_study(study, train, test))
     validation = timed("validate", lambda: validate_study(study, model, test, history))

@@ -6,7 +6,8 @@
     problem.py     the contract of whatever a sweep asks; a problem made of one function
     sweep.py       the sweep, from its plan to its dataset
     plan.py        points, chains of neighbours and labels, settled before the first solve
-    runner.py      the chains on Dask, through failures
+    case.py        one case after the other, in a child process that may crash or hang
+    runner.py      the chains on Dask, through the loss of workers
     cluster.py     worker processes on this machine; worker.py is the process
     ledger.py      finished parts of an interrupted sweep, on disk
 """

@@ -10,13 +10,13 @@ from __future__ import annotations
 import logging
 import subprocess
 import sys
-import tempfile
 import time
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 from palpate.errors import SolverError, UsageError
+from palpate.files import TemporaryFolder
 from palpate.processes import available_cores, helper_environment
 
 __all__ = ["LocalCluster", "local_cluster"]
@@ -37,7 +37,7 @@ class LocalCluster:
     """
 
     def __init__(self, workers: int) -> None:
-        self._folder = tempfile.TemporaryDirectory(prefix="palpate-")
+        self._scratch = TemporaryFolder()
         self._lives = workers + _SPARE_LIVES
         self._scheduler: Any = None
         self._workers: list[subprocess.Popen[bytes]] = []
@@ -60,6 +60,11 @@ class LocalCluster:
     def process_ids(self) -> tuple[int, ...]:
         """Process ids of the workers."""
         return tuple(worker.pid for worker in self._workers)
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the scratch files of all workers."""
+        return self._scratch.path
 
     def __len__(self) -> int:
         return len(self._workers)
@@ -96,20 +101,20 @@ class LocalCluster:
         deadline = time.monotonic() + _GRACE
         for worker in self._workers:
             _end(worker, deadline)
-        self._folder.cleanup()
+        self._scratch.remove()
 
     def _start_worker(self) -> subprocess.Popen[bytes]:
         self._lives -= 1
         if self._lives < 0:
             raise SolverError("The workers of the sweep die again and again.", why=self._last_words())
         name = f"worker-{self._lives}"
-        with (Path(self._folder.name) / f"{name}.log").open("wb") as log:
+        with (self.folder / f"{name}.log").open("wb") as log:
             return subprocess.Popen(
-                [sys.executable, "-m", "palpate.sweeps.worker", self._folder.name, name],
+                [sys.executable, "-m", "palpate.sweeps.worker", str(self.folder), name],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
                 stderr=log,
-                env=helper_environment(),
+                env=helper_environment(scratch=self.folder),
                 # Ctrl-C in the terminal is for this process, which then ends its workers
                 start_new_session=True,
             )
@@ -123,7 +128,7 @@ class LocalCluster:
                 pass  # it died already: `revive` sees to it
 
     def _last_words(self) -> str:
-        logs = sorted(Path(self._folder.name).glob("*.log"), key=lambda log: log.stat().st_mtime)
+        logs = sorted(self.folder.glob("*.log"), key=lambda log: log.stat().st_mtime)
         return "\n".join(log.read_text(errors="replace")[-2000:] for log in logs[-1:])
 
 

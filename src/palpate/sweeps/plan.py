@@ -20,8 +20,8 @@ import numpy as np
 from palpate import checks
 from palpate.dataset import Dataset, Field, Layout, assemble, check_schema, with_bookkeeping
 from palpate.errors import UsageError
+from palpate.sweeps.case import Columns
 from palpate.sweeps.problem import Checking, Designed, Problem, has_chains, missing_members, own_design
-from palpate.sweeps.runner import Columns
 from palpate.sweeps.space import Design, Space, design_points
 
 __all__ = [

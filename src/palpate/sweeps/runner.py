@@ -1,6 +1,7 @@
-"""The chains of a sweep, run on Dask through failures of samples and of workers.
+"""The chains of a sweep on Dask: handed out to workers, and collected through the loss of workers.
 
-`solve_chain` is the task that a worker runs; `run` hands out the tasks and collects their answers.
+What a case does to the process that solves it, `palpate.sweeps.case` sees to. Here a worker may still vanish, or
+the scheduler.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import hashlib
 import queue
 import signal
 import threading
-import time
+import uuid
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from types import FrameType
@@ -18,30 +19,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.dataset import BOOKKEEPING, Field
-from palpate.errors import UsageError
+from palpate.dataset import Field
+from palpate.errors import ResourceError
+from palpate.processes import end_by_sigterm
+from palpate.sweeps.case import Columns, Task, failed_rows, solve_chain
 from palpate.sweeps.cluster import LocalCluster, local_cluster
-from palpate.sweeps.problem import Answer, Problem, Resettable, Solver
+from palpate.sweeps.problem import Problem
 
 if TYPE_CHECKING:
     import distributed
 
-__all__ = [
-    "Columns",
-    "connect",
-    "deferred_interrupt",
-    "empty",
-    "failed_row",
-    "put",
-    "run",
-    "solve_chain",
-]
+__all__ = ["connect", "deferred_interrupt", "run"]
 
 _PATIENCE = 0.5  # s between looks at the workers
 _FETCH = 5.0  # s; Dask's client may wait for ever for a result whose worker died just after it
-_TRIES = 3  # a worker may die of something else than its sample
-# samples solved apart differ from those of a chain in their last bits: no accident should do it
-_CHAIN_TRIES = 2
+_TRIES = 3  # that a chain gets on workers that vanish
+_KEPT = "What is solved is kept where the sweep has a path: the same command goes on."
 
 
 @contextlib.contextmanager
@@ -50,6 +43,11 @@ def connect(cluster: Any, workers: int | None) -> Iterator[tuple[distributed.Cli
 
     A `LocalCluster`, a scheduler's address, or a cluster or client of Dask's is used and left running; for
     ``None`` a cluster is started and ended.
+
+    Raises
+    ------
+    ResourceError
+        If no scheduler answers.
     """
     import distributed
 
@@ -61,32 +59,31 @@ def connect(cluster: Any, workers: int | None) -> Iterator[tuple[distributed.Cli
             yield cluster, revive
         else:
             address = cluster.address if isinstance(cluster, LocalCluster) else cluster
-            client = stack.enter_context(distributed.Client(address, set_as_default=False))
-            yield client, revive
+            yield stack.enter_context(_client(address)), revive
 
 
-@dataclass
-class _Chain:
-    """A chain being solved: its rows, their answers as they come, and the number of missing ones."""
+def _client(address: Any) -> distributed.Client:
+    import distributed
 
-    rows: np.ndarray
-    answers: Columns
-    missing: int
+    try:
+        return distributed.Client(address, set_as_default=False)
+    except (
+        OSError,
+        ValueError,
+    ) as error:  # a time-out is one of the first; an address that is none, of the second
+        raise ResourceError(
+            f"No scheduler answers at {address}.",
+            why=f"{type(error).__name__}: {error}",
+            fix="Check the address and that the scheduler runs; without one a sweep uses this machine's cores.",
+        ) from error
 
 
 @dataclass(frozen=True)
-class _Task:
-    """Places of a chain that a worker is asked to solve."""
+class _Chain:
+    """Rows of a chain that a worker is asked to solve."""
 
-    chain: _Chain
-    places: np.ndarray
-    tries: int = 0
-
-    def is_worth_another_try(self, error: BaseException | None) -> bool:
-        """Tell whether to try again: after a lost answer (no error) or a death; other errors would come again."""
-        if error is not None and not _is_death(error):
-            return False
-        return self.tries + 1 < (_TRIES if self.places.size == 1 else _CHAIN_TRIES)
+    rows: np.ndarray
+    tries: int = 1
 
 
 def run(
@@ -97,11 +94,12 @@ def run(
     points: np.ndarray,
     chains: Sequence[np.ndarray],
     accept: Callable[[np.ndarray, Columns], None],
+    case_limit: float,
 ) -> None:
     """Solve the chains and hand over each one's rows and answers when it is whole.
 
-    A chain that raises, or whose worker dies again and again, is solved sample by sample, each by a new solver;
-    a sample that then still does so becomes a row with the error's words. The sweep goes on.
+    A case that fails becomes a row with the reason, and the sweep goes on. A chain whose worker vanishes is given to
+    another one; if that happens again and again, all its rows have failed.
 
     Parameters
     ----------
@@ -119,51 +117,60 @@ def run(
         Rows of `points`.
     accept : callable
         Takes rows and their answers.
+    case_limit : float
+        Time in s that a case may take.
+
+    Raises
+    ------
+    ResourceError
+        If the scheduler is lost.
     """
     finished: queue.SimpleQueue[Any] = queue.SimpleQueue()
-    pending: dict[Any, _Task] = {}
-    identity = _identity(problem)
+    pending: dict[Any, _Chain] = {}
+    task = _task(problem, schema, case_limit)
 
-    def submit(task: _Task) -> None:
-        rows = task.chain.rows[task.places]
-        future = client.submit(solve_chain, problem, identity, schema, points[rows], pure=False)
-        pending[future] = task
+    def submit(chain: _Chain) -> None:
+        future = client.submit(solve_chain, task, points[chain.rows], pure=False)
+        pending[future] = chain
         future.add_done_callback(finished.put)
-
-    def settle(task: _Task, answers: Columns) -> None:
-        put(task.chain.answers, task.places, answers)
-        task.chain.missing -= task.places.size
-        if not task.chain.missing:
-            accept(task.chain.rows, task.chain.answers)
 
     with deferred_interrupt() as check_interrupt:
         for rows in chains:
-            submit(_Task(_Chain(rows, empty(rows.size, schema), rows.size), np.arange(rows.size)))
+            submit(_Chain(rows))
         while pending:
             check_interrupt()
+            _require_scheduler(client)
             try:
                 future = finished.get(timeout=_PATIENCE)
             except queue.Empty:
                 revive()
                 continue
-            task = pending.pop(future)
+            chain = pending.pop(future)
             answers, error = _outcome(future)
             if answers is not None:
-                settle(task, answers)
-            elif task.is_worth_another_try(error):
-                submit(_Task(task.chain, task.places, task.tries + 1))
-            elif task.places.size > 1:
-                for place in task.places:
-                    submit(_Task(task.chain, place[None]))
+                accept(chain.rows, answers)
+            elif chain.tries < _TRIES and (error is None or _is_death(error)):
+                submit(_Chain(chain.rows, chain.tries + 1))
             else:
-                settle(task, failed_row(schema, _reason(error)))
+                accept(chain.rows, failed_rows(chain.rows.size, schema, _reason(error)))
 
 
-def _identity(problem: Problem) -> str:
-    """Return a digest of the problem as a worker gets it, its functions included, which `describe` may leave out."""
+def _task(problem: Problem, schema: Sequence[Field], case_limit: float) -> Task:
+    """Return the problem as workers get it: with its functions, which `describe` may leave out."""
     from distributed.protocol.pickle import dumps
 
-    return hashlib.sha256(dumps(problem)).hexdigest()
+    content = dumps(problem)
+    identity = hashlib.sha256(content).hexdigest()
+    return Task(content, identity, tuple(schema), case_limit, uuid.uuid4().hex)
+
+
+def _require_scheduler(client: distributed.Client) -> None:
+    if client.status != "running":  # it tries to connect again, but what was asked for is forgotten
+        raise ResourceError(
+            f"The scheduler of the sweep is lost ({client.status}).",
+            why="It ended, or the connection to it broke.",
+            fix=f"Start it again. {_KEPT}",
+        )
 
 
 def _outcome(future: Any) -> tuple[Columns | None, BaseException | None]:
@@ -176,138 +183,52 @@ def _outcome(future: Any) -> tuple[Columns | None, BaseException | None]:
 
 
 def _is_death(error: BaseException) -> bool:
-    return type(error).__name__ == "KilledWorker"
+    return type(error).__name__ in {"KilledWorker", "FutureCancelledError", "CancelledError"}
 
 
 def _reason(error: BaseException | None) -> str:
     if error is None:
         return "its answer was lost on the way"
-    return "the process that solved it died" if _is_death(error) else f"{type(error).__name__}: {error}"
+    return "its worker died" if _is_death(error) else f"{type(error).__name__}: {error}"
 
 
 def _nothing() -> None:
-    """Do nothing: workers of a foreign cluster are its owner's affair."""
+    """Do nothing: workers of a foreign cluster are their owner's affair."""
 
 
-Columns = dict[str, np.ndarray]
-"""An array for each answer of a dataset, samples first."""
-
-_BOOKKEEPING_NAMES = {field.name for field in BOOKKEEPING}
-
-
-def empty(count: int, schema: Sequence[Field]) -> Columns:
-    """Make rows that hold no answer yet: NaN, not converged."""
-    return {field.name: field.empty(count) for field in schema}
-
-
-def put(columns: Columns, rows: np.ndarray, part: Columns) -> None:
-    """Write the rows of `part` at `rows` of `columns`."""
-    for name, values in columns.items():
-        values[rows] = part[name]
-
-
-def failed_row(schema: Sequence[Field], message: str) -> Columns:
-    """Make a row that says why it has no answer."""
-    row = empty(1, schema)
-    row["message"][0] = message
-    return row
-
-
-def solve_chain(problem: Problem, identity: str, schema: Sequence[Field], points: np.ndarray) -> Columns:
-    """Solve at each of the points (N, n) in turn: the task that a worker runs.
-
-    A worker that has a problem of the same `identity` open goes on with its solver.
-    """
-    columns = empty(len(points), schema)
-    solver = _take_solver(problem, identity)
-    for row, x in enumerate(points):
-        begun = time.perf_counter()
-        answer = solver.solve(x)
-        columns["solve_seconds"][row] = time.perf_counter() - begun
-        _record(columns, schema, row, answer)
-    _last_solver.entry = (identity, solver)
-    return columns
-
-
-class _LastSolver(threading.local):
-    """The solver opened last, in each thread its own: meshing and opening cost seconds."""
-
-    entry: tuple[str, Solver] | None = None
-
-
-_last_solver = _LastSolver()
-
-
-def _take_solver(problem: Problem, identity: str) -> Solver:
-    """Return the solver of this problem that is open here, reset, or a new one.
-
-    It is taken away while a chain is solved, so that none is kept which an error has left in the midst of a
-    solve. One is kept at most: an opened solid takes hundreds of megabytes.
-    """
-    last, _last_solver.entry = _last_solver.entry, None
-    if last is not None and isinstance(last[1], Resettable) and last[0] == identity:
-        last[1].reset()
-        return last[1]
-    del last
-    return problem.open()
-
-
-def _record(columns: Columns, schema: Sequence[Field], row: int, answer: Answer) -> None:
-    columns["converged"][row] = answer.converged
-    columns["message"][row] = answer.message
-    columns["iterations"][row] = answer.iterations
-    columns["residual"][row] = answer.residual
-    if not answer.converged:  # the fields of a failed solve stay NaN
-        return
-    for field in schema:
-        if field.name not in _BOOKKEEPING_NAMES:
-            columns[field.name][row] = _value(answer, field)
-
-
-def _value(answer: Answer, field: Field) -> Any:
-    if not hasattr(answer, field.name):
-        if field.optional:
-            return field.fill
-        raise UsageError(
-            f"The answer of a solve lacks {field.name!r}.",
-            why="The problem's schema promises it.",
-            fix="Answer it, or mark the field as optional.",
-        )
-    value = getattr(answer, field.name)
-    if np.shape(value) != field.shape:
-        raise UsageError(
-            f"The answer {field.name!r} of a solve has the shape {np.shape(value)}.",
-            why=f"The problem's schema promises {field.shape}.",
-            fix="Make the schema and the answers fit.",
-        )
-    return value
+_HANDLERS = {
+    signal.SIGINT: (signal.default_int_handler,),
+    signal.SIGTERM: (signal.SIG_DFL, end_by_sigterm),
+}
+"""Signals that are held back, and the handlers that are replaced: another one is somebody's decision."""
 
 
 @contextlib.contextmanager
 def deferred_interrupt() -> Iterator[Callable[[], None]]:
-    """Hold Ctrl-C back; yield a function that raises KeyboardInterrupt, where it is safe, if one came.
+    """Hold Ctrl-C and SIGTERM back; yield a function that ends the work, where it is safe, if one came.
 
-    Raised at any odd moment it gets lost, for example inside one of Dask's destructors. A second Ctrl-C is not
-    held back.
+    It raises KeyboardInterrupt or SystemExit. Raised at any odd moment they get lost, for example inside one of
+    Dask's destructors. A second signal is not held back.
     """
-    interrupted = threading.Event()
-    usual = signal.getsignal(signal.SIGINT)
+    received: list[int] = []
+    usual = {number: signal.getsignal(number) for number in _HANDLERS}
 
     def note(number: int, frame: FrameType | None) -> None:
-        interrupted.set()
-        signal.signal(signal.SIGINT, usual)
+        received.append(number)
+        signal.signal(number, usual[signal.Signals(number)])
 
     def check() -> None:
-        if interrupted.is_set():
-            raise KeyboardInterrupt
+        if received:
+            if received[0] == signal.SIGINT:
+                raise KeyboardInterrupt
+            end_by_sigterm(received[0], None)
 
     main = threading.current_thread() is threading.main_thread()
-    # only Python's own handler is replaced: another one is somebody's decision
-    if not main or usual is not signal.default_int_handler:
-        yield check
-        return
-    signal.signal(signal.SIGINT, note)
+    held = [number for number, own in _HANDLERS.items() if main and usual[number] in own]
+    for number in held:
+        signal.signal(number, note)
     try:
         yield check
     finally:
-        signal.signal(signal.SIGINT, usual)
+        for number in held:
+            signal.signal(number, usual[number])

@@ -12,11 +12,14 @@ from typing import Any
 
 import numpy as np
 
+from palpate import checks
 from palpate.dataset import Dataset
 from palpate.errors import SolverError
+from palpate.processes import CASE_LIMIT
+from palpate.sweeps.case import Columns, empty, put
 from palpate.sweeps.ledger import Ledger
 from palpate.sweeps.plan import Plan, make_plan
-from palpate.sweeps.runner import Columns, connect, empty, put, run
+from palpate.sweeps.runner import connect, run
 from palpate.sweeps.space import Design
 
 __all__ = [
@@ -41,13 +44,14 @@ def sweep(
     progress: bool | Report = True,
     path: str | os.PathLike[str] | None = None,
     max_failed: float = 0.5,
+    case_limit: float = CASE_LIMIT,
 ) -> Dataset:
     """Solve a body under many loads, or touched at many places, in parallel.
 
     Samples are solved in chains, each solve starting from the last one's answer. The chains are settled before
     the first solve, by the problem and the points alone: how many workers there are, and whether the sweep was
     interrupted, changes no bit of the answers. A sample that fails becomes a row with NaN and a message, and the
-    sweep goes on.
+    sweep goes on, also where it ends the process that solves it or never ends.
 
     Parameters
     ----------
@@ -75,6 +79,8 @@ def sweep(
         A Zarr store to write. An interrupted sweep takes up its finished chains there; a finished one is read.
     max_failed : float
         Largest share of failed samples that is put up with.
+    case_limit : float
+        Time in s after which the solve of a sample has failed; by default an hour.
 
     Returns
     -------
@@ -85,20 +91,28 @@ def sweep(
     ------
     UsageError
         For a wrong argument, or if `path` holds another sweep.
+    ResourceError
+        If no scheduler answers or it is lost, or the disk is full; what is solved is kept at `path`.
     SolverError
         If more than `max_failed` of the samples failed.
     """
+    checks.positive("The limit of a case", case_limit, "s")
     plan = make_plan(body, interactions, samples, seed, design, points)
     ledger = Ledger(Path(path), plan.config) if path is not None else None
     data = ledger.complete() if ledger else None
     if data is None:
-        data = _solve(plan, ledger, workers, cluster, progress)
+        data = _solve(plan, ledger, workers, cluster, progress, case_limit)
     _check_failures(data, max_failed)
     return data
 
 
 def _solve(
-    plan: Plan, ledger: Ledger | None, workers: int | None, cluster: Any, progress: bool | Report
+    plan: Plan,
+    ledger: Ledger | None,
+    workers: int | None,
+    cluster: Any,
+    progress: bool | Report,
+    case_limit: float,
 ) -> Dataset:
     columns = empty(len(plan.points), plan.schema)
     chains = plan.chains()
@@ -115,7 +129,7 @@ def _solve(
         unsolved = [rows for rows in chains if not done[rows].all()]
         if unsolved:
             with connect(cluster, workers) as (client, revive):
-                run(client, revive, plan.problem, plan.schema, plan.points, unsolved, accept)
+                run(client, revive, plan.problem, plan.schema, plan.points, unsolved, accept, case_limit)
     data = plan.label(columns, np.arange(len(plan.points)))
     return ledger.finish(data) if ledger else data
 
@@ -174,7 +188,9 @@ def _check_failures(data: Dataset, max_failed: float) -> None:
     failed = np.flatnonzero(~data.converged)
     if failed.size == 0 or failed.size <= max_failed * len(data):
         return
-    first = [f"{_inputs(data, row)}: {data.data['message'].values[row]}" for row in failed[:3]]
+    # without the tracebacks, which the rows keep
+    reasons = [str(data.message[row]).partition("\n\n")[0] for row in failed[:3]]
+    first = [f"{_inputs(data, row)}: {reason}" for row, reason in zip(failed[:3], reasons, strict=True)]
     heading = "The first of them:" if failed.size > 3 else "They are:" if failed.size > 1 else "It is:"
     raise SolverError(
         f"{failed.size} of {len(data)} solves failed.",

@@ -1,0 +1,222 @@
+"""Files and folders that are written whole or not at all, temporary folders, and errors of the system in sentences.
+
+::
+
+    writing          yields a path beside the file; what is written there takes its place at once, or never
+    write_file       the same for bytes or a text
+    writing_folder   the same for a folder, such as a Zarr store
+    TemporaryFolder  a folder for scratch files; those of processes that were killed are removed by the next one
+    system_errors    turns errors of the operating system into palpate's own
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import shutil
+import tempfile
+import uuid
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from palpate.errors import PalpateError, ResourceError, UsageError
+
+__all__ = [
+    "TemporaryFolder",
+    "explain_system_error",
+    "system_errors",
+    "write_file",
+    "writing",
+    "writing_folder",
+]
+
+_PREFIX, _LOCK = "palpate-", "in-use" if os.name != "nt" else "lock"
+_WRONG_PATH = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ENAMETOOLONG, errno.EINVAL, errno.ELOOP}
+_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+_FORBIDDEN = {errno.EACCES, errno.EPERM, errno.EROFS}
+
+
+@contextlib.contextmanager
+def writing(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Yield a path beside `path` for a file that takes its place when it is whole; else nothing changes.
+
+    Raises
+    ------
+    UsageError
+        If the path can't be a file's, for example because its folder is missing.
+    ResourceError
+        If the disk is full, the folder is write-protected, or the disk fails.
+    """
+    target = Path(path)
+    part = target.with_name(f".{target.name}.{uuid.uuid4().hex[:8]}.part")
+    with system_errors(f"{target} could not be written."):
+        try:
+            if target.is_dir():
+                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
+            yield part
+            _synchronise(part)
+            os.replace(part, target)
+            _synchronise(target.parent)
+        finally:
+            with contextlib.suppress(OSError):
+                part.unlink(missing_ok=True)
+
+
+def write_file(path: str | os.PathLike[str], content: bytes | str) -> Path:
+    """Write a file of these bytes, or of this text in UTF-8, whole or not at all.
+
+    Raises
+    ------
+    UsageError, ResourceError
+        As for `writing`.
+    """
+    with writing(path) as part:
+        part.write_bytes(content.encode() if isinstance(content, str) else content)
+    return Path(path)
+
+
+@contextlib.contextmanager
+def writing_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Yield a path beside `path` for a folder that takes its place when it is whole; else nothing changes.
+
+    A folder that is there already is replaced.
+
+    Raises
+    ------
+    UsageError, ResourceError
+        As for `writing`.
+    """
+    target = Path(path)
+    mark = uuid.uuid4().hex[:8]
+    part, old = (target.with_name(f".{target.name}.{mark}{end}") for end in ("", ".old"))
+    with system_errors(f"{target} could not be written."):
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            yield part
+            for file in part.rglob("*"):
+                _synchronise(file)
+            if target.exists():
+                os.rename(target, old)
+            os.replace(part, target)
+            _synchronise(target.parent)
+        finally:
+            if old.exists() and not target.exists():
+                os.replace(old, target)
+            for leftover in (part, old):
+                shutil.rmtree(leftover, ignore_errors=True)
+
+
+def _synchronise(path: Path) -> None:
+    """Wait until a file, or the names in a folder, are on the disk: a full one may tell only then."""
+    if path.is_dir() and os.name == "nt":
+        return  # folders can't be opened there
+    handle = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
+    try:
+        os.fsync(handle)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # some network disks can't
+            raise
+    finally:
+        os.close(handle)
+
+
+@contextlib.contextmanager
+def system_errors(what: str) -> Iterator[None]:
+    """Turn errors of the operating system, and want of memory, into palpate's own; `what` happened, as a sentence.
+
+    Raises
+    ------
+    UsageError
+        If a path can't be one.
+    ResourceError
+        If the disk is full or write-protected, the memory is used up, or the like.
+    """
+    try:
+        yield
+    except PalpateError:
+        raise
+    except (OSError, MemoryError) as error:
+        raise explain_system_error(what, error) from error
+
+
+def explain_system_error(what: str, error: OSError | MemoryError) -> PalpateError:
+    """Return the error of palpate's own that tells of an error of the system."""
+    if isinstance(error, MemoryError):
+        return ResourceError(
+            what,
+            why="This machine has no memory left for it.",
+            fix="End other programs, use fewer workers or larger elements, or take a machine with more memory.",
+        )
+    code, said = error.errno, f"{error.strerror or error}".rstrip(".")
+    where = f": {error.filename}" if error.filename else ""
+    if code in _FULL:
+        fix = "Make room, then give the same command again: what was finished is kept."
+        return ResourceError(what, why=f"The disk is full ({said}){where}.", fix=fix)
+    if code in _FORBIDDEN:
+        fix = "Choose a folder that you may write to, or change its permissions."
+        return ResourceError(what, why=f"The place is write-protected ({said}){where}.", fix=fix)
+    if code == errno.ENOMEM:
+        return explain_system_error(what, MemoryError())
+    if code in _WRONG_PATH:
+        return UsageError(what, why=f"{said}{where}.", fix="Name a file in a folder that exists.")
+    return ResourceError(what, why=f"{said}{where}.", fix="Check the disk and its connection, and try again.")
+
+
+class TemporaryFolder:
+    """A folder for scratch files, whose owner holds a lock in it; a context manager that yields its path.
+
+    A process that is killed leaves its folder behind. The lock is gone with it, and the next one that makes a folder
+    removes those without.
+    """
+
+    def __init__(self) -> None:
+        with system_errors("A folder for temporary files could not be made."):
+            base = Path(tempfile.gettempdir())
+            _remove_stale(base)
+            self.path = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=base))
+            self._lock: Any = (self.path / "lock").open("wb")
+            _try_to_lock(self._lock)
+            if os.name != "nt":  # which renames no open file, and needs no lock beside its being open
+                os.rename(self.path / "lock", self.path / _LOCK)  # others see it when it is locked
+
+    def remove(self) -> None:
+        """Remove the folder and all in it; removing it again does nothing."""
+        self._lock.close()
+        shutil.rmtree(self.path, ignore_errors=True)
+
+    def __enter__(self) -> Path:
+        return self.path
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.remove()
+
+
+def _remove_stale(base: Path) -> None:
+    for lock in base.glob(f"{_PREFIX}*/{_LOCK}"):
+        try:
+            with lock.open("r+b") as file:
+                stale = _try_to_lock(file)
+            if os.name == "nt":  # where a file that is open can't be removed
+                lock.unlink()
+        except OSError:  # another user's, or just removed
+            continue
+        if stale:
+            shutil.rmtree(lock.parent, ignore_errors=True)
+
+
+def _try_to_lock(file: Any) -> bool:
+    """Lock an open file for as long as it is open; False where another process has locked it."""
+    try:
+        import fcntl
+    except ImportError:
+        return True
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True

@@ -1,0 +1,254 @@
+"""Work in a child process that may crash or hang: it costs an error there, and nothing here.
+
+A `Child` answers calls one after the other and keeps its state in between, like this process would. Where a call
+ends it, or takes longer than its limit, `ChildEnded` says how, with the traceback of the moment: libraries in C may
+end their process without an exception that Python could catch. The next call starts a new one.
+
+The child's side is `palpate.supervised_child`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import pickle
+import queue
+import signal
+import struct
+import subprocess
+import sys
+import threading
+import time
+import weakref
+from collections.abc import Callable
+from pathlib import Path
+from typing import IO, Any, TypeVar
+
+from palpate.errors import SolverError
+from palpate.files import TemporaryFolder
+from palpate.processes import helper_environment, is_supervised, kill_group
+
+__all__ = ["Child", "ChildEnded", "RemoteTraceback", "read_frame", "run_in_child", "write_frame"]
+
+START = 60.0  # s in which a child has to be ready
+GRACE = 5.0  # s after a call's limit in which the child ends by itself, with the traceback of the moment
+READER = "read_requests"  # the function of a child's second thread, whose place is of no interest
+_OWN_FRAMES = ("supervised_child.py", "<frozen runpy>")  # below those of the work
+_HEAD = struct.Struct(">Q")
+_DETAILS = 4000  # characters of the child's last words that are kept
+
+Result = TypeVar("Result")
+
+
+class ChildEnded(SolverError):
+    """A child process was ended by what it was asked to do.
+
+    Attributes
+    ----------
+    overdue : bool
+        True where it was ended because the call took longer than its limit.
+    reason : str
+        The end in words: a signal, an exit code, a limit.
+    details : str
+        What the process wrote last, with the traceback of the moment where there is one.
+    """
+
+    overdue = False
+    reason = ""
+    details = ""
+
+
+class RemoteTraceback(Exception):
+    """The traceback of an exception in a child process, as text; the cause of the exception here."""
+
+    def __str__(self) -> str:
+        return f"\n{self.args[0]}"
+
+
+class Child:
+    """A process beside this one that works for it, one call at a time.
+
+    It is started by the first call, and ends with `close`, with this process, or when nobody refers to it.
+    """
+
+    def __init__(self) -> None:
+        self._running: _Running | None = None
+        self._lock = threading.Lock()
+
+    @property
+    def pid(self) -> int | None:
+        """Process id; None while no process runs."""
+        return None if self._running is None else self._running.process.pid
+
+    def start(self) -> None:
+        """Start the process now, so that the first call need not wait for it."""
+        with self._lock:
+            self._started()
+
+    def call(self, function: Callable[..., Result], *arguments: Any, limit: float) -> Result:
+        """Call a function of a module, with arguments that can be pickled, in the child.
+
+        Parameters
+        ----------
+        function : callable
+            Defined at the top of a module, where the child finds it.
+        *arguments
+            Of the function.
+        limit : float
+            Time in s after which the child is ended.
+
+        Raises
+        ------
+        ChildEnded
+            If the call ends the process, or takes longer.
+        BaseException
+            What the function raised; its cause is a `RemoteTraceback`.
+        """
+        request = pickle.dumps((limit, function, arguments), protocol=pickle.HIGHEST_PROTOCOL)
+        with self._lock:
+            running = self._started()
+            try:
+                good, answer = running.ask(request, limit)
+            except BaseException:  # an interruption too: nobody would take the answer any more
+                self.close()
+                raise
+        if good:
+            result: Result = answer
+            return result
+        error, trace = answer
+        raise error from RemoteTraceback(trace)
+
+    def close(self) -> None:
+        """End the process and remove its files; closing again does nothing."""
+        running, self._running = self._running, None
+        if running is not None:
+            running.end()
+
+    def _started(self) -> _Running:
+        if self._running is None or self._running.process.poll() is not None:
+            self.close()
+            self._running = _Running()
+        return self._running
+
+
+class _Running:
+    """One process of a child, with its scratch folder and the answers that it sent."""
+
+    def __init__(self) -> None:
+        self.folder = TemporaryFolder()
+        # appended to, so that it can be emptied from here
+        self._log = (self.folder.path / "child.log").open("ab")
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "palpate.supervised_child"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._log,
+            # what a crash leaves in the folder for temporary files goes with ours
+            env=helper_environment(scratch=self.folder.path),
+            # a group of its own: it is ended with all that it started
+            start_new_session=True,
+        )
+        self._answers: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
+        assert self.process.stdin
+        assert self.process.stdout
+        self._stdin, self._ready = self.process.stdin, False
+        threading.Thread(target=_receive, args=(self.process.stdout, self._answers), daemon=True).start()
+        self.end = weakref.finalize(self, _end, self.process, self._log, self.folder)
+
+    def ask(self, request: bytes, limit: float) -> tuple[bool, Any]:
+        """Return True and the result of a call, or False and its exception with the traceback."""
+        if not self._ready:  # its imports are no part of the call
+            self._ready = True
+            self._answer(START)
+        self._log.truncate(0)
+        with contextlib.suppress(OSError):  # it is gone, and its input with it: the answers end
+            write_frame(self._stdin, request)
+        good, result = pickle.loads(self._answer(limit))
+        return good, result
+
+    def _answer(self, limit: float) -> bytes:
+        began = time.monotonic()
+        try:
+            answer = self._answers.get(timeout=limit + GRACE)
+        except queue.Empty:
+            raise self._ended(overdue=True, limit=limit) from None
+        if answer is None:
+            self.process.wait()
+            raise self._ended(overdue=time.monotonic() - began >= limit, limit=limit)
+        return answer
+
+    def _ended(self, *, overdue: bool, limit: float) -> ChildEnded:
+        code = self.process.poll()
+        reason = f"it took longer than {limit:g} s" if overdue else _describe_exit(code or 0)
+        details = self._last_words()
+        error = ChildEnded(f"A process that worked for this one was ended: {reason}.", why=details)
+        error.overdue, error.reason, error.details = overdue, reason, details
+        return error
+
+    def _last_words(self) -> str:
+        text = Path(self._log.name).read_text(encoding="utf-8", errors="replace").strip()
+        for mark in ("Fatal Python error", "Windows fatal exception", "Timeout ("):
+            if (place := text.rfind(mark)) >= 0:
+                threads = [t for t in text[place:].split("\n\n") if READER not in t]
+                lines = "\n".join(threads).splitlines()
+                text = "\n".join(line for line in lines if not any(own in line for own in _OWN_FRAMES))
+                return text[:_DETAILS]
+        return text[-_DETAILS:]
+
+
+def _end(process: subprocess.Popen[bytes], log: IO[bytes], folder: TemporaryFolder) -> None:
+    kill_group(process)
+    for pipe in (process.stdin, process.stdout, log):
+        with contextlib.suppress(OSError):
+            if pipe is not None:
+                pipe.close()
+    folder.remove()
+
+
+def _receive(pipe: IO[bytes], answers: queue.SimpleQueue[bytes | None]) -> None:
+    with contextlib.suppress(OSError, ValueError):  # closed here
+        while (frame := read_frame(pipe)) is not None:
+            answers.put(frame)
+    answers.put(None)
+
+
+def write_frame(pipe: IO[bytes], content: bytes) -> None:
+    """Write one message: its length, then its bytes."""
+    pipe.write(_HEAD.pack(len(content)))
+    pipe.write(content)
+    pipe.flush()
+
+
+def read_frame(pipe: IO[bytes]) -> bytes | None:
+    """Read one message; None at the end of the input."""
+    head = pipe.read(_HEAD.size)
+    if len(head) < _HEAD.size:
+        return None
+    (size,) = _HEAD.unpack(head)
+    content = pipe.read(size)
+    return content if len(content) == size else None
+
+
+def _describe_exit(code: int) -> str:
+    if code >= 0:
+        shown = f"0x{code:X}" if code > 255 else str(code)  # Windows' own codes are read in hexadecimal
+        return f"its process ended with exit code {shown}"
+    try:
+        name = signal.Signals(-code).name
+    except ValueError:
+        name = f"signal {-code}"
+    memory = ", which a system sends that has no memory left" if name == "SIGKILL" else ""
+    return f"its process was ended by {name}{memory}"
+
+
+def run_in_child(function: Callable[..., Result], *arguments: Any, limit: float) -> Result:
+    """Call a function in a child process of its own, or here where this process is a child already.
+
+    The parameters and exceptions are those of `Child.call`.
+    """
+    if is_supervised():
+        return function(*arguments)
+    child = Child()
+    try:
+        return child.call(function, *arguments, limit=limit)
+    finally:
+        child.close()

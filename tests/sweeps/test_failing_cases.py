@@ -1,0 +1,134 @@
+"""Cases that crash, hang, raise or lie cost themselves; a lost worker or scheduler costs no answer."""
+
+import os
+import signal
+import threading
+
+import numpy as np
+import psutil
+import pytest
+from solid_problems import Ground
+from sweep_problems import Spring
+
+from palpate.dataset import Dataset
+from palpate.errors import ResourceError, SolverError, UsageError
+from palpate.sweeps import local_cluster, sweep
+
+
+def test_crashing_cases_cost_only_themselves(cluster, tmp_path):
+    """Four of 96 take their process down, by a signal or an exit, among others that raise."""
+    points = np.arange(96.0) / 10
+    spring = Spring(aborts=(1.0, 5.0), dies=(5.2, 9.5), raises=(3.0,), log=str(tmp_path))
+    before = cluster.process_ids
+    data = sweep(spring, points=points, cluster=cluster)
+    failed = np.flatnonzero(~data.converged)
+    np.testing.assert_array_equal(failed, [10, 30, 50, 52, 95])
+    np.testing.assert_array_equal(data.ok.displacement[:, 0, 1], -np.delete(points, failed) / 2)
+    assert cluster.process_ids == before
+    # two tries each, and no more
+    tries = [len(list(tmp_path.glob(f"{points[row]:.6f}-*"))) for row in failed]
+    assert tries == [2] * 5
+    aborted, raised, died = (data.message[row] for row in (10, 30, 95))
+    assert aborted.startswith("its process was ended by SIGABRT, in each of 2 tries\n\n")
+    assert "Fatal Python error: Aborted" in aborted
+    assert "sweep_problems.py" in aborted
+    assert died.startswith("its process ended with exit code 3, in each of 2 tries")
+    assert raised.startswith("ZeroDivisionError: no answer at 3\n\nTraceback")
+    assert "in solve" in raised
+    assert "case.py" not in raised
+
+
+def test_a_case_that_never_ends_costs_its_limit_once(cluster, tmp_path):
+    spring = Spring(hangs=(4.0,), log=str(tmp_path))
+    data = sweep(spring, points=np.arange(8.0), cluster=cluster, case_limit=0.5)
+    np.testing.assert_array_equal(np.flatnonzero(~data.converged), [4])
+    assert data.message[4].startswith("it took longer than 0.5 s\n\n")
+    assert "in never_end" in data.message[4]
+    assert len(list(tmp_path.glob("4.000000-*"))) == 1
+
+
+def test_too_many_failures_are_told_without_their_tracebacks(cluster):
+    with pytest.raises(SolverError) as caught:
+        sweep(Spring(raises=(1.0, 2.0)), points=[1.0, 2.0], cluster=cluster)
+    assert "ZeroDivisionError: no answer at 1" in caught.value.why
+    assert "Traceback" not in caught.value.why
+
+
+def test_convergence_without_numbers_is_a_failure(cluster):
+    data = sweep(Spring(lies=(3.0,)), points=np.arange(5.0), cluster=cluster)
+    np.testing.assert_array_equal(np.flatnonzero(~data.converged), [3])
+    assert data.message[3] == "the solver calls it converged, but potential_energy is not finite"
+
+
+class Unopenable(Ground):
+    def open(self):
+        super().open()
+        os.abort()
+
+
+def test_a_model_that_cannot_be_opened_is_tried_twice_by_each_worker(cluster, tmp_path):
+    with pytest.raises(SolverError, match="32 of 32") as caught:
+        sweep(Unopenable(log=str(tmp_path)), samples=32, cluster=cluster)
+    assert "The model could not be opened: its process was ended by SIGABRT" in caught.value.why
+    assert len(list(tmp_path.iterdir())) <= 2 * len(cluster)
+
+
+def test_the_limit_of_a_case_is_a_time():
+    with pytest.raises(UsageError, match="limit of a case"):
+        sweep(Spring(), points=[1.0], case_limit=0.0)
+
+
+def test_a_killed_worker_changes_no_bit():
+    with local_cluster(2) as mortal:
+        before = mortal.process_ids
+
+        def kill(done, total):
+            if done == 0:
+                os.kill(before[0], signal.SIGKILL)
+
+        data = sweep(Ground(), samples=16, cluster=mortal, progress=kill)
+        assert data.hash == sweep(Ground(), samples=16, cluster=mortal).hash
+        assert mortal.process_ids != before
+
+
+def test_no_scheduler_is_said_in_a_sentence():
+    import dask
+
+    with (
+        dask.config.set({"distributed.comm.timeouts.connect": "200ms"}),
+        pytest.raises(ResourceError, match=r"No scheduler answers at tcp://127.0.0.1:9") as caught,
+    ):
+        sweep(Spring(), points=[1.0], cluster="tcp://127.0.0.1:9")
+    assert caught.value.exit_code == 3
+
+
+def test_a_lost_scheduler_keeps_what_is_solved(tmp_path):
+    arguments = {"body": Spring(), "samples": 64, "path": tmp_path / "a.zarr"}
+    mortal = local_cluster(1)
+    ends = threading.Thread(target=mortal.close)
+
+    def lose(done, total):
+        if done and not ends.ident:
+            ends.start()
+            ends.join()
+
+    with pytest.raises(ResourceError, match="is lost") as caught:
+        sweep(**arguments, cluster=mortal.address, progress=lose)
+    assert "same command goes on" in caught.value.fix
+    kept = sum(len(Dataset.open(part)) for part in (tmp_path / "a.zarr.parts").glob("part-*.zarr"))
+    assert kept > 0
+    seen = []
+    sweep(**arguments, workers=1, progress=lambda done, _: seen.append(done))
+    assert seen[0] == kept
+
+
+def test_children_of_workers_leave_nothing(tmp_path):
+    with local_cluster(1) as cluster:
+        sweep(Spring(aborts=(1.0,)), points=[0.0, 1.0, 2.0], cluster=cluster)
+        folder = cluster.folder
+        grandchildren = psutil.Process(cluster.process_ids[0]).children()
+        assert len(grandchildren) == 1
+        assert folder.is_dir()
+    assert not folder.exists()
+    _, alive = psutil.wait_procs(grandchildren, timeout=10)
+    assert not alive

@@ -12,7 +12,7 @@ from sweep_problems import Spring
 from palpate.dataset import Dataset
 from palpate.errors import FileFormatError, SolverError, UsageError
 from palpate.physics import Cantilever, Circle, LinearElastic, TipLoad, preset
-from palpate.sweeps import sweep
+from palpate.sweeps import Scheduler, sweep
 from palpate.sweeps.sweep import reporter
 
 BODY = Cantilever(1.0, Circle(0.005), LinearElastic(2e9, 0.43), elements=5)
@@ -117,14 +117,33 @@ def test_wrong_arguments(arguments):
         sweep(**arguments)
 
 
-def test_any_scheduler_address_will_do(cluster):
+def test_any_scheduler_and_any_client_will_do(cluster, tmp_path):
     import distributed
 
-    by_address = sweep(Spring(), points=[1.0, 2.0], cluster=cluster.address)
-    with distributed.Client(cluster.address, set_as_default=False) as client:
+    certificate, key = tmp_path / "certificate.pem", tmp_path / "key.pem"
+    certificate.write_text(cluster.security.tls_client_cert)
+    key.write_text(cluster.security.tls_client_key)
+    own = Scheduler(cluster.address, ca=certificate, certificate=certificate, key=key)
+    by_scheduler = sweep(Spring(), points=[1.0, 2.0], cluster=own)
+    with distributed.Client(cluster.address, security=cluster.security, set_as_default=False) as client:
         by_client = sweep(Spring(), points=[1.0, 2.0], cluster=client)
         assert client.status == "running"
-    assert by_address.hash == by_client.hash
+    assert by_scheduler.hash == by_client.hash
+
+
+@pytest.mark.parametrize(
+    ("scheduler", "words"),
+    [
+        ({"address": "cluster.example"}, "tls://HOST:PORT"),
+        ({"address": "tcp://127.0.0.1:8786", "ca": __file__, "certificate": __file__}, "tls://"),
+        ({"address": "tls://127.0.0.1:8786", "ca": __file__}, "your own"),
+        ({"address": "tls://127.0.0.1:8786", "ca": "absent.pem", "certificate": __file__}, "absent.pem"),
+        ({"address": "tls://127.0.0.1:8786"}, "--tls-ca"),
+    ],
+)
+def test_a_scheduler_that_cannot_be_asked_is_refused_before_anything_is_sent(scheduler, words):
+    with pytest.raises(UsageError, match=words):
+        sweep(Spring(), points=[1.0], cluster=Scheduler(**scheduler))
 
 
 def test_a_finished_sweep_is_read_not_solved_again(cluster, tmp_path):

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from palpate.cli.console import Console
 from palpate.errors import AccuracyError, UsageError
 from palpate.processes import CASE_LIMIT
+
+if TYPE_CHECKING:
+    from palpate.sweeps import Scheduler
 
 __all__ = ["is_archive", "learn_file", "sweep_file", "validate_model", "validate_study_file"]
 
@@ -20,16 +23,35 @@ TEST_SETS = ("-test.zarr", "-random.zarr", "-unseen.palpate")
 """Ends of the names of test sets, which begin with the name of the model."""
 
 
-def sweep_file(study: Path, workers: int | None, console: Console, *, case_limit: float = CASE_LIMIT) -> None:
-    """Solve what a study file describes, and print where the solves are."""
+def sweep_file(
+    study: Path,
+    workers: int | None,
+    console: Console,
+    scheduler: Scheduler | None = None,
+    *,
+    case_limit: float = CASE_LIMIT,
+) -> None:
+    """Solve what a study file describes, here or on a scheduler, and print where the solves are."""
     from palpate.study import read_study
     from palpate.study.run import Paths, sweep_study
+    from palpate.sweeps import Scheduler
 
     record = read_study(study).with_workers(workers)
     paths = Paths(study.parent, record.name)
     if paths.data.with_name(paths.data.name + ".parts").exists():
         console.say(f"Going on with the interrupted sweep in {paths.data} …")
-    data, further = sweep_study(record, paths, progress=not console.as_json, case_limit=case_limit)
+    if scheduler is None and record.sweep is not None and record.sweep.scheduler is not None:
+        scheduler = Scheduler(record.sweep.scheduler)
+    if scheduler is not None and record.sweep is None:
+        raise UsageError(
+            "The histories of this study are solved in this process, not on a scheduler.",
+            fix="Leave --scheduler out.",
+        )
+    if scheduler is not None and scheduler.warning:
+        console.say(f"Warning: {scheduler.warning}")
+    data, further = sweep_study(
+        record, paths, cluster=scheduler, progress=not console.as_json, case_limit=case_limit
+    )
     target, other = (
         (paths.data, paths.random) if record.memory is None else (paths.histories, paths.unseen_histories)
     )

@@ -12,7 +12,7 @@
     ledger.py      finished parts of an interrupted sweep, on disk
 """
 
-from palpate.sweeps.cluster import LocalCluster, local_cluster
+from palpate.sweeps.cluster import LocalCluster, Scheduler, local_cluster
 from palpate.sweeps.problem import (
     Answer,
     Chained,
@@ -37,6 +37,7 @@ __all__ = [
     "LocalCluster",
     "Problem",
     "Resettable",
+    "Scheduler",
     "Solver",
     "Space",
     "grid",

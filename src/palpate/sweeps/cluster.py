@@ -3,14 +3,20 @@
 Dask's own local cluster starts workers by multiprocessing, which imports the user's script anew and so needs
 an ``if __name__ == "__main__"`` guard in it. These workers are started as ``python -m palpate.sweeps.worker``
 and need none: a sweep works in a file without a guard, in a notebook and on standard input.
+
+Whoever may talk to a scheduler or a worker can run code as its owner, and other users of a machine reach its
+127.0.0.1. Each local cluster therefore has a key of its own: scheduler, workers and client speak TLS and show it to
+each other. It is made when the cluster starts and reaches the workers through their standard input alone.
 """
 
 from __future__ import annotations
 
+import json
 import logging
 import subprocess
 import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -19,7 +25,7 @@ from palpate.errors import SolverError, UsageError
 from palpate.files import TemporaryFolder
 from palpate.processes import available_cores, helper_environment
 
-__all__ = ["LocalCluster", "local_cluster"]
+__all__ = ["LocalCluster", "Scheduler", "local_cluster"]
 
 _GRACE = 1.0  # s to end by themselves; a worker in the midst of a solve does not
 _SPARE_LIVES = 16  # workers started again after a crash, per cluster
@@ -34,6 +40,11 @@ class LocalCluster:
     ----------
     workers : int
         Number of worker processes.
+
+    Attributes
+    ----------
+    security : distributed.Security
+        Key and certificate of this cluster, for a Dask client of it. They exist in memory only.
     """
 
     def __init__(self, workers: int) -> None:
@@ -44,9 +55,10 @@ class LocalCluster:
         try:
             # they import Dask while the scheduler starts here
             self._workers = [self._start_worker() for _ in range(workers)]
-            self._scheduler = _start_scheduler()
+            self.security = _temporary_security()
+            self._scheduler = _start_scheduler(self.security)
             for worker in self._workers:
-                self._tell_address(worker)
+                self._invite(worker)
         except BaseException:
             self.close()
             raise
@@ -92,7 +104,7 @@ class LocalCluster:
             if worker.poll() is not None:
                 _end(worker, time.monotonic())
                 self._workers[place] = self._start_worker()
-                self._tell_address(self._workers[place])
+                self._invite(self._workers[place])
 
     def close(self) -> None:
         """End the scheduler and all workers; closing again does nothing."""
@@ -119,10 +131,16 @@ class LocalCluster:
                 start_new_session=True,
             )
 
-    def _tell_address(self, worker: subprocess.Popen[bytes]) -> None:
+    def _invite(self, worker: subprocess.Popen[bytes]) -> None:
+        """Give a worker the scheduler's address and the key, as one line of JSON on its standard input."""
+        invitation = {
+            "address": self.address,
+            "certificate": self.security.tls_worker_cert,
+            "key": self.security.tls_worker_key,
+        }
         if worker.stdin:
             try:
-                worker.stdin.write(self.address.encode() + b"\n")
+                worker.stdin.write(json.dumps(invitation).encode() + b"\n")
                 worker.stdin.flush()
             except BrokenPipeError:
                 pass  # it died already: `revive` sees to it
@@ -163,18 +181,103 @@ def local_cluster(workers: int | None = None) -> LocalCluster:
     return LocalCluster(count)
 
 
-def _start_scheduler() -> Any:
+@dataclass(frozen=True)
+class Scheduler:
+    """A Dask scheduler of the user's own, and the files that its TLS asks for.
+
+    Attributes
+    ----------
+    address : str
+        Such as ``tls://cluster.example:8786``. Through ``tcp://`` whoever reaches the port can run code as you.
+    ca, certificate, key : path, optional
+        PEM files: the certificate of the authority that both sides trust, and this side's own certificate with its
+        key (left out where the certificate's file holds it too). By default those of Dask's configuration.
+
+    Examples
+    --------
+    >>> own = Scheduler("tls://cluster.example:8786", ca="ca.pem", certificate="me.pem", key="me.key")
+    >>> sweep(body, loads, samples=200, cluster=own)  # doctest: +SKIP
+    """
+
+    address: str
+    ca: str | Path | None = None
+    certificate: str | Path | None = None
+    key: str | Path | None = None
+
+    def __post_init__(self) -> None:
+        scheme, separator, place = self.address.partition("://")
+        if not separator or not place:
+            raise UsageError(
+                f"{self.address!r} is no scheduler's address.", fix="Write it as tls://HOST:PORT."
+            )
+        files = [path for path in (self.ca, self.certificate, self.key) if path is not None]
+        if files and scheme != "tls":
+            raise UsageError(
+                f"Certificates don't protect {self.address}.",
+                why="Only an address that begins with tls:// is encrypted.",
+                fix="Start the scheduler with its TLS options and give its tls:// address.",
+            )
+        if files and None in (self.ca, self.certificate):
+            raise UsageError(
+                "TLS needs the authority's certificate and your own.",
+                fix="Give both, and the key where it stands in a file of its own.",
+            )
+        for path in files:
+            if not Path(path).is_file():
+                raise UsageError(f"There is no file {path}.", fix="Name the PEM files of your cluster.")
+
+    @property
+    def warning(self) -> str:
+        """A sentence for who uses an address without TLS, else ""."""
+        if self.address.startswith("tls://"):
+            return ""
+        return (
+            f"{self.address} is not encrypted: whoever reaches that port can run code as you. "
+            "Start the scheduler and its workers with TLS and give the tls:// address."
+        )
+
+    def security(self) -> Any:
+        """Return Dask's record of these files, with what its configuration adds; None for an address without TLS."""
+        import distributed
+
+        if not self.address.startswith("tls://"):
+            return None
+        named = {"tls_ca_file": self.ca, "tls_client_cert": self.certificate, "tls_client_key": self.key}
+        given = {name: str(path) for name, path in named.items() if path is not None}
+        security = distributed.Security(require_encryption=True, **given)
+        if not security.tls_ca_file or not security.tls_client_cert:
+            raise UsageError(
+                f"{self.address} asks for certificates.",
+                why="Neither options nor Dask's configuration (distributed.comm.tls) name any.",
+                fix="Give --tls-ca, --tls-cert and --tls-key.",
+            )
+        return security
+
+
+def _temporary_security() -> Any:
+    import distributed
+
+    return distributed.Security.temporary()
+
+
+def _start_scheduler(security: Any) -> Any:
     import dask
     import distributed
 
     # Dask silences its loggers while a cluster runs; a connection that closes just after would still be told
     logging.getLogger("distributed.batched").setLevel(logging.WARNING)
-    # one task at a time per worker: a task that kills it takes no other one along
-    with dask.config.set({"distributed.scheduler.worker-saturation": 1.0}):
+    settings = {
+        # one task at a time per worker: a task that kills it takes no other one along
+        "distributed.scheduler.worker-saturation": 1.0,
+        # Dask opens a port for pages in any case, which knows no key: it serves nothing
+        "distributed.scheduler.http.routes": [],
+    }
+    with dask.config.set(settings):
         return distributed.LocalCluster(
             n_workers=0,
             processes=False,
-            protocol="tcp://",
+            protocol="tls://",
+            security=security,
             host="127.0.0.1",
             silence_logs=logging.CRITICAL,
             scheduler_kwargs={

@@ -23,7 +23,7 @@ from palpate.dataset import Field
 from palpate.errors import ResourceError
 from palpate.processes import end_by_sigterm
 from palpate.sweeps.case import Columns, Task, failed_rows, solve_chain
-from palpate.sweeps.cluster import LocalCluster, local_cluster
+from palpate.sweeps.cluster import LocalCluster, Scheduler, local_cluster
 from palpate.sweeps.problem import Problem
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ _KEPT = "What is solved is kept where the sweep has a path: the same command goe
 def connect(cluster: Any, workers: int | None) -> Iterator[tuple[distributed.Client, Callable[[], None]]]:
     """Yield a client of `cluster`, and a function that starts dead workers again.
 
-    A `LocalCluster`, a scheduler's address, or a cluster or client of Dask's is used and left running; for
+    A `LocalCluster`, a `Scheduler` or its address, or a cluster or client of Dask's is used and left running; for
     ``None`` a cluster is started and ended.
 
     Raises
@@ -58,15 +58,20 @@ def connect(cluster: Any, workers: int | None) -> Iterator[tuple[distributed.Cli
         if isinstance(cluster, distributed.Client):
             yield cluster, revive
         else:
-            address = cluster.address if isinstance(cluster, LocalCluster) else cluster
-            yield stack.enter_context(_client(address)), revive
+            yield stack.enter_context(_client(cluster)), revive
 
 
-def _client(address: Any) -> distributed.Client:
+def _client(cluster: Any) -> distributed.Client:
+    """Return a new client of a `LocalCluster`, of a scheduler or its address, or of one of Dask's clusters."""
     import distributed
 
+    if isinstance(cluster, str):
+        cluster = Scheduler(cluster)
+    security = cluster.security() if isinstance(cluster, Scheduler) else getattr(cluster, "security", None)
+    address = cluster.address if isinstance(cluster, Scheduler | LocalCluster) else cluster
+
     try:
-        return distributed.Client(address, set_as_default=False)
+        return distributed.Client(address, security=security, set_as_default=False)
     except (
         OSError,
         ValueError,

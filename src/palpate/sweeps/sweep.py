@@ -72,7 +72,7 @@ def sweep(
     workers : int, optional
         Processes on this machine, by default one for each core.
     cluster : optional
-        What to run on instead: a `local_cluster`, a scheduler's address, or a cluster or client of Dask's.
+        What to run on instead: a `local_cluster`, a `Scheduler` or its address, or a cluster or client of Dask's.
     progress : bool or callable
         A bar on standard error if that is a terminal; or a function (done, total).
     path : path, optional

@@ -1,11 +1,13 @@
 """The worker process of a sweep: ``python -m palpate.sweeps.worker``, started by `palpate.sweeps.cluster`.
 
-It reads the scheduler's address from the first line of its standard input, and ends when that input closes.
-So no worker outlives the process that started it, however that one died.
+It reads the scheduler's address and the cluster's key from the first line of its standard input, where no other user
+of the machine sees them, and ends when that input closes. So no worker outlives the process that started it, however
+that one died.
 """
 
 from __future__ import annotations
 
+import json
 import sys
 
 from palpate.processes import end_with_input
@@ -13,11 +15,21 @@ from palpate.processes import end_with_input
 __all__ = ["main"]
 
 
-async def _work(address: str, folder: str, name: str) -> None:
-    from distributed import Worker
+async def _work(invitation: dict[str, str], folder: str, name: str) -> None:
+    from distributed import Security, Worker
 
+    certificate, key = invitation["certificate"], invitation["key"]
+    security = Security(
+        require_encryption=True,
+        tls_ca_file=certificate,
+        tls_worker_cert=certificate,
+        tls_worker_key=key,
+        tls_client_cert=certificate,
+        tls_client_key=key,
+    )
     async with Worker(
-        address,
+        invitation["address"],
+        security=security,
         nthreads=1,
         name=name,
         host="127.0.0.1",
@@ -31,18 +43,20 @@ async def _work(address: str, folder: str, name: str) -> None:
 
 
 def main(folder: str, name: str) -> None:
-    """Work for the scheduler whose address comes on standard input, with scratch files in `folder`."""
+    """Work for the scheduler that the line on standard input names, with scratch files in `folder`."""
     import asyncio
     import logging
 
+    import dask
     import distributed  # noqa: F401 - the import runs while the scheduler starts
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
-    address = sys.stdin.buffer.readline().decode().strip()
-    if not address:
+    dask.config.set({"distributed.worker.http.routes": []})  # a port that knows no key serves nothing
+    line = sys.stdin.buffer.readline()
+    if not line.endswith(b"\n"):  # the cluster ended before it started
         return
     end_with_input()
-    asyncio.run(_work(address, folder, name))
+    asyncio.run(_work(json.loads(line), folder, name))
 
 
 if __name__ == "__main__":

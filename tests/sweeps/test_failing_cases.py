@@ -103,6 +103,8 @@ def test_no_scheduler_is_said_in_a_sentence():
 
 
 def test_a_lost_scheduler_keeps_what_is_solved(tmp_path):
+    import distributed
+
     arguments = {"body": Spring(), "samples": 64, "path": tmp_path / "a.zarr"}
     mortal = local_cluster(1)
     ends = threading.Thread(target=mortal.close)
@@ -112,8 +114,9 @@ def test_a_lost_scheduler_keeps_what_is_solved(tmp_path):
             ends.start()
             ends.join()
 
-    with pytest.raises(ResourceError, match="is lost") as caught:
-        sweep(**arguments, cluster=mortal.address, progress=lose)
+    own = distributed.Client(mortal.address, security=mortal.security, set_as_default=False)
+    with own, pytest.raises(ResourceError, match="is lost") as caught:
+        sweep(**arguments, cluster=own, progress=lose)
     assert "same command goes on" in caught.value.fix
     kept = sum(len(Dataset.open(part)) for part in (tmp_path / "a.zarr.parts").glob("part-*.zarr"))
     assert kept > 0

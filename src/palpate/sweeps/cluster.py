@@ -48,6 +48,7 @@ class LocalCluster:
     """
 
     def __init__(self, workers: int) -> None:
+        self.security: Any = None
         self._scratch = TemporaryFolder()
         self._lives = workers + _SPARE_LIVES
         self._scheduler: Any = None
@@ -55,8 +56,7 @@ class LocalCluster:
         try:
             # they import Dask while the scheduler starts here
             self._workers = [self._start_worker() for _ in range(workers)]
-            self.security = _temporary_security()
-            self._scheduler = _start_scheduler(self.security)
+            self.security, self._scheduler = _start_scheduler()
             for worker in self._workers:
                 self._invite(worker)
         except BaseException:
@@ -244,7 +244,7 @@ class Scheduler:
             return None
         named = {"tls_ca_file": self.ca, "tls_client_cert": self.certificate, "tls_client_key": self.key}
         given = {name: str(path) for name, path in named.items() if path is not None}
-        security = distributed.Security(require_encryption=True, **given)
+        security: Any = distributed.Security(require_encryption=True, **given)
         if not security.tls_ca_file or not security.tls_client_cert:
             raise UsageError(
                 f"{self.address} asks for certificates.",
@@ -254,15 +254,12 @@ class Scheduler:
         return security
 
 
-def _temporary_security() -> Any:
-    import distributed
-
-    return distributed.Security.temporary()
-
-
-def _start_scheduler(security: Any) -> Any:
+def _start_scheduler() -> tuple[Any, Any]:
+    """Return a new key, as Dask's record of it, and a scheduler that asks for it."""
     import dask
     import distributed
+
+    security = distributed.Security.temporary()
 
     # Dask silences its loggers while a cluster runs; a connection that closes just after would still be told
     logging.getLogger("distributed.batched").setLevel(logging.WARNING)
@@ -273,7 +270,7 @@ def _start_scheduler(security: Any) -> Any:
         "distributed.scheduler.http.routes": [],
     }
     with dask.config.set(settings):
-        return distributed.LocalCluster(
+        scheduler = distributed.LocalCluster(
             n_workers=0,
             processes=False,
             protocol="tls://",
@@ -288,6 +285,7 @@ def _start_scheduler(security: Any) -> Any:
                 "dashboard_address": "127.0.0.1:0",
             },
         )
+    return security, scheduler
 
 
 def _end(worker: subprocess.Popen[bytes], deadline: float) -> None:

@@ -34,7 +34,16 @@ __all__ = [
 ]
 
 _PREFIX, _LOCK = "palpate-", "in-use" if os.name != "nt" else "lock"
-_WRONG_PATH = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ENAMETOOLONG, errno.EINVAL, errno.ELOOP}
+_SYNCHRONISED_AT_ONCE = 16
+_WRONG_PATH = {
+    errno.ENOENT,
+    errno.EEXIST,
+    errno.ENOTDIR,
+    errno.EISDIR,
+    errno.ENAMETOOLONG,
+    errno.EINVAL,
+    errno.ELOOP,
+}
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 _FORBIDDEN = {errno.EACCES, errno.EPERM, errno.EROFS}
 
@@ -51,8 +60,9 @@ def writing(path: str | os.PathLike[str]) -> Iterator[Path]:
         If the disk is full, the folder is write-protected, or the disk fails.
     """
     target = Path(path)
-    part = target.with_name(f".{target.name}.{uuid.uuid4().hex[:8]}.part")
-    with system_errors(f"{target} could not be written."):
+    # its ending stays: it tells some writers the format
+    part = target.with_name(f".{target.stem}.{uuid.uuid4().hex[:8]}.part{target.suffix}")
+    with system_errors(f"Could not write {target}."):
         try:
             if target.is_dir():
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
@@ -92,12 +102,16 @@ def writing_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
     target = Path(path)
     mark = uuid.uuid4().hex[:8]
     part, old = (target.with_name(f".{target.name}.{mark}{end}") for end in ("", ".old"))
-    with system_errors(f"{target} could not be written."):
+    with system_errors(f"Could not write {target}."):
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
             yield part
-            for file in part.rglob("*"):
-                _synchronise(file)
+            from concurrent.futures import ThreadPoolExecutor
+
+            with ThreadPoolExecutor(
+                _SYNCHRONISED_AT_ONCE
+            ) as pool:  # a disk takes many in little more than the time of one
+                list(pool.map(_synchronise, part.rglob("*")))
             if target.exists():
                 os.rename(target, old)
             os.replace(part, target)
@@ -151,7 +165,8 @@ def explain_system_error(what: str, error: OSError | MemoryError) -> PalpateErro
             fix="End other programs, use fewer workers or larger elements, or take a machine with more memory.",
         )
     code, said = error.errno, f"{error.strerror or error}".rstrip(".")
-    where = f": {error.filename}" if error.filename else ""
+    place = str(error.filename or "")
+    where = f": {place}" if place and not Path(place).name.startswith(".") else ""
     if code in _FULL:
         fix = "Make room, then give the same command again: what was finished is kept."
         return ResourceError(what, why=f"The disk is full ({said}){where}.", fix=fix)

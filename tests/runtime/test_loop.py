@@ -179,6 +179,34 @@ def test_a_force_that_was_not_delivered_is_not_claimed(bench):
     assert states[-1].fault == Fault.DEVICE_ERROR
 
 
+@pytest.mark.parametrize(
+    "error", [KeyError("axis"), RuntimeError("driver"), AttributeError("x"), MemoryError()]
+)
+def test_whatever_a_driver_raises_the_loop_goes_on(bench, error):
+    full = np.linalg.norm(bench.settle().force)
+    bench.device.read_error, bench.device.write_error = error, RuntimeError("and again")
+    bad = bench.ticks(5)
+    assert zero(bad)
+    assert bad[-1].fault_counts[Fault.DEVICE_ERROR] == 1
+    assert bench.loop.device_error == f"{type(error).__name__}: {error}"
+    bench.device.read_error = bench.device.write_error = None
+    assert_ramps_in(bench.ticks(RAMP + 30), full)
+
+
+def test_a_driver_that_reports_no_position_is_a_fault(bench):
+    bench.settle()
+    bench.device.sample.position = None
+    assert zero(bench.ticks(2))
+    assert bench.shared.read_state().fault == Fault.DEVICE_ERROR
+
+
+def test_a_driver_that_fails_at_the_end_is_closed_all_the_same(bench):
+    bench.device.write_error = RuntimeError("unplugged")
+    bench.loop.end()
+    assert bench.device.closed == 1
+    assert bench.loop.device_error == "RuntimeError: unplugged"
+
+
 def test_silent_hardware_gets_zero_force_within_20_ms(bench):
     bench.settle()
     bench.device.silent = True

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import shutil
-import uuid
 import warnings
 from collections.abc import Iterable
 from pathlib import Path
@@ -16,6 +13,7 @@ import numpy as np
 
 from palpate.dataset.schema import FORMAT, FORMAT_VERSION, TIMINGS
 from palpate.errors import FileFormatError, UsageError
+from palpate.files import writing_folder
 
 if TYPE_CHECKING:
     import xarray
@@ -48,17 +46,16 @@ def write(data: xarray.Dataset, path: Path, *, overwrite: bool) -> Path:
             why="It holds something else than the dataset to be saved.",
             fix="Save under another name, delete it, or pass overwrite=True.",
         )
-    path.parent.mkdir(parents=True, exist_ok=True)
-    staging = path.with_name(f".{path.name}.{uuid.uuid4().hex[:8]}")
-    try:
-        stamped = data.assign_attrs(checksum=_checksum(data))
+    if path.exists() and not (path / "zarr.json").is_file():
+        raise UsageError(
+            f"{path} won't be overwritten.",
+            why="It is no Zarr store.",
+            fix="Save under another name, or delete it yourself.",
+        )
+    stamped = data.assign_attrs(checksum=_checksum(data))
+    with writing_folder(path) as staging:
         # consolidated metadata is no part of Zarr's format 3
         stamped.to_zarr(staging, mode="w-", zarr_format=3, consolidated=False, encoding=_chunks(data))
-        if path.exists():
-            _remove(path)
-        os.replace(staging, path)
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)
     return path
 
 
@@ -168,14 +165,3 @@ def _holds(path: Path, data: xarray.Dataset) -> bool:
     if json.loads(stored.attrs["provenance"]) != json.loads(data.attrs["provenance"]):
         return False
     return fingerprint(stored, TIMINGS) == fingerprint(data, TIMINGS)
-
-
-def _remove(path: Path) -> None:
-    """Remove a store, never anything else."""
-    if not (path / "zarr.json").is_file():
-        raise UsageError(
-            f"{path} won't be overwritten.",
-            why="It is no Zarr store.",
-            fix="Save under another name, or delete it yourself.",
-        )
-    shutil.rmtree(path)

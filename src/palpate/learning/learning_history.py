@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.errors import FileFormatError, UsageError
+from palpate.errors import FileFormatError
+from palpate.files import writing
 from palpate.rbf.filter.step import Event
 
 if TYPE_CHECKING:
@@ -84,13 +85,9 @@ class History:
         UsageError
             If the file can't be written.
         """
-        path = Path(path)
-        try:
-            with path.open("wb") as file:
-                np.savez_compressed(file, **vars(self))
-        except OSError as error:
-            raise UsageError(f"Could not write {path}.", why=str(error)) from error
-        return path
+        with writing(path) as part, part.open("wb") as file:
+            np.savez_compressed(file, **vars(self))
+        return Path(path)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> History:

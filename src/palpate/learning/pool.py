@@ -19,7 +19,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
-from palpate.errors import PalpateError, UsageError
+from palpate.errors import ResourceError, UsageError
 from palpate.processes import available_cores, helper_environment
 
 __all__ = ["Pool"]
@@ -71,7 +71,7 @@ class Pool:
 
         Raises
         ------
-        PalpateError
+        ResourceError
             If a process ends before it has answered.
         """
         results: list[R] = []
@@ -102,7 +102,7 @@ class Pool:
             )
             return list(executor.map(work, items))
         except BrokenProcessPool as error:
-            raise PalpateError(
+            raise ResourceError(
                 f"One of the {self._workers} processes that learn was ended before it had answered.",
                 why="It was killed: by hand, or by the system because memory ran out.",
                 fix="Learn with workers=1, which needs least memory and finds the same result, or on fewer solves.",

@@ -23,7 +23,8 @@ from typing import Any
 
 import numpy as np
 
-from palpate.errors import FileFormatError, UsageError
+from palpate.errors import FileFormatError
+from palpate.files import write_file
 
 __all__ = ["MAKE_ANEW", "Container", "read_container", "write_container"]
 
@@ -75,21 +76,13 @@ def write_container(path: str | os.PathLike[str], container: Container) -> Path:
     Raises
     ------
     UsageError
-        If the folder does not exist or can't be written.
+        If the folder does not exist.
+    ResourceError
+        If the disk is full, or the folder write-protected.
     """
     from safetensors.numpy import save
 
-    path = Path(path)
-    temporary = path.with_name(path.name + ".part")
-    try:
-        temporary.write_bytes(save(dict(container.tensors), container.header))
-        os.replace(temporary, path)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
-        raise UsageError(
-            f"Could not write {path}.", why=str(error), fix="Choose a folder that exists."
-        ) from error
-    return path
+    return write_file(path, save(dict(container.tensors), container.header))
 
 
 def read_container(path: str | os.PathLike[str]) -> Container:

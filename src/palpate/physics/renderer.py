@@ -17,6 +17,7 @@ import numpy as np
 from numba import njit
 
 from palpate.errors import UsageError
+from palpate.files import writing
 from palpate.physics import deformed
 from palpate.physics.deformed import Ball, NodalField
 
@@ -58,8 +59,9 @@ class Picture:
         """
         target = Path(path)
         try:
-            self.figure.savefig(target)
-        except (ValueError, OSError) as error:
+            with writing(target) as part:
+                self.figure.savefig(part)
+        except ValueError as error:
             raise UsageError(
                 f"Could not write {target}.", why=str(error), fix="Write to NAME.png, .pdf, .svg or .jpg."
             ) from error

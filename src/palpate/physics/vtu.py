@@ -7,8 +7,7 @@ added here.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -16,6 +15,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.files import system_errors, writing
 from palpate.physics.deformed import ball_of, nodal_strain, require_state
 
 __all__ = ["write_pvd", "write_vtu"]
@@ -66,14 +66,14 @@ def write_vtu(solution: Any, path: str | os.PathLike[str]) -> Path:
         for name, column in (("region", 2), ("surface", 3))
     }
     grid = meshio.Mesh(mesh.points, cells, point_data=_point_data(solution), cell_data=data)
-    with _reported(target):
-        meshio.vtu.write(target, grid, header_type="UInt64")
+    with writing(target) as part:
+        meshio.vtu.write(part, grid, header_type="UInt64")
         # what belongs to the whole body meshio reads, but does not write
-        tree = ElementTree.parse(target)
+        tree = ElementTree.parse(part)
         body = tree.getroot().find("UnstructuredGrid")
         assert body is not None
         body.insert(0, _field_data(_metadata(solution)))
-        tree.write(target, encoding="utf-8", xml_declaration=True)
+        tree.write(part, encoding="utf-8", xml_declaration=True)
     return target
 
 
@@ -105,7 +105,7 @@ def write_pvd(
     if not solutions or len(times) != len(solutions):
         raise UsageError(f"{len(solutions)} solutions and {len(times)} values make no series.")
     folder = target.with_suffix("")
-    with _reported(folder):
+    with system_errors(f"Could not write {folder}."):
         folder.mkdir(parents=True, exist_ok=True)
     file = ElementTree.Element("VTKFile", type="Collection", version="0.1")
     collection = ElementTree.SubElement(file, "Collection")
@@ -114,8 +114,8 @@ def write_pvd(
         write_vtu(solution, folder / name)
         entry = {"timestep": f"{time:.17g}", "group": "", "part": "0", "file": f"{folder.name}/{name}"}
         ElementTree.SubElement(collection, "DataSet", entry)
-    with _reported(target):
-        ElementTree.ElementTree(file).write(target, encoding="utf-8", xml_declaration=True)
+    with writing(target) as part:
+        ElementTree.ElementTree(file).write(part, encoding="utf-8", xml_declaration=True)
     return target
 
 
@@ -165,16 +165,3 @@ def _require_ending(suffix: str, path: str | os.PathLike[str]) -> Path:
         why="ParaView tells a file's format by its name.",
         fix=f"Write to {target.with_suffix(suffix).name if target.name else 'NAME' + suffix}.",
     )
-
-
-@contextmanager
-def _reported(path: Path) -> Iterator[None]:
-    """Turn a failure to write a file or folder into an error that names it."""
-    try:
-        yield
-    except OSError as error:
-        raise UsageError(
-            f"Could not write {path}.",
-            why=f"{error.strerror or error}.",
-            fix="Write to a folder that exists.",
-        ) from error

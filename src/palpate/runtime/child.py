@@ -69,7 +69,8 @@ def _run(options: argparse.Namespace) -> int:
     loop = Loop(model, device, shared, workspace, limits, rate=options.rate, orphaned=orphaned)
     _say({"obtained": obtain()})
     loop.run(rehearsal(model, workspace, limits, options.rate))
-    _say({"foreign": [name for name in FOREIGN if sys.modules.get(name)]})
+    foreign = [name for name in FOREIGN if sys.modules.get(name)]
+    _say({"foreign": foreign, "device_error": loop.device_error})
     return 0
 
 

@@ -17,11 +17,12 @@ import gc
 import math
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Protocol
 
 import numpy as np
 
-from palpate.errors import DeviceError, UsageError
+from palpate.errors import UsageError
 from palpate.runtime.devices import Device
 from palpate.runtime.devices.page import PageDevice
 from palpate.runtime.hand_evaluator import HandEvaluator
@@ -108,6 +109,7 @@ class Loop:
         self.out.describe(workspace, limits)
         self.parameters = np.array([(r.low + r.high) / 2.0 for r in model.parameters])
         self.fault, self.now, self.holding = Fault.NONE, 0.0, False
+        self.device_error = ""
         self._answered, self._sent = math.inf, np.zeros(3)
         self._commands, self._quit = shared.command, shared.command.record["quit"]
         self._wished = shared.command.record["parameters"]
@@ -163,22 +165,27 @@ class Loop:
         if self.fault is Fault.NONE:
             self.fault = fault
 
+    def device_failed(self, error: Exception) -> None:
+        """Record an error of the device's driver; of many, the first one's words are kept."""
+        self.device_error = self.device_error or f"{type(error).__name__}: {error}"
+        self.fail(Fault.DEVICE_ERROR)
+
     def read(self) -> None:
         """Read device and commands: where the hand is, and whether that can be believed."""
         self._commands.fetch()  # an unfinished write leaves the last commands standing
         try:
             sample = self.device.read(self.now)
-        except (DeviceError, OSError):
+            late = sample.asleep or stalled(self.now, sample.time, sample.patience)
+            x, y, z = sample.position.tolist()
+            self.holding = bool(sample.holding)
+        except Exception as error:  # noqa: BLE001 - a driver is foreign code: whatever it does, the loop goes on
             self.holding = False
             self.out.input(holding=False, late=True)
-            self.fail(Fault.DEVICE_ERROR)
+            self.device_failed(error)
             return
-        self.holding = sample.holding
-        late = sample.asleep or stalled(self.now, sample.time, sample.patience)
-        self.out.input(holding=sample.holding, late=late)
-        if late and sample.holding:  # nothing held, nothing at fault: a page may be hidden
+        self.out.input(holding=self.holding, late=late)
+        if late and self.holding:  # nothing held, nothing at fault: a page may be hidden
             self.fail(Fault.INPUT_STALLED)
-        x, y, z = sample.position.tolist()
         if not math.isfinite(x + y + z):
             self.fail(Fault.INPUT_NOT_FINITE)
         if self.fault is Fault.NONE:
@@ -223,18 +230,19 @@ class Loop:
         self.workspace.force_on_hand(self.safety.force, self._sent)
         try:
             self.device.write(self._sent)
-        except (DeviceError, OSError):
+        except Exception as error:  # noqa: BLE001 - as for `read`
             self.safety.stop()  # nobody knows what was sent: don't claim it, and ramp in again
-            self.fail(Fault.DEVICE_ERROR)
+            self.device_failed(error)
 
     def end(self) -> None:
         """Send and publish zero force, whatever happened before, and close the device."""
         self.safety.stop()
         self.out.end()
-        try:
-            self.device.write(self.safety.force)
-        finally:
-            self.device.close()
+        for last in (partial(self.device.write, self.safety.force), self.device.close):
+            try:
+                last()
+            except Exception as error:  # noqa: BLE001 - as for `read`
+                self.device_failed(error)
 
 
 def rehearsal(model: Model, workspace: Workspace, limits: Limits, rate: float) -> Callable[[], None]:

@@ -102,6 +102,8 @@ class LoopReport:
         What the operating system granted; see `palpate.runtime.realtime`.
     foreign : tuple of str
         Packages in the loop's process that have no business there.
+    device_error : str
+        First error of the device's driver, once the loop has ended; empty without one.
     """
 
     ticks: int
@@ -116,10 +118,15 @@ class LoopReport:
     faults: Mapping[str, int]
     obtained: Mapping[str, str]
     foreign: tuple[str, ...] = ()
+    device_error: str = ""
 
     @classmethod
     def of(
-        cls, state: State, obtained: Mapping[str, str] | None = None, foreign: tuple[str, ...] = ()
+        cls,
+        state: State,
+        obtained: Mapping[str, str] | None = None,
+        foreign: tuple[str, ...] = (),
+        device_error: str = "",
     ) -> LoopReport:
         """Sum up a published state.
 
@@ -131,6 +138,8 @@ class LoopReport:
             What the system granted, once that is known.
         foreign : tuple of str
             Packages that the loop's process should not have loaded.
+        device_error : str
+            First error of the device's driver, in words.
         """
         return cls(
             ticks=state.tick,
@@ -145,6 +154,7 @@ class LoopReport:
             faults={f.name.lower(): int(state.fault_counts[f]) for f in Fault if state.fault_counts[f]},
             obtained=dict(obtained or {}),
             foreign=foreign,
+            device_error=device_error,
         )
 
     def as_dict(self) -> dict[str, Any]:
@@ -168,5 +178,6 @@ class LoopReport:
                 f"clamped   {100 * self.clamped:.1f} % of the ticks",
                 f"faults    {faults or 'none'}",
                 f"system    {granted or 'not known'}",
+                *([f"device    {self.device_error}"] if self.device_error else []),
             ]
         )

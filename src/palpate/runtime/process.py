@@ -220,7 +220,9 @@ class LoopProcess:
 
     def report(self) -> LoopReport:
         """Return the report of the loop, so far or in all; what the system granted is known once it has stopped."""
-        return LoopReport.of(self._state(), self._said.get("obtained"), tuple(self._said.get("foreign", ())))
+        foreign = tuple(self._said.get("foreign", ()))
+        said = self._said.get("device_error", "")
+        return LoopReport.of(self._state(), self._said.get("obtained"), foreign, said)
 
     def _failure(self, what: str) -> DeviceError | UsageError:
         code = self._running.poll()

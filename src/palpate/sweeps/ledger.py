@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from palpate.dataset import Dataset
-from palpate.errors import FileFormatError, UsageError
+from palpate.errors import FileFormatError, ResourceError, UsageError
+from palpate.files import system_errors, write_file
 
 __all__ = ["Ledger"]
 
@@ -71,11 +72,12 @@ class Ledger:
             If it belongs to another sweep.
         """
         plan = self.parts / "plan.json"
-        if plan.exists():
-            self._check(self.parts, json.loads(plan.read_text(encoding="utf-8")).get("config_hash"))
+        if (config := _config_in(plan)) is not None:
+            self._check(self.parts, config)
             return
-        self.parts.mkdir(parents=True, exist_ok=True)
-        plan.write_text(json.dumps({"config_hash": self.config}), encoding="utf-8")
+        with system_errors(f"The folder {self.parts} could not be made."):
+            self.parts.mkdir(parents=True, exist_ok=True)
+        write_file(plan, json.dumps({"config_hash": self.config}))
 
     def read(self) -> Iterator[Dataset]:
         """Yield the parts that earlier runs finished."""
@@ -108,7 +110,7 @@ class Ledger:
         if other is None:
             try:
                 dataset.save(self.path)
-            except (UsageError, OSError):  # the other run may have come in between
+            except (UsageError, ResourceError):  # the other run may have come in between
                 other = self.complete()
                 if other is None:
                     raise
@@ -122,3 +124,12 @@ class Ledger:
                 why="Its body, loads or samples are not those asked for now.",
                 fix="Write to another path, or delete it first.",
             )
+
+
+def _config_in(plan: Path) -> object:
+    """Return the hash in a plan; None where there is no plan, or an earlier version was killed as it wrote it."""
+    try:
+        content = json.loads(plan.read_text(encoding="utf-8"))
+    except (FileNotFoundError, ValueError):
+        return None
+    return content.get("config_hash") if isinstance(content, dict) else None

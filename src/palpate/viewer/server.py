@@ -12,9 +12,7 @@ import asyncio
 import contextlib
 import functools
 import os
-import tempfile
 from collections.abc import AsyncIterator, Callable
-from pathlib import Path
 
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
@@ -22,6 +20,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route, WebSocketRoute
 
+from palpate.files import TemporaryFolder
 from palpate.runtime import LoopProcess
 from palpate.runtime.touchable import load_touchable, touchable
 from palpate.surrogates import Surrogate
@@ -130,8 +129,8 @@ class Viewer(LocalServer):
         """Return a file of the model, which the real-time process can read."""
         if isinstance(self._source, str | os.PathLike):
             return self._source
-        folder = self._closing.enter_context(tempfile.TemporaryDirectory(prefix="palpate-"))
-        return self._source.save(Path(folder) / "model.palpate")
+        folder = self._closing.enter_context(TemporaryFolder())
+        return self._source.save(folder / "model.palpate")
 
 
 def serve(

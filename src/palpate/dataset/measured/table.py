@@ -28,6 +28,7 @@ import numpy as np
 
 from palpate.dataset.measured.measured_columns import NAMES, Columns, Measured, UnitError, number
 from palpate.errors import FileFormatError, UsageError
+from palpate.files import write_file
 
 __all__ = ["read_measured", "write_measured"]
 
@@ -73,16 +74,9 @@ def write_measured(path: str | os.PathLike[str], position: np.ndarray, force: np
     UsageError
         If the file can't be written.
     """
-    path = Path(path)
     rows = ["x,y,z,Fx,Fy,Fz", "m,m,m,N,N,N"]
     rows += [",".join(repr(float(v)) for v in row) for row in np.hstack([position, force])]
-    try:
-        path.write_text("\n".join(rows) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise UsageError(
-            f"Could not write {path}.", why=str(error), fix="Choose a folder that exists."
-        ) from error
-    return path
+    return write_file(path, "\n".join(rows) + "\n")
 
 
 def _columns(

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from palpate.errors import FileFormatError, UsageError
+from palpate.files import TemporaryFolder
 from palpate.physics.shapes.body_file import UNITS, SurfacePatch, apply_patches, read_with_meshio, segments
 from palpate.physics.shapes.mesh import BodyMesh, body_mesh
 from palpate.physics.shapes.meshing import (
@@ -218,8 +217,8 @@ def _stl_geometry(points: np.ndarray, triangles: np.ndarray) -> Any:
     from netgen.stl import STLGeometry
     from trimesh import Trimesh
 
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "body.stl"
+    with TemporaryFolder() as folder:
+        path = folder / "body.stl"
         # as text, which keeps all digits
         Trimesh(points, triangles, process=False).export(str(path), file_type="stl_ascii")
         return STLGeometry(str(path))
@@ -232,9 +231,9 @@ def _generate_mesh(geometry: Any, coarse: float, fine: list[tuple[np.ndarray, fl
     ngsolve.SetNumThreads(1)
     rows = [(*point, size) for points, size in fine for point in points.tolist()]
     try:
-        with tempfile.TemporaryDirectory() as folder:
+        with TemporaryFolder() as folder:
             # Netgen takes sizes at points of such a geometry from a file only
-            sizes = Path(folder) / "sizes.txt"
+            sizes = folder / "sizes.txt"
             lines = [str(len(rows)), *(" ".join(map(repr, row)) for row in rows), "0"]
             sizes.write_text("\n".join(lines) + "\n", encoding="ascii")
             return geometry.GenerateMesh(

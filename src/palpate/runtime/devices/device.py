@@ -71,8 +71,8 @@ class Device(Protocol):
     """A haptic device, real or virtual.
 
     `read` and `write` are called once a tick. They must not block for longer than a fraction of it and must
-    not allocate; what they can't do they raise as `DeviceError` or `OSError`, which the loop turns into a
-    fault and zero force.
+    not allocate. Whatever they raise, best a `DeviceError` or an `OSError`, the loop turns into a fault and zero
+    force.
     """
 
     @property

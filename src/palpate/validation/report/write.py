@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from palpate.errors import UsageError
+from palpate.files import system_errors, writing
 from palpate.format import bind_units
 from palpate.validation.report.chapter import Chapter
 from palpate.validation.report.hand_pictures import hand_pictures
@@ -60,27 +60,16 @@ def write_report(
     Raises
     ------
     UsageError
-        If there is no chapter, or the file can't be written.
+        If there is no chapter, or the path can't be a file's.
+    ResourceError
+        If the disk is full, or the folder write-protected.
     """
     target = Path(path)
-    part = target.with_name(f".{target.name}.part")
-    try:
-        # a path that can't be written is found before the figures are drawn
+    with system_errors(f"Could not write {target}."):
         target.parent.mkdir(parents=True, exist_ok=True)
-        if target.is_dir():
-            raise IsADirectoryError(f"{target} is a folder")
-        part.touch()
+    with writing(target) as part:  # a reader never meets half a page
+        part.touch()  # a path that can't be written is found before the figures are drawn
         part.write_text(render(chapters, title=title, machine=machine), encoding="utf-8", newline="\n")
-        part.replace(target)  # a reader never meets half a page
-    except OSError as error:
-        raise UsageError(
-            f"The report can't be written to {target}.",
-            why=str(error),
-            fix="Name a file in a folder that you may write to.",
-        ) from error
-    finally:
-        with contextlib.suppress(OSError):
-            part.unlink()
     return target
 
 

@@ -262,3 +262,51 @@ def test_a_limit_on_time_plans_for_less_work_however_many_rows(count, monkeypatc
     found = palpate.fit(X, y + 0.01 * rng.normal(size=count), seconds=3.0)
     assert time.process_time() - began < 1.2 * 3.0 + 2.0
     assert found.heldout < 0.1
+
+
+@pytest.fixture(scope="module")
+def tabular():
+    """A table with named columns and a network learnt from it."""
+    rng = np.random.default_rng(0)
+    table = pd.DataFrame({"depth": rng.uniform(0, 10, 60), "speed": rng.uniform(0, 1, 60)})
+    return table, palpate.fit(table, 0.1 * table["depth"] + 5 * table["speed"] ** 2, effort=0.02)
+
+
+def test_columns_of_a_table_are_matched_by_name(tabular, tmp_path):
+    table, found = tabular
+    straight, turned = found.predict(table), table[["speed", "depth"]]
+    for again in (found, Fitted.load(found.save(tmp_path / "model.palpate"))):
+        np.testing.assert_array_equal(again.predict(turned), straight)
+        np.testing.assert_array_equal(again.network.predict(turned)[:, 0], straight)
+        np.testing.assert_array_equal(again.trusted(turned), again.trusted(table))
+        np.testing.assert_array_equal(again.interval(turned), again.interval(table))
+        np.testing.assert_array_equal(again.deviation(turned), again.deviation(table.to_numpy()))
+        with pytest.raises(UsageError, match="'speed' is missing, 'pace' is unknown"):
+            again.predict(table.rename(columns={"speed": "pace"}))
+        with pytest.raises(UsageError, match="'time' is unknown"):
+            again.predict(table.assign(time=0.0))
+
+
+def test_declared_inputs_are_matched_to_the_columns_of_their_name(tabular):
+    table, found = tabular
+    y = found.predict(table)
+    ranges = [palpate.Range("speed", 0.0, 1.0, "m/s"), palpate.Range("depth", 0.0, 10.0, "mm")]
+    named = palpate.fit(table, y, inputs=ranges, effort=0.02)
+    np.testing.assert_array_equal(named.predict(table), named.predict(table[["speed", "depth"]].to_numpy()))
+    other = [palpate.Range("d", 0.0, 10.0, "mm"), palpate.Range("v", 0.0, 1.0, "m/s")]
+    renamed = palpate.fit(table, y, inputs=other, effort=0.02)
+    np.testing.assert_array_equal(
+        renamed.predict(table[["speed", "depth"]]), renamed.predict(table.to_numpy())
+    )
+    with pytest.raises(UsageError, match="'v' is missing, 'speed' is unknown"):
+        palpate.fit(table.rename(columns={"depth": "d"}), y, inputs=other)
+
+
+@pytest.mark.parametrize("missing", [None, np.nan, pd.NA])
+def test_a_missing_value_names_its_row_and_column(tabular, missing):
+    table = tabular[0].copy().assign(count=np.arange(60)).convert_dtypes()
+    table.loc[3, "count"] = missing
+    with pytest.raises(UsageError, match=r"1 of 60 samples .* first in row 3 \(column 'count'\)"):
+        palpate.fit(table, np.arange(60.0))
+    with pytest.raises(UsageError, match=r"first in row 3 \(column 'y0'\)"):
+        palpate.fit(table[["depth"]], table["count"])

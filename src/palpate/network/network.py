@@ -27,6 +27,7 @@ from palpate.network.network_kernels import (
 )
 from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction
 from palpate.network.soundness import check_shapes, unreal
+from palpate.tables import column_names, columns_in_order
 from palpate.units import Quantity, Range, bounds
 
 __all__ = [
@@ -303,13 +304,15 @@ class Network:
         return (*workspace(parts), *parts)
 
     def predict(self, X: np.ndarray, *, precision: Precision = "double") -> np.ndarray:
-        """Outputs (N, m) at inputs X (N, n), both in physical (SI) units.
+        """Outputs (N, m) at inputs X (N, n), both in physical (SI) units; a table's columns are matched by name.
 
         Raises
         ------
         UsageError
-            If X has the wrong number of columns, or there is no such precision.
+            If X has the wrong number of columns, a table other ones, or there is no such precision.
         """
+        if column_names(X):
+            X = columns_in_order("Inputs X", X, [r.name for r in self.inputs])
         X = np.ascontiguousarray(X, dtype=np.float64)
         if X.ndim != 2 or X.shape[1] != len(self.inputs):
             raise UsageError(

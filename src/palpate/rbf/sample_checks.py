@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.tables import numbers_of
 
 __all__ = [
     "numbers",
-    "real",
     "relative_error",
     "samples",
     "second_derivatives",
@@ -40,7 +40,7 @@ def numbers(what: str, given: Any, shape: tuple[int | None, ...], *, finite: boo
     UsageError
         If it holds anything but real numbers, has another shape, or is not finite.
     """
-    found = real(what, given)
+    found = numbers_of(what, given)
     fits = found.ndim == len(shape) and all(
         f == w or (w is None and f > 0) for f, w in zip(found.shape, shape, strict=True)
     )
@@ -180,36 +180,9 @@ def _finite(what: str, found: np.ndarray) -> None:
         )
 
 
-def real(what: str, given: Any) -> np.ndarray:
-    """An array of any shape as float64; masked numbers are not-a-number.
-
-    Raises
-    ------
-    UsageError
-        If it holds anything but real numbers, or rows of different length.
-    """
-    try:
-        if isinstance(given, np.ma.MaskedArray):  # what is masked is missing, whatever number stands there
-            given = np.ma.filled(given.astype(np.float64), np.nan)
-        found = np.asarray(given)
-        if found.dtype.kind in "biufO":
-            return np.asarray(found, dtype=np.float64)
-    except (TypeError, ValueError):  # ragged lists, or objects that are no numbers
-        raise _no_numbers(what, "an object that is no array of numbers") from None
-    raise _no_numbers(what, f"an array of {found.dtype}")
-
-
-def _no_numbers(what: str, found: str) -> UsageError:
-    return UsageError(
-        f"{what} are {found}.",
-        why="Samples are real numbers, in rows of equal length.",
-        fix="Pass a float array; encode words, dates and complex numbers as columns of their own first.",
-    )
-
-
 def _weights(what: str, given: Any, N: int, columns: int = 0) -> np.ndarray:
     """(N,), or (N, columns) where one came for each column."""
-    given = real(what, given)
+    given = numbers_of(what, given)
     shape = (N, columns) if columns and given.ndim == 2 else (N,)
     found = numbers(what, np.full(N, float(given)) if given.ndim == 0 else given, shape)
     if (found < 0).any():

@@ -14,7 +14,8 @@ from palpate.network import Network, Scaling
 from palpate.network.radial import RadialFunction
 from palpate.rbf.freezing import training_record
 from palpate.rbf.output_modes import leading_modes
-from palpate.rbf.sample_checks import real, samples, spread_of
+from palpate.rbf.sample_checks import samples, spread_of
+from palpate.tables import column_names, columns_in_order, numbers_of
 from palpate.units import Quantity, Range
 
 __all__ = ["FEWEST", "ArrayProblem", "Samples", "check_search", "constant", "points"]
@@ -36,6 +37,8 @@ class Samples:
         Names, units and ranges of the columns of X, names and units of those of Y.
     one_output : bool
         Whether Y came as (N,).
+    columns : tuple of str
+        Names of the table's columns that are the inputs, in their order; of a bare array those of the inputs.
     """
 
     X: np.ndarray
@@ -43,6 +46,7 @@ class Samples:
     inputs: tuple[Range, ...]
     outputs: tuple[Quantity, ...]
     one_output: bool
+    columns: tuple[str, ...]
 
     @classmethod
     def of(
@@ -55,16 +59,17 @@ class Samples:
         UsageError
             If they are no samples to learn from.
         """
-        columns, names = _names(X, "x"), _names(Y, "y")
-        X, Y = real("Inputs X", X), real("Outputs Y", Y)
+        X, columns = _numbers_and_names("Inputs X", X, inputs)
+        Y, names = _numbers_and_names("Outputs Y", Y, outputs)
         one = Y.ndim == 1
         X, Y = (a[:, None] if a.ndim == 1 else a for a in (X, Y))
-        _check_rows(X, Y)
-        declared = ranges_of(X, columns(X.shape[1])) if inputs is None else tuple(inputs)
-        named = tuple(map(Quantity, names(Y.shape[1]))) if outputs is None else tuple(outputs)
+        columns, names = _named(columns, X, "x"), _named(names, Y, "y")
+        _check_rows(X, Y, columns + names)
+        declared = ranges_of(X, columns) if inputs is None else tuple(inputs)
+        named = tuple(map(Quantity, names)) if outputs is None else tuple(outputs)
         _check_declared(declared, X.shape[1], Range, "input", 'palpate.Range("force", 0.0, 5.0, "N")')
         _check_declared(named, Y.shape[1], Quantity, "output", 'palpate.Quantity("tip", "m")')
-        return cls(X, Y, declared, named, one)
+        return cls(X, Y, declared, named, one, columns)
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,16 +157,25 @@ def _scales(Y: np.ndarray, outputs: Sequence[Quantity]) -> float | np.ndarray:
     return np.array([spread[unit] or 1.0 for unit in units])
 
 
-def points(X: Any, inputs: Sequence[Range]) -> np.ndarray:
+def points(X: Any, inputs: Sequence[Range], columns: Sequence[str] = ()) -> np.ndarray:
     """Return inputs (N, n) at which something is asked; of a single input (N,) will do.
+
+    Parameters
+    ----------
+    X : array-like or table
+        The inputs; a table's columns are matched by name and may stand in any order.
+    inputs : sequence of n ranges
+        What the network takes.
+    columns : sequence of str
+        Names of the columns in a table; by default those of the inputs.
 
     Raises
     ------
     UsageError
-        If it is no such array.
+        If it is no such array, or a table that lacks a column or has an unknown one.
     """
     n = len(inputs)
-    asked = real("Inputs X", X)
+    asked = columns_in_order("Inputs X", X, columns or [r.name for r in inputs])
     if asked.ndim == 1 and n == 1:
         asked = asked[:, None]
     if asked.ndim != 2 or asked.shape[1] != n:
@@ -200,19 +214,24 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float, np.number)) and not isinstance(value, (bool, np.complexfloating))
 
 
-def _names(table: Any, letter: str) -> Any:
-    """Return a function that names so many columns: the table's own where it has them, else x0, x1 and so on."""
-    own = getattr(table, "columns", None)
+def _numbers_and_names(
+    what: str, given: Any, declared: Sequence[Range] | Sequence[Quantity] | None
+) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Return numbers, and the names of a table's columns, in the order of what is declared where the names agree."""
+    own = column_names(given) or ()
+    stated = [str(getattr(item, "name", "")) for item in declared or ()]
+    if stated and set(stated) & set(own):
+        return columns_in_order(what, given, stated), tuple(stated)
+    return numbers_of(what, given), own
 
-    def of(count: int) -> list[str]:
-        if own is not None and not callable(own) and len(own) == count:
-            return [str(name) for name in own]
-        return [f"{letter}{i}" for i in range(count)]
 
-    return of
+def _named(own: tuple[str, ...], values: np.ndarray, letter: str) -> tuple[str, ...]:
+    """Return a name for each column: the table's own where it has them, else x0, x1 and so on."""
+    count = values.shape[-1] if values.ndim == 2 else 0
+    return own if len(own) == count else tuple(f"{letter}{i}" for i in range(count))
 
 
-def _check_rows(X: np.ndarray, Y: np.ndarray) -> None:
+def _check_rows(X: np.ndarray, Y: np.ndarray, names: Sequence[str]) -> None:
     if X.ndim != 2 or Y.ndim != 2 or len(X) != len(Y) or not X.shape[1] or not Y.shape[1]:
         raise UsageError(
             f"Inputs of shape {X.shape} and outputs of shape {Y.shape} are not samples.",
@@ -225,10 +244,13 @@ def _check_rows(X: np.ndarray, Y: np.ndarray) -> None:
             why="Some must be held out to judge by.",
             fix=f"Give {FEWEST} at least.",
         )
-    bad = ~(np.isfinite(X).all(axis=1) & np.isfinite(Y).all(axis=1))
+    finite = np.hstack([np.isfinite(X), np.isfinite(Y)])
+    bad = ~finite.all(axis=1)
     if bad.any():
+        first = int(bad.argmax())
         raise UsageError(
-            f"{bad.sum()} of {len(X)} samples hold NaN or infinity, the first in row {int(bad.argmax())}.",
+            f"{bad.sum()} of {len(X)} samples hold NaN or infinity, the first in row {first}"
+            f" (column {names[int(np.argmin(finite[first]))]!r}).",
             why="A sample without a value says nothing, and would spoil the others.",
             fix="Leave them out: ok = np.isfinite(X).all(1) & np.isfinite(Y).all(1); X[ok], Y[ok].",
         )

@@ -70,7 +70,8 @@ def fit(
     Parameters
     ----------
     X : (N, n)
-        Inputs; 20 samples at least. Arrays, nested lists or tables; (N,) for a single input.
+        Inputs; 20 samples at least. Arrays, nested lists or tables (of pandas, Polars, PyArrow, NumPy records); (N,)
+        for a single input. Columns of tables are matched by name: to `inputs`, and in whatever is asked later.
     Y : (N, m)
         Outputs, parts of one quantity: what is small beside the others is learnt less closely relative to its own
         size. (N,) for one output, which then comes back as (N,).
@@ -121,6 +122,7 @@ def fit(
         budget = Budget(min(budget.effort, seconds / _SECONDS), began + 0.85 * seconds)
     with threadpool_limits(1):  # small matrices: threads would cost more than they bring
         fitted = _Chooser(samples, began, budget, Pool(workers), seed, target, level).chosen()
+    fitted = replace(fitted, columns=samples.columns)
     for note in fitted.notes:
         if not note.startswith(IDLE):
             warnings.warn(note, FitWarning, stacklevel=2)

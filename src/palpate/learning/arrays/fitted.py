@@ -54,6 +54,9 @@ class Fitted:
         The networks whose mean answers; none where one alone does.
     notes : tuple of str
         What must be known of it, such as inputs that hardly matter.
+    columns : tuple of str
+        Names of the columns of the table that it was fitted to, by which columns are matched later; those of the
+        inputs if empty.
     """
 
     network: Network
@@ -69,16 +72,19 @@ class Fitted:
     one_output: bool = False
     members: tuple[Network, ...] = ()
     notes: tuple[str, ...] = ()
+    columns: tuple[str, ...] = ()
 
     def predict(self, X: Any) -> np.ndarray:
         """Return outputs (N, m) at inputs X (N, n); (N,) where Y was.
 
+        The columns of a table are matched by name, in any order, here and below.
+
         Raises
         ------
         UsageError
-            If X has the wrong shape.
+            If X has the wrong shape, or a table lacks a column or has an unknown one.
         """
-        return self._shaped(self.network.predict(points(X, self.network.inputs)))
+        return self._shaped(self.network.predict(self._points(X)))
 
     def deviation(self, X: Any) -> np.ndarray:
         """Return the standard deviation (N, m) of what would be measured at X (N, n).
@@ -90,7 +96,7 @@ class Fitted:
         UsageError
             If X has the wrong shape.
         """
-        return self._shaped(self._deviation(points(X, self.network.inputs)))
+        return self._shaped(self._deviation(self._points(X)))
 
     def _deviation(self, X: np.ndarray) -> np.ndarray:
         """Return the calibrated deviation (N, m); the members' disagreement where that is more."""
@@ -121,7 +127,7 @@ class Fitted:
             If X has the wrong shape, or the level is no probability.
         """
         level = self.level if level is None else level
-        X = points(X, self.network.inputs)
+        X = self._points(X)
         low, high = self.uncertainty.interval(X, level)
         half, middle = (high - low) / 2.0, (high + low) / 2.0
         half = np.maximum(half, NormalDist().inv_cdf((1.0 + level) / 2.0) * self.disagreement(X))
@@ -138,7 +144,7 @@ class Fitted:
         UsageError
             If X has the wrong shape.
         """
-        X = points(X, self.network.inputs)
+        X = self._points(X)
         far = self.region.distances(self.network.scaling.scale_inputs(X))
         agree = (self.disagreement(X) <= _ASTRAY * self.uncertainty.deviation(X)).all(axis=1)
         # written so that a point that is not a number is not trusted
@@ -166,6 +172,7 @@ class Fitted:
             "heldout": self.heldout,
             "level": self.level,
             "one_output": self.one_output,
+            "columns": list(self.columns),
         }
         whole = replace(network, extras={**network.extras, **region}, meta={**network.meta, "choice": kept})
         return whole.save(path)
@@ -214,6 +221,9 @@ class Fitted:
             lines += [f"    {error:.1e}  {what}" for what, error in list(best.items())[:_SHOWN]]
         return "\n".join(lines)
 
+    def _points(self, X: Any) -> np.ndarray:
+        return points(X, self.network.inputs, self.columns)
+
     def _shaped(self, Y: np.ndarray) -> np.ndarray:
         return Y[:, 0] if self.one_output else Y
 
@@ -240,6 +250,7 @@ def _restored(network: Network) -> Fitted:
         bool(kept["one_output"]) and len(network.outputs) == 1,
         _members(network),
         tuple(str(note) for note in kept.get("notes", ())),
+        tuple(str(name) for name in kept.get("columns", ())),
     )
 
 

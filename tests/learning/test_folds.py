@@ -7,7 +7,7 @@ import pytest
 
 from palpate.learning.energy.energy_problem import EnergyProblem
 from palpate.learning.energy.energy_search import best_mean, score
-from palpate.learning.folds import fold_numbers, held_out
+from palpate.learning.folds import fold_numbers, held_out, near_places
 from palpate.learning.search import Candidate, Search
 from palpate.learning.starts import random_units
 
@@ -106,6 +106,16 @@ def test_what_is_held_out_is_at_places_of_its_own(copies, fold):
     assert held.sum() == 4 * copies
     assert not set(place[kept]) & set(place[held])
     assert (held != held_out(place, 0.2, seed=1, fold=1)[1]).any()
+
+
+@pytest.mark.parametrize("inputs", [3, 9])
+def test_rows_that_are_nearly_copies_are_at_one_place(inputs):
+    rng = np.random.default_rng(inputs)
+    alone, copied = rng.uniform(-1, 1, (2000, inputs)), rng.uniform(-1, 1, (100, inputs))
+    copies = np.repeat(copied, 3, axis=0) + 1e-6 * rng.normal(size=(300, inputs))
+    places = near_places(np.vstack([alone, copies]))
+    assert (np.ptp(places[2000:].reshape(100, 3), axis=1) == 0).all()
+    assert len(np.unique(places)) > 2090
 
 
 def test_errors_are_as_large_as_at_places_never_seen():

@@ -135,3 +135,11 @@ def test_a_query_costs_microseconds():
         region.inside(x)
         times.append(time.perf_counter() - began)
     assert min(times) < 20e-6  # 2 µs on an idle machine
+
+
+def test_a_region_of_very_many_inputs_holds_them_all():
+    X = np.random.default_rng(0).uniform(-1, 1, (30_000, 2))
+    X[7] = 3.0, 3.0  # alone, and perhaps not among those of which points are chosen
+    region = TrainedRegion.of(X, most=100)
+    assert len(region.points) == 100
+    assert (region.distances(X) <= region.radius).all()

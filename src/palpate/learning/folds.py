@@ -14,6 +14,8 @@ _NEAR = (
     0.05  # of that distance: copies of one place, such as a stand's returns or a star of finite differences
 )
 _SOME = 1000  # samples tell the typical distance
+_TREE = 6  # inputs up to which trees are fast
+_DISTANCES = 4_000_000  # in one block
 
 
 def near_places(X: np.ndarray) -> np.ndarray:
@@ -30,18 +32,44 @@ def near_places(X: np.ndarray) -> np.ndarray:
     neighbours = min(_NEIGHBOURS, len(exact) // 4)
     if neighbours < 1:
         return np.asarray(own.ravel())
-    some = exact[np.linspace(0, len(exact) - 1, min(len(exact), _SOME)).astype(int)]
-    far = np.asarray(KDTree(exact).query(some, neighbours + 1)[0])[:, -1]
-    reach = _NEAR * float(np.median(far))
+    count = _SOME if X.shape[1] <= _TREE else _SOME // 4
+    some = exact[np.linspace(0, len(exact) - 1, min(len(exact), count)).astype(int)]
+    reach = _NEAR * float(np.median(_neighbour_distances(exact, some, neighbours)))
     if reach <= 0.0:
         return np.asarray(own.ravel())
     # what is in one cell is near: so pairs are sought among cells, however many copies a place has
     cells = np.floor(exact * (np.sqrt(exact.shape[1]) / reach))
     _, first, cell = np.unique(cells, axis=0, return_index=True, return_inverse=True)
-    pairs = KDTree(exact[first]).query_pairs(reach, output_type="ndarray")
+    pairs = _pairs_within(exact[first], reach)
     ones = np.ones(len(pairs), dtype=bool)
     graph = coo_array((ones, (pairs[:, 0], pairs[:, 1])), shape=(len(first), len(first)))
     return np.asarray(connected_components(graph, directed=False)[1][cell.ravel()][own.ravel()])
+
+
+def _neighbour_distances(X: np.ndarray, some: np.ndarray, k: int) -> np.ndarray:
+    """Return the distance of each of some samples (S, n) of X (N, n) to its k-th neighbour."""
+    if X.shape[1] <= _TREE:
+        return np.asarray(KDTree(X).query(some, k + 1)[0])[:, -1]
+    squares = (X * X).sum(axis=1)
+    step = max(1, _DISTANCES // len(X))
+    parts = [
+        np.partition(squares - 2.0 * Z @ X.T, k, axis=1)[:, k] + (Z * Z).sum(axis=1)
+        for Z in (some[i : i + step] for i in range(0, len(some), step))
+    ]
+    return np.asarray(np.sqrt(np.maximum(np.concatenate(parts), 0.0)))
+
+
+def _pairs_within(X: np.ndarray, reach: float) -> np.ndarray:
+    """Return the pairs (P, 2) of samples of X (N, n) that are no farther apart.
+
+    Of many inputs pairs are sought along the six directions in which samples differ most, and then looked at in all.
+    """
+    if X.shape[1] <= _TREE:
+        return np.asarray(KDTree(X).query_pairs(reach, output_type="ndarray"))
+    axes = np.linalg.eigh(np.cov(X.T))[1][:, -_TREE:]
+    pairs = KDTree(X @ axes).query_pairs(reach * (1.0 + 1e-9), output_type="ndarray")
+    apart = ((X[pairs[:, 0]] - X[pairs[:, 1]]) ** 2).sum(axis=1)
+    return np.asarray(pairs[apart <= reach * reach])
 
 
 def fold_numbers(groups: np.ndarray, folds: int, *, seed: int = 0) -> np.ndarray:

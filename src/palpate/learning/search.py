@@ -132,6 +132,12 @@ class Work:
         pace = max(self.spent, _PACE * _PRIOR) / max(now - self._began, _PRIOR)
         return min(counted, max(self._deadline - now, 0.0) * pace)
 
+    def extended(self, more: float, deadline: float) -> Work:
+        """Return the work left and so much more, under another limit on time at the pace so far."""
+        other = Work(self._total + more, deadline)
+        other.spent, other._began = self.spent, self._began
+        return other
+
     def spend(self, work: float) -> None:
         """Count multiplications that were done."""
         self.spent += work

@@ -48,6 +48,7 @@ __all__ = [
     "jacobian_into",
     "packed",
     "pattern",
+    "regressor_rows_into",
     "regressors_into",
     "second_order_into",
     "value_and_jacobian_into",
@@ -407,6 +408,16 @@ def second_order_into(x, g, H, grams, work, steps, layout, scales, units, rows, 
             H[j, i] = H[i, j]
             pair += 1
     return float(value)
+
+
+@_jit
+def regressor_rows_into(X, F, work, steps, layout, scales, units, constants) -> None:
+    """[1, ξ, φ] at N points X (N, n) into F (N, 1 + n + h), each as `value_into` has them."""
+    line, _ = _places(work, layout, scales, units)
+    for i in range(X.shape[0]):
+        _regress(X[i], line, work, steps, layout, scales, units, constants, 0)
+        for k in range(F.shape[1]):
+            F[i, k] = work[line, k]
 
 
 @_jit

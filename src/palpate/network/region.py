@@ -20,6 +20,7 @@ _jit = njit(cache=True, nogil=True, error_model="numpy")
 
 _DOUBLE = np.dtype(np.float64)
 _MOST = 512  # points kept: a few microseconds per query
+_MANY = 20_000  # inputs of which points are chosen; of more, some at random
 _TYPICAL = 0.99  # share of the data's own nearest-neighbour distances that a radius covers
 
 
@@ -57,9 +58,9 @@ class TrainedRegion:
     def of(cls, X: np.ndarray, *, groups: np.ndarray | None = None, most: int = _MOST) -> TrainedRegion:
         """The region of scaled training inputs X (N, n).
 
-        More than `most` are thinned by farthest-point selection (Gonzalez 1985). The radius is what 99 % of the
-        data are from their nearest other kept point, as each was left out, and never less than what it takes to
-        hold all data.
+        More than `most` are thinned by farthest-point selection (Gonzalez 1985), of more than 20,000 so many at
+        random. The radius is what 99 % of the data are from their nearest other kept point, as each was left out, and
+        never less than what it takes to hold all data.
 
         Parameters
         ----------
@@ -85,11 +86,18 @@ class TrainedRegion:
                 f"Groups of shape {own.shape} do not say which of {len(everything)} inputs are one sample.",
                 fix="Give one number for each row of X.",
             )
-        kept, cover = _farthest(everything, min(most, len(everything)))
-        gaps = _gaps(everything, own, everything[kept], own[kept])
+        some = everything
+        if len(everything) > _MANY:
+            rows = np.sort(np.random.default_rng(0).choice(len(everything), _MANY, replace=False))
+            some, own = everything[rows], own[rows]
+        kept, squared = _farthest(some, min(most, len(some)))
+        cover = float(np.sqrt(squared))
+        if some is not everything:
+            cover = float(_distances(everything, some[kept]).max())
+        gaps = _gaps(some, own, some[kept], own[kept])
         gaps = gaps[np.isfinite(gaps)]  # the only sample kept of one place has no other
         typical = float(np.quantile(gaps, _TYPICAL)) if gaps.size else 0.0
-        return cls(everything[kept], max(typical, float(np.sqrt(cover))))
+        return cls(some[kept], max(typical, cover))
 
     def distance(self, x: np.ndarray) -> float:
         """Distance from a scaled input x (n,) to the nearest point; infinite where x is not finite.

@@ -101,6 +101,8 @@ def _some(count: int) -> tuple[np.ndarray, float]:
 
 def spread_of(network: Refined, root: np.ndarray, X: np.ndarray) -> np.ndarray:
     """Return 1 + φ̃ᵀ G Gᵀ φ̃ (N',) at X (N', n)."""
+    if root.shape[1] > len(root):  # G Gᵀ is the same of a square one
+        root = np.asarray(np.linalg.qr(root.T, mode="r")).T
     return np.asarray(1.0 + ((_rows(network, X) @ root) ** 2).sum(axis=1))
 
 
@@ -199,13 +201,25 @@ class Finish:
     scales: np.ndarray
 
     def network(
-        self, network: Refined, split: HeldOut, error: float, *, before: Refined, form: str | None = None
+        self,
+        network: Refined,
+        split: HeldOut,
+        error: float,
+        *,
+        before: Refined,
+        form: str | None = None,
+        root: np.ndarray | None = None,
     ) -> Fitted:
-        """Return the result for one network; what it missed, before its weights saw it, sets the intervals."""
-        held = split.unseen[0]
-        root = regressor_root(before, split.X)
-        evidence = Evidence(self._missed(before.predict(held), split.held), spread_of(before, root, held))
-        return self._of(Ensemble((network,)), error, evidence, split.held, form)
+        """Return the result for one network; what it missed, before its weights saw it, sets the intervals.
+
+        G Gᵀ, of `root` G (c, c), is the covariance of the coefficients over s²; by default it is made of the samples.
+        """
+        held, spread = split.unseen[0], np.ones(len(split.unseen[0]))
+        if len(before.coefficients) <= LARGEST:
+            G = regressor_root(before, split.X) if root is None else root
+            spread = spread_of(before, G, held)
+        evidence = Evidence(self._missed(before.predict(held), split.held), spread)
+        return self._of(Ensemble((network,)), error, evidence, split.held, form, root)
 
     def crossed(self, crossed: Crossed) -> Fitted:
         """Return the result for the mean of networks learnt crosswise, each judged by what it had not seen."""
@@ -221,12 +235,18 @@ class Finish:
         return self._of(Ensemble(crossed.networks), crossed.error, evidence, tested, None)
 
     def _of(
-        self, mean: Ensemble, error: float, evidence: Evidence, tested: np.ndarray, form: str | None
+        self,
+        mean: Ensemble,
+        error: float,
+        evidence: Evidence,
+        tested: np.ndarray,
+        form: str | None,
+        root: np.ndarray | None = None,
     ) -> Fitted:
         M = None
         if sum(len(network.coefficients) for network in mean.members) <= LARGEST:
-            root = mean_root(mean.members, self.problem.X)
-            M = root @ root.T
+            G = mean_root(mean.members, self.problem.X) if root is None else root
+            M = G @ G.T
         arrays = (*mean.regressors.form.factors(mean.theta), *mean.weights_and_tail)
         name, radial = form or mean.regressors.form.name, mean.regressors.radial
         members = [

@@ -25,6 +25,7 @@ from palpate.learning.arrays.calibration import Finish
 from palpate.learning.arrays.fit_notes import IDLE, FitWarning
 from palpate.learning.arrays.fitted import Fitted
 from palpate.learning.arrays.held_out import RIDGE, HeldOut, carry, forms_for
+from palpate.learning.arrays.many_rows import MANY_ROWS, SUBSET, ManyRows, RowParts, Structure
 from palpate.learning.arrays.members import LOOK_SAMPLES, ROWS, Crossed, Fresh, refit_weights
 from palpate.learning.folds import fold_masks, near_places
 from palpate.learning.kernel_layer import CENTRES_MAX, STARTS, KernelLayer, Metric, likely_metric
@@ -80,13 +81,15 @@ def fit(
     outputs : sequence of m quantities, optional
         Named y0, y1, … if left out.
     effort : float
-        Multiplies the work of the search, which takes about half a minute on one core at the default of 1; 0.1 gives
-        a quick look. The result depends on it, never on how fast or busy the machine is.
+        Multiplies the work of the search, which takes about half a minute on one core at the default of 1, and up to
+        a minute for more than 10,000 samples; 0.1 gives a quick look. The result depends on it, never on how fast or
+        busy the machine is.
     seconds : float, optional
         Limit on time; by default none. A limit below 30 plans for as much less work, and what still takes longer on
         this machine is left out: the result then depends on the machine.
     workers : int
-        Processes that refine networks at a time; the result is the same with any number.
+        Processes that refine networks at a time, and threads that add up many samples; the result is the same with
+        any number.
     seed : int
         Decides everything that is drawn.
     target : float, optional
@@ -105,6 +108,10 @@ def fit(
     learnt each without a fifth of the samples, and their mean is handed over: error and intervals are those of the
     networks that had not seen a sample (see `palpate.learning.arrays.calibration`).
 
+    Of more than 10,000 samples 5,000 decide the kind of network; its units and weights learn from all of them, but for
+    4,000 by which more units and steps are decided and 4,000 that measure the error and set the intervals. In the end
+    the weights learn from every sample (see `palpate.learning.arrays.many_rows`).
+
     Raises
     ------
     UsageError
@@ -121,7 +128,13 @@ def fit(
         # fitting to all samples and freezing come after the search
         budget = Budget(min(budget.effort, seconds / _SECONDS), began + 0.85 * seconds)
     with threadpool_limits(1):  # small matrices: threads would cost more than they bring
-        fitted = _Chooser(samples, began, budget, Pool(workers), seed, target, level).chosen()
+        problem = ArrayProblem.of(samples.X, samples.Y, samples.inputs, samples.outputs)
+        places = near_places(problem.X)
+        options = samples, problem, places, began, budget, Pool(workers), seed, target, level
+        if len(places) > MANY_ROWS:
+            fitted = _Chooser(*options, RowParts.of(places, seed)).chosen_for_many(workers)
+        else:
+            fitted = _Chooser(*options).chosen()
     fitted = replace(fitted, columns=samples.columns)
     for note in fitted.notes:
         if not note.startswith(IDLE):
@@ -135,23 +148,29 @@ class _Chooser:
     def __init__(
         self,
         samples: Samples,
+        problem: ArrayProblem,
+        places: np.ndarray,
         began: float,
         budget: Budget,
         pool: Pool,
         seed: int,
         target: float | None,
         level: float,
+        parts: RowParts | None = None,
     ) -> None:
-        problem = ArrayProblem.of(samples.X, samples.Y, samples.inputs, samples.outputs)
-        self.problem, self.seed, self.pool, self.budget = problem, seed, pool, budget
-        self.X, self.Y = problem.X, problem.Y
+        self.problem, self.seed, self.pool = problem, seed, pool
+        # of many rows some are chosen by, in half of the time
+        self.parts = parts
+        rows = slice(None) if parts is None else parts.learn[:SUBSET]
+        self.budget = budget if parts is None else budget.part(0.5)
+        self.deadline = budget.deadline
+        self.X, self.Y, self.places = problem.X[rows], problem.Y[rows], places[rows]
         # errors are per latent output until they are told
         self.target = max(target or 0.0, _ROUND_OFF) * problem.unit
         self.total = _WORK * budget.effort
-        self.work = Work(self.total, budget.deadline)
+        self.work = Work(self.total, self.budget.deadline)
         self.size = min(2.0, math.sqrt(budget.effort))
         self.share = 0.15 if len(self.X) >= 1000 else 0.2
-        self.places = near_places(self.X)
         self.split = self._fold(0)
         self.scales, self.known_scales = np.ones(self.X.shape[1]), False
         self.centres = int(np.clip((0.15 * self.total) ** (1 / 3), 300, CENTRES_MAX))
@@ -159,21 +178,16 @@ class _Chooser:
         self.ran: list[Candidate] = []
         # for the networks learnt crosswise
         self.reserve = _CROSSED_SHARE * self.total
-        self._finish = partial(Finish, samples, problem, self.trials, began, seed, level, self.places)
+        self._finish = partial(Finish, samples, problem, self.trials, began, seed, level, places)
 
     def chosen(self) -> Fitted:
         tail = self._tail()
         if tail.error <= self.target:
             return self._single(tail, form="affine")
         metric, mark = self._kernel()
-        winner = self._radials(*self._forms(mark))
-        if winner.theta.size < 0.6 * _NUMBERS * self.size:
-            winner = self._sizes(winner)
-        if winner.error > _HOPELESS * mark:
-            return self._kernel_network(metric, mark)
-        if winner.error > self.target:
-            winner = self._run([winner], round(120 * self.size), self.split)[0]
-        if winner.network is None or winner.error > max(_BEATEN * mark, self.target):
+        winner = self._winner(mark)
+        behind = winner.error > max(_BEATEN * mark, self.target) or winner.error > _HOPELESS * mark
+        if winner.network is None or behind:
             return self._kernel_network(metric, mark)
         self.reserve = 0.0
         crossed = self._finalist(winner)
@@ -184,6 +198,32 @@ class _Chooser:
             if error < crossed.error:
                 return self._finished.kernel_network(self._layer(metric, self.X, self.Y), layers, error)
         return self._finished.crossed(crossed)
+
+    def chosen_for_many(self, workers: int) -> Fitted:
+        """Return the network whose kind the subset decides, and whose units and weights learn from all rows."""
+        assert self.parts is not None
+        structure = Structure(self._tail())
+        if structure.units.error > self.target:
+            metric, mark = self._kernel()
+            structure = Structure(self._winner(mark), metric, mark)
+        rows = ManyRows(
+            *(self.problem, self.parts, self.work.extended(self.total, self.deadline)),
+            seed=self.seed,
+            target=self.target,
+            workers=workers,
+            deadline=self.deadline,
+            trials=self.trials,
+        )
+        return rows.fitted(structure, self.scales, self._finished)
+
+    def _winner(self, mark: float) -> Candidate:
+        """Return the best form, radial function and size, refined where the kernel layer is not far ahead."""
+        winner = self._radials(*self._forms(mark))
+        if winner.theta.size < 0.6 * _NUMBERS * self.size:
+            winner = self._sizes(winner)
+        if self.target < winner.error <= _HOPELESS * mark:
+            winner = self._run([winner], round(120 * self.size), self.split)[0]
+        return winner
 
     @property
     def _finished(self) -> Finish:

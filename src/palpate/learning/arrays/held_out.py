@@ -18,10 +18,12 @@ from palpate.rbf.forms import Centred, Form, unit_form
 from palpate.rbf.refinement.refine import refine
 from palpate.rbf.regressors import Regressors
 
-__all__ = ["RIDGE", "HeldOut", "carry", "forms_for", "start_units"]
+__all__ = ["FIRST_RADIAL", "RIDGE", "HeldOut", "carry", "forms_for", "start_units"]
 
 RIDGE = 1e-10
-_FIRST: RadialFunction = "inverse-multiquadric"
+FIRST_RADIAL: RadialFunction = "inverse-multiquadric"
+"""Of the units that everyone starts with."""
+
 _PATIENCE = 20
 # how much faster the others fall off: their scales, for a unit as wide at half its height
 _STEEPER: dict[RadialFunction, float] = {"gaussian": 0.48, "matern-5/2": 0.6, "inverse-multiquadric": 1.0}
@@ -117,7 +119,7 @@ class HeldOut:
         units = unit_form(form, self.X.shape[1])
         h = int(np.clip(numbers // units.size, 2, max(2, self.room(units.size))))
         theta = start_units(units, self.X, scales, h, seed)
-        return Candidate(Regressors(units, _FIRST), theta, "random")
+        return Candidate(Regressors(units, FIRST_RADIAL), theta, "random")
 
 
 def forms_for(inputs: int) -> tuple[str, ...]:

@@ -15,7 +15,16 @@ from palpate.rbf.forms import Form
 from palpate.rbf.refinement.projection import Fit, gauss_newton, project
 from palpate.rbf.refinement.rows import Rows
 
-__all__ = ["DAMPING", "MORE", "DampedSystem", "LevenbergStep", "damped_step", "levenberg_step"]
+__all__ = [
+    "DAMPING",
+    "MORE",
+    "DampedSystem",
+    "LevenbergStep",
+    "bounded_step",
+    "damped_step",
+    "levenberg_step",
+    "next_damping",
+]
 
 DAMPING = (1e-12, 1e12)
 MORE = 4.0  # times the damping, where it did not help
@@ -84,13 +93,13 @@ def damped_step(
     step = system.step(damping)
     if step is None:
         return None
-    step = _limited(rows.regressors.form, theta, step.reshape(theta.shape))
+    step = bounded_step(rows.regressors.form, theta, step.reshape(theta.shape))
     new = project(rows, theta + step, penalty)
     gain = fit.cost - new.cost
     if not gain > 0:
         return None
     ratio = gain / max(system.predicted_gain(step.ravel()), 1e-300)
-    return LevenbergStep(theta + step, new, _next_damping(damping, ratio), gain)
+    return LevenbergStep(theta + step, new, next_damping(damping, ratio), gain)
 
 
 def levenberg_step(
@@ -114,13 +123,13 @@ def levenberg_step(
     return LevenbergStep(theta, fit, min(damping, 1e6), 0.0)
 
 
-def _next_damping(damping: float, ratio: float) -> float:
+def next_damping(damping: float, ratio: float) -> float:
     """Less damping after steps that kept their promise, more after those that did not."""
     factor = 0.2 if ratio > 0.75 else 0.5 if ratio > 0.4 else 1.0 if ratio > 0.2 else 2.0
     return max(damping * factor, DAMPING[0])
 
 
-def _limited(form: Form, theta: np.ndarray, step: np.ndarray) -> np.ndarray:
+def bounded_step(form: Form, theta: np.ndarray, step: np.ndarray) -> np.ndarray:
     """A step (h, p), shortened unit by unit so that no width or centre leaps."""
     if form.stride(theta, step) <= _LONGEST:
         return step

@@ -23,7 +23,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Any, TypeVar
 
-from palpate.errors import SolverError
+from palpate.errors import PalpateError, SolverError
 from palpate.files import TemporaryFolder
 from palpate.processes import helper_environment, is_supervised, kill_group
 
@@ -31,6 +31,7 @@ __all__ = ["Child", "ChildEnded", "RemoteTraceback", "read_frame", "run_in_child
 
 START = 60.0  # s in which a child has to be ready
 GRACE = 5.0  # s after a call's limit in which the child ends by itself, with the traceback of the moment
+_IDLE = 10.0  # s without a call after which a shared child is ended
 READER = "read_requests"  # the function of a child's second thread, whose place is of no interest
 _OWN_FRAMES = ("supervised_child.py", "<frozen runpy>")  # below those of the work
 _HEAD = struct.Struct(">Q")
@@ -103,7 +104,10 @@ class Child:
         BaseException
             What the function raised; its cause is a `RemoteTraceback`.
         """
-        request = pickle.dumps((limit, function, arguments), protocol=pickle.HIGHEST_PROTOCOL)
+        import cloudpickle
+
+        # functions of a script or a notebook cell, which no module holds, go along
+        request = cloudpickle.dumps((limit, function, arguments))
         with self._lock:
             running = self._started()
             try:
@@ -115,7 +119,16 @@ class Child:
             result: Result = answer
             return result
         error, trace = answer
-        raise error from RemoteTraceback(trace)
+        # an error of palpate's own says all in its words
+        raise error from (None if isinstance(error, PalpateError) else RemoteTraceback(trace))
+
+    def close_if_idle(self) -> None:
+        """End the process unless it is at work."""
+        if self._lock.acquire(blocking=False):
+            try:
+                self.close()
+            finally:
+                self._lock.release()
 
     def close(self) -> None:
         """End the process and remove its files; closing again does nothing."""
@@ -241,14 +254,33 @@ def _describe_exit(code: int) -> str:
 
 
 def run_in_child(function: Callable[..., Result], *arguments: Any, limit: float) -> Result:
-    """Call a function in a child process of its own, or here where this process is a child already.
+    """Call a function in a child process, or here where this process is a child already.
 
     The parameters and exceptions are those of `Child.call`.
     """
     if is_supervised():
         return function(*arguments)
-    child = Child()
-    try:
-        return child.call(function, *arguments, limit=limit)
-    finally:
-        child.close()
+    return _shared.call(function, *arguments, limit=limit)
+
+
+class _SharedChild:
+    """A child for calls without a child of their own; it ends when nobody has called for a while."""
+
+    def __init__(self) -> None:
+        self._child, self._timer = Child(), threading.Timer(0.0, _nothing)
+
+    def call(self, function: Callable[..., Result], *arguments: Any, limit: float) -> Result:
+        self._timer.cancel()
+        try:
+            return self._child.call(function, *arguments, limit=limit)
+        finally:
+            self._timer = threading.Timer(_IDLE, self._child.close_if_idle)
+            self._timer.daemon = True
+            self._timer.start()
+
+
+def _nothing() -> None:
+    """Do nothing: the timer before the first call."""
+
+
+_shared = _SharedChild()

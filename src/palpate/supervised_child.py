@@ -8,6 +8,7 @@ runs any more; it and crashes leave the traceback of the moment on standard erro
 
 from __future__ import annotations
 
+import contextlib
 import faulthandler
 import os
 import pickle
@@ -39,6 +40,7 @@ def main() -> None:
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)
     os.dup2(2, 1)  # what the work prints is no answer
+    _forbid_core_dumps()
     faulthandler.enable()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that started this one
     become_supervised()
@@ -47,6 +49,14 @@ def main() -> None:
     write_frame(pipes[1], b"ready")
     while True:
         write_frame(pipes[1], _answer(requests.get()))
+
+
+def _forbid_core_dumps() -> None:
+    """Let a crash write no image of the memory, which takes seconds and the room of the whole process."""
+    with contextlib.suppress(ImportError, OSError, ValueError):
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))
 
 
 def _answer(request: bytes) -> bytes:

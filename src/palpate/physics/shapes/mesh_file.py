@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.physics.apart import mesh_apart
 from palpate.physics.shapes.body_file import (
     UNITS,
     SurfacePatch,
@@ -92,12 +93,20 @@ class ImportedMesh(Shape):
     def __str__(self) -> str:
         return f"mesh of {Path(self.path).name}"
 
+    foreign = True
+
     def generate(self, refinements: tuple[FineMesh, ...]) -> Any:
         """The file's mesh, its tetrahedra bisected where a refinement asks for smaller ones."""
-        mesh = to_ngsolve(_read(self))
-        for refinement in refinements:
-            _bisect(mesh, refinement)
-        return mesh.ngmesh
+        if not refinements:
+            return to_ngsolve(_read(self)).ngmesh
+        return mesh_apart(_refine, _read(self), refinements, doing=f"refining the {self}")
+
+
+def _refine(bare: BodyMesh, refinements: tuple[FineMesh, ...]) -> Any:
+    mesh = to_ngsolve(bare)
+    for refinement in refinements:
+        _bisect(mesh, refinement)
+    return mesh.ngmesh
 
 
 @lru_cache(maxsize=8)

@@ -114,6 +114,7 @@ class Shape:
     """
 
     curved: ClassVar[bool] = False  # whether elements shall follow the surface between their vertices
+    foreign: ClassVar[bool] = False  # whether another program's file decides it, which may crash the mesher
 
     @property
     def surfaces(self) -> tuple[str, ...]:

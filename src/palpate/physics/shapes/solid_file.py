@@ -13,6 +13,7 @@ import numpy as np
 
 from palpate import checks
 from palpate.errors import FileFormatError, UsageError
+from palpate.physics.apart import mesh_apart, read_apart
 from palpate.physics.shapes.body_file import (
     FEATURE_ANGLE,
     SurfacePatch,
@@ -225,6 +226,8 @@ class ImportedSolid(Shape):
         if self.unit is not None:
             require_unit(self.unit)
 
+    foreign = True
+
     @property
     def is_step(self) -> bool:
         """True for a STEP file, False for an STL file."""
@@ -240,7 +243,7 @@ class ImportedSolid(Shape):
         """Names found in the file or made from it, or given by patches."""
         if not self.is_step:
             return _skin(self)[0].surfaces
-        return tuple(dict.fromkeys(f.name for f in _solid(self).faces if f.name != INTERFACE))
+        return _names(self)[0]
 
     @property
     def faces(self) -> tuple[Face, ...]:
@@ -252,7 +255,7 @@ class ImportedSolid(Shape):
         """Names of the solids, or ``body``."""
         if not self.is_step:
             return ("body",)
-        return tuple(dict.fromkeys(solid.name for solid in _solid(self).solids))
+        return _names(self)[1]
 
     def describe(self) -> dict[str, Any]:
         """Everything that decides the mesh, as plain data."""
@@ -271,20 +274,35 @@ class ImportedSolid(Shape):
     def generate(self, refinements: tuple[FineMesh, ...]) -> Any:
         """A new `netgen.meshing.Mesh` in m, whose names of surfaces and regions are set."""
         if self.is_step:
-            # read anew: meshing sets element sizes on the faces
-            solid = _solid.__wrapped__(self)
-            return mesh_solid(solid, self._coarse(*solid.bounding_box), refinements)
+            return mesh_apart(_mesh_step, self, refinements, doing=f"meshing the {self}")
         skin, volume = _skin(self)
-        return to_ngsolve(fill_surface(skin, volume, self._coarse(*skin.corners), refinements)).ngmesh
+        return to_ngsolve(fill_surface(skin, volume, self.coarse(*skin.corners), refinements)).ngmesh
 
-    def _coarse(self, low: Any, high: Any) -> float:
+    def coarse(self, low: Any, high: Any) -> float:
+        """Return the largest element size in m of a body between two corners."""
         return self.element if self.element is not None else min(high[i] - low[i] for i in range(3)) / 3
 
 
-@lru_cache(maxsize=8)
-def _solid(shape: ImportedSolid) -> Any:
+def _mesh_step(shape: ImportedSolid, refinements: tuple[FineMesh, ...]) -> Any:
+    solid = _read_solid(shape)
+    return mesh_solid(solid, shape.coarse(*solid.bounding_box), refinements)
+
+
+def _read_solid(shape: ImportedSolid) -> Any:
     require_same(shape.path, shape.digest)
     return read_step(shape.path, shape.patches)
+
+
+@lru_cache(maxsize=8)
+def _names(shape: ImportedSolid) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of the surfaces and regions of a STEP file."""
+    return read_apart(_read_names, shape, doing=f"reading the {shape}")
+
+
+def _read_names(shape: ImportedSolid) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    solid = _read_solid(shape)
+    surfaces = dict.fromkeys(face.name for face in solid.faces if face.name != INTERFACE)
+    return tuple(surfaces), tuple(dict.fromkeys(part.name for part in solid.solids))
 
 
 @lru_cache(maxsize=8)

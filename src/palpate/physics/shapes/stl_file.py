@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from palpate.errors import FileFormatError, UsageError
 from palpate.files import TemporaryFolder
+from palpate.physics.apart import read_apart
 from palpate.physics.shapes.body_file import UNITS, SurfacePatch, apply_patches, read_with_meshio, segments
 from palpate.physics.shapes.mesh import BodyMesh, body_mesh
 from palpate.physics.shapes.meshing import (
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
 
 __all__ = ["fill_surface", "name_parts", "read_stl", "require_closed", "unite_points"]
 
+FLUSH = 1e-6  # of the body's length, below which two faces lie on each other
 LENGTH = 100.0  # longest side in the units in which Netgen meshes: its tolerances are those of millimetres
 SHARP = (
     0.05  # weight of a normal's direction against distance over the body's length, where faces are compared
@@ -100,6 +103,15 @@ def require_closed(surface: Trimesh, source: str) -> None:
             fix="Unite overlapping parts (Boolean union) in the program that made the file.",
         )
 
+    if (contact := _contact(surface)) is not None:
+        first, second, centre = contact
+        where = ", ".join(f"{v:.4g}" for v in centre)
+        raise UsageError(
+            f"Closed shells {first} and {second} of the surface of {source} touch around ({where}) m.",
+            why="Faces of them lie on each other and share no nodes, so that the body is neither one nor two.",
+            fix="Unite the parts (Boolean union) in the program that made the file, or move them apart.",
+        )
+
 
 def _where(surface: Trimesh, edges: np.ndarray) -> str:
     middle = surface.vertices[edges].mean(axis=(0, 1))
@@ -109,13 +121,7 @@ def _where(surface: Trimesh, edges: np.ndarray) -> str:
 def _crossing(surface: Trimesh) -> tuple[int, int] | None:
     """Two triangles that cross without sharing a node; None where there are none."""
     corners, nodes = np.asarray(surface.triangles), np.asarray(surface.faces)
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    order = np.argsort(low[:, 0], kind="stable")
-    starts = low[order, 0]
-    for rank, i in enumerate(order):
-        stop = int(np.searchsorted(starts, high[i, 0], side="right"))
-        others = order[rank + 1 : stop]
-        near = others[((low[others] <= high[i]) & (high[others] >= low[i])).all(axis=1)]
+    for i, near in _neighbours(corners, 0.0):
         near = near[~(nodes[near][:, :, None] == nodes[i]).any(axis=(1, 2))]
         if len(near):
             mine = np.broadcast_to(corners[i], (len(near), 3, 3))
@@ -123,6 +129,54 @@ def _crossing(surface: Trimesh) -> tuple[int, int] | None:
             if hit.any():
                 return int(i), int(near[hit.argmax()])
     return None
+
+
+def _neighbours(corners: np.ndarray, slack: float) -> Iterator[tuple[int, np.ndarray]]:
+    """Yield each triangle of (t, 3, 3) with those after it, in x, whose boxes come within `slack` m of its own."""
+    low, high = corners.min(axis=1) - slack, corners.max(axis=1)
+    order = np.argsort(low[:, 0], kind="stable")
+    starts = low[order, 0]
+    for rank, i in enumerate(order):
+        stop = int(np.searchsorted(starts, high[i, 0], side="right"))
+        others = order[rank + 1 : stop]
+        overlaps = (low[others] <= high[i]) & (high[others] >= low[i])
+        yield int(i), others[overlaps.all(axis=1)]
+
+
+def _contact(surface: Trimesh) -> tuple[int, int, np.ndarray] | None:
+    """Two closed shells, counted from 1, with faces in one plane that overlap, and where in m; None without such."""
+    from trimesh.graph import connected_component_labels
+
+    shell = connected_component_labels(surface.face_adjacency, node_count=len(surface.faces))
+    if not shell.any():
+        return None
+    corners, normals = np.asarray(surface.triangles), np.asarray(surface.face_normals)
+    tolerance = FLUSH * float(surface.extents.max())
+    for i, near in _neighbours(corners, tolerance):
+        near = near[(shell[near] != shell[i]) & (np.abs(normals[near] @ normals[i]) > 1 - FLUSH)]
+        distance = np.abs((corners[near] - corners[i, 0]) @ normals[i]).max(axis=1, initial=0.0)
+        near = near[distance < tolerance]
+        touching = near[_overlap(corners[i], corners[near], normals[i], tolerance)]
+        if len(touching):
+            first, second = sorted((int(shell[i]) + 1, int(shell[touching[0]]) + 1))
+            return first, second, corners[touching].mean(axis=(0, 1))
+    return None
+
+
+def _overlap(corners: np.ndarray, others: np.ndarray, normal: np.ndarray, tolerance: float) -> np.ndarray:
+    """Mask (n,) of the triangles (n, 3, 3) that share an area with one in the same plane: no edge separates them."""
+    together = np.ones(len(others), dtype=bool)
+    for triangles in (np.broadcast_to(corners, others.shape), others):
+        edges = np.roll(triangles, -1, axis=1) - triangles
+        across = np.cross(edges, normal)
+        across /= np.linalg.norm(across, axis=2, keepdims=True)
+        mine = np.einsum("nek,ck->nec", across, corners)
+        theirs = np.einsum("nek,nck->nec", across, others)
+        depth = np.minimum(mine.max(axis=2), theirs.max(axis=2)) - np.maximum(
+            mine.min(axis=2), theirs.min(axis=2)
+        )
+        together &= (depth > tolerance).all(axis=1)
+    return together
 
 
 def _pierces(edges_of: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -201,15 +255,29 @@ def fill_surface(skin: BodyMesh, volume: float, coarse: float, refinements: tupl
     ------
     UsageError
         If there would be too many elements, or Netgen can't mesh the body.
+    SolverError
+        If Netgen ends its process or takes too long.
     """
     low, high = skin.corners
     scale = LENGTH / float((high - low).max())
     fine = [(*points_on(skin, refinement), refinement.element) for refinement in refinements]
     require_budget([(volume, coarse)], [(area, size) for _, area, size in fine])
-    geometry = _stl_geometry(skin.points * scale, skin.triangles)
-    netgen = _generate_mesh(geometry, coarse * scale, [(at * scale, size * scale) for at, _, size in fine])
-    netgen.Scale(1 / scale)
-    return _rename_surfaces(body_mesh(netgen), skin)
+    sizes = [(at * scale, size * scale) for at, _, size in fine]
+    work = (skin.points * scale, skin.triangles, coarse * scale, sizes, 1 / scale)
+    return _rename_surfaces(read_apart(_fill, *work, doing="meshing a closed surface"), skin)
+
+
+def _fill(
+    points: np.ndarray,
+    triangles: np.ndarray,
+    coarse: float,
+    sizes: list[tuple[np.ndarray, float]],
+    scale: float,
+) -> BodyMesh:
+    """Return the mesh inside a surface, scaled: a function for the child process in which Netgen runs."""
+    mesh = _generate_mesh(_stl_geometry(points, triangles), coarse, sizes)
+    mesh.Scale(scale)
+    return body_mesh(mesh)
 
 
 def _stl_geometry(points: np.ndarray, triangles: np.ndarray) -> Any:

@@ -12,12 +12,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cached_property
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from palpate.dataset import Field, solid_fields
 from palpate.errors import UsageError
+from palpate.physics.apart import is_foreign, solve_apart
 from palpate.physics.interactions.interaction import Interaction
 from palpate.physics.interactions.sphere import SphereProbe
 from palpate.physics.shapes.block import LayeredBlock
@@ -346,6 +347,8 @@ class FamilyProblem:
 
     def solve(self, x: Any) -> SolidSolution:
         """Solve for inputs x (n + k,), from the body without interaction."""
+        if is_foreign(self.base.body.geometry):
+            return cast("SolidSolution", solve_apart(self, x, {}))
         return self.open().solve(x)
 
     def design(self, samples: int, seed: int = 0, **options: Any) -> np.ndarray:

@@ -6,13 +6,14 @@ import hashlib
 import json
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from palpate import checks
 from palpate.dataset import Field, Layout, solid_fields
 from palpate.errors import UsageError
+from palpate.physics.apart import is_foreign, solve_apart
 from palpate.physics.interactions.glued import GluedPad
 from palpate.physics.interactions.interaction import Interaction, Planned
 from palpate.physics.interactions.pads import advise_on_pad
@@ -210,6 +211,7 @@ class SolidProblem:
         """Solve for inputs x (n,), from the body without interaction.
 
         Inputs a little beyond their ranges are solved too; `SolidSolution.inside` tells, and so does its print.
+        A body from a file of another program is solved in a child process, which it may crash.
 
         Parameters
         ----------
@@ -225,6 +227,8 @@ class SolidProblem:
         UsageError
             If `x` has not one finite number per input, or `dt` is not positive.
         """
+        if is_foreign(self.body.geometry):
+            return cast("SolidSolution", solve_apart(self, x, {"dt": dt, "fields": fields}))
         return self.open().solve(x, dt=dt, fields=fields)
 
     def design(self, samples: int, seed: int = 0, **options: Any) -> np.ndarray:

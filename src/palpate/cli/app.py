@@ -29,6 +29,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
+dataset_app = typer.Typer(help="Datasets of solves.", no_args_is_help=True)
+app.add_typer(dataset_app, name="dataset")
+
 StudyFile = Annotated[Path, typer.Argument(help="Study file, as [bold]palpate init[/] writes it.")]
 ModelFile = Annotated[
     Path, typer.Argument(help="Model file (.palpate), as [bold]palpate learn[/] writes it.")
@@ -180,10 +183,21 @@ def sweep(
 
 
 @app.command()
-def learn(study: StudyFile = STUDY, as_json: Json = False) -> None:
+def learn(
+    study: Annotated[Path, typer.Argument(help="Study file, or a dataset (NAME.zarr).")] = STUDY,
+    effort: Annotated[
+        float | None, typer.Option(min=0.01, help="Of a dataset: how much is tried; 0.1 is a quick look.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
     """Learn a surrogate from the solves of a study, check it, and write it to a model file."""
-    from palpate.cli.study_commands import learn_file
+    from palpate.cli.study_commands import learn_dataset_file, learn_file
 
+    if study.is_dir():
+        learn_dataset_file(study, 1.0 if effort is None else effort, Console(as_json))
+        return
+    if effort is not None:
+        raise UsageError("A study file states its own effort.", fix="Leave out --effort.")
     learn_file(study, Console(as_json))
 
 
@@ -350,6 +364,48 @@ def correct(
     correct_model(
         model, source, out, parameter or [], differs, Noise(noise, relative, jitter), Console(as_json)
     )
+
+
+@dataset_app.command("import")
+def import_dataset(
+    files: Annotated[list[Path], typer.Argument(help="Results of another solver: all files of one model.")],
+    mapping: Annotated[
+        Path | None,
+        typer.Option(help="TOML file that says which columns are inputs, outputs and coordinates."),
+    ] = None,
+    inputs: Annotated[
+        list[str] | None, typer.Option("--input", help="Input and its column: NAME=COLUMN. Several times.")
+    ] = None,
+    outputs: Annotated[
+        list[str] | None,
+        typer.Option("--output", help="Output and its column, or components with commas. Several times."),
+    ] = None,
+    units: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--unit", help="Unit of a column, or of length, force and time of the model: NAME=UNIT."
+        ),
+    ] = None,
+    coordinates: Annotated[
+        list[str] | None, typer.Option("--coordinate", help="Axis of the body's coordinates. Several times.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Dataset to write. Default: the first file's name with .zarr.")
+    ] = None,
+    test: Annotated[
+        float, typer.Option(min=0, max=0.9, help="Share of the cases for a test set, NAME-test.zarr.")
+    ] = 0.0,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Print what the files hold and what would be written.")
+    ] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace datasets that exist.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Make a dataset of another solver's results: COMSOL, CalculiX, VTK, and arrays or tables of your own."""
+    from palpate.cli.dataset_command import import_files
+
+    options = (inputs or [], outputs or [], units or [], coordinates or [])
+    import_files(files, mapping, options, out, test, dry_run, overwrite, Console(as_json))
 
 
 @app.command()

@@ -13,7 +13,14 @@ from palpate.processes import CASE_LIMIT
 if TYPE_CHECKING:
     from palpate.sweeps import Scheduler
 
-__all__ = ["is_archive", "learn_file", "sweep_file", "validate_model", "validate_study_file"]
+__all__ = [
+    "is_archive",
+    "learn_dataset_file",
+    "learn_file",
+    "sweep_file",
+    "validate_model",
+    "validate_study_file",
+]
 
 _CORRECTED = (
     "Corrected by {} measured touches: it is of the specimen, and differs from solves of the model on purpose. "
@@ -120,6 +127,32 @@ def validate_study_file(study: Path, report: bool, console: Console) -> None:
         text += f"\nreport: {paths.report}"
     console.result(text, validation.as_dict() | {"report": str(paths.report) if report else None})
     validation.raise_if_failed()
+
+
+def learn_dataset_file(path: Path, effort: float, console: Console) -> None:
+    """Learn a dataset on its own, write the model beside it, and print how it was learnt.
+
+    Parameters
+    ----------
+    path : Path
+        Dataset, a folder ``NAME.zarr``.
+    effort : float
+        Multiplies the counts of candidates and iterations of the searches.
+    console : Console
+        Printer of the result.
+    """
+    from palpate.dataset import Dataset
+    from palpate.learning import learn_dataset
+
+    data = Dataset.open(path)
+    console.say(f"Learning from {len(data.ok)} solves …")
+    model, history = learn_dataset(
+        data, name=path.stem, effort=effort, log=lambda stage: console.say(f"{stage} …")
+    )
+    target = path.with_suffix(".palpate")
+    model.save(target)
+    console.result("\n".join([str(model), str(history), str(target)]), {"model": str(target)})
+    console.say(f"Next: palpate validate {target} --test DATA.zarr, palpate view {target}")
 
 
 def is_archive(path: Path) -> bool:

@@ -301,10 +301,17 @@ def _has_weight(data: Dataset) -> bool:
     return bool(data.provenance.get("problem", {}).get("body", {}).get("self_weight", False))
 
 
+def _is_even(data: Dataset) -> bool:
+    """Return whether a body is its own mirror image across its axis: straight and without weight, unless it says no."""
+    return not _has_weight(data) and bool(
+        data.provenance.get("problem", {}).get("body", {}).get("mirrored", True)
+    )
+
+
 def _mirrors(data: Dataset, touched: tuple[int, ...]) -> bool:
-    """Return whether the other side is a mirror image: one load across the body, from zero up, without weight."""
+    """Return whether the other side is a mirror image: one load across the body, from zero up, of an even body."""
     across = len(data.ranges) == 1 and abs(_directions(data, touched)[0, 0]) < 1e-12
-    return bool(across and data.ranges[0].low == 0.0 and not _has_weight(data))
+    return bool(across and data.ranges[0].low == 0.0 and _is_even(data))
 
 
 def _energy_of(data: Dataset, field: NodeField, coupling: float | None) -> tuple[Baseline, Solves]:
@@ -336,7 +343,7 @@ def _energy_of(data: Dataset, field: NodeField, coupling: float | None) -> tuple
     there = np.einsum(
         "nic,ic->ni", data.displacement[:, data.load_nodes[others], :2], data.load_directions[others, :2]
     )
-    symmetric = not others and not _has_weight(data) and bool((np.abs(D) > 1 - 1e-12).any(axis=1).all())
+    symmetric = not others and _is_even(data) and bool((np.abs(D) > 1 - 1e-12).any(axis=1).all())
     even = all(r.low == -r.high for r, d in zip(data.ranges, D, strict=False) if abs(d[1]) > 0.5)
     return ConstantBaseline(level, D, compliance), Solves(
         np.hstack([h, data.X[:, others]]),

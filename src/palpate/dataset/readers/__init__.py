@@ -1,0 +1,27 @@
+"""Results of other solvers, read and made into datasets: one file for each format.
+
+results         the value that every reader returns, and how several files are joined
+formats         the formats, and the one door to all of them
+comsol, calculix_frd, calculix_dat, vtk_files, array_files   the readers
+mapping         which columns are inputs, outputs and coordinates
+column_choice   columns found by name, reduced and converted
+import_results  all of it made into a dataset
+"""
+
+from palpate.dataset.readers.formats import FORMATS, Format, read_results
+from palpate.dataset.readers.import_results import Imported, import_results
+from palpate.dataset.readers.mapping import ImportMapping, read_mapping
+from palpate.dataset.readers.results import Column, Places, Results
+
+__all__ = [
+    "FORMATS",
+    "Column",
+    "Format",
+    "ImportMapping",
+    "Imported",
+    "Places",
+    "Results",
+    "import_results",
+    "read_mapping",
+    "read_results",
+]

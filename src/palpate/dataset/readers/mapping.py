@@ -1,0 +1,287 @@
+"""The mapping: which columns of another solver's results are inputs, outputs and coordinates, and in which units.
+
+A TOML file, or the same as a dictionary::
+
+    name = "nylon beam"
+    coordinates = ["x", "y"]           # of a plane body; all that the file has by default
+
+    [units]
+    length = "mm"                      # a consistent system, for files that state no units
+    force = "N"
+
+    [[inputs]]
+    name = "tip load"
+    from = "time"                      # a column; by default the one of this name
+    times = "5 N"                      # a load factor times the whole load
+    load = { at = ["100 mm", "0 mm"], direction = [0, -1] }
+
+    [[outputs]]
+    name = "displacement"
+    from = "DISP"                      # a vector, or a list of its components
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from palpate.errors import UsageError
+from palpate.units import to_si
+
+__all__ = ["ImportMapping", "Input", "Load", "Output", "read_mapping"]
+
+Place = int | tuple[float, ...]
+
+
+class _Record(BaseModel):
+    """A table of the mapping; unknown keys are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+
+
+def _lengths(value: Any) -> Any:
+    """Return coordinates in m from numbers in m or texts such as ``"3 mm"``."""
+    return tuple(to_si(v, "m") for v in value) if isinstance(value, list | tuple) else value
+
+
+class Load(_Record):
+    """A force on one node.
+
+    Attributes
+    ----------
+    at : int or coordinates
+        Number of the node in the file, or its place at rest, m.
+    direction : tuple of float
+        Direction of a positive load, of any length.
+    """
+
+    at: Place
+    direction: tuple[float, ...]
+
+    _in_metres = field_validator("at", mode="before")(_lengths)
+
+
+class _Source(_Record):
+    name: str
+    source: str | tuple[str, ...] = Field(default="", alias="from")
+    unit: str | None = None
+    times: float | str = 1.0
+    at: Place | None = None
+    reduce: Literal["max", "min", "mean", "sum"] | None = None
+
+    _in_metres = field_validator("at", mode="before")(_lengths)
+
+    @property
+    def columns(self) -> str | tuple[str, ...]:
+        """Column that it comes from, or the components of a vector."""
+        return self.source or self.name
+
+
+class Input(_Source):
+    """One input of the dataset.
+
+    Attributes
+    ----------
+    name : str
+        Name of the input.
+    source : str
+        Column that it comes from, in the file ``from``; by default the one of its name.
+    unit : str, optional
+        Unit of the column, where the file states none or a wrong one.
+    times : float or str
+        Factor, such as -1; as a quantity, ``"5 N"``, the column is a load factor without a unit.
+    at : int or coordinates, optional
+        Place of the column whose values are meant.
+    reduce : {"max", "min", "mean", "sum"}, optional
+        How one number is made of all places of the column.
+    load : Load, optional
+        Node and direction where the input is a force on a node.
+    range : pair of float or str, optional
+        Ends of the range in SI units, or as text with a unit; by default the least and the largest value.
+    """
+
+    load: Load | None = None
+    range: tuple[float | str, float | str] | None = None
+
+
+class Output(_Source):
+    """One quantity that each case answers; the keys of an `Input` and these.
+
+    Attributes
+    ----------
+    invariant : {"von Mises"}, optional
+        Number that is made of the six components of a tensor.
+    meaning : str
+        A few words that are kept beside the numbers.
+    """
+
+    invariant: Literal["von Mises"] | None = None
+    meaning: str = ""
+
+
+class Nodes(_Record):
+    """Nodes that are kept.
+
+    Attributes
+    ----------
+    near : mapping of axis to m
+        Coordinates that a kept node has, by the name of the axis in the file.
+    tolerance : float
+        Largest distance from them, m; a millionth of the body's size by default.
+    sort : str
+        Axis along which the nodes are ordered.
+    """
+
+    near: dict[str, float] = Field(default_factory=dict)
+    tolerance: float | None = None
+    sort: str | None = None
+
+    @field_validator("near", mode="before")
+    @classmethod
+    def _metres(cls, value: Any) -> Any:
+        return {k: to_si(v, "m") for k, v in value.items()} if isinstance(value, Mapping) else value
+
+    @field_validator("tolerance", mode="before")
+    @classmethod
+    def _tolerance(cls, value: Any) -> Any:
+        return to_si(value, "m") if isinstance(value, str) else value
+
+
+class ImportMapping(_Record):
+    """Meaning of the columns of another solver's results.
+
+    Attributes
+    ----------
+    name : str
+        Name of the body, for the dataset's record.
+    inputs, outputs : tuple of Input, tuple of Output
+        What becomes an input and an output of the dataset.
+    units : mapping
+        Units by column, and ``length``, ``force`` and ``time`` of a consistent system.
+    coordinates : tuple of str, optional
+        Axes that the body's coordinates are, two or three of those of the file; all by default.
+    join : {"stem", "columns", "cases"}
+        How several files belong together: files of one name but for its ending have the same cases (``stem``); all
+        files have them; or each file has further cases.
+    file_pattern : str
+        Regular expression with named groups, such as ``F(?P<force>[0-9.]+)``: numbers in the names of files, which
+        become columns.
+    nodes : Nodes, optional
+        Nodes that are kept; all by default.
+    surfaces : mapping of name to coordinates
+        Parts of the surface by a coordinate of all corners of their triangles, such as ``top = { z = "50 mm" }``.
+    mirrored : bool
+        True where the body is its own mirror image across its axis, such as a straight beam: loads of the other sign
+        are then known too, and a range of one load begins at zero.
+    body : mapping
+        Further facts of the body for its record, such as ``half_height`` in m.
+    interactions : tuple of mappings
+        What acts on the body, as the record of a sweep has it, such as a ``SphereProbe``; lengths in m or as text.
+    """
+
+    name: str = "imported body"
+    inputs: tuple[Input, ...] = ()
+    outputs: tuple[Output, ...] = ()
+    units: dict[str, str] = Field(default_factory=dict)
+    coordinates: tuple[str, ...] | None = None
+    join: Literal["stem", "columns", "cases"] = "stem"
+    file_pattern: str = ""
+    nodes: Nodes | None = None
+    surfaces: dict[str, dict[str, float]] = Field(default_factory=dict)
+    mirrored: bool = False
+    body: dict[str, Any] = Field(default_factory=dict)
+    interactions: tuple[dict[str, Any], ...] = ()
+
+    @field_validator("surfaces", mode="before")
+    @classmethod
+    def _surfaces(cls, value: Any) -> Any:
+        if not isinstance(value, Mapping):
+            return value
+        return {
+            name: {axis: to_si(v, "m") for axis, v in at.items()} if isinstance(at, Mapping) else at
+            for name, at in value.items()
+        }
+
+    @field_validator("interactions", mode="before")
+    @classmethod
+    def _interactions(cls, value: Any) -> Any:
+        return [_plain(entry) for entry in value] if isinstance(value, list | tuple) else value
+
+    @field_validator("body", mode="before")
+    @classmethod
+    def _body(cls, value: Any) -> Any:
+        return _plain(value)
+
+    @field_validator("file_pattern")
+    @classmethod
+    def _pattern(cls, value: str) -> str:
+        try:
+            groups = re.compile(value).groupindex
+        except re.error as error:
+            raise ValueError(f"it is no regular expression: {error}") from error
+        if value and not groups:
+            raise ValueError("it names no group; write (?P<force>[0-9.]+) for a number called force")
+        return value
+
+    @model_validator(mode="after")
+    def _names(self) -> ImportMapping:
+        for kind, entries in (("inputs", self.inputs), ("outputs", self.outputs)):
+            names = [entry.name for entry in entries]
+            twice = sorted({name for name in names if names.count(name) > 1})
+            if twice:
+                raise ValueError(f"two of the {kind} are called {twice[0]!r}")
+        if any(not isinstance(entry.columns, str) for entry in self.inputs):
+            raise ValueError("an input comes from one column; write several inputs for a vector")
+        return self
+
+
+def _plain(value: Any) -> Any:
+    """Turn texts with a length, such as ``"10 mm"``, into m; all else stays."""
+    if isinstance(value, Mapping):
+        return {key: _plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, str) and re.match(r"^[-+]?[\d.]", value):
+        return to_si(value, "m")
+    return value
+
+
+def read_mapping(source: str | os.PathLike[str] | Mapping[str, Any] | ImportMapping) -> ImportMapping:
+    """Return a mapping from a TOML file or a dictionary.
+
+    Parameters
+    ----------
+    source : path, dict or ImportMapping
+        Where it stands; one that has been read is returned as it is.
+
+    Raises
+    ------
+    UsageError
+        If the file is missing or no TOML, or a key is unknown or has a wrong value; all of them are listed.
+    """
+    if isinstance(source, ImportMapping):
+        return source
+    where = "The mapping"
+    if not isinstance(source, Mapping):
+        where, path = os.fspath(source), Path(source)
+        try:
+            source = tomllib.loads(path.read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+            raise UsageError(
+                f"{path} can't be read as a mapping.", why=f"{error}.", fix="Write a TOML file."
+            ) from error
+    try:
+        return ImportMapping.model_validate(dict(source))
+    except ValidationError as error:
+        lines = [f"  {'.'.join(map(str, e['loc'])) or 'mapping'}: {e['msg']}" for e in error.errors()]
+        raise UsageError(
+            f"{where} does not say what the columns are:",
+            why="\n".join(dict.fromkeys(lines)),
+            fix="The guide “Results of other solvers” has every key with its meaning.",
+        ) from error

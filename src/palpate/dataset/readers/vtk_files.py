@@ -1,0 +1,249 @@
+"""Files of the VTK family, as ParaView and many solvers write them: ``.vtu``, ``.vtp``, ``.vtk``, and series ``.pvd``.
+
+PyVista reads them where it is installed (``pip install "palpate[results]"``). Without it meshio, which palpate has
+always, reads ``.vtu`` files of the usual codings.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+from palpate.dataset.readers.results import TIME, Column, Places, Results, refuse
+from palpate.dataset.readers.surface import outer_surface
+from palpate.errors import FileFormatError, UsageError
+
+__all__ = ["SUFFIXES", "read_vtk"]
+
+FORMAT = "VTK"
+SUFFIXES = (".pvd", ".vtu", ".vtp", ".vtk")
+INSTALL = 'Install PyVista: pip install "palpate[results]"'
+# VTK's numbers of the cells that have faces; the second of a pair has nodes between the corners
+_KINDS = {
+    5: "triangle",
+    22: "triangle",
+    9: "quad",
+    23: "quad",
+    28: "quad",
+    10: "tetra",
+    24: "tetra",
+    12: "hexahedron",
+    25: "hexahedron",
+    29: "hexahedron",
+    13: "wedge",
+    26: "wedge",
+    14: "pyramid",
+    27: "pyramid",
+}
+_PARTS = {2: "xy", 3: "xyz"}
+_TENSORS = {6: ("xx", "yy", "zz", "xy", "yz", "xz")}  # VTK's order of a symmetric tensor
+
+
+@dataclass(frozen=True, eq=False)
+class _Grid:
+    """Content of one file: nodes, cells by kind, and arrays of nodes, of cells and of the whole."""
+
+    points: np.ndarray
+    cells: Sequence[tuple[str, np.ndarray]]
+    count: int
+    point_data: Mapping[str, np.ndarray]
+    cell_data: Mapping[str, np.ndarray]
+    field_data: Mapping[str, np.ndarray]
+
+
+def read_vtk(path: Path) -> Results:
+    """Read a file of the VTK family; of a ``.pvd`` each step is a case.
+
+    Columns are called as the array, of a vector ``NAME.x``, of a symmetric tensor ``NAME.xx``.
+
+    Raises
+    ------
+    FileFormatError
+        If the file or one that it names is missing or damaged, or nodes move or change from step to step.
+    UsageError
+        If the format needs PyVista, and it isn't installed.
+    """
+    if path.suffix.lower() != ".pvd":
+        return _collect(path, [_read(path)], None)
+    times, files = _series(path)
+    grids = [_read(file) for file in files]
+    for file, grid in zip(files, grids, strict=True):
+        if grid.points.shape != grids[0].points.shape or grid.count != grids[0].count:
+            raise refuse(
+                file,
+                None,
+                f"it has {len(grid.points)} nodes and {grid.count} cells, the first step {len(grids[0].points)} and "
+                f"{grids[0].count}.",
+                why="The body was meshed anew between the steps.",
+                fix="Export results on one mesh.",
+            )
+        if not np.allclose(grid.points, grids[0].points, rtol=0, atol=1e-6 * np.ptp(grids[0].points)):
+            raise refuse(
+                file,
+                None,
+                "its nodes are elsewhere than in the first step.",
+                why="The coordinates are those of the deformed body, or of another mesh.",
+                fix="Export the undeformed mesh, with the displacement as a field.",
+            )
+    return _collect(path, grids, times)
+
+
+def _series(path: Path) -> tuple[np.ndarray, list[Path]]:
+    """Return the times and files of a collection, in the order of time."""
+    try:
+        rows = ElementTree.parse(path).getroot().findall("Collection/DataSet")
+    except (ElementTree.ParseError, OSError) as error:
+        line = error.position[0] if isinstance(error, ElementTree.ParseError) else None
+        raise refuse(path, line, "the series can't be read.", why=f"{error}.") from error
+    if len({row.get("part", "0") for row in rows}) > 1:
+        raise refuse(
+            path,
+            None,
+            "the series has several parts for one time.",
+            fix="Export one part, or the parts apart.",
+        )
+    entries = []
+    for row in rows:
+        try:
+            entries.append((float(row.get("timestep", "nan")), path.parent / row.get("file", "")))
+        except ValueError:
+            raise refuse(path, None, f"the time step {row.get('timestep')!r} is no number.") from None
+    if not entries:
+        raise refuse(
+            path, None, "the series names no files.", why="It is empty, or no collection of DataSet entries."
+        )
+    entries.sort(key=lambda entry: entry[0])
+    return np.array([time for time, _ in entries]), [file for _, file in entries]
+
+
+def _read(path: Path) -> _Grid:
+    if not path.is_file():
+        raise refuse(path, None, "there is no such file.", fix="Keep the files of a series together.")
+    if importlib.util.find_spec("pyvista") is not None:
+        return _read_with_pyvista(path)
+    if path.suffix.lower() == ".vtu":
+        return _read_with_meshio(path)
+    raise UsageError(
+        f"{path} can't be read without PyVista.", why="meshio reads .vtu files only.", fix=INSTALL
+    )
+
+
+def _read_with_pyvista(path: Path) -> _Grid:
+    import pyvista
+
+    faults: list[str] = []
+    try:
+        reader = pyvista.get_reader(str(path))
+        # VTK prints what it finds wrong, and goes on with what it has
+        reader.reader.AddObserver("ErrorEvent", lambda *_: faults.append("VTK reports an error"))
+        grid: Any = reader.read()
+        whole = grid.cast_to_unstructured_grid()
+    except (OSError, ValueError, TypeError, RuntimeError, AttributeError) as error:
+        raise _damaged(path, str(error)) from error
+    if faults or not whole.n_points:
+        raise _damaged(path, faults[0] if faults else "it has no nodes")
+    cells = [(_KINDS[kind], nodes) for kind, nodes in whole.cells_dict.items() if kind in _KINDS]
+    return _Grid(
+        np.asarray(whole.points, dtype=float),
+        cells,
+        int(whole.n_cells),
+        dict(whole.point_data.items()),
+        dict(whole.cell_data.items()),
+        dict(whole.field_data.items()),
+    )
+
+
+def _read_with_meshio(path: Path) -> _Grid:
+    import meshio
+    from meshio import vtu  # meshio.read ends the program where it can't read
+
+    try:
+        mesh = vtu.read(path)
+    # the kinds of errors that it raises on codings that it doesn't know, and on broken bytes
+    except (meshio.ReadError, OSError, ElementTree.ParseError, ValueError, KeyError, AssertionError) as error:
+        raise _damaged(
+            path, f"{error or 'meshio does not know its coding'}", f"{INSTALL}, or export it again."
+        ) from error
+    kinds = [(block.type.rstrip("0123456789"), block.data) for block in mesh.cells]
+    cell_data = {name: np.concatenate(values) for name, values in mesh.cell_data.items()}
+    count = sum(len(block.data) for block in mesh.cells)
+    return _Grid(
+        np.asarray(mesh.points, dtype=float), kinds, count, mesh.point_data, cell_data, mesh.field_data
+    )
+
+
+def _damaged(path: Path, why: str, fix: str = "") -> FileFormatError:
+    return refuse(
+        path, None, "the file can't be read.", why=f"It is damaged, cut short or foreign: {why}.", fix=fix
+    )
+
+
+def _collect(path: Path, grids: Sequence[_Grid], times: np.ndarray | None) -> Results:
+    first = grids[0]
+    columns = [] if times is None else [Column(TIME, times, None, "{time}")]
+    notes: list[str] = []
+    for where, arrays in (
+        ("nodes", [grid.point_data for grid in grids]),
+        ("cells", [grid.cell_data for grid in grids]),
+        ("", [grid.field_data for grid in grids]),
+    ):
+        for name, sample in arrays[0].items():
+            reason = _reason_to_skip(name, sample, arrays)
+            if reason:
+                notes.append(f"Skipped {name}: {reason}.")
+                continue
+            columns += _columns(
+                name, np.stack([np.asarray(step[name], dtype=float) for step in arrays]), where
+            )
+        further = dict.fromkeys(name for step in arrays[1:] for name in step if name not in arrays[0])
+        notes += [f"Skipped {name}: the first step has no such array." for name in further]
+    plane = first.points.shape[1] == 2 or not np.ptp(first.points[:, 2])
+    coordinates = {
+        axis: Column(axis, first.points[:, i], None, "{length}")
+        for i, axis in enumerate("xy" if plane and len(first.points) > 1 else "xyz")
+    }
+    places = {
+        "nodes": Places(np.arange(len(first.points)), coordinates, outer_surface(first.cells, first.points)),
+        "cells": Places(np.arange(first.count), nodal=False),
+    }
+    used = {column.places for column in columns} | {"nodes"}
+    places = {name: value for name, value in places.items() if name in used}
+    form = f"{FORMAT} {path.suffix}"
+    return Results.of(path, form, len(grids), columns, places, notes)
+
+
+def _reason_to_skip(name: str, sample: Any, arrays: Sequence[Mapping[str, Any]]) -> str:
+    values = np.asarray(sample)
+    if values.dtype.kind not in "fiub":
+        return "it holds no numbers"
+    if not all(name in step for step in arrays):
+        return "not every step has it"
+    if len({np.shape(step[name]) for step in arrays}) > 1:
+        return "its size differs from step to step"
+    return ""
+
+
+def _columns(name: str, values: np.ndarray, where: str) -> list[Column]:
+    """Return the components of an array (case, place, component) as columns."""
+    if not where:
+        values = values.reshape(len(values), 1, -1)  # of the whole body: all numbers are components
+    if values.ndim == 2 or values.shape[-1] == 1:
+        flat = values.reshape(len(values), -1)
+        return [Column(name, flat if where else flat[:, 0], None, _measure(name), where)]
+    width = values.shape[-1]
+    values = values.reshape(len(values), -1, width)
+    parts = tuple(_PARTS.get(width, ())) or _TENSORS.get(width) or tuple(map(str, range(width)))
+    return [
+        Column(f"{name}.{part}", values[:, :, i] if where else values[:, 0, i], None, _measure(name), where)
+        for i, part in enumerate(parts)
+    ]
+
+
+def _measure(name: str) -> str:
+    return "{length}" if name.lower() in {"u", "disp", "displacement", "displacements"} else ""

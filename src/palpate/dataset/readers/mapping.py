@@ -34,7 +34,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from palpate.errors import UsageError
 from palpate.units import to_si
 
-__all__ = ["ImportMapping", "Input", "Load", "Output", "read_mapping"]
+__all__ = ["ImportMapping", "Input", "Load", "Nodes", "Output", "read_mapping"]
 
 Place = int | tuple[float, ...]
 

@@ -190,7 +190,8 @@ def _take_apart(path: Path, lines: Sequence[str]) -> _Export:
         blocks[-1].comments.append((number, text))
     row = next((text for block in blocks for _, text in block.rows), "")
     separator = ";" if ";" in row else "\t" if "\t" in row else "," if "," in row and dressing != ":" else ""
-    return _Export(path, keys, blocks, separator, separator != "," and "," in row)
+    decimal_comma = separator != "," and any("," in text for block in blocks for _, text in block.rows)
+    return _Export(path, keys, blocks, separator, decimal_comma)
 
 
 def _is_point(export: _Export) -> bool:

@@ -89,6 +89,8 @@ def split_names(text: str, separator: str, wanted: int) -> list[str]:
     """
     best: list[str] = []
     for mark in dict.fromkeys((separator, ",", ";", "\t", "")):
+        if mark != separator and (wanted == 1 or (mark and mark not in text)):
+            continue  # it would not part anything
         names = re.split(r"\s{2,}|\t", text.strip()) if not mark else _split_outside(text, mark)
         if mark and len(names) > wanted:
             names = _join_assignments(names)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.dataset.schema import FORMAT, FORMAT_VERSION, TIMINGS
+from palpate.dataset.stored_sizes import require_stored_sizes
 from palpate.errors import FileFormatError, UsageError
 from palpate.files import writing_folder
 
@@ -118,6 +119,7 @@ def _load(path: Path) -> xarray.Dataset:
     if part := _part_without_metadata(path):
         raise _corrupt(path, f"its part {part} has no zarr.json.")
     try:
+        require_stored_sizes(path)
         with warnings.catch_warnings():
             # what a file manager leaves in a folder is no part of it
             warnings.filterwarnings(

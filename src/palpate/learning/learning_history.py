@@ -18,6 +18,7 @@ import numpy as np
 from palpate.errors import FileFormatError
 from palpate.files import writing
 from palpate.rbf.filter.step import Event
+from palpate.sizes import require_npz
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -100,8 +101,10 @@ class History:
         """
         try:
             # opened here: on a damaged archive NumPy would leave its own handle open
-            with Path(path).open("rb") as raw, np.load(raw, allow_pickle=False) as file:
-                parts = {f.name: file[f.name] for f in fields(cls)}
+            with Path(path).open("rb") as raw:
+                require_npz(raw)
+                with np.load(raw, allow_pickle=False) as file:
+                    parts = {f.name: file[f.name] for f in fields(cls)}
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
             raise FileFormatError(f"{path} is not a learning history.", why=str(error)) from error
         return cls(**(parts | {"passes": int(parts["passes"])}))

@@ -6,6 +6,8 @@ import zlib
 
 import numpy as np
 
+from palpate.sizes import require_deflated
+
 __all__ = ["pack", "unpack"]
 
 LEVEL = 1  # of zlib: the fastest; higher ones gain a few percent
@@ -27,6 +29,7 @@ def unpack(packed: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     """
     size = 8 * int(np.prod(np.array(shape, dtype=object)))
     reader = zlib.decompressobj()
+    require_deflated(size, packed.size)
     try:
         plain = reader.decompress(packed.tobytes(), size + 1)  # no more than that, whatever the bytes say
     except zlib.error as error:

@@ -65,7 +65,7 @@ def _check_array(folder: Path) -> int:
                 _check_chunk(file, compressor, expected, exactly=not text)
             except ValueError as error:
                 raise ValueError(f"{folder.name}, chunk {file.relative_to(folder)}: {error}") from error
-    return math.prod(metadata["shape"]) * (np.dtypes.StringDType().itemsize if text else item)
+    return int(math.prod(metadata["shape"])) * (np.dtypes.StringDType().itemsize if text else item)
 
 
 def _compressor(metadata: Mapping[str, Any], first: str) -> str:

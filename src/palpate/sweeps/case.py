@@ -35,6 +35,8 @@ __all__ = [
     "solve_chain",
 ]
 
+OPEN_LIMIT = 600.0
+"""Time in s that opening a problem may take at least: it meshes, and imports what it needs."""
 _TRIES = 2  # that a case gets: the first may have ended for a reason of its own, such as want of memory
 _TRACE = 3000  # characters of a traceback that a row keeps, its end
 
@@ -172,10 +174,10 @@ def _open(child: Child, task: Task) -> str:
     """Open the problem in the child; return why that is not possible, else an empty text."""
     if _local.refused[0] == task.run:
         return _local.refused[1]
-    reason = ""
+    reason, limit = "", max(task.limit, OPEN_LIMIT)
     for tries in range(1, _TRIES + 1):
         try:
-            failure = child.call(open_problem, task.identity, task.problem, task.schema, limit=task.limit)
+            failure = child.call(open_problem, task.identity, task.problem, task.schema, limit=limit)
         except ChildEnded as error:
             reason = f"The model could not be opened: {_last_words(error, tries)}"
             if error.overdue:

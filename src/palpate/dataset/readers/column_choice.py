@@ -161,7 +161,7 @@ def chosen_columns(
             values, unit = column.values, unit_of_factor
         else:
             values, unit = values_in_si(column, own_units, wanted)
-        converted.append(replace(column, values=factor * values, unit=unit))
+        converted.append(replace(column, values=values, unit=unit))
         units.append(unit)
     if len(set(units)) > 1:
         raise UsageError(
@@ -170,7 +170,8 @@ def chosen_columns(
         )
     if isinstance(entry, Output) and entry.invariant is not None:
         converted = [_von_mises(entry, converted)]
-    return [_reduced(results, entry, column, mapping) for column in converted], units[0]
+    reduced = [_reduced(results, entry, column, mapping) for column in converted]
+    return [replace(column, values=factor * column.values) for column in reduced], units[0]
 
 
 def _factor(times: float | str) -> tuple[float, str]:

@@ -95,7 +95,7 @@ class Input(_Source):
     unit : str, optional
         Unit of the column, where the file states none or a wrong one.
     times : float or str
-        Factor, such as -1; as a quantity, ``"5 N"``, the column is a load factor without a unit.
+        Factor, such as -1, after all else; as a quantity, ``"5 N"``, the column is a load factor without a unit.
     at : int or coordinates, optional
         Place of the column whose values are meant.
     reduce : {"max", "min", "mean", "sum"}, optional

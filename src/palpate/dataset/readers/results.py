@@ -283,6 +283,10 @@ def join_cases(parts: Sequence[Results]) -> Results:
     left_out = [
         f"Skipped {name}: not in all of the {len(parts)} files or groups of files." for name in missing
     ]
+    used = {first.columns[name].places for name in names} - {""}
+    for part in parts[1:]:
+        for name in used & set(part.places):
+            _require_same_places(first.places[name], part.places[name], first, part)
     columns = {}
     for name in names:
         same = [part.columns[name] for part in parts]
@@ -295,10 +299,6 @@ def join_cases(parts: Sequence[Results]) -> Results:
                 fix="Export all files with the same settings.",
             )
         columns[name] = replace(same[0], values=np.concatenate([column.values for column in same]))
-    used = {column.places for column in columns.values()} - {""}
-    for part in parts[1:]:
-        for name in used:
-            _require_same_places(first.places[name], part.places[name], first, part)
     notes = dict.fromkeys(sentence for part in parts for sentence in part.notes)
     return Results(
         tuple(file for part in parts for file in part.files),

@@ -16,7 +16,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 
-__all__ = ["Quantity", "Range", "bounds", "to_si"]
+__all__ = ["Quantity", "Range", "bounds", "registry", "to_si"]
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,8 @@ def bounds(ranges: Sequence[Range]) -> tuple[np.ndarray, np.ndarray]:
 
 
 @functools.cache
-def _registry() -> Any:
+def registry() -> Any:
+    """Return the one registry of units of Pint."""
     import pint  # costs about 0.3 s: only those who parse units pay
 
     return pint.UnitRegistry()
@@ -112,7 +113,7 @@ def to_si(value: str | float, unit: str) -> float:
     import pint
 
     try:
-        quantity = _registry().Quantity(value)
+        quantity = registry().Quantity(value)
         if unit and quantity.unitless:
             raise UsageError(
                 f"{value!r} has no unit.",

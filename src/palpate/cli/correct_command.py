@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -43,6 +44,10 @@ class Source:
         Port of 127.0.0.1 at which one connection is awaited; 0: any free port.
     stall, wait : float
         Seconds of silence that end a stream, and that a connection is waited for.
+    missing : str
+        For a file: "leave-out" or "refuse" rows in which a value is missing.
+    options : mapping, optional
+        For a file: how the table is written, as `palpate.tables.read_table` takes it.
     """
 
     file: Path | None
@@ -50,6 +55,8 @@ class Source:
     port: int | None
     stall: float
     wait: float
+    missing: str = "leave-out"
+    options: Mapping[str, Any] | None = None
 
     def __post_init__(self) -> None:
         if (self.file is not None) + self.stdin + (self.port is not None) != 1:
@@ -92,19 +99,23 @@ def correct_model(
             fix="Choose another name for --out.",
         )
     values = _parameters(body, parameters)
+    notes: list[str] = []
     if not out.absolute().parent.is_dir():  # before anything is measured
         raise UsageError(f"There is no folder for {out}.", fix="Choose a folder that exists.")
     if source.file is not None:
-        done = correct(
-            body, read_measured(source.file), parameters=values, discrepancy=discrepancy, noise=noise
-        )
+        measured = read_measured(source.file, missing=source.missing, **(source.options or {}))
+        notes = list(measured.notes)
+        for note in notes:
+            console.say(f"{source.file}: {note}")
+        done = correct(body, measured, parameters=values, discrepancy=discrepancy, noise=noise)
     else:
         corrector = Corrector(body, parameters=values, discrepancy=discrepancy, noise=noise)
         done = _streamed(corrector, source, console)
     path = done.surrogate.save(out)
     if done.warning and not done.doubtful:
         console.say(done.warning)
-    console.result(f"{done}\n{path}", {**done.as_dict(), "warning": done.warning or None, "model": str(path)})
+    content = {**done.as_dict(), "warning": done.warning or None, "notes": notes, "model": str(path)}
+    console.result(f"{done}\n{path}", content)
     if done.doubtful:
         raise AccuracyError(
             done.warning,

@@ -64,10 +64,10 @@ def test_depths_at_a_place(tmp_path):
     [
         ("", "holds no table"),
         ("# nothing\n", "holds no table"),
-        ("x,y,z,Fz\nm,m,m,N\n", "no measurement"),
+        ("x,y,z,Fz\nm,m,m,N\n", "no rows of numbers"),
         ("x [m],y [m],z [m],Fz [N]\n1,2,3,4\n\n1,2,oops,4\n", "line 4: Column 3 (z) holds 'oops'"),
-        ("x [m],y [m],z [m],Fz [N]\n1,2,3,nan\n", "line 2: Column 4 (fz) holds 'nan'"),
-        ("x [m],y [m],z [m],Fz [N]\n1,2,3,1_0\n", "line 2: Column 4 (fz) holds '1_0'"),
+        ("x [m],y [m],z [m],Fz [N]\n1,2,3,nan\n", "1 of 1 rows left out"),
+        ("x [m],y [m],z [m],Fz [N]\n1,2,3,1_0\n", "line 2: Column 4 (Fz) holds '1_0'"),
         ("x [m],y [m],z [m],Fz [N]\n1,2,3\n", "line 2: 3 values stand where 4 belong"),
         ("x [m],y [m],z [m],Fz [N]\n1,2,3,1e999\n", "line 2: Column 4"),
         ("x [m],y [m],z [m],Fz [lbf]\n1,2,3,4\n", "line 1: 'lbf' is no unit of force"),
@@ -77,9 +77,10 @@ def test_depths_at_a_place(tmp_path):
         ("x,y,z,Fz\nm,m,m\n1,2,3,4\n", "line 2: The row of units has 3 cells"),
         ("# a bench\nx,y,z,Fz\n\nm,m,m,lbf\n1,2,3,4\n", "line 4: 'lbf' is no unit of force"),
         ("x,y,z,Fz\nm,m,,N\n1,2,3,4\n", "line 2: Column 3, 'z', has no unit"),
-        ("x,y,w,Fz\nm,m,m,N\n1,2,3,4\n", "line 1: Column 3 is called 'w'"),
-        ("x [m],y [m],y [m],Fz [N]\n1,2,3,4\n", "line 1: Column 3 is called 'y', as another"),
-        ("x [m],y [m],w [m],Fz [N]\n1,2,3,4\n", "line 1: Column 3 is called 'w'"),
+        ("x,y,w,Fz\nm,m,m,N\n1,2,3,4\n", "Columns of other names: w"),
+        ("x [m],y [m],y [m],Fz [N]\n1,2,3,4\n", "line 1: 'y' is the name of columns 2 and 3"),
+        ("x [m],y [m],w [m],Fz [N]\n1,2,3,4\n", "line 1: Columns x y fz make no measurement"),
+        ("x;y;z;Fz\nmm;mm;mm;mN\n50;50;59;1,234\n", "line 3: '1,234' may be 1.234 or 1234"),
         ("x [m],y [m],z [m],Fx [N],Fz [N]\n1,2,3,4,5\n", "make no measurement"),
         ("x [m],y [m],Fz [N]\n1,2,3\n", "make no measurement"),
         ("depth [mm],F [N]\n1,2\n", "make no measurement"),
@@ -126,7 +127,7 @@ def test_units_in_two_places_are_refused(tmp_path):
 def test_a_missing_file_and_one_of_bytes_are_refused(tmp_path):
     with pytest.raises(FileFormatError, match="can't be read"):
         read_measured(tmp_path / "none.csv")
-    (tmp_path / "bytes.csv").write_bytes(b"\xff\xfe\x00\x01")
+    (tmp_path / "bytes.csv").write_bytes(b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR")
     with pytest.raises(FileFormatError, match="can't be read"):
         read_measured(tmp_path / "bytes.csv")
 
@@ -138,3 +139,21 @@ def test_what_is_written_is_read_back_bit_for_bit(tmp_path):
     np.testing.assert_array_equal(found.force, force)
     with pytest.raises(UsageError):
         write_measured(tmp_path / "no" / "made.csv", position, force)
+
+
+def test_further_columns_and_rows_with_gaps_are_left_out_and_named(tmp_path):
+    text = "x (mm);y (mm);z (mm);Fz (N);Stage;Room [°C]\n50;50;59,5;0,01;in;21\n50;50;59;;in;21\n50;50;58;NaN;in;21\n"
+    path = table(tmp_path, text)
+    found = read_measured(path)
+    np.testing.assert_allclose(found.position, [[0.05, 0.05, 0.0595]], rtol=1e-15)
+    assert found.notes == (
+        "2 columns left out: Stage, Room.",
+        "2 of 3 rows left out, in which a value is missing: line 3, 4.",
+    )
+    with pytest.raises(FileFormatError, match="line 3: Column fz has no value; so have 2 of 3 rows"):
+        read_measured(path, missing="refuse")
+    with pytest.raises(UsageError, match="leave-out"):
+        read_measured(path, missing="zero")
+    ambiguous = table(tmp_path, "x [mm];y [mm];z [mm];Fz [mN]\n50;50;59;1,234\n")
+    assert read_measured(ambiguous, decimal=",").force[0, 2] == pytest.approx(1.234e-3)
+    assert read_measured(ambiguous, decimal=".").force[0, 2] == pytest.approx(1.234)

@@ -1,13 +1,13 @@
-"""Forces measured on a specimen: from text tables and from a live sensor.
+"""Forces measured on a specimen: from tables and from a live sensor.
 
 measured_columns   Measured: N measurements in SI units; the columns and units that make one
-table              text tables with units, read and written
+measured_table     tables with units, read and written
 live               lines of text from a pipe or a TCP connection, and the line protocol
 """
 
 from palpate.dataset.measured.live import Connection, lines_of, listening, measurements
 from palpate.dataset.measured.measured_columns import Measured
-from palpate.dataset.measured.table import read_measured, write_measured
+from palpate.dataset.measured.measured_table import read_measured, write_measured
 
 __all__ = [
     "Connection",

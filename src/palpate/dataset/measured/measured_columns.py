@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.tables import plain_unit
 from palpate.units import to_si
 
 __all__ = ["NAMES", "Columns", "Measured", "UnitError", "number"]
@@ -54,6 +55,8 @@ class Measured:
         Depth from first touch in m, where depths were measured; not-a-number elsewhere.
     time : (N,)
         Time in s; not-a-number where it is not known.
+    notes : tuple of str
+        Sentences on what of a file was left out, or taken for something.
     """
 
     position: np.ndarray
@@ -61,6 +64,7 @@ class Measured:
     along: np.ndarray
     depth: np.ndarray
     time: np.ndarray
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.force)
@@ -202,7 +206,7 @@ class Columns:
 
 
 def number(text: str) -> float | None:
-    """Read a finite decimal number; None if the text is none."""
+    """Read a finite decimal number of a line of text; None if the text is none."""
     text = text.strip()
     if not text or not set(text) <= set("0123456789+-.eE"):
         return None
@@ -214,6 +218,7 @@ def number(text: str) -> float | None:
 
 
 def _scale(unit: str, quantity: str, si_unit: str, spellings: Sequence[str]) -> float:
+    unit = plain_unit(unit)
     if unit not in spellings:
         raise UnitError(
             f"{unit!r} is no unit of {quantity}.",

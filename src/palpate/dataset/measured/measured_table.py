@@ -1,0 +1,188 @@
+"""Tables of measured indentation: a head with names and units, and a row for each measurement.
+
+::
+
+    # silicone block, probe of 10 mm                   lines that begin with # or % are skipped
+    t, x, y, z, Fx, Fy, Fz                             or: t [s], x [mm], … or t (s), x (mm), …
+    s, mm, mm, mm, N, N, N                             then without this row
+    0.00, 50.0, 50.0, 59.5, 0.001, -0.002, 0.013
+
+`palpate.tables` reads the file, so cells, numbers and heads may be written as there. Further columns are left out and
+named, rows with an empty cell are left out and counted. Units may also stand in a sidecar, ``NAME.json`` beside
+``NAME.csv``:
+
+    {"units": {"depth": "mm", "F": "gf"}, "place": [0.05, 0.05, 0.05], "direction": [0, 0, -1]}
+
+with the place (m) at which depths were measured and the direction of pressing, by default down.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate import checks
+from palpate.dataset.measured.measured_columns import NAMES, Columns, Measured, UnitError
+from palpate.errors import FileFormatError, UsageError
+from palpate.files import write_file
+from palpate.format import count
+from palpate.tables import Column, Table, read_table
+
+__all__ = ["read_measured", "write_measured"]
+
+_KEYS = {"units", "place", "direction"}
+_MAKE = "Write a head such as `t [s], x [mm], y [mm], z [mm], Fz [N]` and a row of numbers for each touch."
+_SHOWN = 5  # lines or columns that a note names
+
+
+def read_measured(path: str | os.PathLike[str], *, missing: str = "leave-out", **options: Any) -> Measured:
+    """Read a table of measured indentation.
+
+    Parameters
+    ----------
+    path : path
+        A text table or a workbook; units may stand in a JSON file of the same name beside it.
+    missing : str
+        "leave-out" leaves out rows in which a cell is empty or not a number, and counts them in the notes; "refuse"
+        refuses the table.
+    **options
+        Of `palpate.tables.read_table`: how the table is written, and units.
+
+    Returns
+    -------
+    Measured
+        The measurements; `notes` says what was left out.
+
+    Raises
+    ------
+    FileFormatError
+        If the file can't be read or is no such table; the message names file, line and column.
+    UsageError
+        If an option can't be.
+    """
+    path = Path(path)
+    checks.one_of("What becomes of missing values", missing, ("leave-out", "refuse"))
+    table = read_table(path, **options)
+    side_path = path.with_suffix(".json")
+    side = _sidecar(side_path)
+    chosen, columns = _columns(table, side, side_path)
+    values = np.column_stack(
+        [scale * table.numbers(c.name) for c, scale in zip(chosen, columns.scales, strict=True)]
+    )
+    good = np.isfinite(values).all(axis=1)
+    notes = (*table.notes, *_further_columns(table, chosen), *_gaps(table, values, columns, missing))
+    rows = [dict(zip(columns.names, row, strict=True)) for row in values[good].tolist()]
+    if not rows:
+        raise FileFormatError(f"{path} holds a head and no measurement.", why=" ".join(notes), fix=_MAKE)
+    where = {key: side[key] for key in ("place", "direction") if key in side}
+    return replace(Measured.of(rows, **where), notes=notes)
+
+
+def write_measured(path: str | os.PathLike[str], position: np.ndarray, force: np.ndarray) -> Path:
+    """Write positions (N, 3) in m and forces (N, 3) in N, so that `read_measured` gives them back bit for bit.
+
+    Raises
+    ------
+    UsageError
+        If the file can't be written.
+    """
+    rows = ["x,y,z,Fx,Fy,Fz", "m,m,m,N,N,N"]
+    rows += [",".join(repr(float(v)) for v in row) for row in np.hstack([position, force])]
+    return write_file(path, "\n".join(rows) + "\n")
+
+
+def _columns(table: Table, side: Mapping[str, Any], side_path: Path) -> tuple[list[Column], Columns]:
+    """Return the columns that hold measured quantities, and what they measure; an error names the line at fault."""
+    beside = {name.strip().lower(): unit for name, unit in side.get("units", {}).items()}
+    given = {n.strip().lower() for c in table.columns for n in (c.name, *c.aliases)}
+    quantities = {table.column(name): name for name in NAMES if name in given}
+    chosen = [column for column in table.columns if column in quantities]
+    number = (chosen or table.columns)[0].line
+    line = f"{table.path}, line {number}" if number else str(table.path)
+    if beside and any(column.unit for column in chosen):
+        raise FileFormatError(
+            f"{line}: Units stand in the header and in the sidecar.",
+            fix="Name them in one place, so that one is right.",
+        )
+    names = [quantities[column] for column in chosen]
+    units = {name: column.unit or beside.get(name, "") for name, column in zip(names, chosen, strict=True)}
+    unit_line = max((column.unit_line for column in chosen), default=0)
+    units_place = str(side_path) if beside else f"{table.path}, line {unit_line}" if unit_line else line
+    try:
+        return chosen, Columns.of(names, units, placed="place" in side)
+    except UsageError as error:
+        others = [column.name for column in table.columns if column not in quantities]
+        further = f" Columns of other names: {', '.join(others[:_SHOWN])}." if others else ""
+        where = units_place if isinstance(error, UnitError) else line
+        raise FileFormatError(f"{where}: {error.what}", why=error.why + further, fix=error.fix) from error
+
+
+def _further_columns(table: Table, chosen: list[Column]) -> list[str]:
+    """Return a note on columns that measure something else."""
+    others = [column.name for column in table.columns if column not in chosen]
+    if not others:
+        return []
+    names = ", ".join(others[:_SHOWN]) + (", …" if len(others) > _SHOWN else "")
+    return [f"{count(len(others), 'column')} left out: {names}."]
+
+
+def _gaps(table: Table, values: np.ndarray, columns: Columns, missing: str) -> list[str]:
+    """Return a note on rows of values (N, k) in which one is missing, or refuse them."""
+    gaps = ~np.isfinite(values)
+    rows = np.flatnonzero(gaps.any(axis=1))
+    if not rows.size:
+        return []
+    lines = table.lines[rows]
+    if missing == "refuse":
+        raise FileFormatError(
+            f"{table.path}, line {lines[0]}: Column {columns.names[int(gaps[rows[0]].argmax())]} has no value; "
+            f"so have {len(rows)} of {len(gaps)} rows.",
+            why="Rows with a gap were to be refused.",
+            fix="Correct them, or have them left out: missing='leave-out' (--missing).",
+        )
+    shown = ", ".join(map(str, lines[:_SHOWN])) + (", …" if len(lines) > _SHOWN else "")
+    return [f"{len(rows)} of {len(gaps)} rows left out, in which a value is missing: line {shown}."]
+
+
+def _sidecar(path: Path) -> dict[str, Any]:
+    if not path.is_file():
+        return {}
+    try:
+        side = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise FileFormatError(
+            f"{path} is no JSON.", why=str(error), fix="Mend it or take it away."
+        ) from error
+    if fault := _fault_of_sidecar(side):
+        raise FileFormatError(f"{path}: {fault}.", fix=_MAKE)
+    return dict(side)
+
+
+def _fault_of_sidecar(side: Any) -> str:
+    if not isinstance(side, dict) or not side.keys() <= _KEYS:
+        return f"it is no object with keys among {', '.join(sorted(_KEYS))}"
+    units = side.get("units", {})
+    if not isinstance(units, dict) or not all(isinstance(v, str) for v in units.values()):
+        return "its units are no texts by column"
+    if unknown := [name for name in units if name.strip().lower() not in NAMES]:
+        return f"it has a unit for {unknown[0]!r}, which is no measured quantity"
+    for key in ("place", "direction"):
+        if key in side and not _is_vector(side[key]):
+            return f"its {key} is not three finite numbers"
+    if "direction" in side and not any(side["direction"]):
+        return "its direction has no length"
+    return ""
+
+
+def _is_vector(value: Any) -> bool:
+    return (
+        isinstance(value, list)
+        and len(value) == 3
+        and all(type(v) in {int, float} and np.isfinite(v) for v in value)
+    )

@@ -35,6 +35,7 @@ BENCHMARKS = (
     "touching_cost",
     "touching_feel",
     "touching_mesh",
+    "trust",
 )
 
 

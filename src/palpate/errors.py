@@ -24,6 +24,7 @@ __all__ = [
     "AccuracyError",
     "DeviceError",
     "FileFormatError",
+    "FitWarning",
     "PalpateError",
     "PortInUseError",
     "ResourceError",
@@ -104,3 +105,7 @@ class ResourceError(PalpateError):
     """The machine lacks what the work needs: room on a disk, the right to write, memory, a scheduler."""
 
     exit_code = 3
+
+
+class FitWarning(UserWarning):
+    """A network was learnt, but its user must know something of it: the notes of what `palpate.fit` returned say it."""

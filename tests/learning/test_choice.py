@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.errors import UsageError
+from palpate.errors import FitWarning, UsageError
 from palpate.learning.arrays.fit import fit
-from palpate.learning.arrays.fit_notes import FitWarning, wild_rows
+from palpate.learning.arrays.fit_notes import wild_rows
 from palpate.learning.arrays.held_out import HeldOut, carry, start_units
-from palpate.learning.arrays.members import Crossed, refit_weights
+from palpate.learning.arrays.members import Crossed, CrossedLayers, clearly_less, refit_weights
 from palpate.learning.ensemble import Ensemble
 from palpate.learning.folds import fold_masks, near_places
 from palpate.learning.kernel_layer import KernelLayer, Metric, likely_metric, negative_likelihood
@@ -257,6 +257,35 @@ def test_a_network_that_was_caught_elsewhere_is_left_out():
     assert [network.off for network in kept.networks] == [o for o in offsets if o < 1]
     assert kept.tested.all()
     assert kept.error < 0.1 * whole.error
+
+
+def test_layers_are_judged_where_neither_they_nor_their_metric_had_learnt():
+    rng = np.random.default_rng(0)
+    X = rng.uniform(-1, 1, (60, 2))
+    Y = np.sin(3 * X[:, :1]) + 0.1 * rng.normal(size=(60, 1))
+    masks = fold_masks(np.arange(60), 5)
+    metric = likely_metric("gaussian", X, Y)
+    layers = CrossedLayers.of(metric, X, Y, masks)
+    for mask in masks:
+        alone = KernelLayer.fit(metric, X[~mask], Y[~mask])
+        np.testing.assert_allclose(layers.missed[mask], Y[mask] - alone.predict(X[mask]), atol=1e-12)
+    own = CrossedLayers.of(metric, X, Y, masks, steps=30)
+    for (layer, mask), climbed in zip(own.folds, masks, strict=True):
+        best = likely_metric("gaussian", X[~climbed], Y[~climbed])
+        values = [
+            negative_likelihood(np.log(np.r_[m.scales, m.ridge]), "gaussian", X[~mask], Y[~mask])[0]
+            for m in (layer.metric, best)
+        ]
+        assert values[0] < values[1] + 1e-3
+    assert own.error > 0.95 * layers.error
+
+
+def test_less_by_luck_is_not_clearly_less():
+    rng = np.random.default_rng(1)
+    other = rng.normal(size=(200, 2))
+    assert not clearly_less(other * rng.choice([0.99, 1.01], size=(200, 1)), other)
+    assert clearly_less(0.8 * other, other)
+    assert not clearly_less(other, 0.8 * other)
 
 
 @pytest.mark.parametrize("inputs", [1, 3])

@@ -99,14 +99,23 @@ class KernelLayer:
 
 
 def likely_metric(
-    name: RadialFunction, X: np.ndarray, Y: np.ndarray, *, samples: int = 500, iterations: int = 40
+    name: RadialFunction,
+    X: np.ndarray,
+    Y: np.ndarray,
+    *,
+    samples: int = 500,
+    iterations: int = 40,
+    start: Metric | None = None,
 ) -> Metric:
-    """Return scales and ridge of the largest likelihood on the first `samples` of X (N, n) and Y (N, k)."""
+    """Return scales and ridge of the largest likelihood on the first `samples` of X (N, n) and Y (N, k).
+
+    The likelihood is climbed from a metric near the optimum, `start`, or else from two ridges.
+    """
     X, Y = X[:samples], Y[:samples]
     one = _tail(X)
     Y = Y - one @ np.linalg.lstsq(one, Y, rcond=None)[0]
     n = X.shape[1]
-    scales = np.full(n, -0.5 * np.log(n))
+    scales = np.full(n, -0.5 * np.log(n)) if start is None else np.log(start.scales)
     if not np.any(Y) or len(X) < n + 3:
         return Metric(name, np.exp(scales), 1e-8)
     # noise has two explanations, and from one start only the interpolating one is found (Rasmussen & Williams 2006,
@@ -121,7 +130,7 @@ def likely_metric(
             bounds=[_SCALES] * n + [_RIDGES],
             options={"maxiter": iterations},
         )
-        for ridge in STARTS
+        for ridge in (STARTS if start is None else (start.ridge,))
     ]
     best = min(optima, key=lambda one: float(one.fun))
     return Metric(name, np.exp(best.x[:n]), float(np.exp(best.x[n])))

@@ -28,7 +28,7 @@ from palpate.learning.arrays.array_samples import ArrayProblem, Samples
 from palpate.learning.arrays.fit_notes import notes_on
 from palpate.learning.arrays.fitted import Fitted
 from palpate.learning.arrays.held_out import HeldOut
-from palpate.learning.arrays.members import ROWS, Crossed
+from palpate.learning.arrays.members import ROWS, Crossed, CrossedLayers
 from palpate.learning.ensemble import Ensemble
 from palpate.learning.kernel_layer import KernelLayer
 from palpate.learning.search import Trial
@@ -258,31 +258,21 @@ class Finish:
             arrays, radial, name, error, M, evidence, rows, members if len(members) > 1 else ()
         )
 
-    def kernel_network(
-        self, layer: KernelLayer, test_layers: Sequence[tuple[KernelLayer, np.ndarray]], error: float
-    ) -> Fitted:
-        """Return the result for a kernel layer.
-
-        Parameters
-        ----------
-        layer : KernelLayer
-            The layer of all samples.
-        test_layers : sequence of (KernelLayer, mask)
-            Layers of the same metric, and the samples (N,) that each has not seen.
-        error : float
-            Error to expect per latent output.
-        """
-        M, small = None, len(layer.centres) <= LARGEST
+    def kernel_network(self, crossed: CrossedLayers, error: float | None = None) -> Fitted:
+        """Return the result for a kernel layer; `error` per latent output is by default what its folds missed."""
+        layer, M = crossed.layer, None
+        small = len(layer.centres) <= LARGEST
         if small:
             M = kernel_covariance(layer)
         parts = []
-        for other, unseen in test_layers:
+        for other, unseen in crossed.folds:
             held = self.problem.X[unseen]
             spread = kernel_spread(other, held) if small else np.ones(len(held))
             parts.append(Evidence(self._missed(other.predict(held), unseen), spread))
         arrays = (*layer.units(), layer.weights, layer.tail)
         evidence = Evidence.together(parts)
-        rows = np.concatenate([np.flatnonzero(unseen) for _, unseen in test_layers])
+        rows = np.concatenate([np.flatnonzero(unseen) for _, unseen in crossed.folds])
+        error = crossed.error if error is None else error
         return self._fitted(arrays, layer.metric.radial, "kernel layer", error, M, evidence, rows)
 
     def _missed(self, latent: np.ndarray, held: np.ndarray) -> np.ndarray:

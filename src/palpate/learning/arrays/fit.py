@@ -20,13 +20,22 @@ from typing import Any
 
 import numpy as np
 
+from palpate.errors import FitWarning
 from palpate.learning.arrays.array_samples import ArrayProblem, Samples, check_search
 from palpate.learning.arrays.calibration import Finish
-from palpate.learning.arrays.fit_notes import IDLE, FitWarning
+from palpate.learning.arrays.fit_notes import IDLE
 from palpate.learning.arrays.fitted import Fitted
 from palpate.learning.arrays.held_out import RIDGE, HeldOut, carry, forms_for
 from palpate.learning.arrays.many_rows import MANY_ROWS, SUBSET, ManyRows, RowParts, Structure
-from palpate.learning.arrays.members import LOOK_SAMPLES, ROWS, Crossed, Fresh, refit_weights
+from palpate.learning.arrays.members import (
+    LOOK_SAMPLES,
+    ROWS,
+    Crossed,
+    CrossedLayers,
+    Fresh,
+    clearly_less,
+    refit_weights,
+)
 from palpate.learning.folds import fold_masks, near_places
 from palpate.learning.kernel_layer import CENTRES_MAX, STARTS, KernelLayer, Metric, likely_metric
 from palpate.learning.pool import Pool
@@ -46,6 +55,7 @@ _SMALL = 600  # and of one that is only looked at
 _METRIC_SAMPLES = 500  # for the likelihood
 _FOLDS, _ROUNDS = 5, 2  # of the networks learnt crosswise
 _LAYER_FOLDS = 10  # of a kernel layer: its final one learns from all samples, and fewer would say too much
+_STEPS = 15  # of a fold's own likelihood, from the metric of all
 _CROSSED_SHARE = 0.5  # of all work, for these
 _BEATEN = 1.3  # times the kernel layer's error: a mean of ten may still miss less
 _BEHIND = 1.2  # times the best error: too far for another ten iterations
@@ -194,9 +204,9 @@ class _Chooser:
         if crossed is None:
             return self._kernel_network(metric, mark) if winner.error > mark else self._single(winner)
         if len(self.X) <= self.centres and crossed.error > self.target:
-            layers, error = self._crossed_layers(metric)
-            if error < crossed.error:
-                return self._finished.kernel_network(self._layer(metric, self.X, self.Y), layers, error)
+            layers = self._likeliest(metric)
+            if not clearly_less(crossed.gain * crossed.missed, layers.missed[crossed.tested]):
+                return self._finished.kernel_network(layers)
         return self._finished.crossed(crossed)
 
     def chosen_for_many(self, workers: int) -> Fitted:
@@ -306,24 +316,34 @@ class _Chooser:
 
     def _kernel_network(self, metric: Metric, error: float) -> Fitted:
         if len(self.X) <= self.centres:
-            layers, error = self._crossed_layers(metric)
-            return self._finished.kernel_network(self._layer(metric, self.X, self.Y), layers, error)
+            return self._finished.kernel_network(self._likeliest(metric))
         some = self._kernel_rows(0.1, len(self.X))
         rows = np.sort(np.random.default_rng(self.seed).permutation(len(self.X))[:some])
         judging = self._kernel_rows(0.03, len(self.split.X))
         test_layer = self._layer(metric, self.split.X[:judging], self.split.Y[:judging])
         layer = self._layer(metric, self.X[rows], self.Y[rows])
-        return self._finished.kernel_network(layer, [(test_layer, self.split.held)], error)
+        return self._finished.kernel_network(
+            CrossedLayers(layer, ((test_layer, self.split.held),), self.X, self.Y), error
+        )
 
-    def _crossed_layers(self, metric: Metric) -> tuple[list[tuple[KernelLayer, np.ndarray]], float]:
-        """Return layers that had not seen a fold each, with those folds, and what they miss there."""
-        layers, squares = [], 0.0
-        for unseen in fold_masks(self.places, _LAYER_FOLDS):
-            layer = self._layer(metric, self.X[~unseen], self.Y[~unseen])
-            squares += float(((layer.predict(self.X[unseen]) - self.Y[unseen]) ** 2).sum())
-            self.work.spend(float((~unseen).sum()) ** 3)
-            layers.append((layer, unseen))
-        return layers, math.sqrt(squares / self.Y.size)
+    def _likeliest(self, metric: Metric) -> CrossedLayers:
+        """Return the layers of the best metric for all samples.
+
+        A metric found without the samples held out is not as good as one of all, where these are few.
+        """
+        metrics, samples = [metric], len(self.X)
+        if samples <= 1.25 * _METRIC_SAMPLES * min(1.0, self.size) and not self.budget.over:
+            metrics = [likely_metric(name, self.X, self.Y, samples=samples) for name in RADIAL_FUNCTIONS]
+            self.work.spend(len(metrics) * len(STARTS) * 80.0 * samples**3)
+        masks = fold_masks(self.places, _LAYER_FOLDS)
+        self.work.spend(len(metrics) * len(masks) * float(samples) ** 3)
+        best = min(
+            (CrossedLayers.of(one, self.X, self.Y, masks) for one in metrics), key=lambda one: one.error
+        )
+        if len(metrics) == 1 or self.budget.over:
+            return best
+        self.work.spend(len(masks) * 2.0 * _STEPS * samples**3)
+        return CrossedLayers.of(best.layer.metric, self.X, self.Y, masks, steps=_STEPS)
 
     def _forms(self, mark: float) -> tuple[Candidate, Candidate]:
         """Return the form that does best, at full size if a look needs less, and it before its last run."""

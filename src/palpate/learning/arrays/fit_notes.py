@@ -12,12 +12,7 @@ if TYPE_CHECKING:
     from palpate.learning.arrays.array_samples import ArrayProblem, Samples
     from palpate.learning.arrays.fitted import Fitted
 
-__all__ = ["IDLE", "FitWarning", "notes_on", "wild_rows"]
-
-
-class FitWarning(UserWarning):
-    """A network was learnt, but something of it must be known: `Fitted.notes` says what."""
-
+__all__ = ["IDLE", "notes_on", "wild_rows"]
 
 _NO_BETTER = (
     0.95  # of the outputs' standard deviation: a network that misses so much says no more than their mean

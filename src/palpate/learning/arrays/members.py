@@ -14,7 +14,7 @@ networks that diverge would be rewarded.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -22,12 +22,13 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from palpate.learning.arrays.held_out import RIDGE, HeldOut, carry
+from palpate.learning.kernel_layer import KernelLayer, Metric, likely_metric
 from palpate.learning.search import Candidate
 from palpate.rbf.refinement.projection import project
 from palpate.rbf.refinement.refine import Refined, refine
 from palpate.rbf.refinement.rows import Rows
 
-__all__ = ["LOOK_SAMPLES", "ROWS", "Crossed", "Fresh", "refit_weights"]
+__all__ = ["LOOK_SAMPLES", "ROWS", "Crossed", "CrossedLayers", "Fresh", "clearly_less", "refit_weights"]
 
 ROWS = 4000
 """Samples by which a ridge is chosen and a covariance is made; more would say the same and take longer."""
@@ -151,6 +152,69 @@ def refit_weights(network: Refined, X: np.ndarray, Y: np.ndarray, ridge: float =
     problem = Rows.of(network.regressors, X, Y)
     solution = project(problem, network.theta, chosen * problem.total)
     return replace(best, coefficients=solution.coefficients @ problem.modes)
+
+
+@dataclass(frozen=True, eq=False)
+class CrossedLayers:
+    """A kernel layer of all samples, and layers of its metric that had not seen some of them.
+
+    Attributes
+    ----------
+    layer : KernelLayer
+        The one that is handed over.
+    folds : tuple of (KernelLayer, mask)
+        Each layer with the samples (N,) that it had not seen; no sample is in two.
+    X, Y : (N, n) and (N, k) arrays
+        All samples, scaled inputs and latent outputs.
+    """
+
+    layer: KernelLayer
+    folds: tuple[tuple[KernelLayer, np.ndarray], ...]
+    X: np.ndarray
+    Y: np.ndarray
+
+    @classmethod
+    def of(
+        cls, metric: Metric, X: np.ndarray, Y: np.ndarray, masks: Sequence[np.ndarray], *, steps: int = 0
+    ) -> CrossedLayers:
+        """Return the layers of a metric, one without each mask (N,) of samples.
+
+        With `steps` each layer's metric goes so many steps further in likelihood on the samples that it may know: else
+        all have had their part in the metric, and errors look a little too small.
+        """
+        folds = []
+        for unseen in masks:
+            own = metric
+            if steps:
+                known = ~unseen
+                own = likely_metric(
+                    metric.radial, X[known], Y[known], samples=len(X), iterations=steps, start=metric
+                )
+            folds.append((KernelLayer.fit(own, X[~unseen], Y[~unseen]), unseen))
+        return cls(KernelLayer.fit(metric, X, Y), tuple(folds), X, Y)
+
+    @cached_property
+    def missed(self) -> np.ndarray:
+        """Error (N, k) at each sample of the layer that had not seen it; not-a-number where there is none."""
+        errors = np.full(self.Y.shape, np.nan)
+        for layer, unseen in self.folds:
+            errors[unseen] = self.Y[unseen] - layer.predict(self.X[unseen])
+        return errors
+
+    @property
+    def error(self) -> float:
+        """Error to expect, root mean square per latent output."""
+        return float(np.sqrt(np.nanmean(self.missed**2)))
+
+
+def clearly_less(missed: np.ndarray, other: np.ndarray) -> bool:
+    """Return True if errors (J, k) are less than others at the same samples by more than their difference's own error.
+
+    The mean of the squares' differences is compared with its standard error. What was chosen among many by an error
+    with noise in it has a little luck; so a tie goes to the other.
+    """
+    gain = (other**2).mean(axis=1) - (missed**2).mean(axis=1)
+    return bool(gain.mean() > gain.std() / np.sqrt(len(gain)))
 
 
 @dataclass(frozen=True, eq=False)

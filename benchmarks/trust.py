@@ -36,6 +36,10 @@ def tables(*, quick: bool = False) -> list[Table]:
     return [_coverage(quick), _diabetes(quick), _ranks(quick)]
 
 
+def _mark(quick: bool) -> str:
+    return " (quick)" if quick else ""
+
+
 @dataclass(frozen=True, eq=False)
 class Split:
     """Rows of one case to learn from, and new ones."""
@@ -70,8 +74,8 @@ def _coverage(quick: bool) -> Table:
         outside.append(float(max(INSIDE[0] - np.median(inside), np.median(inside) - INSIDE[1])))
         off.append(float(max(RATIO[0] - np.median(ratio), np.median(ratio) - RATIO[1])))
     return Table(
-        "trust_coverage" + ("_quick" if quick else ""),
-        f"Intervals of {LEVEL:.0%} and held-out errors of palpate.fit against new rows, {1 if quick else SEEDS} seeds",
+        "trust_coverage",
+        f"Intervals of {LEVEL:.0%} and held-out errors of palpate.fit against new rows, {SEEDS} seeds{_mark(quick)}",
         [
             Column("case", "data"),
             Column("rows", "rows", ",d"),
@@ -153,8 +157,8 @@ def _diabetes(quick: bool) -> Table:
         one = _measured(split, quick)
         rows.append({"seed": seed, "inside": 100 * one.inside, "ratio": one.ratio, "worst": one.worst})
     return Table(
-        "trust_diabetes" + ("_quick" if quick else ""),
-        "scikit-learn's diabetes, one split a seed",
+        "trust_diabetes",
+        f"scikit-learn's diabetes, one split a seed{_mark(quick)}",
         [
             Column("seed", "seed", "d"),
             Column("inside", "inside, %", ".0f"),
@@ -195,8 +199,8 @@ def _ranks(quick: bool) -> Table:
                 | {name: float(np.median(values)) for name, values in errors.items()}
             )
     return Table(
-        "trust_ranks" + ("_quick" if quick else ""),
-        f"Error on 4,000 new places over the answers' spread, median of {1 if quick else RANK_SEEDS} seeds",
+        "trust_ranks",
+        f"Error on 4,000 new places over the answers' spread, median of {RANK_SEEDS} seeds{_mark(quick)}",
         [
             Column("case", "standard"),
             Column("rows", "rows", "d"),

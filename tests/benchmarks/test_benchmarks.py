@@ -155,7 +155,8 @@ def test_curves_of_error_are_drawn_for_the_studies_that_were_measured(tables, tm
 
 
 def test_documentation_holds_a_block_for_every_table(tables):
-    pages = (ROOT / "docs" / "benchmarks.md", ROOT / "docs" / "method" / "published-tables.md")
+    docs = ROOT / "docs"
+    pages = (docs / "benchmarks.md", docs / "trust.md", docs / "method" / "published-tables.md")
     text = "".join(page.read_text(encoding="utf-8") for page in pages)
     for name, table in tables.items():
         begin, end = (f"<!-- benchmark {name}: {edge} -->" for edge in ("begin", "end"))

@@ -118,3 +118,16 @@ def test_an_unknown_layout_is_refused(tmp_path, name, content, message):
 def test_a_missing_file_is_refused(tmp_path):
     with pytest.raises(FileFormatError, match="no such file"):
         read_results(tmp_path / "a.frd")
+
+
+def test_a_text_table_has_a_case_in_each_row(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text("F [N];w [mm];label\n0,5;1,25;a\n1,5;;b\n")
+    results = read_results(path)
+    np.testing.assert_array_equal(results.columns["F"].values, [0.5, 1.5])
+    np.testing.assert_array_equal(results.columns["w"].values, [1.25, np.nan])
+    assert {name: column.unit for name, column in results.columns.items()} == {"F": "N", "w": "mm"}
+    assert any(note.startswith("Skipped label") for note in results.notes)
+    path.write_text("F [N],w [mm]\n0.5,1\n1.5,oops\n2.5,3\n")
+    with pytest.raises(FileFormatError, match="line 3"):
+        read_results(path)

@@ -353,3 +353,29 @@ def test_a_file_that_is_no_result_names_itself(tmp_path):
     (tmp_path / "x.frd").write_text("nothing")
     with pytest.raises(FileFormatError, match=r"x\.frd, line 1"):
         pp.read_results(tmp_path / "x.frd")
+
+
+LONG = {
+    "coordinates": ["x", "y"],
+    "inputs": [{"name": "P", "load": {"at": ["100 mm", 0], "direction": [0, -1]}}],
+    "outputs": [{"name": "displacement", "from": ["u", "v"]}],
+}
+
+
+def long_table(path, rows):
+    lines = [f"{1e3 * P!r},{1e3 * x!r},0,0,{-1e3 * deflection(P, x)!r}" for P, x in rows]
+    path.write_text("\n".join(["P [mN],x [mm],y [mm],u [mm],v [mm]", *lines]) + "\n")
+    return path
+
+
+def test_a_table_with_a_row_for_each_place_of_each_case(tmp_path):
+    rows = [(float(P), float(x)) for P in LOADS for x in PLACES[::-1]]
+    data = pp.import_results(long_table(tmp_path / "long.csv", rows), LONG).dataset
+    np.testing.assert_allclose(data.X[:, 0], LOADS)
+    np.testing.assert_allclose(data.displacement[:, :, 1], -deflection(LOADS[:, None], PLACES), atol=1e-15)
+    work = LOADS * deflection(LOADS, LENGTH)
+    np.testing.assert_allclose(data.potential_energy, -work / 2, rtol=1e-9, atol=1e-15)
+    with pytest.raises(UsageError, match="29 rows for 6 cases and 5 places"):
+        pp.import_results(long_table(tmp_path / "lost.csv", rows[:-1]), LONG)
+    with pytest.raises(UsageError, match="one row for each place"):
+        pp.import_results(long_table(tmp_path / "twice.csv", [*rows[:-1], rows[0]]), LONG)

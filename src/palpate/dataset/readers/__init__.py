@@ -2,7 +2,7 @@
 
 results         the value that every reader returns, and how several files are joined
 formats         the formats, and the one door to all of them
-comsol, calculix_frd, calculix_dat, vtk_files, array_files   the readers
+comsol, calculix_frd, calculix_dat, vtk_files, array_files, text_tables   the readers
 mapping         which columns are inputs, outputs and coordinates
 column_choice   columns found by name, reduced and converted
 import_results  all of it made into a dataset

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from palpate.dataset.readers import array_files, calculix_dat, calculix_frd, comsol, vtk_files
+from palpate.dataset.readers import array_files, calculix_dat, calculix_frd, comsol, text_tables, vtk_files
 from palpate.dataset.readers.file_text import head_of
 from palpate.dataset.readers.results import Results, refuse
 
@@ -42,6 +42,7 @@ FORMATS = (
     Format("COMSOL text export", (".txt", ".csv", ".dat", ".asc"), comsol.read_comsol, comsol.is_comsol),
     Format("VTK files", vtk_files.SUFFIXES, vtk_files.read_vtk),
     Format("NumPy arrays", (".npz",), array_files.read_npz),
+    Format("text tables", text_tables.SUFFIXES, text_tables.read_text_table),
     Format("Parquet tables", (".parquet", ".pq"), array_files.read_parquet),
 )
 

@@ -48,13 +48,16 @@ def by_case_and_place(results: Results, mapping: ImportMapping) -> Results:
             why="Every case needs one row for each place; coordinates must be those of the undeformed body.",
             fix="Correct `coordinates`, or the inputs by which the cases are told apart.",
         )
+    # a component of a vector may be zero everywhere and is a field nevertheless
+    alone = {entry.columns for entry in mapping.outputs if isinstance(entry.columns, str)}
     columns = {}
     for name, column in results.columns.items():
         if name in axes:
             continue
         values = np.full((len(first), len(rest)), np.nan)
         values[case, place] = column.values
-        constant = name in sources or not np.nanmax(np.ptp(values, axis=1), initial=0.0) > 0
+        even = not np.nanmax(np.ptp(values, axis=1), initial=0.0) > 0
+        constant = name in sources or (even and name in alone)
         columns[name] = (
             replace(column, values=values[:, 0])
             if constant

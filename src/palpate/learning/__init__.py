@@ -28,6 +28,7 @@ from palpate.learning.learn_dataset import learn as learn_dataset
 from palpate.learning.learning_history import History
 from palpate.learning.pad_fit import fit_pad
 from palpate.learning.search import Trial
+from palpate.learning.stream.following import Following
 from palpate.learning.stream.learner import Learner
 from palpate.learning.stream.refining import Refining
 from palpate.learning.stream.reservoir import Reservoir
@@ -45,6 +46,7 @@ __all__ = [
     "EnergyHistory",
     "Event",
     "Fitted",
+    "Following",
     "History",
     "Learned",
     "Learner",

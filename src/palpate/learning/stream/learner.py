@@ -16,7 +16,8 @@ from threadpoolctl import ThreadpoolController
 
 from palpate.errors import UsageError
 from palpate.learning.learning_history import History
-from palpate.learning.stream.output_scaling import OutputScaling, declared_scaling
+from palpate.learning.stream.following import Follower, Following
+from palpate.learning.stream.output_scaling import OutputScaling, declared_scaling, settled_scaling, spikes
 from palpate.learning.stream.refining import Progress, Refining, refined_state
 from palpate.learning.stream.reservoir import Reservoir
 from palpate.network import Network, Publisher, Scaling
@@ -33,25 +34,36 @@ __all__ = ["Learner"]
 # beyond these a scaled number is a broken sensor's: its square would swamp what double precision keeps
 _FARTHEST_INPUT, _FARTHEST_OUTPUT = 2.0, 1e6
 _MOVED = 0.1  # share of an input's range over which a sensor must have moved to show how large outputs are
+_REFINING = Refining()
 _PATIENCE = 10  # times the observations asked for, after which less movement has to do
 
 
 class Learner:
     """A network that follows a stream of observations.
 
-    Every observation goes through the filter's `step`. Besides, R samples are retained, and every k-th observation
-    also pays for one Levenberg–Marquardt iteration on them, from which the filter goes on with the Gauss–Newton
-    posterior. Without refinement the object is the fold of `step`, bit by bit.
+    As it comes, it follows a map that may rest, drift or jump, passes over outliers and learns the noise by place: a
+    bank of linear filters over Gaussian units (see `palpate.learning.stream.tracker`) whose scales are looked for in
+    the readings. An event says `outlier` and `changed`; `state.changed_at` is the observation that began the latest
+    jump, `state.drifts` the probability of a drift.
+
+    With `settings`, or another `refining`, it is one of the sequential filters. Every observation goes through the
+    filter's `step`. Besides, R samples are retained, and every k-th observation also pays for one Levenberg–Marquardt
+    iteration on them, from which the filter goes on with the Gauss–Newton posterior. Without refinement the object is
+    the fold of `step`, bit by bit. These take noise-free samples farther, and trust every one of them.
 
     Outputs are scaled by what is declared: a `Scaling`, or ranges for the outputs. Without either the first
-    `settle` observations decide (their mean, and their largest deviation from it); they are then learnt in the
-    order in which they came, and until then the network is their mean.
+    `settle` observations decide (their mean, and their largest deviation from it, without a few spikes); they are then
+    learnt in the order in which they came, and until then the network is their mean.
 
-    Cost of an observation, h units of p numbers, d unknowns, q observed numbers: the filter's, about 2 q d²
-    operations for the full rule and (p_t + h)² + (h p)² r for the shared one, and for every k-th one R (h p)² +
-    tries · ((h p)³/3 + 2 R (h + p_t)²), and that posterior's (h p)³ (shared) or R q d² (full). Memory: d² or
-    (p_t + h)² + (h p)² numbers of covariance, R (n + m + 2) of samples, M (n + m + 1) of the window, `remember`
-    events; none of it grows with the stream. With `basis`, m counts the modes.
+    Cost of an observation, h units of p numbers, d unknowns, q observed numbers. Following: 72 (h + n + 1)² operations
+    and as many for each of three retained readings while a tracker is taught anew, or one Cholesky factor of a hundred
+    readings while scales are looked for. A sequential filter: about 2 q d² operations for the full rule and
+    (p_t + h)² + (h p)² r for the shared one, and for every k-th one R (h p)² +
+    tries · ((h p)³/3 + 2 R (h + p_t)²), and that posterior's (h p)³ (shared) or R q d² (full).
+
+    Memory: 14 (h + n + 1)² numbers of following, d² or (p_t + h)² + (h p)² of a filter's covariance, R (n + m + 2) of
+    samples, M (n + m + 1) of the window, `remember` events; none of it grows with the stream. With `basis`, m counts
+    the modes.
 
     Parameters
     ----------
@@ -59,10 +71,10 @@ class Learner:
         Names, units and ranges of the inputs; the ranges scale them.
     outputs : sequence of m quantities or ranges
         If all of them are ranges, these scale them.
-    settings : Settings, optional
-        `default()` if left out; `shared()` costs less for many outputs or units.
+    settings : Following or Settings, optional
+        `Following()` if left out. `default()` is a sequential filter; `shared()` costs less for many outputs or units.
     refining : Refining, optional
-        `None` for the filter alone.
+        Refinement of a sequential filter; `None` for the filter alone. Given without settings, it asks for `default()`.
     scaling : Scaling, optional
         Between SI and scaled quantities.
     settle : int
@@ -86,8 +98,8 @@ class Learner:
         inputs: Sequence[Range],
         outputs: Sequence[Quantity | Range],
         *,
-        settings: Settings | None = None,
-        refining: Refining | None = Refining(),  # noqa: B008 - a frozen value
+        settings: Settings | Following | None = None,
+        refining: Refining | None = _REFINING,
         scaling: Scaling | None = None,
         settle: int = 50,
         basis: int | None = None,
@@ -99,10 +111,14 @@ class Learner:
                 "A learner needs inputs, outputs, and positive counts.",
                 fix="Name every column, and settle on one observation at least.",
             )
-        self.settings = _check_declarations(inputs, outputs, settings)
+        if settings is None:
+            settings = Following() if refining is _REFINING else default()
+        settings = _check_declarations(inputs, outputs, settings)
+        self.following = settings if isinstance(settings, Following) else None
+        self.settings = settings.settings if isinstance(settings, Following) else settings
         self.inputs = tuple(inputs)
         self.outputs = tuple(o if isinstance(o, Quantity) else Quantity(o.name, o.unit) for o in outputs)
-        self.refining = refining if refining is not None and refining.every else None
+        self.refining = refining if refining is not None and refining.every and not self.following else None
         self.count = 0
         # two rules that both add units would add too many
         grows = self.refining is not None and self.refining.grows
@@ -112,11 +128,14 @@ class Learner:
         self._settle, self._basis, self._seed = settle, basis, seed
         self._early: deque[Observation] = deque(maxlen=_PATIENCE * settle)
         self._state: State | None = None
+        self._follower: Follower | None = None
         self._reservoir: Reservoir | None = None
         self._progress = Progress()
         self._events: deque[tuple[Event, float]] = deque(maxlen=remember)
         self._threads = ThreadpoolController()
-        by_modes = self.settings.update == "shared" and len(outputs) > self.settings.modes
+        by_modes = (
+            not self.following and self.settings.update == "shared" and len(outputs) > self.settings.modes
+        )
         if self._scaling is not None and basis is None and not by_modes:
             self._start(OutputScaling(self._scaling))
 
@@ -124,7 +143,7 @@ class Learner:
         return str(self)
 
     def __str__(self) -> str:
-        state = "settling the scaling" if self._state is None else f"{self._state.units} units"
+        state = "settling the scaling" if self._output_scaling is None else f"{self._units} units"
         sizes = f"{len(self.inputs)} inputs → {len(self.outputs)} outputs"
         return f"Learner: {sizes}, {state} after {self.count} observations"
 
@@ -190,9 +209,14 @@ class Learner:
                 if self._output_scaling is None
                 else self._learn(self._output_scaling.scale(observation))
             )
-        innovation = np.nan if self._state is None else self._state.innovation
-        self._events.append((event, innovation))
+        self._events.append((event, self._innovation))
         return event
+
+    @property
+    def _innovation(self) -> float:
+        if self._follower is not None:
+            return self._follower.noise
+        return np.nan if self._state is None else self._state.innovation
 
     @property
     def state(self) -> State:
@@ -203,6 +227,8 @@ class Learner:
         UsageError
             While scaling is still being settled.
         """
+        if self._follower is not None:
+            return self._follower.state()
         if self._state is None:
             raise UsageError(
                 f"Nothing is learnt before {self._settle} observations have settled the scaling.",
@@ -239,12 +265,17 @@ class Learner:
 
     @property
     def expected(self) -> float:
-        """RMS error per scaled output on the samples that judge; not-a-number before the first refinement."""
-        return self._progress.expected
+        """RMS error per scaled output on the samples that judge; not-a-number before the first refinement.
+
+        A learner that follows has none; the noise's deviation stands for it.
+        """
+        return self._progress.expected if self._follower is None else float(np.sqrt(self._follower.noise))
 
     @property
     def numbers(self) -> int:
         """Count of the numbers kept, but for events: parameters, covariance, memory and retained samples."""
+        if self._follower is not None:
+            return self._follower.numbers
         s = self.state
         own = s.coefficients.size + s.theta.size + s.covariance.numbers + s.memory.size + s.errors.size
         return own + (0 if self._reservoir is None else self._reservoir.numbers)
@@ -263,7 +294,7 @@ class Learner:
         if not self._settled():
             return _skip(0, "settling the scaling")
         Y = np.array([o.y for o in self._early])
-        scaling = self._scaling or Scaling.of(self.inputs, Y)
+        scaling = self._scaling or settled_scaling(self.inputs, Y)
         directions = output_modes(scaling.scale_outputs(Y), self._basis) if self._basis else None
         output_scaling = self._start(OutputScaling(scaling, directions), Y)
         early = list(self._early)
@@ -271,8 +302,14 @@ class Learner:
         return [self._learn(output_scaling.scale(o)) for o in early][-1]
 
     def _settled(self) -> bool:
-        """True once the observations say something of the outputs' size: an idle sensor does not."""
+        """True once the observations say something of the outputs' size.
+
+        An idle sensor does not; rare large readings are spikes or the beginning of a touch, which more readings tell.
+        """
         if len(self._early) < self._settle:
+            return False
+        rare = spikes(np.array([o.y for o in self._early])).any()
+        if self._scaling is None and rare and len(self._early) < 2 * self._settle:
             return False
         X = np.array([o.x for o in self._early])
         low, high = bounds(self.inputs)
@@ -281,7 +318,11 @@ class Learner:
         return self._scaling is not None or (varied and (moved or len(self._early) == self._early.maxlen))
 
     def _start(self, output_scaling: OutputScaling, Y: np.ndarray | None = None) -> OutputScaling:
-        self._output_scaling, self._state = output_scaling, output_scaling.initial_state(self.settings, Y)
+        self._output_scaling = output_scaling
+        if self.following is not None:
+            self._follower = Follower(self.following, *output_scaling.size)
+            return output_scaling
+        self._state = output_scaling.initial_state(self.settings, Y)
         if self.refining is not None:
             size = self._state.inputs, self._state.outputs
             keeping, samples = self.refining.keeping, self.refining.samples
@@ -289,15 +330,11 @@ class Learner:
         return output_scaling
 
     def _learn(self, observation: Observation) -> Event:
-        state = self.state
-        if observation.flaw:
-            return _skip(state.units, observation.flaw)
-        if (
-            np.abs(observation.x).max() > _FARTHEST_INPUT
-            or np.abs(observation.targets()).max() > _FARTHEST_OUTPUT
-        ):
-            return _skip(state.units, "far outside the declared scales")
-        state, event = observe(state, observation, self._filter, donate=True)
+        if why := _unusable(observation):
+            return _skip(self._units, why)
+        if self._follower is not None:
+            return self._follower.observe(observation)
+        state, event = observe(self.state, observation, self._filter, donate=True)
         if event.why:
             return event
         if self._reservoir is not None and self.refining is not None:
@@ -309,6 +346,10 @@ class Learner:
                 )
         self._state = state
         return event
+
+    @property
+    def _units(self) -> int:
+        return self._follower.units if self._follower is not None else self.state.units
 
     def _refine(self, state: State, reservoir: Reservoir, refining: Refining) -> State:
         try:
@@ -322,19 +363,30 @@ class Learner:
 
 
 def _check_declarations(
-    inputs: Sequence[Range], outputs: Sequence[Quantity | Range], settings: Settings | None
-) -> Settings:
+    inputs: Sequence[Range], outputs: Sequence[Quantity | Range], settings: Settings | Following
+) -> Settings | Following:
     """The settings, once the declarations are what they are taken for."""
     if not all(isinstance(i, Range) for i in inputs):
         raise UsageError("Inputs must be ranges.", fix='Declare them: Range("force", 0.0, 5.0, "N").')
     if not all(isinstance(o, (Quantity, Range)) for o in outputs):
         raise UsageError("Outputs must be quantities or ranges.", fix='Declare them: Quantity("tip", "m").')
-    if settings is not None and not isinstance(settings, Settings):
+    if not isinstance(settings, (Settings, Following)):
         raise UsageError(
             f"Settings are {settings!r}, not a Settings record.",
             fix='Take a preset, such as PRESETS["shared"](), or Settings(…).',
         )
-    return default() if settings is None else settings
+    return settings
+
+
+def _unusable(observation: Observation) -> str:
+    """The reason why nothing is learnt from an observation in scaled quantities; empty if something can be."""
+    if observation.flaw:
+        return observation.flaw
+    far = (
+        np.abs(observation.x).max() > _FARTHEST_INPUT
+        or np.abs(observation.targets()).max() > _FARTHEST_OUTPUT
+    )
+    return "far outside the declared scales" if far else ""
 
 
 def _skip(units: int, why: str) -> Event:

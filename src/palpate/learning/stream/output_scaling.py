@@ -16,7 +16,10 @@ from palpate.rbf.output_modes import output_modes
 from palpate.rbf.regressors import pairs
 from palpate.units import Quantity, Range, bounds
 
-__all__ = ["OutputScaling", "declared_scaling"]
+__all__ = ["OutputScaling", "declared_scaling", "settled_scaling", "spikes"]
+
+_ORDINARY = 0.94  # share of the readings that are no spikes
+_SPIKE = 5.0  # times the distance of all of these
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +36,12 @@ class OutputScaling:
 
     scaling: Scaling
     directions: np.ndarray | None = None
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Inputs, and outputs or modes, that the filter learns."""
+        outputs = self.scaling.output_scale.size if self.directions is None else self.directions.shape[1]
+        return self.scaling.input_half.size, outputs
 
     def scale(self, observation: Observation) -> Observation:
         """An observation in SI units, in the filter's quantities."""
@@ -78,6 +87,17 @@ def declared_scaling(inputs: Sequence[Range], outputs: Sequence[Quantity | Range
         return None
     low, high = bounds(ranges)
     return Scaling.of(inputs, (low + high)[None] / 2, scale=float((high - low).max() / 2))
+
+
+def settled_scaling(inputs: Sequence[Range], Y: np.ndarray) -> Scaling:
+    """The scaling that the first readings Y (N, m) settle, spikes left aside."""
+    return Scaling.of(inputs, Y[~spikes(Y)])
+
+
+def spikes(Y: np.ndarray) -> np.ndarray:
+    """Mask (N,) of readings (N, m) that are much farther from the median than all but a twentieth of them."""
+    distance = np.abs(Y - np.median(Y, axis=0)).max(axis=1)
+    return np.asarray(distance > _SPIKE * np.quantile(distance, _ORDINARY))
 
 
 def _along(V: np.ndarray, derivatives: np.ndarray | None) -> np.ndarray | None:

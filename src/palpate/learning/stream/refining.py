@@ -23,6 +23,10 @@ __all__ = ["Progress", "Refining", "refined_state"]
 _SETTLED = 0.1  # a step that gains less of the cost than this: what is left needs more units, not other ones
 _WIDE = 1.5  # new units' widths relative to their spacing
 _WIDTHS = 0.4  # spread of new units' log widths
+_SPIKE = 30.0  # times the median error from which a sample may be a spike
+_SPIKE_WEIGHT = 1e-8
+_NEIGHBOURS = 4  # samples that a spike disagrees with
+_ENOUGH = 8  # samples among which spikes are looked for
 _FILLED = 0.5  # unknowns per number in the reservoir up to which units are added
 
 
@@ -113,10 +117,12 @@ def refined_state(
 ) -> tuple[State, Progress]:
     """Return the state after one iteration on the reservoir, with the Gauss–Newton posterior, and what it achieved.
 
-    With a forgetting factor λ a sample of age a weighs λᵃ, as it does in the filter. Moved and new units
-    replace the state's once they have less error on the judging samples; weights and tail are then fitted to all.
+    With a forgetting factor λ a sample of age a weighs λᵃ, as it does in the filter. Spikes hardly weigh. Moved and
+    new units replace the state's once they have less error on the judging samples; weights and tail are then fitted
+    to all.
     """
     weights = kept.weights * settings.forgetting_factor ** (kept.ages - kept.ages.min())
+    weights = np.where(_spikes(state, kept, settings), _SPIKE_WEIGHT * weights, weights)
     judging = _judging(kept, weights, refining)
     penalty = max(refining.ridge, 1e-30)
     rows = _rows(state, kept, settings, np.where(judging, 0.0, weights))
@@ -177,6 +183,20 @@ def _continued(
     return replace(state, errors=_window_errors(state, settings))
 
 
+def _spikes(state: State, kept: Reservoir, settings: Settings) -> np.ndarray:
+    """Mask (N,) of retained samples that are far off the network, where their nearest neighbours are not."""
+    if len(kept) < _ENOUGH:
+        return np.zeros(len(kept), bool)
+    of = settings.regressors(state.inputs)
+    f = np.hstack([of.tail_rows(kept.X), of.phi(kept.X, state.theta)]) @ state.coefficients
+    size = np.linalg.norm(kept.Y - f, axis=1)
+    spikes = size > _SPIKE * max(float(np.median(size)), 1e-12)
+    for i in np.flatnonzero(spikes):
+        near = np.argsort(((kept.X - kept.X[i]) ** 2).sum(axis=1))[1 : 1 + _NEIGHBOURS]
+        spikes[i] = float(np.median(size[near])) < 0.1 * size[i]
+    return spikes
+
+
 def _judging(kept: Reservoir, weights: np.ndarray, refining: Refining) -> np.ndarray:
     """Return which retained samples (N,) judge: a place says nothing about when its sample came."""
     none = np.zeros(len(kept), bool)
@@ -232,7 +252,7 @@ def _start(
     rng = np.random.default_rng((state.count, state.units))
     if settled and (new := _growth(state, len(kept), settings, refining, last)):
         return np.vstack([state.theta, _drawn(state, kept, settings, new, rng)]), fresh, True
-    if last.since and last.failed % 2 == 0 and refining.grows:
+    if last.since and last.failed % 2 == 0 and refining.grows and state.units:
         none = replace(state, theta=state.theta[:0], coefficients=state.coefficients[: -state.units or None])
         return _drawn(none, kept, settings, state.units, rng), fresh, True
     return state.theta, fresh if last.since else last.damping, True

@@ -44,6 +44,11 @@ class State:
         The coefficients by those modes, kept up to date so that no step has to form them.
     least_error : float
         Least mean squared error over the memory so far, ‖e‖² per observation; slowly fading.
+    changed_at : int
+        The observation that began the latest abrupt change, counting from one; 0 for none. Found by learners that
+        follow a stream (see `palpate.learning.stream.following`).
+    drifts : float
+        Probability that the map drifts, found by the same; 0 elsewhere.
     """
 
     coefficients: np.ndarray
@@ -59,6 +64,8 @@ class State:
     modes: np.ndarray | None = None
     mode_coefficients: np.ndarray | None = None
     least_error: float = float("inf")
+    changed_at: int = 0
+    drifts: float = 0.0
 
     def __repr__(self) -> str:
         return str(self)

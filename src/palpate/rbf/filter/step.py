@@ -40,6 +40,10 @@ class Event:
         For a skipped observation, the reason; else empty.
     refined : bool
         Whether an iteration of the refinement on retained samples followed (see `palpate.learning.stream.learner`).
+    outlier : bool
+        True where the observation is likelier wrong than right (see `palpate.learning.stream.tracker`).
+    changed : bool
+        True where it made likely that the map has jumped, at the state's `changed_at`.
     """
 
     error: float
@@ -50,6 +54,8 @@ class Event:
     units: int
     why: str = ""
     refined: bool = False
+    outlier: bool = False
+    changed: bool = False
 
 
 def step(

@@ -154,6 +154,12 @@ def learn_bent(
             f"{len(good)} converged solves are too few to learn from.",
             fix=f"Sweep at least {FEWEST}, better 26 or more.",
         )
+    if good.rest.shape[1] != 2:
+        raise UsageError(
+            "A body that loads bend is learnt in a plane; these solves have three coordinates.",
+            why="The hand pulls a node in the plane of the body.",
+            fix="Import or sweep it with two coordinates, such as coordinates = ['x', 'y'] in an import's mapping.",
+        )
     settings = settings or recommended(len(good.ranges))
     refinement = refinement or _refinement_for(len(good.ranges))
     # few solves need more presentations: the filter sees each one's linearisation once per pass

@@ -9,7 +9,10 @@ import pytest
 
 import palpate as pp
 from dataset.readers.solved_by_ccx import beam_deck, run
+from palpate.errors import UsageError
 from palpate.learning import Refinement
+from palpate.runtime.touchable import load_touchable
+from palpate.viewer.page_model import LineDrawing
 from palpate.viewer.shown_body import body_of
 
 LOAD = 40.0
@@ -80,19 +83,38 @@ def test_energies_follow_from_the_deflections_alone(beam, imported):
     np.testing.assert_allclose(data.potential_energy, imported.dataset.potential_energy, rtol=2e-4)
 
 
-def test_an_imported_beam_is_learnt_validated_and_seen(imported):
+@pytest.fixture(scope="module")
+def learnt(imported):
+    """A body learnt from three quarters of the cases, and the others."""
     train, test = imported.dataset.split(0.25)
-    body, history = pp.learn(
-        train, effort=0.05, passes=1, refinement=Refinement(units_max=3, starts=1), workers=1
-    )
+    body, _ = pp.learn(train, effort=0.05, passes=1, refinement=Refinement(units_max=3, starts=1), workers=1)
+    return body, test
+
+
+def test_an_imported_beam_is_learnt_and_validated(learnt):
+    body, test = learnt
     validation = pp.validate(body, test)
     assert validation.passed, str(validation)
     inner = test.X[:, 0] < LOAD
     sag = -test.displacement[inner, -1, 1]
     force = np.array([np.linalg.norm(body.energy.force(np.array([[w]]))) for w in sag])
     np.testing.assert_allclose(force, test.X[inner, 0], rtol=0.01)
-    assert body.fields["displacement"].points.shape[0] == len(imported.dataset.rest)
-    assert history.solves == len(train)
+
+
+def test_a_page_shows_an_imported_beam(imported, learnt, tmp_path):
+    body = load_touchable(learnt[0].save(tmp_path / "beam.palpate"))
+    line = LineDrawing(body, body.line).line
+    np.testing.assert_allclose(np.array(line.rest)[:, :2], imported.dataset.rest)
+    assert line.touch_node == len(imported.dataset.rest) - 1
+
+
+def test_loads_in_space_are_refused_with_the_remedy(beam):
+    mapping = tomllib.loads(MAPPING) | {"coordinates": ["x", "y", "z"]}
+    mapping["inputs"][0]["load"] = {"at": ["100 mm", 0, 0], "direction": [0, -1, 0]}
+    data = pp.import_results([beam / "beam.frd", beam / "beam.dat"], mapping).dataset
+    assert data.displacement.shape[2] == 3
+    with pytest.raises(UsageError, match=r"coordinates = \['x', 'y'\]"):
+        pp.learn(data)
 
 
 def test_an_imported_solid_is_looked_at(beam):

@@ -149,17 +149,7 @@ def learn_bent(
         If there are too few converged solves to learn from, or they have no energies.
     """
     good = train.ok
-    if len(good) < FEWEST:
-        raise UsageError(
-            f"{len(good)} converged solves are too few to learn from.",
-            fix=f"Sweep at least {FEWEST}, better 26 or more.",
-        )
-    if good.rest.shape[1] != 2:
-        raise UsageError(
-            "A body that loads bend is learnt in a plane; these solves have three coordinates.",
-            why="The hand pulls a node in the plane of the body.",
-            fix="Import or sweep it with two coordinates, such as coordinates = ['x', 'y'] in an import's mapping.",
-        )
+    _refuse_unfit(good)
     settings = settings or recommended(len(good.ranges))
     refinement = refinement or _refinement_for(len(good.ranges))
     # few solves need more presentations: the filter sees each one's linearisation once per pass
@@ -204,6 +194,21 @@ def learn_bent(
         "dataset": {"hash": good.hash, "provenance": train.provenance},
     }
     return LearntBent(Surrogate(energy, fields, meta=meta), found, sequential)
+
+
+def _refuse_unfit(good: Dataset) -> None:
+    """Refuse too few converged solves, and solves in space."""
+    if len(good) < FEWEST:
+        raise UsageError(
+            f"{len(good)} converged solves are too few to learn from.",
+            fix=f"Sweep at least {FEWEST}, better 26 or more.",
+        )
+    if good.rest.shape[1] != 2:
+        raise UsageError(
+            "A body that loads bend is learnt in a plane; these solves have three coordinates.",
+            why="The hand pulls a node in the plane of the body.",
+            fix="Import or sweep it with two coordinates, such as coordinates = ['x', 'y'] in an import's mapping.",
+        )
 
 
 def node_outputs(data: Dataset) -> tuple[tuple[Quantity, ...], list[tuple[int, int]]]:

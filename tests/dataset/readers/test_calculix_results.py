@@ -239,3 +239,41 @@ def test_files_of_different_cases_without_common_times_are_refused(tmp_path):
     )
     with pytest.raises(UsageError, match="different cases"):
         join_columns([read_results(frd), read_results(dat)])
+
+
+def test_every_mode_of_a_frequency_analysis_is_a_case(ccx, tmp_path):
+    deck = patch_deck(GRADIENT, YOUNG, POISSON)
+    deck = deck.replace("*SOLID SECTION", "*DENSITY\n1e-9\n*SOLID SECTION").replace(
+        deck[deck.index("*STEP") : deck.index("*NODE FILE")],
+        "*BOUNDARY\n1, 1, 3\n2, 2, 3\n4, 3, 3\n*STEP\n*FREQUENCY\n3\n",
+    )
+    path = run(ccx, tmp_path, "modes", deck)
+    frd, dat = read_results(path), read_results(path.with_suffix(".dat"))
+    assert frd.cases == dat.cases == 3
+    assert (np.diff(frd.columns["frequency"].values) > 0).all()
+    joined = join_columns([frd, dat])
+    shapes = joined.columns["DISP.D1"].values, joined.columns["displacements.vx of ALL"].values
+    np.testing.assert_allclose(*shapes, rtol=1e-4, atol=1e-5 * np.abs(shapes[0]).max())
+
+
+def test_prints_with_local_axes_odd_heads_and_open_numbers_of_values(tmp_path):
+    time = "and time  0.1000000E+01\n\n"
+    path = tmp_path / "odd.dat"
+    path.write_text(
+        f" stresses (elem, integ.pnt.,sxx,syy,szz,sxy,sxz,syz) for set B {time}"
+        "         1   1  1.0E+00  2.0E+00  3.0E+00  4.0E+00  5.0E+00  6.0E+00 _shell_0000000001   \n\n"
+        f" equivalent plastic strain (elem, integ.pnt.,pe)for set B {time}         1   1  2.5E-01\n\n"
+        f" internal state variables (elem, integ.pnt.,values) for set B {time}         1   1  1.0E+00  2.0E+00\n\n"
+        f" center of gravity for set B {time}        1.0E+00  2.0E+00  3.0E+00\n\n"
+        f" temperatures for set N {time}         3  2.93E+02\n\n"
+        f" mass (element, mass) and mass moment of inertia (xx,yy) for set B {time}         1  1.0E+00  2.0E+00\n"
+    )
+    results = read_results(path)
+    values = {name: column.values.ravel().tolist() for name, column in results.columns.items()}
+    assert values["stresses.syz of B"] == [6.0]
+    assert values["equivalent plastic strain of B"] == [0.25]
+    assert values["internal state variables.v2 of B"] == [2.0]
+    assert values["center of gravity.z of B"] == [3.0]
+    assert values["temperatures of N"] == [293.0]
+    assert any("local axes, _shell_0000000001" in note for note in results.notes)
+    assert any(note.startswith("Skipped line 21") for note in results.notes)

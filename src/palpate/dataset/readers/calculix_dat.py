@@ -35,8 +35,12 @@ MEASURES = {
 }
 PURE = ("strains", "mechanical strains", "equivalent plastic strain")
 _HEAD = re.compile(
-    r"^\s*(?P<title>[A-Za-z][^(]*?)\s*(?:\((?P<parts>[^)]*)\)\s*)?for set (?P<set>\S+) and time\s+(?P<time>\S+)\s*$"
+    r"^\s*(?P<title>[A-Za-z][^(]*?)\s*(?:\((?P<parts>[^)]*)\)\s*)?for set\s*(?P<set>\S+) and time\s+(?P<time>\S+)\s*$"
 )
+_BARE = {
+    "center of gravity": ("x", "y", "z")
+}  # one row without a number, whose components the head leaves out
+_MODE = re.compile(r"^\s*E I G E N V A L U E +N U M B E R\s")  # every mode is a case, all at one time
 _KEYS = {"elem", "element", "node", "integ.pnt."}
 _NUMBER = re.compile(
     r"^[-+]?(?:\d+(?:\.\d*)?(?:[EeDd][-+]?\d+|[-+]\d{3})?|nan|inf(?:inity)?)$", re.IGNORECASE
@@ -52,6 +56,7 @@ class _Table:
     keys: tuple[str, ...]
     components: tuple[str, ...]
     line: int
+    local: str = ""  # name of a system of coordinates of its own
     ids: list[int] = field(default_factory=list)
     rows: list[list[float]] = field(default_factory=list)
 
@@ -80,14 +85,18 @@ def read_dat(path: Path) -> Results:
     cases: list[tuple[float, dict[str, _Table]]] = []
     table: _Table | None = None
     unknown: dict[str, int] = {}
+    mode_begins = False
     for number, line in enumerate(read_lines(path), 1):
         if not line.strip():
             continue
         if head := _HEAD.match(line):
             time, table = _number(path, number, head["time"]), _table_of(head, number)
-            if not cases or cases[-1][0] != time:
+            if not cases or cases[-1][0] != time or mode_begins:
                 cases.append((time, {}))
+            mode_begins = False
             table = _add(path, cases[-1][1], table)
+        elif _MODE.match(line):
+            table, mode_begins = None, True
         elif re.match(r"^\s*[A-Za-z]", line) and not _NUMBER.match(line.split()[0]):
             table = None
             unknown.setdefault(line.strip(), number)
@@ -117,7 +126,8 @@ def _table_of(head: re.Match[str], line: int) -> _Table:
     keys = tuple(part for part in parts if part in _KEYS)
     components = tuple(part for part in parts if part not in _KEYS)
     title = head["title"].strip()
-    if not keys and not title.startswith("total"):
+    components = _BARE.get(title, components)
+    if not keys and not title.startswith("total") and title not in _BARE:
         keys = ("node",)
     return _Table(title, head["set"], keys, components or ("",), line)
 
@@ -135,8 +145,11 @@ def _add(path: Path, tables: dict[str, _Table], table: _Table) -> _Table:
 
 def _add_row(path: Path, number: int, line: str, table: _Table) -> None:
     cells = line.split()
-    if cells[-1] == "L":  # in the local system of a node
+    if not _NUMBER.match(cells[-1]) and re.match(r"[A-Za-z_]", cells[-1]):
+        table.local = "of the node" if cells[-1] == "L" else cells[-1]
         cells = cells[:-1]
+    if table.components == ("values",) and not table.rows:
+        table.components = tuple(f"v{i + 1}" for i in range(len(cells) - len(table.keys)))
     width = len(table.keys) + len(table.components)
     if len(cells) != width:
         raise refuse(
@@ -163,6 +176,8 @@ def _collect(path: Path, cases: Sequence[tuple[float, dict[str, _Table]]], notes
                 _require_like(path, first, table)
         nothing = np.full((len(first.rows), len(first.components)), np.nan)
         values = np.stack([nothing if table is None else np.array(table.rows) for table in tables])
+        if first.local:
+            notes.append(f"{name}: its components are along local axes, {first.local}.")
         if first.title.endswith(" again") and _is_repeated(cases, name):
             continue
         support = _places_of(first, places)

@@ -129,6 +129,21 @@ def test_an_interrupted_write_leaves_the_old_file(tmp_path):
     assert names(folder) == ["new"]
 
 
+def test_what_a_killed_process_was_writing_goes_with_the_next_write(tmp_path):
+    old, young, store = (
+        tmp_path / name for name in (".a.0123abcd.part.txt", ".a.89abcdef.part.txt", ".b.01234567.part")
+    )
+    for part in (old, young):
+        part.touch()
+    store.mkdir()
+    for part in (old, store):
+        os.utime(part, (0.0, 0.0))
+    write_file(tmp_path / "a.txt", "new")
+    with writing_folder(tmp_path / "b") as part:
+        part.mkdir()
+    assert names(tmp_path) == [young.name, "a.txt", "b"]
+
+
 HOLDER = """
 import signal, sys
 from palpate.cli import main

@@ -13,9 +13,11 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import glob
 import os
 import shutil
 import tempfile
+import time
 import uuid
 from collections.abc import Iterator
 from pathlib import Path
@@ -35,6 +37,10 @@ __all__ = [
 
 _PREFIX, _LOCK = "palpate-", "in-use" if os.name != "nt" else "lock"
 _SYNCHRONISED_AT_ONCE = 16
+_MARK, _ABANDONED = (
+    "?" * 8,
+    3600.0,
+)  # pattern of the marks of unfinished files; s after which nobody writes them
 _WRONG_PATH = {
     errno.ENOENT,
     errno.EEXIST,
@@ -62,6 +68,7 @@ def writing(path: str | os.PathLike[str]) -> Iterator[Path]:
     target = Path(path)
     # its ending stays: it tells some writers the format
     part = target.with_name(f".{target.stem}.{uuid.uuid4().hex[:8]}.part{target.suffix}")
+    _remove_abandoned(target.parent, f".{glob.escape(target.stem)}.{_MARK}.part{glob.escape(target.suffix)}")
     with system_errors(f"Could not write {target}."):
         try:
             if target.is_dir():
@@ -101,7 +108,8 @@ def writing_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
     """
     target = Path(path)
     mark = uuid.uuid4().hex[:8]
-    part, old = (target.with_name(f".{target.name}.{mark}{end}") for end in ("", ".old"))
+    part, old = (target.with_name(f".{target.name}.{mark}.{end}") for end in ("part", "old"))
+    _remove_abandoned(target.parent, f".{glob.escape(target.name)}.{_MARK}.part")
     with system_errors(f"Could not write {target}."):
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -121,6 +129,14 @@ def writing_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
                 os.replace(old, target)
             for leftover in (part, old):
                 shutil.rmtree(leftover, ignore_errors=True)
+
+
+def _remove_abandoned(folder: Path, pattern: str) -> None:
+    """Remove what a killed process was writing; what is young may be another one's that writes now."""
+    with contextlib.suppress(OSError):
+        for part in folder.glob(pattern):
+            if time.time() - part.stat().st_mtime > _ABANDONED:
+                shutil.rmtree(part, ignore_errors=True) if part.is_dir() else part.unlink()
 
 
 def _synchronise(path: Path) -> None:

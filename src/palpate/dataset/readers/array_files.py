@@ -16,6 +16,7 @@ import numpy as np
 
 from palpate.dataset.readers.results import Column, Places, Results, refuse
 from palpate.errors import UsageError
+from palpate.sizes import require_npz
 
 __all__ = ["name_and_unit", "read_npz", "read_parquet"]
 
@@ -101,8 +102,10 @@ def read_npz(path: Path) -> Results:
 
 def _arrays(path: Path) -> dict[str, np.ndarray]:
     try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
+        with path.open("rb") as file:
+            require_npz(file)
+            with np.load(file, allow_pickle=False) as archive:
+                return {name: archive[name] for name in archive.files}
     except (OSError, ValueError, KeyError, EOFError, AttributeError, TypeError, zipfile.BadZipFile) as error:
         raise refuse(
             path,

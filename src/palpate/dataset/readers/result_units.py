@@ -11,6 +11,8 @@ import numpy as np
 
 from palpate.dataset.readers.results import Column
 from palpate.errors import UsageError
+from palpate.tables.unit_names import plain_unit
+from palpate.units import registry
 
 __all__ = ["SYSTEM", "to_si_units", "unit_of", "values_in_si"]
 
@@ -41,13 +43,6 @@ _SI = (
 )
 _ANGLE = re.compile(r"\b(rad|radian|deg|degree|rpm|rev|turn)", re.IGNORECASE)
 _SIGNS = str.maketrans({"µ": "u", "μ": "u", "·": "*", "⋅": "*", "²": "**2", "³": "**3", "°": "deg"})
-
-
-@functools.cache
-def _registry() -> Any:
-    import pint  # costs 0.3 s
-
-    return pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
 
 
 def unit_of(column: Column, units: Mapping[str, str]) -> str | None:
@@ -84,11 +79,10 @@ def to_si_units(unit: str) -> tuple[float, float, str]:
         return 1.0, 0.0, ""
     import pint
 
-    registry = _registry()
-    text = unit.translate(_SIGNS).replace("^", "**").replace("%", "percent")
-    text = {"degC": "degree_Celsius", "degF": "degree_Fahrenheit"}.get(text.strip(), text)
+    text = re.sub(r"\brev\b", "turn", plain_unit(unit).replace("^", "**").replace("%", "percent"))
+    text = text.translate(_SIGNS)
     try:
-        zero, one = (registry.Quantity(value, text).to_base_units() for value in (0.0, 1.0))
+        zero, one = (registry().Quantity(value, text).to_base_units() for value in (0.0, 1.0))
     except (
         pint.errors.PintError,
         ValueError,
@@ -102,20 +96,18 @@ def to_si_units(unit: str) -> tuple[float, float, str]:
             why=f"{error}.",
             fix='Name the unit in the mapping, such as "mm", "N", "N/mm^2" or "1" for a pure number.',
         ) from error
-    factor, offset = float(one.magnitude) - float(zero.magnitude), float(zero.magnitude)
-    if _ANGLE.search(text):
-        known = [
-            name for name in ("rad", "rad/s") if registry.Unit(name).dimensionality == one.dimensionality
-        ]
-    else:
-        known = [n for n in _SI if "rad" not in n and _unit(n).dimensionality == one.dimensionality]
-    if one.dimensionless and not known:
+    factor, offset = float(one.magnitude - zero.magnitude), float(zero.magnitude)
+    angular = bool(_ANGLE.search(text))
+    names = [n for n in _SI if ("rad" in n) == angular and _unit(n).dimensionality == one.dimensionality]
+    if names:
+        return factor, offset, names[0]
+    if one.dimensionless:
         return factor, offset, ""
-    return factor, offset, known[0] if known else f"{one.units:~C}".replace("**", "^")
+    return factor, offset, unit if (factor, offset) == (1.0, 0.0) else f"{one.units:~C}".replace("**", "^")
 
 
 def _unit(name: str) -> Any:
-    return _registry().Unit(name.translate(_SIGNS))
+    return registry().Unit(name.translate(_SIGNS))
 
 
 def values_in_si(

@@ -1,14 +1,16 @@
-"""A page without a browser: a program's way into the viewer's websocket."""
+"""A page without a browser: a program's way into the viewer's websocket and files."""
 
 from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
+from typing import Any
 
+import httpx
 import numpy as np
 from websockets.sync.client import ClientConnection, connect
 
-from palpate.viewer import Viewer
+from palpate.viewer import BodyViewer, Viewer
 from palpate.viewer.messages import Credit, Frame, Hand, Hello
 
 
@@ -42,6 +44,18 @@ class Client:
 @contextlib.contextmanager
 def client_of(viewer: Viewer) -> Iterator[Client]:
     """A connected client."""
-    origin = viewer.url.rstrip("/")
-    with connect(f"{viewer.url.replace('http', 'ws', 1)}touch", origin=origin) as socket:
+    with socket_of(viewer) as socket:
         yield Client(socket)
+
+
+def socket_of(viewer: Viewer, **options: Any) -> ClientConnection:
+    """A websocket to the page's place, with the cookie of the page."""
+    cookies = "; ".join(f"{name}={value}" for name, value in viewer.cookies.items())
+    options = {"origin": viewer.address.rstrip("/"), "additional_headers": {"Cookie": cookies}} | options
+    return connect(f"{viewer.address.replace('http', 'ws', 1)}touch", **options)
+
+
+def get(viewer: Viewer | BodyViewer, path: str = "", **headers: str) -> httpx.Response:
+    """The answer that the page gets for a path."""
+    with httpx.Client(cookies=viewer.cookies) as page:
+        return page.get(viewer.address + path, headers=headers)

@@ -95,12 +95,10 @@ def test_it_passes_the_checklist(check, body, tmp_path):
 
 
 def test_it_goes_all_the_way(solves, body, tmp_path):
-    import httpx
-
     from palpate.validation import Chapter
     from palpate.viewer import Viewer
     from palpate.viewer.messages import Surface
-    from websocket_page import client_of
+    from websocket_page import client_of, get
 
     file = body.save(tmp_path / "bed.palpate")
     judged = pp.validate(pp.load(file), solves[1])
@@ -110,7 +108,7 @@ def test_it_goes_all_the_way(solves, body, tmp_path):
     stroke = "stroke:frequency=2,amplitude=0.02"
     with Viewer(file, port=0, device=stroke) as viewer, client_of(viewer) as page:
         frames = [page.next_frame() for _ in range(100)]
-        drawn = Surface.unpack(httpx.get(viewer.url + "surface").content)
+        drawn = Surface.unpack(get(viewer, "surface").content)
     deep = max(frames, key=lambda frame: frame.depth)
     assert deep.depth > 0.003
     assert not deep.faults

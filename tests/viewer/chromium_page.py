@@ -42,7 +42,7 @@ def open_page(
     page = browser.new_context(**options).new_page()
     page.on("console", lambda m: complaints.append(m.text) if m.type in {"error", "warning"} else None)
     page.on("pageerror", lambda error: complaints.append(str(error)))
-    local = (viewer.url, "data:", "blob:")
+    local = (viewer.address, "data:", "blob:")
     page.on("request", lambda r: None if r.url.startswith(local) else complaints.append(f"asks {r.url}"))
     page.goto(viewer.url)
     page.wait_for_selector(f"html[data-tick][data-{ready}]")

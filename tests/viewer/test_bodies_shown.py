@@ -15,6 +15,7 @@ from palpate.viewer import BodyViewer
 from palpate.viewer.messages import Shown, Step, Surface
 from palpate.viewer.shown_body import ShownBody, body_of
 from palpate.viewer.surfaces import outer_triangles, split
+from websocket_page import get
 
 
 def test_a_block_is_split_into_six_faces():
@@ -49,12 +50,12 @@ def test_the_skin_of_two_tetrahedra():
 def test_the_server_sends_what_the_solutions_say():
     solutions = dents(3)
     with BodyViewer(solutions, name="block", port=0) as viewer:
-        shown = Shown.from_json(httpx.get(viewer.url + "shown").text)
-        surface = Surface.unpack(httpx.get(viewer.url + "surface").content)
-        step = Step.unpack(httpx.get(viewer.url + "steps/2").content)
-        assert httpx.get(viewer.url + "steps/3").status_code == 404
-        assert httpx.get(viewer.url).headers["content-security-policy"].startswith("default-src 'none'")
-        assert httpx.get(viewer.url, headers={"host": "elsewhere.example"}).status_code == 403
+        shown = Shown.from_json(get(viewer, "shown").text)
+        surface = Surface.unpack(get(viewer, "surface").content)
+        step = Step.unpack(get(viewer, "steps/2").content)
+        assert get(viewer, "steps/3").status_code == 404
+        assert get(viewer).headers["content-security-policy"].startswith("default-src 'none'")
+        assert get(viewer, host="elsewhere.example").status_code == 403
     with pytest.raises(httpx.ConnectError):
         httpx.get(viewer.url)
     assert [f.name for f in shown.fields] == ["displacement", "von Mises stress"]

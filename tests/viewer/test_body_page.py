@@ -14,6 +14,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from palpate.viewer import BodyViewer
 from palpate.viewer.shown_body import ShownBody, ShownStep
+from palpate.viewer.web_server import way_in
 
 pytestmark = pytest.mark.timeout(120)
 
@@ -29,7 +30,7 @@ def open_body(browser: Browser, viewer: BodyViewer, complaints: list[str], **opt
     page = browser.new_context(**options).new_page()
     page.on("console", lambda m: complaints.append(m.text) if m.type in {"error", "warning"} else None)
     page.on("pageerror", lambda error: complaints.append(str(error)))
-    local = (viewer.url, "data:", "blob:")
+    local = (viewer.address, "data:", "blob:")
     page.on("request", lambda r: None if r.url.startswith(local) else complaints.append(f"asks {r.url}"))
     page.goto(viewer.url)
     page.wait_for_selector('html[data-drawn="0"]')
@@ -156,4 +157,21 @@ def test_shading_is_smooth_across_the_facets_of_a_ball(browser: Browser, complai
         # facets of 22 degrees, each in one shade, would jump by 0.02 within three pixels
         assert np.abs(middle[3:] - middle[:-3]).max() < 0.01
         page.context.close()
+    assert_no(complaints)
+
+
+def test_the_file_that_opens_the_page_leaves_a_cookie_and_no_token(
+    browser: Browser, block_viewer: BodyViewer, complaints: list[str]
+):
+    page = browser.new_context().new_page()
+    with way_in(block_viewer) as file:
+        page.goto(file)
+        page.wait_for_url(block_viewer.address)
+    page.wait_for_selector('html[data-drawn="0"]')
+    page.reload()  # the cookie suffices
+    page.wait_for_selector('html[data-drawn="0"]')
+    assert page.evaluate("document.cookie") == ""
+    (cookie,) = page.context.cookies()
+    assert (cookie["httpOnly"], cookie["sameSite"], cookie["expires"]) == (True, "Strict", -1)
+    page.context.close()
     assert_no(complaints)

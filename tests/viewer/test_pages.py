@@ -108,19 +108,22 @@ def test_the_end_of_the_loop_is_shown_and_the_page_returns(visit, keep, complain
     assert page.inner_text("#force-norm") == "–"
     keep(page, "disconnected")
     page.evaluate("document.kept = true")
-    with Viewer(rod, port=viewer.port, strict_port=True):
+    with Viewer(rod, port=viewer.port, strict_port=True) as again:
+        page.context.request.get(again.url)  # as opening the new address in the same browser does
         settled(page, "free")
         assert page.evaluate("document.kept")
         assert page.is_hidden("#banner")
         drag(page, -20, 100)
         check_force(rod, settled(page, "inside"), np.zeros(0))
         page.mouse.up()
-    with Viewer(spring_beam(), port=viewer.port, strict_port=True):  # another body: a fresh page
+    with Viewer(spring_beam(), port=viewer.port, strict_port=True) as other:  # another body: a fresh page
+        page.context.request.get(other.url)
         expect(page.locator("#model-name")).to_have_text("spring", timeout=10_000)
         page.wait_for_selector("html[data-tick][data-tip]")
         assert not page.evaluate("document.kept")
         page.context.close()
-    assert_no([c for c in complaints if "ERR_CONNECTION_REFUSED" not in c])
+    known = ("ERR_CONNECTION_REFUSED", "403")  # no server, or one whose token it has not got yet
+    assert_no([c for c in complaints if not any(word in c for word in known)])
     complaints.clear()
 
 

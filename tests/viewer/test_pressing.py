@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import time
-import urllib.request
 from collections.abc import Iterator
-from urllib.error import HTTPError
 
+import httpx
 import numpy as np
 import pytest
 from slabs import DEVIATION, HALF, family, touched_slab
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import ClientConnection
 
 import pressed
 from palpate.runtime.touchable import touchable
@@ -21,6 +20,7 @@ from palpate.viewer import Viewer
 from palpate.viewer.messages import Credit, Frame, Hand, Hello, Hold, Modes, Surface
 from palpate.viewer.surface_drawing import SurfaceDrawing
 from palpate.viewer.surfaces import relief
+from websocket_page import get, socket_of
 
 pytestmark = pytest.mark.timeout(120)
 
@@ -71,13 +71,12 @@ class PressClient:
 
 @contextlib.contextmanager
 def client_of(viewer: Viewer) -> Iterator[PressClient]:
-    with connect(f"{viewer.url.replace('http', 'ws', 1)}touch", origin=viewer.url.rstrip("/")) as socket:
+    with socket_of(viewer) as socket:
         yield PressClient(socket)
 
 
 def fetched(viewer: Viewer, path: str) -> bytes:
-    with urllib.request.urlopen(viewer.url + path) as answer:
-        return answer.read()
+    return get(viewer, path).raise_for_status().content
 
 
 def test_force_depth_and_trust_are_the_surrogates_own(pressed_viewer: Viewer, slab: Surrogate):
@@ -178,7 +177,7 @@ def test_the_page_gets_the_skin_and_the_modes_once(pressed_viewer: Viewer, slab:
     modes = Modes.unpack(fetched(pressed_viewer, "fields/0"))
     assert modes.modes.size == 2 * surface.rest.size
     assert modes.rows == slab.fields["displacement"].local_mode.table.shape[1]
-    with pytest.raises(HTTPError, match="404"):
+    with pytest.raises(httpx.HTTPStatusError, match="404"):
         fetched(pressed_viewer, "fields/2")
 
 

@@ -55,6 +55,13 @@ Port = Annotated[
         help="Port of the page. Default: that of the study. If it is busy, the next free port is used.",
     ),
 ]
+AskToken = Annotated[
+    bool,
+    typer.Option(
+        "--token/--no-token",
+        help="Open the page only to who has its whole address. Without a token every user of this machine can open it.",
+    ),
+]
 Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a web browser.")]
 
 STUDY = Path("study.toml")
@@ -90,6 +97,7 @@ def demo(
     case_limit: CaseLimit = CASE_LIMIT,
     port: Port = None,
     browser: Browser = True,
+    token: AskToken = True,
     as_json: Json = False,
 ) -> None:
     """Run named studies completely: solve, learn, check, and show the result. The two beams take about a minute."""
@@ -100,7 +108,7 @@ def demo(
     models = run_demo(names, folder, workers, console, quick=quick, case_limit=case_limit)
     if view and not as_json:
         if sys.stdout.isatty():
-            _serve(models[-1], port=port, browser=browser)
+            _serve(models[-1], port=port, browser=browser, token=token)
         else:
             console.say("No terminal, so no page is served: `palpate view FILE` does it.")
 
@@ -243,9 +251,10 @@ def view(
         bool, typer.Option("--strict-port", help="Stop with an error if the port is busy.")
     ] = False,
     browser: Browser = True,
+    token: AskToken = True,
 ) -> None:
     """Open a page on which you can touch the model. Only this machine can reach it."""
-    _serve(model, port=port, browser=browser, strict_port=strict_port)
+    _serve(model, port=port, browser=browser, strict_port=strict_port, token=token)
 
 
 @app.command()
@@ -256,11 +265,13 @@ def show(
         bool, typer.Option("--strict-port", help="Stop with an error if the port is busy.")
     ] = False,
     browser: Browser = True,
+    token: AskToken = True,
 ) -> None:
     """Open a page that shows solved bodies: their deformation, in colour, one state after the other."""
     from palpate.viewer import show as show_body
 
-    show_body(file, port=port, strict_port=strict_port, open_browser=browser and sys.stdout.isatty())
+    open_browser = browser and sys.stdout.isatty()
+    show_body(file, port=port, strict_port=strict_port, token=token, open_browser=open_browser)
 
 
 @app.command()
@@ -416,7 +427,7 @@ def doctor(as_json: Json = False) -> None:
     report(Console(as_json))
 
 
-def _serve(model: Path, *, port: int | None, browser: bool, strict_port: bool = False) -> None:
+def _serve(model: Path, *, port: int | None, browser: bool, token: bool, strict_port: bool = False) -> None:
     from palpate.runtime.touchable import load_touchable
     from palpate.viewer import serve
 
@@ -428,6 +439,7 @@ def _serve(model: Path, *, port: int | None, browser: bool, strict_port: bool = 
         max_force=settings.get("max_force"),
         open_browser=browser and sys.stdout.isatty(),
         strict_port=strict_port,
+        token=token,
     )
 
 

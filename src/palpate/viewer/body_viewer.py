@@ -69,6 +69,8 @@ class BodyViewer(LocalServer):
         ``127.0.0.1``, ``localhost`` or ``::1``: the viewer serves this machine only.
     strict_port : bool
         Whether a busy port is an error; otherwise the next free one is taken.
+    token : bool
+        Whether the page opens only with the token that stands in `url`; without, to every user of this machine.
 
     Attributes
     ----------
@@ -93,8 +95,9 @@ class BodyViewer(LocalServer):
         port: int = 8080,
         host: str = "127.0.0.1",
         strict_port: bool = False,
+        token: bool = True,
     ) -> None:
-        super().__init__(port, host, strict_port=strict_port)
+        super().__init__(port, host, strict_port=strict_port, token=token)
         self.body = body_of(source, name)
 
     @property
@@ -113,6 +116,7 @@ def show(
     port: int = 8080,
     host: str = "127.0.0.1",
     strict_port: bool = False,
+    token: bool = True,
     open_browser: bool = False,
     on_ready: Callable[[BodyViewer], object] | None = None,
 ) -> None:
@@ -130,5 +134,5 @@ def show(
     -----
     The other parameters and the errors are those of `BodyViewer`, which does the same without waiting.
     """
-    viewer = BodyViewer(source, name=name, port=port, host=host, strict_port=strict_port)
+    viewer = BodyViewer(source, name=name, port=port, host=host, strict_port=strict_port, token=token)
     wait_until_interrupted(viewer, open_browser=open_browser, on_ready=on_ready)

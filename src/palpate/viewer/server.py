@@ -2,7 +2,7 @@
 
 `Viewer` is a context manager that starts all three and stops them; `serve` keeps one open until interrupted.
 The server runs in a thread with an event loop of its own, so both work in a script, in a notebook and on
-standard input. What page and server say to each other stands in `messages`, who may talk at all in `web_server`,
+standard input. What page and server say to each other stands in `messages`, who may talk at all in `guard`,
 and credits and heartbeats in `session`.
 """
 
@@ -81,6 +81,8 @@ class Viewer(LocalServer):
         Force limit, N; the device's own by default.
     strict_port : bool
         Whether a busy port is an error; otherwise the next free one is taken.
+    token : bool
+        Whether the page opens only with the token that stands in `url`; without, to every user of this machine.
 
     Attributes
     ----------
@@ -107,8 +109,9 @@ class Viewer(LocalServer):
         rate: float = 1000.0,
         max_force: float | None = None,
         strict_port: bool = False,
+        token: bool = True,
     ) -> None:
-        super().__init__(port, host, strict_port=strict_port)
+        super().__init__(port, host, strict_port=strict_port, token=token)
         self._source = model
         if isinstance(model, str | os.PathLike):
             self.model = load_touchable(model)
@@ -142,6 +145,7 @@ def serve(
     rate: float = 1000.0,
     max_force: float | None = None,
     strict_port: bool = False,
+    token: bool = True,
     open_browser: bool = False,
     on_ready: Callable[[Viewer], object] | None = None,
 ) -> None:
@@ -160,6 +164,13 @@ def serve(
     The other parameters and the errors are those of `Viewer`.
     """
     viewer = Viewer(
-        model, port=port, host=host, device=device, rate=rate, max_force=max_force, strict_port=strict_port
+        model,
+        port=port,
+        host=host,
+        device=device,
+        rate=rate,
+        max_force=max_force,
+        strict_port=strict_port,
+        token=token,
     )
     wait_until_interrupted(viewer, open_browser=open_browser, on_ready=on_ready)

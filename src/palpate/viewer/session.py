@@ -1,7 +1,8 @@
 """The pages of one server: credits, frames, heartbeats, and the end of the real-time process.
 
 One frame is composed per credit, at the moment it is sent, from the newest published tick. A page that grants
-nothing gets nothing; `MOST_CREDITS` bounds what it may have outstanding and `SHORTEST` how fast it may ask.
+nothing gets nothing; `MOST_CREDITS` bounds what it may have outstanding and `SHORTEST` how fast it may ask. Pages take
+turns (`traffic`), and a page is heard at most `MESSAGES` times a second: one that floods waits for itself alone.
 """
 
 from __future__ import annotations
@@ -10,7 +11,8 @@ import asyncio
 import contextlib
 import itertools
 import logging
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -24,6 +26,7 @@ from palpate.runtime.shared_state import Shared, State, now
 from palpate.viewer.hand_lock import Command, HandLock
 from palpate.viewer.messages import Credit, Frame, Hand, Hello, Loop, Notice
 from palpate.viewer.page_model import PageModel, vector
+from palpate.viewer.traffic import Bucket, Turns
 
 __all__ = ["LoopLike", "Page", "Session"]
 
@@ -34,13 +37,21 @@ SHORTEST = 1.0 / 125.0  # s between frames to one page: no display that matters 
 STALE = 0.25  # s without a tick until the loop counts as frozen
 WATCH = 0.1  # s between looks at the real-time process
 GRACE = 0.5  # s; a signal that ends the whole program may reach the real-time process first
+MOST_PAGES = 32
+MESSAGES, MESSAGES_AT_ONCE = 1000.0, 250.0  # of a page, per second and at once; a display at 360 Hz needs 485
+SLICE = 0.02  # s; a page that is owed less than that is heard on
 MAX_U32 = 2**32 - 1
 _NO_FAULT = (Fault.NONE, Fault.INPUT_STALLED)
 
 ENDED = Notice(
     "The real-time process has ended: the force is zero and nothing moves any more.",
     "It was killed or failed; the terminal that serves this page may say more.",
-    "Start palpate again; this page finds the new server by itself.",
+    "Start palpate again and open the address that it prints; this page then finds the new server by itself.",
+)
+CROWDED = Notice(
+    f"{MOST_PAGES} pages look at this body already.",
+    "More would share the same pictures among them.",
+    "Close one; this page then finds its place by itself.",
 )
 
 
@@ -66,6 +77,7 @@ class Page:
 
     number: int
     socket: WebSocket
+    heard: Bucket
     credits: int = 0
     echo: float = 0.0  # ms, the page's clock
     histogram: np.ndarray | None = None  # of lateness, as of the frame before
@@ -86,20 +98,38 @@ class Page:
 
 
 class Session:
-    """A body, its real-time process and the pages that look at it."""
+    """A body, its real-time process and the pages that look at it.
 
-    def __init__(self, model: PageModel, loop: LoopLike) -> None:
-        self.model, self.loop = model, loop
+    Parameters
+    ----------
+    model : PageModel
+        The body as its pages see it.
+    loop : LoopLike
+        The real-time process.
+    clock : function
+        Time in s, for the pages' shares.
+    """
+
+    def __init__(
+        self, model: PageModel, loop: LoopLike, clock: Callable[[], float] = time.perf_counter
+    ) -> None:
+        self.model, self.loop, self._clock = model, loop, clock
         self._lock = HandLock(np.array([(r.low + r.high) / 2 for r in model.body.parameters]))
         self._pages: dict[int, Page] = {}
         self._numbers: Iterator[int] = itertools.count(1)
+        self._turns = Turns(SHORTEST, clock)
         self._ended = False
         self._state = loop.shared.read_state()
 
     async def talk(self, socket: WebSocket) -> None:
         """Hold one page's whole conversation."""
         await socket.accept()
-        page = Page(next(self._numbers), socket)
+        if len(self._pages) >= MOST_PAGES:
+            await socket.send_text(CROWDED.to_json())
+            await socket.close(1013)
+            return
+        heard = Bucket(MESSAGES, MESSAGES_AT_ONCE, self._clock)
+        page = Page(next(self._numbers), socket, heard)
         self._pages[page.number] = page
         with contextlib.suppress(WebSocketDisconnect):
             await socket.send_text(self.hello().to_json())
@@ -176,14 +206,18 @@ class Session:
         with contextlib.suppress(WebSocketDisconnect):
             while True:
                 await page.spend()
-                await page.socket.send_bytes(self.frame(page).pack())
-                await asyncio.sleep(SHORTEST)
+                async with self._turns.turn():
+                    picture = self.frame(page).pack()
+                await page.socket.send_bytes(picture)  # outside: a page that does not read holds nobody up
+                await asyncio.sleep(self._turns.pause(len(self._pages)))
 
     async def _listen(self, page: Page) -> None:
         """Take a page's messages until it leaves; bytes that are no message end the conversation."""
         try:
             while (data := (await page.socket.receive()).get("bytes")) is not None:
                 self._take(page, data)
+                if (debt := page.heard.take()) > SLICE:
+                    await asyncio.sleep(debt)
         except UsageError as error:
             logger.warning("a page was sent away: %s", error)
             await page.socket.close(1003, error.what)

@@ -1,20 +1,19 @@
-"""A web server for this machine alone: a free port, who may talk to it, and a thread of its own.
+"""A web server for this machine alone: a free port, a thread of its own, and the page's address in the browser.
 
-A server on 127.0.0.1 is still within reach of every web page that the user's browser has open. Two checks keep those
-out: the *Host* header must name this machine (a foreign name that was made to resolve to 127.0.0.1 is DNS rebinding),
-and a websocket's *Origin* must be the page that this server served. Both answer 403. The content security policy keeps
-the page itself from fetching or running anything from elsewhere.
+Who may talk to it stands in `guard`, how its pages share it in `traffic`.
 """
 
 from __future__ import annotations
 
 import contextlib
 import errno
-import logging
+import functools
+import html
 import os
 import signal
 import socket
 import sys
+import tempfile
 import threading
 import time
 import webbrowser
@@ -22,34 +21,30 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import Any, Self, TypeVar, cast
 
 import uvicorn
 from starlette.applications import Starlette
-from starlette.datastructures import Headers, MutableHeaders
-from starlette.middleware import Middleware
-from starlette.responses import PlainTextResponse
 from starlette.routing import BaseRoute, Mount
 from starlette.staticfiles import StaticFiles
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from palpate.errors import DeviceError, PortInUseError, UsageError
+from palpate.viewer.guard import LOOPBACK, Guard, Token
+from palpate.viewer.traffic import PatientHttp, PatientWebSocket, Waiting
 
 __all__ = [
-    "LOOPBACK",
     "STATIC",
     "TRIES",
-    "Guard",
     "LocalServer",
     "free_port",
     "listen",
     "local_application",
-    "refusal",
     "wait_until_interrupted",
+    "way_in",
 ]
 
-LOOPBACK = ("127.0.0.1", "localhost", "::1")
 TRIES = 50  # a machine with that many servers side by side wants to be told
+READ = 4096  # bytes that the system keeps of what a page sends and is not read yet; it may double them
 
 
 def listen(port: int, host: str = "127.0.0.1", *, strict: bool = False) -> socket.socket:
@@ -100,9 +95,11 @@ def _try(host: str, port: int) -> socket.socket | None:
     server = socket.socket(socket.AF_INET6 if host == "::1" else socket.AF_INET)
     if os.name == "posix":  # elsewhere it would let two servers share a port
         server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    # a connection inherits it: of a flood, little is parsed at once
+    server.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, READ)
     try:
         server.bind((host, port))
-        server.listen(64)
+        server.listen(BACKLOG)
     except OSError as error:
         server.close()
         if error.errno in {errno.EADDRINUSE, errno.EACCES}:
@@ -111,86 +108,14 @@ def _try(host: str, port: int) -> socket.socket | None:
     return server
 
 
-logger = logging.getLogger("palpate.viewer")
-
-HEADERS = {
-    "content-security-policy": "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
-    "img-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
-    "x-content-type-options": "nosniff",
-    "referrer-policy": "no-referrer",
-    "cross-origin-resource-policy": "same-origin",
-    "cross-origin-opener-policy": "same-origin",
-    "cache-control": "no-cache",  # a page of yesterday's version would speak yesterday's protocol
-}
-
-
-def refusal(kind: str, headers: Headers) -> str:
-    """Return why a request is refused, or "" where it is not.
-
-    Parameters
-    ----------
-    kind : str
-        ``"http"`` or ``"websocket"``.
-    headers : Headers
-        Of the request.
-    """
-    hosts = headers.getlist("host")
-    if len(hosts) != 1 or _hostname(hosts[0]) not in LOOPBACK:
-        return f"the host {', '.join(hosts) or 'not given'} is not this machine"
-    origins = headers.getlist("origin")
-    # a program can say what it likes, so a missing Origin gains it nothing; a browser always sends one
-    if kind == "websocket" and origins != [f"http://{hosts[0]}"]:
-        return f"the origin {', '.join(origins) or 'not given'} is not the viewer's own page"
-    return ""
-
-
-def _hostname(host: str) -> str:
-    """``localhost`` of ``localhost:8080``, ``::1`` of ``[::1]:8080``."""
-    if host.startswith("["):
-        return host[1:].partition("]")[0]
-    return host.partition(":")[0].lower()
-
-
-class Guard:
-    """ASGI middleware: refuses strangers with 403 and puts `HEADERS` on every answer."""
-
-    def __init__(self, app: ASGIApp) -> None:
-        self.app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer one connection."""
-        kind = scope["type"]
-        if kind not in {"http", "websocket"}:
-            await self.app(scope, receive, send)
-            return
-
-        async def with_headers(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                MutableHeaders(scope=message).update(HEADERS)
-            await send(message)
-
-        if reason := refusal(kind, Headers(scope=scope)):
-            logger.warning("refused: %s", reason)
-            await _refuse(kind, reason, scope, receive, with_headers)
-        else:
-            await self.app(scope, receive, with_headers)
-
-
-async def _refuse(kind: str, reason: str, scope: Scope, receive: Receive, send: Send) -> None:
-    if kind == "websocket":
-        await receive()
-        await send({"type": "websocket.close", "code": 1008, "reason": reason})  # before accepting: 403
-    else:
-        await PlainTextResponse(f"Refused: {reason}.\n", 403)(scope, receive, send)
-
-
 STATIC = Path(__file__).parent / "static"
 LARGEST_MESSAGE = 4096  # bytes from a page; a Hand with eight parameters has 79
 START = 10.0  # s until the server must listen
+BACKLOG = 32  # connections that are taken at once, between two looks at what pages sent
 
 
 def local_application(routes: Sequence[BaseRoute], **options: Any) -> Starlette:
-    """Return a web application of these routes and the built pages, behind the `Guard`.
+    """Return a web application of these routes and the built pages.
 
     Parameters
     ----------
@@ -200,7 +125,7 @@ def local_application(routes: Sequence[BaseRoute], **options: Any) -> Starlette:
         Of `Starlette`.
     """
     files = Mount("/", StaticFiles(directory=STATIC, html=True))
-    return Starlette(routes=[*routes, files], middleware=[Middleware(Guard)], **options)
+    return Starlette(routes=[*routes, files], **options)
 
 
 class LocalServer(ABC):
@@ -214,6 +139,8 @@ class LocalServer(ABC):
         ``127.0.0.1``, ``localhost`` or ``::1``: it serves this machine only.
     strict_port : bool
         Whether a busy port is an error; otherwise the next free one is taken.
+    token : bool
+        Whether a page must show the token that stands in `url`.
 
     Attributes
     ----------
@@ -221,15 +148,26 @@ class LocalServer(ABC):
         The port taken, once started.
     """
 
-    def __init__(self, port: int, host: str, *, strict_port: bool) -> None:
+    def __init__(self, port: int, host: str, *, strict_port: bool, token: bool) -> None:
         self.host, self.port = host, port
+        self._token = Token() if token else None
         self._wanted = (port, host, strict_port)
         self._closing = contextlib.ExitStack()
 
     @property
-    def url(self) -> str:
-        """The page's address."""
+    def address(self) -> str:
+        """The server's address, without the token: ``http://127.0.0.1:8080/``."""
         return f"http://{f'[{self.host}]' if ':' in self.host else self.host}:{self.port}/"
+
+    @property
+    def url(self) -> str:
+        """The page's address, with the token that opens it."""
+        return self.address if self._token is None else f"{self.address}?token={self._token.secret}"
+
+    @property
+    def cookies(self) -> dict[str, str]:
+        """The cookie that a browser shows after it has opened `url`, for programs in the page's place."""
+        return {} if self._token is None else {self._token.name: self._token.secret}
 
     @property
     @abstractmethod
@@ -256,6 +194,8 @@ class LocalServer(ABC):
             port, host, strict = self._wanted
             listener = self._closing.enter_context(listen(port, host, strict=strict))
             self.port = int(listener.getsockname()[1])
+            if self._token is not None:
+                self._token.name = f"palpate-{self.port}"
             self._serve(self._application(), listener)
         except BaseException:
             self.stop()
@@ -264,12 +204,15 @@ class LocalServer(ABC):
 
     def _serve(self, application: Starlette, listener: socket.socket) -> None:
         """Run the application in a thread of its own; return once it listens."""
+        http = functools.partial(PatientHttp, waiting=Waiting())
         server = uvicorn.Server(
             uvicorn.Config(
-                application,
+                Guard(application, self._token),
                 log_config=None,  # the program that embeds us decides on logging
                 access_log=False,
-                ws="websockets-sansio",
+                backlog=BACKLOG,
+                http=cast(type[PatientHttp], http),
+                ws=PatientWebSocket,
                 ws_max_size=LARGEST_MESSAGE,
                 ws_per_message_deflate=False,  # frames are small, and packing them would cost more than sending
                 timeout_graceful_shutdown=1,
@@ -331,12 +274,37 @@ def wait_until_interrupted(
     with _termination_interrupts(), contextlib.suppress(KeyboardInterrupt), server:
         if on_ready is None:
             sys.stderr.write(f"{server.url} shows {server.caption} Ctrl-C ends it.\n")
+            if not server.cookies:
+                sys.stderr.write(
+                    "Warning: this page asks for no token; every user and program of this machine can open it.\n"
+                )
             sys.stderr.flush()
         else:
             on_ready(server)
-        if open_browser:
-            webbrowser.open(server.url)
-        server.wait()
+        with way_in(server) if open_browser else contextlib.nullcontext(server.url) as way:
+            if open_browser:
+                webbrowser.open(way)
+            server.wait()
+
+
+@contextlib.contextmanager
+def way_in(server: LocalServer) -> Iterator[str]:
+    """Yield the address of a file that leads to the page and that only this user can read.
+
+    A browser is started with its address on a command line, which every user of the machine can see, the token in it
+    too.
+    """
+    # browsers that come as a snap see neither the temporary folder nor hidden ones
+    home = Path.home() if Path("/snap/bin").is_dir() else None
+    with tempfile.TemporaryDirectory(prefix="palpate-", dir=home) as folder:
+        file = Path(folder) / "open.html"
+        target = html.escape(server.url, quote=True)
+        file.write_text(
+            '<!doctype html><meta charset="utf-8"><meta name="referrer" content="no-referrer">'
+            f'<meta http-equiv="refresh" content="0; url={target}"><title>palpate</title>',
+            encoding="utf-8",
+        )
+        yield file.as_uri()
 
 
 @contextlib.contextmanager

@@ -151,12 +151,12 @@ def test_a_pipe_that_falls_silent_ends_and_what_came_is_kept(folder):
 def test_a_connection_to_a_real_process(folder):
     X, F = measured()
     with started(folder, "--port", "0", "--json") as process:
-        port = int(re.search(r"127\.0\.0\.1:(\d+)", process.stderr.readline())[1])
+        port, token = re.search(r"127\.0\.0\.1:(\d+); first line: (\S+)", process.stderr.readline()).groups()
         with (
-            socket.create_connection(("127.0.0.1", port), timeout=10) as sensor,
+            socket.create_connection(("127.0.0.1", int(port)), timeout=10) as sensor,
             sensor.makefile("rw") as talk,
         ):
-            talk.write(HELLO + lines(X[:30], F[:30]) + "1 2 3\n")
+            talk.write(f"{token}\n" + HELLO + lines(X[:30], F[:30]) + "1 2 3\n")
             talk.flush()
             assert talk.readline().startswith("ok")
             assert talk.readline().startswith("error line 32:")
@@ -214,3 +214,5 @@ def test_what_can_not_be_is_refused_with_its_reason(palpate, folder):
     silent = palpate("correct", model_, "--port", "0", "--wait", "0.1", "--out", out)
     assert (silent.code, "Nobody connected" in silent.err) == (3, True)
     assert "port 0" not in silent.err  # but the one that it took
+    open_ = palpate("correct", model_, "--port", "0", "--wait", "0.1", "--no-token", "--out", out)
+    assert "Warning: no token" in open_.err

@@ -323,7 +323,8 @@ def correct(
         typer.Option(
             min=0,
             max=65535,
-            help="Read lines from one connection to 127.0.0.1 at this port. 0: any free port.",
+            help="Read lines from one connection to 127.0.0.1 at this port. 0: any free port. "
+            "The first line must be the printed token.",
         ),
     ] = None,
     parameter: Annotated[
@@ -364,13 +365,21 @@ def correct(
         float, typer.Option(min=0.1, help="A stream ends after so many seconds without a line.")
     ] = 30.0,
     wait: Annotated[float, typer.Option(min=0.1, help="Seconds to wait for a connection.")] = 60.0,
+    token: Annotated[
+        bool,
+        typer.Option(
+            "--token/--no-token",
+            help="For --port: take lines only from who sends the printed token first. "
+            "Without a token every user of this machine can send.",
+        ),
+    ] = True,
     as_json: Json = False,
 ) -> None:
     """Correct a model by forces measured on a specimen, and print the error before and after."""
     from palpate.cli.correct_command import Source, correct_model
     from palpate.learning.correction import Discrepancy, Noise
 
-    source = Source(file, stdin, port, stall, wait)
+    source = Source(file, stdin, port, stall, wait, token)
     differs = Discrepancy(constant=constant, varying=varying, offset=offset)
     correct_model(
         model, source, out, parameter or [], differs, Noise(noise, relative, jitter), Console(as_json)

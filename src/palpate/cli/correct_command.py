@@ -48,6 +48,8 @@ class Source:
         For a file: "leave-out" or "refuse" rows in which a value is missing.
     options : mapping, optional
         For a file: how the table is written, as `palpate.tables.read_table` takes it.
+    token : bool
+        Whether a connection must begin with the token that is printed.
     """
 
     file: Path | None
@@ -57,6 +59,7 @@ class Source:
     wait: float
     missing: str = "leave-out"
     options: Mapping[str, Any] | None = None
+    token: bool = True
 
     def __post_init__(self) -> None:
         if (self.file is not None) + self.stdin + (self.port is not None) != 1:
@@ -125,9 +128,10 @@ def correct_model(
 
 
 def _streamed(corrector: Corrector, source: Source, console: Console) -> Correction:
-    def say(port: int) -> None:
-        # whoever feeds it must know the port, with --json too
-        print(f"listening on 127.0.0.1:{port}", file=sys.stderr, flush=True)  # noqa: T201
+    def say(port: int, token: str) -> None:
+        # whoever feeds it must know the port and the token, with --json too
+        asks = f"first line: {token}" if token else "Warning: no token; every user of this machine can send"
+        print(f"listening on 127.0.0.1:{port}; {asks}", file=sys.stderr, flush=True)  # noqa: T201
 
     def answer(text: str) -> None:
         print(text, file=sys.stderr, flush=True)  # noqa: T201
@@ -136,7 +140,7 @@ def _streamed(corrector: Corrector, source: Source, console: Console) -> Correct
         print(f"the stream ended: {why}; what had come is learnt from", file=sys.stderr, flush=True)  # noqa: T201
 
     if source.port is not None:
-        with listening(source.port, source.wait, say) as other:
+        with listening(source.port, source.wait, say, token=source.token) as other:
             lines = measurements(other.lines(source.stall, ended), other.answer)
             return _learnt(corrector, lines, console)
     # a descriptor of its own: at exit Python waits for a thread that still reads sys.stdin

@@ -10,7 +10,8 @@
 `wire`             how those dataclasses become bytes; `typescript`: how they become TypeScript
 `body_viewer`      `show` and `BodyViewer`: the page of a solved body
 `shown_body`       that body as plain arrays, of solutions, VTU, PVD or datasets
-`web_server`       a server for this machine alone: port, Host and Origin rules, a thread of its own
+`web_server`       a server for this machine alone: its port, its thread, the page's way into the browser
+`guard`            who is let in: Host, Origin and token; `traffic`: fair shares, rates, limits of connections
 ``client/``        the page's sources (TypeScript, three.js); ``static/`` is what they build to
 =================  ====================================================================================
 

@@ -102,7 +102,7 @@ def served(stall=5.0, wait=5.0):
 
     def serve():
         try:
-            with listening(0, wait, ports.put) as connection:
+            with listening(0, wait, lambda port, _: ports.put(port), token=False) as connection:
                 found.put(list(measurements(connection.lines(stall), connection.answer)))
         except DeviceError as error:
             found.put(error)
@@ -164,9 +164,9 @@ def test_only_this_machine_is_listened_to_and_a_busy_port_is_named():
         other.bind(("127.0.0.1", 0))
         other.listen(1)
         port = other.getsockname()[1]
-        with pytest.raises(PortInUseError, match=str(port)), listening(port, 1.0, lambda _: None):
+        with pytest.raises(PortInUseError, match=str(port)), listening(port, 1.0, lambda *_: None):
             pass
-    with pytest.raises(UsageError), listening(70000, 1.0, lambda _: None):
+    with pytest.raises(UsageError), listening(70000, 1.0, lambda *_: None):
         pass
     _, found, _ = served(wait=0.2)
     assert "Nobody connected" in str(found.get(timeout=5))

@@ -1,4 +1,4 @@
-"""Measurements from a live sensor: lines of text from a pipe or from one TCP connection of this machine.
+"""Measurements from a live sensor: lines of text from a pipe or from a TCP connection (`sensor_port`).
 
 The protocol has one measurement a line::
 
@@ -19,8 +19,6 @@ and answered as such. A last line without its end is dropped.
 from __future__ import annotations
 
 import contextlib
-import errno
-import os
 import queue
 import select
 import socket
@@ -29,14 +27,13 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import BinaryIO
 
 from palpate.dataset.measured.measured_columns import Columns, Measured
-from palpate.errors import DeviceError, PortInUseError, UsageError
+from palpate.errors import UsageError
 
 __all__ = [
     "VERSION",
     "Connection",
     "greeting",
     "lines_of",
-    "listening",
     "measurements",
 ]
 
@@ -122,63 +119,6 @@ class Connection:
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
         self._socket.close()
-
-
-@contextlib.contextmanager
-def listening(port: int, wait: float, announce: Callable[[int], None]) -> Iterator[Connection]:
-    """Wait for the first connection to a port of this machine and yield it; a context manager.
-
-    Parameters
-    ----------
-    port : int
-        Port on 127.0.0.1; 0 takes any free one.
-    wait : float
-        Seconds until someone must have connected.
-    announce : function of the port
-        Called once it listens.
-
-    Raises
-    ------
-    PortInUseError
-        If another program listens there.
-    DeviceError
-        If nobody connects in time.
-    UsageError
-        If there is no such port.
-    """
-    if not 0 <= port <= 65535:
-        raise UsageError(f"There is no port {port}.", fix="Choose one from 1024 to 65535, or 0 for any.")
-    with socket.socket() as server:
-        if os.name == "posix":  # elsewhere it would let two servers share a port
-            server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        _bind(server, port)
-        server.settimeout(wait)
-        announce(int(server.getsockname()[1]))
-        try:
-            other, _ = server.accept()
-        except TimeoutError:
-            raise DeviceError(
-                f"Nobody connected to port {server.getsockname()[1]} within {wait:g} s.",
-                fix="Start the sensor's script meanwhile, or wait longer.",
-            ) from None
-    other.settimeout(None)
-    connection = Connection(other)
-    try:
-        yield connection
-    finally:
-        connection.close()
-
-
-def _bind(server: socket.socket, port: int) -> None:
-    try:
-        server.bind(("127.0.0.1", port))
-        server.listen(1)
-    except OSError as error:
-        if error.errno in {errno.EADDRINUSE, errno.EACCES}:
-            raise PortInUseError(
-                f"Port {port} is in use.", why=str(error), fix="Choose another one; 0 takes any that is free."
-            ) from error
-        raise
 
 
 def measurements(lines: Iterable[str], answer: Callable[[str], None]) -> Iterator[Measured]:

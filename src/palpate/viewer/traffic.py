@@ -25,7 +25,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import Frame
 
-__all__ = ["Bucket", "PatientHttp", "PatientWebSocket", "Turns", "Waiting"]
+__all__ = ["Bucket", "Closable", "PatientHttp", "PatientWebSocket", "Turns", "Waiting"]
 
 Clock = Callable[[], float]
 

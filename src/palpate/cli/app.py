@@ -379,7 +379,7 @@ def correct(
     from palpate.cli.correct_command import Source, correct_model
     from palpate.learning.correction import Discrepancy, Noise
 
-    source = Source(file, stdin, port, stall, wait, token)
+    source = Source(file, stdin, port, stall, wait, token=token)
     differs = Discrepancy(constant=constant, varying=varying, offset=offset)
     correct_model(
         model, source, out, parameter or [], differs, Noise(noise, relative, jitter), Console(as_json)

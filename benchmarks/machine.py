@@ -8,7 +8,7 @@ import platform
 from importlib import metadata
 from pathlib import Path
 
-__all__ = ["machine_line", "machine_record"]
+__all__ = ["gigabytes", "machine_line", "machine_record"]
 
 _LIBRARIES = ("palpate", "ngsolve", "numpy", "scipy", "numba", "scikit-learn", "dask", "distributed")
 
@@ -61,3 +61,9 @@ def _version(name: str) -> str:
 
             return palpate.__version__
         return "not installed"
+
+
+def gigabytes(name: str) -> float:
+    """A figure of this process' memory by Linux's name for it, GB."""
+    lines = Path("/proc/self/status").read_text(encoding="utf-8").splitlines()
+    return next((float(line.split()[1]) / 1e6 for line in lines if line.startswith(f"{name}:")), 0.0)

@@ -28,6 +28,7 @@ BENCHMARKS = (
     "peers",
     "refinement",
     "runtime",
+    "scale",
     "stability",
     "surrogates",
     "sweep",

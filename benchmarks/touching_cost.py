@@ -10,11 +10,11 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from benchmarks.machine import gigabytes
 from benchmarks.runner import main
 from benchmarks.table import Claim, Column, Table
 from benchmarks.touching import HEIGHT, RADIUS, block, probe
@@ -120,8 +120,8 @@ def measured(form: str, size: float, depths: Sequence[float]) -> dict[str, Any]:
         "size": 1e3 * size,
         **_operations(problem),
         **_samples(problem, depths),
-        "memory": _gigabytes("VmHWM"),  # ru_maxrss would count the parent's too, from before the exec
-        "swap": _gigabytes("VmSwap"),
+        "memory": gigabytes("VmHWM"),  # ru_maxrss would count the parent's too, from before the exec
+        "swap": gigabytes("VmSwap"),
     }
 
 
@@ -161,12 +161,6 @@ def _samples(problem: Any, depths: Sequence[float]) -> dict[str, float]:
         "tangents": float(np.mean([solution.iterations + 1 for solution in found])),
         "converged": float(np.mean([solution.converged for solution in found])),
     }
-
-
-def _gigabytes(name: str) -> float:
-    """A figure of this process' memory by Linux's name for it, GB."""
-    lines = Path("/proc/self/status").read_text(encoding="utf-8").splitlines()
-    return next((float(line.split()[1]) / 1e6 for line in lines if line.startswith(f"{name}:")), 0.0)
 
 
 def _run(arguments: Sequence[str]) -> int:

@@ -128,6 +128,13 @@ def test_copies_of_a_row_are_in_one_part():
     np.testing.assert_array_equal(learn.astype(int) + parts.decide + parts.judge, 1)
 
 
+@pytest.mark.parametrize("places", [3, 200])
+def test_rows_at_few_places_are_dealt_one_by_one(places):
+    parts = RowParts.of(np.random.default_rng(0).integers(places, size=12_000), seed=1)
+    assert (parts.decide.sum(), parts.judge.sum()) == (1200, 1200)
+    assert len(parts.learn) == 9600
+
+
 def test_all_rows_make_a_better_network_than_some(many):
     fitted, X, y = many
     asked, _ = rows_of(4000, seed=9)

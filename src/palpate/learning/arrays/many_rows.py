@@ -34,7 +34,6 @@ from palpate.learning.arrays.streamed_weights import (
     solve_weights,
     step_work,
 )
-from palpate.learning.folds import held_out
 from palpate.learning.kernel_layer import CENTRES_MAX, Metric
 from palpate.learning.search import Candidate, Trial, Work
 from palpate.rbf.forms import Centred
@@ -51,6 +50,7 @@ SUBSET = 5_000
 
 _FEW = 4 * SUBSET  # rows on which units take their first steps
 _SHARE, _MOST_HELD = 0.1, 4_000  # of the rows, to decide by; as many again measure the error
+_FEWEST_PLACES = 50  # that each of these parts has
 _MOST_NUMBERS = 2_500  # unknowns of units that move together: their matrix is 50 MB
 _STEPS, _FEWEST_STEPS = 15, 2  # on one number of rows
 _START_STEPS = 20  # of units that are added, by themselves
@@ -101,11 +101,18 @@ class RowParts:
 
     @classmethod
     def of(cls, places: np.ndarray, seed: int) -> RowParts:
-        """Deal out rows of places (N,); copies of one place stay together."""
-        share = min(_SHARE, _MOST_HELD / len(places))
-        order, decide = held_out(places, share, seed=seed)
-        judge = held_out(places, share, seed=seed, fold=1)[1] & ~decide
-        return cls(order[~judge[order]], decide, judge)
+        """Deal out rows of places (N,): copies of one place stay together, unless most rows are at few places."""
+        wanted, rng = min(_SHARE * len(places), _MOST_HELD), np.random.default_rng(seed)
+        sizes = np.bincount(places)
+        dealt = rng.permutation(len(sizes))
+        dealt = dealt[sizes[dealt] <= wanted / _FEWEST_PLACES]
+        if sizes[dealt].sum() < len(places) / 2:
+            places, sizes, dealt = np.arange(len(places)), np.ones(len(places)), rng.permutation(len(places))
+        ends = np.searchsorted(np.cumsum(sizes[dealt]), (wanted, 2 * wanted), side="right")
+        part = np.zeros(len(sizes), dtype=int)
+        part[dealt[: ends[0]]], part[dealt[ends[0] : ends[1]]] = 1, 2
+        own, order = part[places], rng.permutation(len(places))
+        return cls(order[own[order] == 0], own == 1, own == 2)
 
 
 class ManyRows:
@@ -153,7 +160,7 @@ class ManyRows:
         """Return the result for a structure; new units start as wide as scales (n,) say."""
         best, form = self._moved(structure, scales), None if structure.units.theta.size else "affine"
         ridge, error = self._ridge(best)
-        if structure.metric is not None and structure.mark < error:
+        if structure.metric is not None and self.target < error and structure.mark < error:
             self.work = self.work.extended(_KERNEL_WORK * self.work.spent, self.deadline)
             layer = self._kernel_layer(structure.metric)
             own_ridge, missed = self._ridge(layer)

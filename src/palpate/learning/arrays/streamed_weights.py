@@ -27,7 +27,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from palpate.network.network_kernels import pattern, regressor_rows_into
 from palpate.network.radial import HEAD, RADIAL_FUNCTIONS, RadialFunction, constants
-from palpate.rbf.refinement.levenberg import DAMPING, MORE, DampedSystem, bounded_step, next_damping
+from palpate.rbf.refinement.levenberg import MORE, DampedSystem, bounded_step, next_damping
 from palpate.rbf.regressors import Regressors
 
 __all__ = [
@@ -48,6 +48,7 @@ _BLOCK = 2_000_000
 _MOST_ROWS = 8192
 _TAIL_RIDGE = 1e-24  # of round-off's size, so that an input that never changes leaves an inverse
 _FUNCTIONS = 60  # multiplications that an entry of the derivatives takes as long as
+_TRIES = 8  # dampings, each four times the last
 _NO_GAIN = 1e-5  # of the cost: a step that gains less is the last
 
 
@@ -352,7 +353,7 @@ def newton_steps(stream: RowStream, start: UnitFit, *, damping: float = 1e-2) ->
     fit = start
     while fit.theta.size:
         system = DampedSystem(*_gauss_newton(stream, fit))
-        while True:
+        for _ in range(_TRIES):
             step = system.step(damping)
             if step is not None:
                 step = bounded_step(fit.regressors.form, fit.theta, step.reshape(fit.theta.shape))
@@ -360,8 +361,8 @@ def newton_steps(stream: RowStream, start: UnitFit, *, damping: float = 1e-2) ->
                 if new.cost < fit.cost:
                     break
             damping *= MORE
-            if damping > DAMPING[1]:
-                return
+        else:
+            return
         gain = fit.cost - new.cost
         damping = next_damping(damping, gain / max(system.predicted_gain(step.ravel()), 1e-300))
         fit = new
@@ -385,6 +386,8 @@ def _gauss_newton(stream: RowStream, fit: UnitFit) -> tuple[np.ndarray, np.ndarr
 
     descent, B, G = stream.sums(of_block, h * p)
     G -= B.T @ cho_solve(fit.moments.factor(fit.ridge, tail), B, check_finite=False)
+    diagonal = np.diag_indices(h * p)
+    G[diagonal] = np.maximum(G[diagonal], 0.0)  # where rounding left less than nothing
     blocks = G.reshape(h, p, h, p)
     blocks *= (W @ W.T)[:, None, :, None]
     return np.asfortranarray(G.astype(np.float32)), descent

@@ -83,9 +83,9 @@ def settled(page: Page, flag: str = "") -> dict[str, Any]:
 
 
 def let_go(page: Page) -> dict[str, Any]:
-    """What the page shows once nobody holds the body; it may still swing."""
-    page.wait_for_selector("#flags [data-flag=free]")
-    return page.evaluate(READ)
+    """What the page shows once nobody holds the body and that is all it says; the body may still swing."""
+    free = f"() => {{ const shown = ({READ})(); return shown.flags.join() === 'free' && shown; }}"
+    return page.wait_for_function(free).json_value()
 
 
 def drag(page: Page, dx: float, dy: float, steps: int = 6) -> None:

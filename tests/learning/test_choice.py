@@ -56,13 +56,13 @@ def cubic_error(X, Y, X_test, Y_test):
 @pytest.fixture(scope="module")
 def ridge_fit():
     data = samples(ridges)
-    return fit(*data[:2], INPUTS, OUTPUTS, effort=0.5), data
+    return fit(*data[:2], INPUTS, OUTPUTS, effort=0.25), data
 
 
 @pytest.fixture(scope="module")
 def bump_fit():
     data = samples(rotated_bumps)
-    return fit(*data[:2], INPUTS, OUTPUTS, effort=0.5), data
+    return fit(*data[:2], INPUTS, OUTPUTS, effort=0.25), data
 
 
 def test_ridges_are_learnt_by_ridges(ridge_fit):

@@ -207,7 +207,7 @@ def learnt(surface):
         choose=False,
         units_max=32,
         target=0.0,
-        effort=0.5,
+        effort=0.25,
         form="rotated",
         radial="inverse-multiquadric",
     )
@@ -332,7 +332,7 @@ def test_the_probes_radius_may_be_an_input(surface):
     np.testing.assert_allclose(slopes, 0.5 / X[:, 3] * 1e-3, rtol=1e-6)
     given = np.where(np.arange(4) < 3, response, np.nan)  # as finite elements tell it
     kind = {"choose": False, "form": "axis-aligned", "radial": "gaussian"}
-    s, _ = learn_energy(solves(X, U, given, K, inputs=inputs), baseline, **kind, units_max=12, effort=0.3)
+    s, _ = learn_energy(solves(X, U, given, K, inputs=inputs), baseline, **kind, units_max=12, effort=0.15)
     assert s.baseline.radius_input == 3
     X, U, response, _ = sized(100, 6)
     size = np.linalg.norm(response[:, :3], axis=1)

@@ -142,7 +142,7 @@ def test_rigid_fields_whose_coefficients_are_affine_are_found_exactly(face):
     values = 1e-3 * np.tensordot(f[:, None] * b, shapes, 1)
     known = {"points": points, "triangles": triangles, "surface": surface, "radius": RADIUS, "inputs": BOX}
     learnt = learn_field(
-        X, values, **known, tolerance=1e-12, moving=False, groups=column, units_max=4, effort=0.5
+        X, values, **known, tolerance=1e-12, moving=False, groups=column, units_max=4, effort=0.2
     )
     assert learnt.field.amplitude.name == "square"
     assert len(learnt.field.modes) == 4
@@ -189,7 +189,7 @@ def test_a_dimple_alone_needs_no_modes(face, components):
 
     more = {**known, "triangles": triangles, "radius": RADIUS, "inputs": BOX, "groups": column}
     errors = [
-        learn_field(X, dimples(X), **more, moving=t, amplitude="square", effort=0.5, units_max=2)
+        learn_field(X, dimples(X), **more, moving=t, amplitude="square", effort=0.2, units_max=2)
         .field.errors(new, dimples(new))
         .mean()
         for t in (True, False)
@@ -212,7 +212,7 @@ def test_a_dimple_that_differs_from_place_to_place_is_learnt(face, components):
     X, column = columns(30)
     new, _ = columns(12, seed=1)
     known = {"surface": surface, "points": points, "triangles": triangles, "radius": RADIUS, "inputs": BOX}
-    learnt = learn_field(X, dimples(X), **known, groups=column, amplitude="square", effort=0.5, units_max=2)
+    learnt = learn_field(X, dimples(X), **known, groups=column, amplitude="square", effort=0.2, units_max=2)
     assert learnt.field.local_mode.variation is not None
     assert "a local mode that varies" in str(learnt.field)
     fixed = replace(learnt.field, local_mode=replace(learnt.field.local_mode, variation=None))
@@ -230,10 +230,10 @@ def test_a_dimple_that_is_the_same_everywhere_does_not_vary(face):
     values = 1e-3 * np.where(rho < 1, (1 - rho**2) ** 4, 0.0) * (s**2)[:, None]
     values += rng.normal(0.0, 1e-5, values.shape)  # what no place tells
     known = {"surface": surface, "points": points, "triangles": triangles, "radius": RADIUS, "inputs": BOX}
-    learnt = learn_field(X, values, **known, groups=column, amplitude="square", effort=0.5, units_max=2)
+    learnt = learn_field(X, values, **known, groups=column, amplitude="square", effort=0.2, units_max=2)
     assert learnt.field.local_mode.variation is None
     alone = learn_field(
-        X, values, **known, groups=np.zeros(len(X)), amplitude="square", effort=0.5, units_max=2
+        X, values, **known, groups=np.zeros(len(X)), amplitude="square", effort=0.2, units_max=2
     )
     assert alone.field.local_mode.variation is None, "nothing can be left out"
 
@@ -295,7 +295,7 @@ def test_what_travels_is_learnt_at_the_nodes_that_it_was_solved_on(face):
     new, _ = columns(12, seed=1)
     mass = lumped_mass(points, triangles)
     known = {"inputs": BOX, "points": points, "triangles": triangles, "surface": surface, "radius": RADIUS}
-    known |= {"amplitude": "linear", "effort": 0.5, "units_max": 2, "mass": mass}
+    known |= {"amplitude": "linear", "effort": 0.2, "units_max": 2, "mass": mass}
     own = Snapshots(
         X, dimples(X, solved)[..., None], column, solved, lumped_mass(solved, triangles), triangles
     )
@@ -353,7 +353,7 @@ def test_without_contact_nothing_moves_and_the_file_and_record_are_whole(face):
     values = 1.0 + rng.normal(size=(15, len(points))) * 1e-3
     learnt = learn_field(
         X, values, points=points, triangles=triangles, surface=surface, radius=RADIUS, inputs=BOX, groups=column,
-        name="largest stretch", unit="", rest=np.ones((len(points), 1)), effort=0.5, units_max=2,
+        name="largest stretch", unit="", rest=np.ones((len(points), 1)), effort=0.2, units_max=2,
     )  # fmt: skip
     F = learnt.field
     assert (F.values(np.array([[0.0, 0, RADIUS], [0, 0, 1.0]])) == 1.0).all()
@@ -389,7 +389,7 @@ def test_a_pressed_block_is_seen_within_stated_errors():
     top = np.abs(data.rest[data.triangles][:, :, 2] - 0.03).max(axis=1) < 1e-9
     surface = TouchedSurface.of(data.rest, data.triangles[top], radius=RADIUS)
     train, test = data.take(np.arange(12)), data.take(np.arange(12, len(data)))
-    learnt = learn_displacement(train, surface=surface, radius=RADIUS, effort=0.5)
+    learnt = learn_displacement(train, surface=surface, radius=RADIUS, effort=0.2)
     nodes = np.unique(data.triangles)
     errors = learnt.field.errors(test.X, test.displacement[:, nodes])
     assert np.abs(test.displacement).max() > 1e-3  # it was pressed

@@ -125,16 +125,17 @@ def test_what_is_no_region_is_refused():
         TrainedRegion(np.zeros((3, 2)), -1.0)
 
 
-def test_a_query_costs_microseconds():
+def test_a_query_costs_less_than_the_distances_by_numpy():
     region = TrainedRegion.of(np.random.default_rng(0).uniform(-1, 1, (2000, 6)))
     x = np.zeros(6)
-    region.inside(x)
-    times = []
+    queries = {"region": lambda: region.inside(x), "NumPy": lambda: ((region.points - x) ** 2).sum(axis=1)}
+    least = dict.fromkeys(queries, np.inf)
     for _ in range(200):
-        began = time.perf_counter()
-        region.inside(x)
-        times.append(time.perf_counter() - began)
-    assert min(times) < 20e-6  # 2 µs on an idle machine
+        for name, query in queries.items():
+            began = time.perf_counter()
+            query()
+            least[name] = min(least[name], time.perf_counter() - began)
+    assert least["region"] < least["NumPy"]  # 2 of 15 µs
 
 
 def test_a_region_of_very_many_inputs_holds_them_all():

@@ -13,6 +13,8 @@ import pytest
 from palpate.errors import UsageError
 from palpate.sweeps import local_cluster
 
+pytestmark = pytest.mark.slow  # programs and their worker processes
+
 SCRIPT = """
 from palpate.physics import Cantilever, Circle, LinearElastic, TipLoad
 from palpate.sweeps import sweep

@@ -79,6 +79,7 @@ def test_the_integral_equation_agrees_with_a_later_series_closer_to_the_ground()
         assert exact(0.5, chi) == pytest.approx(garcia(chi), rel=3e-3)
 
 
+@pytest.mark.slow
 def test_on_a_compressible_layer_the_ground_adds_what_theory_says():
     force = pressed(0.3, 0.2)
     assert force == pytest.approx(dimitriadis(0.3, 0.2), rel=0.02)

@@ -16,7 +16,7 @@ from palpate.viewer import BodyViewer
 from palpate.viewer.shown_body import ShownBody, ShownStep
 from palpate.viewer.web_server import way_in
 
-pytestmark = pytest.mark.timeout(120)
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
 
 
 @pytest.fixture(scope="module")
@@ -118,7 +118,6 @@ def test_layers_scale_keys_and_turning(body_page: Page, keep):
     assert np.mean(np.abs(canvas_pixels(page) - still) > 0.05) < 0.01
 
 
-@pytest.mark.slow
 def test_playing_goes_round(body_page: Page):
     body_page.click("#play")
     for step in (2, 5, 1):

@@ -20,7 +20,7 @@ from palpate.units import Quantity, Range
 from palpate.viewer import Viewer, hand_lock
 from websocket_page import client_of
 
-pytestmark = pytest.mark.timeout(120)
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
 
 
 def test_a_finger_pulls(visit, keep, viewer: Viewer, rod: Surrogate):
@@ -91,7 +91,6 @@ def test_the_second_page_watches(visit, keep, viewer: Viewer, rod: Surrogate):
     assert let_go(page)["flags"] == ["free"]
 
 
-@pytest.mark.slow
 def test_the_end_of_the_loop_is_shown_and_the_page_returns(visit, keep, complaints, rod: Surrogate):
     with Viewer(rod, port=0) as viewer:
         page = visit(viewer)

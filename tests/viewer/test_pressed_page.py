@@ -16,7 +16,7 @@ from palpate.surrogates import Surrogate
 from palpate.viewer import Viewer
 from palpate.viewer.surface_drawing import SurfaceDrawing
 
-pytestmark = pytest.mark.timeout(180)
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(180)]
 
 
 @pytest.fixture(scope="module")
@@ -104,7 +104,6 @@ def test_holding_the_button_presses_and_the_numbers_are_the_surrogates(page: Pag
     assert float(released["data"]["largest"]) == 0.0, "back at rest"
 
 
-@pytest.mark.slow
 def test_moving_slides_the_probe_at_its_depth(page: Page, slab: Surrogate):
     x, y = middle(page)
     page.mouse.move(x, y + 10)
@@ -116,7 +115,6 @@ def test_moving_slides_the_probe_at_its_depth(page: Page, slab: Surrogate):
     assert after[0, 2] == pytest.approx(before[0, 2], abs=1e-5)
 
 
-@pytest.mark.slow
 def test_the_wheel_presses_deeper_and_beyond_the_training_says_so(page: Page, keep, slab: Surrogate):
     x, y = middle(page)
     page.mouse.move(x, y + 10)
@@ -133,7 +131,6 @@ def test_the_wheel_presses_deeper_and_beyond_the_training_says_so(page: Page, ke
     page.locator("#depth-wanted").fill(str(shallow))
 
 
-@pytest.mark.slow
 def test_space_presses_arrows_slide_and_escape_lets_go(page: Page, slab: Surrogate):
     page.focus("#view")
     page.keyboard.down("Space")
@@ -172,7 +169,6 @@ def test_beside_the_touched_surface_the_view_turns_instead(page: Page):
     assert middle(page) == pytest.approx((x, y), abs=0.5)
 
 
-@pytest.mark.slow
 def test_colours_are_chosen_with_their_own_scale(page: Page, keep, slab: Surrogate):
     assert page.inner_text("#legend-title") == "displacement (mm)"
     x, y = middle(page)
@@ -243,7 +239,6 @@ def test_a_print_stays_on_the_page_when_the_hand_has_gone(browser: Browser, keep
     assert_no([c for c in complaints if "WebSocket" not in c])
 
 
-@pytest.mark.slow
 def test_a_surrogate_alone_says_that_its_surface_does_not_move(browser: Browser, keep):
     complaints: list[str] = []
     alone = pressed.surrogate()

@@ -82,7 +82,7 @@ def test_a_stream_ends_when_it_closes_and_when_it_is_silent():
         os.write(writing, b"one\n")
         began = time.monotonic()
         assert list(lines_of(stream, 0.3)) == ["one"]
-        assert 0.25 < time.monotonic() - began < 3.0
+        assert time.monotonic() - began > 0.25
         os.close(writing)  # lets the reading thread end
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -58,16 +60,22 @@ def palpate(capsys) -> Palpate:
 
 @pytest.fixture(scope="session")
 def carried_out(tmp_path_factory) -> Path:
-    """Folder of a study that was swept and learnt through the command line; tests copy what they change."""
+    """Folder of a study that was swept and learnt through the command line; tests copy what they change.
+
+    What `learn` said is in `learn.out` and `learn.err`.
+    """
     folder = tmp_path_factory.mktemp("study")
     (folder / "study.toml").write_text(SMALL, encoding="utf-8")
     here = Path.cwd()
     os.chdir(folder)  # the default study file is the one in the present folder
     try:
         for command in ("sweep", "learn"):
-            with pytest.raises(SystemExit) as stop:
+            out, err = io.StringIO(), io.StringIO()
+            with redirect_stdout(out), redirect_stderr(err), pytest.raises(SystemExit) as stop:
                 main([command])
-            assert not stop.value.code
+            assert not stop.value.code, err.getvalue()
+        Path("learn.out").write_text(out.getvalue(), encoding="utf-8")
+        Path("learn.err").write_text(err.getvalue(), encoding="utf-8")
     finally:
         os.chdir(here)
     return folder

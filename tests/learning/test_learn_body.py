@@ -272,6 +272,7 @@ def test_a_beam_is_still_learnt_as_a_beam():
     assert touch.energy.baseline.holds
 
 
+@pytest.mark.slow
 def test_a_family_of_bodies_is_learnt_as_one():
     """Elements of a body and of its family: modulus and probe's radius become inputs of what is touched."""
     data = solved("family")

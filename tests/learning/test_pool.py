@@ -90,6 +90,7 @@ def _end(number):
     time.sleep(0.5)
 
 
+@pytest.mark.slow
 def test_errors_of_the_work_come_back():
     with pytest.raises(UsageError, match="no such number"):
         Pool(2).map(_refuse, range(2))

@@ -85,6 +85,7 @@ def test_an_unknown_device_is_a_usage_error(rod: Surrogate):
         Viewer(rod, port=0, device="gloves").start()
 
 
+@pytest.mark.slow
 def test_after_a_failed_start_nothing_is_left(rod: Surrogate):
     with Viewer(rod, port=0) as first:
         second = Viewer(rod, port=first.port, strict_port=True)

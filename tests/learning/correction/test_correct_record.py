@@ -66,6 +66,7 @@ def test_errors_left_out_are_those_of_new_measurements():
     assert correct(Surrogate(S), record(X[:5], specimen.force(X[:5]))).left_out is None
 
 
+@pytest.mark.slow
 def test_units_that_are_wrong_by_a_thousand_are_suspicious():
     S = model()
     X = touches(30, 3)

@@ -97,6 +97,7 @@ def test_a_sweep_over_a_family_is_a_dataset_like_any() -> None:
     assert row["potential_energy"][0] == pytest.approx(again.potential_energy, rel=1e-7)
 
 
+@pytest.mark.slow
 def test_layers_of_other_thickness_have_the_same_elements_moved() -> None:
     family = BodyFamily(layered(), Varied("fat.thickness", 0.010, 0.020))
     whole = family.problem(PROBE, element=0.008)
@@ -164,6 +165,7 @@ def test_what_can_not_vary_is_said() -> None:
     assert isinstance(problem().member((4e3, 0.4)), SolidProblem)
 
 
+@pytest.mark.slow
 def test_stress_is_in_every_row_that_asks_for_it() -> None:
     """Of a body and of a family; which questions are asked of a problem is part of its identity."""
     for whole, places in ((layered(), (CENTRE,)), (FAMILY, ((*CENTRE, 5e3, 0.4),))):

@@ -293,6 +293,8 @@ def test_declared_inputs_are_matched_to_the_columns_of_their_name(tabular):
     ranges = [palpate.Range("speed", 0.0, 1.0, "m/s"), palpate.Range("depth", 0.0, 10.0, "mm")]
     named = palpate.fit(table, y, inputs=ranges, effort=0.02)
     np.testing.assert_array_equal(named.predict(table), named.predict(table[["speed", "depth"]].to_numpy()))
+    bare = palpate.fit(table[["speed", "depth"]].to_numpy(), y, inputs=ranges, effort=0.02)
+    np.testing.assert_array_equal(bare.predict(table), named.predict(table))
     other = [palpate.Range("d", 0.0, 10.0, "mm"), palpate.Range("v", 0.0, 1.0, "m/s")]
     renamed = palpate.fit(table, y, inputs=other, effort=0.02)
     np.testing.assert_array_equal(

@@ -14,6 +14,18 @@ from typing import Annotated
 import typer
 
 from palpate.cli.console import Console, advice_in_words
+from palpate.cli.table_commands import correct, fit
+from palpate.cli.table_options import (
+    DecimalOption,
+    EncodingOption,
+    HeaderOption,
+    Json,
+    LastOption,
+    SeparatorOption,
+    SheetOption,
+    UnitOption,
+    reading_options,
+)
 from palpate.errors import AccuracyError, PalpateError, UsageError
 from palpate.files import explain_system_error, write_file
 from palpate.processes import CASE_LIMIT, end_by_sigterm
@@ -36,7 +48,6 @@ StudyFile = Annotated[Path, typer.Argument(help="Study file, as [bold]palpate in
 ModelFile = Annotated[
     Path, typer.Argument(help="Model file (.palpate), as [bold]palpate learn[/] writes it.")
 ]
-Json = Annotated[bool, typer.Option("--json", help="Print the results as one JSON object.")]
 Workers = Annotated[
     int | None, typer.Option(min=1, help="Number of worker processes. Default: one per core.")
 ]
@@ -283,12 +294,36 @@ def ask(
             help="Values of all inputs in SI units, with commas between: 0.05,0.05,0.055. Can be given several times."
         ),
     ] = None,
+    table: Annotated[
+        Path | None, typer.Option(help="Table whose rows are asked for; its columns are matched by name.")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("-o", "--out", help="For --table: file for the answers, as CSV. Default: stdout."),
+    ] = None,
+    encoding: EncodingOption = None,
+    separator: SeparatorOption = None,
+    decimal: DecimalOption = None,
+    header: HeaderOption = None,
+    last: LastOption = None,
+    sheet: SheetOption = None,
+    unit: UnitOption = None,
     as_json: Json = False,
 ) -> None:
-    """Print what a model file holds, or the force, the stiffness and the trust at given places."""
-    from palpate.cli.ask_command import ask as ask_model
+    """Print what a model file holds, or its answers at given places or at all rows of a table."""
+    reading = reading_options(encoding, separator, decimal, header, last, sheet, unit)
+    if table is None:
+        if out is not None or reading:
+            raise UsageError("These options are for a table.", fix="Give the table with --table.")
+        from palpate.cli.ask_command import ask as ask_model
 
-    ask_model(model, at or [], Console(as_json))
+        ask_model(model, at or [], Console(as_json))
+        return
+    if at:
+        raise UsageError("Places come from --at or from --table.", fix="Give one of them.")
+    from palpate.cli.ask_table import ask_table
+
+    ask_table(model, table, out, Console(as_json), reading)
 
 
 @app.command()
@@ -310,80 +345,8 @@ def run(
     run_loop(model, seconds, device, rate, Console(as_json))
 
 
-@app.command()
-def correct(
-    model: Annotated[Path, typer.Argument(help="Model file (.palpate) of a body that a probe presses.")],
-    out: Annotated[Path, typer.Option(help="File for the corrected model.")],
-    file: Annotated[Path | None, typer.Option(help="Table of measured positions and forces.")] = None,
-    stdin: Annotated[
-        bool, typer.Option("--stdin", help="Read the lines of a sensor from standard input.")
-    ] = False,
-    port: Annotated[
-        int | None,
-        typer.Option(
-            min=0,
-            max=65535,
-            help="Read lines from one connection to 127.0.0.1 at this port. 0: any free port. "
-            "The first line must be the printed token.",
-        ),
-    ] = None,
-    parameter: Annotated[
-        list[str] | None,
-        typer.Option(help="Value of a further input of the model: NAME=VALUE. Can be given several times."),
-    ] = None,
-    offset: Annotated[
-        float,
-        typer.Option(min=0, help="Uncertainty of the height of the surface, in m (one standard deviation)."),
-    ] = 5e-4,
-    constant: Annotated[
-        float,
-        typer.Option(
-            min=0,
-            help="Uncertainty of the stiffness of the whole body, as a natural logarithm (one standard deviation).",
-        ),
-    ] = 0.5,
-    varying: Annotated[
-        float,
-        typer.Option(
-            min=0,
-            help="Uncertainty of the stiffness from place to place, as a natural logarithm (one standard deviation).",
-        ),
-    ] = 0.3,
-    noise: Annotated[
-        float, typer.Option(help="Noise of a measured force component, in N (one standard deviation).")
-    ] = 0.005,
-    relative: Annotated[
-        float,
-        typer.Option(
-            min=0, help="Noise of a measured force, as a share of its size (one standard deviation)."
-        ),
-    ] = 0.01,
-    jitter: Annotated[
-        float, typer.Option(min=0, help="Noise of the measured position, in m (one standard deviation).")
-    ] = 0.0,
-    stall: Annotated[
-        float, typer.Option(min=0.1, help="A stream ends after so many seconds without a line.")
-    ] = 30.0,
-    wait: Annotated[float, typer.Option(min=0.1, help="Seconds to wait for a connection.")] = 60.0,
-    token: Annotated[
-        bool,
-        typer.Option(
-            "--token/--no-token",
-            help="For --port: take lines only from who sends the printed token first. "
-            "Without a token every user of this machine can send.",
-        ),
-    ] = True,
-    as_json: Json = False,
-) -> None:
-    """Correct a model by forces measured on a specimen, and print the error before and after."""
-    from palpate.cli.correct_command import Source, correct_model
-    from palpate.learning.correction import Discrepancy, Noise
-
-    source = Source(file, stdin, port, stall, wait, token=token)
-    differs = Discrepancy(constant=constant, varying=varying, offset=offset)
-    correct_model(
-        model, source, out, parameter or [], differs, Noise(noise, relative, jitter), Console(as_json)
-    )
+app.command()(fit)
+app.command()(correct)
 
 
 @dataset_app.command("import")

@@ -21,7 +21,7 @@ from palpate.surrogates import LearntEnergy, Surrogate
 from palpate.surrogates.surrogate import correction_warning
 from palpate.units import Range
 
-__all__ = ["ask"]
+__all__ = ["answers_at", "ask", "inputs_of"]
 
 _STEPS = 16  # in a radius
 
@@ -37,7 +37,7 @@ def ask(model: Path, at: Sequence[str], console: Console) -> None:
         If a place is not as many numbers as there are inputs, or what the file holds has no answer to a place.
     """
     contents = load(model)
-    what, inputs = type(contents).__name__, _inputs(contents)
+    what, inputs = type(contents).__name__, inputs_of(contents)
     if not at:
         ranges = [{"name": r.name, "low": r.low, "high": r.high, "unit": r.unit} for r in inputs]
         content = {"model": str(model), "kind": what, "inputs": ranges, "text": str(contents)}
@@ -46,7 +46,7 @@ def ask(model: Path, at: Sequence[str], console: Console) -> None:
         return
     if isinstance(contents, Surrogate):
         X = _places(at, inputs)
-        answers: Sequence[Any] = _answered(contents, X)
+        answers: Sequence[Any] = answers_at(contents, X)
         words = [one.words(inputs) for one in answers] + _reservations(contents)
     elif isinstance(contents, Fitted | Network):
         answers = predictions(contents, _places(at, inputs))
@@ -62,14 +62,15 @@ def ask(model: Path, at: Sequence[str], console: Console) -> None:
     console.result("\n".join(words), content | _as_field(_warning(contents)))
 
 
-def _inputs(asked: Any) -> tuple[Range, ...]:
+def inputs_of(asked: Any) -> tuple[Range, ...]:
     """Return the ranges of the n inputs; none of histories."""
     if isinstance(asked, LoadHistories):
         return ()
     return tuple(asked.network.inputs if isinstance(asked, Fitted) else asked.inputs)
 
 
-def _answered(body: Surrogate, X: np.ndarray) -> list[Answer]:
+def answers_at(body: Surrogate, X: np.ndarray) -> list[Answer]:
+    """Return the answers of a body that is pressed or gripped, at inputs X (N, n)."""
     energy: LearntEnergy = body.energy
     known = energy.deviation(X) if energy.root is not None else np.full(len(X), math.nan)
     forces = energy.force(X)

@@ -161,8 +161,11 @@ def _learnt(corrector: Corrector, lines: Iterable[Measured], console: Console) -
             why="The stream ended, or was silent for too long, before the first good line.",
             fix="Greet with units first, such as: palpate 1 length=mm force=N time=s",
         )
-    fields = ("position", "force", "along", "depth", "time")
-    record = Measured(*(np.concatenate([getattr(r, name) for r in rows]) for name in fields))
+    position, force, along, depth, time = (
+        np.concatenate([getattr(r, name) for r in rows])
+        for name in ("position", "force", "along", "depth", "time")
+    )
+    record = Measured(position, force, along, depth, time)
     return summarise_correction(corrector, record)
 
 

@@ -12,4 +12,12 @@ from palpate.tables.frames import column_names, columns_in_order, numbers_of
 from palpate.tables.table import Column, Table, read_table
 from palpate.tables.unit_names import plain_unit
 
-__all__ = ["Column", "Table", "column_names", "columns_in_order", "numbers_of", "plain_unit", "read_table"]
+__all__ = [
+    "Column",
+    "Table",
+    "column_names",
+    "columns_in_order",
+    "numbers_of",
+    "plain_unit",
+    "read_table",
+]

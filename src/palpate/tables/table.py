@@ -39,6 +39,7 @@ from palpate.units import registry
 
 __all__ = ["Column", "Table", "read_table"]
 
+_MAKE = "Write a line of names such as t [s], x [mm], F [N], and rows of numbers."
 _WORKBOOKS = {".xlsx", ".xlsm"}
 
 
@@ -306,20 +307,19 @@ def _table(
     """Return the table of rows of text."""
     notes = list(notes)
     first, numeric = body_of(rows)
-    if not rows or not (numeric or first or header):
+    if not rows:
+        raise FileFormatError(f"{path} holds no table.", why="It is empty but for comments.", fix=_MAKE)
+    if not numeric:
         raise FileFormatError(
-            f"{path} holds no table.",
-            why="No row of it holds a number." if rows else "It is empty but for comments.",
-            fix="Write a line of names such as t [s], x [mm], F [N], and rows of numbers.",
+            f"{path} holds no rows of numbers; line {rows[0].line} begins with {rows[0].cells[0][:40]!r}.",
+            fix=_MAKE,
         )
     if header is not None:
         first = max(first, sum(row.line <= header for row in rows))
     head = head_of(rows, first, comments, separator, header)
     data = _data(rows[first:], head, notes)
     if not data:
-        raise FileFormatError(
-            f"{path} holds a head and no rows of numbers.", fix="Give a table with at least one row."
-        )
+        raise FileFormatError(f"{path} holds no rows of numbers below its head.", fix=_MAKE)
     width = head.names.filled if head else 0
     for row in data:
         if len(row.cells) > width:

@@ -222,7 +222,7 @@ def _numbers_and_names(
     stated = [str(getattr(item, "name", "")) for item in declared or ()]
     if stated and set(stated) & set(own):
         return columns_in_order(what, given, stated), tuple(stated)
-    return numbers_of(what, given), own
+    return numbers_of(what, given), own or tuple(stated)
 
 
 def _named(own: tuple[str, ...], values: np.ndarray, letter: str) -> tuple[str, ...]:

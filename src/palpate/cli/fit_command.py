@@ -1,0 +1,157 @@
+"""`palpate fit`: learn a network from the columns of a table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate import checks
+from palpate.cli.console import Console
+from palpate.cli.table_options import column_list
+from palpate.errors import FileFormatError, UsageError
+from palpate.format import count
+from palpate.learning import fit
+from palpate.learning.automatic import ranges_of
+from palpate.tables import Table, read_table
+from palpate.units import Quantity, Range
+
+__all__ = ["Columns", "fit_table"]
+
+_SHOWN = 5  # lines that a note names
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Columns of a table to learn from.
+
+    Attributes
+    ----------
+    inputs, outputs : sequences of str
+        Names, or several with commas between them.
+    missing : str
+        "leave-out" or "refuse" rows in which a value is missing.
+    """
+
+    inputs: Sequence[str]
+    outputs: Sequence[str]
+    missing: str = "leave-out"
+
+
+def fit_table(
+    path: Path,
+    columns: Columns,
+    out: Path | None,
+    console: Console,
+    *,
+    reading: Mapping[str, Any],
+    force: bool = False,
+    **search: Any,
+) -> None:
+    """Learn a network from a table and write it; a summary goes to stdout.
+
+    Parameters
+    ----------
+    path : Path
+        The table.
+    columns : Columns
+        What is learnt from what.
+    out : Path, optional
+        File for the model; by default the table's name with the ending .palpate.
+    console : Console
+        Takes progress and results.
+    reading : mapping
+        How the table is written, as `palpate.tables.read_table` takes it.
+    force : bool
+        True to replace a file that exists.
+    **search
+        Of `palpate.fit`.
+
+    Raises
+    ------
+    FileFormatError
+        If the table can't be read.
+    UsageError
+        If a column is missing, or there is nothing to learn from.
+    """
+    out = path.with_suffix(".palpate") if out is None else out
+    if out.exists() and (not force or out.samefile(path)):
+        raise UsageError(
+            f"{out} exists already.", fix="Choose another name with -o, or replace it with --force."
+        )
+    if not out.absolute().parent.is_dir():  # before anything is learnt
+        raise UsageError(f"There is no folder for {out}.", fix="Choose a folder that exists.")
+    checks.one_of("What becomes of missing values", columns.missing, ("leave-out", "refuse"))
+    table = read_table(path, **reading)
+    inputs = _names(table, columns.inputs, "inputs")
+    outputs = _names(table, columns.outputs, "outputs")
+    if both := [name for name in inputs if name in outputs]:
+        raise UsageError(f"Column {both[0]!r} is an input and an output.", fix="Choose one of them.")
+    values = table.array([*inputs, *outputs])
+    rows, notes = _rows_without_gaps(table, values, [*inputs, *outputs], columns.missing)
+    notes = [*table.notes, *notes]
+    for note in notes:
+        console.say(f"{path}: {note}")
+    X, Y = values[rows, : len(inputs)], values[rows, len(inputs) :]
+    if not rows.any():
+        raise UsageError(f"{path}: no row has all values.", fix="Choose other columns.")
+    ranges = [Range(r.name, r.low, r.high, table.si_unit(r.name)) for r in ranges_of(X, inputs)]
+    quantities = [Quantity(name, table.si_unit(name)) for name in outputs]
+    model = fit(X, Y[:, 0] if len(outputs) == 1 else Y, ranges, quantities, **search)
+    saved = model.save(out)
+    content = {
+        "model": str(saved),
+        "table": str(path),
+        "rows": len(X),
+        "rows_left_out": int((~rows).sum()),
+        "inputs": [{"name": r.name, "low": r.low, "high": r.high, "unit": r.unit} for r in ranges],
+        "outputs": [{"name": q.name, "unit": q.unit} for q in quantities],
+        "heldout": model.heldout,
+        "notes": [*notes, *model.notes],
+    }
+    lines = [str(model), *(f"  {r}" for r in ranges)]
+    lines += [f"  → {q.name} {q.unit}".rstrip() for q in quantities]
+    lines.append(f"{count(len(X), 'row')} of {path}\n{saved}")
+    console.result("\n".join(lines), content)
+
+
+def _names(table: Table, texts: Sequence[str], word: str) -> list[str]:
+    """Return the names of columns as they stand in the table."""
+    names = [table.column(name).name for name in column_list(texts, table.names)]
+    if not names or len(set(names)) < len(names):
+        raise UsageError(
+            f"The {word} are {', '.join(map(repr, names)) or 'not named'}.",
+            why=f"Columns of {table.path}: {', '.join(map(repr, table.names))}.",
+            fix=f"Name each of them once, with commas between: --{word} NAME,NAME.",
+        )
+    return names
+
+
+def _rows_without_gaps(
+    table: Table, values: np.ndarray, names: Sequence[str], missing: str
+) -> tuple[np.ndarray, list[str]]:
+    """Return which rows (N,) have all values, and a note on the others.
+
+    Raises
+    ------
+    FileFormatError
+        If rows with gaps are to be refused, and there are some.
+    """
+    gaps = np.isnan(values)
+    rows = np.flatnonzero(gaps.any(axis=1))
+    if not rows.size:
+        return np.ones(len(values), dtype=bool), []
+    if missing == "refuse":
+        column = names[int(gaps[rows[0]].argmax())]
+        raise FileFormatError(
+            f"{table.path}, line {table.lines[rows[0]]}: column {column!r} has no value; so have {len(rows)} of "
+            f"{len(values)} rows.",
+            why="Rows with a gap were to be refused.",
+            fix="Correct them, or have them left out: --missing leave-out.",
+        )
+    shown = ", ".join(map(str, table.lines[rows[:_SHOWN]])) + (", …" if len(rows) > _SHOWN else "")
+    note = f"{len(rows)} of {len(values)} rows left out, in which a value is missing: line {shown}."
+    return ~gaps.any(axis=1), [note]

@@ -150,3 +150,23 @@ def test_two_loads_get_a_coupling_and_the_answer_leads_back_to_the_hand(solved):
     loads = -force @ directions.T
     contact = field.values(loads)[:, field.held]
     np.testing.assert_allclose(contact + compliance * loads @ directions, hand @ directions, atol=0.05)
+
+
+def test_random_loads_leave_no_dead_zone_at_the_first_touch(solved):
+    """No solve is near rest, but without load nothing deflects: a hundredth of the loads moves the beam."""
+    _, _, two, sobol = solved
+    few = Refinement(samples=0, units_max=8, target=1e-3, starts=1)
+    away = sobol.take(np.flatnonzero(np.abs(sobol.X / [1.5, 5.0]).max(axis=1) > 0.3))
+    touch = learn_bent(away, passes=2, refinement=few, effort=0.1).surrogate
+    field, solver = touch.fields["displacement"], two.problem().open()
+    for load in ([0.0, 0.05], [0.015, -0.05]):
+        u = solver.solve(np.array(load)).displacement[field.held, :2]
+        got = field.values(np.array([load]))[0, field.held, :2]
+        np.testing.assert_allclose(got, u, atol=0.15 * np.abs(u).max())
+        hand = u @ touch.energy.baseline.directions[:, :2].T + touch.energy.baseline.compliance * np.array(
+            load
+        )
+        felt = touch.energy.force(hand[None])[0] @ touch.energy.baseline.directions.T
+        np.testing.assert_allclose(-felt, load, atol=0.005)  # of 1.5 and 5 N
+    assert touch.meta["refinement"]["used"] == len(away) + 1
+    assert np.abs(field.values(np.zeros((1, 2)))).max() < 0.003  # m, of 0.9

@@ -5,6 +5,8 @@ Of one set of solves come
     fields   loads → displacements: of all nodes, of the nodes asked for, and the sequential filter's own network
     energy   the energy of the held node's place, whose slope is the force on the hand
 
+To the solves one is added that needs no solver: no load, no deflection.
+
 The hand displaces the node along the loads' unit directions D_i, i = 1 … k loads at that node.
 
 *One load.* With nothing else on the body, its energy begins as ½ K w² with w = D·u, and the network says how it goes
@@ -154,7 +156,9 @@ def learn_bent(
     refinement = refinement or _refinement_for(len(good.ranges))
     # few solves need more presentations: the filter sees each one's linearisation once per pass
     passes = passes or max(5, math.ceil(_OBSERVATIONS / len(good)))
-    few = _spread_rows(good, refinement.samples)
+    identity = good.hash
+    few = _with_rest(_spread_rows(good, refinement.samples))
+    good = _with_rest(good)
     with threadpool_limits(1):  # small matrices: more BLAS threads cost time and the bits of the result
         outputs, columns = node_outputs(good)
         sequential = learn(
@@ -191,7 +195,7 @@ def learn_bent(
         "filter": {"samples": len(good), "passes": passes, "seed": seed, "units": sequential.network.units},
         "settings": asdict(settings),
         "refinement": asdict(refinement) | {"used": len(few)},
-        "dataset": {"hash": good.hash, "provenance": train.provenance},
+        "dataset": {"hash": identity, "provenance": train.provenance},
     }
     return LearntBent(Surrogate(energy, fields, meta=meta), found, sequential)
 
@@ -253,6 +257,24 @@ def _spread_rows(data: Dataset, count: int) -> Dataset:
     order = np.argsort(data.X[:, 0], kind="stable")
     share = (1.0 - np.cos(np.pi * np.linspace(0.0, 1.0, count))) / 2.0
     return data.take(order[np.unique(np.round(share * (len(data) - 1)).astype(int))])
+
+
+def _with_rest(data: Dataset) -> Dataset:
+    """Return the rows and one more that needs no solve: without load nothing deflects, and no energy is stored.
+
+    Random loads hardly ever come near it, and several loads are learnt as small as that only if a row says so. A body
+    with weight is bent without load; where zero is outside of a load's range nobody will ask there.
+    """
+    zero = all(r.low <= 0.0 <= r.high for r in data.ranges)
+    if _has_weight(data) or not zero or not np.abs(data.X).any(axis=1).all():
+        return data
+    row = data.take([0]).data
+    still = {
+        name: row[name] * 0.0
+        for name in row.data_vars
+        if "sample" in row[name].dims and np.issubdtype(row[name].dtype, np.floating)
+    }
+    return Dataset.concat([data, Dataset(row.assign(still))])
 
 
 def _touched(data: Dataset) -> tuple[int, tuple[int, ...]]:

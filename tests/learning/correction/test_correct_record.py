@@ -62,7 +62,7 @@ def test_errors_left_out_are_those_of_new_measurements():
     assert done.left_out.median == pytest.approx(fresh.median, rel=0.35)
     assert "left out" in str(done)
     assert done.as_dict()["counts"]["learnt"] > 140
-    assert not done.warning
+    assert "no reading was taken in air" in done.warning  # all of these are touches
     assert correct(Surrogate(S), record(X[:5], specimen.force(X[:5]))).left_out is None
 
 

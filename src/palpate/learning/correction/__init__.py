@@ -7,12 +7,14 @@ corrector            the object that observes
 corrected_surrogate  posterior → corrected surrogate
 probe_positions      depths at a place → positions
 measures             errors before and after
+load_cell            offset, drift and faults of the load cell
 correct              a whole record at once
 phantom              a specimen made by formula
 """
 
 from palpate.learning.correction.correct import Correction, correct, summarise_correction
 from palpate.learning.correction.corrector import Corrector, Event
+from palpate.learning.correction.load_cell import LoadCell
 from palpate.learning.correction.measures import ForceError, force_error
 from palpate.learning.correction.phantom import Phantom
 from palpate.learning.correction.prior import Discrepancy
@@ -26,6 +28,7 @@ __all__ = [
     "Discrepancy",
     "Event",
     "ForceError",
+    "LoadCell",
     "Noise",
     "Phantom",
     "SpecimenPosterior",

@@ -12,6 +12,7 @@ import numpy as np
 from palpate.dataset.measured import Measured
 from palpate.errors import UsageError
 from palpate.learning.correction.corrector import Corrector
+from palpate.learning.correction.load_cell import LoadCell, cell_from_air, leave_out_faults
 from palpate.learning.correction.measures import ForceError, felt_along, force_error
 from palpate.learning.correction.probe_positions import probe_positions
 from palpate.surrogates import LearntEnergy, Surrogate
@@ -48,6 +49,8 @@ class Correction:
         How many times larger the noise is than was said.
     ratio : float
         How many times the model's forces the measured ones are, least squares; not-a-number without contact.
+    cell : LoadCell
+        Offset, drift and faults of the load cell.
     """
 
     surrogate: Surrogate
@@ -59,6 +62,7 @@ class Correction:
     surprise: float
     noise_inflation: float
     ratio: float
+    cell: LoadCell = LoadCell()  # noqa: RUF009 - a frozen value
 
     @property
     def doubtful(self) -> bool:
@@ -70,6 +74,8 @@ class Correction:
         """Text on what is suspicious; "" if nothing is."""
         if self.doubtful:
             return _doubt(self.ratio)
+        if self.cell.faults:
+            return " ".join(self.cell.faults)
         out, learnt = self.counts.get("outlier", 0), self.counts.get("learnt", 0)
         if out > _STRANGE * (out + learnt):
             return (
@@ -86,7 +92,7 @@ class Correction:
                 f"The specimen differs by {self.surprise:.0f} standard deviations of what was expected: units, frame "
                 "or probe may be others than the model's, or the discrepancy is larger."
             )
-        return ""
+        return self.cell.warning
 
     def __str__(self) -> str:
         said = ", ".join(f"{n} {verdict}" for verdict, n in self.counts.items() if n)
@@ -102,7 +108,8 @@ class Correction:
         )
         lines.append(f"left out  {whole}")
         height, sure = self.offset
-        return "\n".join([*lines, f"surface   {1e3 * height:+.3f} ± {1e3 * sure:.3f} mm over the model's"])
+        lines.append(f"surface   {1e3 * height:+.3f} ± {1e3 * sure:.3f} mm over the model's")
+        return "\n".join([*lines, str(self.cell)] if self.cell.deviation.any() else lines)
 
     def as_dict(self) -> dict[str, Any]:
         """The figures, by name."""
@@ -115,6 +122,7 @@ class Correction:
             "noise_inflation": self.noise_inflation,
             "ratio": self.ratio,
             "offset": {"value": self.offset[0], "deviation": self.offset[1]},
+            "load_cell": self.cell.as_dict(),
         }
 
 
@@ -148,13 +156,49 @@ def correct(
         measured, surface, baseline.radius if own is None else float(parameters[own - 3])
     )
     with _doubted(corrector, measured):
+        measured, cell = _without_faults(corrector, measured)
         _observed(corrector, measured, np.arange(len(measured)))
+        if not cell.readings and _sound(corrector, measured):
+            rest = corrector.load_cell(float(np.nanmax(np.linalg.norm(measured.force, axis=1))))
+            if rest.offset.any():
+                corrector = Corrector(surrogate, **options)
+                measured = rest.corrected(measured)
+                _observed(corrector, measured, np.arange(len(measured)))
+            cell = replace(rest, faults=cell.faults)
         left_out = _left_out(surrogate, measured, options)
-    return summarise_correction(corrector, measured, left_out=left_out)
+    return summarise_correction(corrector, measured, left_out=left_out, cell=cell)
+
+
+def _sound(corrector: Corrector, measured: Measured) -> bool:
+    """True where residuals may be asked for an offset: most touches were learnt, by forces that can be this body's."""
+    X, force, along = _usable(corrector, measured)
+    learnt, out = corrector.counts["learnt"], corrector.counts["outlier"]
+    return (
+        learnt >= _FEWEST
+        and out <= _STRANGE * (out + learnt)
+        and not _doubt(_ratio(corrector.model.force(X), force, along))
+    )
+
+
+def _without_faults(corrector: Corrector, measured: Measured) -> tuple[Measured, LoadCell]:
+    """The record without faulty readings and without what its load cell reads in air, and that load cell."""
+    X = _inputs(corrector.model, measured, corrector.parameters)
+    noise = corrector.noise.absolute
+    finite = np.isfinite(X).all(axis=1)
+    predicted, depth = np.full((len(X), 3), np.nan), np.full(len(X), np.nan)
+    predicted[finite], depth[finite] = corrector.model.force(X[finite]), corrector.model.depth(X[finite])
+    usable, faults = leave_out_faults(measured, predicted, noise)
+    cell = cell_from_air(usable, depth < -corrector.clearance, noise)
+    if cell is None:
+        return usable, LoadCell(faults=faults)
+    return cell.corrected(usable), replace(cell, faults=faults)
 
 
 def summarise_correction(
-    corrector: Corrector, measured: Measured, left_out: ForceError | None = None
+    corrector: Corrector,
+    measured: Measured,
+    left_out: ForceError | None = None,
+    cell: LoadCell = LoadCell(),  # noqa: B008 - a frozen value
 ) -> Correction:
     """Summarise what a corrector learnt from measurements.
 
@@ -166,6 +210,8 @@ def summarise_correction(
         The measurements, by whose forces the errors before and after are taken.
     left_out : ForceError, optional
         Error of measurements that a correction did not know, where one was computed.
+    cell : LoadCell
+        Of the load cell, whose offset the measurements no longer have.
 
     Raises
     ------
@@ -173,10 +219,12 @@ def summarise_correction(
         If it has learnt nothing.
     """
     with _doubted(corrector, measured):
-        return _summary(corrector, measured, left_out)
+        return _summary(corrector, measured, left_out, cell)
 
 
-def _summary(corrector: Corrector, measured: Measured, left_out: ForceError | None) -> Correction:
+def _summary(
+    corrector: Corrector, measured: Measured, left_out: ForceError | None, cell: LoadCell
+) -> Correction:
     after = corrector.surrogate
     counts = {verdict: n for verdict, n in corrector.counts.items() if n}
     if not counts.get("learnt"):
@@ -199,6 +247,7 @@ def _summary(corrector: Corrector, measured: Measured, left_out: ForceError | No
         surprise,
         corrector.noise_inflation,
         _ratio(corrector.model.force(X), force, along),
+        cell,
     )
     return replace(done, surrogate=_warned(after, done.warning)) if done.warning else done
 

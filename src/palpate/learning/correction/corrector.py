@@ -18,6 +18,7 @@ from threadpoolctl import threadpool_limits
 
 from palpate.errors import UsageError
 from palpate.learning.correction.corrected_surrogate import corrected_surrogate
+from palpate.learning.correction.load_cell import LoadCell, cell_from_residuals
 from palpate.learning.correction.prior import Discrepancy, add_broad_units, specimen_prior
 from palpate.learning.correction.specimen_posterior import SpecimenPosterior
 from palpate.learning.correction.touches import Noise, Touches
@@ -28,6 +29,7 @@ __all__ = ["Corrector", "Event", "Verdict"]
 
 Verdict = Literal["learnt", "no contact", "outside", "outlier", "not finite"]
 _FREE = 4.0  # deviations of the surface's height: farther above it nothing is to be learnt
+_CLEAR = 5e-4  # m above the surface at least where a probe is in air
 _BEYOND = 0.25  # of the width over which ℓ is followed beyond a range
 _ENOUGH = 30  # touches from which it is judged how far the noise is larger than was said
 _MEDIANS = (0.674, 1.538)  # of the size of one and of three standard normal numbers
@@ -170,6 +172,23 @@ class Corrector:
         What no change of the weights explains counts as noise: then the posterior covers it.
         """
         return self._noise_inflation
+
+    @property
+    def clearance(self) -> float:
+        """Height over the model's surface from which a probe is in air whatever the specimen, m."""
+        return max(_FREE * self._prior.offset, _CLEAR)
+
+    def load_cell(self, largest: float) -> LoadCell:
+        """Offset of the load cell, by what the touches of the window leave; `largest` is the largest force, N."""
+        self.settle()
+        learnt = np.array(self._learnt, bool)
+        if not learnt.any():
+            return LoadCell()
+        touches = Touches.joined(self._seen).take(learnt)
+        weights = np.full(len(touches), self._noise_inflation**-2)
+        return cell_from_residuals(
+            touches.weighted(weights), self._posterior.mean, largest, self.noise.absolute
+        )
 
     @property
     def expressed(self) -> float:

@@ -60,10 +60,8 @@ class NoiseLevel:
         self, x: np.ndarray, phi: np.ndarray, errors: np.ndarray, S: np.ndarray, chances: np.ndarray, r: float
     ) -> None:
         """Learn from innovations (B, m) of variances S (B,) by filters of these chances (B,), r being the noise."""
-        share, square = _learn(
-            *(self._log, self._information, self._prior, self._near, self.shares),
-            *(x, phi, errors, S, chances, r),
-        )
+        parts = (self._log, self._information, self._prior, self._near, self.shares)
+        share, square = _learn(*parts, x, phi, errors, S, chances, r)
         self.mean += 0.01 * share * (square - self.mean)
 
 
@@ -73,7 +71,7 @@ def _level(log: np.ndarray, x: np.ndarray) -> float:
     value = log[0]
     for i in range(x.size):
         value += log[1 + i] * x[i]
-    return np.exp(min(max(value, -60.0), 60.0))
+    return float(np.exp(min(max(value, -60.0), 60.0)))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

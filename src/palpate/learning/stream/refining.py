@@ -194,7 +194,7 @@ def _spikes(state: State, kept: Reservoir, settings: Settings) -> np.ndarray:
     for i in np.flatnonzero(spikes):
         near = np.argsort(((kept.X - kept.X[i]) ** 2).sum(axis=1))[1 : 1 + _NEIGHBOURS]
         spikes[i] = float(np.median(size[near])) < 0.1 * size[i]
-    return spikes
+    return np.asarray(spikes)
 
 
 def _judging(kept: Reservoir, weights: np.ndarray, refining: Refining) -> np.ndarray:

@@ -256,7 +256,7 @@ def _derivatives(
         weights = np.broadcast_to(observation.slope_weight, n)
         rows = regressors.slopes(x, theta)[0]
         for k in np.flatnonzero(weights > 0):
-            tail = np.eye(1, 1 + n, 1 + k)[0]
+            tail = np.eye(1 + n)[1 + k]
             yield tail, rows[k], 2.0 / lengths[k] ** 2, weights[k], observation.slopes[:, k]
     if observation.curvatures is not None:
         i, j = pairs(n)
@@ -274,4 +274,4 @@ def _transitions(B: int) -> np.ndarray:
     T[:, -1] = _JUMP
     T[-1] = _SETTLE / (B - 1)
     T[-1, -1] = 1.0 - _SETTLE
-    return T / T.sum(axis=1, keepdims=True)
+    return np.asarray(T / T.sum(axis=1, keepdims=True))

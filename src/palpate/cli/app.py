@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import signal
 import sys
-import threading
 from pathlib import Path
 from typing import Annotated
 
@@ -418,10 +417,8 @@ def _serve(model: Path, *, port: int | None, browser: bool, token: bool, strict_
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; an error that palpate foresaw ends with its exit code and without a traceback."""
     words = sys.argv[1:] if arguments is None else arguments
-    if (
-        signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
-        and threading.current_thread() is threading.main_thread()
-    ):
+    # a program that calls this keeps its own way to end
+    if arguments is None and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
         signal.signal(signal.SIGTERM, end_by_sigterm)  # temporary folders are removed on the way
     try:
         with advice_in_words():

@@ -30,6 +30,7 @@ BENCHMARKS = (
     "runtime",
     "scale",
     "stability",
+    "streams",
     "surrogates",
     "sweep",
     "touching",

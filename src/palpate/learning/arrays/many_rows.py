@@ -107,7 +107,8 @@ class RowParts:
         dealt = rng.permutation(len(sizes))
         dealt = dealt[sizes[dealt] <= wanted / _FEWEST_PLACES]
         if sizes[dealt].sum() < len(places) / 2:
-            places, sizes, dealt = np.arange(len(places)), np.ones(len(places)), rng.permutation(len(places))
+            places, sizes = np.arange(len(places)), np.ones(len(places), dtype=int)
+            dealt = rng.permutation(len(places))
         ends = np.searchsorted(np.cumsum(sizes[dealt]), (wanted, 2 * wanted), side="right")
         part = np.zeros(len(sizes), dtype=int)
         part[dealt[: ends[0]]], part[dealt[ends[0] : ends[1]]] = 1, 2

@@ -73,7 +73,7 @@ class LoadCell:
     def corrected(self, measured: Measured) -> Measured:
         """Return the record without offset and drift."""
         zero = self.without_load(measured.time)
-        single = measured.along.any(axis=1)
+        single = (measured.along != 0.0).any(axis=1)
         along = measured.along * (zero * measured.along).sum(axis=1)[:, None]
         return replace(measured, force=measured.force - np.where(single[:, None], along, zero))
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.errors import UsageError
-from palpate.runtime.stability import passive_stiffness, stable_stiffness, stiffness_warning
+from palpate.runtime.stability import FeltStiffness, passive_stiffness, stable_stiffness
 from palpate.runtime.workspace import Workspace
 
 
@@ -52,12 +52,38 @@ def test_virtual_damping_costs_passivity_and_helps_stability():
     assert passive_stiffness(0.5, 1000.0, virtual_damping=0.6) == 0.0
 
 
-def test_warning_comes_with_its_figures_or_not_at_all():
-    assert stiffness_warning(999.0, 0.5, 1000.0) is None
-    assert "1000 N/m" in stiffness_warning(1001.0, 0.5, 1000.0)
-    assert stiffness_warning(330.0, 0.5, 1000.0, delay=1e-3) is None
-    assert "oscillate" in stiffness_warning(340.0, 0.5, 1000.0, delay=1e-3)
-    assert stiffness_warning(1e9, None, 1000.0) is None, "nothing without a motor oscillates"
+def test_delayed_springs_are_passive_below_the_bound_at_every_frequency():
+    """Colgate & Schenkel's theorem itself, on a fine lattice of frequencies up to half the rate."""
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        damping, rate, delay = rng.uniform(0.1, 5.0), rng.uniform(100.0, 2000.0), rng.uniform(0.0, 0.01)
+        T, omega = 1.0 / rate, np.linspace(1e-4, 1.0, 20_001) * np.pi * rate
+        K = passive_stiffness(damping, rate, delay=delay)
+        H = K * np.exp(-1j * omega * delay)
+        asked = T / 2 * ((1 - np.exp(-1j * omega * T)) * H).real / (1 - np.cos(omega * T))
+        assert asked.max() <= damping * (1 + 1e-6)
+        assert asked.max() >= damping * (1 - 1e-3), "and no more is asked for than must be"
+
+
+def test_a_body_is_softened_to_the_bound_and_no_softer():
+    soft = FeltStiffness(999.0, 0.5, 1000.0)
+    assert (soft.coupling, soft.felt, soft.warning) == (np.inf, 999.0, None)
+    stiff = FeltStiffness(4000.0, 0.5, 1000.0)
+    assert stiff.bound == pytest.approx(1000.0)
+    assert 1 / (1 / stiff.coupling + 1 / stiff.body) == pytest.approx(stiff.bound)
+    assert stiff.felt == pytest.approx(1000.0)
+    assert "softened to 1000 N/m" in stiff.warning
+    late = FeltStiffness(340.0, 0.5, 1000.0, delay=1e-3)
+    assert late.felt == pytest.approx(1000 / 3)
+    as_it_is = FeltStiffness(4000.0, 0.5, 1000.0, override=True)
+    assert (as_it_is.coupling, as_it_is.felt) == (np.inf, 4000.0)
+    assert "as asked" in as_it_is.warning
+    drawn = FeltStiffness(1e9, None, 1000.0)
+    assert (drawn.coupling, drawn.warning) == (np.inf, None), "nothing without a motor oscillates"
+    assert FeltStiffness(100.0, 0.0, 1000.0).felt <= 1.0, "a device without damping bears nothing"
+
+
+def test_bounds_refuse_nonsense():
     with pytest.raises(UsageError):
         passive_stiffness(0.5, 0.0)
     with pytest.raises(UsageError):

@@ -336,12 +336,19 @@ def run(
         float | None,
         typer.Option(min=10, max=10000, help="Ticks per second (Hz). Default: that of the study."),
     ] = None,
+    unsoftened: Annotated[
+        bool,
+        typer.Option(
+            "--unsoftened",
+            help="Let a body that is too stiff for the device feel so. It may hum or oscillate.",
+        ),
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Run the real-time loop without a page, and print how late its ticks were."""
     from palpate.cli.run_command import run_loop
 
-    run_loop(model, seconds, device, rate, Console(as_json))
+    run_loop(model, seconds, device, rate, Console(as_json), unsoftened=unsoftened)
 
 
 app.command()(fit)

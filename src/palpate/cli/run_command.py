@@ -14,13 +14,13 @@ from palpate.format import share
 from palpate.runtime import LoopProcess
 from palpate.runtime.devices import device_traits
 from palpate.runtime.shared_state import State
-from palpate.runtime.stability import stiffness_warning
 from palpate.runtime.touchable import Touchable, load_touchable
 from palpate.surrogates.surrogate import correction_warning
 
 __all__ = ["run_loop"]
 
 LOOK = 0.02  # s between two looks at the loop
+_TOLD = 0.2  # change of the spring in front of a stiff body from which on it is said again: a tenth is hardly felt
 
 
 @dataclass
@@ -67,23 +67,44 @@ class _Peak:
         }
 
 
-def run_loop(model: Path, seconds: float, device: str, rate: float | None, console: Console) -> None:
-    """Run a model's loop for a while and print its report."""
+def run_loop(
+    model: Path,
+    seconds: float,
+    device: str,
+    rate: float | None,
+    console: Console,
+    *,
+    unsoftened: bool = False,
+) -> None:
+    """Run a model's loop for a while and print its report.
+
+    Parameters
+    ----------
+    model : Path
+        File of a learnt body that can be touched.
+    seconds : float
+        Duration, s.
+    device : str
+        Name of the device, and its options after a colon.
+    rate : float, optional
+        Ticks per second, Hz; by default the body's own, or 1000.
+    console : Console
+        Takes what is said.
+    unsoftened : bool
+        Whether a body that is too stiff for the device shall feel so all the same.
+    """
     touch, traits = load_touchable(model), device_traits(device)
     settings = touch.meta.get("runtime", {})
     rate = rate or settings.get("rate", 1000.0)
     workspace = touch.workspace(traits.radius)
-    felt = workspace.felt(touch.stiffness_max)
     device = _aimed(device, touch, workspace.scale)
-    if warning := stiffness_warning(felt, traits.damping, rate):
-        console.say(warning)
     if warning := correction_warning(touch.meta):
         console.say(f"its correction was warned of: {warning}")
     limit = settings.get("max_force")
     peak = _Peak()
     # whoever stops it early still wants to know
     with (
-        LoopProcess(model, device=device, rate=rate, max_force=limit) as loop,
+        LoopProcess(model, device=device, rate=rate, max_force=limit, unsoftened=unsoftened) as loop,
         contextlib.suppress(KeyboardInterrupt),
     ):
         _wait(loop, seconds, console, peak)
@@ -94,7 +115,7 @@ def run_loop(model: Path, seconds: float, device: str, rate: float | None, conso
 def _aimed(device: str, touch: Touchable, scale: float) -> str:
     """Return the device; a scripted stroke without a place presses where the body was trained to be pressed."""
     name, _, text = device.partition(":")
-    if name != "stroke" or touch.holds:
+    if name not in {"stroke", "simulated"} or touch.holds:
         return device
     given = {part.partition("=")[0].strip() for part in text.split(",") if part}
     axes = {"x", "y", "z"}
@@ -110,10 +131,14 @@ def _wait(loop: LoopProcess, seconds: float, console: Console, peak: _Peak) -> N
     """Look at the force while the loop runs, and show it in a terminal."""
     end = time.monotonic() + seconds
     shown = sys.stderr.isatty() and not console.as_json
+    coupling = math.inf
     while (left := end - time.monotonic()) > 0:
         time.sleep(min(left, LOOK))
         state = loop.read()
         peak.see(state)
+        if not math.isclose(state.coupling, coupling, rel_tol=_TOLD):
+            coupling = state.coupling
+            console.say(state.felt_stiffness.warning or f"{state.felt_stiffness}.")
         if shown:
             print(f"\r  force {_vector(state.force)} N   tick {state.tick}", end="", file=sys.stderr)  # noqa: T201
     if shown:

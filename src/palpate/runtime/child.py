@@ -52,6 +52,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--max-force", type=float, required=True, help="N")
     parser.add_argument("--slew", type=float, default=0.0, help="N/s; 0: full force in 20 ms")
     parser.add_argument(
+        "--unsoftened", action="store_true", help="a body too stiff for the device feels so all the same"
+    )
+    parser.add_argument(
         "--module", action="append", default=[], help="imported for a file of an unknown kind"
     )
     return parser
@@ -66,7 +69,17 @@ def _run(options: argparse.Namespace) -> int:
     device = device_named(options.device, shared.command)
     workspace = model.workspace(options.radius)
     limits = Limits(options.max_force, options.slew)
-    loop = Loop(model, device, shared, workspace, limits, rate=options.rate, orphaned=orphaned)
+    loop = Loop(
+        model,
+        device,
+        shared,
+        workspace,
+        limits,
+        rate=options.rate,
+        stiffness=model.stiffness_max if device.traits.damping is not None else 0.0,
+        override=options.unsoftened,
+        orphaned=orphaned,
+    )
     _say({"obtained": obtain()})
     loop.run(rehearsal(model, workspace, limits, options.rate))
     foreign = [name for name in FOREIGN if sys.modules.get(name)]

@@ -188,6 +188,16 @@ class HandEvaluator:
             position[i] += self._grip[i]
 
     @property
+    def remembers(self) -> bool:
+        """True for a body with a memory, which each call takes further."""
+        return self._memory is not None
+
+    @property
+    def tangent(self) -> np.ndarray:
+        """∂F/∂x (3, 3) of the elastic answer at the last call, N/m; zero where it isn't known."""
+        return self._elastic.stiffness  # type: ignore[no-any-return]
+
+    @property
     def grew(self) -> bool:
         """True where the last call made an indentation grow."""
         return self._indentation is not None and self._indentation.lost_in_step > 0.0

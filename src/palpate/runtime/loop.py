@@ -1,6 +1,10 @@
-"""One tick of touch, as a list of stages: read → map → evaluate → limit → write → publish.
+"""One tick of touch, as a list of stages: read → map → evaluate → limit → control → write → publish.
 
-    device position → workspace → force of the learnt body → limits → device → shared memory
+    device position → hand's axes and clutch → workspace → coupling → learnt body and its memory
+        → force, slew and ramp limits → passivity controller → device → shared memory
+
+Each stage is a class of its own (`workspace`, `coupling`, `hand_evaluator`, `safety`, `passivity`) and gets the time
+from outside: the loop runs live, on recorded samples, or by `run_for` as fast as it can be computed, and is the same.
 
 All stages work in arrays made beforehand, most of them views of the record that is published, so that a tick
 allocates next to nothing. Nothing raises: the first thing that goes wrong in a tick is its fault, and a tick
@@ -17,23 +21,30 @@ import gc
 import math
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Protocol
 
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.runtime.coupling import STEPS, Coupling
 from palpate.runtime.devices import Device
 from palpate.runtime.devices.page import PageDevice
 from palpate.runtime.hand_evaluator import HandEvaluator
+from palpate.runtime.passivity import PassivityController, largest_damping
 from palpate.runtime.publisher import Publisher
 from palpate.runtime.realtime import Metronome
 from palpate.runtime.safety import Fault, Limits, Safety, stalled
 from palpate.runtime.shared_state import MAX_INPUTS, MAX_PLACES, Shared, now
-from palpate.runtime.workspace import Workspace
+from palpate.runtime.stability import FeltStiffness
+from palpate.runtime.workspace import HandFrame, Workspace
 from palpate.units import Range
 
 __all__ = ["Loop", "Model", "rehearsal"]
+
+_DELAY_TIME = 0.1  # s, over which the age of the samples is averaged
+_DELAY_CHANGE = 0.02  # of T/2 + d: smaller changes move no bound that matters
 
 
 class Model(Protocol):
@@ -66,6 +77,12 @@ class Loop:
         Largest force and its rate of change.
     rate : float
         Ticks per second, 10 to 10,000 Hz.
+    stiffness : float
+        The body's largest, N/m in its own metres; 0 where it isn't known: such a body is never softened.
+    override : bool
+        Whether a body that is too stiff for its device shall feel so all the same.
+    control : bool
+        Whether the passivity controller may damp; without it it only counts.
     orphaned : callable
         Returns whether the process that wanted the loop has ended; asked once a tick.
 
@@ -85,6 +102,9 @@ class Loop:
         limits: Limits,
         *,
         rate: float = 1000.0,
+        stiffness: float = 0.0,
+        override: bool = False,
+        control: bool = True,
         orphaned: Callable[[], bool] = lambda: False,
     ) -> None:
         if not 10.0 <= rate <= 10_000.0:
@@ -107,14 +127,43 @@ class Loop:
         self.out = Publisher(shared, len(self.evaluator.loads))
         self.safety = Safety(limits, self.period, self.out.force)
         self.out.describe(workspace, limits)
+        self._prepare(limits, rate, stiffness, override, control)
         self.parameters = np.array([(r.low + r.high) / 2.0 for r in model.parameters])
         self.fault, self.now, self.holding = Fault.NONE, 0.0, False
         self.device_error = ""
         self._answered, self._sent = math.inf, np.zeros(3)
+        self._sent_to_device, self._heard = np.zeros(3), False
+        self._before, self._wanted = math.nan, self.evaluator.force
         self._commands, self._quit = shared.command, shared.command.record["quit"]
         self._wished = shared.command.record["parameters"]
         self._orphaned = orphaned
-        self.stages = (self.read, self.map, self.evaluate, self.limit, self.write)
+        self.stages = (self.read, self.map, self.evaluate, self.limit, self.control, self.write)
+
+    def _prepare(self, limits: Limits, rate: float, stiffness: float, override: bool, control: bool) -> None:
+        """Make the coupling and the passivity controller for this device, body and rate."""
+        traits = self.device.traits
+        self.frame = HandFrame(traits.axes)
+        self.motors = traits.damping is not None
+        self._controlled = self.motors and control
+        self.passivity = PassivityController(self.period, max_force=limits.max_force, max_damping=0.0)
+        self.bounds = FeltStiffness(
+            self.workspace.felt(stiffness), traits.damping, rate, traits.delay, override
+        )
+        self.coupling = Coupling(hardest=stiffness)
+        self._steps = 1 if self.evaluator.remembers else STEPS
+        self._take_delay(traits.delay)
+
+    def _take_delay(self, delay: float) -> None:
+        """Draw the consequences of a delay, s: for the coupling's spring, the ledger and the added damping."""
+        traits = self.device.traits
+        self._age = delay
+        self.bounds = replace(self.bounds, delay=delay)
+        self.passivity.delay = delay
+        if self._controlled:
+            self.passivity.max_damping = largest_damping(traits.mass, self.bounds.rate, delay=delay)
+        self._spring = self.bounds.coupling / self.workspace.scale
+        self.coupling.change(self._spring)
+        self.out.stiffness(self.bounds)
 
     def run(self, rehearse: Callable[[], None] = lambda: None) -> None:
         """Tick until a command ends the loop or its parent is gone; leave the device at zero force.
@@ -136,6 +185,17 @@ class Loop:
             gc.enable()
             gc.unfreeze()
             self.end()
+
+    def run_for(self, seconds: float, start: float = 0.0) -> None:
+        """Tick for a time of the loop's own clock, as fast as it can be computed; the device stays open.
+
+        Parameters
+        ----------
+        seconds, start : float
+            How long, and from which time on, s.
+        """
+        for k in range(round(seconds / self.period)):
+            self.tick(start + k * self.period)
 
     def tick(self, now: float, lateness: float = 0.0, *, jumped: bool = False) -> None:
         """Pass through the stages once.
@@ -177,7 +237,7 @@ class Loop:
             sample = self.device.read(self.now)
             late = sample.asleep or stalled(self.now, sample.time, sample.patience)
             x, y, z = sample.position.tolist()
-            self.holding = bool(sample.holding)
+            self.holding = bool(sample.holding) and not sample.clutched
         except Exception as error:  # noqa: BLE001 - a driver is foreign code: whatever it does, the loop goes on
             self.holding = False
             self.out.input(holding=False, late=True)
@@ -189,7 +249,23 @@ class Loop:
         if not math.isfinite(x + y + z):
             self.fail(Fault.INPUT_NOT_FINITE)
         if self.fault is Fault.NONE:
-            self.out.hand[:] = sample.position
+            self.frame.to_hand(sample.position, self.out.hand, clutched=sample.clutched)
+            if self.motors:
+                self._measure_delay(self.now - sample.time)
+
+    def _measure_delay(self, age: float) -> None:
+        """Take the age of a sample into the mean delay, and soften a body that it makes too stiff.
+
+        What leaks is proportional to the delay, so that the mean over a tenth of a second is what counts.
+        """
+        age = max(0.0, age) + self.device.traits.delay
+        self._age += (
+            (age - self._age) * min(1.0, self.period / _DELAY_TIME) if self._heard else age - self._age
+        )
+        self._heard = True
+        known = self.bounds.delay
+        if abs(self._age - known) > _DELAY_CHANGE * (self.period / 2.0 + known):
+            self._take_delay(self._age)
 
     def map(self) -> None:
         """Turn hand metres into body metres, and take over the parameters that were set."""
@@ -203,14 +279,23 @@ class Loop:
 
     def evaluate(self) -> None:
         """Ask the learnt body."""
+        if self.fault is not Fault.NONE or not self.holding:
+            self.coupling.reset()
         if self.fault is not Fault.NONE:
             return
         answer = self.evaluator
         answer.elapsed = max(0.0, self.now - self._answered)
         self._answered = self.now
         try:
-            answer(self.out.position, self.parameters)
+            if self.coupling.stiffness != self._spring:  # one that may only get stiffer where it is slack
+                self.coupling.change(self._spring)
+            if self.coupling.active and self.holding:
+                self._answer_through_spring()
+            else:
+                answer(self.out.position, self.parameters)
+                self._wanted = answer.force
         except (ArithmeticError, ValueError, TypeError, IndexError):
+            self.coupling.reset()
             self.fail(Fault.EVALUATOR_ERROR)
             return
         if math.isfinite(
@@ -218,20 +303,47 @@ class Loop:
         ):
             self.out.answer(answer)
         else:
+            self.coupling.reset()
             self.fail(Fault.OUTPUT_NOT_FINITE)
+
+    def _answer_through_spring(self) -> None:
+        """Ask the learnt body at the proxy that a spring draws after the hand; the hand feels the spring."""
+        answer, coupling, hand = self.evaluator, self.coupling, self.out.position
+        for _ in range(self._steps):
+            coupling.follow(hand, answer.force, answer.tangent)
+            answer(coupling.proxy, self.parameters)
+            if coupling.balanced(hand, answer.force):
+                break
+        self._wanted = coupling.pull(hand)
 
     def limit(self) -> None:
         """Limit force, slew and ramp; zero after a fault and for a hand that doesn't hold."""
-        self.safety.apply(self.evaluator.force, gate=self.holding and self.fault is Fault.NONE)
+        self.safety.apply(self._wanted, gate=self.holding and self.fault is Fault.NONE)
         self.out.clamped(self.safety.clamped)
+
+    def control(self) -> None:
+        """Count the energy, and damp what would give the hand more than it gave."""
+        controller, force, sent = self.passivity, self.out.force, self._sent
+        if self.fault is not Fault.NONE or not self.holding:
+            sent[:] = 0.0
+            controller.interrupt()
+        else:
+            self.workspace.force_on_hand(force, sent)
+            free = not self.evaluator.force.any() and not sent.any()
+            controller.apply(self.out.hand, sent, self.now - self._before, free=free)
+            if controller.damping > 0.0:
+                self.workspace.force_on_body(sent, force)
+        self._before = self.now
+        self.out.passivity(controller)
 
     def write(self) -> None:
         """Push on the hand."""
-        self.workspace.force_on_hand(self.safety.force, self._sent)
+        self.frame.to_device(self._sent, self._sent_to_device)
         try:
-            self.device.write(self._sent)
+            self.device.write(self._sent_to_device)
         except Exception as error:  # noqa: BLE001 - as for `read`
             self.safety.stop()  # nobody knows what was sent: don't claim it, and ramp in again
+            self.passivity.amend()
             self.device_failed(error)
 
     def end(self) -> None:

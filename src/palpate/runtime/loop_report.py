@@ -104,6 +104,18 @@ class LoopReport:
         Packages in the loop's process that have no business there.
     device_error : str
         First error of the device's driver, once the loop has ended; empty without one.
+    energy_lowest : float
+        The lowest energy that the hand had put in, less what it was given back, J.
+    leak_bound : float
+        The most that sampling and delay can have leaked, J: `energy_lowest` is no lower than minus this.
+    damping_energy : float
+        Energy that the passivity controller's damping was meant to take, J.
+    delay : float
+        Measured, from the device's sample to its force, s.
+    body_stiffness, felt_stiffness : float
+        Of the body's stiffest touch, and of what the hand feels of it, N/m in hand metres; 0 where it isn't known.
+    stiffness : str
+        Both in words, with the bound of the device; empty for a device without motors.
     """
 
     ticks: int
@@ -119,6 +131,13 @@ class LoopReport:
     obtained: Mapping[str, str]
     foreign: tuple[str, ...] = ()
     device_error: str = ""
+    energy_lowest: float = 0.0
+    leak_bound: float = 0.0
+    damping_energy: float = 0.0
+    delay: float = 0.0
+    body_stiffness: float = 0.0
+    felt_stiffness: float = 0.0
+    stiffness: str = ""
 
     @classmethod
     def of(
@@ -141,6 +160,7 @@ class LoopReport:
         device_error : str
             First error of the device's driver, in words.
         """
+        bounds = state.felt_stiffness
         return cls(
             ticks=state.tick,
             rate=state.rate,
@@ -155,11 +175,25 @@ class LoopReport:
             obtained=dict(obtained or {}),
             foreign=foreign,
             device_error=device_error,
+            energy_lowest=state.energy_lowest,
+            leak_bound=bounds.felt * state.leak,
+            damping_energy=state.damping_energy,
+            delay=bounds.delay,
+            body_stiffness=bounds.body,
+            felt_stiffness=bounds.felt,
+            stiffness="" if bounds.damping is None else str(bounds),
         )
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers and texts, in SI units, for JSON."""
         return asdict(self) | {"foreign": list(self.foreign)}
+
+    @property
+    def _energy(self) -> str:
+        return (
+            f"energy    never below {1e3 * min(self.energy_lowest, 0.0):.3g} mJ (sampling can leak "
+            f"{1e3 * self.leak_bound:.3g} mJ), added damping took {1e3 * self.damping_energy:.3g} mJ"
+        )
 
     def __str__(self) -> str:
         def us(seconds: float) -> str:
@@ -178,6 +212,7 @@ class LoopReport:
                 f"clamped   {100 * self.clamped:.1f} % of the ticks",
                 f"faults    {faults or 'none'}",
                 f"system    {granted or 'not known'}",
+                *([f"stiffness {self.stiffness}", self._energy] if self.stiffness else []),
                 *([f"device    {self.device_error}"] if self.device_error else []),
             ]
         )

@@ -48,6 +48,9 @@ class LoopProcess:
         N; the device's own by default.
     slew : float
         N/s; 0 chooses full force in 20 ms.
+    unsoftened : bool
+        Whether a body that is too stiff for its device, its rate and delay shall feel so all the same; by default it
+        is touched through a spring that makes it as soft as they bear.
     parameters : (p,) floats
         Values of the inputs that the hand doesn't supply; the middle of their ranges by default.
 
@@ -68,6 +71,7 @@ class LoopProcess:
         workspace: float | None = None,
         max_force: float | None = None,
         slew: float = 0.0,
+        unsoftened: bool = False,
         parameters: Sequence[float] = (),
     ) -> None:
         traits = device_traits(device)
@@ -80,6 +84,8 @@ class LoopProcess:
             "--slew": slew,
         }
         self._arguments = [os.fspath(model), *(f"{key}={value}" for key, value in settings.items())]
+        if unsoftened:
+            self._arguments.append("--unsoftened")
         self._parameters = parameters
         self._process: subprocess.Popen[str] | None = None
         self._shared: Shared | None = None

@@ -6,8 +6,10 @@ import math
 
 from palpate.runtime.hand_evaluator import HandEvaluator
 from palpate.runtime.loop_report import Histogram
+from palpate.runtime.passivity import PassivityController
 from palpate.runtime.safety import Fault, Limits
 from palpate.runtime.shared_state import Shared, size_of
+from palpate.runtime.stability import FeltStiffness
 from palpate.runtime.workspace import Workspace
 
 __all__ = ["Publisher"]
@@ -25,7 +27,7 @@ class Publisher:
         self.hand, self.position, self.force = record["hand"], record["position"], record["force"]
         self._contact, self._loads = record["contact"], record["loads"][:inputs]
         self._depth, self._stiffness = record["depth"], record["stiffness"]
-        self._let_go = record["let_go"]
+        self._let_go, self._ledger = record["let_go"], record["ledger"]
         self._tick, self._time = record["tick"], record["time"]
         self._inside = record["inside"]
         self._grabbed, self._stalled, self._clamped = record["grabbed"], record["stalled"], record["clamped"]
@@ -39,6 +41,7 @@ class Publisher:
         """Take over all that does not change while the loop runs: scale, radius and force limit."""
         self._record["scale"], self._record["radius"] = workspace.scale, workspace.radius
         self._record["max_force"] = limits.max_force
+        self._record["coupling"] = math.inf
         self._inside[()] = True
 
     def input(self, *, holding: bool, late: bool) -> None:
@@ -62,6 +65,21 @@ class Publisher:
         self._clamped[()] = acted
         if acted:
             self._record["clamped_ticks"] += 1
+
+    def stiffness(self, bounds: FeltStiffness) -> None:
+        """Take over how stiff the body is and may be, and through which spring it is touched."""
+        record = self._record
+        record["delay"], record["body_stiffness"], record["coupling"] = (
+            bounds.delay,
+            bounds.body,
+            bounds.coupling,
+        )
+        record["device_damping"] = math.nan if bounds.damping is None else bounds.damping
+        record["unsoftened"], record["nominal_rate"] = bounds.override, bounds.rate
+
+    def passivity(self, controller: PassivityController) -> None:
+        """Take over the energy ledger and the damping that it asked for."""
+        self._ledger[:] = controller.ledger
 
     def tick(self, now: float, lateness: float, fault: Fault) -> None:
         """Close the tick that began at `now` (s), `lateness` (s) behind its schedule, and publish it."""

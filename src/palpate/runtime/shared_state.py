@@ -7,6 +7,7 @@ a sequence lock (`network.shared_memory`).
 
 from __future__ import annotations
 
+import math
 import mmap
 import threading
 import time
@@ -22,6 +23,8 @@ from palpate.errors import DeviceError, UsageError
 from palpate.network import shared_memory
 from palpate.network.shared_memory import Block
 from palpate.runtime.loop_report import BINS, percentile
+from palpate.runtime.passivity import LEDGER
+from palpate.runtime.stability import FeltStiffness
 
 __all__ = [
     "COMMAND",
@@ -68,6 +71,16 @@ STATE = np.dtype(
         ("scale", "f8"),  # metres of body per metre of hand
         ("radius", "f8"),  # m, the hand's workspace
         ("max_force", "f8"),  # N
+        ("ledger", "f8", LEDGER),  # of the passivity controller, see `State`
+        ("delay", "f8"),  # s, measured, from the device's sample to its force
+        ("device_damping", "f8"),  # N·s/m; NaN for a device without motors
+        ("body_stiffness", "f8"),  # N/m in hand metres, the body's largest; 0 where it isn't known
+        ("nominal_rate", "f8"),  # Hz, as asked
+        (
+            "coupling",
+            "f8",
+        ),  # N/m in hand metres, of the spring in front of a body that is too stiff; inf: none
+        ("unsoftened", "u1"),  # the body shall feel as stiff as it is
         ("histogram", "i8", BINS),  # lateness, `Histogram` bins
         ("work_histogram", "i8", BINS),
     ],
@@ -130,9 +143,48 @@ class State:
     scale: float
     radius: float
     max_force: float
+    ledger: np.ndarray
+    delay: float
+    device_damping: float
+    body_stiffness: float
+    nominal_rate: float
+    coupling: float
+    unsoftened: bool
     histogram: np.ndarray
     work_histogram: np.ndarray
     indentation: np.ndarray  # (n,) √J, of the indentation at each place; empty where nothing has yielded
+
+    @property
+    def energy(self) -> float:
+        """What the hand has put in, less what it was given back, J; a credit ends where nothing is touched."""
+        return float(self.ledger[0])
+
+    @property
+    def energy_lowest(self) -> float:
+        """The lowest `energy` so far, J."""
+        return float(self.ledger[1])
+
+    @property
+    def added_damping(self) -> float:
+        """Damping of the passivity controller on this tick, N·s/m."""
+        return float(self.ledger[2])
+
+    @property
+    def damping_energy(self) -> float:
+        """Energy that added damping was meant to take, in all, J."""
+        return float(self.ledger[3])
+
+    @property
+    def leak(self) -> float:
+        """Σ (½ + d/T) |Δx|², m²: times the felt stiffness the most that sampling can have leaked, J."""
+        return float(self.ledger[4])
+
+    @property
+    def felt_stiffness(self) -> FeltStiffness:
+        """How stiff the body is and may be in this hand, with the delay that was measured."""
+        damping = None if math.isnan(self.device_damping) else self.device_damping
+        rate = self.nominal_rate
+        return FeltStiffness(self.body_stiffness, damping, rate, self.delay, self.unsoftened)
 
     @property
     def lateness_p50(self) -> float:
@@ -165,7 +217,7 @@ class State:
     @classmethod
     def of(cls, record: np.ndarray, indentation: np.ndarray) -> State:
         """Copy records of dtype `STATE` and `INDENTATION`, shape ()."""
-        flags = {"inside", "let_go", "clamped", "grabbed", "stalled"}
+        flags = {"inside", "let_go", "clamped", "grabbed", "stalled", "unsoftened"}
         values: dict[str, Any] = {}
         for name in STATE.names or ():
             value = record[name]

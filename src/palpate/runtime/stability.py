@@ -1,13 +1,22 @@
-"""Bounds on how stiff a body may feel before the sampled loop itself starts to push.
+"""How stiff a body may feel before the sampled loop itself starts to push, and what follows where it is stiffer.
 
 A force computed from a sample is held for a tick, and so trails the hand: the loop leaks energy in proportion
-to the stiffness K and the tick T, and the device's own damping b must absorb it. With a virtual damping B:
+to the stiffness K and the tick T, and the device's own damping b must absorb it. With a virtual damping B and a
+transport delay d from the device's sample to its force:
 
-- passive, whatever holds the device:   K < 2 (b − |B|)/T          (Colgate & Schenkel 1997)
-- stable in a still hand, delay t_d:    K < (b + B)/(T/2 + t_d)    (Gil et al. 2009)
+- passive, whatever holds the device:   K < (b − |B|)/(T/2 + d)    (Colgate & Schenkel 1997)
+- stable in a still hand:               K < (b + B)/(T/2 + d)      (Gil et al. 2009)
 
-K is the felt stiffness in hand coordinates: the body's largest eigenvalue of ∂F/∂x over the trained range,
-times the workspace scale (positions are scaled, forces are not).
+The first is their theorem for a delayed spring. It asks, for every ω up to π/T, that
+
+    b > T/2 · Re[(1 − e^(−jωT)) K e^(−jωd)]/(1 − cos ωT) = K T/2 · sin(ω (T/2 + d))/sin(ωT/2)
+
+whose largest value is that at ω → 0, since sin aθ ≤ a sin θ for a ≥ 1 and θ ≤ π/2. Without a delay it is their
+K < 2 (b − |B|)/T.
+
+K is the felt stiffness in hand coordinates: the body's largest eigenvalue of −∂F/∂x over the trained range,
+times the workspace scale (positions are scaled, forces are not). A body beyond the first bound is touched through a
+spring (`coupling`), unless its user overrides that.
 
 References
 ----------
@@ -19,12 +28,18 @@ influence of damping and delay, J. Computing and Information Science in Engineer
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+
 from palpate.errors import UsageError
+from palpate.runtime.coupling import coupling_stiffness
 
-__all__ = ["passive_stiffness", "stable_stiffness", "stiffness_warning"]
+__all__ = ["FeltStiffness", "passive_stiffness", "stable_stiffness"]
 
 
-def passive_stiffness(damping: float, rate: float, *, virtual_damping: float = 0.0) -> float:
+def passive_stiffness(
+    damping: float, rate: float, *, delay: float = 0.0, virtual_damping: float = 0.0
+) -> float:
     """Return the stiffness (N/m) below which the loop is passive; Colgate & Schenkel 1997.
 
     Parameters
@@ -33,16 +48,18 @@ def passive_stiffness(damping: float, rate: float, *, virtual_damping: float = 0
         The device's own, b, N·s/m.
     rate : float
         Ticks per second, Hz.
+    delay : float
+        From the device's sample to its force, beyond the hold of one tick, s.
     virtual_damping : float
         B that the loop adds, N·s/m.
 
     Raises
     ------
     UsageError
-        If the rate is not positive or the damping negative.
+        If the rate is not positive, or damping or delay negative.
     """
-    _check(damping, rate, 0.0)
-    return max(0.0, 2.0 * (damping - abs(virtual_damping)) * rate)
+    _check(damping, rate, delay)
+    return max(0.0, (damping - abs(virtual_damping)) / (0.5 / rate + delay))
 
 
 def stable_stiffness(
@@ -59,37 +76,75 @@ def stable_stiffness(
     return max(0.0, (damping + virtual_damping) / (0.5 / rate + delay))
 
 
-def stiffness_warning(
-    stiffness: float, damping: float | None, rate: float, *, delay: float = 0.0
-) -> str | None:
-    """Return a warning for a body that is too stiff for the device, or None.
+@dataclass(frozen=True)
+class FeltStiffness:
+    """How stiff a body is and may be in the hand, on one device, at one rate and delay.
 
-    Parameters
+    Attributes
     ----------
-    stiffness : float
-        Felt, K, N/m: `Workspace.felt(model.stiffness_max)`.
+    body : float
+        The body's largest stiffness in hand metres, N/m: `Workspace.felt(model.stiffness_max)`.
     damping : float or None
-        The device's own, N·s/m; None for one without motors, which can't become unstable.
+        The device's own, b, N·s/m; None for one without motors, which can't become unstable.
     rate : float
         Ticks per second, Hz.
     delay : float
         From the device's sample to its force, beyond the hold of one tick, s.
+    override : bool
+        Whether the body shall feel as stiff as it is, whatever follows from that.
     """
-    if damping is None:
-        return None
-    passive = passive_stiffness(damping, rate)
-    if stiffness < passive and delay == 0.0:
-        return None
-    stable = stable_stiffness(damping, rate, delay=delay)
-    if stiffness < min(passive, stable):
-        return None
-    outcome = "it may hum in a tight grip" if stiffness < stable else "it will oscillate in a loose grip"
-    return (
-        f"The body feels as stiff as {stiffness:.0f} N/m, and {outcome}: with the device's damping of "
-        f"{damping:g} N·s/m at {rate:.0f} Hz the loop is passive below {passive:.0f} N/m and, with "
-        f"{1e3 * delay:g} ms of delay, stable below {stable:.0f} N/m. Use a larger workspace, a higher rate "
-        "or a softer body."
-    )
+
+    body: float
+    damping: float | None
+    rate: float
+    delay: float = 0.0
+    override: bool = False
+
+    @property
+    def bound(self) -> float:
+        """The largest stiffness, N/m, with which the loop is passive; infinite on a device without motors."""
+        return (
+            math.inf if self.damping is None else passive_stiffness(self.damping, self.rate, delay=self.delay)
+        )
+
+    @property
+    def coupling(self) -> float:
+        """The spring, N/m in hand metres, through which the body is touched; infinite for none.
+
+        On a device without any damping that pulls a body which must not be felt at all: a spring of next to nothing.
+        """
+        if self.override or self.body <= self.bound:
+            return math.inf
+        return coupling_stiffness(self.body, max(self.bound, _NEXT_TO_NOTHING))
+
+    @property
+    def felt(self) -> float:
+        """The largest stiffness that the hand feels, N/m."""
+        return self.body if math.isinf(self.coupling) else min(self.body, max(self.bound, _NEXT_TO_NOTHING))
+
+    def __str__(self) -> str:
+        if self.damping is None:
+            return f"stiffest touch {self.body:.0f} N/m; the device has no motors"
+        limits = (
+            f"with the device's damping of {self.damping:g} N·s/m, {self.rate:.0f} Hz and a delay of "
+            f"{1e3 * self.delay:.3g} ms the loop is passive up to {self.bound:.0f} N/m"
+        )
+        if self.body <= self.bound:
+            return f"stiffest touch {self.body:.0f} N/m; {limits}"
+        if self.override:
+            return f"stiffest touch {self.body:.0f} N/m, as asked, although {limits}: it may hum or oscillate"
+        return (
+            f"stiffest touch {self.body:.0f} N/m, softened to {self.felt:.0f} N/m by a spring of "
+            f"{self.coupling:.0f} N/m: {limits}"
+        )
+
+    @property
+    def warning(self) -> str | None:
+        """The sentence for a body that is softened, or is too stiff and must not be; None where neither is so."""
+        return None if self.damping is None or self.body <= self.bound else f"{self}."
+
+
+_NEXT_TO_NOTHING = 1.0  # N/m
 
 
 def _check(damping: float, rate: float, delay: float) -> None:

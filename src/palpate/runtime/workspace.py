@@ -1,4 +1,7 @@
-"""A scaling from the hand's few centimetres to the body's travel and back.
+"""From a device's own axes to the hand's, and from the hand's few centimetres to the body's travel and back.
+
+`HandFrame` turns what a device reports into x right, y up, z towards the user by one rotation, and keeps the offset
+that a clutch leaves: while it is pressed the device moves and the hand in the body doesn't. `Workspace` scales.
 
 Of a body held at a node or a patch the device's centre is the rest position of what is held; of a body pressed
 anywhere it is a place of first contact. Solids stand upright: devices have y up and z towards the user, solids z up.
@@ -15,7 +18,11 @@ import numpy as np
 
 from palpate.errors import UsageError
 
-__all__ = ["Workspace"]
+__all__ = ["PLAIN_AXES", "Axes", "HandFrame", "Workspace"]
+
+Axes = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
+PLAIN_AXES: Axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+_ROUNDING = 1e-9  # of a rotation's entries
 
 _USED = 0.8  # share of the radius that the trained reach takes: the rest shows that the range has an end
 
@@ -90,6 +97,71 @@ class Workspace:
             return
         sent[0], sent[1], sent[2] = force[0], force[2], -force[1]
 
+    def force_on_body(self, sent: np.ndarray, force: np.ndarray) -> None:
+        """Write a force (3,) on the hand, N, into `force`, in the body's axes; undoes `force_on_hand`."""
+        if not self.upright:
+            force[:] = sent
+            return
+        force[0], force[1], force[2] = sent[0], -sent[2], sent[1]
+
     def felt(self, stiffness: float) -> float:
         """Return the stiffness (N/m) that the hand feels of a body's `stiffness` (N/m)."""
         return stiffness * self.scale
+
+
+class HandFrame:
+    """A device's own axes and the clutch.
+
+    Parameters
+    ----------
+    axes : (3, 3) floats, row by row
+        Turns a vector of the device into x right, y up, z towards the user; a rotation.
+
+    Attributes
+    ----------
+    offset : (3,)
+        Added to the turned position, m; what the clutch has left.
+
+    Raises
+    ------
+    UsageError
+        If the matrix mirrors, stretches or shears.
+    """
+
+    def __init__(self, axes: Axes = PLAIN_AXES) -> None:
+        turn = np.array(axes, dtype=np.float64)
+        if turn.shape != (3, 3) or not (
+            np.abs(turn @ turn.T - np.eye(3)).max() < _ROUNDING and np.linalg.det(turn) > 0.0
+        ):
+            raise UsageError(
+                f"A device's axes can't be {axes}.",
+                why="They must be a rotation: orthonormal rows, and a determinant of +1.",
+                fix="Give, row by row, where x right, y up and z towards the user lie in the device's own axes.",
+            )
+        self.offset = np.zeros(3)
+        self._plain = axes == PLAIN_AXES
+        self._turn, self._back = turn, np.ascontiguousarray(turn.T)
+        self._clutched = False
+
+    def to_hand(self, position: np.ndarray, hand: np.ndarray, *, clutched: bool) -> None:
+        """Write the hand (3,), m, of a device's position (3,), m, into `hand`; one with a clutch pressed stays."""
+        if clutched or self._clutched:
+            self._move_offset(position, hand)
+            self._clutched = clutched
+            return
+        if self._plain:
+            hand[:] = position
+        else:
+            np.dot(self._turn, position, out=hand)
+        hand += self.offset
+
+    def _move_offset(self, position: np.ndarray, hand: np.ndarray) -> None:
+        np.dot(self._turn, position, out=self.offset)
+        np.subtract(hand, self.offset, out=self.offset)
+
+    def to_device(self, force: np.ndarray, sent: np.ndarray) -> None:
+        """Write a force (3,) on the hand, N, into `sent`, in the device's axes."""
+        if self._plain:
+            sent[:] = force
+        else:
+            np.dot(self._back, force, out=sent)

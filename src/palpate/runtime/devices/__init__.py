@@ -1,4 +1,4 @@
-"""Haptic devices, one file each, chosen by name: ``page`` or ``stroke:amplitude=0.02,frequency=1``."""
+"""Haptic devices, one file each, chosen by name: ``page``, ``simulated`` or ``stroke:amplitude=0.02,frequency=1``."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Protocol
 from palpate.errors import UsageError
 from palpate.runtime.devices.device import Device, Sample, Traits
 from palpate.runtime.devices.page import PageDevice
+from palpate.runtime.devices.simulated import SimulatedHand
 from palpate.runtime.devices.stroke import StrokeDevice
 from palpate.runtime.shared_state import Block
 
@@ -20,7 +21,7 @@ class _Kind(Protocol):
     def open(self, commands: Block, options: Mapping[str, str]) -> Device: ...
 
 
-_KINDS: dict[str, _Kind] = {"page": PageDevice, "stroke": StrokeDevice}
+_KINDS: dict[str, _Kind] = {"page": PageDevice, "stroke": StrokeDevice, "simulated": SimulatedHand}
 
 
 def device_names() -> tuple[str, ...]:

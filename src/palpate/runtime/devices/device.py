@@ -14,6 +14,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.runtime.safety import HARDWARE_PATIENCE
+from palpate.runtime.workspace import PLAIN_AXES, Axes
 
 __all__ = ["Device", "Sample", "Traits", "settings_from"]
 
@@ -32,12 +33,21 @@ class Traits:
         The device's own damping b, N·s/m, for the stability bounds; None where no motor pushes.
     source : str
         Where the figures come from.
+    mass : float
+        Apparent mass of the handle without a hand, kg: bounds the damping that the passivity controller may add.
+    delay : float
+        From a sample to the force that answers it, as far as it is the device's own and no time stamp shows it, s.
+    axes : (3, 3) floats, row by row
+        What turns the device's own axes into x right, y up, z towards the user; a rotation, det +1.
     """
 
     radius: float
     max_force: float
     damping: float | None
     source: str
+    mass: float = 0.1
+    delay: float = 0.0
+    axes: Axes = PLAIN_AXES
 
 
 class Sample:
@@ -46,7 +56,7 @@ class Sample:
     Attributes
     ----------
     position : (3,)
-        Hand, m from the centre of the workspace: x right, y up, z towards the user.
+        Hand, m from the centre of the workspace, in the axes that `Traits.axes` turns.
     time : float
         Last sign of life, s of the loop's clock: a fresh sample of hardware, a heartbeat of a page.
     patience : float
@@ -55,9 +65,11 @@ class Sample:
         Whether a hand holds the body.
     asleep : bool
         The device itself says that nobody is looking or steering: counts as stalled at any age.
+    clutched : bool
+        A clutch is pressed: the device moves alone, and nothing is felt until it is let go.
     """
 
-    __slots__ = ("asleep", "holding", "patience", "position", "time")
+    __slots__ = ("asleep", "clutched", "holding", "patience", "position", "time")
 
     def __init__(self, patience: float = HARDWARE_PATIENCE) -> None:
         self.position = np.zeros(3)
@@ -65,6 +77,7 @@ class Sample:
         self.patience = patience
         self.holding = False
         self.asleep = False
+        self.clutched = False
 
 
 class Device(Protocol):

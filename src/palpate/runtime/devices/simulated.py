@@ -1,0 +1,263 @@
+"""A simulated hand on a simulated device: a mass that the loop really pushes, so that its stability can be seen.
+
+    m ẍ = F − b ẋ + k_g (x_g − x) − b_g ẋ − f sign(ẋ)
+
+F is the loop's force, b the device's own damping, f its Coulomb friction; the hand holds it by a spring k_g and damper
+b_g and wants it at x_g, which a script moves. The motion is integrated in steps of a tenth of a millisecond, implicit
+in all dampers. What the loop reads is rounded to the encoder's steps and is `delay` seconds old, as its time says. It
+runs by the loop's own clock, which may be any: live, or as fast as it can be computed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numba import njit
+
+from palpate.errors import UsageError
+from palpate.runtime.devices.device import Sample, Traits, settings_from
+from palpate.runtime.shared_state import Block
+
+__all__ = ["SimulatedHand", "SimulatedSettings"]
+
+_SHAPES = ("sine", "press", "random", "adversarial")
+_STEP = 1e-4  # s
+_PAST = 512  # samples kept for the delay
+_LONGEST_DELAY, _LONGEST_STRETCH = (
+    0.015,
+    0.1,
+)  # s: staler input counts as stalled; a longer pause isn't simulated
+_WAVES = 6  # of the random script: tremor has 8 to 12 Hz, voluntary motion ends near 6
+_SLOWEST, _FASTEST = 0.2, 8.0  # Hz
+_RISE = 0.2  # s, of a press
+
+_jit = njit(cache=True, nogil=True, error_model="numpy")
+
+
+@dataclass(frozen=True)
+class SimulatedSettings:
+    """Settings of the hand, of the device in it, and of the script.
+
+    Attributes
+    ----------
+    mass : float
+        Of device and hand together, kg.
+    damping : float
+        The device's own, b, N·s/m.
+    friction : float
+        The device's Coulomb friction, N.
+    grip, grip_damping : float
+        The hand's spring, N/m, and damper, N·s/m.
+    step : float
+        Of the encoder, m; 0 for none.
+    delay : float
+        Age of what is read, s, at most 0.015.
+    shape : {"sine", "press", "random", "adversarial"}
+        Where the hand wants to be: A sin 2πft along the direction; A within 0.2 s, and stay; A times smooth noise in
+        all directions about 0.6 A; or A and 0.2 A by turns, whichever way it already moves, in order to shake.
+    amplitude : float
+        A, m.
+    frequency : float
+        Of the sine, Hz.
+    x, y, z : float
+        Direction, normalised.
+    seed : float
+        Of the random script; a whole number.
+    """
+
+    mass: float = 0.3
+    damping: float = 0.5
+    friction: float = 0.0
+    grip: float = 300.0
+    grip_damping: float = 5.0
+    step: float = 0.0
+    delay: float = 0.0
+    shape: str = "sine"
+    amplitude: float = 0.03
+    frequency: float = 0.5
+    x: float = 0.0
+    y: float = -1.0
+    z: float = 0.0
+    seed: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.shape not in _SHAPES:
+            raise UsageError(
+                f"There is no script of shape {self.shape!r}.", fix=f"Choose one of {', '.join(_SHAPES)}."
+            )
+        numbers = (self.mass, self.damping, self.friction, self.grip, self.grip_damping, self.step,
+                   self.delay, self.amplitude, self.frequency, self.x, self.y, self.z, self.seed)  # fmt: skip
+        if not (
+            all(map(math.isfinite, numbers))
+            and math.hypot(self.x, self.y, self.z) > 0.0
+            and self.mass > 0.0
+            and min(numbers[1:7]) >= 0.0
+            and self.delay <= _LONGEST_DELAY
+            and self.seed >= 0.0
+        ):
+            raise UsageError(
+                "No hand can be simulated with these settings.",
+                why="A mass is positive, dampers, springs and steps are not negative, a delay is at most "
+                f"{1e3 * _LONGEST_DELAY:g} ms, and a direction is not zero.",
+                fix="For example simulated:mass=0.3,damping=0.5,grip=300,delay=0.002,y=-1.",
+            )
+
+
+class SimulatedHand:
+    """Holds the body and moves by the script, as far as the loop's force lets it.
+
+    Attributes
+    ----------
+    place, velocity : (3,)
+        The true handle, m and m/s, without encoder and delay.
+    work : float
+        What the loop's force has done on the handle, J: positive where the loop gave energy.
+    """
+
+    traits: ClassVar[Traits] = Traits(
+        0.075, 12.0, 0.5, "a simulation; radius and force limit are omega.3's", mass=0.2
+    )
+
+    def __init__(self, settings: SimulatedSettings | None = None) -> None:
+        s = self.settings = settings or SimulatedSettings()
+        if s.damping != self.traits.damping:  # a device's word goes before that of its kind
+            known = type(self).traits
+            self.traits = Traits(  # type: ignore[misc]
+                known.radius, known.max_force, s.damping, known.source, mass=min(s.mass, known.mass)
+            )
+        rng = np.random.default_rng(int(s.seed))
+        self._along = np.array([s.x, s.y, s.z]) / math.hypot(s.x, s.y, s.z)
+        self._frequencies = rng.uniform(_SLOWEST, _FASTEST, (_WAVES, 3))
+        self._phases = rng.uniform(0.0, 2.0 * math.pi, (_WAVES, 3))
+        self._figures = np.array(
+            [
+                s.mass,
+                s.damping + s.grip_damping,
+                s.friction,
+                s.grip,
+                s.amplitude,
+                s.frequency,
+                self.traits.radius,
+            ]
+        )
+        self._shape = _SHAPES.index(s.shape)
+        self.place, self.velocity, self._push = np.zeros(3), np.zeros(3), np.zeros(3)
+        self._clock = np.zeros(2)  # s since the first reading; J of work
+        self._past, self._count = np.zeros((_PAST, 4)), 0
+        self._began, self._last = math.nan, math.nan
+        self.sample = Sample()
+        self.sample.holding = True
+        self._move(0.0)
+        _delayed(self._past, 1, 0.0, 0.0, self.sample.position)
+
+    @classmethod
+    def open(cls, commands: Block, options: Mapping[str, str]) -> SimulatedHand:
+        """Open from texts such as ``{"mass": "0.2"}``."""
+        return cls(settings_from(SimulatedSettings, options))
+
+    @property
+    def work(self) -> float:
+        """Work of the loop's force on the handle, J."""
+        return float(self._clock[1])
+
+    def read(self, now: float) -> Sample:
+        """Let the hand move until `now`, s, and return what the encoders say of the moment `delay` ago."""
+        if math.isnan(self._began):
+            self._began = self._last = now
+        self._move(min(max(0.0, now - self._last), _LONGEST_STRETCH))
+        self._last = now
+        past, k = self._past, self._count % _PAST
+        past[k, 0] = now
+        past[k, 1:] = self.place
+        self._count += 1
+        seen = max(now - self.settings.delay, self._began)
+        self.sample.time = seen
+        _delayed(past, self._count, seen, self.settings.step, self.sample.position)
+        return self.sample
+
+    def _move(self, span: float) -> None:
+        _integrate(
+            self.place,
+            self.velocity,
+            self._push,
+            self._clock,
+            span,
+            self._shape,
+            self._along,
+            self._figures,
+            self._frequencies,
+            self._phases,
+        )
+
+    def write(self, force: np.ndarray) -> None:
+        """Push with a force (3,), N, until the next call."""
+        self._push[:] = force
+
+    def close(self) -> None:
+        """Stop pushing and let go."""
+        self._push[:] = 0.0
+        self.sample.holding = False
+
+
+@_jit
+def _integrate(place, velocity, push, clock, span, shape, along, figures, frequencies, phases):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    mass, damper, friction, grip, amplitude, frequency, radius = figures
+    count = max(1, math.ceil(span / _STEP))
+    h = span / count
+    if h <= 0.0:
+        return
+    for _ in range(count):
+        clock[0] += h
+        time, speed, toward = clock[0], 0.0, 0.0
+        for i in range(3):
+            toward += velocity[i] * along[i]
+        for i in range(3):
+            if shape == 0:
+                aim = amplitude * along[i] * math.sin(2.0 * math.pi * frequency * time)
+            elif shape == 1:
+                aim = amplitude * along[i] * min(1.0, time / _RISE)
+            elif shape == 2:
+                aim = 0.0
+                for j in range(len(frequencies)):
+                    aim += math.sin(2.0 * math.pi * frequencies[j, i] * time + phases[j, i])
+                aim *= amplitude * 0.4 / math.sqrt(len(frequencies) / 2.0)
+                aim += 0.6 * amplitude * along[i]
+            else:
+                aim = amplitude * along[i] * (1.0 if toward >= 0.0 else 0.2)
+            velocity[i] += h / mass * (push[i] + grip * (aim - place[i]))
+            velocity[i] /= 1.0 + h * damper / mass
+            speed += velocity[i] * velocity[i]
+        speed = math.sqrt(speed)
+        kept = max(0.0, 1.0 - friction * h / mass / speed) if speed > 0.0 else 0.0
+        distance = 0.0
+        for i in range(3):
+            velocity[i] *= kept
+            place[i] += h * velocity[i]
+            clock[1] += push[i] * h * velocity[i]
+            distance += place[i] * place[i]
+        if distance > radius * radius:  # the device's own end stop, which takes all motion
+            shrink = radius / math.sqrt(distance)
+            for i in range(3):
+                clock[1] += push[i] * (shrink - 1.0) * place[i]
+                place[i] *= shrink
+                velocity[i] = 0.0
+
+
+@_jit
+def _delayed(past, count, seen, step, position):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    newest = (count - 1) % _PAST
+    k, older = newest, newest
+    for _ in range(min(count, _PAST) - 1):
+        older = (k - 1) % _PAST
+        if past[older, 0] <= seen:
+            break
+        k = older
+    span = past[k, 0] - past[older, 0]
+    share = min(1.0, max(0.0, (seen - past[older, 0]) / span)) if span > 0.0 else 1.0
+    for i in range(3):
+        value = past[older, 1 + i] + share * (past[k, 1 + i] - past[older, 1 + i])
+        position[i] = math.floor(value / step + 0.5) * step if step > 0.0 else value

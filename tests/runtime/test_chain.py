@@ -1,0 +1,168 @@
+"""The whole chain around a simulated hand, on time that the test makes: energy, rest, and the stiffness limit.
+
+Each run is a loop as it is, with a learnt body, a simulated hand on a device and no clock.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import held
+import pressed
+from models import spring_beam
+from palpate.errors import UsageError
+from palpate.runtime.devices.simulated import SimulatedHand, SimulatedSettings
+from palpate.runtime.loop import Loop
+from palpate.runtime.safety import Fault, Limits
+from palpate.runtime.shared_state import Shared
+from palpate.runtime.touchable import touchable
+from palpate.runtime.workspace import PLAIN_AXES, HandFrame, Workspace
+from palpate.surrogates.memories import Relaxation
+
+LIMITS = Limits(12.0)
+FAST, SLOW = (1000.0, 0.0), (200.0, 0.005)  # Hz, s
+BODIES = {
+    "block": pressed.surrogate,
+    "stiff block": lambda: pressed.surrogate(factor=50.0),
+    "relaxing block": lambda: pressed.surrogate(factor=50.0, memory=Relaxation(((0.4, 0.1),))),
+    "beam": lambda: spring_beam(200.0),
+}
+
+
+class Touch:
+    """One body in one simulated hand, and all that was sent and moved."""
+
+    def __init__(self, name, pace, seconds, *, override=False, control=True, **settings):
+        body = touchable(BODIES[name]())
+        scale = body.workspace(SimulatedHand.traits.radius).scale
+        rate, delay = pace
+        aim = body.stroke(scale) | settings
+        self.hand = SimulatedHand(SimulatedSettings(**aim, delay=delay))
+        self.loop = Loop(
+            body, self.hand, Shared.private(), body.workspace(0.075), LIMITS,
+            rate=rate, stiffness=body.stiffness_max, override=override, control=control,
+        )  # fmt: skip
+        self.forces, self.speeds, self.places = [], [], []
+        for k in range(round(seconds * rate)):
+            self.loop.tick(k / rate)
+            self.forces.append(self.loop.out.force.copy())
+            self.speeds.append(np.linalg.norm(self.hand.velocity))
+            self.places.append(self.hand.place.copy())
+            assert self.loop.fault is Fault.NONE
+
+    @property
+    def floor(self):
+        """The bound of the ledger, J."""
+        return -self.loop.bounds.felt * self.loop.passivity.leak
+
+    def rms(self, since):
+        return math.sqrt(np.mean(np.square(self.speeds[round(since / self.loop.period) :])))
+
+
+@pytest.mark.parametrize("shape", ["random", "adversarial"])
+@pytest.mark.parametrize("pace", [FAST, SLOW], ids=["1 kHz", "200 Hz, 5 ms"])
+@pytest.mark.parametrize("name", list(BODIES))
+def test_no_more_energy_than_sampling_leaks(name, pace, shape):
+    touch = Touch(name, pace, 3.0, shape=shape, seed=7)
+    assert np.linalg.norm(touch.forces, axis=1).max() > 0.02, "the body was felt"
+    assert touch.loop.passivity.lowest >= touch.floor - 1e-9
+    assert np.linalg.norm(touch.forces, axis=1).max() <= LIMITS.max_force + 1e-12
+    # and the device's own damping takes more than the force gave it
+    own = 0.5 * np.square(np.linalg.norm(np.diff(touch.places, axis=0), axis=1)).sum() / touch.loop.period
+    assert touch.hand.work <= own + 1e-9
+
+
+@pytest.mark.parametrize("pace", [FAST, SLOW], ids=["1 kHz", "200 Hz, 5 ms"])
+@pytest.mark.parametrize("name", list(BODIES))
+def test_a_hand_in_contact_comes_to_rest(name, pace):
+    touch = Touch(name, pace, 2.0, shape="press", step=1e-5)
+    assert np.linalg.norm(touch.forces[-1]) > 0.02
+    assert touch.rms(1.0) < 1e-3
+
+
+def test_the_limit_acts_with_the_delay_that_was_measured_and_says_so():
+    quick, late = Touch("stiff block", FAST, 1.0), Touch("stiff block", SLOW, 1.0)
+    assert late.loop.bounds.delay == pytest.approx(0.005, rel=0.05)
+    assert quick.loop.bounds.felt == pytest.approx(1000.0)
+    assert late.loop.bounds.felt == pytest.approx(200 / 3, rel=0.05)
+    assert "softened to 67 N/m" in late.loop.bounds.warning
+    assert Touch("block", FAST, 0.1).loop.bounds.warning is None
+    assert not Touch("block", FAST, 0.1).loop.coupling.active
+
+
+def test_without_limit_and_controller_the_body_shakes_the_hand():
+    """The rivals: only the limit keeps the loop calm, and only the controller bounds what a body without it gives."""
+    options = {"shape": "adversarial", "override": True}
+    wild = Touch("stiff block", SLOW, 4.0, control=False, **options)
+    kept = Touch("stiff block", SLOW, 4.0, **options)
+    calm = Touch("stiff block", SLOW, 4.0, shape="adversarial")
+    assert wild.hand.work > 0.1
+    assert kept.hand.work < 0.1 * wild.hand.work
+    assert calm.hand.work < 0.1 * kept.hand.work
+    assert "as asked" in kept.loop.bounds.warning
+    assert kept.loop.passivity.injected > 0.0
+
+
+def test_the_softened_body_is_felt_as_body_and_spring_in_series():
+    touch = Touch("stiff block", FAST, 1.5, shape="press")
+    loop = touch.loop
+    loop.evaluator(loop.coupling.proxy, loop.parameters)
+    np.testing.assert_allclose(loop.out.force, loop.evaluator.force, rtol=2e-3, atol=1e-3)
+    body = loop.coupling.stiffness * (loop.coupling.proxy - loop.out.position)
+    np.testing.assert_allclose(loop.out.force, body)
+
+
+def test_a_repeated_run_gives_the_same_bits():
+    first, second = (Touch("relaxing block", SLOW, 1.0, shape="random", seed=3, step=1e-5) for _ in range(2))
+    np.testing.assert_array_equal(first.forces, second.forces)
+    np.testing.assert_array_equal(first.loop.passivity.state, second.loop.passivity.state)
+
+
+def test_a_gripped_pad_is_softened_too():
+    body = touchable(held.pad())
+    hand = SimulatedHand(SimulatedSettings(delay=0.01, damping=0.02, shape="random"))
+    loop = Loop(
+        body, hand, Shared.private(), body.workspace(0.075), LIMITS, rate=200.0, stiffness=body.stiffness_max
+    )  # fmt: skip
+    loop.run_for(1.0)
+    assert loop.coupling.active
+    assert loop.passivity.lowest >= -loop.bounds.felt * loop.passivity.leak - 1e-9
+    published = loop.out._record
+    assert published["coupling"] == pytest.approx(loop.bounds.coupling)
+
+
+TURNED = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))  # x towards the user, y right, z up
+
+
+def test_axes_turn_positions_there_and_forces_back():
+    frame, hand, sent = HandFrame(TURNED), np.zeros(3), np.zeros(3)
+    frame.to_hand(np.array([1.0, 2.0, 3.0]), hand, clutched=False)
+    assert hand.tolist() == [2.0, 3.0, 1.0]
+    frame.to_device(hand, sent)
+    assert sent.tolist() == [1.0, 2.0, 3.0]
+    mirror = ((-1.0, 0.0, 0.0), *PLAIN_AXES[1:])
+    for bad in (mirror, ((2.0, 0.0, 0.0), *PLAIN_AXES[1:]), ((1.0, 0.1, 0.0), *PLAIN_AXES[1:])):
+        with pytest.raises(UsageError, match=r"\+1"):
+            HandFrame(bad)
+
+
+def test_a_clutch_moves_the_device_and_not_the_hand():
+    frame, hand = HandFrame(), np.zeros(3)
+    frame.to_hand(np.array([0.01, 0.0, 0.0]), hand, clutched=False)
+    frame.to_hand(np.array([0.05, 0.02, 0.0]), hand, clutched=True)
+    assert hand.tolist() == [0.01, 0.0, 0.0]
+    frame.to_hand(np.array([0.06, 0.02, 0.0]), hand, clutched=False)
+    np.testing.assert_allclose(hand, [0.01, 0.0, 0.0])
+    frame.to_hand(np.array([0.07, 0.02, 0.0]), hand, clutched=False)
+    np.testing.assert_allclose(hand, [0.02, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("upright", [False, True])
+def test_forces_go_to_the_hand_and_back(upright):
+    space, sent, back = Workspace(0.075, 1.0, upright=upright), np.zeros(3), np.zeros(3)
+    space.force_on_hand(np.array([1.0, 2.0, 3.0]), sent)
+    space.force_on_body(sent, back)
+    assert back.tolist() == [1.0, 2.0, 3.0]

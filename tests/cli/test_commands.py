@@ -128,6 +128,13 @@ def test_doctor_has_a_remedy_for_each_miss(palpate):
     assert all(c["ok"] or c["remedy"] for c in checks)
 
 
+def test_devices_lists_by_default(palpate):
+    answer = palpate("devices", "--json")
+    assert answer.code == 0
+    assert {"page", "stroke"} <= {d["name"] for d in json.loads(answer.out)["devices"]}
+    assert palpate("devices", "list", "--json").out == answer.out
+
+
 @pytest.mark.slow
 def test_demo_runs_both_founding_beams(tmp_path):
     command = [sys.executable, "-m", "palpate", "demo", "--folder", str(tmp_path / "d"), "--json"]

@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from palpate.cli.console import Console, advice_in_words
+from palpate.cli.device_commands import devices_app
 from palpate.cli.table_commands import correct, fit
 from palpate.cli.table_options import (
     DecimalOption,
@@ -42,6 +43,7 @@ app = typer.Typer(
 
 dataset_app = typer.Typer(help="Datasets of solves.", no_args_is_help=True)
 app.add_typer(dataset_app, name="dataset")
+app.add_typer(devices_app, name="devices")
 
 StudyFile = Annotated[Path, typer.Argument(help="Study file, as [bold]palpate init[/] writes it.")]
 ModelFile = Annotated[

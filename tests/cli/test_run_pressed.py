@@ -56,3 +56,22 @@ def test_a_pad_is_pulled_by_the_script(palpate, tmp_path):
     answer = palpate("run", file, "--seconds", "0.5", "--device", "stroke:frequency=2")
     assert answer.code == 0, answer.err
     assert "mm from rest" in answer.out
+
+
+def test_a_body_too_stiff_for_its_device_is_softened_and_that_is_told(palpate, tmp_path):
+    stiff = slab.surrogate(factor=50.0).save(tmp_path / "stiff.palpate")
+    device = "simulated:delay=0.004,damping=0.3,shape=press"
+    answer = palpate("run", stiff, "--seconds", "1", "--rate", "200", "--device", device, "--json")
+    assert answer.code == 0, answer.err
+    told = json.loads(answer.out)
+    assert told["delay"] == pytest.approx(0.004, rel=0.1)
+    assert told["felt_stiffness"] == pytest.approx(0.3 / (0.0025 + told["delay"]))
+    assert told["felt_stiffness"] < 100.0 < told["body_stiffness"]
+    assert told["energy_lowest"] >= -told["leak_bound"] - 1e-9
+    assert told["largest_force"] > 0.01
+    assert "softened to" in told["stiffness"]
+    words = palpate("run", stiff, "--seconds", "0.2", "--rate", "200", "--device", device)
+    assert "softened to" in words.err
+    answer = palpate("run", stiff, "--seconds", "0.2", "--rate", "200", "--device", device, "--unsoftened")
+    assert "as asked" in answer.err
+    assert "energy    never below" in answer.out

@@ -4,7 +4,8 @@
     process, child                    LoopProcess: the parent's handle, and the process behind it
     loop                              one tick, as a list of stages
     realtime, loop_report             punctuality, and how well it was kept
-    safety, stability                 what may reach a hand
+    safety, passivity                 what may reach a hand
+    stability, coupling               how stiff a body may feel, and the spring in front of one that is stiffer
     workspace, devices                where the hand is
     touchable, hand_evaluator         what it is laid on, and what answers it
 

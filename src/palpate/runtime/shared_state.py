@@ -156,7 +156,7 @@ class State:
 
     @property
     def energy(self) -> float:
-        """What the hand has put in, less what it was given back, J; a credit ends where nothing is touched."""
+        """Energy that the hand has put in, less what it was given back, J; a credit ends where nothing is touched."""
         return float(self.ledger[0])
 
     @property
@@ -181,7 +181,7 @@ class State:
 
     @property
     def felt_stiffness(self) -> FeltStiffness:
-        """How stiff the body is and may be in this hand, with the delay that was measured."""
+        """The stiffness of the body in this hand, and its bound, with the delay that was measured."""
         damping = None if math.isnan(self.device_damping) else self.device_damping
         rate = self.nominal_rate
         return FeltStiffness(self.body_stiffness, damping, rate, self.delay, self.unsoftened)

@@ -1,4 +1,4 @@
-"""How stiff a body may feel before the sampled loop itself starts to push, and what follows where it is stiffer.
+"""Bounds on how stiff a body may feel before the sampled loop itself starts to push, and what follows from them.
 
 A force computed from a sample is held for a tick, and so trails the hand: the loop leaks energy in proportion
 to the stiffness K and the tick T, and the device's own damping b must absorb it. With a virtual damping B and a
@@ -78,7 +78,7 @@ def stable_stiffness(
 
 @dataclass(frozen=True)
 class FeltStiffness:
-    """How stiff a body is and may be in the hand, on one device, at one rate and delay.
+    """The stiffness of a body in the hand and its bound, on one device, at one rate and delay.
 
     Attributes
     ----------

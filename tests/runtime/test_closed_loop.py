@@ -1,4 +1,4 @@
-"""The whole chain around a simulated hand, on time that the test makes: energy, rest, and the stiffness limit.
+"""The whole loop around a simulated hand, on time that the test makes: energy, rest, and the stiffness limit.
 
 Each run is a loop as it is, with a learnt body, a simulated hand on a device and no clock.
 """

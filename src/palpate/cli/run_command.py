@@ -131,12 +131,13 @@ def _wait(loop: LoopProcess, seconds: float, console: Console, peak: _Peak) -> N
     """Look at the force while the loop runs, and show it in a terminal."""
     end = time.monotonic() + seconds
     shown = sys.stderr.isatty() and not console.as_json
-    coupling = math.inf
+    coupling = math.nan  # nothing was said yet
     while (left := end - time.monotonic()) > 0:
         time.sleep(min(left, LOOK))
         state = loop.read()
         peak.see(state)
-        if not math.isclose(state.coupling, coupling, rel_tol=_TOLD):
+        with_motors = state.felt_stiffness.damping is not None
+        if with_motors and not math.isclose(state.coupling, coupling, rel_tol=_TOLD):
             coupling = state.coupling
             console.say(state.felt_stiffness.warning or f"{state.felt_stiffness}.")
         if shown:

@@ -154,7 +154,8 @@ def report(console):
         print(folder, flush=True)
         signal.pause()
 palpate.cli.doctor.report = report
-main(["doctor"])
+sys.argv = ["palpate", "doctor"]
+main()
 """
 
 

@@ -256,7 +256,9 @@ def _record(row: Columns, schema: Sequence[Field], answer: Answer) -> None:
     if not answer.converged:  # the fields of a failed solve stay NaN
         return
     answers = {field.name: _value(answer, field) for field in schema if field.name not in _BOOKKEEPING_NAMES}
-    if wrong := [name for name, value in answers.items() if value is not None and not _is_finite(value)]:
+    if wrong := [
+        name for name, value in answers.items() if value is not None and not _is_finite(_stated(name, value))
+    ]:
         row["converged"][0] = False
         row["message"][0] = (
             f"the solver calls it converged, but {', '.join(wrong)} {'is' if len(wrong) == 1 else 'are'} not finite"
@@ -265,6 +267,19 @@ def _record(row: Columns, schema: Sequence[Field], answer: Answer) -> None:
     for name, value in answers.items():
         if value is not None:
             row[name][0] = value
+
+
+def _stated(name: str, value: Any) -> Any:
+    """Return a quantity without what its solver does not state.
+
+    A family of bodies does not state how the force varies with a material's numbers: these rows and columns of the
+    gradient are not-a-number altogether. Without any number nothing is left out.
+    """
+    if name != "response_gradient" or not np.isfinite(value).any():
+        return value
+    gradient = np.asarray(value)
+    known = np.isfinite(gradient).any(axis=1)
+    return gradient[np.ix_(known, np.isfinite(gradient).any(axis=0))]
 
 
 def _is_finite(value: Any) -> bool:

@@ -223,6 +223,28 @@ def test_silent_hardware_gets_zero_force_within_20_ms(bench):
             assert state.force.any(), "no sooner than agreed"
 
 
+def test_the_delay_is_the_mean_age_of_fresh_samples(bench):
+    bench.device.silent, bench.device.sample.holding = True, False
+    bench.ticks(5)
+    assert bench.shared.read_state().delay == 0.0, "a device that was never heard of has no age"
+    bench.device.sample.holding = True
+    for k in range(1000):
+        bench.device.sample.time = bench.now + TICK - (0.002 if k % 2 else 0.004)
+        bench.ticks(1)
+    assert bench.shared.read_state().delay == pytest.approx(0.003, rel=0.05)
+
+
+def test_a_clutch_is_no_force_and_no_fault(bench):
+    full = np.linalg.norm(bench.settle().force)
+    bench.device.sample.clutched = True
+    bench.device.sample.position[:] = 0.02
+    states = bench.ticks(5)
+    assert zero(states)
+    assert states[-1].faults == 0
+    bench.device.sample.clutched = False
+    assert_ramps_in(bench.ticks(RAMP + 90), full)
+
+
 @pytest.mark.parametrize(("period", "limit"), [(0.01, 0.100), (0.05, 0.150)])
 def test_a_page_that_falls_silent(page, period, limit):
     page.settle()

@@ -250,7 +250,7 @@ class Loop:
             self.fail(Fault.INPUT_NOT_FINITE)
         if self.fault is Fault.NONE:
             self.frame.to_hand(sample.position, self.out.hand, clutched=sample.clutched)
-            if self.motors:
+            if self.motors and not late:
                 self._measure_delay(self.now - sample.time)
 
     def _measure_delay(self, age: float) -> None:

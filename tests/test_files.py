@@ -149,7 +149,7 @@ import signal, sys
 from palpate.cli import main
 import palpate.cli.doctor
 from palpate.files import TemporaryFolder
-def report(console):
+def report(*_):
     with TemporaryFolder() as folder:
         print(folder, flush=True)
         signal.pause()

@@ -15,6 +15,7 @@ from palpate import __version__
 from palpate.dataset import Dataset
 from palpate.learning.loading import load
 from palpate.physics.advice import advise
+from palpate.runtime import LoopReport
 from palpate.study import Study, preset_names, preset_study, read_study
 
 from .conftest import SMALL
@@ -123,15 +124,34 @@ def test_run_reports_the_loop(palpate, carried_out):
 
 
 def test_doctor_has_a_remedy_for_each_miss(palpate):
-    checks = json.loads(palpate("doctor", "--json").out)["checks"]
-    assert {"Python", "NGSolve", "chromium"} <= {c["name"] for c in checks}
-    assert all(c["ok"] or c["remedy"] for c in checks)
+    answer = json.loads(palpate("doctor", "--json", "--seconds", "0").out)
+    assert {"Python", "NGSolve", "chromium", "load"} <= {c["name"] for c in answer["checks"]}
+    assert all(c["ok"] or c["remedy"] for c in answer["checks"])
+    assert all(d["state"] == "ready" or d["remedy"] for d in answer["devices"])
+    assert answer["timing"] is None
+
+
+def test_doctor_gives_a_verdict_on_the_loop(palpate, monkeypatch):
+    figures = dict.fromkeys(("lateness_p50", "lateness_p99", "lateness_p999", "work_p50", "work_p99"), 2e-5)
+    run = LoopReport(4000, 1000.0, **figures, lateness_max=3e-5, clamped=0.0, faults={}, obtained={})
+    monkeypatch.setattr("palpate.cli.doctor.run_timing_test", lambda seconds, rate: run)
+    answer = palpate("doctor", "--seconds", "4")
+    assert "✓ good: this machine can drive a device at 1000 Hz" in answer.out
+    answer = palpate("doctor", "--seconds", "5", "--json")  # for which there are too few ticks
+    assert json.loads(answer.out)["timing"]["grade"] == "not fit"
+
+
+def test_doctor_outlives_a_timing_test_that_fails(palpate, monkeypatch):
+    monkeypatch.setattr(sys, "executable", "/nowhere/python")
+    answer = palpate("doctor", "--seconds", "0.1")
+    assert answer.code == 0
+    assert "did not run to its end" in answer.out
 
 
 def test_devices_lists_by_default(palpate):
     answer = palpate("devices", "--json")
     assert answer.code == 0
-    assert {"page", "stroke"} <= {d["name"] for d in json.loads(answer.out)["devices"]}
+    assert {"page", "stroke"} <= {d["device"] for d in json.loads(answer.out)["devices"]}
     assert palpate("devices", "list", "--json").out == answer.out
 
 

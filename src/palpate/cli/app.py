@@ -400,11 +400,16 @@ def import_dataset(
 
 
 @app.command()
-def doctor(as_json: Json = False) -> None:
-    """Check this machine: software, real-time scheduling and devices, with advice for what is missing."""
+def doctor(
+    seconds: Annotated[
+        float, typer.Option(min=0, max=3600, help="Duration of the timing test in seconds; 0 leaves it out.")
+    ] = 10.0,
+    as_json: Json = False,
+) -> None:
+    """Check this machine: software, timing of the real-time loop, and devices, with advice for what is missing."""
     from palpate.cli.doctor import report
 
-    report(Console(as_json))
+    report(Console(as_json), seconds)
 
 
 def _serve(model: Path, *, port: int | None, browser: bool, token: bool, strict_port: bool = False) -> None:

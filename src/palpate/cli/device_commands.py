@@ -1,18 +1,27 @@
-"""`palpate devices`: what can be touched with on this machine, and what is missing.
+"""`palpate devices`: what can be touched with on this machine, what was looked for and where, and what to do.
 
 The group lists by default; each further command of devices is a command of this group.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import typer
 
 from palpate.cli.console import Console
 from palpate.cli.table_options import Json
 
-__all__ = ["devices_app"]
+if TYPE_CHECKING:
+    from palpate.runtime.device_search import Finding
+
+__all__ = ["devices_app", "findings_in_words"]
 
 devices_app = typer.Typer(help="Devices for the hand: what is there, and what to do for the others.")
+
+_MARKS = {"ready": "✓", "present": "○", "absent": "·"}
+_STATES = {"ready": "ready", "present": "there, without a driver", "absent": "not there"}
 
 
 @devices_app.callback(invoke_without_command=True)
@@ -23,9 +32,23 @@ def _default(context: typer.Context, as_json: Json = False) -> None:
 
 @devices_app.command("list")
 def list_devices(as_json: Json = False) -> None:
-    """List the devices that this version drives, with their traits."""
-    from palpate.runtime.devices import device_names, device_traits
+    """List the devices that are there, those that were looked for and where, and what to do."""
+    from palpate.runtime.device_search import search
 
-    found = {name: device_traits(name) for name in device_names()}
-    lines = [f"{name:12} {traits.source}" for name, traits in found.items()]
-    Console(as_json).result("\n".join(lines), {"devices": [{"name": n} | vars(t) for n, t in found.items()]})
+    findings = search()
+    Console(as_json).result(findings_in_words(findings), {"devices": [vars(f) for f in findings]})
+
+
+def findings_in_words(findings: Sequence[Finding]) -> str:
+    """Return findings as lines for a person."""
+    lines = []
+    for f in findings:
+        use = f"   --device {f.device}" if f.state == "ready" else ""
+        lines.append(f"{_MARKS[f.state]} {f.name}: {_STATES[f.state]}{use}")
+        lines.append(f"    {f.detail}")
+        if f.looked_for:
+            lines.append(f"    looked for {', '.join(f.looked_for)}")
+            lines.append(f"    in {', '.join(f.looked_in)}")
+        if f.remedy:
+            lines.append(f"    → {f.remedy}")
+    return "\n".join(lines)

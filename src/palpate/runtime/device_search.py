@@ -1,0 +1,323 @@
+"""A search for haptic devices on this machine: by the names of files and ports, without loading or opening any.
+
+Each kind of device is an entry of `HARDWARE`: the vendor's library, the port of a local service, or the kernel's list
+of gamepads. An entry says where it looks and what to do when nothing is there. Whether this version drives what is
+found is asked of the table in `palpate.runtime.devices`: an entry whose `device` is in it can be used by that name.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+from palpate.runtime.devices import device_names, device_traits
+
+__all__ = ["HARDWARE", "Finding", "GamepadSearch", "LibrarySearch", "ServiceSearch", "Surroundings", "search"]
+
+_ANSWER = 0.2  # s that a port of this machine may take to answer
+
+
+def _port_answers(host: str, port: int) -> bool:
+    try:
+        with socket.create_connection((host, port), _ANSWER):
+            return True
+    except OSError:
+        return False
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """The machine that is searched; a test lays out one of its own.
+
+    Attributes
+    ----------
+    root : Path
+        Folder below which absolute paths are looked up.
+    environment : mapping of str to str
+        Environment variables.
+    platform : str
+        ``linux``, ``darwin`` or ``win32``.
+    answers : callable
+        Returns whether something listens on a host's port.
+    """
+
+    root: Path = Path("/")
+    environment: Mapping[str, str] = field(default_factory=lambda: os.environ)
+    platform: str = sys.platform
+    answers: Callable[[str, int], bool] = _port_answers
+
+    def place(self, path: str) -> Path:
+        """Return where an absolute path lies below the root."""
+        if self.root == Path("/"):
+            return Path(path)
+        return self.root / path.lstrip("/")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One kind of device: what there is of it.
+
+    Attributes
+    ----------
+    name : str
+        Of the device, or of the family of devices.
+    kind : {"built in", "library", "service", "gamepad"}
+        What it is reached through.
+    state : {"ready", "present", "absent"}
+        Ready for ``--device``; there, without a driver in this version; or not there.
+    detail : str
+        What was found.
+    looked_for : tuple of str
+        Names of the files or ports.
+    looked_in : tuple of str
+        Folders, variables of the environment or hosts.
+    remedy : str
+        What to do; empty where it is ready.
+    device : str
+        Name for ``--device``; empty where this version has no driver.
+    """
+
+    name: str
+    kind: str
+    state: str
+    detail: str
+    looked_for: tuple[str, ...] = ()
+    looked_in: tuple[str, ...] = ()
+    remedy: str = ""
+    device: str = ""
+
+
+class _Search(Protocol):
+    @property
+    def device(self) -> str: ...
+    def look(self, surroundings: Surroundings) -> Finding: ...
+
+
+def search(surroundings: Surroundings | None = None) -> tuple[Finding, ...]:
+    """Return a finding for each device that this version has, and for each kind of hardware that was looked for."""
+    surroundings = surroundings or Surroundings()
+    hardware = {entry.device for entry in HARDWARE}
+    own = (_built_in(name) for name in device_names() if name not in hardware)
+    return (*own, *(entry.look(surroundings) for entry in HARDWARE))
+
+
+def _built_in(name: str) -> Finding:
+    traits = device_traits(name)
+    detail = f"workspace ±{1e3 * traits.radius:.0f} mm, at most {traits.max_force:g} N: {traits.source}"
+    return Finding(name, "built in", "ready", detail, device=name)
+
+
+def _state(found: bool, device: str) -> tuple[str, str]:
+    """Return the state of what was found or not, and its name for ``--device``."""
+    driven = device if device in device_names() else ""
+    if not found:
+        return "absent", driven
+    return ("ready" if driven else "present"), driven
+
+
+_NO_DRIVER = "This version has no driver for it yet: touch with the page, or with a scripted stroke."
+
+
+def _advice(state: str, driven: str, to_install: str) -> str:
+    if state == "ready":
+        return ""
+    return to_install if driven else _NO_DRIVER
+
+
+@dataclass(frozen=True)
+class LibrarySearch:
+    """A vendor's shared library, by its file name.
+
+    Attributes
+    ----------
+    name, device : str
+        Of the family of devices, and of its driver.
+    files : mapping of str to tuple of str
+        File names by platform, the preferred one first.
+    folders : tuple of str
+        Where the vendor's installer puts it, beside the system's own folders; may hold wildcards.
+    variables : tuple of str
+        Environment variables that name a folder of the vendor's kit; its subfolders ``lib*`` are looked in.
+    override : str
+        Environment variable that names the file itself, or its folder.
+    download : str
+        Title of what the vendor offers.
+    """
+
+    name: str
+    device: str
+    files: Mapping[str, tuple[str, ...]]
+    folders: tuple[str, ...]
+    variables: tuple[str, ...]
+    override: str
+    download: str
+
+    def look(self, surroundings: Surroundings) -> Finding:
+        """Return the finding on this machine."""
+        names = self.files.get(surroundings.platform, self.files["linux"])
+        path = self.find(surroundings)
+        state, driven = _state(path is not None, self.device)
+        named = (self.override, *self.variables, *_PATHS.get(surroundings.platform, ()))
+        looked_in = (*(f"${v}" for v in named), *self.folders, *_SYSTEM.get(surroundings.platform, ()))
+        install = f"Install {self.download} and name its library in the environment variable {self.override}."
+        detail = "not found" if path is None else f"found {path}"
+        return Finding(
+            self.name, "library", state, detail, names, looked_in, _advice(state, driven, install), driven
+        )
+
+    def find(self, surroundings: Surroundings) -> Path | None:
+        """Return the library's file, or None where there is none."""
+        names = self.files.get(surroundings.platform, self.files["linux"])
+        if given := surroundings.environment.get(self.override):
+            place = surroundings.place(given)
+            if place.is_file():
+                return place
+        for folder in self._places(surroundings):
+            for name in names:
+                if (folder / name).is_file():
+                    return folder / name
+        return None
+
+    def _places(self, surroundings: Surroundings) -> Iterator[Path]:
+        environment = surroundings.environment
+        if given := environment.get(self.override):
+            yield surroundings.place(given)
+        for variable in self.variables:
+            if base := environment.get(variable):
+                kit = surroundings.place(base)
+                yield from (kit, *kit.glob("lib*"), *kit.glob("lib*/*"), *kit.glob("lib*/*/*"))
+        separator = ";" if surroundings.platform == "win32" else ":"
+        for variable in _PATHS.get(surroundings.platform, ()):
+            for part in filter(None, environment.get(variable, "").split(separator)):
+                yield surroundings.place(part)
+        for pattern in (*self.folders, *_SYSTEM.get(surroundings.platform, ())):
+            yield from sorted(surroundings.root.glob(pattern.lstrip("/")))
+
+
+_PATHS = {"linux": ("LD_LIBRARY_PATH",), "darwin": ("DYLD_LIBRARY_PATH",), "win32": ("PATH",)}
+_SYSTEM = {
+    "linux": ("/usr/local/lib", "/usr/local/lib64", "/usr/lib/*-linux-gnu", "/usr/lib64", "/usr/lib"),
+    "darwin": ("/usr/local/lib", "/opt/homebrew/lib"),
+}
+
+
+@dataclass(frozen=True)
+class ServiceSearch:
+    """A program on this machine that owns the devices, by the ports that it listens on.
+
+    Attributes
+    ----------
+    name, device : str
+        Of the family of devices, and of its driver.
+    ports : mapping of int to str
+        Each port, and what speaks there.
+    install : str
+        What to install or start, as a sentence.
+    """
+
+    name: str
+    device: str
+    ports: Mapping[int, str]
+    install: str
+
+    def look(self, surroundings: Surroundings) -> Finding:
+        """Return the finding on this machine; a connection is made and closed at once, and nothing is sent."""
+        host = "127.0.0.1"
+        open_ports = [port for port in self.ports if surroundings.answers(host, port)]
+        state, driven = _state(bool(open_ports), self.device)
+        detail = ", ".join(f"port {port} answers, usually {self.ports[port]}" for port in open_ports)
+        return Finding(
+            self.name,
+            "service",
+            state,
+            detail or "no port answers",
+            tuple(f"port {port} ({words})" for port, words in self.ports.items()),
+            (f"{host}, this machine",),
+            _advice(state, driven, self.install),
+            driven,
+        )
+
+
+@dataclass(frozen=True)
+class GamepadSearch:
+    """Gamepads in the Linux kernel's list of input devices: those with a joystick's handler."""
+
+    name: str = "Gamepad (evdev)"
+    device: str = "evdev"
+    listing: str = "/proc/bus/input/devices"
+
+    def look(self, surroundings: Surroundings) -> Finding:
+        """Return the finding on this machine."""
+        pads = list(self._pads(surroundings))
+        state, driven = _state(bool(pads), self.device)
+        install = "Plug it in; on another system than Linux none is looked for."
+        closed = [path for _, path in pads if not os.access(surroundings.place(path), os.R_OK)]
+        detail = ", ".join(f"{name} at {path}" for name, path in pads) or "none plugged in"
+        remedy = _advice(state, driven, install)
+        if closed:
+            detail += f"; {', '.join(closed)} can't be read"
+            remedy = f"Add yourself to the group input, and log in again. {remedy}".strip()
+        return Finding(
+            self.name, "gamepad", state, detail, ("a handler js…",), (self.listing,), remedy, driven
+        )
+
+    def _pads(self, surroundings: Surroundings) -> Iterator[tuple[str, str]]:
+        """Yield name and event file of each gamepad."""
+        try:
+            text = surroundings.place(self.listing).read_text(encoding="utf-8", errors="replace")
+        except OSError:
+            return
+        for block in text.split("\n\n"):
+            lines = {line[:1]: line[3:] for line in block.splitlines() if line[:1] in "NH"}
+            handlers = lines.get("H", "").partition("=")[2].split()
+            if any(handler.startswith("js") for handler in handlers):
+                event = next((h for h in handlers if h.startswith("event")), "")
+                yield lines.get("N", "").partition("=")[2].strip('"'), f"/dev/input/{event}"
+
+
+HARDWARE: tuple[_Search, ...] = (
+    ServiceSearch(
+        name="Haply Inverse3, Minverse, VerseGrip",
+        device="haply",
+        ports={10001: "websocket and HTTP of the service 3.x", 10000: "HTTP and format 3.0", 10020: "events"},
+        install="Install and start the Haply Inverse Service 3.x (Haply Inverse SDK); it owns the devices.",
+    ),
+    LibrarySearch(
+        name="Force Dimension delta, omega, sigma, lambda; Novint Falcon (DHD)",
+        device="dhd",
+        files={
+            "linux": ("libdrd.so", "libdrd.so.3", "libdhd.so", "libdhd.so.3"),
+            "darwin": ("libdrd.dylib", "libdrd.3.dylib", "libdhd.dylib", "libdhd.3.dylib"),
+            "win32": ("drd64.dll", "dhd64.dll", "drdms64.dll", "dhdms64.dll"),
+        },
+        folders=("/opt/force[-_]dimension*/lib/release/*", "/opt/sdk-3.*/lib/release/*"),
+        variables=("FDSDK",),
+        override="PALPATE_DHD",
+        download="the Force Dimension SDK, 3.16 or later",
+    ),
+    LibrarySearch(
+        name="3D Systems Touch, Touch X, Phantom (OpenHaptics HD)",
+        device="hd",
+        files={
+            "linux": ("libHD.so", "libHD.so.3.4", "libHD.so.3.4.0"),
+            "darwin": ("HD.framework/HD",),
+            "win32": ("hd.dll",),
+        },
+        folders=("/opt/OpenHaptics/Developer/*/lib64", "/opt/OpenHaptics/Developer/*/lib"),
+        variables=("OH_SDK_BASE", "3DTOUCH_BASE"),
+        override="PALPATE_HD",
+        download="OpenHaptics for Developers, and the Touch device driver, of 3D Systems",
+    ),
+    ServiceSearch(
+        name="CRTK robots over the ROS bridge",
+        device="crtk",
+        ports={9090: "rosbridge"},
+        install="Start the bridge: ros2 launch rosbridge_server rosbridge_websocket_launch.xml",
+    ),
+    GamepadSearch(),
+)

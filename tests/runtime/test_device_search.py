@@ -1,0 +1,130 @@
+"""The search for devices on a machine laid out in a folder: nothing is loaded, and no port of this machine is asked."""
+
+from __future__ import annotations
+
+import pytest
+
+from palpate.runtime import device_search
+from palpate.runtime.device_search import HARDWARE, LibrarySearch, Surroundings, search
+from palpate.runtime.devices import device_names
+
+GAMEPAD = """\
+I: Bus=0003 Vendor=046d
+N: Name="A mouse"
+H: Handlers=mouse0 event2
+
+I: Bus=0003 Vendor=045e
+N: Name="Pad of two sticks"
+H: Handlers=event7 js0
+"""
+
+
+def entry(device):
+    return next(e for e in HARDWARE if e.device == device)
+
+
+@pytest.fixture
+def empty(tmp_path):
+    return Surroundings(tmp_path, {}, "linux", lambda host, port: False)
+
+
+def touch(root, path):
+    file = root / path.lstrip("/")
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.touch()
+    return file
+
+
+def test_an_empty_machine_has_the_devices_of_this_version(empty):
+    findings = search(empty)
+    assert {f.device for f in findings if f.state == "ready"} >= {"page", "stroke"}
+    for finding in findings:
+        assert finding.detail
+        if finding.kind != "built in":
+            assert finding.state == "absent"
+            assert finding.looked_for
+            assert finding.looked_in
+            assert finding.remedy
+    assert len({f.name for f in findings}) == len(findings)
+
+
+@pytest.mark.parametrize(
+    ("device", "path", "environment"),
+    [
+        ("dhd", "/usr/local/lib/libdrd.so", {}),
+        ("dhd", "/usr/lib/x86_64-linux-gnu/libdhd.so.3", {}),
+        ("dhd", "/home/me/sdk/lib/release/lin-x86_64-gcc/libdrd.so.3", {"FDSDK": "/home/me/sdk"}),
+        ("dhd", "/home/me/odd-name.so", {"PALPATE_DHD": "/home/me/odd-name.so"}),
+        ("dhd", "/home/me/libdhd.so", {"PALPATE_DHD": "/home/me"}),
+        ("dhd", "/a/libdhd.so", {"LD_LIBRARY_PATH": "/nowhere:/a"}),
+        ("hd", "/usr/lib/libHD.so", {}),
+        ("hd", "/opt/OpenHaptics/Developer/3.4-0/lib64/libHD.so.3.4", {}),
+        ("hd", "/kit/lib/libHD.so", {"OH_SDK_BASE": "/kit"}),
+    ],
+)
+def test_a_library_is_found_where_it_lies(empty, device, path, environment):
+    file = touch(empty.root, path)
+    surroundings = Surroundings(empty.root, environment, "linux", empty.answers)
+    found = entry(device).look(surroundings)
+    assert str(file) in found.detail
+    assert found.state == ("ready" if device in device_names() else "present")
+
+
+def test_the_file_that_is_named_wins(empty):
+    touch(empty.root, "/usr/lib/libdrd.so")
+    named = touch(empty.root, "/mine/libdhd.so")
+    surroundings = Surroundings(empty.root, {"PALPATE_DHD": "/mine/libdhd.so"}, "linux", empty.answers)
+    assert entry("dhd").find(surroundings) == named
+
+
+def test_windows_has_its_own_names(empty):
+    touch(empty.root, "/vendor/dhd64.dll")
+    surroundings = Surroundings(empty.root, {"PATH": "/a;/vendor"}, "win32", empty.answers)
+    assert "dhd64.dll" in entry("dhd").look(surroundings).detail
+    assert "absent" in entry("dhd").look(empty).state
+
+
+@pytest.mark.parametrize(("device", "port"), [("haply", 10001), ("haply", 10000), ("crtk", 9090)])
+def test_a_service_is_found_by_its_port(empty, device, port):
+    asked = []
+
+    def answers(host, number):
+        asked.append((host, number))
+        return number == port
+
+    found = entry(device).look(Surroundings(empty.root, {}, "linux", answers))
+    assert found.state != "absent"
+    assert f"port {port} answers" in found.detail
+    assert {host for host, _ in asked} == {"127.0.0.1"}, "only this machine is asked"
+
+
+def test_gamepads_come_from_the_kernels_list(empty):
+    listing = touch(empty.root, "/proc/bus/input/devices")
+    listing.write_text(GAMEPAD, encoding="utf-8")
+    touch(empty.root, "/dev/input/event7")
+    found = entry("evdev").look(empty)
+    assert found.state != "absent"
+    assert "Pad of two sticks at /dev/input/event7" in found.detail
+    assert "mouse" not in found.detail
+
+
+def test_a_gamepad_that_can_not_be_read_says_what_to_do(empty):
+    touch(empty.root, "/proc/bus/input/devices").write_text(GAMEPAD, encoding="utf-8")
+    assert "group input" in entry("evdev").look(empty).remedy
+
+
+def test_what_is_driven_is_ready_by_its_name(empty, monkeypatch):
+    """A driver that is entered in the table of devices makes its library usable, and is listed once."""
+    monkeypatch.setattr(device_search, "device_names", lambda: ("page", "dhd"))
+    assert "Force Dimension SDK" in entry("dhd").look(empty).remedy
+    touch(empty.root, "/usr/lib/libdrd.so")
+    found = [f for f in search(empty) if f.device == "dhd"]
+    assert [f.state for f in found] == ["ready"]
+    assert found[0].remedy == ""
+
+
+def test_each_library_has_names_for_each_system():
+    for library in HARDWARE:
+        if isinstance(library, LibrarySearch):
+            assert set(library.files) == {"linux", "darwin", "win32"}
+            assert library.override.startswith("PALPATE_")

@@ -1,4 +1,4 @@
-"""Haptic devices, one file each, chosen by name: ``page``, ``simulated`` or ``stroke:amplitude=0.02,frequency=1``."""
+"""Haptic devices, one file each, chosen by name: ``page``, ``stroke:amplitude=0.02``, ``simulated`` or ``haply``."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Protocol
 
 from palpate.errors import UsageError
 from palpate.runtime.devices.device import Device, Sample, Traits
+from palpate.runtime.devices.haply import HaplyDevice
 from palpate.runtime.devices.page import PageDevice
 from palpate.runtime.devices.simulated import SimulatedHand
 from palpate.runtime.devices.stroke import StrokeDevice
@@ -21,7 +22,12 @@ class _Kind(Protocol):
     def open(self, commands: Block, options: Mapping[str, str]) -> Device: ...
 
 
-_KINDS: dict[str, _Kind] = {"page": PageDevice, "stroke": StrokeDevice, "simulated": SimulatedHand}
+_KINDS: dict[str, _Kind] = {
+    "page": PageDevice,
+    "stroke": StrokeDevice,
+    "simulated": SimulatedHand,
+    "haply": HaplyDevice,
+}
 
 
 def device_names() -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import tracemalloc
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from palpate.errors import UsageError
 from palpate.runtime.devices import Sample, device_named, device_names, device_traits
+from palpate.runtime.devices.haply_simulator import HaplySimulator, SimulatorSettings
 
 
 @pytest.fixture(params=device_names())
@@ -16,12 +18,23 @@ def name(request):
     return request.param
 
 
+@contextlib.contextmanager
+def served(name):
+    """The device's address; one of hardware is that of its double."""
+    if name != "haply":
+        yield name
+        return
+    with HaplySimulator(SimulatorSettings(port=0, events=0)) as service:
+        yield f"haply:ws://127.0.0.1:{service.port},events={service.events_port},wait=1"
+
+
 @pytest.fixture
 def device(name, shared):
     shared.write_command(beat=0.0, grabbed=True, target=(0.0, -0.01, 0.0), period=0.1)
-    device = device_named(name, shared.command)
-    yield device
-    device.close()
+    with served(name) as address:
+        device = device_named(address, shared.command)
+        yield device
+        device.close()
 
 
 def test_traits_are_physical(name):

@@ -332,7 +332,10 @@ def run(
     model: ModelFile,
     seconds: Annotated[float, typer.Option(min=0.1, help="Duration in seconds.")] = 5.0,
     device: Annotated[
-        str, typer.Option(help="Device with its settings, for example stroke:amplitude=0.02,frequency=1 or haply.")
+        str,
+        typer.Option(
+            help="Device with its settings, for example stroke:amplitude=0.02,frequency=1 or haply."
+        ),
     ] = "stroke",
     rate: Annotated[
         float | None,

@@ -63,4 +63,6 @@ def simulate(
         console.say(f"A simulated Haply Inverse3 listens. Next: palpate run MODEL --device {device}")
         with contextlib.suppress(KeyboardInterrupt):
             time.sleep(seconds)
-    console.result(f"{service.received} commands were answered.", {"device": device, "commands": service.received})
+    console.result(
+        f"{service.received} commands were answered.", {"device": device, "commands": service.received}
+    )

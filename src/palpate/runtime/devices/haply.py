@@ -108,6 +108,8 @@ class HaplyDevice:
         Whether an echoed force has shown that the service takes it.
     lost, surplus : int
         Answers that never came, and frames that nobody asked for.
+    wait : float
+        Longest wait of `read` for an outstanding answer, s.
     """
 
     traits: ClassVar[Traits] = Traits(
@@ -123,6 +125,7 @@ class HaplyDevice:
         self.spelling = SPELLINGS[0] if settings.spelling == "auto" else settings.spelling
         self.proven = settings.spelling != "auto"
         self.lost = self.surplus = 0
+        self.wait = settings.wait
         self._turn = np.array(AXES)
         self._raw, self._force = np.zeros(3), np.zeros(3)
         self._outstanding, self._closed, self._switched = 0, False, False
@@ -151,7 +154,7 @@ class HaplyDevice:
         """Return the hand as of the last command that was answered."""
         self._now = now
         self._heed_events()
-        frames = self._channel.receive(self._settings.wait if self._outstanding else 0.0)
+        frames = self._channel.receive(self.wait if self._outstanding else 0.0)
         if frames:
             self.surplus += max(0, len(frames) - self._outstanding)
             self._outstanding = max(0, self._outstanding - len(frames))

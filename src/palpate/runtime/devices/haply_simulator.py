@@ -274,7 +274,7 @@ class HaplySimulator:
 
         s = self.settings
         # answers must not wait for a compressor, nor the loop for a ping
-        plain: dict[str, Any] = {"compression": None, "ping_interval": None, "close_timeout": 0.2}
+        plain: dict[str, Any] = {"compression": None, "ping_interval": None, "close_timeout": 0.05}
         for handler, port in ((self._simulate, s.port), (self._watch, s.events), (self._legacy, s.legacy)):
             server = await serve(handler, s.host, port, process_request=self._answer_http, **plain)
             self._servers.append(server)
@@ -372,7 +372,10 @@ class HaplySimulator:
             devices = []
         else:
             devices = [self._entry(device, full=full) for device in self._devices]
-        grip = {"device_id": "6F1A", "state": {"orientation": {"w": 1, "x": 0, "y": 0, "z": 0}, "buttons": self.buttons}}
+        grip = {
+            "device_id": "6F1A",
+            "state": {"orientation": {"w": 1, "x": 0, "y": 0, "z": 0}, "buttons": self.buttons},
+        }
         frame: dict[str, Any] = {"inverse3": devices, "verse_grip": [grip], "wireless_verse_grip": []}
         return {"session_id": self.session, **frame} if full else frame
 

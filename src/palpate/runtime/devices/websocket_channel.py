@@ -48,9 +48,13 @@ class WebsocketChannel:
             address = urlsplit(url)
             host, port, uri = address.hostname, address.port or 80, parse_uri(url)
         except (ValueError, WebSocketException) as error:
-            raise UsageError(f"{url} is no address of a websocket.", fix="For example ws://localhost:10001.") from error
+            raise UsageError(
+                f"{url} is no address of a websocket.", fix="For example ws://localhost:10001."
+            ) from error
         if uri.secure or host is None:
-            raise UsageError(f"{url} is encrypted, which no device service is.", fix="Write ws:// and not wss://.")
+            raise UsageError(
+                f"{url} is encrypted, which no device service is.", fix="Write ws:// and not wss://."
+            )
         self._protocol, self._part = ClientProtocol(uri), b""
         try:
             self._socket = socket.create_connection((host, port), _OPENING)

@@ -285,7 +285,8 @@ HARDWARE: tuple[_Search, ...] = (
         name="Haply Inverse3, Minverse, VerseGrip",
         device="haply",
         ports={10001: "websocket and HTTP of the service 3.x", 10000: "HTTP and format 3.0", 10020: "events"},
-        install="Install and start the Haply Inverse Service 3.x (Haply Inverse SDK); it owns the devices.",
+        install="Install and start the Haply Inverse Service 3.x (Haply Inverse SDK), or a double of it: "
+        "palpate devices simulate haply.",
     ),
     LibrarySearch(
         name="Force Dimension delta, omega, sigma, lambda; Novint Falcon (DHD)",

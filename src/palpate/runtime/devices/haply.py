@@ -1,13 +1,14 @@
 """Haply Inverse3 and Inverse3x through the Haply Inverse Service 3.x, over its websocket.
 
-The service answers each message with exactly one frame and never sends one unasked (Haply, *Inverse SDK 3.5*, "Simulation
-Channel"). So the driver works in lock-step: `write` sends one command, the next `read` takes its answer. Frames are counted: while
-an answer is outstanding nothing is sent, except a zero force; after 10 ms of silence the answer counts as lost and the latest
-force is sent again; of several frames the newest counts. A position is therefore one tick old, and its time is that of the command
-it answers.
+The service answers each message with exactly one frame and never sends one unasked (Haply, *Inverse SDK 3.5*,
+"Simulation Channel"). So the driver works in lock-step: `write` sends one command, the next `read` takes its answer.
+Frames are counted: while an answer is outstanding nothing is sent, except a zero force; after 10 ms of silence the
+answer counts as lost and the latest force is sent; of several frames the newest counts. A position is therefore one
+tick old, and its time is that of the command it answers.
 
-Two spellings of a force are in use, ``vector`` and ``values``, and the service says nothing of one it doesn't know. The driver
-proves itself by the echoed force: an echo that stays zero for 50 commands makes it try the other spelling, once.
+Two spellings of a force are in use, ``vector`` and ``values``. The service is silent about one that it doesn't know.
+The driver proves itself by the echoed force: an echo that stays zero for 50 commands makes it try the other spelling,
+once.
 
 Only the thread that calls `read` and `write` is used; no call waits for longer than `HaplySettings.wait`.
 """
@@ -37,6 +38,7 @@ AXES = ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0))
 
 SPELLINGS = ("vector", "values")
 _PRESET = "arm_front_centered"  # the origin in the middle of the reach
+_GOODBYE = 0.05  # s for each of the two answers that may be outstanding at the end
 _LOST = 0.010  # s after which an answer counts as lost
 _PROOF, _PROVING_FORCE = 50, 0.05  # commands of more than that many N until an echo is missed
 _FIRST, _FASTEST = 50, 1.0  # samples that are checked and thrown away, m/s
@@ -117,6 +119,7 @@ class HaplyDevice:
         10.0,
         0.5,
         "radius: the vendor's tutorials; force: the Inverse3's peak; damping: none is published, 0.5 N·s/m is assumed",
+        axes=AXES,
     )
 
     def __init__(self, settings: HaplySettings) -> None:
@@ -126,8 +129,7 @@ class HaplyDevice:
         self.proven = settings.spelling != "auto"
         self.lost = self.surplus = 0
         self.wait = settings.wait
-        self._turn = np.array(AXES)
-        self._raw, self._force = np.zeros(3), np.zeros(3)
+        self._force = np.zeros(3)
         self._outstanding, self._closed, self._switched = 0, False, False
         self._now, self._asked, self._sent = -math.inf, -math.inf, 0.0
         self._unproven, self._impossible = 0, 0
@@ -161,6 +163,8 @@ class HaplyDevice:
             self._take(self._entry(_decoded(frames[-1])))
         if self._stop:
             raise DeviceError(self._stop, fix="Free the device, then start again.")
+        if math.isinf(self._asked):
+            self.sample.time = now  # nothing has been asked of it since it was opened
         return self.sample
 
     def write(self, force: np.ndarray) -> None:
@@ -178,16 +182,18 @@ class HaplyDevice:
             if silent:
                 self.lost += self._outstanding
                 self._outstanding = 0
-        np.matmul(force, self._turn, out=self._force)  # the transpose of AXES turns back
+        self._force[:] = force
         self._send(norm)
 
     def close(self) -> None:
-        """Send zero force and let go."""
+        """Send zero force, wait at most 0.1 s for its answer, and let go."""
         if self._closed:
             return
         self._force[:] = 0.0
         try:
             self._send(0.0)
+            for _ in range(self._outstanding):
+                self._channel.receive(_GOODBYE)
         except DeviceError:
             pass  # the service is gone, and with it the force
         finally:
@@ -217,8 +223,8 @@ class HaplyDevice:
                     fix="Check its power supply and calibrate it in the Haply Hub.",
                 )
         self._prove(state)
-        self._raw[:] = _vector(state, "cursor_position", math.nan)
-        if math.hypot(*self._raw.tolist()) > _REACH:
+        place = _vector(state, "cursor_position", math.nan)
+        if math.hypot(*place) > _REACH:
             self._impossible += 1
             if self._impossible >= _IMPOSSIBLE:
                 raise DeviceError(
@@ -228,7 +234,7 @@ class HaplyDevice:
                 )
             return  # the sample stays as old as it is
         self._impossible = 0
-        np.matmul(self._turn, self._raw, out=sample.position)
+        sample.position[:] = place
         sample.time = self._asked
 
     def _prove(self, state: Mapping[str, Any]) -> None:

@@ -1,11 +1,11 @@
-"""A double of the Haply Inverse Service 3.x, with a simulated hand behind it: to try the driver without hardware, and to test it.
+"""A double of the Haply Inverse Service 3.x with a simulated hand behind it, for trials and tests without hardware.
 
-It speaks as the service does (Haply, *Inverse SDK 3.5*, "Simulation Channel", "HTTP", "Events & Monitoring"): an inventory on
-connecting, then exactly one frame per message, a force only in a spelling that it knows, a force that lapses without commands. It
-has the service's faults too; see `SimulatorFaults`.
+It speaks as the service does (Haply, *Inverse SDK 3.5*, "Simulation Channel", "HTTP", "Events & Monitoring"): an
+inventory on connecting, then exactly one frame per message, a force only in a spelling that it knows, a force that
+lapses without commands. It has the service's faults too; see `SimulatorFaults`.
 
-The hand is a mass on a spring whose other end moves up and down by a sine, with damping; all in the service's axes: x right, y away
-from the user, z up.
+The hand is a mass on a spring whose other end moves up and down by a sine, with damping; all in the service's axes:
+x right, y away from the user, z up.
 """
 
 from __future__ import annotations

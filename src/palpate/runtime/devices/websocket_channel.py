@@ -1,13 +1,15 @@
 """A websocket for the 1 kHz loop: no thread of its own, and no call that waits longer than it is told.
 
-The protocol is that of the `websockets` package without its input and output; this file moves the bytes. `websockets` is imported
-when a channel is opened.
+The protocol is that of the `websockets` package without its input and output; this file moves the bytes. The package is
+imported when a channel is opened.
 """
 
 from __future__ import annotations
 
+import contextlib
 import select
 import socket
+from collections.abc import Sequence
 from urllib.parse import urlsplit
 
 from palpate.errors import DeviceError, UsageError
@@ -137,11 +139,11 @@ class WebsocketChannel:
         try:
             self._protocol.send_close()
             self._flush()
-        except Exception:  # noqa: BLE001, S110 - whoever is gone needs no goodbye
+        except Exception:  # noqa: BLE001 - whoever is gone needs no goodbye
             pass
         self._socket.close()
 
-    def _messages(self, events: list[object]) -> list[str]:
+    def _messages(self, events: Sequence[object]) -> list[str]:
         messages = []
         for frame in events:
             if getattr(frame, "opcode", None) in self._texts:
@@ -152,10 +154,8 @@ class WebsocketChannel:
         return messages
 
     def _answer_pings(self) -> None:
-        try:
+        with contextlib.suppress(OSError):  # the next message tells
             self._flush()
-        except OSError:
-            pass  # the next message tells
 
     def _flush(self) -> None:
         for data in self._protocol.data_to_send():

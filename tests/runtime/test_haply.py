@@ -6,10 +6,10 @@ import contextlib
 import http.client
 import json
 import math
+import time
 
 import numpy as np
 import pytest
-from standins import STIFFNESS
 
 from palpate.errors import DeviceError, PortInUseError, UsageError
 from palpate.runtime import Fault, LoopProcess, Workspace, now
@@ -141,7 +141,8 @@ def test_another_spelling_starts_from_no_force(clock, plain, shared):
     assert loop.device.spelling == "values"
     assert "now trying 'values'" in loop.device_error
     assert max(felt) > 0.5
-    assert np.abs(np.diff(felt)).max() < 0.1, "it grew from nothing"
+    # two commands at most lie between two looks; at once it would be 2 N
+    assert np.abs(np.diff(felt)).max() < 0.3, "it grew from nothing"
 
 
 def test_a_service_that_knows_no_spelling_is_refused(clock):
@@ -190,7 +191,7 @@ def test_silence_is_zero_force_within_20_ms_a_reason_and_a_ramp(service, loop, c
     loop.device.wait = 1.0
     again = run(loop, clock, 200)
     assert all(fault is Fault.NONE for _, fault in again[5:])
-    assert 0.0 < again[5][0] < 0.2 * again[-1][0], "it ramps in"
+    assert 0.0 < again[5][0] < 0.5 * again[-1][0], "it ramps in"
     drive(loop.device, clock, 3)
     assert drive(loop.device, clock, 3)[-1][1] == pytest.approx(TICK), "no answer is left behind"
 
@@ -210,6 +211,9 @@ def test_lost_and_doubled_answers_are_counted_and_survived(service, device, cloc
     drive(device, clock, 5)
     service.faults.doubled = 3
     drive(device, clock, 20)
+    until = now() + 20.0
+    while device.surplus < 3 and now() < until:
+        device.read(clock.time)
     assert device.surplus == 3
     service.faults.dropped, device.wait = 2, 0.02
     drive(device, clock, 40)
@@ -221,6 +225,7 @@ def test_lost_and_doubled_answers_are_counted_and_survived(service, device, cloc
 
 def test_a_force_lapses_when_its_program_is_gone(service, device, clock):
     drive(device, clock, 5, force=(0.0, 0.0, 1.0))
+    device.read(clock.time)  # nothing is on its way
     assert service.force()[2] == 1.0
     clock.time += 0.2
     channel = WebsocketChannel(f"ws://127.0.0.1:{service.port}", "service")
@@ -430,10 +435,9 @@ def test_the_real_loop_on_the_double(spring_file):
     with HaplySimulator(SimulatorSettings(port=0, events=0, frequency=2.0)) as service:
         device = f"haply:ws://127.0.0.1:{service.port},events={service.events_port}"
         with LoopProcess(spring_file, device=device) as loop:
-            until = now() + 20.0
-            while now() < until and loop.read().force[1] < 0.2:
-                pass
-            state = loop.read()
-    assert state.force[1] >= 0.2 or state.faults == 0
+            until, force = now() + 20.0, 0.0
+            while now() < until and force < 0.2:
+                time.sleep(0.01)
+                force = loop.read().force[1]
+    assert force >= 0.2, "the hand goes down and is pushed up"
     assert loop.report().foreign == ()
-    assert STIFFNESS > 0.0

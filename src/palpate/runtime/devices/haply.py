@@ -319,7 +319,8 @@ class HaplyDevice:
         names = [e["device_id"] for e in entries] if isinstance(entries, list) else list(entries)
         if not names or (wanted and wanted not in names) or (len(names) > 1 and not wanted):
             raise DeviceError(
-                f"The Haply service has {len(names)} devices: {', '.join(names) or 'none'}; {wanted or 'one'} is wanted.",
+                f"The Haply service has {len(names)} devices: {', '.join(names) or 'none'}.",
+                why=f"{wanted or 'One'} is wanted.",
                 fix="Connect and switch on the device, or name it with device=ID.",
             )
         self.device_id = wanted or names[0]

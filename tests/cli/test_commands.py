@@ -155,6 +155,15 @@ def test_devices_lists_by_default(palpate):
     assert palpate("devices", "list", "--json").out == answer.out
 
 
+def test_a_simulated_device_says_where_it_listens(palpate):
+    answer = palpate("devices", "simulate", "haply", "--port", 0, "--events", 0, "--seconds", 0.1, "--json")
+    assert answer.code == 0, answer.err
+    assert json.loads(answer.out)["device"].startswith("haply:ws://localhost:")
+    answer = palpate("devices", "simulate", "omega", "--json")
+    assert answer.code == 2
+    assert "Choose haply" in answer.out + answer.err
+
+
 @pytest.mark.slow
 def test_demo_runs_both_founding_beams(tmp_path):
     command = [sys.executable, "-m", "palpate", "demo", "--folder", str(tmp_path / "d"), "--json"]

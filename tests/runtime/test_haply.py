@@ -157,6 +157,16 @@ def test_a_service_that_knows_no_spelling_is_refused(clock):
         device.close()
 
 
+@pytest.mark.parametrize("factor", [-1.0, 20.0])
+def test_an_echo_of_another_direction_or_size_is_refused(clock, factor):
+    with serve(clock) as service:
+        service.faults.echo = factor
+        device = connect(service)
+        with pytest.raises(DeviceError, match="echoes a force"):
+            drive(device, clock, 100, force=(0.0, 0.0, 0.5))
+        device.close()
+
+
 def test_forces_too_small_to_be_echoed_prove_nothing(clock):
     with serve(clock, spellings=()) as service:
         device = connect(service)

@@ -250,11 +250,15 @@ class HaplyDevice:
         if self._unproven < _PROOF:
             return
         tried, self._unproven = self.spelling, 0
-        if self._switched or math.hypot(*echo.tolist()) > _PROVING_FORCE:
+        unchecked = "spelling=vector or spelling=values goes without this check"
+        if math.hypot(*echo.tolist()) > _PROVING_FORCE:
+            sent, echoed = np.round(self._force, 3).tolist(), np.round(echo, 3).tolist()
             self._stop = (
-                f"The Haply service took no force, neither as {' nor as '.join(map(repr, SPELLINGS))}: it echoes "
-                f"{np.round(echo, 3).tolist()} N. spelling=vector or spelling=values goes without this check"
+                f"The Haply service echoes a force of {echoed} N where {sent} N was sent; {unchecked}."
             )
+            return
+        if self._switched:
+            self._stop = f"The Haply service took no force, neither as 'vector' nor as 'values'; {unchecked}."
             return
         self._switched, self.spelling = True, SPELLINGS[1 - SPELLINGS.index(tried)]
         # one tick of zero force: what the hand feels next must grow from nothing

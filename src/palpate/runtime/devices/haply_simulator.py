@@ -108,6 +108,8 @@ class SimulatorFaults:
         Number of the next frames without any device; -1 for ever.
     bare : bool
         Frames without what is optional: status, velocity and echoed force.
+    echo : float
+        Factor of the echoed force; the hand feels the force as it is.
     in_use, powered, calibrated : bool
         Status of the device.
     silent_http : bool
@@ -124,6 +126,7 @@ class SimulatorFaults:
     closing: bool = False
     absent: int = 0
     bare: bool = False
+    echo: float = 1.0
     in_use: bool = False
     powered: bool = True
     calibrated: bool = True
@@ -386,7 +389,7 @@ class HaplySimulator:
         entry: dict[str, Any] = {"device_id": device.device_id, "state": state}
         if not faults.bare:
             state["cursor_velocity"] = _xyz(hand.velocity)
-            state["current_cursor_force"] = _xyz(hand.force)
+            state["current_cursor_force"] = _xyz(faults.echo * hand.force)
             entry["status"] = {
                 "calibrated": faults.calibrated,
                 "in_use": faults.in_use,

@@ -20,7 +20,7 @@ from palpate.runtime.devices.websocket_channel import WebsocketChannel
 from palpate.runtime.loop import Loop
 from palpate.runtime.safety import HARDWARE_PATIENCE, Limits
 
-pytestmark = pytest.mark.timeout(60)
+pytestmark = pytest.mark.timeout(240)
 TICK = 1e-3
 OPENING = 50  # messages
 

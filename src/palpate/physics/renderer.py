@@ -25,10 +25,8 @@ __all__ = ["Camera", "Picture", "draw_body", "draw_triangles", "palette", "plot_
 
 SMOOTHING = 2  # samples per pixel along each side
 PIECES = 12  # of a line between two nodes, each of which is hidden or not
-PLAIN, STEEL = (
-    np.array([0.80, 0.72, 0.66]),
-    np.array([0.72, 0.76, 0.80]),
-)  # a body without colours, and a probe
+PLAIN = np.array([0.80, 0.72, 0.66])  # a body without colours
+STEEL = np.array([0.72, 0.76, 0.80])  # a probe
 LAMP = np.array([-0.22, 0.50, 0.84]) / math.sqrt(1.004)  # to the right, up and towards the camera
 HALFWAY = (LAMP + np.eye(3)[2]) / np.linalg.norm(LAMP + np.eye(3)[2])  # between lamp and camera
 DARKEST = 0.14  # of viridis is left out, as on the page: the deepest violet hides the shading

@@ -10,6 +10,7 @@ The child's side is `palpate.supervised_child`.
 from __future__ import annotations
 
 import contextlib
+import os
 import pickle
 import queue
 import signal
@@ -38,6 +39,14 @@ _HEAD = struct.Struct(">Q")
 _DETAILS = 4000  # characters of the child's last words that are kept
 
 Result = TypeVar("Result")
+
+
+def _folder() -> str | None:
+    """Return the working directory; nothing where it has been removed."""
+    try:
+        return os.getcwd()
+    except FileNotFoundError:
+        return None
 
 
 class ChildEnded(SolverError):
@@ -93,7 +102,7 @@ class Child:
         function : callable
             Defined at the top of a module, where the child finds it.
         *arguments
-            Of the function.
+            Of the function; relative paths start from this process's working directory.
         limit : float
             Time in s after which the child is ended.
 
@@ -107,7 +116,7 @@ class Child:
         import cloudpickle
 
         # functions of a script or a notebook cell, which no module holds, go along
-        request = cloudpickle.dumps((limit, function, arguments))
+        request = cloudpickle.dumps((limit, _folder(), function, arguments))
         with self._lock:
             running = self._started()
             try:

@@ -62,7 +62,9 @@ def _forbid_core_dumps() -> None:
 def _answer(request: bytes) -> bytes:
     """Return the pickled answer: True and the result, or False and the exception with its traceback."""
     try:
-        limit, function, arguments = pickle.loads(request)
+        limit, folder, function, arguments = pickle.loads(request)
+        if folder is not None and os.path.isdir(folder):
+            os.chdir(folder)  # the caller may have moved since the child was started
         faulthandler.dump_traceback_later(limit, exit=True)
         try:
             result = function(*arguments)

@@ -1,8 +1,11 @@
 """Cases that crash, hang, raise or lie cost themselves; a lost worker or scheduler costs no answer."""
 
+import contextlib
 import os
 import signal
 import threading
+from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import psutil
@@ -13,6 +16,7 @@ from sweep_problems import Spring
 from palpate.dataset import Dataset
 from palpate.errors import ResourceError, SolverError, UsageError
 from palpate.sweeps import local_cluster, sweep
+from palpate.sweeps.runner import connect
 
 
 def test_crashing_cases_cost_only_themselves(cluster, tmp_path):
@@ -140,11 +144,23 @@ def test_a_lost_scheduler_keeps_what_is_solved(cluster, tmp_path):
             ends.join()
 
     own = distributed.Client(mortal.address, security=mortal.security, set_as_default=False)
-    with own, pytest.raises(ResourceError, match="is lost") as caught:
+    with pytest.raises(ResourceError, match="is lost") as caught:
         sweep(**arguments, cluster=own, progress=lose)
+    with contextlib.suppress(OSError, ValueError):  # of Dask, which tries to connect again meanwhile
+        own.close()
     assert "same command goes on" in caught.value.fix
     kept = sum(len(Dataset.open(part)) for part in (tmp_path / "a.zarr.parts").glob("part-*.zarr"))
     assert kept > 0
     seen = []
     sweep(**arguments, cluster=cluster, progress=lambda done, _: seen.append(done))
     assert seen[0] == kept
+
+
+@pytest.mark.parametrize("status", ["connecting", "running"])
+def test_a_client_that_fails_to_close_hides_no_loss(monkeypatch, status):
+    client = SimpleNamespace(status=status, close=Mock(side_effect=ValueError("IOStream is not idle")))
+    monkeypatch.setattr("distributed.Client", lambda *_, **__: client)
+    expected = ResourceError if status == "connecting" else ValueError
+    with pytest.raises(expected), connect("tcp://127.0.0.1:9", None):
+        raise ResourceError("The scheduler of the sweep is lost.")
+    client.close.assert_called_once_with()

@@ -58,7 +58,24 @@ def connect(cluster: Any, workers: int | None) -> Iterator[tuple[distributed.Cli
         if isinstance(cluster, distributed.Client):
             yield cluster, revive
         else:
-            yield stack.enter_context(_client(cluster)), revive
+            yield stack.enter_context(_closing(_client(cluster))), revive
+
+
+@contextlib.contextmanager
+def _closing(client: distributed.Client) -> Iterator[distributed.Client]:
+    """Close a client at the end; where its scheduler is lost, an error on the way is of no account.
+
+    A client that tries to connect again closes with whatever that ends in: Tornado's ValueError over TLS, for one.
+    """
+    try:
+        yield client
+    finally:
+        connected = client.status == "running"
+        try:
+            client.close()
+        except (OSError, ValueError):
+            if connected:
+                raise
 
 
 def _client(cluster: Any) -> distributed.Client:

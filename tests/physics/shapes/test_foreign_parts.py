@@ -51,6 +51,14 @@ def test_a_mesher_that_never_ends_is_given_up(monkeypatch):
         apart.read_apart(time.sleep, 60.0, doing="sleeping")
 
 
+def test_relative_paths_start_where_this_process_is(tmp_path, monkeypatch):
+    """Also when it has moved since the child was started, as a notebook does."""
+    for folder in (tmp_path / "first", tmp_path / "second"):
+        folder.mkdir()
+        monkeypatch.chdir(folder)
+        assert apart.read_apart(os.getcwd, doing="asking where it is") == str(folder)
+
+
 @dataclass
 class Deadly:
     def open(self):

@@ -1,11 +1,10 @@
 """Cases that crash, hang, raise or lie cost themselves; a lost worker or scheduler costs no answer."""
 
 import contextlib
+import gc
 import os
 import signal
 import threading
-from types import SimpleNamespace
-from unittest.mock import Mock
 
 import numpy as np
 import psutil
@@ -131,6 +130,9 @@ def test_no_scheduler_is_said_in_a_sentence():
     assert caught.value.exit_code == 3
 
 
+@pytest.mark.filterwarnings(
+    "ignore::pytest.PytestUnraisableExceptionWarning"
+)  # sockets that Dask lets go, below
 def test_a_lost_scheduler_keeps_what_is_solved(cluster, tmp_path):
     import distributed
 
@@ -148,6 +150,7 @@ def test_a_lost_scheduler_keeps_what_is_solved(cluster, tmp_path):
         sweep(**arguments, cluster=own, progress=lose)
     with contextlib.suppress(OSError, ValueError):  # of Dask, which tries to connect again meanwhile
         own.close()
+    gc.collect()  # a connection that it began is warned of here, not in the next test
     assert "same command goes on" in caught.value.fix
     kept = sum(len(Dataset.open(part)) for part in (tmp_path / "a.zarr.parts").glob("part-*.zarr"))
     assert kept > 0
@@ -158,9 +161,17 @@ def test_a_lost_scheduler_keeps_what_is_solved(cluster, tmp_path):
 
 @pytest.mark.parametrize("status", ["connecting", "running"])
 def test_a_client_that_fails_to_close_hides_no_loss(monkeypatch, status):
-    client = SimpleNamespace(status=status, close=Mock(side_effect=ValueError("IOStream is not idle")))
-    monkeypatch.setattr("distributed.Client", lambda *_, **__: client)
+    class Failing:
+        def __init__(self, address, **options):
+            self.status = status
+
+        def close(self):
+            closed.append(True)
+            raise ValueError("IOStream is not idle")
+
+    closed = []
+    monkeypatch.setattr("distributed.Client", Failing)
     expected = ResourceError if status == "connecting" else ValueError
     with pytest.raises(expected), connect("tcp://127.0.0.1:9", None):
         raise ResourceError("The scheduler of the sweep is lost.")
-    client.close.assert_called_once_with()
+    assert closed == [True]

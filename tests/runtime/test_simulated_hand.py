@@ -87,3 +87,13 @@ def test_the_device_has_an_end(shared):
 def test_refuses_nonsense(shared, options):
     with pytest.raises(UsageError):
         device_named(f"simulated:{options}", shared.command)
+
+
+def test_a_profile_sets_workspace_and_largest_force():
+    device = hand(profile="falcon", shape="press", amplitude=1.0)
+    assert (device.traits.radius, device.traits.max_force) == (0.04, 8.0)
+    for k in range(1000):
+        device.read(k * T)
+    assert np.linalg.norm(device.place) == pytest.approx(0.04)
+    with pytest.raises(UsageError, match=r"no profile of a device 'fulcrum'"):
+        hand(profile="fulcrum")

@@ -20,6 +20,7 @@ from numba import njit
 
 from palpate.errors import UsageError
 from palpate.runtime.devices.device import Sample, Traits, settings_from
+from palpate.runtime.devices.profiles import device_profile
 from palpate.runtime.shared_state import Block
 
 __all__ = ["SimulatedHand", "SimulatedSettings"]
@@ -67,6 +68,8 @@ class SimulatedSettings:
         Direction, normalised.
     seed : float
         Of the random script; a whole number.
+    profile : str
+        Device whose workspace and largest force it has, such as ``falcon``; see `profiles.PROFILES`.
     """
 
     mass: float = 0.3
@@ -83,6 +86,7 @@ class SimulatedSettings:
     y: float = -1.0
     z: float = 0.0
     seed: float = 0.0
+    profile: str = "omega.3"
 
     def __post_init__(self) -> None:
         if self.shape not in _SHAPES:
@@ -124,11 +128,14 @@ class SimulatedHand:
 
     def __init__(self, settings: SimulatedSettings | None = None) -> None:
         s = self.settings = settings or SimulatedSettings()
-        if s.damping != self.traits.damping:  # a device's word goes before that of its kind
-            known = type(self).traits
-            self.traits = Traits(  # type: ignore[misc]
-                known.radius, known.max_force, s.damping, known.source, mass=min(s.mass, known.mass)
-            )
+        known, limits = type(self).traits, device_profile(s.profile)
+        self.traits = Traits(  # type: ignore[misc]  # a device's word goes before that of its kind
+            limits.radius,
+            limits.max_force,
+            s.damping,
+            f"a simulation; radius and largest force are those of {limits.name}",
+            mass=min(s.mass, known.mass),
+        )
         rng = np.random.default_rng(int(s.seed))
         self._along = np.array([s.x, s.y, s.z]) / math.hypot(s.x, s.y, s.z)
         self._frequencies = rng.uniform(_SLOWEST, _FASTEST, (_WAVES, 3))

@@ -43,3 +43,9 @@ def chromium() -> str:
 def ccx() -> str:
     """Path of CalculiX's solver."""
     return require_program("ccx")
+
+
+@pytest.fixture(scope="session")
+def c_compiler() -> str:
+    """Path of a C compiler."""
+    return require_program("cc", "gcc", "clang")

@@ -6,6 +6,7 @@ import pytest
 from standins import STIFFNESS, PlainModel
 
 from models import spring_beam
+from palpate.runtime.device_doubles import compile_double
 from palpate.runtime.shared_state import Shared
 
 
@@ -28,3 +29,17 @@ def shared():
 @pytest.fixture
 def plain():
     return PlainModel()
+
+
+@pytest.fixture(scope="session")
+def double(c_compiler, tmp_path_factory):
+    """Compiles the double of a device's library, once for each device and set of definitions; returns its file."""
+    compiled = {}
+
+    def compile_once(device, **definitions):
+        key = (device, *sorted(definitions.items()))
+        if key not in compiled:
+            compiled[key] = compile_double(device, tmp_path_factory.mktemp(device), definitions)
+        return compiled[key]
+
+    return compile_once

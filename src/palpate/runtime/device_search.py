@@ -7,6 +7,7 @@ found is asked of the table in `palpate.runtime.devices`: an entry whose `device
 
 from __future__ import annotations
 
+import ctypes
 import os
 import socket
 import sys
@@ -15,9 +16,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
+from palpate.errors import DeviceError
 from palpate.runtime.devices import device_names, device_traits
 
-__all__ = ["HARDWARE", "Finding", "GamepadSearch", "LibrarySearch", "ServiceSearch", "Surroundings", "search"]
+__all__ = [
+    "HARDWARE",
+    "Finding",
+    "GamepadSearch",
+    "LibrarySearch",
+    "ServiceSearch",
+    "Surroundings",
+    "load_library",
+    "search",
+]
 
 _ANSWER = 0.2  # s that a port of this machine may take to answer
 
@@ -322,3 +333,43 @@ HARDWARE: tuple[_Search, ...] = (
     ),
     GamepadSearch(),
 )
+
+
+def load_library(device: str, file: str = "", surroundings: Surroundings | None = None) -> ctypes.CDLL:
+    """Load the vendor's library of a device, as its driver does when it is opened.
+
+    Parameters
+    ----------
+    device : str
+        Name of the driver, as in ``--device``.
+    file : str
+        The library's file; empty looks for it.
+    surroundings : Surroundings, optional
+        The machine that is searched; by default this one.
+
+    Raises
+    ------
+    DeviceError
+        If the library is not there or can't be loaded, with the names, folders and variables that were tried.
+    """
+    surroundings = surroundings or Surroundings()
+    entry = next(e for e in HARDWARE if isinstance(e, LibrarySearch) and e.device == device)
+    path = Path(file) if file else entry.find(surroundings)
+    finding = entry.look(surroundings)
+    install = f"Install {entry.download}, or name its library in the environment variable {entry.override}"
+    if path is None or not path.is_file():
+        raise DeviceError(
+            f"The library of {entry.name} is not there{f': {file}' if file else ''}.",
+            why=""
+            if file
+            else f"Looked for {', '.join(finding.looked_for)} in {', '.join(finding.looked_in)}.",
+            fix=f"{install} or with --device {device}:library=FILE.",
+        )
+    try:
+        return ctypes.CDLL(str(path))
+    except OSError as error:
+        raise DeviceError(
+            f"The library of {entry.name} can't be loaded: {path}.",
+            why=str(error),
+            fix=f"It may be of another processor, or lack libraries that come with it. {install}.",
+        ) from error

@@ -1,0 +1,86 @@
+"""Doubles of the vendors' libraries: C sources that come with palpate, compiled where they are needed.
+
+A double has a library's functions, numbers and faults, and a simulated hand behind them. The driver loads it as it
+loads the vendor's, so that a user can try it, and a test can break it, without hardware. The sources lie beside the
+drivers in `palpate.runtime.devices`; each says in its head which functions switch its faults.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+
+from palpate.errors import ResourceError, UsageError
+
+__all__ = ["DOUBLES", "c_compiler", "compile_double"]
+
+# device, as in --device: the source, and the library's name without what each system puts around it
+DOUBLES: Mapping[str, tuple[str, str]] = MappingProxyType({})
+_COMPILERS = ("cc", "gcc", "clang")
+_LIMIT = 120.0  # s for the compiler
+
+
+def c_compiler() -> str:
+    """Return the path of the system's C compiler: that of the variable ``CC``, else cc, gcc or clang.
+
+    Raises
+    ------
+    ResourceError
+        If there is none.
+    """
+    for name in (os.environ.get("CC", ""), *_COMPILERS):
+        if name and (path := shutil.which(name)):
+            return path
+    raise ResourceError(
+        "There is no C compiler on this machine.",
+        why=f"Looked for the program in the variable CC, and for {', '.join(_COMPILERS)}.",
+        fix="Install one: on Debian and Ubuntu `apt install gcc libc6-dev`, on macOS `xcode-select --install`.",
+    )
+
+
+def compile_double(device: str, folder: Path, definitions: Mapping[str, float] | None = None) -> Path:
+    """Compile the double of a device's library and return its file.
+
+    Parameters
+    ----------
+    device : str
+        Name of the driver, as in ``--device``.
+    folder : Path
+        Where the library is put; made if it doesn't exist.
+    definitions : mapping of str to float, optional
+        Numbers that the source takes at compile time, such as the stroke of its hand.
+
+    Raises
+    ------
+    UsageError
+        If there is no double of that device.
+    ResourceError
+        If there is no compiler, or it fails.
+    """
+    if device not in DOUBLES:
+        raise UsageError(
+            f"There is no library to compile as a double of {device!r}.",
+            fix=f"Choose one of {', '.join(DOUBLES)}.",
+        )
+    source, stem = DOUBLES[device]
+    name = {"win32": f"{stem}.dll", "darwin": f"lib{stem}.dylib"}.get(sys.platform, f"lib{stem}.so")
+    folder.mkdir(parents=True, exist_ok=True)
+    library = folder.resolve() / name
+    numbers = [f"-D{key}={value!r}" for key, value in (definitions or {}).items()]
+    command = [
+        *(c_compiler(), "-O2", "-std=gnu11", "-Wall", "-Wextra", "-shared", "-fPIC", *numbers),
+        *(str(Path(__file__).parent / "devices" / source), "-o", str(library), "-lm", "-lpthread"),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=_LIMIT, check=False)
+    if done.returncode != 0:
+        raise ResourceError(
+            f"The double of {device} could not be compiled.",
+            why=done.stderr.strip()[-500:],
+            fix="Run the command by hand, or name another compiler in the variable CC: " + " ".join(command),
+        )
+    return library

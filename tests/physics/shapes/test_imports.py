@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from pathlib import Path
+from typing import Any
 
 import meshio
 import ngsolve
@@ -45,9 +46,9 @@ def write_plate(path: Path, *, names: bool = True) -> None:
     plate.WriteStep(str(path))
 
 
-def write_stl(path: Path, points: np.ndarray, triangles: np.ndarray) -> ImportedSolid:
+def write_stl(path: Path, points: np.ndarray, triangles: np.ndarray, **more: Any) -> ImportedSolid:
     meshio.Mesh(points, [("triangle", triangles)]).write(path, binary=True)
-    return ImportedSolid(path, unit="m")
+    return ImportedSolid(path, unit="m", **more)
 
 
 def write_tetrahedra(path: Path, mesh, **extra) -> None:
@@ -264,9 +265,29 @@ def test_faults_of_volume_meshes(tmp_path: Path):
 
 def test_patches_need_a_place():
     assert "no clear place" in failure(lambda: SurfacePatch("tip"))
-    assert "no clear place" in failure(lambda: SurfacePatch("tip", lower=(0, 0, 0)))
     assert "no clear place" in failure(lambda: SurfacePatch("tip", (0, 0, 0), (1, 1, 1), above))
     assert "patterns" in failure(lambda: SurfacePatch("tip|top", (0, 0, 0), (1, 1, 1)))
+    assert "points nowhere" in failure(lambda: SurfacePatch("tip", facing=(0, 0, 0)))
+
+
+def test_patches_are_chosen_by_plane_by_direction_and_by_name(tmp_path: Path):
+    """On a cube each choice is a known number of its six faces of 0.01 m²; choices in one patch must all hold."""
+    square = 0.01
+
+    def area(**choice: Any) -> float:
+        patches = (SurfacePatch("chosen", **choice),)
+        cube = write_stl(tmp_path / "cube.stl", CUBE, SIDES, patches=patches)
+        return next(face.area for face in cube.faces if face.name == "chosen") / square
+
+    assert area(facing=(0, 0, 2)) == pytest.approx(1)
+    assert area(facing=(0, 0, 1), within=90) == pytest.approx(5)
+    assert area(facing=(1, 1, 1)) == pytest.approx(3)  # each at arccos(1/√3) = 54.7°
+    assert area(upper=(None, None, 0.001)) == pytest.approx(1)
+    assert area(lower=(None, None, None)) == pytest.approx(6)
+    assert area(lower=(None, None, 0.001), facing=(1, 0, 0)) == pytest.approx(1)
+    names = write_stl(tmp_path / "cube.stl", CUBE, SIDES).surfaces
+    assert area(faces=names[:2]) == pytest.approx(2)
+    assert "Did you mean" in failure(lambda: area(faces=("face1",)))
 
 
 def test_faces_say_where_they_are(tmp_path: Path):

@@ -11,7 +11,8 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import io
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,7 +21,7 @@ import numpy as np
 
 from palpate import checks
 from palpate.errors import FileFormatError, UsageError
-from palpate.physics.shapes.naming import require_name
+from palpate.physics.shapes.naming import require_known, require_name
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -39,7 +40,9 @@ __all__ = [
 
 UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
 FEATURE_ANGLE = 40.0  # degrees between neighbouring triangles from which the edge between them is sharp
+WITHIN = 60.0  # degrees from a direction within which a surface faces that way
 Point = tuple[float, float, float]
+Corner = tuple[float | None, float | None, float | None]
 
 
 def require_unit(unit: Any) -> None:
@@ -141,52 +144,134 @@ def _unreadable(path: str, error: BaseException) -> FileFormatError:
 
 @dataclass(frozen=True)
 class SurfacePatch:
-    """A name for a part of an imported surface.
+    """A name for a part of an imported surface: what keeps all of its bounds.
 
     Attributes
     ----------
     name : str
         Name that the part gets.
-    lower, upper : tuple of three floats, optional
-        Corners in m of an upright box: what has its centre inside gets the name.
+    lower, upper : tuple of three floats or None, optional
+        Corners in m of an upright box: what has its centre inside gets the name. None is no bound along that axis,
+        so ``upper=(None, None, 0.005)`` is all below 5 mm, and a corner that is left out bounds nothing.
     where : callable, optional
         In place of a box: a function of centres (n, 3) in m to bool (n,). Define it in a module, so that other
         processes find it.
+    facing : tuple of three floats, optional
+        Direction of the outward normal: ``(0, 0, 1)`` is all that faces up. Not for STEP files, whose faces are
+        named whole.
+    within : float
+        Largest angle in degrees between normal and `facing`; by default 60.
+    faces : tuple of str
+        Names that the file gives, or that sharp edges give: the patch is in these surfaces only.
 
     Raises
     ------
     UsageError
-        Unless there is either a box or a function.
+        Unless there is a bound, or where there are both a box and a function.
     """
 
     name: str
-    lower: Point | None = None
-    upper: Point | None = None
+    lower: Corner | None = None
+    upper: Corner | None = None
     where: Callable[[np.ndarray], np.ndarray] | None = None
+    facing: Point | None = None
+    within: float = WITHIN
+    faces: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         require_name("The name of a patch", self.name)
-        boxed = self.lower is not None and self.upper is not None
-        if boxed == (self.where is not None) or (self.lower is None) != (self.upper is None):
+        object.__setattr__(self, "faces", tuple(self.faces))
+        boxed = self.lower is not None or self.upper is not None
+        places = boxed + (self.where is not None)
+        if places > 1 or not (places or self.faces or self.facing is not None):
             raise UsageError(
                 f"The patch {self.name!r} has no clear place.",
-                why="It is either a box of two corners or a function.",
-                fix="Pass lower=(x, y, z) and upper=(x, y, z), or where=function.",
+                why="It is a box, a function, a direction that it faces, or surfaces of the file; a box and a function "
+                "exclude each other.",
+                fix="Pass lower=(x, y, z) and upper=(x, y, z), or where=function, facing=(0, 0, 1), faces=(name,).",
             )
-        if boxed:
-            object.__setattr__(self, "lower", checks.triple("A patch's lower corner", self.lower, "m"))
-            object.__setattr__(self, "upper", checks.triple("A patch's upper corner", self.upper, "m"))
+        for corner, word in (("lower", "lower"), ("upper", "upper")):
+            if (value := getattr(self, corner)) is not None:
+                object.__setattr__(self, corner, _corner(f"A patch's {word} corner", value))
+        if self.facing is not None:
+            direction = checks.triple("The direction that a patch faces", self.facing, "")
+            length = math.hypot(*direction)
+            if not length:
+                raise UsageError(
+                    f"The direction that the patch {self.name!r} faces points nowhere.",
+                    why="All of its three parts are 0.",
+                    fix="Pass for example facing=(0, 0, 1) for what faces up.",
+                )
+            object.__setattr__(self, "facing", tuple(part / length for part in direction))
+        checks.fits("The angle of a patch's normals", self.within, "degrees", above=0, most=180)
 
-    def contains(self, centres: np.ndarray) -> np.ndarray:
-        """Mask (n,) of the centres (n, 3) in m that belong to the patch."""
+    def contains(
+        self, centres: np.ndarray, normals: np.ndarray | None = None, names: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Return which parts of a surface belong to the patch.
+
+        Parameters
+        ----------
+        centres : (n, 3) array
+            Centres in m.
+        normals : (n, 3) array, optional
+            Outward unit normals; needed for `facing`.
+        names : (n,) array of str, optional
+            Names of the surfaces that they are parts of; needed for `faces`.
+
+        Returns
+        -------
+        (n,) bool array
+        """
         if self.where is not None:
-            return np.asarray(self.where(centres), dtype=bool)
-        return np.asarray(((centres >= self.lower) & (centres <= self.upper)).all(axis=1))
+            inside = np.asarray(self.where(centres), dtype=bool)
+        else:
+            low, high = _bounds(self.lower, -np.inf), _bounds(self.upper, np.inf)
+            inside = np.asarray(((centres >= low) & (centres <= high)).all(axis=1))
+        if self.facing is not None:
+            if normals is None:
+                raise UsageError(
+                    f"The patch {self.name!r} is chosen by the direction that it faces.",
+                    why="Faces of a STEP file are named whole, and a curved one faces many ways.",
+                    fix="Name them: faces=('face 1',); `faces` of the solid without patches tells which is where.",
+                )
+            # a hundred-thousandth of a degree: a plane that faces just so is meant to belong
+            inside = inside & (normals @ np.array(self.facing) >= np.cos(np.radians(self.within)) - 1e-7)
+        if self.faces:
+            given = np.full(len(centres), "") if names is None else names
+            known = tuple(dict.fromkeys(given.tolist()))
+            for face in self.faces:
+                require_known("surface", face, known)
+            inside = inside & np.array([name in self.faces for name in given.tolist()], dtype=bool)
+        return inside
 
     def describe(self) -> dict[str, Any]:
         """Return the patch as plain data."""
         function = self.where and f"{self.where.__module__}.{self.where.__qualname__}"
-        return {"name": self.name, "lower": self.lower, "upper": self.upper, "where": function}
+        plain: dict[str, Any] = {
+            "name": self.name,
+            "lower": self.lower,
+            "upper": self.upper,
+            "where": function,
+        }
+        if self.facing is not None:
+            plain |= {"facing": self.facing, "within": self.within}
+        return plain | ({"faces": self.faces} if self.faces else {})
+
+
+def _corner(what: str, value: Any) -> Corner:
+    """Return a corner whose bounds are numbers in m or None."""
+    parts = tuple(value) if isinstance(value, Iterable) else value
+    if not isinstance(parts, tuple) or None not in parts:
+        return checks.triple(what, parts, "m")
+    numbers = checks.triple(what, tuple(0.0 if part is None else part for part in parts), "m")
+    x, y, z = (None if part is None else number for part, number in zip(parts, numbers, strict=True))
+    return x, y, z
+
+
+def _bounds(corner: Corner | None, missing: float) -> np.ndarray:
+    """Return a corner (3,) in m, infinite where it has no bound."""
+    return np.array([missing if part is None else part for part in corner or (None, None, None)])
 
 
 def segments(surface: Trimesh, angle: float = FEATURE_ANGLE) -> np.ndarray:
@@ -215,7 +300,11 @@ def segments(surface: Trimesh, angle: float = FEATURE_ANGLE) -> np.ndarray:
 
 
 def apply_patches(
-    names: Sequence[str], index: np.ndarray, centres: np.ndarray, patches: Sequence[SurfacePatch]
+    names: Sequence[str],
+    index: np.ndarray,
+    centres: np.ndarray,
+    patches: Sequence[SurfacePatch],
+    normals: np.ndarray | None = None,
 ) -> tuple[tuple[str, ...], np.ndarray]:
     """Give the parts inside the patches their names; a later patch goes over an earlier one.
 
@@ -229,6 +318,8 @@ def apply_patches(
         Centres of the faces, m.
     patches : sequence of SurfacePatch
         Names to give, and where.
+    normals : (n, 3) array, optional
+        Outward unit normals of the faces; without them no patch can be chosen by the way that it faces.
 
     Returns
     -------
@@ -243,14 +334,15 @@ def apply_patches(
         If a patch contains nothing.
     """
     label = np.array([names[i] for i in index], dtype=object)
+    given = label.copy()
     for patch in patches:
-        inside = patch.contains(centres)
+        inside = patch.contains(centres, normals, given)
         if not inside.any():
             low, high = (", ".join(f"{v:.4g}" for v in f(axis=0)) for f in (centres.min, centres.max))
             raise UsageError(
                 f"The patch {patch.name!r} contains no part of the surface.",
                 why=f"The centres of the surface's faces lie between ({low}) and ({high}) m.",
-                fix="Move or enlarge its box, in m.",
+                fix="Move or enlarge its bounds, in m.",
             )
         label[inside] = patch.name
     present = set(label)

@@ -201,7 +201,9 @@ def _with_surfaces(bare: BodyMesh, source: Any, used: np.ndarray, shape: Importe
     part_of = np.unique(parts[index < 0], return_inverse=True)[1]
     index[index < 0] = len(names) + part_of
     every = (*names, *(f"face {i + 1}" for i in range(int(part_of.max(initial=-1)) + 1)))
-    surfaces, surface_of = apply_patches(every, index, surface.triangles_center, shape.patches)
+    surfaces, surface_of = apply_patches(
+        every, index, surface.triangles_center, shape.patches, surface.face_normals
+    )
     return replace(bare, triangles=outer, surface_of=surface_of, surfaces=surfaces)
 
 

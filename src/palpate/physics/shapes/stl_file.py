@@ -231,7 +231,7 @@ def name_parts(surface: Trimesh, patches: tuple[SurfacePatch, ...], angle: float
     """Return the surface, split along sharp edges into ``face 1``, ``face 2``, …; a mesh without tetrahedra."""
     part = segments(surface, angle)
     names = [f"face {i + 1}" for i in range(part.max() + 1)]
-    surfaces, surface_of = apply_patches(names, part, surface.triangles_center, patches)
+    surfaces, surface_of = apply_patches(names, part, surface.triangles_center, patches, surface.face_normals)
     return BodyMesh(
         surface.vertices, np.empty((0, 4)), surface.faces, surface_of, np.empty(0), surfaces, ("body",)
     )

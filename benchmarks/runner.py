@@ -22,6 +22,7 @@ __all__ = ["BENCHMARKS", "Benchmark", "main"]
 BENCHMARKS = (
     "cantilever",
     "filters",
+    "hand_drives",
     "latency",
     "literature",
     "online",

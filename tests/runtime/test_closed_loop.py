@@ -130,7 +130,7 @@ def test_a_gripped_pad_is_softened_too():
     loop.run_for(1.0)
     assert loop.coupling.active
     assert loop.passivity.lowest >= -loop.bounds.felt * loop.passivity.leak - 1e-9
-    published = loop.out._record
+    published = loop.out.record
     assert published["coupling"] == pytest.approx(loop.bounds.coupling)
 
 

@@ -35,6 +35,7 @@ from palpate.runtime.hand_evaluator import HandEvaluator
 from palpate.runtime.passivity import PassivityController, largest_damping
 from palpate.runtime.publisher import Publisher
 from palpate.runtime.realtime import Metronome
+from palpate.runtime.recording import TickRecorder
 from palpate.runtime.safety import Fault, Limits, Safety, stalled
 from palpate.runtime.shared_state import MAX_INPUTS, MAX_PLACES, Shared, now
 from palpate.runtime.stability import FeltStiffness
@@ -85,6 +86,8 @@ class Loop:
         Whether the passivity controller may damp; without it it only counts.
     orphaned : callable
         Returns whether the process that wanted the loop has ended; asked once a tick.
+    recorder : TickRecorder, optional
+        Takes down each tick while a recording is wanted.
 
     Raises
     ------
@@ -106,12 +109,14 @@ class Loop:
         override: bool = False,
         control: bool = True,
         orphaned: Callable[[], bool] = lambda: False,
+        recorder: TickRecorder | None = None,
     ) -> None:
         if not 10.0 <= rate <= 10_000.0:
             raise UsageError(
                 f"The loop can't run at {rate:g} Hz.", fix="Choose 10 … 10000 Hz; 1000 is usual."
             )
-        self.evaluator, self.device, self.workspace = model.evaluator(), device, workspace
+        self.evaluator, self.workspace, self.recorder = model.evaluator(), workspace, recorder
+        self.device = device if recorder is None else recorder.watch(device)
         if max(len(self.evaluator.loads), len(model.parameters)) > MAX_INPUTS:
             raise UsageError(
                 f"The model has {len(self.evaluator.loads)} inputs; the runtime carries {MAX_INPUTS}.",
@@ -133,7 +138,7 @@ class Loop:
         self.device_error = ""
         self._answered, self._sent = math.inf, np.zeros(3)
         self._sent_to_device, self._heard = np.zeros(3), False
-        self._before, self._wanted = math.nan, self.evaluator.force
+        self._before, self.wanted = math.nan, self.evaluator.force
         self._commands, self._quit = shared.command, shared.command.record["quit"]
         self._wished = shared.command.record["parameters"]
         self._orphaned = orphaned
@@ -144,22 +149,22 @@ class Loop:
         traits = self.device.traits
         self.frame = HandFrame(traits.axes)
         self.motors = traits.damping is not None
-        self._controlled = self.motors and control
+        self.controlled = self.motors and control
         self.passivity = PassivityController(self.period, max_force=limits.max_force, max_damping=0.0)
         self.bounds = FeltStiffness(
             self.workspace.felt(stiffness), traits.damping, rate, traits.delay, override
         )
         self.coupling = Coupling(hardest=stiffness)
         self._steps = 1 if self.evaluator.remembers else STEPS
-        self._take_delay(traits.delay)
+        self.take_delay(traits.delay)
 
-    def _take_delay(self, delay: float) -> None:
+    def take_delay(self, delay: float) -> None:
         """Draw the consequences of a delay, s: for the coupling's spring, the ledger and the added damping."""
         traits = self.device.traits
         self._age = delay
         self.bounds = replace(self.bounds, delay=delay)
         self.passivity.delay = delay
-        if self._controlled:
+        if self.controlled:
             self.passivity.max_damping = largest_damping(traits.mass, self.bounds.rate, delay=delay)
         self._spring = self.bounds.coupling / self.workspace.scale
         self.coupling.change(self._spring)
@@ -218,6 +223,8 @@ class Loop:
         for stage in self.stages:
             stage()
         self.out.tick(now, lateness, self.fault)
+        if self.recorder is not None:
+            self.recorder.tick(self, lateness)
         self.out.worked(time.thread_time() - began)
 
     def fail(self, fault: Fault) -> None:
@@ -265,7 +272,7 @@ class Loop:
         self._heard = True
         known = self.bounds.delay
         if abs(self._age - known) > _DELAY_CHANGE * (self.period / 2.0 + known):
-            self._take_delay(self._age)
+            self.take_delay(self._age)
 
     def map(self) -> None:
         """Turn hand metres into body metres, and take over the parameters that were set."""
@@ -293,7 +300,7 @@ class Loop:
                 self._answer_through_spring()
             else:
                 answer(self.out.position, self.parameters)
-                self._wanted = answer.force
+                self.wanted = answer.force
         except (ArithmeticError, ValueError, TypeError, IndexError):
             self.coupling.reset()
             self.fail(Fault.EVALUATOR_ERROR)
@@ -314,11 +321,11 @@ class Loop:
             answer(coupling.proxy, self.parameters)
             if coupling.balanced(hand, answer.force):
                 break
-        self._wanted = coupling.pull(hand)
+        self.wanted = coupling.pull(hand)
 
     def limit(self) -> None:
         """Limit force, slew and ramp; zero after a fault and for a hand that doesn't hold."""
-        self.safety.apply(self._wanted, gate=self.holding and self.fault is Fault.NONE)
+        self.safety.apply(self.wanted, gate=self.holding and self.fault is Fault.NONE)
         self.out.clamped(self.safety.clamped)
 
     def control(self) -> None:

@@ -18,12 +18,21 @@ _EVERY = 100  # ticks between two updates of the rate: 10 Hz is what an eye can 
 
 
 class Publisher:
-    """Fills and publishes state and indentations; the stages write to its views `hand`, `position` and `force` (3,)."""
+    """Fills and publishes state and indentations; the stages write to its views `hand`, `position` and `force` (3,).
+
+    Attributes
+    ----------
+    record : record of dtype `STATE`, shape ()
+        The tick that is being filled.
+    offset : float
+        Added to the time that is published, s: a replay that others look at has times of its own.
+    """
 
     def __init__(self, shared: Shared, inputs: int) -> None:
         self._block, record = shared.state, shared.state.record
+        self.offset = 0.0
         self._indentation, self._amplitude = shared.indentation, shared.indentation.record["amplitude"]
-        self._record = record
+        self.record = record
         self.hand, self.position, self.force = record["hand"], record["position"], record["force"]
         self._contact, self._loads = record["contact"], record["loads"][:inputs]
         self._depth, self._stiffness = record["depth"], record["stiffness"]
@@ -39,9 +48,9 @@ class Publisher:
 
     def describe(self, workspace: Workspace, limits: Limits) -> None:
         """Take over all that does not change while the loop runs: scale, radius and force limit."""
-        self._record["scale"], self._record["radius"] = workspace.scale, workspace.radius
-        self._record["max_force"] = limits.max_force
-        self._record["coupling"] = math.inf
+        self.record["scale"], self.record["radius"] = workspace.scale, workspace.radius
+        self.record["max_force"] = limits.max_force
+        self.record["coupling"] = math.inf
         self._inside[()] = True
 
     def input(self, *, holding: bool, late: bool) -> None:
@@ -64,11 +73,11 @@ class Publisher:
         """Take over whether the force limit acted, and count it."""
         self._clamped[()] = acted
         if acted:
-            self._record["clamped_ticks"] += 1
+            self.record["clamped_ticks"] += 1
 
     def stiffness(self, bounds: FeltStiffness) -> None:
         """Take over how stiff the body is and may be, and through which spring it is touched."""
-        record = self._record
+        record = self.record
         record["delay"], record["body_stiffness"], record["coupling"] = (
             bounds.delay,
             bounds.body,
@@ -84,7 +93,7 @@ class Publisher:
     def tick(self, now: float, lateness: float, fault: Fault) -> None:
         """Close the tick that began at `now` (s), `lateness` (s) behind its schedule, and publish it."""
         self._count += 1
-        self._tick[()], self._time[()], self._lateness[()] = self._count, now, lateness
+        self._tick[()], self._time[()], self._lateness[()] = self._count, now + self.offset, lateness
         self._late.add(lateness)
         self._worst[()] = self._late.maximum
         if self._count == 1:
@@ -104,18 +113,18 @@ class Publisher:
         """Publish a last record: nothing held, nothing pushed."""
         self._grabbed[()] = False
         if self._count < _EVERY:
-            self._pace(float(self._time))
+            self._pace(float(self._time) - self.offset)
         self._block.publish()
 
     def _changed(self, fault: Fault) -> None:
         self._before = fault
         self._fault[()] = fault
         if fault is not Fault.NONE:
-            self._record["last_fault"] = fault
-            self._record["faults"] += 1
-            self._record["fault_counts"][fault] += 1
+            self.record["last_fault"] = fault
+            self.record["faults"] += 1
+            self.record["fault_counts"][fault] += 1
 
     def _pace(self, now: float) -> None:
         if now > self._since:
-            self._record["rate"] = (self._count - self._counted) / (now - self._since)
+            self.record["rate"] = (self._count - self._counted) / (now - self._since)
             self._counted, self._since = self._count, now

@@ -1,0 +1,215 @@
+"""The parent's side of a recording: a thread that empties the loop's ring into a file, twice a second.
+
+A disk that is full or slow never reaches the loop. A file that can't be written any more ends the recording, not the
+touch: `TraceRecorder.error` says why, and what was written before stays.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import platform
+import threading
+from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import DeviceError, PalpateError
+from palpate.runtime.recording import Ring
+from palpate.runtime.trace_file import TraceWriter
+
+__all__ = ["TraceRecorder", "machine_facts", "model_facts"]
+
+_LOOK, _CHUNK = 0.1, 0.5  # s between two looks at the ring, and between two chunks of the file
+_BEGIN = 10.0  # s within which a running loop begins a recording
+
+
+class TraceRecorder:
+    """Records what one loop does into one file, from its making until `stop`.
+
+    Parameters
+    ----------
+    ring : Ring
+        That the loop fills.
+    path : path
+        A new file.
+    header : mapping
+        What is known of model, device and rate before the loop says more.
+    running : bool
+        Whether the loop ticks already. Then the recording begins with one of its next ticks; otherwise with its first.
+
+    Attributes
+    ----------
+    error : PalpateError or None
+        Why the recording has stopped by itself.
+    ticks, size : int
+        Ticks and bytes that are in the file.
+
+    Raises
+    ------
+    UsageError, ResourceError
+        If the file can't be made.
+    """
+
+    def __init__(
+        self, ring: Ring, path: str | os.PathLike[str], header: Mapping[str, Any], *, running: bool = True
+    ) -> None:
+        self.path, self.error, self.ticks = Path(path), None, 0
+        self._ring, self._running = ring, running
+        self._writer = TraceWriter(
+            self.path, dict(header) | machine_facts() | {"recorded": datetime.now(UTC).isoformat()}
+        )
+        self._rows: list[np.ndarray] = []
+        self._events: list[dict[str, Any]] = []
+        self._lost = ring.lost
+        self._known: Mapping[str, Any] = header
+        self._ending, self._end = threading.Event(), threading.Event()
+        ring.read = int(ring.head)
+        self._number = int(ring.begun) + 1
+        ring.asked[()] = self._number
+        self._thread = threading.Thread(target=self._work, name="palpate-recorder", daemon=True)
+
+    error: PalpateError | None
+
+    def start(self) -> None:
+        """Begin to write."""
+        self._thread.start()
+
+    @property
+    def size(self) -> int:
+        """Bytes that are in the file."""
+        return self._writer.size
+
+    @property
+    def lost(self) -> int:
+        """Number of ticks that were overwritten before they could be written down."""
+        return self._ring.lost - self._lost
+
+    def add_event(self, kind: str, **facts: Any) -> None:
+        """Note an event, such as another surrogate that answers from here on.
+
+        Parameters
+        ----------
+        kind : str
+            Such as ``swap``.
+        **facts
+            Numbers and texts that tell of it; ``tick`` is the newest tick written.
+        """
+        self._events.append({"kind": kind, "tick": self.ticks} | facts)
+
+    def stop(self, end: Callable[[], Mapping[str, Any]] | None = None) -> None:
+        """Write what is left and close the file; harmless when repeated.
+
+        Parameters
+        ----------
+        end : callable, optional
+            Returns what is to be said of the end, as JSON takes it.
+        """
+        if self._end.is_set():
+            return
+        self._end.set()
+        self._ending.set()
+        if self._thread.is_alive():
+            self._thread.join()
+        self._ring.asked[()] = 0
+        self._try(self._chunk)
+        if self.error is None:
+            facts = {"ticks": self.ticks, "lost": self.lost} | dict(end() if end else {})
+            self._try(lambda: self._writer.close(facts))
+
+    def _work(self) -> None:
+        waited = 0.0
+        self._try(self._begin)
+        while self.error is None and not self._ending.wait(_LOOK):
+            waited += _LOOK
+            self._collect()
+            if waited >= _CHUNK:
+                waited = 0.0
+                self._try(self._chunk)
+
+    def _begin(self) -> None:
+        """Wait for the loop's first word, and write down what it remembers."""
+        for _ in range(round(_BEGIN / 0.01)):
+            if int(self._ring.begun) == self._number:
+                break
+            if self._ending.wait(0.01):
+                return
+        else:
+            raise DeviceError(f"The recording {self.path} has not begun.", why="The loop doesn't tick.")
+        self._writer.add_json("loop", self._ring.facts)
+        state = self._ring.state
+        if state is None:
+            self.add_event("state", text="what the loop remembered was too much to keep")
+        else:
+            self._writer.add_state(state)
+
+    def _collect(self) -> None:
+        before = self.lost
+        rows = self._ring.take()
+        if self.lost > before and self._running:
+            self.add_event("lost", count=self.lost - before)
+        if len(rows):
+            self._rows.append(rows)
+
+    def _chunk(self) -> None:
+        """Write down what has come since the last chunk."""
+        self._collect()
+        if self._rows:
+            rows = np.concatenate(self._rows)
+            self._writer.add_ticks(rows)
+            self.ticks += len(rows)
+            self._rows.clear()
+        if self._events:
+            self._writer.add_events(self._events)
+            self._events.clear()
+
+    def _try(self, step: Callable[[], None]) -> None:
+        """Take a step of writing; one that fails ends the recording."""
+        if self.error is not None:
+            return
+        try:
+            step()
+        except PalpateError as error:
+            self.error = error
+            self._ring.asked[()] = 0
+            with contextlib.suppress(OSError):
+                self._writer.abandon()
+
+
+def machine_facts() -> dict[str, Any]:
+    """Return what the last bits of a computed force depend on besides the model: versions, and the processor."""
+    import numba
+
+    from palpate import __version__
+
+    return {
+        "palpate": __version__,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "numba": numba.__version__,
+        "processor": _processor(),
+    }
+
+
+def _processor() -> str:
+    with contextlib.suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return f"{platform.machine()}, {line.partition(':')[2].strip()}"
+    return f"{platform.machine()}, {platform.processor()}"
+
+
+def model_facts(path: str | os.PathLike[str]) -> dict[str, str]:
+    """Return name and checksum of a model's file, by which a replay knows it again.
+
+    Raises
+    ------
+    OSError
+        If the file can't be read.
+    """
+    path = Path(path)
+    return {"file": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}

@@ -1,0 +1,346 @@
+"""The loop's side of a recording: every tick as one record, in a ring that another process empties.
+
+The loop never waits for a disk. It writes each tick into the next slot of a ring in shared memory; the process that
+started the loop takes them out and writes them to a file (`recorder`). A ring that is not emptied in time loses its
+oldest ticks, which are counted and told.
+
+A record holds all that a tick depends on (its time, what the device said, the parameters in force, whether the driver
+failed) and what came of it, so that a `replay` gives the same forces to the last bit and can say so. What a loop
+remembers from before a recording is saved once, at its first tick (`snapshot`).
+"""
+
+from __future__ import annotations
+
+import json
+import mmap
+import pickle
+import zlib
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.errors import DeviceError
+from palpate.network import shared_memory
+from palpate.runtime.devices.device import Device, Sample, Traits
+from palpate.runtime.passivity import LEDGER
+from palpate.runtime.shared_state import MAX_INPUTS
+from palpate.runtime.snapshot import snapshot
+
+if TYPE_CHECKING:
+    from palpate.runtime.loop import Loop
+
+__all__ = [
+    "FLAGS",
+    "TICK",
+    "RecordedDevice",
+    "Ring",
+    "TickRecorder",
+]
+
+FLAGS = (
+    "holding",  # the device says that a hand holds
+    "clutched",  # its clutch is pressed
+    "asleep",  # it says that nobody is there
+    "read_failed",  # its driver raised an error instead of a sample
+    "write_failed",  # its driver raised an error instead of pushing
+    "grabbed",  # the loop takes it that a hand holds the body
+    "stalled",  # the sample is older than its device allows
+    "inside",  # within the trained range
+    "clamped",  # the force limit acted
+    "let_go",  # the body has let go of a probe that is too deep in it
+)
+"""Bits of a tick's flags, the lowest first: append, never reorder."""
+
+_BIT = {name: 1 << k for k, name in enumerate(FLAGS)}
+
+TICK = np.dtype(
+    [
+        ("tick", "i8"),
+        ("time", "f8"),  # s, of the loop's clock, when the tick began
+        ("sample_position", "f8", 3),  # m, device axes, as the driver gave it
+        ("sample_time", "f8"),  # s
+        ("patience", "f8"),  # s
+        ("hand", "f8", 3),  # m, x right, y up, z towards the user
+        ("contact", "f8", 3),  # m, body: where it is touched
+        ("wanted", "f8", 3),  # N on the hand, body axes: before limits and controller
+        ("force", "f8", 3),  # N on the hand, body axes, as sent
+        ("sent", "f8", 3),  # N, device axes, as the driver was given it
+        ("ledger", "f8", LEDGER),  # energy, its lowest, added damping, what that took, leak: J, N·s/m, m²
+        ("parameters", "f8", MAX_INPUTS),  # the inputs that the hand doesn't supply, in force
+        ("lateness", "f4"),  # s
+        ("depth", "f4"),  # m
+        ("stiffness", "f4"),  # N/m
+        ("delay", "f4"),  # s, measured
+        ("coupling", "f4"),  # N/m, of the spring in front of the body; inf: none
+        ("flags", "u2"),  # bits of `FLAGS`
+        ("fault", "u1"),
+        ("spare", "u1"),
+        ("checksum", "u4"),  # of all before it
+    ]
+)
+
+_SECONDS, _LEAST = 4.0, 4096  # of ticks that the ring holds
+_HEAD = 4096  # bytes before the slots: counters
+_FACTS = 64 * 1024  # bytes for what the loop says of itself, JSON
+_SNAPSHOT = 2 * 1024 * 1024  # bytes for what the loop remembers at the start of a recording
+_MAGIC = b"palpate ring %08x\n" % zlib.crc32(repr(TICK.descr).encode())
+
+
+class Ring:
+    """Ticks on their way from the loop to the process that writes them down, in shared memory.
+
+    One side fills it (`TickRecorder`), the other empties it (`take`). Neither waits.
+
+    Attributes
+    ----------
+    name : str
+        Path of the shared memory, for `attach`; empty for one that a single process uses.
+    head : () int64
+        Number of ticks written so far.
+    asked : () int64
+        Number of the recording that the reader wants, 0 for none.
+    begun : () int64
+        Number of the recording that the loop has begun.
+    """
+
+    def __init__(self, name: str, memory: mmap.mmap) -> None:
+        self.name, self._map = name, memory
+        view = memoryview(memory)
+        counters = np.frombuffer(view[64:_HEAD], np.int64, 8)
+        self.head, self.asked, self.begun = (
+            counters[0:1].reshape(()),
+            counters[1:2].reshape(()),
+            counters[2:3].reshape(()),
+        )
+        self._sizes = counters[
+            3:5
+        ]  # bytes of facts and of the snapshot; the latter -1 where there was no room
+        self._facts = view[_HEAD : _HEAD + _FACTS]
+        self._snapshot = view[_HEAD + _FACTS : _HEAD + _FACTS + _SNAPSHOT]
+        slots = view[_HEAD + _FACTS + _SNAPSHOT :]
+        self.length = len(slots) // TICK.itemsize
+        self.slots = np.frombuffer(slots, np.uint8, self.length * TICK.itemsize).reshape(
+            self.length, TICK.itemsize
+        )
+        self.read, self.lost = 0, 0
+
+    @classmethod
+    def create(cls, rate: float) -> Ring:
+        """Make a ring that holds some seconds of ticks at `rate` (Hz).
+
+        Raises
+        ------
+        DeviceError
+            If the system gives no shared memory.
+        """
+        try:
+            return cls.attach(shared_memory.create(_MAGIC, _size(rate)))
+        except OSError as error:
+            raise DeviceError(
+                "No shared memory for a recording.",
+                why=str(error),
+                fix=f"Free some space in {shared_memory.folder()}.",
+            ) from error
+
+    @classmethod
+    def attach(cls, name: str) -> Ring:
+        """Join a ring made by `create` in another process.
+
+        Raises
+        ------
+        DeviceError
+            If there is none of that name, or another version of palpate made it.
+        """
+        try:
+            memory = shared_memory.attach(name)
+        except (OSError, ValueError) as error:
+            raise DeviceError(f"There is no ring named {name!r}.", why=str(error)) from error
+        if memory[: len(_MAGIC)] != _MAGIC:
+            memory.close()
+            raise DeviceError(
+                f"{name!r} is not this version's ring.", fix="Run both sides from one installation."
+            )
+        return cls(name, memory)
+
+    @classmethod
+    def private(cls, rate: float = 1000.0) -> Ring:
+        """Return a ring without a name, which no other process sees."""
+        return cls("", mmap.mmap(-1, _size(rate)))
+
+    def unlink(self) -> None:
+        """Remove the name; who has attached keeps the memory. Harmless when repeated."""
+        if self.name:
+            shared_memory.remove(self.name)
+
+    def describe(self, facts: Mapping[str, Any]) -> None:
+        """Leave for the reader what the loop says of itself, as JSON."""
+        text = json.dumps(facts, allow_nan=False).encode()[:_FACTS]
+        self._facts[: len(text)] = text
+        self._sizes[0] = len(text)
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What the loop says of itself; empty before it has."""
+        return dict(json.loads(bytes(self._facts[: int(self._sizes[0])]) or b"{}"))
+
+    def keep(self, state: Mapping[str, Any]) -> None:
+        """Leave for the reader what the loop remembers as a recording begins."""
+        data = pickle.dumps(dict(state), protocol=5)
+        fits = len(data) <= _SNAPSHOT
+        if fits:
+            self._snapshot[: len(data)] = data
+        self._sizes[1] = len(data) if fits else -1
+
+    @property
+    def state(self) -> dict[str, Any] | None:
+        """What the loop remembered as the recording began; None where it was too much to keep."""
+        size = int(self._sizes[1])
+        # the bytes come from the loop that this process has started itself
+        return None if size < 0 else dict(pickle.loads(bytes(self._snapshot[:size])))  # noqa: S301
+
+    def take(self) -> np.ndarray:
+        """Return the ticks (N,) written since the last call; those overwritten meanwhile are counted in `lost`."""
+        head = int(self.head)
+        start = max(self.read, head - self.length + 1)
+        rows = self.slots[np.arange(start, head) % self.length].view(TICK).reshape(-1)
+        behind = int(self.head) - self.length + 1 - start  # overwritten while they were copied
+        if behind > 0:
+            rows, start = rows[behind:], start + behind
+        good = _intact(rows)  # the rest is on its way, and is taken next time
+        self.lost += start - self.read
+        self.read = start + good
+        return rows[:good].copy()
+
+    def close(self) -> None:
+        """Let go of the memory. Harmless when repeated."""
+        nothing = np.zeros(8, np.int64)
+        self.head, self.asked, self.begun = (
+            nothing[0:1].reshape(()),
+            nothing[1:2].reshape(()),
+            nothing[2:3].reshape(()),
+        )
+        self._sizes, self.slots = nothing[3:5], np.zeros((1, TICK.itemsize), np.uint8)
+        self._facts.release()
+        self._snapshot.release()
+
+
+def _size(rate: float) -> int:
+    return _HEAD + _FACTS + _SNAPSHOT + max(_LEAST, round(_SECONDS * rate)) * TICK.itemsize
+
+
+def _intact(rows: np.ndarray) -> int:
+    """Return the number of ticks before the first one that is not whole."""
+    data, size = rows.view(np.uint8).reshape(len(rows), TICK.itemsize), TICK.itemsize - 4
+    for k, row in enumerate(data):
+        if zlib.crc32(row[:size].data) != int(rows["checksum"][k]):
+            return k
+    return len(rows)
+
+
+class RecordedDevice:
+    """A device whose samples, failures and forces are noted for the recording.
+
+    Parameters
+    ----------
+    device : Device
+        The one that is read and written.
+    record : record of dtype `TICK`, shape ()
+        Takes the sample and the force.
+    """
+
+    def __init__(self, device: Device, record: np.ndarray) -> None:
+        self.device = device
+        self._position, self._sent = record["sample_position"], record["sent"]
+        self._time, self._patience = record["sample_time"], record["patience"]
+        self.flags = 0
+
+    @property
+    def traits(self) -> Traits:
+        """The device's own."""
+        return self.device.traits
+
+    def read(self, now: float) -> Sample:
+        """Return the device's sample, and note it."""
+        self.flags = _BIT["read_failed"]
+        sample = self.device.read(now)
+        self._position[:] = sample.position
+        self._time[()], self._patience[()] = sample.time, sample.patience
+        self.flags = (
+            (_BIT["holding"] if sample.holding else 0)
+            | (_BIT["clutched"] if sample.clutched else 0)
+            | (_BIT["asleep"] if sample.asleep else 0)
+        )
+        return sample
+
+    def write(self, force: np.ndarray) -> None:
+        """Push with the device, and note the force."""
+        self._sent[:] = force
+        self.flags |= _BIT["write_failed"]
+        self.device.write(force)
+        self.flags &= ~_BIT["write_failed"]
+
+    def close(self) -> None:
+        """Close the device."""
+        self.device.close()
+
+    def __getattr__(self, name: str) -> Any:
+        """Return whatever else the device has."""
+        return getattr(self.device, name)
+
+
+class TickRecorder:
+    """Writes each tick of a loop into a ring, as long as the reader of the ring wants it.
+
+    Parameters
+    ----------
+    ring : Ring
+        Takes the ticks.
+    """
+
+    def __init__(self, ring: Ring) -> None:
+        self.ring = ring
+        self._bytes = np.zeros(TICK.itemsize, np.uint8)
+        record = self._bytes.view(TICK).reshape(())
+        self._covered = self._bytes[:-4].data
+        self._views = {name: record[name] for name in TICK.names or ()}
+        self._record = record
+        self._device: Any = None
+
+    def watch(self, device: Device) -> RecordedDevice:
+        """Return the device to be used in place of `device`."""
+        self._device = RecordedDevice(device, self._record)
+        return self._device  # type: ignore[no-any-return]
+
+    def begin(self, loop: Loop) -> None:
+        """Begin or end a recording with the next tick, where the reader has asked for it."""
+        ring = self.ring
+        asked = int(ring.asked)
+        if asked != int(ring.begun):
+            if asked:
+                ring.keep(snapshot(loop))
+            ring.begun[()] = asked
+
+    def tick(self, loop: Loop, lateness: float) -> None:
+        """Take over the tick that has just ended, `lateness` (s) behind its schedule."""
+        ring = self.ring
+        asked = int(ring.asked)
+        if not asked or asked != int(ring.begun):
+            self.begin(loop)
+            return
+        views, published, device = self._views, loop.out.record, self._device
+        flags = device.flags
+        for name in ("grabbed", "stalled", "inside", "clamped", "let_go"):
+            if published[name]:
+                flags |= _BIT[name]
+        for name in ("tick", "hand", "contact", "force", "depth", "stiffness", "delay", "coupling"):
+            views[name][...] = published[name]
+        views["time"][()], views["lateness"][()] = loop.now, lateness
+        views["wanted"][:] = loop.wanted
+        views["ledger"][:] = loop.passivity.ledger
+        views["parameters"][: len(loop.parameters)] = loop.parameters
+        views["flags"][()], views["fault"][()] = flags, int(loop.fault)
+        views["checksum"][()] = zlib.crc32(self._covered)
+        head = int(ring.head)
+        ring.slots[head % ring.length] = self._bytes
+        ring.head[()] = head + 1

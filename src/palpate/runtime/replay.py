@@ -1,0 +1,313 @@
+"""A recorded touch, felt again: the same loop, on the recorded samples and times, with the same or another body.
+
+`Replay` builds the loop as it was recorded (device, axes, workspace, limits, stiffness limit), puts back what it
+remembered as the recording began, and passes through the recorded ticks. On the same body every force comes out the
+same to the last bit, on the processor and with the versions that recorded it; `Replayed` says so, or from which tick
+on and by how much the forces differ.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import DeviceError, UsageError
+from palpate.runtime.devices.device import Sample, Traits
+from palpate.runtime.loop import Loop
+from palpate.runtime.recorder import machine_facts
+from palpate.runtime.recording import FLAGS
+from palpate.runtime.safety import Fault, Limits
+from palpate.runtime.shared_state import Shared
+from palpate.runtime.snapshot import restore
+from palpate.runtime.touchable import Touchable
+from palpate.runtime.trace_file import Trace
+from palpate.runtime.workspace import Workspace
+
+__all__ = ["Replay", "Replayed", "ReplayDevice", "loop_facts"]
+
+_BIT = {name: 1 << k for k, name in enumerate(FLAGS)}
+
+
+def loop_facts(model: Touchable, loop: Loop, limits: Limits) -> dict[str, Any]:
+    """Return what a replay must know of a loop to build it anew, as JSON takes it.
+
+    Parameters
+    ----------
+    model : Touchable
+        The body that is touched.
+    loop : Loop
+        Before its first tick.
+    limits : Limits
+        Of the loop.
+    """
+    traits, space = loop.device.traits, loop.workspace
+    return {
+        "name": model.name,
+        "holds": model.holds,
+        "parameters": [r.name for r in model.parameters],
+        "inputs": [[r.name, r.low, r.high, r.unit] for r in model.inputs],
+        "rate": loop.bounds.rate,
+        "body_stiffness": loop.coupling.hardest,
+        "override": loop.bounds.override,
+        "control": loop.controlled or traits.damping is None,
+        "limits": asdict(limits),
+        "workspace": asdict(space),
+        "traits": asdict(traits),
+    }
+
+
+class ReplayDevice:
+    """A device that says what a recorded one said, tick by tick.
+
+    Attributes
+    ----------
+    traits : Traits
+        The recorded device's.
+    row : record of dtype `TICK`
+        The tick that is replayed.
+    sent : (3,)
+        The latest force, N, in the device's axes.
+    """
+
+    def __init__(self, traits: Traits) -> None:
+        self.traits, self.row = traits, None
+        self.sample, self.sent = Sample(), np.zeros(3)
+
+    row: Any
+
+    def read(self, now: float) -> Sample:
+        """Return the recorded sample.
+
+        Raises
+        ------
+        DeviceError
+            Where the recorded driver failed.
+        """
+        row, sample = self.row, self.sample
+        flags = int(row["flags"])
+        if flags & _BIT["read_failed"]:
+            raise DeviceError("The recorded device failed here.")
+        sample.position[:] = row["sample_position"]
+        sample.time, sample.patience = float(row["sample_time"]), float(row["patience"])
+        sample.holding = bool(flags & _BIT["holding"])
+        sample.clutched = bool(flags & _BIT["clutched"])
+        sample.asleep = bool(flags & _BIT["asleep"])
+        return sample
+
+    def write(self, force: np.ndarray) -> None:
+        """Remember the force (3,), N.
+
+        Raises
+        ------
+        DeviceError
+            Where the recorded driver failed.
+        """
+        self.sent[:] = force
+        if self.row is not None and int(self.row["flags"]) & _BIT["write_failed"]:
+            raise DeviceError("The recorded device failed here.")
+
+    def close(self) -> None:
+        """Let go."""
+        self.sent[:] = 0.0
+
+
+class Replay:
+    """A loop that goes through a recorded touch.
+
+    Parameters
+    ----------
+    trace : Trace
+        With at least one tick.
+    model : Touchable
+        The body that is touched, the recorded one or another.
+    shared : Shared, optional
+        Where the ticks are published; by default nobody sees them. Commands of others are not heard.
+    same : bool
+        Whether it is the recorded body: its state is put back then.
+    own_workspace : bool
+        Whether another body lies in the hand as it would by itself; by default it lies as the recorded one did, so
+        that the same motion reaches the same places.
+
+    Attributes
+    ----------
+    loop : Loop
+        The loop, between two ticks.
+    device : ReplayDevice
+        Where it finds the hand.
+
+    Raises
+    ------
+    UsageError
+        If the trace holds no tick, or the body is held where the recorded one was pressed.
+    FileFormatError
+        If the recorded state doesn't fit the body.
+    """
+
+    def __init__(
+        self,
+        trace: Trace,
+        model: Touchable,
+        shared: Shared | None = None,
+        *,
+        same: bool = True,
+        own_workspace: bool = False,
+    ) -> None:
+        if not len(trace):
+            raise UsageError(f"{trace.path.name} holds no tick.", why=" ".join(trace.notes))
+        header = trace.header
+        if bool(header["holds"]) != model.holds:
+            how = "held" if header["holds"] else "pressed"
+            raise UsageError(
+                f"{model.name} can't be touched by this hand.",
+                why=f"The recorded body was {how}, this one is {'held' if model.holds else 'pressed'}.",
+                fix="Take a model of the same kind.",
+            )
+        self.trace, self.model = trace, model
+        traits = header["traits"]
+        self.device = ReplayDevice(Traits(**traits | {"axes": _axes(traits["axes"])}))
+        space = header["workspace"]
+        workspace = Workspace(**space | {"centre": tuple(space["centre"])})
+        if own_workspace:
+            workspace = model.workspace(space["radius"])
+        stiffness = float(header["body_stiffness"])
+        self._commands = Shared.private()
+        seen = shared or self._commands
+        blocks: Any = SimpleNamespace(
+            state=seen.state, indentation=seen.indentation, command=self._commands.command
+        )
+        self._orphaned = False
+        self.loop = Loop(
+            model,
+            self.device,
+            blocks,
+            workspace,
+            Limits(**header["limits"]),
+            rate=float(header["rate"]),
+            stiffness=stiffness if same or not stiffness else model.stiffness_max,
+            override=bool(header["override"]),
+            control=bool(header["control"]),
+            orphaned=lambda: self._orphaned,
+        )
+        if same and trace.state is not None:
+            restore(self.loop, trace.state)
+        self._columns = _columns(header["parameters"], model)
+        self._set = np.full(len(model.parameters), np.nan)
+
+    def tick(self, k: int) -> None:
+        """Pass through tick `k` of the trace."""
+        row = self.device.row = self.trace.ticks[k]
+        for i, j in self._columns:
+            self._set[i] = row["parameters"][j]
+        if self._set.size and not np.array_equal(
+            self._set, self._commands.command.record["parameters"][: self._set.size]
+        ):
+            self._commands.write_command(parameters=self._set)
+        fault = int(row["fault"])
+        self._orphaned = fault == Fault.PARENT_GONE
+        self.loop.tick(float(row["time"]), float(row["lateness"]), jumped=fault == Fault.CLOCK_JUMP)
+
+    def run(self) -> Replayed:
+        """Pass through all ticks, as fast as they can be computed, and compare them with the recorded ones."""
+        count = len(self.trace)
+        force, wanted, sent = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3))
+        fault, depth = np.zeros(count, np.uint8), np.zeros(count, np.float32)
+        for k in range(count):
+            self.tick(k)
+            force[k], wanted[k], sent[k] = self.loop.out.force, self.loop.wanted, self.device.sent
+            fault[k], depth[k] = self.loop.fault, self.loop.out.record["depth"]
+        ticks = self.trace.ticks.copy()
+        ticks["force"], ticks["wanted"], ticks["sent"] = force, wanted, sent
+        ticks["fault"], ticks["depth"] = fault, depth
+        return Replayed(self.trace, ticks, self.model.name)
+
+
+@dataclass(frozen=True, eq=False)
+class Replayed:
+    """The outcome of a replay.
+
+    Attributes
+    ----------
+    trace : Trace
+        What was recorded.
+    ticks : (N,) of dtype `TICK`
+        The same samples with the forces, faults and depths of the replay.
+    name : str
+        Of the body that answered in the replay.
+    """
+
+    trace: Trace
+    ticks: np.ndarray
+    name: str
+
+    @property
+    def differing(self) -> np.ndarray:
+        """Indices of the ticks whose force, force in the device's axes or fault has other bits."""
+        old, new = self.trace.ticks, self.ticks
+        other = new["fault"] != old["fault"]
+        for name in ("force", "sent"):
+            other |= (
+                np.ascontiguousarray(new[name]).view(np.int64)
+                != np.ascontiguousarray(old[name]).view(np.int64)
+            ).any(axis=1)
+        return np.flatnonzero(other)
+
+    @property
+    def identical(self) -> bool:
+        """True where every force is the recorded one to the last bit."""
+        return not self.differing.size
+
+    @property
+    def largest(self) -> float:
+        """Largest ‖ΔF‖, N."""
+        return float(np.linalg.norm(self.ticks["force"] - self.trace.ticks["force"], axis=1).max(initial=0.0))
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """Reasons, in words, for which forces may differ: what is not as it was recorded."""
+        header, here = self.trace.header, machine_facts()
+        causes = [
+            f"recorded with {name} {header[name]}, replayed with {here[name]}"
+            for name in here
+            if header.get(name) not in {None, here[name]}
+        ]
+        if self.trace.lost:
+            causes.append(f"the recording is without {self.trace.lost} ticks")
+        if self.trace.state is None:
+            causes.append("the recording doesn't hold what the loop remembered as it began")
+        return tuple(causes)
+
+    def __str__(self) -> str:
+        count = len(self.ticks)
+        if self.identical:
+            return f"{count} ticks replayed on {self.name}: every force is the recorded one, to the last bit"
+        first = int(self.differing[0])
+        because = "".join(f"\n  {cause}" for cause in self.causes)
+        return (
+            f"{count} ticks replayed on {self.name}: {self.differing.size} forces differ, the first at tick "
+            f"{int(self.ticks['tick'][first])} ({self.trace.time[first]:.3f} s), by up to {self.largest:.3g} N{because}"
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the outcome as data for a program."""
+        first = int(self.differing[0]) if self.differing.size else None
+        return {
+            "ticks": len(self.ticks),
+            "identical": self.identical,
+            "differing": int(self.differing.size),
+            "first": first,
+            "first_time": None if first is None else float(self.trace.time[first]),
+            "largest_difference": self.largest,
+            "causes": list(self.causes),
+        }
+
+
+def _axes(rows: Any) -> Any:
+    return tuple(tuple(float(value) for value in row) for row in rows)
+
+
+def _columns(names: list[str], model: Touchable) -> tuple[tuple[int, int], ...]:
+    """Return, for the model's further inputs that the recording has too, their place here and there."""
+    return tuple((i, names.index(r.name)) for i, r in enumerate(model.parameters) if r.name in names)

@@ -1,0 +1,351 @@
+"""Files of recorded touches: chunks of ticks, one after the other, in a ZIP archive that a crash leaves readable.
+
+::
+
+    header.json        what was touched, by which device, at which rate and limits, with which version
+    loop.json          what the loop said of itself: body, workspace, limits, traits of the device
+    state.npz          what it remembered as the recording began
+    ticks-000001.npz   half a second of ticks, by column
+    events-000002.json models that answered, ticks that were lost, faults of the device in words
+    end.json           how it ended
+
+Each entry is appended in one piece and synchronised, so that a process which is killed loses what it had not yet
+written: at most the last second. The archive's directory comes last; without it any entry is still found by its own
+header. A reader takes all entries that are whole and says that the end is missing.
+
+Within a chunk a column whose bits are those of an earlier one is stored as its name, and one that doesn't change as
+its single value: at rest, or on a device with plain axes, most of a tick is neither.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import struct
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from palpate.errors import FileFormatError, UsageError
+from palpate.files import system_errors
+from palpate.runtime.recording import FLAGS, TICK
+
+__all__ = ["COLUMNS", "FORMAT", "VERSION", "Trace", "TraceWriter", "read_trace"]
+
+FORMAT, VERSION = "palpate trace", 1
+COLUMNS = tuple(name for name in TICK.names or () if name not in {"spare", "checksum"})
+_LOCAL = struct.Struct("<4s5H3I2H")  # of APPNOTE.TXT 4.3.7, the header of a ZIP entry
+_CENTRAL = struct.Struct("<4s6H3I5H2I")
+_END = struct.Struct("<4s4H2IH")
+_DATE = 0x21  # 1 January 1980, as early as a ZIP can say
+_MOST_ENTRIES, _LARGEST = 0xFFFF, 0xFFFFFFFF  # for which an archive can have a plain directory
+
+
+class TraceWriter:
+    """Writes a trace, chunk by chunk; whatever was written before a crash can be read.
+
+    Parameters
+    ----------
+    path : path
+        A new file.
+    header : mapping
+        What was touched and how, as JSON takes it.
+
+    Attributes
+    ----------
+    size : int
+        Bytes so far.
+
+    Raises
+    ------
+    UsageError
+        If the file exists, or its folder doesn't.
+    ResourceError
+        If the disk is full or the folder write-protected. The other methods raise it too.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], header: Mapping[str, Any]) -> None:
+        self.path, self.size, self._count = Path(path), 0, 0
+        self._names: list[tuple[bytes, int, int, int]] = []  # name, checksum, bytes, place
+        if self.path.exists():
+            raise UsageError(
+                f"{self.path} exists already.",
+                fix="Choose another name, or remove it: no recording is replaced.",
+            )
+        with system_errors(f"The recording {self.path} could not be begun."):
+            self._file: BinaryIO = self.path.open("xb", buffering=0)
+        self.add_json("header", {"format": FORMAT, "version": VERSION} | dict(header))
+
+    def add_json(self, name: str, content: Any) -> None:
+        """Append a record as JSON."""
+        self._append(f"{name}.json", json.dumps(content, indent=1).encode())
+
+    def add_state(self, state: Mapping[str, Any]) -> None:
+        """Append what the loop remembered as the recording began."""
+        self._append("state.npz", _npz(state))
+
+    def add_ticks(self, ticks: np.ndarray) -> None:
+        """Append ticks (N,) of dtype `TICK`, N ≥ 1."""
+        self._count += 1
+        self._append(f"ticks-{self._count:06d}.npz", _npz(_fold(ticks)))
+
+    def add_events(self, events: Sequence[Mapping[str, Any]]) -> None:
+        """Append events, each with its ``kind`` and ``tick``."""
+        self._count += 1
+        self.add_json(f"events-{self._count:06d}", list(events))
+
+    def close(self, end: Mapping[str, Any]) -> None:
+        """Append how it ended, and the archive's directory."""
+        if not self._file.closed:
+            try:
+                self.add_json("end", dict(end))
+                self._write(self._directory())
+            finally:
+                self._file.close()
+
+    def abandon(self) -> None:
+        """Close the file as it is, for example because the disk is full."""
+        self._file.close()
+
+    def _append(self, name: str, data: bytes) -> None:
+        encoded, checksum = name.encode(), zlib.crc32(data)
+        head = _LOCAL.pack(b"PK\3\4", 20, 0, 0, 0, _DATE, checksum, len(data), len(data), len(encoded), 0)
+        self._names.append((encoded, checksum, len(data), self.size))
+        self._write(head + encoded + data)
+
+    def _write(self, data: bytes) -> None:
+        with system_errors(f"The recording {self.path} stopped."):
+            start = self.size
+            try:
+                rest = memoryview(data)
+                while rest:
+                    rest = rest[self._file.write(rest) or 0 :]
+                os.fsync(self._file.fileno())
+            except OSError:
+                self._file.truncate(start)  # a part of an entry is of no use
+                raise
+            self.size += len(data)
+
+    def _directory(self) -> bytes:
+        if len(self._names) > _MOST_ENTRIES or self.size > _LARGEST // 2:
+            return b""
+        rows = b"".join(
+            _CENTRAL.pack(b"PK\1\2", 20, 20, 0, 0, 0, _DATE, crc, size, size, len(name), *(0,) * 5, place)
+            + name
+            for name, crc, size, place in self._names
+        )
+        count = len(self._names)
+        return rows + _END.pack(b"PK\5\6", 0, 0, count, count, len(rows), self.size, 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """A recorded touch.
+
+    Attributes
+    ----------
+    path : Path
+        Its file.
+    header : mapping
+        What was touched, by which device, at which rate and limits.
+    ticks : (N,) of dtype `TICK`
+        In order of time.
+    state : mapping, optional
+        What the loop remembered as the recording began; None where that was not kept.
+    events : tuple of mappings
+        Each with ``tick`` and ``kind``.
+    end : mapping, optional
+        How it ended; None where the file ends too early.
+    size : int
+        Bytes of the file.
+    notes : tuple of str
+        What is missing, in words.
+    """
+
+    path: Path
+    header: Mapping[str, Any]
+    ticks: np.ndarray
+    state: Mapping[str, Any] | None = None
+    events: tuple[Mapping[str, Any], ...] = ()
+    end: Mapping[str, Any] | None = None
+    size: int = 0
+    notes: tuple[str, ...] = field(default=())
+
+    def __len__(self) -> int:
+        return len(self.ticks)
+
+    def __str__(self) -> str:
+        return f"Trace of {self.header.get('name', 'a body')}: {len(self)} ticks in {self.seconds:.3g} s"
+
+    __repr__ = __str__
+
+    @property
+    def time(self) -> np.ndarray:
+        """Time (N,) since the first tick, s."""
+        return np.asarray(self.ticks["time"] - self.ticks["time"][:1])
+
+    @property
+    def seconds(self) -> float:
+        """Time from the first tick to the last, s."""
+        return float(self.time[-1]) if len(self) else 0.0
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """Inputs (N, p) that the hand doesn't supply, as they were in force."""
+        return np.asarray(self.ticks["parameters"][:, : len(self.header.get("parameters", ()))])
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """Velocity of the hand (N, 3), m/s, by central differences of the recorded places."""
+        if len(self) < 2 or (np.diff(self.time) <= 0.0).any():
+            return np.zeros((len(self), 3))
+        return np.asarray(np.gradient(self.ticks["hand"], self.time, axis=0))
+
+    def flag(self, name: str) -> np.ndarray:
+        """Return one of `palpate.runtime.recording.FLAGS` for each tick, (N,) bool."""
+        return (self.ticks["flags"] & (1 << FLAGS.index(name))).astype(bool)
+
+    @property
+    def lost(self) -> int:
+        """Number of ticks that the recording is without, between its first and its last."""
+        return int(self.ticks["tick"][-1] - self.ticks["tick"][0] + 1 - len(self)) if len(self) else 0
+
+
+def read_trace(path: str | os.PathLike[str]) -> Trace:
+    """Read a recorded touch; one whose end is missing is read as far as it goes, with a note.
+
+    Parameters
+    ----------
+    path : path
+        As `palpate run --record` writes it.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is missing, is no recording, is of a later version, or is damaged before its first tick.
+    """
+    path = Path(path)
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise FileFormatError(
+            f"{path} can't be read.", why=str(error.strerror or error), fix="Check the name."
+        ) from error
+    header: dict[str, Any] = {}
+    state, end = None, None
+    chunks: list[np.ndarray] = []
+    events: list[Mapping[str, Any]] = []
+    used = 0
+    try:
+        for name, content, used in _entries(data):  # noqa: B007 used after the loop
+            if name == "header.json":
+                header = _accepted(path, json.loads(content))
+            elif name == "state.npz":
+                state = _arrays(content)
+            elif name == "loop.json":
+                header = header | json.loads(content)
+            elif name == "end.json":
+                end = json.loads(content)
+            elif name.startswith("events-"):
+                events += json.loads(content)
+            elif name.startswith("ticks-"):
+                chunks.append(_unfold(_arrays(content)))
+    except (ValueError, KeyError, TypeError, zlib.error) as error:
+        raise FileFormatError(
+            f"{path} is damaged.", why=str(error), fix="Copy the file again, or record it anew."
+        ) from error
+    if not header:
+        raise FileFormatError(
+            f"{path} is no recording of palpate.",
+            why="It doesn't begin with the header of one.",
+            fix="Record one with palpate run MODEL --record FILE.",
+        )
+    ticks = np.concatenate(chunks) if chunks else np.zeros(0, TICK)
+    return Trace(path, header, ticks, state, tuple(events), end, len(data), _missing(data, used, end))
+
+
+def _missing(data: bytes, used: int, end: Mapping[str, Any] | None) -> tuple[str, ...]:
+    if end is not None:
+        return ()
+    rest = len(data) - used
+    cut = f"; the last {rest} bytes are an unfinished chunk and were left out" if rest else ""
+    return (f"The recording has no end: its program was killed, or still records{cut}.",)
+
+
+def _accepted(path: Path, header: Mapping[str, Any]) -> dict[str, Any]:
+    if header.get("format") != FORMAT:
+        return {}
+    if int(header["version"]) > VERSION:
+        raise FileFormatError(
+            f"{path} was recorded by a later version of palpate.",
+            why=f"Its layout is {header['version']}; this version reads up to {VERSION}.",
+            fix="Update palpate.",
+        )
+    return dict(header)
+
+
+def _entries(data: bytes) -> Iterator[tuple[str, bytes, int]]:
+    """Yield name, content and end of each whole entry of a ZIP archive, by the entries' own headers."""
+    place = 0
+    while place + _LOCAL.size <= len(data):
+        mark, _, flags, method, _, _, checksum, size, _, names, extra = _LOCAL.unpack_from(data, place)
+        start = place + _LOCAL.size + names + extra
+        if mark != b"PK\3\4" or flags & 8 or method != 0 or start + size > len(data):
+            return
+        content = data[start : start + size]
+        if zlib.crc32(content) != checksum:
+            return
+        name = data[place + _LOCAL.size : place + _LOCAL.size + names].decode("utf-8", "replace")
+        place = start + size
+        yield name, content, place
+
+
+def _npz(arrays: Mapping[str, Any]) -> bytes:
+    file = io.BytesIO()
+    np.savez_compressed(file, **{name: np.asarray(value) for name, value in arrays.items()})
+    return file.getvalue()
+
+
+def _arrays(content: bytes) -> dict[str, np.ndarray]:
+    with np.load(io.BytesIO(content), allow_pickle=False) as archive:
+        return {name: archive[name] for name in archive.files}
+
+
+def _fold(ticks: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the columns of ticks (N,), without those that repeat another one or themselves."""
+    columns: dict[str, np.ndarray] = {}
+    same: list[tuple[str, str]] = []
+    for name in COLUMNS:
+        column = np.ascontiguousarray(ticks[name])
+        bits = column.tobytes()
+        twin = next(
+            (
+                known
+                for known, other in columns.items()
+                if other.dtype == column.dtype and other.tobytes() == bits
+            ),
+            "",
+        )
+        if twin:
+            same.append((name, twin))
+        else:
+            columns[name] = column
+    for name, column in columns.items():
+        if column[:1].tobytes() * len(column) == column.tobytes():
+            columns[name] = column[:1]
+    return columns | {"same": np.array(same, dtype="U16").reshape(-1, 2), "count": np.array(len(ticks))}
+
+
+def _unfold(columns: Mapping[str, np.ndarray]) -> np.ndarray:
+    ticks = np.zeros(int(columns["count"]), TICK)
+    for name in COLUMNS:
+        if name in columns:
+            ticks[name] = columns[name]
+    for name, twin in columns["same"].tolist():
+        ticks[name] = ticks[twin]
+    return ticks

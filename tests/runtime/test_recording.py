@@ -1,0 +1,211 @@
+"""Recorded touches and their replay, on time that the test makes: every force comes out again to the last bit."""
+
+from __future__ import annotations
+
+
+import numpy as np
+import pytest
+
+import held
+import pressed
+from models import spring_beam
+from palpate.errors import DeviceError
+from palpate.runtime.devices.device import Sample, Traits
+from palpate.runtime.devices.page import PageDevice
+from palpate.runtime.devices.simulated import SimulatedHand, SimulatedSettings
+from palpate.runtime.devices.stroke import StrokeDevice, StrokeSettings
+from palpate.runtime.loop import Loop
+from palpate.runtime.recorder import TraceRecorder
+from palpate.runtime.recording import Ring, TickRecorder
+from palpate.runtime.replay import Replay, loop_facts
+from palpate.runtime.safety import Limits
+from palpate.runtime.shared_state import Shared
+from palpate.runtime.touchable import touchable
+from palpate.runtime.trace_file import read_trace
+from palpate.surrogates.memories import Relaxation
+
+LIMITS = Limits(12.0)
+
+
+class Recorded:
+    """A loop under the test's clock, whose recording goes to a file."""
+
+    def __init__(self, path, body, device, shared=None, *, rate=1000.0, before=0, **options):
+        self.body, self.shared = body, shared or Shared.private()
+        self.ring = Ring.private(rate)
+        self.loop = Loop(
+            body, device, self.shared, body.workspace(0.075), LIMITS,
+            rate=rate, stiffness=body.stiffness_max, recorder=TickRecorder(self.ring), **options,
+        )  # fmt: skip
+        self.ring.describe(loop_facts(body, self.loop, LIMITS))
+        self.k = 0
+        self.tick(before)
+        self.recorder = TraceRecorder(self.ring, path, {"device": "test"})
+        self.loop.recorder.begin(self.loop)
+        self.recorder.start()
+        self.path = path
+
+    def tick(self, count, **options):
+        for _ in range(count):
+            self.loop.tick(
+                5.0 + self.k * self.loop.period * (1.0 + 1e-3 * (self.k % 7)), 1e-6 * self.k, **options
+            )
+            self.k += 1
+
+    def trace(self):
+        self.recorder.stop()
+        assert self.recorder.error is None
+        return read_trace(self.path)
+
+
+def hand(**settings):
+    return SimulatedHand(SimulatedSettings(**settings))
+
+
+BODIES = {
+    "beam": lambda: spring_beam(200.0),
+    "stiff block": lambda: pressed.surrogate(factor=50.0),
+    "relaxing block": lambda: pressed.surrogate(factor=50.0, memory=Relaxation(((0.4, 0.1),))),
+    "yielding rod": held.yielding_rod,
+}
+
+
+def assert_same(trace, body):
+    replayed = Replay(trace, body).run()
+    assert replayed.identical, str(replayed)
+    assert "to the last bit" in str(replayed)
+    assert np.abs(trace.ticks["force"]).max() > 1e-3, "something was felt"
+
+
+@pytest.mark.parametrize("before", [0, 400])
+@pytest.mark.parametrize("name", list(BODIES))
+def test_a_simulated_hand_is_replayed_to_the_last_bit(name, before, tmp_path):
+    """From the loop's first tick, and from the midst of a touch; with the controller at work, and a late device."""
+    body = touchable(BODIES[name]())
+    aim = body.stroke(body.workspace(0.075).scale)
+    touch = Recorded(
+        tmp_path / "a.trace", body, hand(shape="adversarial", delay=0.003, step=1e-5, **aim),
+        rate=500.0, override=True, before=before,
+    )  # fmt: skip
+    touch.tick(600)
+    trace = touch.trace()
+    assert len(trace) == 600
+    assert trace.lost == 0
+    assert_same(trace, body)
+    if name == "stiff block":
+        assert trace.ticks["ledger"][:, 2].max() > 0.0, "damping was added"
+
+
+def test_a_page_drive_with_pauses_and_moved_parameters_is_replayed(tmp_path):
+    """Grabs, releases, a hidden tab, silence, and a slider: a page in the hands of a child."""
+    body = touchable(held.pad())
+    shared = Shared.private()
+    touch = Recorded(tmp_path / "a.trace", body, PageDevice(shared.command), shared)
+    rng = np.random.default_rng(0)
+    for frame in range(60):
+        now = 5.0 + touch.k * touch.loop.period
+        if frame not in range(40, 50):
+            shared.write_command(
+                beat=now, period=0.02, grabbed=frame % 17 > 2, hidden=frame in {25, 26},
+                target=rng.uniform(-0.03, 0.03, 3), parameters=[rng.uniform(-0.02, 0.02), 0.0],
+            )  # fmt: skip
+        touch.tick(15)
+    trace = touch.trace()
+    assert len(np.unique(trace.parameters[:, 0])) > 20
+    assert trace.flag("stalled").any()
+    assert_same(trace, body)
+
+
+class Troubled:
+    """A stroke whose driver fails, loses numbers, presses a clutch and refuses forces now and then."""
+
+    traits = Traits(0.075, 12.0, 0.5, "a test", axes=((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)))
+
+    def __init__(self):
+        self.sample, self.count = Sample(), 0
+        self.sample.holding = True
+
+    def read(self, now):
+        self.count += 1
+        if self.count % 97 == 0:
+            raise DeviceError("unplugged")
+        self.sample.time = now - 1e-3 * (self.count % 3)
+        self.sample.position[:] = 0.03 * np.sin(0.02 * self.count + np.arange(3))
+        self.sample.clutched = 300 < self.count < 340
+        self.sample.holding = self.count % 211 > 10
+        if self.count % 131 == 0:
+            self.sample.position[1] = np.nan
+        return self.sample
+
+    def write(self, force):
+        if self.count % 53 == 0:
+            raise OSError("no room in the pipe")
+
+    def close(self):
+        pass
+
+
+@pytest.mark.parametrize("name", ["beam", "relaxing block"])
+def test_faults_are_replayed_as_they_came(name, tmp_path):
+    body = touchable(BODIES[name]())
+    touch = Recorded(tmp_path / "a.trace", body, Troubled())
+    touch.tick(500)
+    touch.tick(1, jumped=True)
+    touch.tick(100)
+    trace = touch.trace()
+    assert len(np.unique(trace.ticks["fault"])) >= 4
+    assert trace.flag("write_failed").any()
+    assert trace.flag("clutched").any()
+    assert_same(trace, body)
+
+
+def test_every_slot_of_a_sample_is_recorded():
+    """One that the loop learns to heed must be recorded too, or a replay goes its own way."""
+    assert set(Sample.__slots__) == {"position", "time", "patience", "holding", "clutched", "asleep"}
+
+
+def test_another_body_under_the_same_hand_differs_and_says_by_how_much(tmp_path):
+    body = touchable(spring_beam(200.0))
+    touch = Recorded(tmp_path / "a.trace", body, StrokeDevice(StrokeSettings(frequency=2.0)))
+    touch.tick(300)
+    trace = touch.trace()
+    replayed = Replay(trace, touchable(spring_beam(210.0)), same=False).run()
+    assert not replayed.identical
+    force = np.abs(trace.ticks["force"]).max()
+    assert 0.0 < replayed.largest == pytest.approx(0.05 * force, rel=0.1)
+    assert f"{replayed.differing.size} forces differ" in str(replayed)
+    assert replayed.as_dict()["first"] == replayed.differing[0]
+
+
+def test_a_ring_that_nobody_empties_counts_what_it_loses():
+    ring = Ring.private(1000.0)
+    loop = Loop(
+        body := touchable(spring_beam()), StrokeDevice(), Shared.private(), body.workspace(0.075), LIMITS,
+        recorder=TickRecorder(ring),
+    )  # fmt: skip
+    ring.asked[()] = 1
+    loop.recorder.begin(loop)
+    loop.run_for(0.1)
+    assert ring.take()["tick"].tolist() == list(range(1, 101))
+    loop.run_for(1e-3 * (ring.length + 50))
+    rows = ring.take()
+    assert ring.lost == 51
+    assert len(rows) == ring.length - 1
+    assert (np.diff(rows["tick"]) == 1).all()
+
+
+def test_a_torn_tick_waits_for_its_rest():
+    ring = Ring.private()
+    loop = Loop(
+        body := touchable(spring_beam()), StrokeDevice(), Shared.private(), body.workspace(0.075), LIMITS,
+        recorder=TickRecorder(ring),
+    )  # fmt: skip
+    ring.asked[()] = 1
+    loop.recorder.begin(loop)
+    loop.run_for(0.01)
+    whole = ring.slots[7].copy()
+    ring.slots[7, 40] ^= 255
+    assert len(ring.take()) == 7
+    ring.slots[7] = whole
+    assert ring.take()["tick"].tolist() == [8, 9, 10]
+    assert ring.lost == 0

@@ -20,9 +20,12 @@ from palpate.network.kinds import import_when_needed
 from palpate.runtime.devices import device_named
 from palpate.runtime.loop import Loop, rehearsal
 from palpate.runtime.realtime import obtain
+from palpate.runtime.recording import Ring, TickRecorder
+from palpate.runtime.replay import is_recorded_model, loop_facts, play
 from palpate.runtime.safety import Limits
 from palpate.runtime.shared_state import Shared
 from palpate.runtime.touchable import load_touchable
+from palpate.runtime.trace_file import read_trace
 
 __all__ = ["FOREIGN", "main"]
 
@@ -46,6 +49,8 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser("python -m palpate.runtime", description="The 1 kHz loop of palpate.")
     parser.add_argument("model", help="surrogate, a .palpate file")
     parser.add_argument("--state", required=True, help="name of the shared memory")
+    parser.add_argument("--ring", default="", help="name of the ring for recordings")
+    parser.add_argument("--replay", default="", help="recorded touch to go through, instead of a device")
     parser.add_argument("--device", default="page", help="name, or name:key=value,key=value")
     parser.add_argument("--rate", type=float, default=1000.0, help="Hz")
     parser.add_argument("--radius", type=float, required=True, help="workspace, m")
@@ -66,6 +71,15 @@ def _run(options: argparse.Namespace) -> int:
     orphaned = _watch_parent()
     import_when_needed(options.module)
     model = load_touchable(options.model)
+    if options.replay:
+        trace = read_trace(options.replay)
+        play(trace, model, shared, orphaned, same=is_recorded_model(trace, options.model))
+        return 0
+    recorder = None
+    if options.ring:
+        ring = Ring.attach(options.ring)
+        ring.unlink()
+        recorder = TickRecorder(ring)
     device = device_named(options.device, shared.command)
     workspace = model.workspace(options.radius)
     limits = Limits(options.max_force, options.slew)
@@ -79,7 +93,11 @@ def _run(options: argparse.Namespace) -> int:
         stiffness=model.stiffness_max if device.traits.damping is not None else 0.0,
         override=options.unsoftened,
         orphaned=orphaned,
+        recorder=recorder,
     )
+    if recorder is not None:
+        recorder.ring.describe(loop_facts(model, loop, limits))
+        recorder.begin(loop)
     _say({"obtained": obtain()})
     loop.run(rehearsal(model, workspace, limits, options.rate))
     foreign = [name for name in FOREIGN if sys.modules.get(name)]

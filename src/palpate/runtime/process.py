@@ -21,6 +21,8 @@ from palpate.network.kinds import outside_modules
 from palpate.processes import helper_environment
 from palpate.runtime.devices import device_traits
 from palpate.runtime.loop_report import LoopReport
+from palpate.runtime.recorder import TraceRecorder, model_facts
+from palpate.runtime.recording import Ring
 from palpate.runtime.shared_state import Shared, State, now
 
 __all__ = ["LoopProcess"]
@@ -53,6 +55,10 @@ class LoopProcess:
         is touched through a spring that makes it as soft as they bear.
     parameters : (p,) floats
         Values of the inputs that the hand doesn't supply; the middle of their ranges by default.
+    record : path, optional
+        New file that takes every tick from the first on; see `start_recording`.
+    replay : path, optional
+        Recorded touch that is gone through instead of a device, at the pace at which it was recorded.
 
     Raises
     ------
@@ -73,6 +79,8 @@ class LoopProcess:
         slew: float = 0.0,
         unsoftened: bool = False,
         parameters: Sequence[float] = (),
+        record: str | os.PathLike[str] | None = None,
+        replay: str | os.PathLike[str] | None = None,
     ) -> None:
         traits = device_traits(device)
         self.device, self.rate = device, rate
@@ -86,6 +94,11 @@ class LoopProcess:
         self._arguments = [os.fspath(model), *(f"{key}={value}" for key, value in settings.items())]
         if unsoftened:
             self._arguments.append("--unsoftened")
+        if replay is not None:
+            self._arguments.append(f"--replay={os.fspath(replay)}")
+        self._model, self._record = model, record
+        self._ring: Ring | None = None
+        self.recording: TraceRecorder | None = None
         self._parameters = parameters
         self._process: subprocess.Popen[str] | None = None
         self._shared: Shared | None = None
@@ -103,17 +116,56 @@ class LoopProcess:
         DeviceError
             If it doesn't start, with what it said.
         """
-        self._shared = Shared.create()
+        self._shared, self._ring = Shared.create(), Ring.create(self.rate)
         if len(self._parameters):
             self.shared.write_command(parameters=self._parameters)
         self._stderr = tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace")  # noqa: SIM115
         try:
+            if self._record is not None:
+                self.recording = self._recorder(self._record, running=False)
             self._process = self._popen()
             self._await_first_tick()
         except BaseException:
             self.stop()
+            if self.recording is not None:
+                self.recording.discard()
             raise
+        if self.recording is not None:
+            self.recording.start()
         return self
+
+    def start_recording(self, path: str | os.PathLike[str]) -> TraceRecorder:
+        """Record every tick from now on into a new file, until `stop_recording` or `stop`.
+
+        A file that can't be written any more ends the recording and not the loop: see `TraceRecorder.error`.
+
+        Parameters
+        ----------
+        path : path
+            A new file, for example ``touch.trace``.
+
+        Raises
+        ------
+        UsageError
+            If a recording runs already, the file exists, or its folder doesn't.
+        ResourceError
+            If the disk is full or the folder write-protected.
+        """
+        if self.recording is not None and self.recording.active:
+            raise UsageError(f"{self.recording.path} is being recorded.", fix="Stop that recording first.")
+        self.recording = self._recorder(path, running=True)
+        self.recording.start()
+        return self.recording
+
+    def stop_recording(self) -> TraceRecorder | None:
+        """End the recording and return it, None where there was none. Harmless when repeated."""
+        if self.recording is not None:
+            self.recording.stop()
+        return self.recording
+
+    def _recorder(self, path: str | os.PathLike[str], *, running: bool) -> TraceRecorder:
+        header = {"device": self.device, "model": model_facts(self._model)}
+        return TraceRecorder(_started(self._ring), path, header, running=running)
 
     def _popen(self) -> subprocess.Popen[str]:
         modules = (f"--module={name}" for name in outside_modules())
@@ -123,6 +175,7 @@ class LoopProcess:
                     *(sys.executable, "-m", "palpate.runtime"),
                     *self._arguments,
                     f"--state={self.shared.name}",
+                    f"--ring={_started(self._ring).name}",
                     *modules,
                 ],
                 stdin=subprocess.PIPE,
@@ -190,9 +243,13 @@ class LoopProcess:
             self.shared.write_command(quit=True)
             self._end(process)
             self._listen(process)
+        if self.recording is not None:
+            self.recording.stop(lambda: {"report": self.report().as_dict()})
         if self._shared is not None and self._last is None:
             self._last = self._state()
             self._errors = self._complaint()
+            _started(self._ring).unlink()
+            _started(self._ring).close()
             self._stderr.close()
             self._shared.close()
             self._shared.unlink()

@@ -116,6 +116,11 @@ class Publisher:
             self._pace(float(self._time) - self.offset)
         self._block.publish()
 
+    def stay(self, now: float) -> None:
+        """Publish the last record again, as of `now`, s."""
+        self._time[()] = now
+        self._block.publish()
+
     def _changed(self, fault: Fault) -> None:
         self._before = fault
         self._fault[()] = fault

@@ -58,7 +58,8 @@ class TraceRecorder:
     def __init__(
         self, ring: Ring, path: str | os.PathLike[str], header: Mapping[str, Any], *, running: bool = True
     ) -> None:
-        self.path, self.error, self.ticks = Path(path), None, 0
+        self.path, self.ticks = Path(path), 0
+        self.error: PalpateError | None = None
         self._ring, self._running = ring, running
         self._writer = TraceWriter(
             self.path, dict(header) | machine_facts() | {"recorded": datetime.now(UTC).isoformat()}
@@ -73,11 +74,14 @@ class TraceRecorder:
         ring.asked[()] = self._number
         self._thread = threading.Thread(target=self._work, name="palpate-recorder", daemon=True)
 
-    error: PalpateError | None
-
     def start(self) -> None:
         """Begin to write."""
         self._thread.start()
+
+    @property
+    def active(self) -> bool:
+        """True until it is stopped, or stops by itself."""
+        return not self._end.is_set() and self.error is None
 
     @property
     def size(self) -> int:
@@ -120,6 +124,11 @@ class TraceRecorder:
         if self.error is None:
             facts = {"ticks": self.ticks, "lost": self.lost} | dict(end() if end else {})
             self._try(lambda: self._writer.close(facts))
+
+    def discard(self) -> None:
+        """Remove the file of a recording that has not begun."""
+        if not self.ticks:
+            self.path.unlink(missing_ok=True)
 
     def _work(self) -> None:
         waited = 0.0

@@ -108,11 +108,7 @@ class Ring:
         self.name, self._map = name, memory
         view = memoryview(memory)
         counters = np.frombuffer(view[64:_HEAD], np.int64, 8)
-        self.head, self.asked, self.begun = (
-            counters[0:1].reshape(()),
-            counters[1:2].reshape(()),
-            counters[2:3].reshape(()),
-        )
+        self.head, self.asked, self.begun = (counters[k : k + 1].reshape(()) for k in range(3))
         self._sizes = counters[
             3:5
         ]  # bytes of facts and of the snapshot; the latter -1 where there was no room
@@ -197,7 +193,7 @@ class Ring:
         """What the loop remembered as the recording began; None where it was too much to keep."""
         size = int(self._sizes[1])
         # the bytes come from the loop that this process has started itself
-        return None if size < 0 else dict(pickle.loads(bytes(self._snapshot[:size])))  # noqa: S301
+        return None if size < 0 else dict(pickle.loads(bytes(self._snapshot[:size])))
 
     def take(self) -> np.ndarray:
         """Return the ticks (N,) written since the last call; those overwritten meanwhile are counted in `lost`."""
@@ -215,11 +211,7 @@ class Ring:
     def close(self) -> None:
         """Let go of the memory. Harmless when repeated."""
         nothing = np.zeros(8, np.int64)
-        self.head, self.asked, self.begun = (
-            nothing[0:1].reshape(()),
-            nothing[1:2].reshape(()),
-            nothing[2:3].reshape(()),
-        )
+        self.head, self.asked, self.begun = (nothing[k : k + 1].reshape(()) for k in range(3))
         self._sizes, self.slots = nothing[3:5], np.zeros((1, TICK.itemsize), np.uint8)
         self._facts.release()
         self._snapshot.release()

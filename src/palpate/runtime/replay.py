@@ -8,6 +8,9 @@ on and by how much the forces differ.
 
 from __future__ import annotations
 
+import os
+import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -17,16 +20,18 @@ import numpy as np
 from palpate.errors import DeviceError, UsageError
 from palpate.runtime.devices.device import Sample, Traits
 from palpate.runtime.loop import Loop
-from palpate.runtime.recorder import machine_facts
+from palpate.runtime.recorder import machine_facts, model_facts
 from palpate.runtime.recording import FLAGS
 from palpate.runtime.safety import Fault, Limits
-from palpate.runtime.shared_state import Shared
+from palpate.runtime.shared_state import Shared, now
 from palpate.runtime.snapshot import restore
 from palpate.runtime.touchable import Touchable
 from palpate.runtime.trace_file import Trace
 from palpate.runtime.workspace import Workspace
 
-__all__ = ["Replay", "Replayed", "ReplayDevice", "loop_facts"]
+__all__ = ["Replay", "ReplayDevice", "Replayed", "is_recorded_model", "loop_facts", "play"]
+
+_LEAD, _IDLE = 0.2, 0.02  # s before a replay that is looked at begins, and between two looks at its end
 
 _BIT = {name: 1 << k for k, name in enumerate(FLAGS)}
 
@@ -201,9 +206,8 @@ class Replay:
         row = self.device.row = self.trace.ticks[k]
         for i, j in self._columns:
             self._set[i] = row["parameters"][j]
-        if self._set.size and not np.array_equal(
-            self._set, self._commands.command.record["parameters"][: self._set.size]
-        ):
+        known = self._commands.command.record["parameters"][: self._set.size]
+        if not np.array_equal(self._set, known):
             self._commands.write_command(parameters=self._set)
         fault = int(row["fault"])
         self._orphaned = fault == Fault.PARENT_GONE
@@ -302,6 +306,52 @@ class Replayed:
             "largest_difference": self.largest,
             "causes": list(self.causes),
         }
+
+
+def is_recorded_model(trace: Trace, model: str | os.PathLike[str]) -> bool:
+    """Return whether a model's file is the one that was touched, by its checksum."""
+    known = trace.header.get("model", {}).get("sha256")
+    return bool(known) and known == model_facts(model)["sha256"]
+
+
+def play(
+    trace: Trace, model: Touchable, shared: Shared, orphaned: Callable[[], bool], *, same: bool = True
+) -> None:
+    """Go through a recorded touch at the pace at which it was recorded, for those who look at the shared memory.
+
+    At its end nothing is held any more, and the last tick stands until a command ends it.
+
+    Parameters
+    ----------
+    trace : Trace
+        With at least one tick.
+    model : Touchable
+        The body that answers.
+    shared : Shared
+        Where the ticks are published; of its commands only ``quit`` is heard.
+    orphaned : callable
+        Returns whether the process that wanted the replay has ended.
+    same : bool
+        Whether it is the recorded body.
+    """
+    replay = Replay(trace, model, shared, same=same)
+    out, times, start = replay.loop.out, trace.time, now() + _LEAD
+    out.offset = start - float(trace.ticks["time"][0])
+
+    def wanted() -> bool:
+        shared.command.fetch()
+        return not (shared.command.record["quit"] or orphaned())
+
+    for k in range(len(trace)):
+        if (rest := start + float(times[k]) - now()) > 0.0:
+            time.sleep(rest)
+        if not wanted():
+            break
+        replay.tick(k)
+    replay.loop.end()
+    while wanted():
+        out.stay(now())
+        time.sleep(_IDLE)
 
 
 def _axes(rows: Any) -> Any:

@@ -1,9 +1,10 @@
 """All that a loop remembers from one tick to the next, as values by name, so that a replay can begin in its midst.
 
 What a tick depends on besides its inputs is scattered: the body's memory, the ledger and the forces on their way, the
-proxy of the coupling, the ramp of the limits, the offset that a clutch has left, the mean age of the samples. `snapshot`
-walks through the loop's own objects and takes every number and every array that it finds there; `restore` puts them
-into a loop that was made in the same way. A stage that begins to remember something is so saved without a word here.
+proxy of the coupling, the ramp of the limits, the offset that a clutch has left, the mean age of the samples.
+`snapshot` walks through the loop's own objects and takes every number and every array that it finds there; `restore`
+puts them into a loop that was made in the same way. A stage that begins to remember something is so saved without a
+word here.
 
 Left out are the devices, the shared memory, what is frozen, and the constants of compiled kernels.
 """
@@ -138,7 +139,7 @@ def _ours(value: Any) -> bool:
         return False
     return not (
         dataclasses.is_dataclass(value) and kind.__dataclass_params__.frozen
-    ) and kind.__name__ not in {  # type: ignore[attr-defined]
+    ) and kind.__name__ not in {
         "Block",
         "Shared",
     }

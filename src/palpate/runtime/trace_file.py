@@ -307,7 +307,8 @@ def _entries(data: bytes) -> Iterator[tuple[str, bytes, int]]:
 
 def _npz(arrays: Mapping[str, Any]) -> bytes:
     file = io.BytesIO()
-    np.savez_compressed(file, **{name: np.asarray(value) for name, value in arrays.items()})
+    columns: dict[str, Any] = {name: np.asarray(value) for name, value in arrays.items()}
+    np.savez_compressed(file, **columns)
     return file.getvalue()
 
 
@@ -323,14 +324,8 @@ def _fold(ticks: np.ndarray) -> dict[str, np.ndarray]:
     for name in COLUMNS:
         column = np.ascontiguousarray(ticks[name])
         bits = column.tobytes()
-        twin = next(
-            (
-                known
-                for known, other in columns.items()
-                if other.dtype == column.dtype and other.tobytes() == bits
-            ),
-            "",
-        )
+        likely = (known for known, other in columns.items() if other.dtype == column.dtype)
+        twin = next((known for known in likely if columns[known].tobytes() == bits), "")
         if twin:
             same.append((name, twin))
         else:

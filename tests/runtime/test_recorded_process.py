@@ -1,0 +1,149 @@
+"""Recordings of the real process: from its first tick, by a button in its midst, killed, and on a disk that is full."""
+
+from __future__ import annotations
+
+import errno
+import itertools
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from palpate.errors import ResourceError, UsageError
+from palpate.runtime import LoopProcess, now
+from palpate.runtime.replay import Replay, is_recorded_model
+from palpate.runtime.touchable import load_touchable
+from palpate.runtime.trace_file import TraceWriter, read_trace
+
+
+def wait_for(condition, seconds=20.0):
+    until = now() + seconds
+    while not condition():
+        assert now() < until, "waited in vain"
+        time.sleep(0.01)
+
+
+def assert_same(path, model):
+    trace = read_trace(path)
+    assert is_recorded_model(trace, model)
+    replayed = Replay(trace, load_touchable(model)).run()
+    assert replayed.identical, str(replayed)
+    return trace
+
+
+def test_a_run_is_recorded_from_its_first_tick_and_a_button_records_its_midst(spring_file, tmp_path):
+    whole, part = tmp_path / "whole.trace", tmp_path / "part.trace"
+    with LoopProcess(spring_file, device="simulated:frequency=3,delay=0.002", record=whole) as loop:
+        wait_for(lambda: loop.recording.ticks > 300)
+        with pytest.raises(UsageError, match="being recorded"):
+            loop.start_recording(part)
+        loop.stop_recording()
+        loop.start_recording(part).add_event("note", text="by hand")
+        wait_for(lambda: loop.recording.ticks > 300)
+    trace = assert_same(whole, spring_file)
+    assert trace.ticks["tick"][0] == 1
+    assert not trace.notes
+    assert np.abs(trace.ticks["force"]).max() > 0.1
+    trace = assert_same(part, spring_file)
+    assert trace.ticks["tick"][0] > 300
+    assert trace.events[0]["kind"] == "note"
+    assert trace.end["report"]["ticks"] >= trace.ticks["tick"][-1]
+    assert trace.end["lost"] == 0
+    with pytest.raises(UsageError, match="exists already"), LoopProcess(spring_file, record=whole):
+        pass
+
+
+def test_a_replay_is_published_at_its_own_pace(spring_file, tmp_path):
+    path = tmp_path / "a.trace"
+    with LoopProcess(spring_file, device="stroke:frequency=2", record=path) as loop:
+        wait_for(lambda: loop.recording.ticks > 500)
+    trace = read_trace(path)
+    with LoopProcess(spring_file, replay=path) as loop:
+        states = []
+        while not states or states[-1].tick < len(trace) or now() - states[-1].time > 0.2:
+            states.append(loop.read())
+            time.sleep(0.002)
+        loop.shared.write_command(beat=now(), grabbed=True, target=(0.0, -0.03, 0.0))  # unheard
+        wait_for(lambda: not loop.read().force.any())
+    seen = {s.tick: s.force for s in states if s.fault == 0 and s.grabbed}
+    assert len(seen) > 20
+    for tick, force in seen.items():
+        np.testing.assert_array_equal(force, trace.ticks["force"][tick - 1])
+    assert all(abs(b.time - a.time) < 1.0 for a, b in itertools.pairwise(states))
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals are POSIX's")
+def test_a_killed_recorder_loses_less_than_a_second(spring_file, tmp_path):
+    path = tmp_path / "a.trace"
+    script = (
+        "import sys, time; from palpate.runtime import LoopProcess\n"
+        "with LoopProcess(sys.argv[1], device='stroke', record=sys.argv[2]) as loop:\n"
+        "    while True:\n"
+        "        time.sleep(0.05); print(loop.read().tick, flush=True)\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", script, spring_file, path], stdout=subprocess.PIPE, text=True
+    ) as process:
+        last = 0
+        for line in process.stdout:
+            last = int(line)
+            if last > 1500:
+                break
+        process.send_signal(signal.SIGKILL)
+    trace = read_trace(path)
+    assert len(trace) > last - 1000 > 0
+    assert "has no end" in trace.notes[0]
+    assert Replay(trace, load_touchable(spring_file)).run().identical
+
+
+def test_an_unfinished_chunk_is_left_out_with_a_note(spring_file, tmp_path):
+    path = tmp_path / "a.trace"
+    with LoopProcess(spring_file, device="stroke", record=path) as loop:
+        wait_for(lambda: loop.recording.ticks > 700)
+    whole, data = read_trace(path), path.read_bytes()
+    cut = data.index(b"ticks-000002.npz") + 100
+    path.write_bytes(data[:cut])
+    trace = read_trace(path)
+    assert 0 < len(trace) < len(whole)
+    np.testing.assert_array_equal(trace.ticks, whole.ticks[: len(trace)])
+    assert "unfinished chunk" in trace.notes[0]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="limits of a process are POSIX's")
+def test_a_full_disk_ends_the_recording_and_not_the_loop(spring_file, tmp_path):
+    resource = pytest.importorskip("resource")
+    path, limits = tmp_path / "a.trace", resource.getrlimit(resource.RLIMIT_FSIZE)
+    with LoopProcess(spring_file, device="stroke", record=path) as loop:
+        wait_for(lambda: loop.recording.ticks > 300)
+        try:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (loop.recording.size + 1000, limits[1]))
+            wait_for(lambda: loop.recording.error is not None)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        tick = loop.read().tick
+        wait_for(lambda: loop.read().tick > tick + 50)
+        assert not loop.recording.active
+    assert "full" in str(loop.recording.error)
+    trace = read_trace(path)
+    assert len(trace) == loop.recording.ticks > 300
+    assert Replay(trace, load_touchable(spring_file)).run().identical
+
+
+def test_a_folder_that_nobody_may_write_to_is_an_error_before_the_loop(spring_file, tmp_path, monkeypatch):
+    with (
+        pytest.raises(UsageError, match="could not be begun"),
+        LoopProcess(spring_file, record=tmp_path / "no" / "a.trace"),
+    ):
+        pass
+
+    def refuse(*_, **__):
+        raise PermissionError(errno.EROFS, "Read-only file system")
+
+    monkeypatch.setattr(Path, "open", refuse)
+    with pytest.raises(ResourceError, match="could not be begun"):
+        TraceWriter(tmp_path / "a.trace", {})

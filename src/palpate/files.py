@@ -68,7 +68,9 @@ def writing(path: str | os.PathLike[str]) -> Iterator[Path]:
     target = Path(path)
     # its ending stays: it tells some writers the format
     part = target.with_name(f".{target.stem}.{uuid.uuid4().hex[:8]}.part{target.suffix}")
-    _remove_abandoned(target.parent, f".{glob.escape(target.stem)}.{_MARK}.part{glob.escape(target.suffix)}")
+    _remove_abandoned_parts(
+        target.parent, f".{glob.escape(target.stem)}.{_MARK}.part{glob.escape(target.suffix)}"
+    )
     with system_errors(f"Could not write {target}."):
         try:
             if target.is_dir():
@@ -109,7 +111,7 @@ def writing_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
     target = Path(path)
     mark = uuid.uuid4().hex[:8]
     part, old = (target.with_name(f".{target.name}.{mark}.{end}") for end in ("part", "old"))
-    _remove_abandoned(target.parent, f".{glob.escape(target.name)}.{_MARK}.part")
+    _remove_abandoned_parts(target.parent, f".{glob.escape(target.name)}.{_MARK}.part")
     with system_errors(f"Could not write {target}."):
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -131,7 +133,7 @@ def writing_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
                 shutil.rmtree(leftover, ignore_errors=True)
 
 
-def _remove_abandoned(folder: Path, pattern: str) -> None:
+def _remove_abandoned_parts(folder: Path, pattern: str) -> None:
     """Remove what a killed process was writing; what is young may be another one's that writes now."""
     with contextlib.suppress(OSError):
         for part in folder.glob(pattern):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 
 from palpate.units import Range
 
@@ -16,6 +17,7 @@ __all__ = [
     "length",
     "millimetres",
     "number",
+    "numbered",
     "plain",
     "power_of_ten",
     "pressure",
@@ -69,6 +71,12 @@ def bind_units(text: str) -> str:
 def count(number: int, singular: str, plural: str = "") -> str:
     """Write a number of things: 1 unit, 1,255 observations."""
     return f"{number:,} {singular if number == 1 else plural or singular + 's'}"
+
+
+def numbered(singular: str, numbers: Sequence[int], shown: int = 5) -> str:
+    """Write things of one kind by their numbers: line 3, or lines 3, 7, 19; … stands for those beyond `shown`."""
+    listed = ", ".join(str(number) for number in numbers[:shown])
+    return f"{singular}{'s' * (len(numbers) > 1)} {listed}{', …' * (len(numbers) > shown)}"
 
 
 def length(metres: float) -> str:

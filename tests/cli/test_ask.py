@@ -12,7 +12,7 @@ import pytest
 
 import palpate as pp
 from models import spring_beam
-from palpate.dataset.measured import read_measured, write_measured
+from palpate.dataset.measured import read_measurements, write_measurements
 from palpate.learning.correction import correct
 from palpate.learning.plastic.load_histories import LoadHistories, LoadHistory
 from palpate.runtime.touchable import touchable
@@ -182,7 +182,7 @@ def test_histories_of_a_held_body_say_what_they_are(palpate, tmp_path):
 
 def test_what_was_suspicious_of_a_correction_is_told_again(palpate, tmp_path):
     S, X, path = model(), touches(30, 3), tmp_path / "wrong.palpate"
-    measured = read_measured(write_measured(tmp_path / "pushed.csv", X, -S.force(X)))
+    measured = read_measurements(write_measurements(tmp_path / "pushed.csv", X, -S.force(X)))
     correct(Surrogate(S), measured).surrogate.save(path)
     for words in ((), ("--at", text_of(X[0]))):
         assert "Change their sign" in palpate("ask", path, *words).out

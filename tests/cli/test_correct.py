@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from palpate.dataset.measured import write_measured
+from palpate.dataset.measured import write_measurements
 from palpate.learning.correction import force_error
 from palpate.surrogates import Surrogate
 
@@ -58,7 +58,7 @@ def started(folder, *words):
 
 def test_a_file_corrects_a_model(palpate, folder):
     X, F = measured()
-    write_measured(folder / "specimen.csv", X, F)
+    write_measurements(folder / "specimen.csv", X, F)
     answer = palpate(*ordered(folder))
     assert answer.code == 0
     assert follows(folder / "new.touch")
@@ -75,7 +75,7 @@ def test_a_file_corrects_a_model(palpate, folder):
 @pytest.mark.parametrize(("factor", "said"), [(-1.0, "Change their sign"), (1e3, "1e+03 times the model's")])
 def test_forces_that_can_hardly_be_this_bodys_are_a_failure_that_loses_nothing(palpate, folder, factor, said):
     X = touches(30, 3)
-    write_measured(folder / "specimen.csv", X, factor * model().force(X))
+    write_measurements(folder / "specimen.csv", X, factor * model().force(X))
     words = ordered(folder)
     answer = palpate(*words)
     assert answer.code == 1
@@ -92,7 +92,7 @@ def test_forces_that_can_hardly_be_this_bodys_are_a_failure_that_loses_nothing(p
 def test_where_such_forces_teach_nothing_they_are_the_reason(palpate, folder, factor, more, said):
     X = touches(60, 3)
     F = factor * model().force(X) + np.random.default_rng(1).normal(0.0, 3.0, (60, 3))
-    write_measured(folder / "specimen.csv", X, F)
+    write_measurements(folder / "specimen.csv", X, F)
     words = ordered(folder)
     answer = palpate(*words, *more)
     assert answer.code == 2
@@ -103,14 +103,14 @@ def test_where_such_forces_teach_nothing_they_are_the_reason(palpate, folder, fa
 
 def test_a_short_record_says_that_none_of_it_was_left_out(palpate, folder):
     X, F = measured(9)
-    write_measured(folder / "specimen.csv", X, F)
+    write_measurements(folder / "specimen.csv", X, F)
     words = ordered(folder)
     assert "left out  not judged: only files of 10" in palpate(*words).out
 
 
 def test_a_body_with_its_shape_stays_one(palpate, folder):
     X, F = measured()
-    write_measured(folder / "specimen.csv", X, F)
+    write_measurements(folder / "specimen.csv", X, F)
     Surrogate(model()).save(folder / "body.palpate")
     words = ("correct", folder / "body.palpate", "--file", folder / "specimen.csv", "--out")
     assert palpate(*words, folder / "new.palpate").code == 0
@@ -174,7 +174,7 @@ def test_a_family_takes_its_parameters_with_units(palpate, tmp_path):
     Surrogate(S).save(tmp_path / "family.touch")
     X = touches(30, 5, extra=[MODULUS])
     X[:, 3] = 9e3
-    write_measured(tmp_path / "specimen.csv", X[:, :3], scaled(S, 1.3).force(X))
+    write_measurements(tmp_path / "specimen.csv", X[:, :3], scaled(S, 1.3).force(X))
     words = (
         "correct",
         tmp_path / "family.touch",

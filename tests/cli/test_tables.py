@@ -75,7 +75,7 @@ def test_fit_says_what_it_left_out_and_what_it_lacks(palpate, bench, learnt, tmp
     assert [r["name"] for r in content["inputs"]] == ["speed", "depth"]
     for more, said in (
         ((), "exists already"),
-        (("--force", "--missing", "refuse"), "line 43: column 'speed' has no value; so have 1 of 41 rows"),
+        (("--force", "--missing", "refuse"), "line 43: Column 'speed' has no value. 1 of 41 rows has a gap"),
         (("--force", "--missing", "zero"), "leave-out"),
         (("--force", "--inputs", "sped"), "Did you mean 'speed'?"),
         (("--force", "--inputs", "stage"), "line 3: Column 4 (stage) holds 'up'"),
@@ -86,6 +86,21 @@ def test_fit_says_what_it_left_out_and_what_it_lacks(palpate, bench, learnt, tmp
     ):
         answer = palpate(*words, *more)
         assert (answer.code, said in " ".join(answer.err.split())) == (2, True), answer.err
+
+
+@pytest.mark.filterwarnings("ignore::palpate.errors.FitWarning")
+def test_a_wild_row_is_named_by_its_line(palpate, tmp_path):
+    rng = np.random.default_rng(0)
+    x = rng.uniform(-1.0, 1.0, 80)
+    y = np.sin(3.0 * x) + 0.03 * rng.normal(size=80)
+    y[20] += 8.0
+    rows = [f"{a:.6f},{b:.6f}" for a, b in zip(x, y, strict=True)]
+    path = tmp_path / "wild.csv"
+    path.write_text("\n".join(["x [m],F [N]", "0.5,", *rows, ""]), encoding="utf-8")  # a gap shifts the rows
+    answer = palpate("fit", path, "--inputs", "x", "--outputs", "F", "--effort", "0.02", "--json")
+    assert "1 of 80 samples is far from what the others say: line 23. A wrong" in str(
+        json.loads(answer.out)["notes"]
+    )
 
 
 def test_all_rows_of_a_table_are_answered(palpate, learnt, tmp_path):
@@ -100,7 +115,7 @@ def test_all_rows_of_a_table_are_answered(palpate, learnt, tmp_path):
     assert rows[2] == ["3", "", "0.1", "", "", ""]
     assert rows[3][-1] == "no"
     assert "does not ask for: room" in answer.err
-    assert "1 of 3 rows have no answer, a value is missing: line 3" in answer.err
+    assert "1 of 3 rows has no answer, a value is missing: line 3" in answer.err
     out = tmp_path / "out.csv"
     assert palpate("ask", learnt, "--table", new, "-o", out).code == 0
     assert list(csv.reader(io.StringIO(out.read_text()))) == rows

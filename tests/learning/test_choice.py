@@ -7,7 +7,7 @@ import pytest
 
 from palpate.errors import FitWarning, UsageError
 from palpate.learning.arrays.fit import fit
-from palpate.learning.arrays.fit_notes import wild_rows
+from palpate.learning.arrays.fit_notes import wild_note, wild_rows
 from palpate.learning.arrays.held_out import HeldOut, carry, start_units
 from palpate.learning.arrays.members import Crossed, CrossedLayers, clearly_less, refit_weights
 from palpate.learning.ensemble import Ensemble
@@ -297,6 +297,21 @@ def test_near_copies_are_one_place(inputs):
     assert (places == places[0]).all()
     assert len(np.unique(places)) == len(np.unique(near_places(X)))
     assert len(np.unique(near_places(X))) >= 57  # scattered places and grids are no copies
+
+
+def test_wild_samples_are_named_by_their_rows_or_lines():
+    said = wild_note([17], 150)
+    assert said.startswith(
+        "1 of 150 samples is far from what the others say: row 17, counted from 0. A wrong number"
+    )
+    assert said.endswith("check it, or leave it out.")
+    said = wild_note([17, 20], 150, range(5, 155))
+    assert said.startswith(
+        "2 of 150 samples are far from what the others say: lines 22, 25. A wrong number there"
+    )
+    assert said.endswith("check them, or leave them out.")
+    with pytest.raises(UsageError, match="99 lines do not number 100 samples"):
+        fit(np.arange(100.0), np.arange(100.0), lines=range(99))
 
 
 def test_wild_samples_are_told_and_corners_are_not():

@@ -8,24 +8,14 @@ from __future__ import annotations
 import signal
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from palpate.cli.console import Console, advice_in_words
 from palpate.cli.device_commands import devices_app
 from palpate.cli.table_commands import correct, fit
-from palpate.cli.table_options import (
-    DecimalOption,
-    EncodingOption,
-    HeaderOption,
-    Json,
-    LastOption,
-    SeparatorOption,
-    SheetOption,
-    UnitOption,
-    reading_options,
-)
+from palpate.cli.table_options import Json, with_table_options
 from palpate.errors import AccuracyError, PalpateError, UsageError
 from palpate.files import explain_system_error, write_file
 from palpate.processes import CASE_LIMIT, end_by_sigterm
@@ -287,6 +277,7 @@ def show(
 
 
 @app.command()
+@with_table_options
 def ask(
     model: ModelFile,
     at: Annotated[
@@ -302,17 +293,10 @@ def ask(
         Path | None,
         typer.Option("-o", "--out", help="For --table: file for the answers, as CSV. Default: stdout."),
     ] = None,
-    encoding: EncodingOption = None,
-    separator: SeparatorOption = None,
-    decimal: DecimalOption = None,
-    header: HeaderOption = None,
-    last: LastOption = None,
-    sheet: SheetOption = None,
-    unit: UnitOption = None,
+    reading: Any = None,
     as_json: Json = False,
 ) -> None:
     """Print what a model file holds, or its answers at given places or at all rows of a table."""
-    reading = reading_options(encoding, separator, decimal, header, last, sheet, unit)
     if table is None:
         if out is not None or reading:
             raise UsageError("These options are for a table.", fix="Give the table with --table.")

@@ -15,7 +15,7 @@ from palpate.cli.ask_command import answers_at, inputs_of
 from palpate.cli.console import Console
 from palpate.errors import UsageError
 from palpate.files import write_file
-from palpate.format import count
+from palpate.format import count, numbered
 from palpate.learning import Fitted
 from palpate.learning.loading import load
 from palpate.network import Network
@@ -24,8 +24,6 @@ from palpate.tables import Table, read_table
 from palpate.units import Range
 
 __all__ = ["ask_table"]
-
-_SHOWN = 5  # lines that a note names
 
 
 def ask_table(
@@ -106,9 +104,10 @@ def _notes(table: Table, inputs: Sequence[Range], whole: np.ndarray, model: Path
     if others:
         notes.append(f"Columns left out that {model.name} does not ask for: {others}.")
     if not whole.all():
-        lines = ", ".join(map(str, table.lines[~whole][:_SHOWN])) + (", …" if (~whole).sum() > _SHOWN else "")
+        lines = table.lines[~whole].tolist()
+        verb = "has" if len(lines) == 1 else "have"
         notes.append(
-            f"{int((~whole).sum())} of {len(whole)} rows have no answer, a value is missing: line {lines}."
+            f"{len(lines)} of {len(whole)} rows {verb} no answer, a value is missing: {numbered('line', lines)}."
         )
     return notes
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from palpate.cli.console import Console
-from palpate.dataset.measured import Measured, lines_of, listening, measurements, read_measured
+from palpate.dataset.measured import Measurements, lines_of, listening, measurements, read_measurements
 from palpate.errors import AccuracyError, UsageError
 from palpate.learning.correction import (
     Correction,
@@ -106,7 +106,7 @@ def correct_model(
     if not out.absolute().parent.is_dir():  # before anything is measured
         raise UsageError(f"There is no folder for {out}.", fix="Choose a folder that exists.")
     if source.file is not None:
-        measured = read_measured(source.file, missing=source.missing, **(source.options or {}))
+        measured = read_measurements(source.file, missing=source.missing, **(source.options or {}))
         notes = list(measured.notes)
         for note in notes:
             console.say(f"{source.file}: {note}")
@@ -148,7 +148,7 @@ def _streamed(corrector: Corrector, source: Source, console: Console) -> Correct
     return _learnt(corrector, measurements(lines_of(stream, source.stall, ended), answer), console)
 
 
-def _learnt(corrector: Corrector, lines: Iterable[Measured], console: Console) -> Correction:
+def _learnt(corrector: Corrector, lines: Iterable[Measurements], console: Console) -> Correction:
     rows = []
     for i, one in enumerate(lines, 1):
         corrector.observe(one.position[0], one.force[0], along=one.along[0])
@@ -165,7 +165,7 @@ def _learnt(corrector: Corrector, lines: Iterable[Measured], console: Console) -
         np.concatenate([getattr(r, name) for r in rows])
         for name in ("position", "force", "along", "depth", "time")
     )
-    record = Measured(position, force, along, depth, time)
+    record = Measurements(position, force, along, depth, time)
     return summarise_correction(corrector, record)
 
 

@@ -7,12 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from palpate import checks
 from palpate.cli.console import Console
 from palpate.cli.table_options import column_list
-from palpate.errors import FileFormatError, UsageError
+from palpate.errors import UsageError
 from palpate.format import count
 from palpate.learning import fit
 from palpate.learning.automatic import ranges_of
@@ -20,8 +17,6 @@ from palpate.tables import Table, read_table
 from palpate.units import Quantity, Range
 
 __all__ = ["Columns", "fit_table"]
-
-_SHOWN = 5  # lines that a note names
 
 
 @dataclass(frozen=True)
@@ -84,14 +79,13 @@ def fit_table(
         )
     if not out.absolute().parent.is_dir():  # before anything is learnt
         raise UsageError(f"There is no folder for {out}.", fix="Choose a folder that exists.")
-    checks.one_of("What becomes of missing values", columns.missing, ("leave-out", "refuse"))
     table = read_table(path, **reading)
     inputs = _names(table, columns.inputs, "inputs")
     outputs = _names(table, columns.outputs, "outputs")
     if both := [name for name in inputs if name in outputs]:
         raise UsageError(f"Column {both[0]!r} is an input and an output.", fix="Choose one of them.")
     values = table.array([*inputs, *outputs])
-    rows, notes = _rows_without_gaps(table, values, [*inputs, *outputs], columns.missing)
+    rows, notes = table.rows_without_gaps(values, [*inputs, *outputs], columns.missing)
     notes = [*table.notes, *notes]
     for note in notes:
         console.say(f"{path}: {note}")
@@ -100,7 +94,9 @@ def fit_table(
         raise UsageError(f"{path}: no row has all values.", fix="Choose other columns.")
     ranges = [Range(r.name, r.low, r.high, table.si_unit(r.name)) for r in ranges_of(X, inputs)]
     quantities = [Quantity(name, table.si_unit(name)) for name in outputs]
-    model = fit(X, Y[:, 0] if len(outputs) == 1 else Y, ranges, quantities, **search)
+    model = fit(
+        X, Y[:, 0] if len(outputs) == 1 else Y, ranges, quantities, lines=table.lines[rows].tolist(), **search
+    )
     saved = model.save(out)
     content = {
         "model": str(saved),
@@ -128,30 +124,3 @@ def _names(table: Table, texts: Sequence[str], word: str) -> list[str]:
             fix=f"Name each of them once, with commas between: --{word} NAME,NAME.",
         )
     return names
-
-
-def _rows_without_gaps(
-    table: Table, values: np.ndarray, names: Sequence[str], missing: str
-) -> tuple[np.ndarray, list[str]]:
-    """Return which rows (N,) have all values, and a note on the others.
-
-    Raises
-    ------
-    FileFormatError
-        If rows with gaps are to be refused, and there are some.
-    """
-    gaps = np.isnan(values)
-    rows = np.flatnonzero(gaps.any(axis=1))
-    if not rows.size:
-        return np.ones(len(values), dtype=bool), []
-    if missing == "refuse":
-        column = names[int(gaps[rows[0]].argmax())]
-        raise FileFormatError(
-            f"{table.path}, line {table.lines[rows[0]]}: column {column!r} has no value; so have {len(rows)} of "
-            f"{len(values)} rows.",
-            why="Rows with a gap were to be refused.",
-            fix="Correct them, or have them left out: --missing leave-out.",
-        )
-    shown = ", ".join(map(str, table.lines[rows[:_SHOWN]])) + (", …" if len(rows) > _SHOWN else "")
-    note = f"{len(rows)} of {len(values)} rows left out, in which a value is missing: line {shown}."
-    return ~gaps.any(axis=1), [note]

@@ -3,27 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from palpate.cli.console import Console
-from palpate.cli.table_options import (
-    DecimalOption,
-    EncodingOption,
-    HeaderOption,
-    Json,
-    LastOption,
-    MissingOption,
-    SeparatorOption,
-    SheetOption,
-    UnitOption,
-    reading_options,
-)
+from palpate.cli.table_options import Json, MissingOption, with_table_options
 
 __all__ = ["correct", "fit"]
 
 
+@with_table_options
 def fit(
     table: Annotated[Path, typer.Argument(help="Table of samples: text (CSV and its kin) or .xlsx.")],
     inputs: Annotated[
@@ -49,13 +39,7 @@ def fit(
         float, typer.Option(help="Share of unseen samples that the intervals are to hold.")
     ] = 0.9,
     missing: MissingOption = "leave-out",
-    encoding: EncodingOption = None,
-    separator: SeparatorOption = None,
-    decimal: DecimalOption = None,
-    header: HeaderOption = None,
-    last: LastOption = None,
-    sheet: SheetOption = None,
-    unit: UnitOption = None,
+    reading: Any = None,
     as_json: Json = False,
 ) -> None:
     """Learn a network from columns of a table, in SI units, and write it to a model file."""
@@ -66,7 +50,7 @@ def fit(
         Columns(inputs, outputs, missing),
         out,
         Console(as_json),
-        reading=reading_options(encoding, separator, decimal, header, last, sheet, unit),
+        reading=reading,
         force=force,
         effort=effort,
         seconds=seconds,
@@ -76,6 +60,7 @@ def fit(
     )
 
 
+@with_table_options
 def correct(
     model: Annotated[Path, typer.Argument(help="Model file (.palpate) of a body that a probe presses.")],
     out: Annotated[Path, typer.Option(help="File for the corrected model.")],
@@ -139,20 +124,13 @@ def correct(
         ),
     ] = True,
     missing: MissingOption = "leave-out",
-    encoding: EncodingOption = None,
-    separator: SeparatorOption = None,
-    decimal: DecimalOption = None,
-    header: HeaderOption = None,
-    last: LastOption = None,
-    sheet: SheetOption = None,
-    unit: UnitOption = None,
+    reading: Any = None,
     as_json: Json = False,
 ) -> None:
     """Correct a model by forces measured on a specimen, and print the error before and after."""
     from palpate.cli.correct_command import Source, correct_model
     from palpate.learning.correction import Discrepancy, Noise
 
-    reading = reading_options(encoding, separator, decimal, header, last, sheet, unit)
     source = Source(file, stdin, port, stall, wait, token=token, missing=missing, options=reading)
     differs = Discrepancy(constant=constant, varying=varying, offset=offset)
     correct_model(

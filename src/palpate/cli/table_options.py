@@ -2,65 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import functools
+import inspect
+from collections.abc import Callable, Sequence
 from typing import Annotated, Any
 
 import typer
 
 from palpate.errors import UsageError
 
-__all__ = [
-    "DecimalOption",
-    "EncodingOption",
-    "HeaderOption",
-    "Json",
-    "LastOption",
-    "MissingOption",
-    "SeparatorOption",
-    "SheetOption",
-    "UnitOption",
-    "column_list",
-    "reading_options",
-]
+__all__ = ["Json", "MissingOption", "column_list", "with_table_options"]
 
 Json = Annotated[bool, typer.Option("--json", help="Print the results as one JSON object.")]
-EncodingOption = Annotated[
-    str | None,
-    typer.Option("--encoding", help="Encoding of the table, such as latin-1. Default: found from its bytes."),
-]
-SeparatorOption = Annotated[
-    str | None,
-    typer.Option(
-        "--separator", help="Mark between cells: ';', ',', tab or space. Default: found from the rows."
-    ),
-]
-DecimalOption = Annotated[
-    str | None, typer.Option("--decimal", help="Decimal mark: . or , Default: found from the numbers.")
-]
-HeaderOption = Annotated[
-    int | None, typer.Option("--header", min=1, help="Number of the line that names the columns.")
-]
-LastOption = Annotated[int | None, typer.Option("--last", min=1, help="Number of the last line of data.")]
-SheetOption = Annotated[
-    str | None, typer.Option("--sheet", help="Sheet of a workbook (.xlsx). Default: its only one.")
-]
-UnitOption = Annotated[
-    list[str] | None,
-    typer.Option("--unit", help="Unit of a column, NAME=UNIT, such as x=mm. Can be given several times."),
-]
 MissingOption = Annotated[
     str, typer.Option("--missing", help="Rows in which a value is missing: leave-out or refuse.")
 ]
 
 
-def reading_options(
-    encoding: str | None,
-    separator: str | None,
-    decimal: str | None,
-    header: int | None,
-    last: int | None,
-    sheet: str | None,
-    unit: Sequence[str] | None,
+def _reading_options(
+    encoding: Annotated[
+        str | None,
+        typer.Option(help="Encoding of the table, such as latin-1. Default: found from its bytes."),
+    ] = None,
+    separator: Annotated[
+        str | None,
+        typer.Option(help="Mark between cells: ';', ',', tab or space. Default: found from the rows."),
+    ] = None,
+    decimal: Annotated[
+        str | None, typer.Option(help="Decimal mark: . or , Default: found from the numbers.")
+    ] = None,
+    header: Annotated[
+        int | None, typer.Option(min=1, help="Number of the line that names the columns.")
+    ] = None,
+    last: Annotated[int | None, typer.Option(min=1, help="Number of the last line of data.")] = None,
+    sheet: Annotated[
+        str | None, typer.Option(help="Sheet of a workbook (.xlsx). Default: its only one.")
+    ] = None,
+    unit: Annotated[
+        list[str] | None,
+        typer.Option(help="Unit of a column, NAME=UNIT, such as x=mm. Can be given several times."),
+    ] = None,
 ) -> dict[str, Any]:
     """Return the options of `palpate.tables.read_table`, from those of a command.
 
@@ -85,6 +66,32 @@ def reading_options(
         "units": units or None,
     }
     return {name: value for name, value in given.items() if value is not None}
+
+
+def with_table_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Return a command that has the options of how a table is written in place of its parameter `reading`.
+
+    Parameters
+    ----------
+    command : callable
+        Takes, among its other arguments, `reading`: the options of `palpate.tables.read_table` that were given.
+    """
+    options = inspect.signature(_reading_options, eval_str=True).parameters
+    own = inspect.signature(command, eval_str=True).parameters.values()
+    parameters = [
+        parameter
+        for argument in own
+        for parameter in (options.values() if argument.name == "reading" else [argument])
+    ]
+
+    @functools.wraps(command)
+    def run(**arguments: Any) -> None:
+        given = {name: arguments.pop(name) for name in options}
+        command(reading=_reading_options(**given), **arguments)
+
+    run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    return run
 
 
 def column_list(texts: Sequence[str], names: Sequence[str]) -> list[str]:

@@ -193,14 +193,14 @@ class MRANRegressor(RadialRegressor):
         given = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
         with refused_as_bad_value():
             if self.settings is not None:
-                settings = replace(self._named(), **given)
+                settings = replace(self._chosen_settings(), **given)
             else:
                 options = {"target": self.target, "passes": self.passes, "seed": seed, "weights": weights}
                 settings = automatic(X, Y, units.inputs, **options, **given)
             settings.regressors(X.shape[1])  # whether there is such a form for so many inputs
         return settings
 
-    def _named(self) -> Settings:
+    def _chosen_settings(self) -> Settings:
         """The settings given, or those of the preset named."""
         if isinstance(self.settings, Settings):
             return self.settings

@@ -22,7 +22,9 @@ from pathlib import Path
 
 import numpy as np
 
+from palpate import checks
 from palpate.errors import FileFormatError, UsageError
+from palpate.format import numbered
 from palpate.tables.numerals import Numerals
 from palpate.tables.table_layout import (
     Head,
@@ -192,6 +194,44 @@ class Table:
     def si_unit(self, name: str) -> str:
         """Return the SI unit in which `values` states a column; "" where the file states none."""
         return self._si(self.column(name))[2]
+
+    def rows_without_gaps(
+        self, values: np.ndarray, names: Sequence[str], missing: str
+    ) -> tuple[np.ndarray, list[str]]:
+        """Return which rows (N,) have all values, and a note on the others.
+
+        Parameters
+        ----------
+        values : (N, k)
+            Numbers of k columns; a gap is not finite.
+        names : sequence of k str
+            Names of these columns, for messages.
+        missing : str
+            "leave-out" or "refuse" rows with a gap.
+
+        Raises
+        ------
+        UsageError
+            If `missing` is neither of these.
+        FileFormatError
+            If rows with gaps are to be refused, and there are some.
+        """
+        checks.one_of("What becomes of missing values", missing, ("leave-out", "refuse"))
+        whole = np.isfinite(values).all(axis=1)
+        rows = np.flatnonzero(~whole)
+        if not rows.size:
+            return whole, []
+        if missing == "refuse":
+            column = names[int((~np.isfinite(values[rows[0]])).argmax())]
+            raise FileFormatError(
+                f"{self.path}, line {self.lines[rows[0]]}: Column {column!r} has no value. {len(rows)} of "
+                f"{len(whole)} rows {'has' if len(rows) == 1 else 'have'} a gap.",
+                why="Rows with a gap were to be refused.",
+                fix="Correct them, or have them left out: missing='leave-out' (--missing leave-out).",
+            )
+        lines = numbered("line", self.lines[rows].tolist())
+        note = f"{len(rows)} of {len(whole)} rows left out, in which a value is missing: {lines}."
+        return whole, [note]
 
     def with_units(self, units: Mapping[str, str]) -> Table:
         """Return the table with other units of some columns, by name.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from correction_made import RADIUS, model, scaled, touches
 
-from palpate.dataset.measured import Measured
+from palpate.dataset.measured import Measurements
 from palpate.errors import UsageError
 from palpate.learning.correction import Phantom, correct, force_error, probe_positions
 from palpate.surrogates import Surrogate
@@ -14,12 +14,12 @@ from palpate.surrogates import Surrogate
 
 def record(X, F):
     nothing = np.full(len(X), np.nan)
-    return Measured(X, F, np.zeros_like(F), nothing, nothing)
+    return Measurements(X, F, np.zeros_like(F), nothing, nothing)
 
 
 def pressed(place, direction, depths, forces):
     rows = [{"depth": d, "f": f} for d, f in zip(depths, forces, strict=True)]
-    return Measured.of(rows, place=place, direction=direction)
+    return Measurements.of(rows, place=place, direction=direction)
 
 
 def test_depths_are_counted_from_first_touch_along_the_direction():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from correction_made import RADIUS, model
 
-from palpate.dataset.measured import Measured
+from palpate.dataset.measured import Measurements
 from palpate.learning.correction import Phantom, correct
 from palpate.surrogates import Surrogate
 
@@ -38,7 +38,7 @@ def forces(above=0.004):
 
 def record(X, F, along=None):
     along = np.zeros((len(X), 3)) if along is None else along
-    return Measured(X, F, along, np.full(len(X), np.nan), 0.01 * np.arange(len(X)))
+    return Measurements(X, F, along, np.full(len(X), np.nan), 0.01 * np.arange(len(X)))
 
 
 def test_an_offset_is_found_in_air_and_is_no_height():

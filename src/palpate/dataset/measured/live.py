@@ -26,7 +26,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from typing import BinaryIO
 
-from palpate.dataset.measured.measured_columns import Columns, Measured
+from palpate.dataset.measured.measured_columns import Columns, Measurements
 from palpate.errors import UsageError
 
 __all__ = [
@@ -121,7 +121,7 @@ class Connection:
         self._socket.close()
 
 
-def measurements(lines: Iterable[str], answer: Callable[[str], None]) -> Iterator[Measured]:
+def measurements(lines: Iterable[str], answer: Callable[[str], None]) -> Iterator[Measurements]:
     """Yield one measurement for each good line, until the lines end or say so.
 
     Parameters
@@ -153,7 +153,7 @@ def measurements(lines: Iterable[str], answer: Callable[[str], None]) -> Iterato
                 refused_data = True
             answer(f"error line {i}: {error.what} {error.fix}".rstrip())
             continue
-        yield Measured.of([row])
+        yield Measurements.of([row])
 
 
 def greeting(words: list[str]) -> Columns:

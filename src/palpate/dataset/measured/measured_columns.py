@@ -20,7 +20,7 @@ from palpate.errors import UsageError
 from palpate.tables import plain_unit
 from palpate.units import to_si
 
-__all__ = ["NAMES", "Columns", "Measured", "UnitError", "number"]
+__all__ = ["NAMES", "Columns", "Measurements", "UnitError", "number"]
 
 _TIME, _PLACE, _FORCE, _PRESSED = "t", ("x", "y", "z"), ("fx", "fy", "fz"), ("depth", "f")
 NAMES = (_TIME, *_PLACE, *_FORCE, *_PRESSED)
@@ -40,7 +40,7 @@ class UnitError(UsageError):
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class Measurements:
     """N measurements on one specimen.
 
     Attributes
@@ -81,7 +81,7 @@ class Measured:
         *,
         place: Sequence[float] | None = None,
         direction: Sequence[float] = (0.0, 0.0, -1.0),
-    ) -> Measured:
+    ) -> Measurements:
         """Make measurements from rows of values by the name of their column.
 
         Parameters

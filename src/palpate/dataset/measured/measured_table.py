@@ -27,21 +27,22 @@ from typing import Any
 
 import numpy as np
 
-from palpate import checks
-from palpate.dataset.measured.measured_columns import NAMES, Columns, Measured, UnitError
+from palpate.dataset.measured.measured_columns import NAMES, Columns, Measurements, UnitError
 from palpate.errors import FileFormatError, UsageError
 from palpate.files import write_file
 from palpate.format import count
 from palpate.tables import Column, Table, read_table
 
-__all__ = ["read_measured", "write_measured"]
+__all__ = ["read_measurements", "write_measurements"]
 
 _KEYS = {"units", "place", "direction"}
 _MAKE = "Write a head such as `t [s], x [mm], y [mm], z [mm], Fz [N]` and a row of numbers for each touch."
-_SHOWN = 5  # lines or columns that a note names
+_SHOWN = 5  # columns that a note names
 
 
-def read_measured(path: str | os.PathLike[str], *, missing: str = "leave-out", **options: Any) -> Measured:
+def read_measurements(
+    path: str | os.PathLike[str], *, missing: str = "leave-out", **options: Any
+) -> Measurements:
     """Read a table of measured indentation.
 
     Parameters
@@ -56,7 +57,7 @@ def read_measured(path: str | os.PathLike[str], *, missing: str = "leave-out", *
 
     Returns
     -------
-    Measured
+    Measurements
         The measurements; `notes` says what was left out.
 
     Raises
@@ -67,7 +68,6 @@ def read_measured(path: str | os.PathLike[str], *, missing: str = "leave-out", *
         If an option can't be.
     """
     path = Path(path)
-    checks.one_of("What becomes of missing values", missing, ("leave-out", "refuse"))
     table = read_table(path, **options)
     side_path = path.with_suffix(".json")
     side = _sidecar(side_path)
@@ -75,17 +75,17 @@ def read_measured(path: str | os.PathLike[str], *, missing: str = "leave-out", *
     values = np.column_stack(
         [scale * table.numbers(c.name) for c, scale in zip(chosen, columns.scales, strict=True)]
     )
-    good = np.isfinite(values).all(axis=1)
-    notes = (*table.notes, *_further_columns(table, chosen), *_gaps(table, values, columns, missing))
+    good, gaps = table.rows_without_gaps(values, columns.names, missing)
+    notes = (*table.notes, *_further_columns(table, chosen), *gaps)
     rows = [dict(zip(columns.names, row, strict=True)) for row in values[good].tolist()]
     if not rows:
         raise FileFormatError(f"{path} holds a head and no measurement.", why=" ".join(notes), fix=_MAKE)
     where = {key: side[key] for key in ("place", "direction") if key in side}
-    return replace(Measured.of(rows, **where), notes=notes)
+    return replace(Measurements.of(rows, **where), notes=notes)
 
 
-def write_measured(path: str | os.PathLike[str], position: np.ndarray, force: np.ndarray) -> Path:
-    """Write positions (N, 3) in m and forces (N, 3) in N, so that `read_measured` gives them back bit for bit.
+def write_measurements(path: str | os.PathLike[str], position: np.ndarray, force: np.ndarray) -> Path:
+    """Write positions (N, 3) in m and forces (N, 3) in N, so that `read_measurements` gives them back bit for bit.
 
     Raises
     ------
@@ -130,24 +130,6 @@ def _further_columns(table: Table, chosen: list[Column]) -> list[str]:
         return []
     names = ", ".join(others[:_SHOWN]) + (", …" if len(others) > _SHOWN else "")
     return [f"{count(len(others), 'column')} left out: {names}."]
-
-
-def _gaps(table: Table, values: np.ndarray, columns: Columns, missing: str) -> list[str]:
-    """Return a note on rows of values (N, k) in which one is missing, or refuse them."""
-    gaps = ~np.isfinite(values)
-    rows = np.flatnonzero(gaps.any(axis=1))
-    if not rows.size:
-        return []
-    lines = table.lines[rows]
-    if missing == "refuse":
-        raise FileFormatError(
-            f"{table.path}, line {lines[0]}: Column {columns.names[int(gaps[rows[0]].argmax())]} has no value; "
-            f"so have {len(rows)} of {len(gaps)} rows.",
-            why="Rows with a gap were to be refused.",
-            fix="Correct them, or have them left out: missing='leave-out' (--missing).",
-        )
-    shown = ", ".join(map(str, lines[:_SHOWN])) + (", …" if len(lines) > _SHOWN else "")
-    return [f"{len(rows)} of {len(gaps)} rows left out, in which a value is missing: line {shown}."]
 
 
 def _sidecar(path: Path) -> dict[str, Any]:

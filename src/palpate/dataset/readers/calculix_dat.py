@@ -178,7 +178,7 @@ def _collect(path: Path, cases: Sequence[tuple[float, dict[str, _Table]]], notes
         values = np.stack([nothing if table is None else np.array(table.rows) for table in tables])
         if first.local:
             notes.append(f"{name}: its components are along local axes, {first.local}.")
-        if first.title.endswith(" again") and _is_repeated(cases, name):
+        if first.title.endswith(" again") and _is_repetition(cases, name):
             continue
         support = _places_of(first, places)
         unit = "" if first.title in PURE else None
@@ -202,7 +202,7 @@ def _require_like(path: Path, first: _Table, table: _Table) -> None:
         )
 
 
-def _is_repeated(cases: Sequence[tuple[float, dict[str, _Table]]], name: str) -> bool:
+def _is_repetition(cases: Sequence[tuple[float, dict[str, _Table]]], name: str) -> bool:
     plain = name.replace(" again of ", " of ", 1)
     pairs = [(tables.get(plain), tables.get(name)) for _, tables in cases]
     return all(b is None or (a is not None and a.rows == b.rows) for a, b in pairs)

@@ -170,7 +170,7 @@ def chosen_columns(
         )
     if isinstance(entry, Output) and entry.invariant is not None:
         converted = [_von_mises(entry, converted)]
-    reduced = [_reduced(results, entry, column, mapping) for column in converted]
+    reduced = [_reduce(results, entry, column, mapping) for column in converted]
     return [replace(column, values=factor * column.values) for column in reduced], units[0]
 
 
@@ -185,7 +185,7 @@ def _factor(times: float | str) -> tuple[float, str]:
     return to_si(match[1], "") * scale + offset, unit
 
 
-def _reduced(results: Results, entry: Input | Output, column: Column, mapping: ImportMapping) -> Column:
+def _reduce(results: Results, entry: Input | Output, column: Column, mapping: ImportMapping) -> Column:
     """Return a column at the place that is asked for, or reduced over all of them."""
     if not column.places or (entry.at is None and entry.reduce is None):
         return column

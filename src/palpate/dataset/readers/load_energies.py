@@ -61,7 +61,7 @@ def with_energies(
         if len(ranges) == 1 and not weight:
             notes += _disagreement(answers["potential_energy"], inputs[:, 0], moves[:, 0])
     elif len(ranges) == 1 and not weight:
-        potential, note = _integrated(inputs[:, 0], moves[:, 0])
+        potential, note = _integrate_deflection(inputs[:, 0], moves[:, 0])
         if potential is None:
             return fields, answers, [f"No energies: {note}."]
         answers["potential_energy"] = potential
@@ -84,7 +84,7 @@ def with_energies(
 
 def _disagreement(energy: np.ndarray, load: np.ndarray, move: np.ndarray) -> list[str]:
     """Return a warning where an energy and the deflection of the loaded node contradict each other."""
-    integral, _ = _integrated(load, move)
+    integral, _ = _integrate_deflection(load, move)
     if integral is None:
         return []
     error = np.nanmax(np.abs(integral - energy)) / max(np.nanmax(np.abs(energy)), 1e-300)
@@ -96,7 +96,7 @@ def _disagreement(energy: np.ndarray, load: np.ndarray, move: np.ndarray) -> lis
     ]
 
 
-def _integrated(load: np.ndarray, move: np.ndarray) -> tuple[np.ndarray | None, str]:
+def _integrate_deflection(load: np.ndarray, move: np.ndarray) -> tuple[np.ndarray | None, str]:
     """Return −∫ w dP from no load for each case, None where it does not follow, and a sentence."""
     good = np.isfinite(load) & np.isfinite(move)
     P, first = np.unique(load[good], return_index=True)

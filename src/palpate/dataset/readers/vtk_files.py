@@ -145,9 +145,9 @@ def _read_with_pyvista(path: Path) -> _Grid:
         grid: Any = reader.read()
         whole = grid.cast_to_unstructured_grid()
     except (OSError, ValueError, TypeError, RuntimeError, AttributeError) as error:
-        raise _damaged(path, str(error)) from error
+        raise _damage_error(path, str(error)) from error
     if faults or not whole.n_points:
-        raise _damaged(path, faults[0] if faults else "it has no nodes")
+        raise _damage_error(path, faults[0] if faults else "it has no nodes")
     cells = [(_KINDS[kind], nodes) for kind, nodes in whole.cells_dict.items() if kind in _KINDS]
     return _Grid(
         np.asarray(whole.points, dtype=float),
@@ -167,7 +167,7 @@ def _read_with_meshio(path: Path) -> _Grid:
         mesh = vtu.read(path)
     # the kinds of errors that it raises on codings that it doesn't know, and on broken bytes
     except (meshio.ReadError, OSError, ElementTree.ParseError, ValueError, KeyError, AssertionError) as error:
-        raise _damaged(
+        raise _damage_error(
             path, f"{error or 'meshio does not know its coding'}", f"{INSTALL}, or export it again."
         ) from error
     kinds = [(block.type.rstrip("0123456789"), block.data) for block in mesh.cells]
@@ -178,7 +178,7 @@ def _read_with_meshio(path: Path) -> _Grid:
     )
 
 
-def _damaged(path: Path, why: str, fix: str = "") -> FileFormatError:
+def _damage_error(path: Path, why: str, fix: str = "") -> FileFormatError:
     return refuse(
         path, None, "the file can't be read.", why=f"It is damaged, cut short or foreign: {why}.", fix=fix
     )

@@ -39,6 +39,8 @@ class Samples:
         Whether Y came as (N,).
     columns : tuple of str
         Names of the table's columns that are the inputs, in their order; of a bare array those of the inputs.
+    lines : tuple of int, optional
+        Line of the table of each sample, by which notes name it; None where they count the rows from 0.
     """
 
     X: np.ndarray
@@ -47,10 +49,16 @@ class Samples:
     outputs: tuple[Quantity, ...]
     one_output: bool
     columns: tuple[str, ...]
+    lines: tuple[int, ...] | None = None
 
     @classmethod
     def of(
-        cls, X: Any, Y: Any, inputs: Sequence[Range] | None = None, outputs: Sequence[Quantity] | None = None
+        cls,
+        X: Any,
+        Y: Any,
+        inputs: Sequence[Range] | None = None,
+        outputs: Sequence[Quantity] | None = None,
+        lines: Sequence[int] | None = None,
     ) -> Samples:
         """Check what a user has; see `palpate.fit`.
 
@@ -63,13 +71,17 @@ class Samples:
         Y, names = _numbers_and_names("Outputs Y", Y, outputs)
         one = Y.ndim == 1
         X, Y = (a[:, None] if a.ndim == 1 else a for a in (X, Y))
-        columns, names = _named(columns, X, "x"), _named(names, Y, "y")
+        columns, names = _complete_names(columns, X, "x"), _complete_names(names, Y, "y")
         _check_rows(X, Y, columns + names)
         declared = ranges_of(X, columns) if inputs is None else tuple(inputs)
         named = tuple(map(Quantity, names)) if outputs is None else tuple(outputs)
         _check_declared(declared, X.shape[1], Range, "input", 'palpate.Range("force", 0.0, 5.0, "N")')
         _check_declared(named, Y.shape[1], Quantity, "output", 'palpate.Quantity("tip", "m")')
-        return cls(X, Y, declared, named, one, columns)
+        if lines is not None and len(lines) != len(X):
+            raise UsageError(
+                f"{len(lines)} lines do not number {len(X)} samples.", fix="Pass one line for each row of X."
+            )
+        return cls(X, Y, declared, named, one, columns, None if lines is None else tuple(lines))
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,7 +237,7 @@ def _numbers_and_names(
     return numbers_of(what, given), own or tuple(stated)
 
 
-def _named(own: tuple[str, ...], values: np.ndarray, letter: str) -> tuple[str, ...]:
+def _complete_names(own: tuple[str, ...], values: np.ndarray, letter: str) -> tuple[str, ...]:
     """Return a name for each column: the table's own where it has them, else x0, x1 and so on."""
     count = values.shape[-1] if values.ndim == 2 else 0
     return own if len(own) == count else tuple(f"{letter}{i}" for i in range(count))

@@ -218,10 +218,10 @@ class Finish:
         if len(before.coefficients) <= LARGEST:
             G = regressor_root(before, split.X) if root is None else root
             spread = spread_of(before, G, held)
-        evidence = Evidence(self._missed(before.predict(held), split.held), spread)
+        evidence = Evidence(self._errors(before.predict(held), split.held), spread)
         return self._of(Ensemble((network,)), error, evidence, split.held, form, root)
 
-    def crossed(self, crossed: Crossed) -> Fitted:
+    def mean_network(self, crossed: Crossed) -> Fitted:
         """Return the result for the mean of networks learnt crosswise, each judged by what it had not seen."""
 
         def spread(network: Refined, unseen: np.ndarray, X: np.ndarray) -> np.ndarray:
@@ -230,7 +230,7 @@ class Finish:
             return spread_of(network, regressor_root(network, self.problem.X[~unseen]), X)
 
         tested = crossed.tested
-        missed = self._missed(crossed.Y[tested] - crossed.missed, tested)
+        missed = self._errors(crossed.Y[tested] - crossed.missed, tested)
         evidence = Evidence(missed * crossed.gain, crossed.spread(spread))
         return self._of(Ensemble(crossed.networks), crossed.error, evidence, tested, None)
 
@@ -268,14 +268,14 @@ class Finish:
         for other, unseen in crossed.folds:
             held = self.problem.X[unseen]
             spread = kernel_spread(other, held) if small else np.ones(len(held))
-            parts.append(Evidence(self._missed(other.predict(held), unseen), spread))
+            parts.append(Evidence(self._errors(other.predict(held), unseen), spread))
         arrays = (*layer.units(), layer.weights, layer.tail)
         evidence = Evidence.together(parts)
         rows = np.concatenate([np.flatnonzero(unseen) for _, unseen in crossed.folds])
         error = crossed.error if error is None else error
         return self._fitted(arrays, layer.metric.radial, "kernel layer", error, M, evidence, rows)
 
-    def _missed(self, latent: np.ndarray, held: np.ndarray) -> np.ndarray:
+    def _errors(self, latent: np.ndarray, held: np.ndarray) -> np.ndarray:
         """Return errors (N', m) in scaled outputs of latent ones (N', k) at samples of a mask (N,)."""
         wanted = self.problem.scaling.scale_outputs(self.samples.Y[held])
         return np.asarray(wanted - latent @ self.problem.basis)

@@ -75,6 +75,7 @@ def fit(
     seed: int = 0,
     target: float | None = None,
     level: float = 0.9,
+    lines: Sequence[int] | None = None,
 ) -> Fitted:
     """Choose and fit a network from samples alone.
 
@@ -106,6 +107,9 @@ def fit(
         Held-out error relative to the outputs' standard deviation that is good enough.
     level : float
         Share of unseen samples that the intervals are to hold.
+    lines : sequence of N int, optional
+        Line of each sample in the file that it comes from; notes name a sample by it. By default they name its row
+        in X, counted from 0.
 
     Returns
     -------
@@ -133,7 +137,7 @@ def fit(
     began = time.monotonic()
     budget = Budget.of(effort, seconds)
     check_search(seed, target, level)
-    samples = Samples.of(X, Y, inputs, outputs)
+    samples = Samples.of(X, Y, inputs, outputs, lines)
     if seconds is not None:
         # fitting to all samples and freezing come after the search
         budget = Budget(min(budget.effort, seconds / _SECONDS), began + 0.85 * seconds)
@@ -188,7 +192,7 @@ class _Chooser:
         self.ran: list[Candidate] = []
         # for the networks learnt crosswise
         self.reserve = _CROSSED_SHARE * self.total
-        self._finish = partial(Finish, samples, problem, self.trials, began, seed, level, places)
+        self._finish_with = partial(Finish, samples, problem, self.trials, began, seed, level, places)
 
     def chosen(self) -> Fitted:
         tail = self._tail()
@@ -204,10 +208,10 @@ class _Chooser:
         if crossed is None:
             return self._kernel_network(metric, mark) if winner.error > mark else self._single(winner)
         if len(self.X) <= self.centres and crossed.error > self.target:
-            layers = self._likeliest(metric)
+            layers = self._likeliest_layers(metric)
             if not clearly_less(crossed.gain * crossed.missed, layers.missed[crossed.tested]):
-                return self._finished.kernel_network(layers)
-        return self._finished.crossed(crossed)
+                return self._last_stage.kernel_network(layers)
+        return self._last_stage.mean_network(crossed)
 
     def chosen_for_many(self, workers: int) -> Fitted:
         """Return the network whose kind the subset decides, and whose units and weights learn from all rows."""
@@ -224,7 +228,7 @@ class _Chooser:
             deadline=self.deadline,
             trials=self.trials,
         )
-        return rows.fitted(structure, self.scales, self._finished)
+        return rows.fitted(structure, self.scales, self._last_stage)
 
     def _winner(self, mark: float) -> Candidate:
         """Return the best form, radial function and size, refined where the kernel layer is not far ahead."""
@@ -236,8 +240,8 @@ class _Chooser:
         return winner
 
     @property
-    def _finished(self) -> Finish:
-        return self._finish(self.scales if self.known_scales else np.ones(0))
+    def _last_stage(self) -> Finish:
+        return self._finish_with(self.scales if self.known_scales else np.ones(0))
 
     def _run(
         self, candidates: Sequence[Candidate], iterations: int, split: HeldOut, *, record: bool = True
@@ -316,17 +320,17 @@ class _Chooser:
 
     def _kernel_network(self, metric: Metric, error: float) -> Fitted:
         if len(self.X) <= self.centres:
-            return self._finished.kernel_network(self._likeliest(metric))
+            return self._last_stage.kernel_network(self._likeliest_layers(metric))
         some = self._kernel_rows(0.1, len(self.X))
         rows = np.sort(np.random.default_rng(self.seed).permutation(len(self.X))[:some])
         judging = self._kernel_rows(0.03, len(self.split.X))
         test_layer = self._layer(metric, self.split.X[:judging], self.split.Y[:judging])
         layer = self._layer(metric, self.X[rows], self.Y[rows])
-        return self._finished.kernel_network(
+        return self._last_stage.kernel_network(
             CrossedLayers(layer, ((test_layer, self.split.held),), self.X, self.Y), error
         )
 
-    def _likeliest(self, metric: Metric) -> CrossedLayers:
+    def _likeliest_layers(self, metric: Metric) -> CrossedLayers:
         """Return the layers of the best metric for all samples.
 
         A metric found without the samples held out is not as good as one of all, where these are few.
@@ -414,11 +418,11 @@ class _Chooser:
 
     def _finalist(self, winner: Candidate) -> Crossed | None:
         """Return the networks of the best kind, learnt crosswise: the winner's, or a rival's if work allows."""
-        best = self._crossed(winner)
+        best = self._learn_crosswise(winner)
         for rival in self._rivals(winner) if best is not None else ():
             if self.work.left < 1.3 * _ROUNDS * _FOLDS * self._fresh(rival).work(self.split):
                 break
-            other = self._crossed(self._run([rival], rival.iterations, self.split, record=False)[0])
+            other = self._learn_crosswise(self._run([rival], rival.iterations, self.split, record=False)[0])
             if other is not None and best is not None and other.error < best.error:
                 best = other
         return best
@@ -431,7 +435,7 @@ class _Chooser:
                 kinds.setdefault(one.kind, one)
         return [one for kind, one in kinds.items() if kind != winner.kind][:3]
 
-    def _crossed(self, winner: Candidate) -> Crossed | None:
+    def _learn_crosswise(self, winner: Candidate) -> Crossed | None:
         """Return networks of the winner's kind, each learnt without a fold; nothing where the work does not suffice.
 
         Each stops by other samples than those that it is judged by: on a handful the best iterate is there by luck.
@@ -448,7 +452,7 @@ class _Chooser:
         ]
         parts = [HeldOut.of(whole.X, whole.Y, share=self.share, seed=self.seed) for whole in wholes]
         networks, unseen, own = [], [], []
-        candidates = self._refined_afresh(fresh, parts)
+        candidates = self._refine_afresh(fresh, parts)
         for (k, mask), whole, one in zip(masks, wholes, candidates, strict=True):
             if one is not None and one.network is not None:
                 networks.append(refit_weights(one.network, whole.X, whole.Y, RIDGE))
@@ -466,7 +470,7 @@ class _Chooser:
     def _fresh(self, like: Candidate) -> Fresh:
         return Fresh(like, self.scales, self.budget.deadline)
 
-    def _refined_afresh(self, fresh: Fresh, splits: Sequence[HeldOut]) -> list[Candidate | None]:
+    def _refine_afresh(self, fresh: Fresh, splits: Sequence[HeldOut]) -> list[Candidate | None]:
         seeds = [self.seed + k for k in range(1, len(splits) + 1)]
         networks = self.pool.map(fresh.refined, list(zip(splits, seeds, strict=True)))
         for split, one in zip(splits, networks, strict=True):
@@ -476,7 +480,7 @@ class _Chooser:
     def _single(self, one: Candidate, form: str | None = None) -> Fitted:
         assert one.network is not None
         network = refit_weights(one.network, self.X, self.Y, RIDGE)
-        return self._finished.network(network, self.split, one.error, before=one.network, form=form)
+        return self._last_stage.network(network, self.split, one.error, before=one.network, form=form)
 
 
 def _best_of(candidates: Sequence[Candidate]) -> Candidate:

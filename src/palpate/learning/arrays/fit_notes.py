@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from palpate.format import share
+from palpate.format import numbered, share
 
 if TYPE_CHECKING:
     from palpate.learning.arrays.array_samples import ArrayProblem, Samples
     from palpate.learning.arrays.fitted import Fitted
 
-__all__ = ["IDLE", "notes_on", "wild_rows"]
+__all__ = ["IDLE", "notes_on", "wild_note", "wild_rows"]
 
 _NO_BETTER = (
     0.95  # of the outputs' standard deviation: a network that misses so much says no more than their mean
@@ -54,19 +55,27 @@ def notes_on(
             f"The network predicts no better than the outputs' mean: its held-out error is {share(fitted.heldout)} of "
             "their spread. The inputs may not decide the outputs, or too few samples show how."
         )
-    wild = np.sort(rows[wild_rows(missed)])
-    if len(wild):
-        listed = ", ".join(map(str, wild[:_LISTED])) + (", …" if len(wild) > _LISTED else "")
-        notes.append(
-            f"{len(wild)} of {len(samples.X)} samples are far from what the others say: row {listed}. A wrong number "
-            "there spoils the network and widens its intervals: check them, or leave them out."
-        )
+    wild = np.sort(rows[wild_rows(missed)]).tolist()
+    if wild:
+        notes.append(wild_note(wild, len(samples.X), samples.lines))
     notes += _passed_over(samples, problem)
     if len(scales) > 1 and fitted.units and scales.max() > 0:
         idle = [r.name for r, s in zip(samples.inputs, scales, strict=True) if s < _IRRELEVANT * scales.max()]
         if idle:
             notes.append(f"{IDLE} {', '.join(idle)}.")
     return tuple(notes)
+
+
+def wild_note(rows: Sequence[int], count: int, lines: Sequence[int] | None = None) -> str:
+    """Return the note on wild rows of `count` samples, by the lines of their table or by their rows."""
+    verb, them = ("is", "it") if len(rows) == 1 else ("are", "them")
+    where = f"{numbered('row', rows)}, counted from 0"
+    if lines is not None:
+        where = numbered("line", [lines[row] for row in rows])
+    return (
+        f"{len(rows)} of {count} samples {verb} far from what the others say: {where}. A wrong number there spoils "
+        f"the network and widens its intervals: check {them}, or leave {them} out."
+    )
 
 
 def wild_rows(missed: np.ndarray) -> np.ndarray:

@@ -159,7 +159,7 @@ class ManyRows:
 
     def fitted(self, structure: Structure, scales: np.ndarray, finish: Finish) -> Fitted:
         """Return the result for a structure; new units start as wide as scales (n,) say."""
-        best, form = self._moved(structure, scales), None if structure.units.theta.size else "affine"
+        best, form = self._move_units(structure, scales), None if structure.units.theta.size else "affine"
         ridge, error = self._ridge(best)
         if structure.metric is not None and self.target < error and structure.mark < error:
             self.work = self.work.extended(_KERNEL_WORK * self.work.spent, self.deadline)
@@ -169,8 +169,8 @@ class ManyRows:
             if missed < error:
                 best, form, ridge, error = layer, "kernel layer", own_ridge, missed
         first = structure.units.network
-        if first is not None and self._missed(first) < error:  # a limit on time came soon
-            return self._finished(finish, first, first, None, None)
+        if first is not None and self._error(first) < error:  # a limit on time came soon
+            return self._result(finish, first, first, None, None)
         root = moments_root(best.moments, RIDGE)
         before = solve_weights(self.rows.first(best.moments.rows), best.rows, best.moments, ridge)
         judged = self._stream(~np.isin(np.arange(len(self.problem.X)), self.parts.learn))
@@ -178,9 +178,9 @@ class ManyRows:
         after = before
         if best.moments.rows == len(self.rows.X):
             after = solve_weights(whole, best.rows, best.moments + judged.moments(best.rows), ridge)
-        return self._finished(finish, _refined(best, before), _refined(best, after), form, root)
+        return self._result(finish, _refined(best, before), _refined(best, after), form, root)
 
-    def _moved(self, structure: Structure, scales: np.ndarray) -> UnitFit:
+    def _move_units(self, structure: Structure, scales: np.ndarray) -> UnitFit:
         """Return the units after steps on more and more rows, and more units while these bring anything.
 
         Its moments are of all rows to learn from.
@@ -190,12 +190,12 @@ class ManyRows:
         best = project_units(self.rows.first(_FEW), regressors, theta, RIDGE)
         self.pace = (time.monotonic() - began) / (best.moments.rows * best.rows.columns)
         if theta.size:
-            best, error = self._stepped(best, self._missed(best), _HOPELESS * structure.mark)
+            best, error = self._take_steps(best, self._error(best), _HOPELESS * structure.mark)
             for k in range(1, _GROWTHS):
-                larger = self._larger(best, scales, k) if error > self.target else None
+                larger = self._add_units(best, scales, k) if error > self.target else None
                 if larger is None:
                     break
-                new, missed = self._stepped(larger, self._missed(larger))
+                new, missed = self._take_steps(larger, self._error(larger))
                 gained = missed < (1.0 - _NO_GAIN) * error
                 if missed < error:
                     best, error = new, missed
@@ -205,7 +205,7 @@ class ManyRows:
             return best
         return project_units(self.rows, regressors, best.theta, RIDGE)
 
-    def _stepped(self, start: UnitFit, error: float, hopeless: float = math.inf) -> tuple[UnitFit, float]:
+    def _take_steps(self, start: UnitFit, error: float, hopeless: float = math.inf) -> tuple[UnitFit, float]:
         """Return the best fit, and its error, after steps on few rows, then more, then all.
 
         Steps end after the first rows where the error is still above `hopeless`.
@@ -217,7 +217,7 @@ class ManyRows:
             try:
                 for fit in self._steps(best, count, most):
                     self.work.spend(each)
-                    missed = self._missed(fit)
+                    missed = self._error(fit)
                     idle = 0 if missed < (1.0 - _NO_GAIN) * error else idle + 1
                     if missed < error:
                         best, error = fit, missed
@@ -240,7 +240,7 @@ class ManyRows:
             yield fit
         yield from islice(newton_steps(stream, fit), most)
 
-    def _larger(self, fit: UnitFit, scales: np.ndarray, k: int) -> UnitFit | None:
+    def _add_units(self, fit: UnitFit, scales: np.ndarray, k: int) -> UnitFit | None:
         """Return the units and half as many again, refined on what they miss; nothing where no work is left."""
         form, h = fit.regressors.form, max(2, len(fit.theta) // 2)
         count = min(_FEW, len(self.rows.X))
@@ -289,7 +289,7 @@ class ManyRows:
         error, best = min((missed(ridge), ridge) for ridge in _RIDGES)
         return best, error
 
-    def _missed(self, network: UnitFit | Refined) -> float:
+    def _error(self, network: UnitFit | Refined) -> float:
         """Return the error on the rows to decide by, root mean square per latent output."""
         return float(np.sqrt(((network.predict(self.decide[0]) - self.decide[1]) ** 2).mean()))
 
@@ -306,7 +306,7 @@ class ManyRows:
             Trial("many rows", form, fit.regressors.radial, units, error / self.problem.unit, seconds)
         )
 
-    def _finished(
+    def _result(
         self,
         finish: Finish,
         before: Refined,

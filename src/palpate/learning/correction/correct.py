@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.dataset.measured import Measured
+from palpate.dataset.measured import Measurements
 from palpate.errors import UsageError
 from palpate.learning.correction.corrector import Corrector
 from palpate.learning.correction.load_cell import LoadCell, cell_from_air, leave_out_faults
@@ -127,7 +127,7 @@ class Correction:
 
 
 def correct(
-    surrogate: Surrogate, measured: Measured, *, parameters: Sequence[float] = (), **options: Any
+    surrogate: Surrogate, measured: Measurements, *, parameters: Sequence[float] = (), **options: Any
 ) -> Correction:
     """Correct a surrogate by a record of one specimen.
 
@@ -135,8 +135,8 @@ def correct(
     ----------
     surrogate : Surrogate
         A body that is pressed by a probe.
-    measured : Measured
-        Positions or depths of the probe and its forces, as `read_measured` reads them.
+    measured : Measurements
+        Positions or depths of the probe and its forces, as `read_measurements` reads them.
     parameters : sequence of p numbers
         The specimen's further inputs.
     **options
@@ -169,7 +169,7 @@ def correct(
     return summarise_correction(corrector, measured, left_out=left_out, cell=cell)
 
 
-def _sound(corrector: Corrector, measured: Measured) -> bool:
+def _sound(corrector: Corrector, measured: Measurements) -> bool:
     """True where residuals may be asked for an offset: most touches were learnt, by forces that can be this body's."""
     X, force, along = _usable(corrector, measured)
     learnt, out = corrector.counts["learnt"], corrector.counts["outlier"]
@@ -180,7 +180,7 @@ def _sound(corrector: Corrector, measured: Measured) -> bool:
     )
 
 
-def _without_faults(corrector: Corrector, measured: Measured) -> tuple[Measured, LoadCell]:
+def _without_faults(corrector: Corrector, measured: Measurements) -> tuple[Measurements, LoadCell]:
     """The record without faulty readings and without what its load cell reads in air, and that load cell."""
     X = _inputs(corrector.model, measured, corrector.parameters)
     noise = corrector.noise.absolute
@@ -196,7 +196,7 @@ def _without_faults(corrector: Corrector, measured: Measured) -> tuple[Measured,
 
 def summarise_correction(
     corrector: Corrector,
-    measured: Measured,
+    measured: Measurements,
     left_out: ForceError | None = None,
     cell: LoadCell = LoadCell(),  # noqa: B008 - a frozen value
 ) -> Correction:
@@ -206,7 +206,7 @@ def summarise_correction(
     ----------
     corrector : Corrector
         After it has observed them.
-    measured : Measured
+    measured : Measurements
         The measurements, by whose forces the errors before and after are taken.
     left_out : ForceError, optional
         Error of measurements that a correction did not know, where one was computed.
@@ -223,7 +223,7 @@ def summarise_correction(
 
 
 def _summary(
-    corrector: Corrector, measured: Measured, left_out: ForceError | None, cell: LoadCell
+    corrector: Corrector, measured: Measurements, left_out: ForceError | None, cell: LoadCell
 ) -> Correction:
     after = corrector.surrogate
     counts = {verdict: n for verdict, n in corrector.counts.items() if n}
@@ -252,7 +252,7 @@ def _summary(
     return replace(done, surrogate=_warned(after, done.warning)) if done.warning else done
 
 
-def _usable(corrector: Corrector, measured: Measured) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _usable(corrector: Corrector, measured: Measurements) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Inputs (N, n), forces and directions (N, 3) of measurements that are finite."""
     X = _inputs(corrector.model, measured, corrector.parameters)
     usable = np.isfinite(X).all(axis=1) & np.isfinite(measured.force).all(axis=1)
@@ -260,7 +260,7 @@ def _usable(corrector: Corrector, measured: Measured) -> tuple[np.ndarray, np.nd
 
 
 @contextlib.contextmanager
-def _doubted(corrector: Corrector, measured: Measured) -> Iterator[None]:
+def _doubted(corrector: Corrector, measured: Measurements) -> Iterator[None]:
     """Where nothing can be learnt, and sign or unit of the forces look wrong, say that first."""
     try:
         yield
@@ -302,7 +302,7 @@ def _ratio(predicted: np.ndarray, measured: np.ndarray, along: np.ndarray) -> fl
     return float((compared * measured).sum()) / size if size > 0 else np.nan
 
 
-def _left_out(surrogate: Surrogate, measured: Measured, options: Mapping[str, Any]) -> ForceError | None:
+def _left_out(surrogate: Surrogate, measured: Measurements, options: Mapping[str, Any]) -> ForceError | None:
     """Errors of every fifth measurement by a correction from the others."""
     if len(measured) < _FEWEST:
         return None
@@ -318,11 +318,11 @@ def _left_out(surrogate: Surrogate, measured: Measured, options: Mapping[str, An
     return force_error((predicted, depth), X, force, measured.along)
 
 
-def _observed(corrector: Corrector, measured: Measured, which: np.ndarray) -> None:
+def _observed(corrector: Corrector, measured: Measurements, which: np.ndarray) -> None:
     for i in which:
         corrector.observe(measured.position[i], measured.force[i], along=measured.along[i])
 
 
-def _inputs(body: Surrogate | LearntEnergy, measured: Measured, parameters: np.ndarray) -> np.ndarray:
+def _inputs(body: Surrogate | LearntEnergy, measured: Measurements, parameters: np.ndarray) -> np.ndarray:
     further = np.broadcast_to(parameters, (len(measured), len(body.parameters)))
     return np.hstack([measured.position, further])

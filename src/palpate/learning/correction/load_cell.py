@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.dataset.measured import Measured
+from palpate.dataset.measured import Measurements
 from palpate.learning.correction.touches import Touches
 
 __all__ = ["LoadCell", "cell_from_air", "cell_from_residuals", "leave_out_faults"]
@@ -70,7 +70,7 @@ class LoadCell:
         later = np.where(np.isfinite(time), time - self.middle, 0.0)
         return np.asarray(self.offset[None] + np.asarray(later)[:, None] * self.drift)
 
-    def corrected(self, measured: Measured) -> Measured:
+    def corrected(self, measured: Measurements) -> Measurements:
         """Return the record without offset and drift."""
         zero = self.without_load(measured.time)
         single = (measured.along != 0.0).any(axis=1)
@@ -111,7 +111,7 @@ class LoadCell:
         return f"load cell {values} mN without load, by {source}{drift}"
 
 
-def cell_from_air(measured: Measured, air: np.ndarray, noise: float) -> LoadCell | None:
+def cell_from_air(measured: Measurements, air: np.ndarray, noise: float) -> LoadCell | None:
     """Return offset and drift by readings in air, a mask (N,); none where they are too few.
 
     `noise` is the least standard deviation of a component, N.
@@ -160,8 +160,8 @@ def cell_from_residuals(touches: Touches, theta: np.ndarray, largest: float, noi
 
 
 def leave_out_faults(
-    measured: Measured, predicted: np.ndarray, noise: float
-) -> tuple[Measured, tuple[str, ...]]:
+    measured: Measurements, predicted: np.ndarray, noise: float
+) -> tuple[Measurements, tuple[str, ...]]:
     """Return the record without readings that say nothing, and a sentence on each fault.
 
     `predicted` (N, 3) are the model's forces, and `noise` the standard deviation of a component, N.
@@ -199,7 +199,7 @@ def leave_out_faults(
     return replace(measured, force=force), tuple(faults)
 
 
-def _equations(measured: Measured, which: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _equations(measured: Measurements, which: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Rows (K, 3), values (K,) and times (K,) of the components that were measured."""
     rows, values, times = [], [], []
     for i in np.flatnonzero(which):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from palpate.dataset.measured import Measured
+from palpate.dataset.measured import Measurements
 from palpate.errors import UsageError
 from palpate.surrogates import TouchedSurface
 
@@ -13,7 +13,7 @@ __all__ = ["probe_positions"]
 _STEPS, _HALVINGS = 64, 60
 
 
-def probe_positions(measured: Measured, surface: TouchedSurface, radius: float) -> Measured:
+def probe_positions(measured: Measurements, surface: TouchedSurface, radius: float) -> Measurements:
     """Return the record with positions in place of depths.
 
     A depth of 0 is where the rigid probe, moved through the place along the direction, first meets the surface.
@@ -35,7 +35,9 @@ def probe_positions(measured: Measured, surface: TouchedSurface, radius: float) 
         if key not in starts:
             starts[key] = _first_touch(surface, radius, place, direction)
         position[i] = starts[key] + measured.depth[i] * direction
-    return Measured(position, measured.force, measured.along, np.full(len(measured), np.nan), measured.time)
+    return Measurements(
+        position, measured.force, measured.along, np.full(len(measured), np.nan), measured.time
+    )
 
 
 def _first_touch(

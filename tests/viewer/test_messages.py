@@ -23,6 +23,7 @@ from palpate.viewer.messages import (
     Loop,
     Notice,
     RangeInfo,
+    Recording,
     Shown,
     StepInfo,
 )
@@ -63,7 +64,8 @@ HELLO = Hello(
 )
 PRESSED = dataclasses.replace(HELLO, holds=False, line=None, fields=(FIELD,), radius_parameter=1)
 SHOWN = Shown(PROTOCOL, "block", (FIELD,), (StepInfo("sample 3", {"energy": "1 mJ"}),), 0.01)
-WRITTEN = (HELLO, PRESSED, SHOWN, Notice("what", "why", "fix"))
+NEWS = Recording(active=True, file="rod.trace", seconds=3.5, size=4e5, lost=0, problem="")
+WRITTEN = (HELLO, PRESSED, SHOWN, Notice("what", "why", "fix"), NEWS)
 
 
 def sample(message: type[Binary]) -> Binary:

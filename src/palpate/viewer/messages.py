@@ -11,6 +11,8 @@ The conversation, over one websocket at ``/touch``:
    Without heartbeats the loop counts the input as stalled and sends no force. A hidden tab says so.
 4. Only one page holds the hand at a time; `Frame.hold` tells each page where it stands.
 5. Rare events in plain words are `Notice` (JSON).
+6. A page that wants the touch recorded, or no longer, says `RecordWish`; the server tells all pages how it goes,
+   `Recording` (JSON), at each change and once a second.
 
 A body drawn as a line (`Line`) is sent node by node in each frame. Of any other the page asks for the surface once, as
 `Surface` at ``/surface``, and for the modes of each field as `Modes` at ``/fields/N``; a frame carries the coefficients
@@ -49,6 +51,8 @@ __all__ = [
     "Modes",
     "Notice",
     "RangeInfo",
+    "RecordWish",
+    "Recording",
     "Shown",
     "Step",
     "StepInfo",
@@ -56,7 +60,7 @@ __all__ = [
     "Vec3",
 ]
 
-PROTOCOL = 3  # a page of another protocol reloads itself
+PROTOCOL = 4  # a page of another protocol reloads itself
 
 Vec3 = tuple[float, float, float]
 
@@ -201,6 +205,15 @@ class Modes(Binary):
     rest: Annotated[np.ndarray, Wire("floats", "components of each point")]
     modes: Annotated[np.ndarray, Wire("floats", "the same of each mode")]
     touched: Annotated[np.ndarray, Wire("floats", "points that the local mode may move")]
+
+
+@dataclass(frozen=True, eq=False)
+class RecordWish(Binary):
+    """The wish to record the touch, page to server."""
+
+    KIND: ClassVar[int] = 7
+
+    wanted: Annotated[bool, Wire("flag", "start one; otherwise stop it")]
 
 
 @dataclass(frozen=True)
@@ -361,6 +374,32 @@ class Notice(Json):
     what: str
     why: str
     fix: str
+
+
+@dataclass(frozen=True)
+class Recording(Json):
+    """The recording of the touch, server to page.
+
+    Attributes
+    ----------
+    active : bool
+        Whether it runs.
+    file : str
+        Its name in the folder of the server; empty where there was none.
+    seconds, size : float
+        Duration, s, and bytes so far.
+    lost : int
+        Number of ticks that could not be written down in time.
+    problem : str
+        Why it could not begin, or has stopped by itself; otherwise empty.
+    """
+
+    active: bool
+    file: str
+    seconds: float
+    size: float
+    lost: int
+    problem: str
 
 
 if __name__ == "__main__":

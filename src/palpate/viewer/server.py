@@ -13,6 +13,7 @@ import contextlib
 import functools
 import os
 from collections.abc import AsyncIterator, Callable
+from pathlib import Path
 
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
@@ -83,6 +84,10 @@ class Viewer(LocalServer):
         Whether a busy port is an error; otherwise the next free one is taken.
     token : bool
         Whether the page opens only with the token that stands in `url`; without, to every user of this machine.
+    recordings : path
+        Folder for what is recorded by the page's button.
+    replay : path, optional
+        Recorded touch that is gone through, instead of a device.
 
     Attributes
     ----------
@@ -110,6 +115,8 @@ class Viewer(LocalServer):
         max_force: float | None = None,
         strict_port: bool = False,
         token: bool = True,
+        recordings: str | os.PathLike[str] = ".",
+        replay: str | os.PathLike[str] | None = None,
     ) -> None:
         super().__init__(port, host, strict_port=strict_port, token=token)
         self._source = model
@@ -117,7 +124,10 @@ class Viewer(LocalServer):
             self.model = load_touchable(model)
         else:
             self.model = touchable(model)
-        self._loop = functools.partial(LoopProcess, device=device, rate=rate, max_force=max_force)
+        self._loop = functools.partial(
+            LoopProcess, device=device, rate=rate, max_force=max_force, replay=replay
+        )
+        self._recordings = Path(recordings) if replay is None else None
 
     @property
     def caption(self) -> str:
@@ -126,7 +136,7 @@ class Viewer(LocalServer):
 
     def _application(self) -> Starlette:
         self.loop = self._closing.enter_context(self._loop(self._file()))
-        return application(Session(PageModel(self.model), self.loop))
+        return application(Session(PageModel(self.model), self.loop, recordings=self._recordings))
 
     def _file(self) -> str | os.PathLike[str]:
         """Return a file of the model, which the real-time process can read."""
@@ -146,6 +156,8 @@ def serve(
     max_force: float | None = None,
     strict_port: bool = False,
     token: bool = True,
+    recordings: str | os.PathLike[str] = ".",
+    replay: str | os.PathLike[str] | None = None,
     open_browser: bool = False,
     on_ready: Callable[[Viewer], object] | None = None,
 ) -> None:
@@ -172,5 +184,7 @@ def serve(
         max_force=max_force,
         strict_port=strict_port,
         token=token,
+        recordings=recordings,
+        replay=replay,
     )
     wait_until_interrupted(viewer, open_browser=open_browser, on_ready=on_ready)

@@ -14,6 +14,7 @@ import logging
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -24,8 +25,9 @@ from palpate.runtime.loop_report import EDGES
 from palpate.runtime.safety import Fault
 from palpate.runtime.shared_state import Shared, State, now
 from palpate.viewer.hand_lock import Command, HandLock
-from palpate.viewer.messages import Credit, Frame, Hand, Hello, Loop, Notice
+from palpate.viewer.messages import Credit, Frame, Hand, Hello, Loop, Notice, Recording, RecordWish
 from palpate.viewer.page_model import PageModel, vector
+from palpate.viewer.page_recording import PageRecording
 from palpate.viewer.traffic import Bucket, Turns
 
 __all__ = ["LoopLike", "Page", "Session"]
@@ -108,10 +110,16 @@ class Session:
         The real-time process.
     clock : function
         Time in s, for the pages' shares.
+    recordings : path, optional
+        Folder for what pages record; by default nothing is recorded.
     """
 
     def __init__(
-        self, model: PageModel, loop: LoopLike, clock: Callable[[], float] = time.perf_counter
+        self,
+        model: PageModel,
+        loop: LoopLike,
+        clock: Callable[[], float] = time.perf_counter,
+        recordings: Path | None = None,
     ) -> None:
         self.model, self.loop, self._clock = model, loop, clock
         self._lock = HandLock(np.array([(r.low + r.high) / 2 for r in model.body.parameters]))
@@ -119,6 +127,11 @@ class Session:
         self._numbers: Iterator[int] = itertools.count(1)
         self._turns = Turns(SHORTEST, clock)
         self._ended = False
+        self._recording: PageRecording | None = None
+        if recordings is not None:
+            recordable: Any = loop
+            self._recording = PageRecording(recordable, recordings, model.body.name, self._tell_all)
+        self._wishes: set[asyncio.Task[None]] = set()
         self._state = loop.shared.read_state()
 
     async def talk(self, socket: WebSocket) -> None:
@@ -135,6 +148,8 @@ class Session:
             await socket.send_text(self.hello().to_json())
             if self._ended:
                 await socket.send_text(ENDED.to_json())
+            if self._recording is not None and self._recording.latest.active:
+                await socket.send_text(self._recording.latest.to_json())
             sender = asyncio.create_task(self._show(page))
             try:
                 await self._listen(page)
@@ -150,9 +165,12 @@ class Session:
         await asyncio.sleep(GRACE)
         self._ended = True
         logger.error("%s %s", ENDED.what, ENDED.fix)
+        await self._tell_all(ENDED)
+
+    async def _tell_all(self, news: Notice | Recording) -> None:
         for page in list(self._pages.values()):
             with contextlib.suppress(WebSocketDisconnect, RuntimeError):  # RuntimeError: just closed
-                await page.socket.send_text(ENDED.to_json())
+                await page.socket.send_text(news.to_json())
 
     def hello(self) -> Hello:
         """Return the first message to every page."""
@@ -226,10 +244,20 @@ class Session:
         if data[:1] == bytes([Credit.KIND]):
             page.grant(Credit.unpack(data).frames)
             return
+        if data[:1] == bytes([RecordWish.KIND]):
+            self._record(RecordWish.unpack(data).wanted)
+            return
         hand = Hand.unpack(data)
         page.echo = hand.sent
         if (command := self._lock.hear(page.number, hand, now())) is not None:
             self._tell(command)
+
+    def _record(self, wanted: bool) -> None:
+        """Take a page's wish; its messages go on meanwhile."""
+        if self._recording is not None:
+            wish = asyncio.create_task(self._recording.want(wanted))
+            self._wishes.add(wish)
+            wish.add_done_callback(self._wishes.discard)
 
     def _tell(self, command: Command) -> None:
         self.loop.shared.write_command(

@@ -21,8 +21,9 @@ BINARY: tuple[type[Binary], ...] = (
     messages.Surface,
     messages.Step,
     messages.Modes,
+    messages.RecordWish,
 )
-JSON: tuple[type[Json], ...] = (messages.Hello, messages.Notice, messages.Shown)
+JSON: tuple[type[Json], ...] = (messages.Hello, messages.Notice, messages.Recording, messages.Shown)
 RECORDS: tuple[type, ...] = (messages.RangeInfo, messages.FieldInfo, messages.Line, messages.StepInfo)
 ENUMS: tuple[type[IntEnum], ...] = (messages.Loop, messages.Hold)
 

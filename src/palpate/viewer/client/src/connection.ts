@@ -1,7 +1,7 @@
 // The websocket: reconnects by itself, grants credits, keeps only the newest frame.
 
-import { decodeFrame, encodeCredit, encodeHand, isHello, isNotice, PROTOCOL } from "./messages";
-import type { Frame, Hand, Hello, Notice } from "./messages";
+import { decodeFrame, encodeCredit, encodeHand, encodeRecordWish, isHello, isNotice, isRecording, PROTOCOL } from "./messages";
+import type { Frame, Hand, Hello, Notice, Recording } from "./messages";
 
 const CREDITS_AT_START = 2; // one frame on its way while one is drawn
 const FIRST_DELAY = 300; // ms until the first new attempt
@@ -10,6 +10,7 @@ const LONGEST_DELAY = 3000; // ms
 export interface Listener {
   hello(hello: Hello): void;
   notice(notice: Notice): void;
+  recording(recording: Recording): void;
   lost(): void;
 }
 
@@ -29,6 +30,10 @@ export class Connection {
 
   send(hand: Hand): void {
     if (this.connected) this.socket?.send(encodeHand(hand));
+  }
+
+  record(wanted: boolean): void {
+    if (this.connected) this.socket?.send(encodeRecordWish({ wanted }));
   }
 
   /** The newest frame not drawn yet; taking it grants the server as many more as have come. */
@@ -58,6 +63,7 @@ export class Connection {
     }
     const message = JSON.parse(data) as { kind: string };
     if (isNotice(message)) this.listener.notice(message);
+    if (isRecording(message)) this.listener.recording(message);
     if (!isHello(message)) return;
     if (message.protocol !== PROTOCOL) {
       location.reload(); // the server is of another version than this page

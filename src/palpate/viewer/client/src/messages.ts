@@ -6,7 +6,7 @@ import type { Layout } from "./wire";
 
 export type Vec3 = [number, number, number];
 
-export const PROTOCOL = 3;
+export const PROTOCOL = 4;
 
 /** The real-time process as the server sees it. */
 export const Loop = {
@@ -85,6 +85,16 @@ export interface Notice {
   fix: string;
 }
 
+/** The recording of the touch, server to page. */
+export interface Recording {
+  active: boolean;
+  file: string;
+  seconds: number;
+  size: number;
+  lost: number;
+  problem: string;
+}
+
 /** A body to look at, server to page. */
 export interface Shown {
   protocol: number;
@@ -100,6 +110,10 @@ export function isHello(message: { kind: string }): message is Hello & { kind: s
 
 export function isNotice(message: { kind: string }): message is Notice & { kind: string } {
   return message.kind === "Notice";
+}
+
+export function isRecording(message: { kind: string }): message is Recording & { kind: string } {
+  return message.kind === "Recording";
 }
 
 export function isShown(message: { kind: string }): message is Shown & { kind: string } {
@@ -342,3 +356,18 @@ const MODES_LAYOUT: Layout = [
 
 export const encodeModes = (m: Modes): ArrayBuffer => encode(MODES, MODES_LAYOUT, m);
 export const decodeModes = (buffer: ArrayBuffer): Modes => decode<Modes>(MODES_LAYOUT, buffer);
+
+export const RECORDWISH = 7;
+
+/** The wish to record the touch, page to server. */
+export interface RecordWish {
+  /** start one; otherwise stop it */
+  wanted: boolean;
+}
+
+const RECORDWISH_LAYOUT: Layout = [
+  ["wanted", "flag"],
+];
+
+export const encodeRecordWish = (m: RecordWish): ArrayBuffer => encode(RECORDWISH, RECORDWISH_LAYOUT, m);
+export const decodeRecordWish = (buffer: ArrayBuffer): RecordWish => decode<RecordWish>(RECORDWISH_LAYOUT, buffer);

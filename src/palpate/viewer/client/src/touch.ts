@@ -7,6 +7,7 @@ import { describe, say, status, warn } from "./flags";
 import { LineView } from "./line_view";
 import type { Frame, Hello } from "./messages";
 import { Panel } from "./panel";
+import { Recorder } from "./recorder";
 import { mode, watch } from "./skeleton";
 import { element, fixed, worded } from "./units";
 
@@ -23,7 +24,8 @@ export function touch(): void {
   let drawn: Frame | null = null;
   let lastFrame = 0;
 
-  const connection = new Connection({ hello: start, notice: warn, lost });
+  const connection = new Connection({ hello: start, notice: warn, lost, recording: (news) => recorder.show(news) });
+  const recorder = new Recorder((wanted) => connection.record(wanted));
 
   function start(news: Hello): void {
     if (hello && JSON.stringify(hello) !== JSON.stringify(news)) {
@@ -68,6 +70,7 @@ export function touch(): void {
     latest = drawn = null;
     body?.hand.release();
     panel.lost();
+    recorder.lost();
     element("arrow-label").hidden = true;
     status("lost", "disconnected, trying again");
     say("Disconnected from palpate. This page connects again as soon as the server is back.", "bad");

@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -159,9 +160,20 @@ def test_a_simulated_device_says_where_it_listens(palpate):
     answer = palpate("devices", "simulate", "haply", "--port", 0, "--events", 0, "--seconds", 0.1, "--json")
     assert answer.code == 0, answer.err
     assert json.loads(answer.out)["device"].startswith("haply:ws://localhost:")
-    answer = palpate("devices", "simulate", "omega", "--json")
+    assert palpate("devices", "simulate", "omega").code == 2
+
+
+def test_the_double_of_a_library_says_how_it_is_used(palpate, c_compiler, tmp_path):
+    answer = palpate(
+        "devices", "simulate", "forcedimension", "--folder", tmp_path / "new", "--type", "falcon", "--json"
+    )
+    assert answer.code == 0, answer.err
+    content = json.loads(answer.out)
+    assert Path(content["library"]).is_file()
+    assert content["device"] == f"forcedimension:library={content['library']}"
+    answer = palpate("devices", "simulate", "forcedimension", "--folder", tmp_path, "--type", "omega.9")
     assert answer.code == 2
-    assert "Choose haply" in answer.out + answer.err
+    assert "omega.3" in answer.err
 
 
 @pytest.mark.slow

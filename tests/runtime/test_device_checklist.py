@@ -8,8 +8,10 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from library_double import LibraryDouble
 
 from palpate.errors import UsageError
+from palpate.runtime.device_doubles import DOUBLES
 from palpate.runtime.devices import Sample, device_named, device_names, device_traits
 from palpate.runtime.devices.haply_simulator import HaplySimulator, SimulatorSettings
 
@@ -20,19 +22,23 @@ def name(request):
 
 
 @contextlib.contextmanager
-def served(name):
+def served(name, request):
     """The device's address; one of hardware is that of its double."""
-    if name != "haply":
+    if name == "haply":
+        with HaplySimulator(SimulatorSettings(port=0, events=0)) as service:
+            yield f"haply:ws://127.0.0.1:{service.port},events={service.events_port},wait=1"
+    elif name in DOUBLES:
+        library = request.getfixturevalue("double")(name)
+        LibraryDouble(library, manual=1)
+        yield f"{name}:library={library}"
+    else:
         yield name
-        return
-    with HaplySimulator(SimulatorSettings(port=0, events=0)) as service:
-        yield f"haply:ws://127.0.0.1:{service.port},events={service.events_port},wait=1"
 
 
 @pytest.fixture
-def device(name, shared):
+def device(name, shared, request):
     shared.write_command(beat=0.0, grabbed=True, target=(0.0, -0.01, 0.0), period=0.1)
-    with served(name) as address:
+    with served(name, request) as address:
         device = device_named(address, shared.command)
         yield device
         device.close()

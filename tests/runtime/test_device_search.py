@@ -51,12 +51,12 @@ def test_an_empty_machine_has_the_devices_of_this_version(empty):
 @pytest.mark.parametrize(
     ("device", "path", "environment"),
     [
-        ("dhd", "/usr/local/lib/libdrd.so", {}),
-        ("dhd", "/usr/lib/x86_64-linux-gnu/libdhd.so.3", {}),
-        ("dhd", "/home/me/sdk/lib/release/lin-x86_64-gcc/libdrd.so.3", {"FDSDK": "/home/me/sdk"}),
-        ("dhd", "/home/me/odd-name.so", {"PALPATE_DHD": "/home/me/odd-name.so"}),
-        ("dhd", "/home/me/libdhd.so", {"PALPATE_DHD": "/home/me"}),
-        ("dhd", "/a/libdhd.so", {"LD_LIBRARY_PATH": "/nowhere:/a"}),
+        ("forcedimension", "/usr/local/lib/libdrd.so", {}),
+        ("forcedimension", "/usr/lib/x86_64-linux-gnu/libdhd.so.3", {}),
+        ("forcedimension", "/home/me/sdk/lib/release/lin-x86_64-gcc/libdrd.so.3", {"FDSDK": "/home/me/sdk"}),
+        ("forcedimension", "/home/me/odd-name.so", {"PALPATE_DHD": "/home/me/odd-name.so"}),
+        ("forcedimension", "/home/me/libdhd.so", {"PALPATE_DHD": "/home/me"}),
+        ("forcedimension", "/a/libdhd.so", {"LD_LIBRARY_PATH": "/nowhere:/a"}),
         ("hd", "/usr/lib/libHD.so", {}),
         ("hd", "/opt/OpenHaptics/Developer/3.4-0/lib64/libHD.so.3.4", {}),
         ("hd", "/kit/lib/libHD.so", {"OH_SDK_BASE": "/kit"}),
@@ -74,14 +74,14 @@ def test_the_file_that_is_named_wins(empty):
     touch(empty.root, "/usr/lib/libdrd.so")
     named = touch(empty.root, "/mine/libdhd.so")
     surroundings = Surroundings(empty.root, {"PALPATE_DHD": "/mine/libdhd.so"}, "linux", empty.answers)
-    assert entry("dhd").find(surroundings) == named
+    assert entry("forcedimension").find(surroundings) == named
 
 
 def test_windows_has_its_own_names(empty):
     touch(empty.root, "/vendor/dhd64.dll")
     surroundings = Surroundings(empty.root, {"PATH": "/a;/vendor"}, "win32", empty.answers)
-    assert "dhd64.dll" in entry("dhd").look(surroundings).detail
-    assert "absent" in entry("dhd").look(empty).state
+    assert "dhd64.dll" in entry("forcedimension").look(surroundings).detail
+    assert "absent" in entry("forcedimension").look(empty).state
 
 
 @pytest.mark.parametrize(("device", "port"), [("haply", 10001), ("haply", 10000), ("crtk", 9090)])
@@ -115,10 +115,10 @@ def test_a_gamepad_that_can_not_be_read_says_what_to_do(empty):
 
 def test_what_is_driven_is_ready_by_its_name(empty, monkeypatch):
     """A driver that is entered in the table of devices makes its library usable, and is listed once."""
-    monkeypatch.setattr(device_search, "device_names", lambda: ("page", "dhd"))
-    assert "Force Dimension SDK" in entry("dhd").look(empty).remedy
+    monkeypatch.setattr(device_search, "device_names", lambda: ("page", "forcedimension"))
+    assert "Force Dimension SDK" in entry("forcedimension").look(empty).remedy
     touch(empty.root, "/usr/lib/libdrd.so")
-    found = [f for f in search(empty) if f.device == "dhd"]
+    found = [f for f in search(empty) if f.device == "forcedimension"]
     assert [f.state for f in found] == ["ready"]
     assert found[0].remedy == ""
 

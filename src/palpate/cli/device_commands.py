@@ -1,20 +1,19 @@
 """`palpate devices`: what can be touched with on this machine, what was looked for and where, and what to do.
 
-The group lists by default; each further command of devices is a command of this group.
+The group lists by default; each further command of devices is a command of this group. The doubles of devices are in
+`simulate_commands`.
 """
 
 from __future__ import annotations
 
-import contextlib
-import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from palpate.cli.console import Console
+from palpate.cli.simulate_commands import simulate_app
 from palpate.cli.table_options import Json
-from palpate.errors import UsageError
 
 if TYPE_CHECKING:
     from palpate.runtime.device_search import Finding
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["devices_app", "findings_in_words"]
 
 devices_app = typer.Typer(help="Devices for the hand: what is there, and what to do for the others.")
+devices_app.add_typer(simulate_app, name="simulate")
 
 _MARKS = {"ready": "✓", "present": "○", "absent": "·"}
 _STATES = {"ready": "ready", "present": "there, without a driver", "absent": "not there"}
@@ -55,49 +55,3 @@ def findings_in_words(findings: Sequence[Finding]) -> str:
         if f.remedy:
             lines.append(f"    → {f.remedy}")
     return "\n".join(lines)
-
-
-@devices_app.command()
-def simulate(
-    name: Annotated[str, typer.Argument(help="Device to simulate: haply.")],
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the simulation channel.")] = 10001,
-    events: Annotated[int, typer.Option(min=0, max=65535, help="Port of the event channel.")] = 10020,
-    amplitude: Annotated[
-        float, typer.Option(min=-0.1, max=0.1, help="Stroke of the simulated hand, m; downwards first.")
-    ] = 0.03,
-    frequency: Annotated[float, typer.Option(min=0.0, max=5.0, help="Strokes per second, Hz.")] = 0.5,
-    spelling: Annotated[
-        str, typer.Option(help="Spelling of a force that is understood: both, vector or values.")
-    ] = "both",
-    force_scale: Annotated[
-        float, typer.Option(help="Factor by which the service multiplies every force.")
-    ] = 1.0,
-    silence: Annotated[
-        float, typer.Option(min=0.001, help="Seconds without a command until the force lapses.")
-    ] = 0.1,
-    seconds: Annotated[float, typer.Option(min=0.1, help="Duration in seconds. Default: a day.")] = 86400.0,
-    as_json: Json = False,
-) -> None:
-    """Run a simulated device, whose hand moves up and down by itself, until Ctrl-C."""
-    from palpate.runtime.devices.haply_simulator import HaplySimulator, SimulatorSettings
-
-    if name != "haply":
-        raise UsageError(f"There is no simulated device {name!r}.", fix="Choose haply.")
-    settings = SimulatorSettings(
-        port=port,
-        events=events,
-        spellings=("vector", "values") if spelling == "both" else (spelling,),
-        silence=silence,
-        force_scale=force_scale,
-        amplitude=amplitude,
-        frequency=frequency,
-    )
-    console = Console(as_json)
-    with HaplySimulator(settings) as service:
-        device = f"haply:ws://localhost:{service.port},events={service.events_port}"
-        console.say(f"A simulated Haply Inverse3 listens. Next: palpate run MODEL --device {device}")
-        with contextlib.suppress(KeyboardInterrupt):
-            time.sleep(seconds)
-    console.result(
-        f"{service.received} commands were answered.", {"device": device, "commands": service.received}
-    )

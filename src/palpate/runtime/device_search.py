@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Protocol
 
 from palpate.errors import DeviceError
+from palpate.runtime.device_doubles import DOUBLES
 from palpate.runtime.devices import device_names, device_traits
 
 __all__ = [
@@ -176,6 +177,8 @@ class LibrarySearch:
         named = (self.override, *self.variables, *_PATHS.get(surroundings.platform, ()))
         looked_in = (*(f"${v}" for v in named), *self.folders, *_SYSTEM.get(surroundings.platform, ()))
         install = f"Install {self.download} and name its library in the environment variable {self.override}."
+        if self.device in DOUBLES:
+            install += f" Without hardware: palpate devices simulate {self.device}."
         detail = "not found" if path is None else f"found {path}"
         return Finding(
             self.name, "library", state, detail, names, looked_in, _advice(state, driven, install), driven
@@ -301,7 +304,7 @@ HARDWARE: tuple[_Search, ...] = (
     ),
     LibrarySearch(
         name="Force Dimension delta, omega, sigma, lambda; Novint Falcon (DHD)",
-        device="dhd",
+        device="forcedimension",
         files={
             "linux": ("libdrd.so", "libdrd.so.3", "libdhd.so", "libdhd.so.3"),
             "darwin": ("libdrd.dylib", "libdrd.3.dylib", "libdhd.dylib", "libdhd.3.dylib"),

@@ -1,4 +1,4 @@
-"""Haptic devices, one file each, chosen by name: ``page``, ``stroke:amplitude=0.02``, ``simulated`` or ``haply``."""
+"""Haptic devices, one file each, chosen by name: ``page``, ``stroke:amplitude=0.02``, ``haply``."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Protocol
 
 from palpate.errors import UsageError
 from palpate.runtime.devices.device import Device, Sample, Traits
+from palpate.runtime.devices.force_dimension import ForceDimensionDevice
 from palpate.runtime.devices.haply import HaplyDevice
 from palpate.runtime.devices.page import PageDevice
 from palpate.runtime.devices.simulated import SimulatedHand
@@ -27,6 +28,7 @@ _KINDS: dict[str, _Kind] = {
     "stroke": StrokeDevice,
     "simulated": SimulatedHand,
     "haply": HaplyDevice,
+    "forcedimension": ForceDimensionDevice,
 }
 
 

@@ -1,0 +1,109 @@
+"""`palpate devices simulate`: a double of each device, to try it without hardware; one command each.
+
+Doubles of services listen until Ctrl-C. Doubles of the vendors' libraries are compiled into a folder, and the command
+says how to use them.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from palpate.cli.console import Console
+from palpate.cli.table_options import Json
+
+__all__ = ["simulate_app"]
+
+simulate_app = typer.Typer(
+    help="Doubles of devices, whose hand moves up and down by itself, to try them without hardware.",
+    no_args_is_help=True,
+)
+
+Amplitude = Annotated[
+    float, typer.Option(min=-0.1, max=0.1, help="Stroke of the simulated hand, m; downwards first.")
+]
+Frequency = Annotated[float, typer.Option(min=0.0, max=5.0, help="Strokes per second, Hz.")]
+Seconds = Annotated[float, typer.Option(min=0.1, help="Duration in seconds. Default: a day.")]
+Folder = Annotated[Path, typer.Option(help="Folder that the library is put into.")]
+
+
+@simulate_app.command()
+def haply(
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the simulation channel.")] = 10001,
+    events: Annotated[int, typer.Option(min=0, max=65535, help="Port of the event channel.")] = 10020,
+    amplitude: Amplitude = 0.03,
+    frequency: Frequency = 0.5,
+    spelling: Annotated[
+        str, typer.Option(help="Spelling of a force that is understood: both, vector or values.")
+    ] = "both",
+    force_scale: Annotated[
+        float, typer.Option(help="Factor by which the service multiplies every force.")
+    ] = 1.0,
+    silence: Annotated[
+        float, typer.Option(min=0.001, help="Seconds without a command until the force lapses.")
+    ] = 0.1,
+    seconds: Seconds = 86400.0,
+    as_json: Json = False,
+) -> None:
+    """Run a double of the Haply Inverse Service, until Ctrl-C."""
+    from palpate.runtime.devices.haply_simulator import HaplySimulator, SimulatorSettings
+
+    settings = SimulatorSettings(
+        port=port,
+        events=events,
+        spellings=("vector", "values") if spelling == "both" else (spelling,),
+        silence=silence,
+        force_scale=force_scale,
+        amplitude=amplitude,
+        frequency=frequency,
+    )
+    console = Console(as_json)
+    with HaplySimulator(settings) as service:
+        device = f"haply:ws://localhost:{service.port},events={service.events_port}"
+        console.say(f"A simulated Haply Inverse3 listens. Next: palpate run MODEL --device {device}")
+        with contextlib.suppress(KeyboardInterrupt):
+            time.sleep(seconds)
+    console.result(
+        f"{service.received} commands were answered.", {"device": device, "commands": service.received}
+    )
+
+
+@simulate_app.command()
+def forcedimension(
+    folder: Folder = Path("palpate-doubles"),
+    kind: Annotated[
+        str, typer.Option("--type", help="Type of the device, such as omega.3, delta.3, sigma.7 or falcon.")
+    ] = "omega.3",
+    amplitude: Amplitude = 0.03,
+    frequency: Frequency = 0.5,
+    homed: Annotated[bool, typer.Option(help="Whether the device has been homed.")] = True,
+    lost_after: Annotated[
+        int, typer.Option(min=0, help="Force commands after which the cable is pulled; 0 for never.")
+    ] = 0,
+    as_json: Json = False,
+) -> None:
+    """Compile a double of Force Dimension's library, with a device behind it."""
+    from palpate.errors import UsageError
+    from palpate.runtime.devices.force_dimension import TYPES
+
+    numbers = {name: number for number, name in reversed(TYPES.items())}
+    if kind not in numbers:
+        raise UsageError(
+            f"There is no simulated {kind!r}.", fix=f"Choose one of {', '.join(sorted(numbers))}."
+        )
+    definitions = {"TYPE": numbers[kind], "AMPLITUDE": amplitude, "FREQUENCY": frequency}
+    _compile("forcedimension", folder, definitions | {"HOMED": homed, "LOST_AFTER": lost_after}, as_json)
+
+
+def _compile(device: str, folder: Path, definitions: dict[str, float], as_json: bool) -> None:
+    """Compile the double of a library and say how it is used."""
+    from palpate.runtime.device_doubles import compile_double
+
+    library = compile_double(device, folder, {name: float(value) for name, value in definitions.items()})
+    use = f"{device}:library={library}"
+    text = f"The library of a simulated device is {library}. Next: palpate run MODEL --device {use}"
+    Console(as_json).result(text, {"device": use, "library": str(library)})

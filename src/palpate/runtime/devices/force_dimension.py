@@ -1,0 +1,375 @@
+"""Force Dimension delta, omega, sigma and lambda, and the Novint Falcon, through the vendor's library (DHD).
+
+The library is loaded when a device is opened, see `force_dimension_library`. Opening takes these steps: one device
+alone, or the one with the serial number asked for; homing where it needs it and only if asked, since it moves by
+itself; the profile's largest force as the library's own limit; the firmware's watchdog at 20 ms; a hundred positions
+with the brakes on, of which the later half must look right. Brakes and forces wait for the first `write`: until the
+loop runs, nobody would feed the watchdog.
+
+In the loop `read` takes a position and the buttons, and every 5 ms the status. A reading that came too soon for the
+library's time guard is no fresh sample. Forces that the device has turned off by itself are an error with its cause in
+words. After its velocity brake or its watchdog they are turned on again once zero force was asked for half a second;
+after its button or dead-man switch when the user does so; after anything else not before it is opened again.
+
+Only the thread that opened a device uses it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Mapping
+from ctypes import byref, c_double, c_ushort
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from palpate.errors import DeviceError, UsageError
+from palpate.runtime.devices.device import Sample, Traits, settings_from
+from palpate.runtime.devices.force_dimension_library import FORCES_OFF, LOST, DhdLibrary, Status
+from palpate.runtime.devices.profiles import DeviceProfile, device_profile
+from palpate.runtime.shared_state import Block
+
+__all__ = ["AXES", "TYPES", "WATCHDOG", "ForceDimensionDevice", "ForceDimensionSettings"]
+
+# Force Dimension: x towards the user, y right, z up. Here: x right, y up, z towards the user.
+AXES = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
+
+# the library's number of a type: our profile; a .3 of sigma and lambda has the base of its .7
+TYPES = {
+    33: "omega.3", 34: "omega.6", 36: "omega.6", 35: "omega.7", 37: "omega.7", 60: "falcon", 63: "delta.3",
+    104: "sigma.7", 105: "sigma.7", 206: "sigma.7", 108: "lambda.7", 109: "lambda.7", 203: "lambda.7",
+}  # fmt: skip
+_UNKNOWN = "falcon"  # the least of all: a type that is not in the table gets its limits
+
+WATCHDOG = 160  # times 125 µs: 20 ms without a force command, and the firmware turns the forces off
+_DAMPING = 0.5  # N·s/m, assumed
+_DELAY = 0.00025  # s: one exchange at the 4 kHz of the link
+_FIRST, _STEP, _FASTEST = 100, 0.001, 1.0  # samples at the start, s between them, m/s
+_TOLERANCE = 1.01  # of the force limit that is read back
+_LOOK, _REST = 0.005, 0.5  # s between looks at the status; s of zero force before forces come back
+_RETURNING, _BY_THE_USER = frozenset((2, 3)), frozenset((1, 6))  # causes of forces off
+
+
+@dataclass(frozen=True)
+class ForceDimensionSettings:
+    """Settings of the connection.
+
+    Attributes
+    ----------
+    serial : float
+        Serial number of the device; 0 takes the only one.
+    library : str
+        File of the vendor's library; empty looks for it.
+    simulator : float
+        1 lets the vendor's own simulator on this machine count as a device.
+    home : float
+        1 lets a device that needs it home itself: it moves by itself.
+    gravity : float
+        0 turns the compensation of the handle's weight off.
+    mass : float
+        Mass of what is mounted on the handle, kg; negative keeps the device's own value.
+    clutch : float
+        Button, counted from 0, that works as a clutch; -1 for none.
+    """
+
+    serial: float = 0.0
+    library: str = ""
+    simulator: float = 0.0
+    home: float = 0.0
+    gravity: float = 1.0
+    mass: float = -1.0
+    clutch: float = -1.0
+
+    def __post_init__(self) -> None:
+        whole = all(map(float.is_integer, (self.serial, self.clutch)))
+        switches = all(value in {0.0, 1.0} for value in (self.simulator, self.home, self.gravity))
+        if not (
+            whole and switches and 0 <= self.serial <= 65535 and -1 <= self.clutch < 16 and self.mass < 1.0
+        ):
+            raise UsageError(
+                "An option of forcedimension is out of range.",
+                why="serial is 0 … 65535, clutch is a button 0 … 15 or -1, mass is below 1 kg, simulator, home and "
+                "gravity are 0 or 1.",
+                fix="For example forcedimension:serial=4711,home=1.",
+            )
+
+
+class ForceDimensionDevice:
+    """One device behind the vendor's library.
+
+    Attributes
+    ----------
+    traits : Traits
+        Of the opened device: its profile, and where the device states a smaller force, that.
+    profile : DeviceProfile
+        The profile that its type has.
+    name : str
+        Its name and serial number.
+    left_handed : bool
+        Whether it is built for the left hand; its translations have the same axes.
+    watchdog : bool
+        Whether its firmware watches over the force commands.
+    guarded : int
+        Readings that came too soon and repeated old values.
+    saturations : int
+        Forces of which a motor gave less, in the same direction.
+    """
+
+    traits: ClassVar[Traits] = Traits(
+        0.15,
+        20.0,
+        _DAMPING,
+        "before it is opened: delta.3's, the largest; damping: none is published, 0.5 N·s/m is assumed",
+        delay=_DELAY,
+        axes=AXES,
+    )
+
+    def __init__(self, settings: ForceDimensionSettings | None = None) -> None:
+        from palpate.runtime.device_search import load_library
+
+        self._settings = settings = settings or ForceDimensionSettings()
+        self._dhd = DhdLibrary(load_library("forcedimension", settings.library))
+        self.sample = Sample()
+        self.sample.holding = True
+        self.guarded = self.saturations = 0
+        self._x, self._y, self._z = c_double(), c_double(), c_double()
+        self._place = byref(self._x), byref(self._y), byref(self._z)
+        self._status = Status()
+        self._clutch = 1 << int(settings.clutch) if settings.clutch >= 0.0 else 0
+        self._position, self._push = self._dhd.dhdGetPosition, self._dhd.dhdSetForce
+        self._now, self._looked, self._pushed = -math.inf, -math.inf, -math.inf
+        self._on, self._cause = False, -1  # no cause: forces have not been on yet
+        self._closed, self.name = False, "The Force Dimension device"
+        self._id = self._connect()
+        try:
+            self._identify()
+            self._home()
+            self._limit()
+            self._check_start()
+        except BaseException:
+            self.close()
+            raise
+
+    @classmethod
+    def open(cls, commands: Block, options: Mapping[str, str]) -> ForceDimensionDevice:
+        """Open from texts such as ``{"serial": "4711"}``."""
+        return cls(settings_from(ForceDimensionSettings, options))
+
+    def read(self, now: float) -> Sample:
+        """Return position and buttons; one that came too soon for the time guard keeps the sample's time."""
+        self._check_open()
+        self._now, sample = now, self.sample
+        if now - self._looked >= _LOOK:
+            self._looked = -math.inf  # what it complains of is looked at again in the next tick
+            self._look()
+            self._looked = now
+        code = self._position(*self._place, self._id)
+        if code == 0:
+            position = sample.position
+            position[0], position[1], position[2] = self._x.value, self._y.value, self._z.value
+            sample.time = now
+        elif code == 1:
+            self.guarded += 1
+        else:
+            raise self._failure("tells no position", code)
+        mask = self._dhd.dhdGetButtonMask(self._id)
+        sample.clutched = bool(mask & self._clutch)
+        return sample
+
+    def write(self, force: np.ndarray) -> None:
+        """Push with a force (3,), N; forces that are off are turned on first where that is due."""
+        self._check_open()
+        x, y, z = force.tolist()
+        norm = math.hypot(x, y, z)
+        if not math.isfinite(norm):
+            raise DeviceError("A force that is not a finite number was kept from the Force Dimension device.")
+        if norm > 0.0:
+            self._pushed = self._now
+        if not self._on:
+            self._turn_on()
+            x = y = z = 0.0
+        code = self._push(x, y, z, self._id)
+        if code == 2:
+            self.saturations += 1
+        elif code != 0:
+            raise self._failure("takes no force", code)
+
+    def close(self) -> None:
+        """Zero force, forces off, brakes on, then let go."""
+        if self._closed:
+            return
+        self._closed = True
+        with contextlib.suppress(DeviceError):  # a device that is gone pushes no more
+            self._dhd.call("dhdSetForce", 0.0, 0.0, 0.0, self._id)
+        for last in ("dhdStop", "dhdClose"):
+            with contextlib.suppress(DeviceError):
+                self._dhd.call(last, self._id)
+
+    def _look(self) -> None:
+        """Read the status, and stop at what the device says of itself."""
+        status = self._status
+        code = self._dhd.dhdGetStatus(status.values, self._id)
+        if code != 0:
+            raise self._failure("tells no status", code)
+        if not status.powered:
+            raise DeviceError(f"{self.name} has no power.", fix="Plug in its supply and switch it on.")
+        if status.forces:
+            self._on, self._cause = True, 0
+        elif self._on or self._cause >= 0:
+            if self._on:
+                self._on, self._cause, self._pushed = False, status.cause, self._now
+            raise DeviceError(
+                f"{self.name} has turned its forces off: {FORCES_OFF.get(self._cause, 'unknown cause')}.",
+                fix=_remedy(self._cause),
+            )
+
+    def _turn_on(self) -> None:
+        """Turn the forces on: at first, and after causes that pass by themselves, at rest of the force."""
+        first, rested = self._cause < 0, self._now - self._pushed >= _REST
+        if not (first or (rested and self._cause in _RETURNING)):
+            return
+        dhd, device = self._dhd, self._id
+        dhd.call("dhdSetBrakes", False, device, optional=True)
+        dhd.call("dhdEnableForce", True, device)
+        dhd.call("dhdSetGravityCompensation", self._settings.gravity == 1.0, device, optional=True)
+        self._on, self._cause = True, 0
+
+    def _failure(self, what: str, code: int) -> DeviceError:
+        number, words = self._dhd.last_error()
+        if code != -1:
+            words = f"it returned {code}, which is no code of its own"
+        fix = "Check cable and power, then start again." if number in LOST else "Start again."
+        return DeviceError(f"{self.name} {what}.", why=f"{words} (error {number})", fix=fix)
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise DeviceError("The Force Dimension device is closed.", fix="Open it again.")
+
+    def _connect(self) -> int:
+        dhd, serial = self._dhd, int(self._settings.serial)
+        if self._settings.simulator:
+            if not dhd.has("dhdEnableSimulator"):
+                raise DeviceError(
+                    "This library can't reach the vendor's simulator.",
+                    fix="Install the Force Dimension SDK, 3.16 or later, or leave simulator=1 out.",
+                )
+            dhd.dhdEnableSimulator(True)
+        count = dhd.dhdGetDeviceCount()
+        if count > 1 and not serial:
+            raise DeviceError(
+                f"There are {count} Force Dimension devices.", fix="Name one: forcedimension:serial=NUMBER."
+            )
+        device = dhd.dhdOpenSerial(serial) if serial else dhd.dhdOpen()
+        if device < 0:
+            number, words = dhd.last_error()
+            raise DeviceError(
+                f"Force Dimension device {serial} can't be opened."
+                if serial
+                else "No Force Dimension device can be opened.",
+                why=f"{words} (error {number}); the library counts {max(0, count)} devices.",
+                fix="Connect it and switch it on, close other programs that use it; on Linux its USB port must be "
+                "open to you (a udev rule, see the vendor's manual).",
+            )
+        return int(device)
+
+    def _identify(self) -> None:
+        """Find out which device it is, and what it may do."""
+        dhd, device = self._dhd, self._id
+        kind, called, serial = dhd.dhdGetSystemType(device), dhd.dhdGetSystemName(device), c_ushort()
+        numbered = dhd.dhdGetSerialNumber(byref(serial), device) == 0
+        called = called.decode("utf-8", "replace") if called else f"type {kind}"
+        self.name = f"Force Dimension {called}" + (f" {serial.value}" if numbered else "")
+        self.left_handed = bool(dhd.dhdIsLeftHanded(device))
+        self.profile: DeviceProfile = device_profile(TYPES.get(kind, _UNKNOWN))
+        own = float(dhd.dhdGetMaxForce(device))  # negative: no limit of its own
+        force = min(self.profile.max_force, own) if own >= 0.0 else self.profile.max_force
+        if not force > 0.0:
+            raise DeviceError(
+                f"{self.name} allows no force.", fix="Raise its limit in the vendor's own program."
+            )
+        known = kind in TYPES
+        self.traits = Traits(  # type: ignore[misc]  # a device's word goes before that of its kind
+            self.profile.radius,
+            force,
+            _DAMPING,
+            f"{'the profile' if known else 'an unknown type, so the profile'} of {self.profile.name}"
+            f"{'; force: the device itself' if force < self.profile.max_force else ''}; damping: none is published, "
+            f"{_DAMPING:g} N·s/m is assumed",
+            delay=_DELAY,
+            axes=AXES,
+        )
+
+    def _home(self) -> None:
+        """Refuse a device whose encoders count from anywhere, or let it home itself where that was asked for."""
+        dhd, device = self._dhd, self._id
+        if not dhd.has("drdIsInitialized"):
+            dhd.call("dhdGetStatus", self._status.values, device)
+            if not self._status.homed:
+                raise DeviceError(
+                    f"{self.name} has not been homed: its positions are wrong.",
+                    fix="Home it with the vendor's own program, or use libdrd instead of libdhd.",
+                )
+            return
+        if dhd.drdOpenID(device) < 0:
+            raise self._failure("is not taken by the vendor's DRD", -1)
+        if dhd.drdIsInitialized(device):
+            return
+        if not self._settings.home:
+            raise DeviceError(
+                f"{self.name} has not been homed: its positions are wrong.",
+                fix="Clear its way and give forcedimension:home=1: it then moves by itself. Or use the vendor's own "
+                "program.",
+            )
+        dhd.call("drdAutoInit", device)
+        if dhd.drdIsRunning(device):
+            dhd.call("drdStop", False, device)
+        if not dhd.drdIsInitialized(device):
+            raise DeviceError(f"{self.name} could not be homed.", fix="Use the vendor's own program.")
+
+    def _limit(self) -> None:
+        """Give library and firmware their limits, and see that they are taken."""
+        dhd, device, force = self._dhd, self._id, self.traits.max_force
+        dhd.call("dhdSetMaxForce", force, device)
+        taken = float(dhd.dhdGetMaxForce(device))
+        if not 0.0 <= taken <= _TOLERANCE * force:
+            raise DeviceError(
+                f"{self.name} doesn't take a limit of {force:g} N.", why=f"It answers {taken:g} N.",
+                fix="Install the Force Dimension SDK, 3.16 or later.",
+            )  # fmt: skip
+        dhd.call("dhdEnableExpertMode")
+        self.watchdog = dhd.call("dhdSetWatchdog", WATCHDOG, device, optional=True)
+        if self._settings.mass >= 0.0:
+            dhd.call("dhdSetEffectorMass", self._settings.mass, device)
+
+    def _check_start(self) -> None:
+        """Read positions for a tenth of a second, brakes on; of the later half each must look right."""
+        before: tuple[float, ...] | None = None
+        for k in range(_FIRST):
+            self._dhd.dhdSleep(_STEP)
+            code = self._position(*self._place, self._id)
+            if code not in {0, 1}:
+                raise self._failure("tells no position", code)
+            place = self._x.value, self._y.value, self._z.value
+            if code == 1 or k < _FIRST // 2:  # several devices deliver garbage at first
+                continue
+            speed = math.dist(place, before) / _STEP if before else 0.0
+            before = place
+            if not (math.hypot(*place) <= 2.0 * self.traits.radius and speed <= _FASTEST):
+                raise DeviceError(
+                    f"{self.name} starts at {', '.join(f'{x:.3g}' for x in place)} m with {speed:.3g} m/s.",
+                    why=f"A start is within {2.0 * self.traits.radius:g} m of the centre and below {_FASTEST:g} m/s.",
+                    fix="Home it, and hold it still while it is opened.",
+                )
+        if before is None:
+            raise DeviceError(f"{self.name} repeats old positions.", fix="Connect it to another USB port.")
+        self.sample.position[:] = before
+
+
+def _remedy(cause: int) -> str:
+    if cause in _RETURNING:
+        return "Hold it still: its forces return by themselves."
+    if cause in _BY_THE_USER:
+        return "Press its force button, or hold its dead-man switch."
+    return "Check cable and power, then start again."

@@ -10,7 +10,7 @@ import trimesh
 
 from palpate.errors import SolverError, UsageError
 from palpate.physics import Body, ImportedSolid, NeoHookean, SurfaceTraction, apart
-from palpate.physics.shapes import stl_file
+from palpate.physics.shapes import surface_checks
 
 
 @pytest.fixture
@@ -38,7 +38,7 @@ def test_shells_apart_are_no_fault(tmp_path, offset):
 
 
 def test_a_crash_of_the_mesher_is_an_error_here(stacked, monkeypatch):
-    monkeypatch.setattr(stl_file, "_contact", lambda surface: None)
+    monkeypatch.setattr(surface_checks, "_contact", lambda surface: None)
     with pytest.raises(SolverError, match="SIGABRT") as caught:
         stacked.mesh()
     assert caught.value.exit_code == 3

@@ -2,7 +2,8 @@
 
 block       Block, LayeredBlock        cylinder    Cylinder, Tube
 dome        Dome, Inclusion            organ       Organ
-solid_file  a body from a STEP or STL file; stl_file reads, checks and fills closed surfaces
+solid_file  a body from a STEP or STL file; stl_file reads and fills closed surfaces, stl_text knows its forms,
+            surface_repair mends small faults of exports, surface_checks refuses what bounds no body
 mesh_file   a body from a volume mesh
 body_file   files of bodies: unit, content, names for parts of their surface
 shape       what every shape offers, and its rotations and reflections

@@ -21,7 +21,9 @@ import numpy as np
 
 from palpate import checks
 from palpate.errors import FileFormatError, UsageError
+from palpate.physics.advice import advise
 from palpate.physics.shapes.naming import require_known, require_name
+from palpate.processes import is_supervised
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -36,6 +38,7 @@ __all__ = [
     "require_same",
     "require_unit",
     "segments",
+    "tell_repairs",
 ]
 
 UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
@@ -88,6 +91,17 @@ def require_same(path: str, digest: str) -> None:
             why="Its content is not the one that this body was made from.",
             fix="Make the body anew from the file as it is now.",
         )
+
+
+def tell_repairs(path: str, notes: Sequence[str]) -> None:
+    """Warn of what was repaired in a file, passed over or decided; not in a child process, whose parent has told it."""
+    if not notes or is_supervised():
+        return
+    advise(
+        f"{path} was read with repairs.",
+        why=" ".join(notes),
+        fix="Look whether that is meant; `notes` of the body repeats it.",
+    )
 
 
 def read_with_meshio(path: str) -> Any:

@@ -21,6 +21,7 @@ from palpate.physics.shapes.body_file import (
     digest_of,
     require_same,
     require_unit,
+    tell_repairs,
 )
 from palpate.physics.shapes.mesh import BodyMesh, Face, faces_of, to_ngsolve
 from palpate.physics.shapes.meshing import FineMesh, mesh_solid
@@ -257,6 +258,11 @@ class ImportedSolid(Shape):
             return ("body",)
         return _names(self)[1]
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """A sentence about each thing in the file that was repaired or passed over."""
+        return () if self.is_step else _skin(self)[2]
+
     def describe(self) -> dict[str, Any]:
         """Everything that decides the mesh, as plain data."""
         return {
@@ -275,7 +281,7 @@ class ImportedSolid(Shape):
         """A new `netgen.meshing.Mesh` in m, whose names of surfaces and regions are set."""
         if self.is_step:
             return mesh_apart(_mesh_step, self, refinements, doing=f"meshing the {self}")
-        skin, volume = _skin(self)
+        skin, volume, _ = _skin(self)
         return to_ngsolve(fill_surface(skin, volume, self.coarse(*skin.corners), refinements)).ngmesh
 
     def coarse(self, low: Any, high: Any) -> float:
@@ -306,7 +312,10 @@ def _read_names(shape: ImportedSolid) -> tuple[tuple[str, ...], tuple[str, ...]]
 
 
 @lru_cache(maxsize=8)
-def _skin(shape: ImportedSolid) -> tuple[BodyMesh, float]:
+def _skin(shape: ImportedSolid) -> tuple[BodyMesh, float, tuple[str, ...]]:
+    """Named surface of an STL file, the volume in it in m³, and notes about repairs."""
     require_same(shape.path, shape.digest)
-    surface = read_stl(shape.path, shape.unit or "m")
-    return name_parts(surface, shape.patches, shape.feature_angle), float(surface.volume)
+    topology, surface = read_stl(shape.path, shape.unit or "m")
+    skin = name_parts(topology, surface, shape.patches, shape.feature_angle)
+    tell_repairs(shape.path, surface.notes)
+    return skin, float(topology.volume), surface.notes

@@ -18,6 +18,7 @@ from palpate.format import (
     pressure,
     scientific,
     share,
+    summary_figure,
 )
 from palpate.units import Range
 
@@ -89,3 +90,10 @@ def test_numbers_stay_with_their_units() -> None:
     assert bind_units("P = -1.5 N at 0.4 m") == f"P{space}={space}−1.5{space}N at 0.4{space}m"
     assert bind_units("3.4 × 10⁻⁷ %") == f"3.4{space}×{space}10⁻⁷{space}%"
     assert bind_units("beam-3 and 5 men") == "beam-3 and 5 men"
+
+
+def test_figures_of_a_record_are_written_as_the_table_of_limits_writes_them() -> None:
+    assert summary_figure("displacement RMSE / full scale", 3.69e-7) == "3.7 × 10⁻⁷"
+    assert summary_figure("force error, 95th percentile", 0.0123) == "1.2 %"
+    assert summary_figure("unseen solves", 101) == 101
+    assert summary_figure("limits kept", True) is True

@@ -12,8 +12,10 @@ from chromium_page import READ, check_force, drag, let_go, number, settled, tip,
 from playwright.sync_api import Page
 from test_messages import WRITTEN, sample
 
+from palpate import format
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import Surrogate
+from palpate.units import Range
 from palpate.viewer import Viewer, typescript
 
 pytestmark = pytest.mark.timeout(120)
@@ -123,7 +125,7 @@ def test_what_is_known_of_the_model_reads_well(page: Page):
     words = " ".join(page.inner_text("#meta").replace("\N{NO-BREAK SPACE}", " ").split())
     for figure in (
         "unseen solves 101",
-        "displacement RMSE / full scale 3.41 × 10⁻⁷",
+        "displacement RMSE / full scale 3.4 × 10⁻⁷",
         "force error, 95th percentile 1.2 %",
         "limits kept yes",
     ):
@@ -134,6 +136,105 @@ def test_what_is_known_of_the_model_reads_well(page: Page):
         page.inner_text("#meta").replace("\N{NO-BREAK SPACE}", " ").split()
     )
     page.click("#about > summary")
+
+
+def test_the_pages_numbers_read_as_the_terminals(page: Page):
+    values = [
+        0.0,
+        3.412e-7,
+        0.000123,
+        0.05,
+        0.5,
+        0.00056,
+        0.9996,
+        1.0,
+        12.34,
+        999.4,
+        12345.6,
+        987654.0,
+        2.5e6,
+        -0.02,
+        1e9,
+    ]
+    words = page.evaluate(
+        """async values => {
+            const m = await import("/assets/units.js");
+            return values.map(v => [m.tidy(v, 2), m.tidy(v), m.share(v), m.measured(v, "m"),
+                                    m.measured(Math.abs(v), "Pa"), m.interval(-v, v, "m")]);
+        }""",
+        values,
+    )
+    for value, said in zip(values, words, strict=True):
+        ours = [
+            format.plain(value),
+            format.plain(value, 3),
+            format.share(value),
+            format.length(value),
+            format.pressure(abs(value)),
+            format.interval(Range("", -value, value, "m")).strip() if value > 0 else said[-1],
+        ]
+        assert [w.replace("\N{NO-BREAK SPACE}", " ").replace("−", "-") for w in said] == [
+            w.replace("−", "-") for w in ours
+        ]
+
+
+def test_what_can_be_dragged_has_its_cursor(page: Page):
+    shown = "getComputedStyle(document.getElementById('view')).cursor"
+    x, y = tip(page)
+    page.mouse.move(x - 120, y + 90)
+    assert page.evaluate(shown) == "auto"
+    page.mouse.move(x, y)
+    assert page.evaluate(shown) == "grab"
+    page.mouse.down()
+    assert page.evaluate(shown) == "grabbing"
+    page.mouse.up()
+    let_go(page)
+
+
+@pytest.mark.parametrize("width", [320, 390, 800])
+def test_no_button_covers_the_title(page: Page, width: int):
+    before = page.viewport_size
+    page.set_viewport_size({"width": width, "height": 700})
+    boxes = page.evaluate(
+        """() => {
+            document.getElementById("model-line").textContent = "trained to 6 mm deep, ".repeat(6);
+            document.getElementById("status").textContent = "real-time process stands still";
+            document.getElementById("true-scale").hidden = false;
+            const all = ["title", "tools"].map(id => document.getElementById(id).getBoundingClientRect().toJSON());
+            document.getElementById("true-scale").hidden = true;
+            return all;
+        }"""
+    )
+    title, tools = boxes
+    assert title["right"] <= tools["left"]
+    assert title["left"] >= 0
+    assert tools["right"] <= width
+    page.set_viewport_size(before)
+
+
+def test_slow_drawing_lowers_the_resolution_until_nothing_moves(page: Page):
+    full = page.evaluate("document.getElementById('view').clientWidth")  # one pixel of the display each
+    page.evaluate(
+        """() => {
+            window.slow = true;
+            const wait = () => {
+                const end = performance.now() + 60;
+                while (performance.now() < end);
+                if (window.slow) requestAnimationFrame(wait);
+            };
+            requestAnimationFrame(wait);
+        }"""
+    )
+    drag(page, -25, 60)
+    for i in range(200):
+        page.mouse.move(tip(page)[0], 250 + 20 * (i % 5))
+        if page.evaluate("document.getElementById('view').width") < 0.8 * full:
+            break
+    assert page.evaluate("document.getElementById('view').width") < 0.8 * full
+    page.evaluate("window.slow = false")
+    page.mouse.up()
+    page.wait_for_function(f"document.getElementById('view').width === {full}")
+    let_go(page)
 
 
 def test_messages_mean_the_same_in_typescript(page: Page):

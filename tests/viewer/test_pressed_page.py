@@ -98,10 +98,13 @@ def test_holding_the_button_presses_and_the_numbers_are_the_surrogates(page: Pag
     # the browser has summed modes and dimple to what the field says
     moved = np.linalg.norm(slab.fields["displacement"].values(at)[0], axis=1)
     assert float(shown["data"]["largest"]) == pytest.approx(moved.max(), rel=1e-5)
+    rest = 3.0 - 1e3 * moved.max()  # of the 3 mm of depth
+    assert f"the soft pad around it takes the other {rest:.2f} mm" in page.inner_text("#largest-note")
     page.mouse.up()
     released = stand_still(page, "free")
     assert number(released["text"]["force-norm"]) == 0.0
     assert float(released["data"]["largest"]) == 0.0, "back at rest"
+    assert page.inner_text("#largest-note") == ""
 
 
 def test_moving_slides_the_probe_at_its_depth(page: Page, slab: Surrogate):

@@ -11,17 +11,17 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
 from starlette.routing import Route
 
+from palpate.viewer.compression import BinaryAnswers
 from palpate.viewer.shown_body import ShownBody, body_of
 from palpate.viewer.web_server import STATIC, LocalServer, local_application, wait_until_interrupted
 
 __all__ = ["BodyViewer", "body_application", "show"]
 
-_BINARY = "application/octet-stream"
-
 
 def body_application(body: ShownBody) -> Starlette:
     """Return the web application of a body: the built page, ``/shown``, ``/surface`` and ``/steps/N``."""
     parts = body.split()
+    once, each = BinaryAnswers(keep=True), BinaryAnswers(keep=False)
     facts, mesh = body.shown(parts).to_json(), body.surface(parts).pack()
 
     # the skeleton of all pages; a touched body's is the other one
@@ -35,14 +35,14 @@ def body_application(body: ShownBody) -> Starlette:
     async def shown(_: Request) -> Response:
         return Response(facts, media_type="application/json")
 
-    async def surface(_: Request) -> Response:
-        return Response(mesh, media_type=_BINARY)
+    async def surface(request: Request) -> Response:
+        return await once.answer(request, lambda: mesh)
 
     async def step(request: Request) -> Response:
         index = request.path_params["index"]
         if index >= len(body.steps):
             raise HTTPException(404)
-        return Response(body.step(index, parts).pack(), media_type=_BINARY)
+        return await each.answer(request, lambda: body.step(index, parts).pack())
 
     return local_application(
         [

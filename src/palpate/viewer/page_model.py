@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from palpate.format import summary_figure
 from palpate.runtime.safety import Fault
 from palpate.runtime.shared_state import State, now
 from palpate.runtime.touchable import Touchable
@@ -97,7 +98,7 @@ class PageModel:
             max_force=state.max_force,
             rate=rate,
             faults=tuple(f.meaning for f in Fault),
-            meta=body.meta,
+            meta=_in_words(body.meta),
         )
 
     def frame(self, loop: Mapping[str, Any], state: State, held: bool, parameters: np.ndarray) -> Frame:
@@ -193,6 +194,15 @@ def swing(elapsed: float) -> float:
 def vector(v: np.ndarray) -> Vec3:
     """Return three numbers as a tuple."""
     return (float(v[0]), float(v[1]), float(v[2]))
+
+
+def _in_words(meta: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a body's record with its figures of merit as the terminal writes them."""
+    words = dict(meta)
+    for part in ("validation", "left_out"):
+        if isinstance(figures := meta.get(part), Mapping):
+            words[part] = {name: summary_figure(name, value) for name, value in figures.items()}
+    return words
 
 
 def _ranges(inputs: tuple[Range, ...]) -> tuple[RangeInfo, ...]:

@@ -25,6 +25,7 @@ from palpate.files import TemporaryFolder
 from palpate.runtime import LoopProcess
 from palpate.runtime.touchable import load_touchable, touchable
 from palpate.surrogates import Surrogate
+from palpate.viewer.compression import BinaryAnswers
 from palpate.viewer.page_model import PageModel
 from palpate.viewer.session import Session
 from palpate.viewer.web_server import LocalServer, local_application, wait_until_interrupted
@@ -42,18 +43,18 @@ def application(session: Session) -> Starlette:
         watcher.cancel()
         await asyncio.gather(watcher, return_exceptions=True)
 
-    model, binary = session.model, "application/octet-stream"
+    model, answers = session.model, BinaryAnswers(keep=True)
 
-    async def surface(_: Request) -> Response:
+    async def surface(request: Request) -> Response:
         if model.surface is None:
             raise HTTPException(404)
-        return Response(model.surface.pack(), media_type=binary)
+        return await answers.answer(request, model.surface.pack)
 
     async def modes(request: Request) -> Response:
         index = request.path_params["index"]
         if index >= model.field_count:
             raise HTTPException(404)
-        return Response(model.modes(index).pack(), media_type=binary)
+        return await answers.answer(request, lambda: model.modes(index).pack())
 
     routes = [
         WebSocketRoute("/touch", session.talk),

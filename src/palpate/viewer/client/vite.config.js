@@ -36,11 +36,12 @@ export default defineConfig({
     modulePreload: { polyfill: false },
     chunkSizeWarningLimit: 1000,
     rollupOptions: {
-      // messages and fields stay modules of their own, whole, so that tests can speak through them
+      // these stay modules of their own, whole, so that tests can speak through them
       input: {
         page: join(here, "index.html"),
         messages: join(here, "src/messages.ts"),
         field: join(here, "src/field.ts"),
+        units: join(here, "src/units.ts"),
       },
       preserveEntrySignatures: "strict",
       output: {

@@ -1,10 +1,9 @@
 // Facts about the model: its own figures, and the record of its making in its file.
 
-import { fixed, share, tidy } from "./units";
+import { fixed, tidy } from "./units";
 
 const ROWS = 80; // of one group
 const FIRST = ["validation", "errors"]; // groups that matter most stand first and open
-const RATIOS = /error, |full scale/; // names of figures that read best in per cent
 const UNITS: Record<string, readonly [unit: string, factor: number]> = {
   young: ["GPa", 1e-9],
   density: ["kg/m³", 1],
@@ -78,10 +77,9 @@ function rows(path: string[], value: unknown): Row[] {
   return value.length <= 8 ? [[name, value.map(plain).join(", ")]] : [];
 }
 
-/** A value with its unit, or in per cent, where its name tells which. */
+/** A value with its unit, where its name tells which; errors and ratios come in words. */
 function measured(name: string, value: unknown): string {
   if (typeof value !== "number") return plain(value);
-  if (RATIOS.test(name) && value !== 0 && Math.abs(value) < 1) return share(value);
   const [unit, factor] = UNITS[name] ?? ["", 1];
   return unit ? `${plain(factor * value)}\u00a0${unit}` : plain(value);
 }

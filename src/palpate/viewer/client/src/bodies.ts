@@ -5,18 +5,17 @@ import type { Connection } from "./connection";
 import { Field, Indentation } from "./field";
 import { PullHand } from "./hand";
 import type { Hand } from "./hand";
-import { choices, largest, legend, shares } from "./legend";
+import { choices, largest, legend, nothing, shares } from "./legend";
 import { LineView } from "./line_view";
 import { decodeModes, decodeSurface } from "./messages";
 import type { FieldInfo, Frame, Hello, Surface } from "./messages";
 import { Panel } from "./panel";
 import { PressHand } from "./press";
 import { PadView, PressView } from "./touch_view";
-import { element, input, measured } from "./units";
+import { element, fixed, input, measured } from "./units";
 import type { View } from "./view";
 import type { Vector3 } from "three";
 
-const PLAIN = 0.35; // share of the colour scale that a body without a field has
 const WORDS = ["title", "tools", "scale-notes", "legend"];
 
 /** A body on the page, with the hand that touches it. */
@@ -100,10 +99,12 @@ class PressedBody implements Body {
     choices(infos, (index) => {
       this.chosen = index;
       legend(this.info);
+      this.view?.neutral(nothing(this.info!));
       this.draw();
     });
     legend(this.info);
     this.view = new PressView(this.canvas, surface, this.hello, WORDS.map(element));
+    if (this.info) this.view.neutral(nothing(this.info));
     this.hand.attach(this.view);
     for (const id of ["show-ghost", "show-mesh"]) input(id).addEventListener("input", () => this.draw());
   }
@@ -150,7 +151,8 @@ class PressedBody implements Body {
     document.documentElement.dataset["summed"] = String(performance.now() - began); // ms
     const layers = { ghost: input("show-ghost").checked, mesh: input("show-mesh").checked };
     view.touch(latest, this.hand.radius, moved, colours, layers);
-    largest(info, values);
+    const most = largest(info, values);
+    element("largest-note").textContent = this.chosen === 0 && latest.grabbed ? remainder(latest.depth, most) : "";
   }
 }
 
@@ -186,6 +188,14 @@ class PadBody implements Body {
   }
 }
 
+/** Where the part of a press goes that does not move the body: the probe is a rigid ball with a soft pad. */
+function remainder(depth: number, most: number): string {
+  const rest = 1000 * (depth - most);
+  if (rest < 0.005) return "";
+  const deep = fixed(1000 * depth, 2);
+  return `The probe is ${deep} mm deep: the soft pad around it takes the other ${fixed(rest, 2)} mm.`;
+}
+
 async function get(path: string): Promise<ArrayBuffer> {
   const answer = await fetch(`./${path}`);
   if (!answer.ok) throw new Error(`${path}: ${answer.status}`);
@@ -193,7 +203,7 @@ async function get(path: string): Promise<ArrayBuffer> {
 }
 
 function plain(numbers: number): Float32Array {
-  return new Float32Array(numbers / 3).fill(PLAIN);
+  return new Float32Array(numbers / 3);
 }
 
 /** For programs that drive the page: where a place is, in pixels of the window. */

@@ -9,7 +9,7 @@ export function legend(info: FieldInfo | null): void {
   element("legend").hidden = !info;
   if (!info) return;
   const { size, unit } = scale(info);
-  element("legend-bar").style.background = gradient();
+  element("legend-bar").style.background = gradient(nothing(info));
   element("legend-title").textContent = unit ? `${info.name} (${unit})` : info.name;
   element("legend-ticks").replaceChildren(
     ...[0, 0.5, 1].map((t) => worded("span", tidy((info.low + t * (info.high - info.low)) / size))),
@@ -32,16 +32,22 @@ export function choices(infos: FieldInfo[], choose: (index: number) => void): vo
   element("fields").replaceChildren(...buttons);
 }
 
-/** Say how large a quantity is at most, of its values at the body's points. */
-export function largest(info: FieldInfo | null, values: Float32Array): void {
+/** Say how large a quantity is at most, of its values at the body's points; return that. */
+export function largest(info: FieldInfo | null, values: Float32Array): number {
   element("largest-section").hidden = !info;
-  if (!info) return;
+  if (!info) return 0;
   const { size, unit } = scale(info);
   const most = values.reduce((a, b) => Math.max(a, b), -Infinity);
   element("largest-title").textContent = info.name.startsWith("largest") ? capital(info.name) : `Largest ${info.name}`;
   element("largest").textContent = tidy(most / size);
   element("largest-unit").textContent = unit;
   document.documentElement.dataset["largest"] = String(most); // for programs that read the page
+  return most;
+}
+
+/** The share of the scale at which a quantity shows nothing: its zero, or the lower end of a scale without one. */
+export function nothing({ low, high }: FieldInfo): number {
+  return low < 0 ? Math.min(-low / (high - low), 1) : 0;
 }
 
 /** Each point's share of the scale. */

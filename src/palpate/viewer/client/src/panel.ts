@@ -6,7 +6,7 @@ import type { Flag, Places } from "./flags";
 import { Hold, Loop } from "./messages";
 import type { Frame, Hello, RangeInfo } from "./messages";
 import { Plot } from "./plot";
-import { element, fixed, input, measured, metres, printed, round125, share, tidy, worded } from "./units";
+import { element, fixed, input, interval, measured, printed, rangeUnit, round125, share, tidy, worded } from "./units";
 
 const EVERY = 80; // ms between changes of the numbers: faster can't be read
 const AT_FIRST = 0.5; // of the deepest trained depth, how deep a press goes
@@ -64,7 +64,7 @@ export class Panel {
     };
     this.depth(first);
     about(hello, [
-      [hello.holds ? "largest trained displacement" : "deepest trained press", metres(hello.deepest, hello.deepest)],
+      [hello.holds ? "largest trained displacement" : "deepest trained press", measured(hello.deepest, "m")],
       ["largest trained force", `${tidy(hello.force_max)} N`],
       ["largest trained stiffness", `${tidy(hello.stiffness_max)} N/m`],
       ...(hello.line ? [["nodes", String(hello.line.rest.length)] as const] : []),
@@ -76,7 +76,12 @@ export class Panel {
   depth(depth: number): void {
     input("depth-wanted").valueAsNumber = depth;
     const beyond = depth > this.hello!.deepest * (1 + 1e-9);
-    element("depth-label").textContent = `${metres(depth, 0)}${beyond ? ", untrained" : ""}`;
+    element("depth-label").textContent = `${tidy(1000 * depth)} mm${beyond ? ", untrained" : ""}`;
+  }
+
+  /** Say with which share of the display's resolution the body is drawn. */
+  sharpness(share: number): void {
+    if (element("resolution").dataset["value"] !== String(100 * share)) put("resolution", 100 * share, 0);
   }
 
   /** Record every frame; now and then show it. */
@@ -205,7 +210,7 @@ function whole(words: string): HTMLElement {
 /** An input and its range. */
 function trained(range: RangeInfo): HTMLElement {
   const words = whole("");
-  words.append(...printed(range.name), ` ${tidy(range.low)} … ${tidy(range.high)} ${range.unit}`);
+  words.append(...printed(range.name), ` ${interval(range.low, range.high, range.unit)}`);
   return words;
 }
 
@@ -238,7 +243,8 @@ function sliders(parameters: RangeInfo[], moved: (i: number, value: number) => v
       [slider.type, slider.id] = ["range", `parameter-${i}`];
       [slider.min, slider.max] = [String(range.low), String(range.high)];
       slider.step = String((range.high - range.low) / 200);
-      slider.dataset["unit"] = range.unit;
+      const { size, unit } = rangeUnit(range.low, range.high, range.unit);
+      [slider.dataset["size"], slider.dataset["unit"]] = [String(size), unit];
       slider.addEventListener("input", () => moved(i, slider.valueAsNumber));
       name!.append(...printed(range.name));
       label!.append(name!, value!, slider);
@@ -253,6 +259,7 @@ function follow(frame: Frame): void {
     const slider = document.getElementById(`parameter-${i}`) as HTMLInputElement | null;
     if (!slider) return;
     if (!slider.matches(":active")) slider.valueAsNumber = value;
-    slider.previousElementSibling!.textContent = `${tidy(value)} ${slider.dataset["unit"]}`;
+    const { size, unit } = slider.dataset;
+    slider.previousElementSibling!.textContent = `${tidy(value / Number(size))} ${unit}`;
   });
 }

@@ -1,7 +1,7 @@
 // The page of a solved body: one of its states at a time, fetched when it is wanted.
 
 import { say } from "./flags";
-import { choices, largest, legend, shares } from "./legend";
+import { choices, largest, legend, nothing, shares } from "./legend";
 import { decodeStep, decodeSurface, isShown, PROTOCOL } from "./messages";
 import type { FieldInfo, Shown, Step } from "./messages";
 import { mode, watch } from "./skeleton";
@@ -45,11 +45,13 @@ async function open(): Promise<void> {
     `${surface.triangles.length / 3} triangles`;
   choices(facts.fields, (index) => {
     field = index;
+    view.neutral(nothing(facts.fields[field]!));
     draw();
   });
   element("states").hidden = facts.steps.length < 2;
   input("state").max = String(facts.steps.length - 1);
   view = new SurfaceView(canvas, surface, ["title", "tools", "scale-notes", "legend"].map(element));
+  view.neutral(nothing(facts.fields[field]!));
   listen();
   requestAnimationFrame(picture);
   await go(0);

@@ -4,7 +4,6 @@ import {
   BoxGeometry,
   BufferAttribute,
   BufferGeometry,
-  Color,
   DoubleSide,
   Float32BufferAttribute,
   LessDepth,
@@ -14,22 +13,22 @@ import {
   MeshBasicMaterial,
   MeshLambertMaterial,
   MeshPhongMaterial,
+  NotEqualStencilFunc,
+  ReplaceStencilOp,
   SphereGeometry,
-  SRGBColorSpace,
   Vector3,
 } from "three";
-import { shade } from "./colour";
+import { palette } from "./colour";
 import type { Surface, Vec3 } from "./messages";
 import { css, round125 } from "./units";
 import { View } from "./view";
 
-const PALETTE = Array.from({ length: 256 }, (_, i) => new Color().setRGB(...shade(i / 255), SRGBColorSpace));
 const STANCE = {
   up: new Vector3(0, 0, 1),
   from: new Vector3(0.62, -1, 0.72).normalize(),
-  sky: 2.1,
-  sun: 1.7,
-  sunFrom: new Vector3(-0.4, -0.9, 1.6),
+  sky: 1.6,
+  sun: 2.4,
+  sunFrom: new Vector3(-1.1, -0.55, 1.0), // low, so that a shallow dent has a bright and a dark side
 };
 
 export interface Layers {
@@ -57,6 +56,7 @@ export class SurfaceView extends View {
   private readonly fixed: LineSegments<BufferGeometry, LineBasicMaterial>;
   private readonly floor: LineSegments<BufferGeometry, LineBasicMaterial>;
   protected readonly probe: Mesh<SphereGeometry, MeshLambertMaterial>;
+  private colours = palette();
   private readonly low = new Vector3().setScalar(Infinity);
   private readonly high = new Vector3().setScalar(-Infinity);
   protected roof: number; // m, room that a view leaves above the body
@@ -78,6 +78,7 @@ export class SurfaceView extends View {
       this.geometry,
       new MeshPhongMaterial({ vertexColors: true, side: DoubleSide, shininess: 24, specular: 0x1c1c1c }),
     );
+    outlined(this.body.material);
     // pulled a little towards the camera, so that the lines on the surface are not half lost in it
     this.body.material.polygonOffset = true;
     [this.body.material.polygonOffsetFactor, this.body.material.polygonOffsetUnits] = [1, 1];
@@ -89,6 +90,7 @@ export class SurfaceView extends View {
     [this.ghost.material.transparent, this.ghost.material.depthFunc] = [true, LessDepth];
     this.fixed = this.lines(surface.fixed, this.position);
     this.still = new Mesh(this.atRest(still), ghostMaterial());
+    this.still.renderOrder = 1; // after the body, around which it is seen
     this.probe = new Mesh(
       new SphereGeometry(1, 48, 32),
       new MeshLambertMaterial({ transparent: true, opacity: 0.5, depthWrite: false }),
@@ -121,7 +123,7 @@ export class SurfaceView extends View {
     const at = this.position.array as Float32Array;
     for (let i = 0; i < at.length; i++) at[i] = rest[i]! + factor * displacement[i]!;
     for (let i = 0; i < shares.length; i++) {
-      const tint = PALETTE[Math.round(255 * Math.min(Math.max(shares[i]!, 0), 1))]!;
+      const tint = this.colours[Math.round(255 * Math.min(Math.max(shares[i]!, 0), 1))]!;
       this.colour.setXYZ(i, tint.r, tint.g, tint.b);
     }
     this.position.needsUpdate = this.colour.needsUpdate = true;
@@ -135,6 +137,11 @@ export class SurfaceView extends View {
     this.wires.visible = layers.mesh;
     this.ghost.visible = this.still.visible = layers.ghost;
     this.dirty = true;
+  }
+
+  /** Set the share of the colour scale at which there is nothing to show. */
+  neutral(none: number): void {
+    this.colours = palette(none);
   }
 
   override recolour(): void {
@@ -213,6 +220,15 @@ export class SurfaceView extends View {
   }
 }
 
+/** Mark the pixels that a material draws. */
+function outlined(material: MeshBasicMaterial | MeshPhongMaterial): void {
+  [material.stencilWrite, material.stencilRef, material.stencilZPass] = [true, 1, ReplaceStencilOp];
+}
+
+/** The shape at rest, seen beside the body alone, where it has drawn back: on the body itself it would be a stain. */
 function ghostMaterial(): MeshBasicMaterial {
-  return new MeshBasicMaterial({ transparent: true, opacity: 0.1, depthWrite: false });
+  const material = new MeshBasicMaterial({ transparent: true, opacity: 0.16, depthWrite: false });
+  outlined(material); // so that what lies behind another part of it is not drawn twice
+  material.stencilFunc = NotEqualStencilFunc;
+  return material;
 }

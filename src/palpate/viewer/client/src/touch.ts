@@ -93,6 +93,7 @@ export function touch(): void {
     if (body?.view?.render() && latest) {
       label(body.view, latest);
       body.place();
+      panel.sharpness(body.view.sharpness);
     }
   }
 

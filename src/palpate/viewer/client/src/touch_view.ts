@@ -31,7 +31,7 @@ export class PressView extends SurfaceView {
       new MeshLambertMaterial({ transparent: true, opacity: 0.28, depthWrite: false }),
     );
     this.hover.visible = this.arrow.group.visible = false;
-    this.probe.material.opacity = 0.62;
+    this.probe.material.opacity = 0.45; // the dent is seen through it
     this.still.geometry.computeVertexNormals();
     this.still.material.side = DoubleSide;
     this.scene.add(this.hover, this.arrow.group);

@@ -1,7 +1,7 @@
 // A tube along a smooth curve through the nodes, rebuilt in place for every picture.
 
-import { BufferAttribute, BufferGeometry, Color, SRGBColorSpace } from "three";
-import { shade } from "./colour";
+import { BufferAttribute, BufferGeometry } from "three";
+import { palette } from "./colour";
 
 const BETWEEN = 4; // rings per pair of nodes
 const SIDES = 12;
@@ -15,7 +15,7 @@ export class Tube {
   private readonly position: BufferAttribute;
   private readonly normal: BufferAttribute;
   private readonly colour: BufferAttribute;
-  private readonly palette: Color[];
+  private readonly palette = palette();
 
   constructor(
     private readonly nodes: number,
@@ -33,7 +33,6 @@ export class Tube {
     this.geometry.setAttribute("normal", this.normal);
     this.geometry.setAttribute("color", this.colour);
     this.geometry.setIndex(this.triangles());
-    this.palette = Array.from({ length: 256 }, (_, i) => new Color().setRGB(...shade(i / 255), SRGBColorSpace));
   }
 
   /** Shape the tube: node positions (3 N) as drawn, and each node's share of the colour scale (N). */

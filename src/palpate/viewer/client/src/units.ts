@@ -1,4 +1,5 @@
-// Numbers as a person reads them, the page's elements, and the theme's colours.
+// Numbers as a person reads them, by the rules of palpate/format.py, so that terminal and page say the same figure alike; the
+// page's elements; the theme's colours.
 
 export function element<T extends HTMLElement>(id: string): T {
   return document.getElementById(id) as T;
@@ -29,19 +30,25 @@ export function round125(x: number): number {
 
 const RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹";
 
-/** Three significant digits without trailing zeros, a proper minus sign, and powers as 2.5 × 10⁻⁸. */
-export function tidy(x: number): string {
+/** `palpate.format.plain`: so many significant digits without trailing zeros, and powers as 2.50 × 10⁻⁸. */
+export function tidy(x: number, digits = 3): string {
+  if (!Number.isFinite(x)) return Number.isNaN(x) ? "not a number" : "infinite";
   if (x === 0) return "0";
   const size = Math.abs(x);
-  if (size >= 1e-3 && size < 1e5) return minus(String(Number(x.toPrecision(3))));
-  const [mantissa, power] = x.toExponential(2).split("e") as [string, string];
-  const raised = power.replace("+", "").replace("-", "⁻").replace(/\d/g, (d) => RAISED[Number(d)]!);
-  return minus(`${Number(mantissa)}\u00a0×\u00a010${raised}`);
+  if (size < 1e-3 || size >= 1e6) return scientific(x, digits);
+  const words = x.toFixed(Math.max(0, digits - 1 - Math.floor(Math.log10(size))));
+  return minus(words.includes(".") ? words.replace(/\.?0+$/, "") : words);
 }
 
-/** A ratio in per cent; ratios too small for that as they are. */
+function scientific(x: number, digits: number): string {
+  const [mantissa, power] = x.toExponential(digits - 1).split("e") as [string, string];
+  const raised = power.replace("+", "").replace("-", "⁻").replace(/\d/g, (d) => RAISED[Number(d)]!);
+  return minus(`${mantissa}\u00a0×\u00a010${raised}`);
+}
+
+/** `palpate.format.share`: a ratio in per cent. */
 export function share(x: number): string {
-  return Math.abs(x) >= 1e-5 ? `${tidy(Number((100 * x).toPrecision(2)))}\u00a0%` : tidy(x);
+  return `${tidy(100 * x, 2)}\u00a0%`;
 }
 
 /** A name as it is printed: what follows its underscore stands lower. */
@@ -63,9 +70,16 @@ export function fixed(x: number, decimals: number): string {
   return Number(words) === 0 ? words.replace("-", "") : words.replace("-", "−");
 }
 
-/** A length in m or mm, whichever reads better beside `full`. */
-export function metres(x: number, full: number): string {
-  return full >= 0.1 ? `${tidy(x)} m` : `${tidy(1000 * x)} mm`;
+/** `palpate.format.interval` without the name: lengths below 1 m in mm. */
+export function interval(low: number, high: number, unit: string): string {
+  const { size, unit: name } = rangeUnit(low, high, unit);
+  return `${tidy(low / size)} … ${tidy(high / size)} ${name}`.trimEnd();
+}
+
+/** The multiple in which all values of a range are printed: mm for lengths below 1 m, else the unit itself. */
+export function rangeUnit(low: number, high: number, unit: string): { size: number; unit: string } {
+  const short = unit === "m" && Math.max(Math.abs(low), Math.abs(high)) < 1;
+  return short ? { size: 1e-3, unit: "mm" } : { size: 1, unit };
 }
 
 const MULTIPLES: Record<string, readonly (readonly [size: number, unit: string])[]> = {
@@ -73,6 +87,7 @@ const MULTIPLES: Record<string, readonly (readonly [size: number, unit: string])
     [1, "m"],
     [1e-3, "mm"],
     [1e-6, "µm"],
+    [1e-9, "nm"],
   ],
   Pa: [
     [1e9, "GPa"],
@@ -82,14 +97,17 @@ const MULTIPLES: Record<string, readonly (readonly [size: number, unit: string])
   ],
 };
 
-/** The multiple of a unit for values up to `full`: the largest of which `full` is at least a tenth. */
+const ROUNDS_TO = 0.9995; // so that 999.6 mm is 1 m
+
+/** The multiple of a unit for values up to `full`: the largest of which `full` is at least one. */
 export function multiple(full: number, unit: string): { size: number; unit: string } {
   const all = MULTIPLES[unit] ?? [[1, unit] as const];
-  const [size, name] = all.find(([size]) => Math.abs(full) >= 0.1 * size) ?? all.at(-1)!;
+  const fitting = all.find(([size]) => Math.abs(full) >= ROUNDS_TO * size) ?? all.at(-1)!;
+  const [size, name] = full === 0 ? (all.find(([size]) => size === 1) ?? fitting) : fitting;
   return { size, unit: name };
 }
 
-/** A value with the unit that reads well. */
+/** `palpate.format.length` and `pressure`: a value with the multiple of its unit that fits it. */
 export function measured(x: number, unit: string): string {
   const { size, unit: name } = multiple(x, unit);
   return `${tidy(x / size)} ${name}`;

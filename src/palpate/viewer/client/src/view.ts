@@ -14,6 +14,7 @@ import {
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { fit, free, project } from "./framing";
 import type { Size } from "./framing";
+import { Resolution } from "./resolution";
 
 /** First view and light of a kind of body. */
 export interface Stance {
@@ -30,6 +31,7 @@ export abstract class View {
   protected readonly controls: OrbitControls;
   protected dirty = true;
   private readonly renderer: WebGLRenderer;
+  private readonly resolution = new Resolution();
   private readonly caster = new Raycaster();
 
   constructor(
@@ -37,7 +39,7 @@ export abstract class View {
     private readonly words: readonly Element[], // that stand in front of the canvas
     private readonly stance: Stance,
   ) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
+    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, stencil: true });
     const sky = new HemisphereLight(new Color(0xffffff), new Color(0xb9c4cc), stance.sky);
     sky.position.copy(stance.up);
     const sun = new DirectionalLight(0xffffff, stance.sun);
@@ -45,6 +47,7 @@ export abstract class View {
     this.scene.add(sky, sun);
     this.camera.up.copy(stance.up);
     this.controls = new OrbitControls(this.camera, canvas);
+    canvas.style.cursor = ""; // the controls set one, which would hide the style sheet's
     this.controls.addEventListener("change", () => (this.dirty = true));
   }
 
@@ -54,12 +57,20 @@ export abstract class View {
   /** Take the theme's colours. */
   abstract recolour(): void;
 
-  /** Render if anything changed since. */
+  /** Render if anything changed since; called for every display frame. */
   render(): boolean {
-    if (!this.dirty) return false;
+    const { resolution } = this;
+    if (!resolution.due(performance.now(), this.dirty)) return false;
     this.dirty = false;
+    const ratio = resolution.share * Math.min(devicePixelRatio, 2);
+    if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
     this.renderer.render(this.scene, this.camera);
     return true;
+  }
+
+  /** Resolution of the latest picture, of the display's. */
+  get sharpness(): number {
+    return this.resolution.share;
   }
 
   /** Where a point of the scene is on the canvas, CSS pixels. */
@@ -70,7 +81,6 @@ export abstract class View {
   resize(): void {
     const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
     if (!width || !height) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();

@@ -233,7 +233,7 @@ def test_slow_drawing_lowers_the_resolution_until_nothing_moves(page: Page):
     assert page.evaluate("document.getElementById('view').width") < 0.8 * full
     page.evaluate("window.slow = false")
     page.mouse.up()
-    page.wait_for_function(f"document.getElementById('view').width === {full}")
+    page.wait_for_function(f"() => document.getElementById('view').width === {full}")
     let_go(page)
 
 

@@ -10,6 +10,8 @@
     ├── SolverError              3   a finite-element solve, or too many of a sweep's, did not converge
     ├── AccuracyError            1   the network misses the accuracy that was asked of it
     ├── DeviceError              3   a haptic device or the real-time process failed to start or vanished
+    │   ├── DeviceLostError      3   a haptic device is no longer there
+    │   └── DeviceStopError      3   a haptic device's own safety has stopped it
     └── ResourceError            3   room on a disk, memory or a scheduler is missing, or a place is write-protected
 
 Each says *what* happened, *why* (as far as known) and *what to do*. Inside the 1 kHz loop nothing raises:
@@ -23,6 +25,8 @@ from typing import ClassVar
 __all__ = [
     "AccuracyError",
     "DeviceError",
+    "DeviceLostError",
+    "DeviceStopError",
     "FileFormatError",
     "FitWarning",
     "PalpateError",
@@ -99,6 +103,14 @@ class DeviceError(PalpateError):
     """A haptic device or the real-time process failed to start or vanished."""
 
     exit_code = 3
+
+
+class DeviceLostError(DeviceError):
+    """A haptic device is no longer there: unplugged, switched off, or its service has ended."""
+
+
+class DeviceStopError(DeviceError):
+    """A haptic device's own safety has stopped it: a brake, a stall, hot motors, its firmware's watchdog."""
 
 
 class ResourceError(PalpateError):

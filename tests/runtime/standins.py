@@ -12,19 +12,20 @@ STIFFNESS = 20.0  # N/m
 class PlainAnswer:
     """F = −k x in every direction, with switches to misbehave."""
 
-    amplitude, depth, inside = 0.0, 0.0, True
+    amplitude, inside = 0.0, True
 
     def __init__(self, parameters):
         self.force = np.zeros(3)
         self.stiffness, self.slope = np.zeros((3, 3)), np.zeros(3)
         self.spring, self.poison, self.error = STIFFNESS, 0.0, None
-        self.seen = np.full(parameters, np.nan)
+        self.seen, self.depth = np.full(parameters, np.nan), 0.0
 
     def __call__(self, position, parameters):
         if self.error is not None:
             raise self.error
         np.multiply(position, -self.spring, out=self.force)
         self.force[0] += self.poison
+        self.depth = float(np.linalg.norm(position))
         self.seen[:] = parameters
 
 

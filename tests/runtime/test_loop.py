@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from standins import STIFFNESS, PlainModel
 
-from palpate.errors import DeviceError, UsageError
+from palpate.errors import DeviceError, DeviceLostError, DeviceStopError, UsageError
 from palpate.runtime.devices.device import Sample, Traits
 from palpate.runtime.devices.page import PageDevice
 from palpate.runtime.loop import Loop
@@ -66,6 +66,20 @@ class Bench:
             states.append(self.shared.read_state())
         return states
 
+    def grab(self):
+        """Take hold anew: nothing is held for one tick."""
+        self.device.sample.holding = False
+        self.ticks(1)
+        self.device.sample.holding = True
+
+    def come_back(self):
+        """The hand is still in the body, and feels nothing; then it lets go and takes hold anew."""
+        states = self.ticks(20)
+        assert zero(states)
+        assert all(state.waiting and state.fault == Fault.NONE for state in states)
+        assert Fault(states[-1].withheld).meaning in states[-1].reason
+        self.grab()
+
     def settle(self):
         last = self.ticks(RAMP + 80)[-1]
         assert np.linalg.norm(last.force) > 0.5
@@ -79,7 +93,9 @@ def handle():
 
 @pytest.fixture
 def bench(plain, handle, shared):
-    return Bench(plain, handle, shared)
+    bench = Bench(plain, handle, shared)
+    bench.grab()
+    return bench
 
 
 @pytest.fixture
@@ -111,7 +127,8 @@ def test_the_hand_feels_the_body(bench):
     np.testing.assert_allclose(state.force, -STIFFNESS * state.position)
     np.testing.assert_allclose(bench.device.sent, state.force)
     assert (state.fault, state.faults, state.stalled, state.grabbed) == (0, 0, False, True)
-    assert state.tick == RAMP + 80
+    assert state.tick == 1 + RAMP + 80
+    assert (state.waiting, state.stopped, state.released, state.reason) == (False, False, False, "")
     assert state.scale == WORKSPACE.scale
 
 
@@ -126,6 +143,18 @@ def test_a_strong_body_is_clamped_and_counted(bench, plain):
     np.testing.assert_allclose(states[-1].force, [0.0, LIMITS.max_force, 0.0])
     assert states[-1].clamped
     assert states[-1].clamped_ticks == 200
+
+
+def test_a_device_with_motors_starts_without_force_in_the_middle_of_a_body(plain, handle, shared):
+    bench = Bench(plain, handle, shared)
+    states = bench.ticks(100)
+    assert zero(states)
+    assert states[-1].waiting
+    assert "out of the body" in states[-1].reason
+    for y in np.arange(-0.03, -0.0025, 0.001):
+        handle.sample.position[1] = y
+        state = bench.ticks(1)[0]
+        assert state.waiting == (y < -0.05 * 0.075), "as good as at rest"
 
 
 BREAK = {
@@ -157,15 +186,20 @@ def test_a_fault_is_zero_force_a_record_and_a_ramp(bench, plain, fault):
     for state in bad:
         numbers = [*state.hand, *state.position, *state.contact, *state.loads]
         assert np.isfinite(numbers).all(), "what is published stays finite"
+    assert bad[-1].onsets == ((bad[0].time, fault),)
+    assert fault.meaning in bad[-1].reason
     MEND[fault](bench, plain)
+    bench.come_back()
     good = bench.ticks(RAMP + 30)
     assert_ramps_in(good, full)
+    assert good[0].withheld == Fault.NONE
     assert (good[0].fault, good[-1].last_fault, good[-1].faults) == (Fault.NONE, fault, 1)
 
 
 def test_a_clock_jump_is_a_fault(bench):
     full = np.linalg.norm(bench.settle().force)
     assert zero(bench.ticks(1, jumped=True))
+    bench.come_back()
     after = bench.ticks(RAMP + 30)
     assert after[-1].last_fault == Fault.CLOCK_JUMP
     assert_ramps_in(after, full)
@@ -190,7 +224,128 @@ def test_whatever_a_driver_raises_the_loop_goes_on(bench, error):
     assert bad[-1].fault_counts[Fault.DEVICE_ERROR] == 1
     assert bench.loop.device_error == f"{type(error).__name__}: {error}"
     bench.device.read_error = bench.device.write_error = None
+    bench.come_back()
     assert_ramps_in(bench.ticks(RAMP + 30), full)
+
+
+@pytest.mark.parametrize("step", [-0.5, 0.021, 1.0, math.nan], ids=["back", "21 ms", "1 s", "no number"])
+def test_the_loop_sees_a_jump_of_the_clock_itself(bench, step):
+    bench.settle()
+    bench.now += step
+    state = bench.ticks(1)[0]
+    assert state.fault == Fault.CLOCK_JUMP
+    assert not bench.device.sent.any()
+
+
+@pytest.mark.parametrize(
+    ("error", "fault"),
+    [
+        (DeviceLostError("The cable is out."), Fault.DEVICE_LOST),
+        (ConnectionResetError("reset by peer"), Fault.DEVICE_LOST),
+        (DeviceStopError("The brake is on."), Fault.DEVICE_STOPPED),
+        (DeviceError("Busy."), Fault.DEVICE_ERROR),
+    ],
+    ids=["lost", "reset", "stopped", "error"],
+)
+def test_drivers_say_what_became_of_the_device(bench, error, fault):
+    bench.settle()
+    bench.device.read_error = error
+    state = bench.ticks(3)[-1]
+    assert (state.fault, state.words) == (fault, str(error))
+    assert str(error) in state.reason
+
+
+def test_an_impossible_place_is_passed_over_once_and_a_fault_when_it_lasts(bench):
+    full = bench.settle().force.copy()
+    bench.device.sample.position[:] = (0.0, -0.03, 0.5)
+    states = bench.ticks(2)
+    assert all(state.fault == Fault.NONE for state in states)
+    np.testing.assert_allclose(states[-1].force, full, err_msg="the last good place stays")
+    bench.device.sample.position[:] = (0.0, -0.03, 0.0)
+    np.testing.assert_allclose(bench.ticks(1)[0].force, full)
+    bench.device.sample.position[:] = (0.0, -0.03, 0.5)
+    states = bench.ticks(30)
+    assert [state.fault for state in states[:3]] == [Fault.NONE, Fault.NONE, Fault.IMPOSSIBLE_PLACE]
+    assert zero(states[2:])
+    assert states[-1].fault == Fault.IMPOSSIBLE_PLACE, "as long as it is out of reach"
+    bench.device.sample.position[:] = (0.0, -0.03, 0.0)
+    bench.ticks(1)
+    bench.come_back()
+    assert_ramps_in(bench.ticks(RAMP + 30), np.linalg.norm(full))
+
+
+def test_a_leap_within_reach_is_a_fault_and_then_the_new_place(bench):
+    bench.settle()
+    bench.device.sample.position[:] = (0.0, 0.03, 0.0)
+    states = bench.ticks(30)
+    assert states[2].fault == Fault.IMPOSSIBLE_PLACE
+    assert states[-1].fault == Fault.NONE
+    assert states[-1].waiting
+    assert zero(states[2:])
+
+
+def test_beyond_the_workspace_nothing_pushes(bench):
+    bench.settle()
+    sample = bench.device.sample
+    for _ in range(20):
+        sample.position[1] -= 0.0045
+        state = bench.ticks(1)[0]
+        assert state.force.any() == (sample.position[1] > -1.25 * 0.075)
+    assert state.last_fault == Fault.OUT_OF_REGION
+    assert state.faults == 1
+    assert state.waiting
+
+
+def test_a_stop_lasts_until_it_is_resumed_and_the_hand_has_left_the_body(bench):
+    full = np.linalg.norm(bench.settle().force)
+    bench.shared.write_command(stop=True)
+    states = bench.ticks(200)
+    assert zero(states)
+    assert states[-1].stopped
+    assert states[-1].fault_counts[Fault.STOPPED] == 1
+    assert "resume" in states[-1].reason
+    bench.grab()
+    assert zero(bench.ticks(100)), "letting go is no leave to push"
+    bench.shared.write_command(stop=True, resume=True)
+    assert bench.ticks(1)[0].stopped, "of both the stop counts"
+    bench.shared.write_command(resume=True)
+    bench.ticks(1)
+    bench.come_back()
+    assert_ramps_in(bench.ticks(RAMP + 30), full)
+
+
+@pytest.mark.parametrize("way", ["switch", "button"])
+def test_the_device_stops_the_force_by_its_own_buttons(bench, way):
+    bench.settle()
+    sample = bench.device.sample
+    if way == "switch":
+        sample.stop = True
+    else:
+        sample.buttons = 0b100
+    assert zero(bench.ticks(1))
+    sample.stop, sample.buttons = False, 0
+    states = bench.ticks(100)
+    assert zero(states)
+    assert states[-1].stopped, "a stop needs no held button"
+
+
+def test_with_a_dead_man_button_there_is_force_only_while_it_is_held(plain, handle, shared):
+    bench = Bench(plain, handle, shared, dead_man=True)
+    bench.grab()
+    states = bench.ticks(100)
+    assert zero(states)
+    assert states[-1].released
+    assert "dead-man" in states[-1].reason
+    handle.sample.buttons = 1
+    assert zero(bench.ticks(20)), "pressed in the middle of the body"
+    bench.grab()
+    full = np.linalg.norm(bench.settle().force)
+    handle.sample.buttons = 0
+    assert zero(bench.ticks(1))
+    handle.sample.buttons = 1
+    bench.grab()
+    assert_ramps_in(bench.ticks(RAMP + 30), full)
+    assert bench.shared.read_state().faults == 0
 
 
 def test_a_driver_that_reports_no_position_is_a_fault(bench):
@@ -223,7 +378,8 @@ def test_silent_hardware_gets_zero_force_within_20_ms(bench):
             assert state.force.any(), "no sooner than agreed"
 
 
-def test_the_delay_is_the_mean_age_of_fresh_samples(bench):
+def test_the_delay_is_the_mean_age_of_fresh_samples(plain, handle, shared):
+    bench = Bench(plain, handle, shared)
     bench.device.silent, bench.device.sample.holding = True, False
     bench.ticks(5)
     assert bench.shared.read_state().delay == 0.0, "a device that was never heard of has no age"
@@ -275,6 +431,10 @@ def test_a_hidden_tab_is_a_stall_at_once(page):
     assert zero(states)
     assert {state.fault for state in states} == {Fault.INPUT_STALLED}
     page.shared.write_command(hidden=False, beat=page.now + 1.0)
+    assert zero(page.ticks(20))
+    page.shared.write_command(grabbed=False)
+    page.ticks(1)
+    page.shared.write_command(grabbed=True)
     assert_ramps_in(page.ticks(RAMP + 30), full)
 
 

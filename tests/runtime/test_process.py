@@ -100,6 +100,12 @@ def test_a_silent_page_gets_zero_force_in_time(spring_file):
         before = [s for s in silent if s.time < heard + 0.1 - 1e-6 and s.faults == alive[-1].faults]
         assert all(s.force.any() and not s.stalled for s in before)
         assert silent[-1].fault_counts[Fault.INPUT_STALLED] == 1
+        again = watch(loop, 0.2, each=lambda: loop.shared.write_command(beat=now()))
+        assert again[-1].waiting
+        assert not again[-1].force.any(), "not in the middle of the body"
+        loop.shared.write_command(grabbed=False)
+        watch(loop, 0.1, each=lambda: loop.shared.write_command(beat=now()))
+        loop.shared.write_command(grabbed=True)
         again = watch(loop, 0.4, each=lambda: loop.shared.write_command(beat=now()))
         assert again[-1].force.any()
         assert again[-1].fault_counts[Fault.INPUT_STALLED] == 1

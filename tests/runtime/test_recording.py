@@ -46,9 +46,7 @@ class Recorded:
 
     def tick(self, count, **options):
         for _ in range(count):
-            self.loop.tick(
-                5.0 + self.k * self.loop.period * (1.0 + 1e-3 * (self.k % 7)), 1e-6 * self.k, **options
-            )
+            self.loop.tick(5.0 + self.loop.period * (self.k + 1e-3 * (self.k % 7)), 1e-6 * self.k, **options)
             self.k += 1
 
     def trace(self):
@@ -160,7 +158,24 @@ def test_faults_are_replayed_as_they_came(name, tmp_path):
 
 def test_every_slot_of_a_sample_is_recorded():
     """One that the loop learns to heed must be recorded too, or a replay goes its own way."""
-    assert set(Sample.__slots__) == {"position", "time", "patience", "holding", "clutched", "asleep"}
+    figures = {"position", "time", "patience", "holding", "clutched", "asleep"}
+    as_flags = {"buttons", "stop"}  # what they ask for: stopped, released
+    assert set(Sample.__slots__) == figures | as_flags
+
+
+def test_stops_and_a_dead_man_button_are_replayed(tmp_path):
+    body, shared = touchable(spring_beam(200.0)), Shared.private()
+    device = StrokeDevice(StrokeSettings(frequency=2.0))
+    touch = Recorded(tmp_path / "a.trace", body, device, shared, dead_man=True)
+    for k in range(60):
+        device.sample.buttons = 0 if k % 20 == 7 else 1
+        device.sample.stop = k == 25
+        shared.write_command(stop=k == 40, resume=k in {27, 43})
+        touch.tick(20)
+    trace = touch.trace()
+    for name in ("stopped", "released", "waiting"):
+        assert 0.0 < trace.flag(name).mean() < 0.5
+    assert_same(trace, body)
 
 
 def test_another_body_under_the_same_hand_differs_and_says_by_how_much(tmp_path):

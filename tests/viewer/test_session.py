@@ -34,11 +34,17 @@ def hold(client: Client, y: float, *, seconds: float = 0.5) -> Frame:
 
 
 def held(client: Client, y: float) -> Frame:
-    """Hold until the loop has arrived and ramped up; on a busy machine that may take several tries."""
+    """Hold until the loop has arrived and ramped up; on a busy machine that may take several tries.
+
+    After a fault the hand must have let go before there is a force.
+    """
     for _ in range(20):
         frame = hold(client, y)
-        if frame.hold == Hold.YOURS and not frame.stalled and abs(frame.position[1] - y) < 1e-6:
+        felt = frame.hold == Hold.YOURS and not frame.stalled and any(frame.force)
+        if felt and abs(frame.position[1] - y) < 1e-6:
             return frame
+        client.hand(0.0, 0.0, grabbed=False)
+        time.sleep(0.05)
     pytest.fail("the loop never followed the hand")
 
 

@@ -60,6 +60,9 @@ def _parser() -> argparse.ArgumentParser:
         "--unsoftened", action="store_true", help="a body too stiff for the device feels so all the same"
     )
     parser.add_argument(
+        "--dead-man", action="store_true", help="force only while the device's first button is held"
+    )
+    parser.add_argument(
         "--module", action="append", default=[], help="imported for a file of an unknown kind"
     )
     return parser
@@ -81,8 +84,11 @@ def _run(options: argparse.Namespace) -> int:
         ring.unlink()
         recorder = TickRecorder(ring)
     device = device_named(options.device, shared.command)
-    workspace = model.workspace(options.radius)
-    limits = Limits(options.max_force, options.slew)
+    traits, radius, max_force = device.traits, options.radius, options.max_force
+    if traits.damping is not None:  # motors: what the opened device says of itself may not be exceeded
+        radius, max_force = min(radius, traits.radius), min(max_force, traits.max_force)
+    workspace = model.workspace(radius)
+    limits = Limits(max_force, options.slew, continuous=traits.continuous_force)
     loop = Loop(
         model,
         device,
@@ -90,8 +96,9 @@ def _run(options: argparse.Namespace) -> int:
         workspace,
         limits,
         rate=options.rate,
-        stiffness=model.stiffness_max if device.traits.damping is not None else 0.0,
+        stiffness=model.stiffness_max if traits.damping is not None else 0.0,
         override=options.unsoftened,
+        dead_man=options.dead_man,
         orphaned=orphaned,
         recorder=recorder,
     )

@@ -10,6 +10,9 @@ own place, or holds a patch or a node of the body, whose displacement from rest 
 - *A held body* without memory returns to rest when nobody holds it. One whose memory lets it lie elsewhere is taken
   hold of where it is and follows the hand's motion from there on: led to the hand's own place, a rod that stays bent
   would be bent back within a tick. A hand that can't be believed for a tick takes hold anew.
+- *A body that was released*, because of a fault or a stop, lets go of the hand: no force, and nothing is remembered,
+  until the hand is where the body holds no energy: a probe outside it, a held place at rest. One that lies elsewhere
+  after a touch is taken hold of anew where it lies.
 - *A memory* walks the elastic energy; what it answers is the force. It never gives back more than it was given.
 """
 
@@ -82,9 +85,13 @@ class HandEvaluator:
         Within the trained region.
     let_go : bool
         Whether the body has let go of a probe that is still in it.
+    waiting : bool
+        Whether the body was released and waits for a hand that is where it holds no energy.
+    rest_zone : float
+        How deep a probe, or how far from rest what is held, may be for that, m.
     depth : float
-        Of the rigid probe in the surface at rest, m; negative without contact, zero for a probe that was let go. Of a
-        held body, how far the hand has displaced it.
+        Of the rigid probe in the surface at rest, m; negative without contact, zero for a probe that was let go or that
+        a released body waits for. Of a held body, how far the hand has displaced it.
     stiffness : float
         Along the force, −F·(∂F/∂x)F/‖F‖², N/m, of the elastic answer; zero without force, or where it isn't known.
     elapsed : float
@@ -153,6 +160,7 @@ class HandEvaluator:
         self._onto = np.ascontiguousarray(felt.T @ felt)
         self._felt: list[list[float]] = self._onto.tolist()
         self.inside, self.let_go = True, False
+        self.waiting, self.rest_zone = False, 0.0
         self.depth, self.stiffness, self.elapsed = -math.inf, 0.0, 0.0
         _along(elastic.force, elastic.stiffness)  # compile now, not in the loop
         _behind(self._normal, self._normal)
@@ -187,6 +195,15 @@ class HandEvaluator:
                 self._grip[i] = stays.lies[i] - (row[0] * x + row[1] * y + row[2] * z)
             position[i] += self._grip[i]
 
+    def release(self) -> None:
+        """Let go of the hand until it is where the body holds no energy."""
+        self.waiting = True
+
+    @property
+    def holds(self) -> bool:
+        """True where the hand holds a patch or a node, and doesn't move a free probe."""
+        return self._holds
+
     @property
     def remembers(self) -> bool:
         """True for a body with a memory, which each call takes further."""
@@ -208,15 +225,18 @@ class HandEvaluator:
         if self._places:
             parameters = self._where_taken(parameters)
         if self._stays is not None and not self._held:
+            self.waiting = False
             good = self._stays.release(self.elapsed, parameters)
         else:
             elastic(position, parameters)
             amplitude = elastic.amplitude
             if not self._holds:
                 self._hold_or_let_go(elastic.depth, parameters)
-                if self.let_go:
-                    amplitude = 0.0
-                    elastic.force[:] = 0.0
+            if self.waiting:
+                self._await_rest(elastic.depth)
+            if self.let_go or self.waiting:
+                amplitude *= 0.0  # what is no number stays none, and is seen
+                elastic.force *= 0.0
             good = memory is None or memory.step(position, amplitude, elastic.slope, self.elapsed)
         stays = self._stays
         _project(position if stays is None or self._held else stays.lies, self._onto, self._place)
@@ -225,10 +245,19 @@ class HandEvaluator:
         if self._node is not None:
             self._node(self._place, self.force, parameters)
         self.inside = elastic.inside and not self.let_go
-        self.depth = 0.0 if self.let_go else elastic.depth
+        untouched = self.let_go or (self.waiting and not self._holds)
+        self.depth = 0.0 if untouched else elastic.depth
         self.stiffness = _along(elastic.force, elastic.stiffness)
         if not good:
             self.force[:] = math.nan  # the loop makes a fault of it
+
+    def _await_rest(self, depth: float) -> None:
+        """End the wait of a released body where the hand presses or displaces it by next to nothing.
+
+        A body that lies elsewhere after a touch was taken hold of anew, and nothing pulls there.
+        """
+        if depth <= self.rest_zone or self._stays is not None:
+            self.waiting = False
 
     def _where_taken(self, parameters: np.ndarray) -> np.ndarray:
         """The further inputs (p,), those of the place as they were when the hand took hold.

@@ -1,4 +1,4 @@
-"""One tick of touch, as a list of stages: read → map → evaluate → limit → control → write → publish.
+"""One tick of touch, as a list of stages: read → guard → map → evaluate → limit → control → write → publish.
 
     device position → hand's axes and clutch → workspace → coupling → learnt body and its memory
         → force, slew and ramp limits → passivity controller → device → shared memory
@@ -8,8 +8,10 @@ from outside: the loop runs live, on recorded samples, or by `run_for` as fast a
 
 All stages work in arrays made beforehand, most of them views of the record that is published, so that a tick
 allocates next to nothing. Nothing raises: the first thing that goes wrong in a tick is its fault, and a tick
-with a fault sends zero force. What is published is always finite: where a number is not, its last good value
-stays.
+with a fault sends zero force. It lasts: a fault releases the body, which waits until the hand is where it holds no
+energy, out of a body that is pressed and at rest of one that is held, and then the force ramps in. So does the start
+on a device with motors, and the end of a stop. What is published is always finite: where a number is not, its last
+good value stays.
 
 A force computed from a sample is held for a tick and so trails the hand by half a tick on average, which is
 what makes a sampled spring active (Colgate & Schenkel 1997, see `stability`): no stage may hold one back.
@@ -27,7 +29,7 @@ from typing import Protocol
 
 import numpy as np
 
-from palpate.errors import UsageError
+from palpate.errors import DeviceLostError, DeviceStopError, UsageError
 from palpate.runtime.coupling import STEPS, Coupling
 from palpate.runtime.devices import Device
 from palpate.runtime.devices.page import PageDevice
@@ -36,7 +38,7 @@ from palpate.runtime.passivity import PassivityController, largest_damping
 from palpate.runtime.publisher import Publisher
 from palpate.runtime.realtime import Metronome
 from palpate.runtime.recording import TickRecorder
-from palpate.runtime.safety import Fault, Limits, Safety, stalled
+from palpate.runtime.safety import HARDWARE_PATIENCE, Fault, Limits, PlaceCheck, Safety, Stop, stalled
 from palpate.runtime.shared_state import MAX_INPUTS, MAX_PLACES, Shared, now
 from palpate.runtime.stability import FeltStiffness
 from palpate.runtime.workspace import HandFrame, Workspace
@@ -44,6 +46,9 @@ from palpate.units import Range
 
 __all__ = ["Loop", "Model", "rehearsal"]
 
+_PAUSE = 0.05  # s between two ticks of a page or script from which on the clock jumped; hardware bears less
+_EDGE = 1.25  # radii of the workspace: no force beyond
+_AIR, _REST = 0.01, 0.05  # radii: as good as outside a pressed body, and as good as at rest of a held one
 _DELAY_TIME = 0.1  # s, over which the age of the samples is averaged
 _DELAY_CHANGE = 0.02  # of T/2 + d: smaller changes move no bound that matters
 
@@ -84,6 +89,8 @@ class Loop:
         Whether a body that is too stiff for its device shall feel so all the same.
     control : bool
         Whether the passivity controller may damp; without it it only counts.
+    dead_man : bool
+        Whether the force acts only while the device's first button is held.
     orphaned : callable
         Returns whether the process that wanted the loop has ended; asked once a tick.
     recorder : TickRecorder, optional
@@ -108,6 +115,7 @@ class Loop:
         stiffness: float = 0.0,
         override: bool = False,
         control: bool = True,
+        dead_man: bool = False,
         orphaned: Callable[[], bool] = lambda: False,
         recorder: TickRecorder | None = None,
     ) -> None:
@@ -132,6 +140,8 @@ class Loop:
         self.out = Publisher(shared, len(self.evaluator.loads))
         self.safety = Safety(limits, self.period, self.out.force)
         self.out.describe(workspace, limits)
+        self.motors = device.traits.damping is not None
+        self._prepare_safety(dead_man)
         self._prepare(limits, rate, stiffness, override, control)
         self.parameters = np.array([(r.low + r.high) / 2.0 for r in model.parameters])
         self.fault, self.now, self.holding = Fault.NONE, 0.0, False
@@ -140,19 +150,47 @@ class Loop:
         self._sent_to_device, self._heard = np.zeros(3), False
         self._before, self.wanted = math.nan, self.evaluator.force
         self._commands, self._quit = shared.command, shared.command.record["quit"]
+        self._stops, self._resumes = shared.command.record["stops"], shared.command.record["resumes"]
         self._wished = shared.command.record["parameters"]
         self._orphaned = orphaned
-        self.stages = (self.read, self.map, self.evaluate, self.limit, self.control, self.write)
+        self.stages = (
+            self.read,
+            self.guard,
+            self.map,
+            self.evaluate,
+            self.limit,
+            self.control,
+            self.write,
+        )
+
+    def _prepare_safety(self, dead_man: bool) -> None:
+        """Make all that decides whether there is a force."""
+        traits, radius = self.device.traits, self.workspace.radius
+        self.stop, self.dead_man = Stop(), dead_man
+        self.released, self.open, self.withheld = dead_man, False, Fault.NONE
+        self._buttons, self._switch, self._driver_fails = 0, False, False
+        self._check = PlaceCheck(traits.reach or 2.0 * traits.radius, traits.speed, self.period)
+        self.longest = max(HARDWARE_PATIENCE if self.motors else _PAUSE, 2.5 * self.period)
+        self._ticked, self._edge = math.nan, _EDGE * radius
+        zone = _REST if self.evaluator.holds else _AIR
+        self.evaluator.rest_zone = zone * radius * self.workspace.scale
+        if self.motors:
+            self.evaluator.release()
+        self.out.device(traits.name)
 
     def _prepare(self, limits: Limits, rate: float, stiffness: float, override: bool, control: bool) -> None:
         """Make the coupling and the passivity controller for this device, body and rate."""
         traits = self.device.traits
         self.frame = HandFrame(traits.axes)
-        self.motors = traits.damping is not None
         self.controlled = self.motors and control
         self.passivity = PassivityController(self.period, max_force=limits.max_force, max_damping=0.0)
         self.bounds = FeltStiffness(
-            self.workspace.felt(stiffness), traits.damping, rate, traits.delay, override
+            self.workspace.felt(stiffness),
+            traits.damping,
+            rate,
+            traits.delay,
+            override,
+            traits.max_stiffness,
         )
         self.coupling = Coupling(hardest=stiffness)
         self._steps = 1 if self.evaluator.remembers else STEPS
@@ -178,7 +216,7 @@ class Loop:
         rehearse : callable
             Called before each tick while there is time; see `palpate.runtime.loop`.
         """
-        metronome = Metronome(self.period)
+        metronome = Metronome(self.period, jump=self.longest)
         gc.collect()
         gc.freeze()
         gc.disable()  # nothing in the loop makes cycles, and a collection would take milliseconds
@@ -216,26 +254,45 @@ class Loop:
         """
         began = time.thread_time()
         self.now, self.fault = now, Fault.NONE
-        if jumped:
-            self.fault = Fault.CLOCK_JUMP
+        pause = now - self._ticked
+        self._ticked = now
+        if jumped or pause > self.longest or pause < 0.0 or not math.isfinite(now):
+            self.fail(Fault.CLOCK_JUMP)
         elif self._orphaned():
-            self.fault = Fault.PARENT_GONE
+            self.fail(Fault.PARENT_GONE)
         for stage in self.stages:
             stage()
-        self.out.tick(now, lateness, self.fault)
+        stopped = self.fault is Fault.NONE and self.stop.stopped
+        if self.fault is Fault.NONE:
+            self._driver_fails = False
+        self.out.hold_back(
+            self.withheld,
+            waiting=self.holding and self.evaluator.waiting,
+            stopped=self.stop.stopped,
+            released=self.released,
+        )
+        self.out.tick(now, lateness, Fault.STOPPED if stopped else self.fault)
         if self.recorder is not None:
             self.recorder.tick(self, lateness)
         self.out.worked(time.thread_time() - began)
 
     def fail(self, fault: Fault) -> None:
-        """Record what went wrong; the first fault of a tick stands."""
+        """Record what went wrong, and release the body; the first fault of a tick stands."""
         if self.fault is Fault.NONE:
-            self.fault = fault
+            self.fault = self.withheld = fault
+            self.evaluator.release()
 
     def device_failed(self, error: Exception) -> None:
-        """Record an error of the device's driver; of many, the first one's words are kept."""
+        """Record an error of the device's driver; of several ticks in a row, the first one's words are published."""
+        if not self._driver_fails:
+            self._driver_fails = True
+            self.out.words(str(error) or type(error).__name__)
         self.device_error = self.device_error or f"{type(error).__name__}: {error}"
-        self.fail(Fault.DEVICE_ERROR)
+        if isinstance(error, DeviceStopError):
+            self.fail(Fault.DEVICE_STOPPED)
+        else:
+            lost = isinstance(error, DeviceLostError | ConnectionError)
+            self.fail(Fault.DEVICE_LOST if lost else Fault.DEVICE_ERROR)
 
     def read(self) -> None:
         """Read device and commands: where the hand is, and whether that can be believed."""
@@ -245,8 +302,10 @@ class Loop:
             late = sample.asleep or stalled(self.now, sample.time, sample.patience)
             x, y, z = sample.position.tolist()
             self.holding = bool(sample.holding) and not sample.clutched
+            self._buttons, self._switch = int(sample.buttons), bool(sample.stop)
         except Exception as error:  # noqa: BLE001 - a driver is foreign code: whatever it does, the loop goes on
             self.holding = False
+            self._buttons, self._switch = 0, False
             self.out.input(holding=False, late=True)
             self.device_failed(error)
             return
@@ -255,10 +314,27 @@ class Loop:
             self.fail(Fault.INPUT_STALLED)
         if not math.isfinite(x + y + z):
             self.fail(Fault.INPUT_NOT_FINITE)
-        if self.fault is Fault.NONE:
+        elif not (self.motors and self.holding):
+            self._check.forget()
+        else:
+            self._check.see(x, y, z, sample.time, self.now)
+            if self._check.fault:
+                self.fail(Fault.IMPOSSIBLE_PLACE)
+        if self.fault is Fault.NONE and not self._check.doubts:  # a doubted place: the last good one stays
             self.frame.to_hand(sample.position, self.out.hand, clutched=sample.clutched)
             if self.motors and not late:
                 self._measure_delay(self.now - sample.time)
+
+    def guard(self) -> None:
+        """Heed a person's stop and the dead-man button, and release the body for as long as they ask."""
+        own = 1 if self.dead_man else 0
+        pressed = self._switch or self._buttons & ~own != 0
+        self.stop.heed(int(self._stops), int(self._resumes), pressed=pressed)
+        self.released = self.dead_man and not self._buttons & 1
+        if self.stop.stopped:
+            self.withheld = Fault.STOPPED
+        if self.stop.stopped or self.released:
+            self.evaluator.release()
 
     def _measure_delay(self, age: float) -> None:
         """Take the age of a sample into the mean delay, and soften a body that it makes too stiff.
@@ -277,7 +353,7 @@ class Loop:
     def map(self) -> None:
         """Turn hand metres into body metres, and take over the parameters that were set."""
         self.workspace.to_body(self.out.hand, self.out.position)
-        believed = self.fault is Fault.NONE
+        believed = self.fault is Fault.NONE and not (self.stop.stopped or self.released)
         self.evaluator.place(self.out.position, holding=self.holding, believed=believed)
         for i in range(len(self.parameters)):
             wish = float(self._wished[i])
@@ -285,18 +361,19 @@ class Loop:
                 self.parameters[i] = wish
 
     def evaluate(self) -> None:
-        """Ask the learnt body."""
-        if self.fault is not Fault.NONE or not self.holding:
+        """Ask the learnt body, and decide whether its force may be felt."""
+        self.open = False
+        answer = self.evaluator
+        if self.fault is not Fault.NONE or not self.holding or answer.waiting:
             self.coupling.reset()
         if self.fault is not Fault.NONE:
             return
-        answer = self.evaluator
         answer.elapsed = max(0.0, self.now - self._answered)
         self._answered = self.now
         try:
             if self.coupling.stiffness != self._spring:  # one that may only get stiffer where it is slack
                 self.coupling.change(self._spring)
-            if self.coupling.active and self.holding:
+            if self.coupling.active and self.holding and not answer.waiting:
                 self._answer_through_spring()
             else:
                 answer(self.out.position, self.parameters)
@@ -312,6 +389,16 @@ class Loop:
         else:
             self.coupling.reset()
             self.fail(Fault.OUTPUT_NOT_FINITE)
+        self._open()
+
+    def _open(self) -> None:
+        """Decide whether the force may be felt: a hand that is where it may be, and nothing that withholds it."""
+        if self.holding and self.wanted.any() and math.hypot(*self.out.hand.tolist()) > self._edge:
+            self.fail(Fault.OUT_OF_REGION)
+        withheld = self.fault is not Fault.NONE or self.stop.stopped or self.evaluator.waiting
+        if not withheld:
+            self.withheld = Fault.NONE
+        self.open = self.holding and not withheld and not self.released
 
     def _answer_through_spring(self) -> None:
         """Ask the learnt body at the proxy that a spring draws after the hand; the hand feels the spring."""
@@ -324,14 +411,14 @@ class Loop:
         self.wanted = coupling.pull(hand)
 
     def limit(self) -> None:
-        """Limit force, slew and ramp; zero after a fault and for a hand that doesn't hold."""
-        self.safety.apply(self.wanted, gate=self.holding and self.fault is Fault.NONE)
+        """Limit force, slew and ramp; zero for a hand that doesn't hold, and where the force is withheld."""
+        self.safety.apply(self.wanted, gate=self.open)
         self.out.clamped(self.safety.clamped)
 
     def control(self) -> None:
         """Count the energy, and damp what would give the hand more than it gave."""
         controller, force, sent = self.passivity, self.out.force, self._sent
-        if self.fault is not Fault.NONE or not self.holding:
+        if not self.open:
             sent[:] = 0.0
             controller.interrupt()
         else:

@@ -8,7 +8,7 @@ from palpate.runtime.hand_evaluator import HandEvaluator
 from palpate.runtime.loop_report import Histogram
 from palpate.runtime.passivity import PassivityController
 from palpate.runtime.safety import Fault, Limits
-from palpate.runtime.shared_state import Shared, size_of
+from palpate.runtime.shared_state import ONSETS, Shared, size_of
 from palpate.runtime.stability import FeltStiffness
 from palpate.runtime.workspace import Workspace
 
@@ -40,6 +40,8 @@ class Publisher:
         self._tick, self._time = record["tick"], record["time"]
         self._inside = record["inside"]
         self._grabbed, self._stalled, self._clamped = record["grabbed"], record["stalled"], record["clamped"]
+        self._withheld, self._waiting, self._idle = record["withheld"], record["waiting"], record["idle"]
+        self._stopped, self._released = record["stopped"], record["released"]
         self._fault, self._lateness, self._work = record["fault"], record["lateness"], record["work"]
         self._late, self._worked = Histogram(record["histogram"]), Histogram(record["work_histogram"])
         self._worst = record["lateness_max"]
@@ -52,6 +54,24 @@ class Publisher:
         self.record["max_force"] = limits.max_force
         self.record["coupling"] = math.inf
         self._inside[()] = True
+        self.record["device_stiffness"] = math.inf
+
+    def device(self, name: str) -> None:
+        """Take over what the device calls itself."""
+        self.record["device"] = name.encode()[:48]
+
+    def words(self, text: str) -> None:
+        """Take over the words of a driver's error."""
+        self.record["words"] = text.encode()[:160]
+
+    def hold_back(self, withheld: Fault, *, waiting: bool, stopped: bool, released: bool) -> None:
+        """Take over why there is no force, besides a fault: see `STATE`."""
+        self._withheld[()], self._waiting[()] = withheld, waiting
+        self._stopped[()], self._released[()] = stopped, released
+
+    def idle(self, resting: bool) -> None:
+        """Take over whether the loop ticks slowly because nobody touches."""
+        self._idle[()] = resting
 
     def input(self, *, holding: bool, late: bool) -> None:
         """Take over whether a hand holds the body, and whether its input is too old."""
@@ -85,6 +105,7 @@ class Publisher:
         )
         record["device_damping"] = math.nan if bounds.damping is None else bounds.damping
         record["unsoftened"], record["nominal_rate"] = bounds.override, bounds.rate
+        record["device_stiffness"] = bounds.stated
 
     def passivity(self, controller: PassivityController) -> None:
         """Take over the energy ledger and the damping that it asked for."""
@@ -99,7 +120,7 @@ class Publisher:
         if self._count == 1:
             self._since = now
         if fault is not self._before:
-            self._changed(fault)
+            self._changed(fault, now)
         if self._count % _EVERY == 0:
             self._pace(now)
         self._block.publish()
@@ -121,10 +142,12 @@ class Publisher:
         self._time[()] = now
         self._block.publish()
 
-    def _changed(self, fault: Fault) -> None:
+    def _changed(self, fault: Fault, now: float) -> None:
         self._before = fault
         self._fault[()] = fault
         if fault is not Fault.NONE:
+            place = self.record["faults"] % ONSETS
+            self.record["onset_times"][place], self.record["onset_kinds"][place] = now, fault
             self.record["last_fault"] = fault
             self.record["faults"] += 1
             self.record["fault_counts"][fault] += 1

@@ -49,6 +49,9 @@ FLAGS = (
     "inside",  # within the trained range
     "clamped",  # the force limit acted
     "let_go",  # the body has let go of a probe that is too deep in it
+    "waiting",  # no force until the hand is where the body holds no energy
+    "stopped",  # no force until a person resumes
+    "released",  # no force until the dead-man button is held
 )
 """Bits of a tick's flags, the lowest first: append, never reorder."""
 
@@ -322,7 +325,7 @@ class TickRecorder:
             return
         views, published, device = self._views, loop.out.record, self._device
         flags = device.flags
-        for name in ("grabbed", "stalled", "inside", "clamped", "let_go"):
+        for name in FLAGS[5:]:
             if published[name]:
                 flags |= _BIT[name]
         for name in ("tick", "hand", "contact", "force", "depth", "stiffness", "delay", "coupling"):

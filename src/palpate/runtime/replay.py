@@ -8,6 +8,7 @@ on and by how much the forces differ.
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections.abc import Callable
@@ -17,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.errors import DeviceError, UsageError
+from palpate.errors import DeviceError, DeviceLostError, DeviceStopError, UsageError
 from palpate.runtime.devices.device import Sample, Traits
 from palpate.runtime.loop import Loop
 from palpate.runtime.recorder import machine_facts, model_facts
@@ -33,6 +34,10 @@ __all__ = ["Replay", "ReplayDevice", "Replayed", "is_recorded_model", "loop_fact
 
 _LEAD, _IDLE = 0.2, 0.02  # s before a replay that is looked at begins, and between two looks at its end
 
+_ERRORS: dict[int, type[DeviceError]] = {
+    Fault.DEVICE_LOST: DeviceLostError,
+    Fault.DEVICE_STOPPED: DeviceStopError,
+}
 _BIT = {name: 1 << k for k, name in enumerate(FLAGS)}
 
 
@@ -58,10 +63,16 @@ def loop_facts(model: Touchable, loop: Loop, limits: Limits) -> dict[str, Any]:
         "body_stiffness": loop.coupling.hardest,
         "override": loop.bounds.override,
         "control": loop.controlled or traits.damping is None,
-        "limits": asdict(limits),
+        "dead_man": loop.dead_man,
+        "limits": _stated(asdict(limits)),
         "workspace": asdict(space),
-        "traits": asdict(traits),
+        "traits": _stated(asdict(traits)),
     }
+
+
+def _stated(figures: dict[str, Any]) -> dict[str, Any]:
+    """Leave out limits that nobody states: they are infinite, which JSON can't say, and so by default."""
+    return {name: value for name, value in figures.items() if value != math.inf}
 
 
 class ReplayDevice:
@@ -73,12 +84,14 @@ class ReplayDevice:
         The recorded device's.
     row : record of dtype `TICK`
         The tick that is replayed.
+    dead_man : bool
+        Whether a dead-man button was asked for.
     sent : (3,)
         The latest force, N, in the device's axes.
     """
 
-    def __init__(self, traits: Traits) -> None:
-        self.traits, self.row = traits, None
+    def __init__(self, traits: Traits, *, dead_man: bool = False) -> None:
+        self.traits, self.row, self.dead_man = traits, None, dead_man
         self.sample, self.sent = Sample(), np.zeros(3)
 
     row: Any
@@ -94,12 +107,13 @@ class ReplayDevice:
         row, sample = self.row, self.sample
         flags = int(row["flags"])
         if flags & _BIT["read_failed"]:
-            raise DeviceError("The recorded device failed here.")
+            raise _ERRORS.get(int(row["fault"]), DeviceError)("The recorded device failed here.")
         sample.position[:] = row["sample_position"]
         sample.time, sample.patience = float(row["sample_time"]), float(row["patience"])
         sample.holding = bool(flags & _BIT["holding"])
         sample.clutched = bool(flags & _BIT["clutched"])
         sample.asleep = bool(flags & _BIT["asleep"])
+        sample.buttons = 1 if self.dead_man and not flags & _BIT["released"] else 0
         return sample
 
     def write(self, force: np.ndarray) -> None:
@@ -112,7 +126,7 @@ class ReplayDevice:
         """
         self.sent[:] = force
         if self.row is not None and int(self.row["flags"]) & _BIT["write_failed"]:
-            raise DeviceError("The recorded device failed here.")
+            raise _ERRORS.get(int(self.row["fault"]), DeviceError)("The recorded device failed here.")
 
     def close(self) -> None:
         """Let go."""
@@ -172,7 +186,8 @@ class Replay:
             )
         self.trace, self.model = trace, model
         traits = header["traits"]
-        self.device = ReplayDevice(Traits(**traits | {"axes": _axes(traits["axes"])}))
+        known = Traits(**traits | {"axes": _axes(traits["axes"])})
+        self.device = ReplayDevice(known, dead_man=bool(header["dead_man"]))
         space = header["workspace"]
         workspace = Workspace(**space | {"centre": tuple(space["centre"])})
         if own_workspace:
@@ -194,6 +209,7 @@ class Replay:
             stiffness=stiffness if same or not stiffness else model.stiffness_max,
             override=bool(header["override"]),
             control=bool(header["control"]),
+            dead_man=bool(header["dead_man"]),
             orphaned=lambda: self._orphaned,
         )
         if same and trace.state is not None:
@@ -209,6 +225,9 @@ class Replay:
         known = self._commands.command.record["parameters"][: self._set.size]
         if not np.array_equal(self._set, known):
             self._commands.write_command(parameters=self._set)
+        stopped = bool(int(row["flags"]) & _BIT["stopped"])
+        if stopped != self.loop.stop.stopped:
+            self._commands.write_command(stop=stopped, resume=not stopped)
         fault = int(row["fault"])
         self._orphaned = fault == Fault.PARENT_GONE
         self.loop.tick(float(row["time"]), float(row["lateness"]), jumped=fault == Fault.CLOCK_JUMP)

@@ -1,14 +1,16 @@
 """The last word on every force: how large, how sudden, and whether at all.
 
-Inside the loop nothing raises: a fault is a value (`Fault`), and the force is zero. Three laws hold on every tick,
+Inside the loop nothing raises: a fault is a value (`Fault`), and the force is zero. Four laws hold on every tick,
 whatever the model says:
 
 - *limit*: ‖F‖ ≤ F_max; a larger force is shortened, never turned;
 - *slew*: while the gate is open, ‖F_k − F_{k−1}‖ ≤ s T, T being the tick;
 - *ramp-in*: after the gate opens (a grab, a start, the end of a fault) the force grows from zero over at
-  least 50 ms, counted in ticks, so that a late tick can't shorten it.
+  least 50 ms, counted in ticks, so that a late tick can't shorten it;
+- *heat*: where the device states a continuous force, the mean of ‖F‖² over ten seconds doesn't exceed its square.
 
-A closed gate means zero at once: letting go of the motors is the safe direction.
+A closed gate means zero at once: letting go of the motors is the safe direction. After a fault it opens again only
+where the body holds no energy (`HandEvaluator.release`), and after a stop only when a person says so (`Stop`).
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 
-__all__ = ["HARDWARE_PATIENCE", "Fault", "Limits", "Safety", "stalled"]
+__all__ = ["HARDWARE_PATIENCE", "Fault", "Limits", "PlaceCheck", "Safety", "Stop", "stalled"]
 
 
 class Fault(IntEnum):
@@ -38,6 +40,11 @@ class Fault(IntEnum):
     DEVICE_ERROR = 5
     EVALUATOR_ERROR = 6
     PARENT_GONE = 7
+    OUT_OF_REGION = 8
+    IMPOSSIBLE_PLACE = 9
+    DEVICE_STOPPED = 10
+    DEVICE_LOST = 11
+    STOPPED = 12
 
     @property
     def meaning(self) -> str:
@@ -54,11 +61,19 @@ _MEANINGS = {
     Fault.DEVICE_ERROR: "the device driver reported an error",
     Fault.EVALUATOR_ERROR: "the model could not be evaluated",
     Fault.PARENT_GONE: "the process that started the loop has ended",
+    Fault.OUT_OF_REGION: "the hand presses the body from outside the workspace",
+    Fault.IMPOSSIBLE_PLACE: "the device reports places that its arm can't be at, or can't reach so fast",
+    Fault.DEVICE_STOPPED: "the device's own safety has stopped it",
+    Fault.DEVICE_LOST: "the device is no longer there",
+    Fault.STOPPED: "stopped by a person",
 }
 
 
 HARDWARE_PATIENCE = 0.020  # s without a fresh sample after which a motorised device gets zero force
 _SHORTEST_RAMP = 0.050  # s
+_WARMING = 10.0  # s over which motors average the force; windings take longer, which is on the safe side
+_WARM = 0.8  # share of the continuous force's square from which on the limit comes down
+_DOUBTS, _DOUBTFUL = 3, 0.015  # impossible samples in a row, and the time, s, after which they are a fault
 _RISE = 0.020  # s from zero to full force where no slew is given: a tenth of a reaction time
 
 
@@ -74,6 +89,8 @@ class Limits:
         Largest rate of change of the force, N/s; 0 chooses full force in 20 ms.
     ramp : float
         Time in which the force grows after a grab, s, at least 0.05.
+    continuous : float
+        Largest force that the motors bear for long, N; infinite where the device states none.
 
     Raises
     ------
@@ -84,9 +101,11 @@ class Limits:
     max_force: float
     slew: float = 0.0
     ramp: float = _SHORTEST_RAMP
+    continuous: float = math.inf
 
     def __post_init__(self) -> None:
-        if not (0.0 < self.max_force < math.inf and 0.0 <= self.slew < math.inf):
+        positive = self.max_force > 0.0 and self.continuous > 0.0
+        if not (positive and self.max_force < math.inf and 0.0 <= self.slew < math.inf):
             raise UsageError(
                 f"A force limit of {self.max_force:g} N and a slew of {self.slew:g} N/s protect nobody.",
                 fix="Give positive, finite limits.",
@@ -102,7 +121,7 @@ class Limits:
 
 
 class Safety:
-    """Applies the three laws, one tick at a time.
+    """Applies the four laws, one tick at a time.
 
     Attributes
     ----------
@@ -117,18 +136,22 @@ class Safety:
         self.clamped = False
         self._max, self._step = limits.max_force, limits.slew * period
         self._rise = period / limits.ramp
+        self._allowed, self._continuous = limits.max_force, limits.continuous
+        self._cooling, self._heat = period / _WARMING, 0.0
         self._gain = 0.0
         self._was = (0.0, 0.0, 0.0)
 
     def apply(self, wanted: np.ndarray, *, gate: bool) -> None:
         """Turn the wanted force (3,), finite, N, into the one that may be sent; a closed gate sends zero."""
+        if self._continuous < self._max:
+            self._warm()
         if not gate:
             self.stop()
             return
         x, y, z = wanted.tolist()
         norm = math.hypot(x, y, z)
-        self.clamped = norm > self._max
-        share = self._gain * (self._max / norm if self.clamped else 1.0)
+        self.clamped = norm > self._allowed
+        share = self._gain * (self._allowed / norm if self.clamped else 1.0)
         self._gain = min(1.0, self._gain + self._rise)
         u, v, w = self._was
         dx, dy, dz = share * x - u, share * y - v, share * z - w
@@ -137,6 +160,15 @@ class Safety:
         # both ends lie in the ball of radius F_max, and so does every point between them
         self._was = (u + part * dx, v + part * dy, w + part * dz)
         self.force[0], self.force[1], self.force[2] = self._was
+
+    def _warm(self) -> None:
+        """Bring the limit down towards the continuous force as the motors get warm."""
+        u, v, w = self._was
+        self._heat += self._cooling * (u * u + v * v + w * w - self._heat)
+        bearable = self._continuous**2
+        spare = (bearable - self._heat) / ((1.0 - _WARM) * bearable)
+        share = min(1.0, max(0.0, spare))
+        self._allowed = self._continuous + share * (self._max - self._continuous)
 
     def stop(self) -> None:
         """Zero force now; the next open gate ramps in again."""
@@ -149,3 +181,83 @@ class Safety:
 def stalled(now: float, seen: float, patience: float) -> bool:
     """Return whether an input last heard of at `seen` (s) is older than `patience` (s); true if a time is NaN."""
     return not now - seen <= patience
+
+
+class PlaceCheck:
+    """Doubts places that are finite but impossible: out of the arm's reach, or too far from the last one.
+
+    A single bad sample is passed over; three in a row, or 15 ms of them, are a fault. After that the newest place is
+    what the next one is compared with, so that an arm which was moved while nobody looked is believed again.
+
+    Attributes
+    ----------
+    doubts : int
+        Impossible samples in a row; 0 where the latest is believed.
+    fault : bool
+        Whether they are too many.
+
+    Parameters
+    ----------
+    reach : float
+        No place is farther from the centre than this, m.
+    speed : float
+        No handle is faster than this, m/s.
+    period : float
+        Shortest time between two samples, s.
+    """
+
+    def __init__(self, reach: float, speed: float, period: float) -> None:
+        self.doubts, self.fault = 0, False
+        self._reach, self._speed, self._period = reach, speed, period
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin anew: nobody holds the device."""
+        self.doubts, self.fault = 0, False
+        self._last = (math.nan, math.nan, math.nan)
+        self._time, self._since = -math.inf, 0.0
+
+    def see(self, x: float, y: float, z: float, time: float, now: float) -> None:
+        """Take a finite place, m, of the time (s) that its sample bears, in the tick that began at `now`, s."""
+        if time == self._time:  # the sample of the tick before
+            self.fault = self.doubts > 0 and (self.fault or now - self._since > _DOUBTFUL)
+            return
+        u, v, w = self._last
+        way = math.hypot(x - u, y - v, z - w)
+        longest = self._speed * max(self._period, time - self._time) if self._time > -math.inf else math.inf
+        self._time = time
+        if way > longest or math.hypot(x, y, z) > self._reach:  # no way is known from the first place
+            if not self.doubts:
+                self._since = now
+            self.doubts += 1
+            self.fault = self.fault or self.doubts >= _DOUBTS or now - self._since > _DOUBTFUL
+            if not self.fault:
+                return
+        else:
+            self.doubts, self.fault = 0, False
+        self._last = (x, y, z)
+
+
+class Stop:
+    """A person's stop: the force stays zero until the person resumes.
+
+    Attributes
+    ----------
+    stopped : bool
+        Whether the force is stopped.
+    """
+
+    def __init__(self) -> None:
+        self.stopped = False
+        self._stops = self._resumes = 0
+
+    def heed(self, stops: int, resumes: int, *, pressed: bool) -> None:
+        """Take the counts of the commands so far, and whether a stop button of the device is pressed.
+
+        Of a stop and a resume that arrive in one tick the stop counts: their order isn't known.
+        """
+        if pressed or stops != self._stops:
+            self.stopped = True
+        elif resumes != self._resumes:
+            self.stopped = False
+        self._stops, self._resumes = stops, resumes

@@ -24,6 +24,7 @@ from palpate.network import shared_memory
 from palpate.network.shared_memory import Block
 from palpate.runtime.loop_report import BINS, percentile
 from palpate.runtime.passivity import LEDGER
+from palpate.runtime.safety import Fault
 from palpate.runtime.stability import FeltStiffness
 
 __all__ = [
@@ -42,6 +43,7 @@ __all__ = [
 MAX_INPUTS = 8
 MAX_PLACES = 4096
 FAULT_KINDS = 16
+ONSETS = 32  # of faults, whose times are kept
 
 STATE = np.dtype(
     [
@@ -63,6 +65,15 @@ STATE = np.dtype(
         ("last_fault", "i4"),  # the latest that was not NONE
         ("faults", "i8"),  # onsets since the start
         ("fault_counts", "i8", FAULT_KINDS),  # the same by kind
+        ("onset_times", "f8", ONSETS),  # s, of the latest onsets: number k is at k modulo their count
+        ("onset_kinds", "i4", ONSETS),
+        ("withheld", "i4"),  # `Fault` that took the force, until it may come back
+        ("waiting", "u1"),  # no force until the hand is where the body holds no energy
+        ("stopped", "u1"),  # no force until a person resumes
+        ("released", "u1"),  # no force until the dead-man button is held
+        ("idle", "u1"),  # nobody touches: the loop ticks more slowly
+        ("words", "S160"),  # of the driver's latest error, UTF-8
+        ("device", "S48"),  # what the device calls itself, UTF-8
         ("clamped_ticks", "i8"),
         ("lateness", "f8"),  # s, this tick's start behind its schedule
         ("lateness_max", "f8"),
@@ -74,6 +85,7 @@ STATE = np.dtype(
         ("ledger", "f8", LEDGER),  # of the passivity controller, see `State`
         ("delay", "f8"),  # s, measured, from the device's sample to its force
         ("device_damping", "f8"),  # N·s/m; NaN for a device without motors
+        ("device_stiffness", "f8"),  # N/m, the largest that its maker states; inf: none
         ("body_stiffness", "f8"),  # N/m in hand metres, the body's largest; 0 where it isn't known
         ("nominal_rate", "f8"),  # Hz, as asked
         (
@@ -102,6 +114,8 @@ COMMAND = np.dtype(
         ("grabbed", "u1"),
         ("hidden", "u1"),  # the tab is in the background
         ("quit", "u1"),
+        ("stops", "i8"),  # counts the stops
+        ("resumes", "i8"),  # counts the ends of a stop
         ("target", "f8", 3),  # m, hand in device coordinates
         ("period", "f8"),  # s between heartbeats
         ("parameters", "f8", MAX_INPUTS),  # the untouched inputs; NaN: not set, middle of its range
@@ -135,6 +149,15 @@ class State:
     last_fault: int
     faults: int
     fault_counts: np.ndarray
+    onset_times: np.ndarray
+    onset_kinds: np.ndarray
+    withheld: int
+    waiting: bool
+    stopped: bool
+    released: bool
+    idle: bool
+    words: str
+    device: str
     clamped_ticks: int
     lateness: float
     lateness_max: float
@@ -146,6 +169,7 @@ class State:
     ledger: np.ndarray
     delay: float
     device_damping: float
+    device_stiffness: float
     body_stiffness: float
     nominal_rate: float
     coupling: float
@@ -184,7 +208,33 @@ class State:
         """The stiffness of the body in this hand, and its bound, with the delay that was measured."""
         damping = None if math.isnan(self.device_damping) else self.device_damping
         rate = self.nominal_rate
-        return FeltStiffness(self.body_stiffness, damping, rate, self.delay, self.unsoftened)
+        own = self.device_stiffness
+        return FeltStiffness(self.body_stiffness, damping, rate, self.delay, self.unsoftened, own)
+
+    @property
+    def onsets(self) -> tuple[tuple[float, Fault], ...]:
+        """The latest onsets of faults, the newest last: time, s, and kind."""
+        latest = range(max(0, self.faults - ONSETS), self.faults)
+        return tuple(
+            (float(self.onset_times[k % ONSETS]), Fault(self.onset_kinds[k % ONSETS])) for k in latest
+        )
+
+    @property
+    def reason(self) -> str:
+        """Why there is no force now, and what brings it back, in words; empty where it may flow."""
+        fault = Fault(self.fault)
+        if self.stopped:
+            return "Stopped: the force stays zero until you resume."
+        if fault is not Fault.NONE:
+            said = f" ({self.words})" if self.words and fault in _DRIVER else ""
+            return f"No force: {fault.meaning}{said}."
+        if self.released:
+            return "No force: the dead-man button is not held."
+        if not self.waiting:
+            return ""
+        after = Fault(self.withheld)
+        since = f" since {after.meaning}" if after is not Fault.NONE else ""
+        return f"No force yet{since}: move the hand out of the body, or bring what it holds back to rest."
 
     @property
     def lateness_p50(self) -> float:
@@ -217,12 +267,19 @@ class State:
     @classmethod
     def of(cls, record: np.ndarray, indentation: np.ndarray) -> State:
         """Copy records of dtype `STATE` and `INDENTATION`, shape ()."""
-        flags = {"inside", "let_go", "clamped", "grabbed", "stalled", "unsoftened"}
         values: dict[str, Any] = {}
         for name in STATE.names or ():
             value = record[name]
-            values[name] = value.copy() if value.ndim else bool(value) if name in flags else value.item()
+            if value.ndim:
+                values[name] = value.copy()
+            elif value.dtype.kind == "S":
+                values[name] = value.item().decode(errors="replace")
+            else:
+                values[name] = bool(value) if value.dtype == np.uint8 else value.item()
         return cls(**values, indentation=indentation["amplitude"][: indentation["count"]].astype(float))
+
+
+_DRIVER = (Fault.DEVICE_ERROR, Fault.DEVICE_STOPPED, Fault.DEVICE_LOST)  # whose words say more
 
 
 def size_of(indentation: np.ndarray) -> int:
@@ -343,6 +400,8 @@ class Shared:
         period: float | None = None,
         parameters: Sequence[float] | np.ndarray | None = None,
         quit: bool | None = None,
+        stop: bool = False,
+        resume: bool = False,
     ) -> None:
         """Change what is given, keep the rest, publish.
 
@@ -358,6 +417,8 @@ class Shared:
             What the page promises between two heartbeats.
         parameters : (p,), optional
             The untouched inputs in SI units, p ≤ 8.
+        stop, resume : bool
+            A person stops the force now, or ends a stop.
 
         Raises
         ------
@@ -373,6 +434,8 @@ class Shared:
             if target is not None:
                 record["target"] = target
                 record["sequence"] += 1
+            record["stops"] += stop
+            record["resumes"] += resume
             if parameters is not None:
                 if len(parameters) > MAX_INPUTS:
                     raise UsageError(

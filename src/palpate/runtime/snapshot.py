@@ -30,6 +30,8 @@ _OUTSIDE = {
     "stages",
     "_wished",  # views of the command block
     "_quit",
+    "_stops",
+    "_resumes",
     "_arguments",  # weights and tables that kernels read, and their scratch
     "_constants",
     "_posterior",

@@ -92,6 +92,8 @@ class FeltStiffness:
         From the device's sample to its force, beyond the hold of one tick, s.
     override : bool
         Whether the body shall feel as stiff as it is, whatever follows from that.
+    stated : float
+        Largest stiffness that the device's maker states, N/m; infinite where none is stated.
     """
 
     body: float
@@ -99,13 +101,17 @@ class FeltStiffness:
     rate: float
     delay: float = 0.0
     override: bool = False
+    stated: float = math.inf
 
     @property
     def bound(self) -> float:
-        """The largest stiffness, N/m, with which the loop is passive; infinite on a device without motors."""
-        return (
-            math.inf if self.damping is None else passive_stiffness(self.damping, self.rate, delay=self.delay)
-        )
+        """The largest stiffness, N/m, with which the loop is passive, or that the maker states where that is less.
+
+        Infinite on a device without motors.
+        """
+        if self.damping is None:
+            return math.inf
+        return min(self.stated, passive_stiffness(self.damping, self.rate, delay=self.delay))
 
     @property
     def coupling(self) -> float:
@@ -129,6 +135,8 @@ class FeltStiffness:
             f"with the device's damping of {self.damping:g} N·s/m, {self.rate:.0f} Hz and a delay of "
             f"{1e3 * self.delay:.3g} ms the loop is passive up to {self.bound:.0f} N/m"
         )
+        if self.bound == self.stated:
+            limits = f"its maker states {self.stated:.0f} N/m for the device"
         if self.body <= self.bound:
             return f"stiffest touch {self.body:.0f} N/m; {limits}"
         if self.override:

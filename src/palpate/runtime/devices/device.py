@@ -6,6 +6,7 @@ checklist in ``tests/runtime/test_device_checklist.py`` then holds it to this co
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, Protocol, TypeVar
@@ -23,6 +24,9 @@ __all__ = ["Device", "Sample", "Traits", "settings_from"]
 class Traits:
     """Traits of a kind of device, known before one is opened.
 
+    An opened device whose own word differs has `traits` of its own: the loop asks those, and of two limits the smaller
+    counts.
+
     Attributes
     ----------
     radius : float
@@ -39,6 +43,18 @@ class Traits:
         From a sample to the force that answers it, as far as it is the device's own and no time stamp shows it, s.
     axes : (3, 3) floats, row by row
         What turns the device's own axes into x right, y up, z towards the user; a rotation, det +1.
+    max_stiffness : float
+        Largest stiffness that its maker states, N/m; infinite where none is stated.
+    continuous_force : float
+        Force that its motors bear for long, N; infinite where none is stated.
+    reach : float
+        No place of the handle is farther from the centre, m; 0 takes twice the radius.
+    speed : float
+        No handle is faster, m/s: a sample that says so is not believed.
+    buttons : int
+        How many buttons `Sample.buttons` tells of.
+    name : str
+        What the opened device calls itself; empty takes the name of its kind.
     """
 
     radius: float
@@ -48,6 +64,12 @@ class Traits:
     mass: float = 0.1
     delay: float = 0.0
     axes: Axes = PLAIN_AXES
+    max_stiffness: float = math.inf
+    continuous_force: float = math.inf
+    reach: float = 0.0
+    speed: float = 5.0
+    buttons: int = 0
+    name: str = ""
 
 
 class Sample:
@@ -67,9 +89,14 @@ class Sample:
         The device itself says that nobody is looking or steering: counts as stalled at any age.
     clutched : bool
         A clutch is pressed: the device moves alone, and nothing is felt until it is let go.
+    buttons : int
+        Buttons that are pressed, one bit each, without those that the driver itself uses. The first is the dead-man
+        button where one is asked for; any other stops the force.
+    stop : bool
+        A stop switch of the device is pressed.
     """
 
-    __slots__ = ("asleep", "clutched", "holding", "patience", "position", "time")
+    __slots__ = ("asleep", "buttons", "clutched", "holding", "patience", "position", "stop", "time")
 
     def __init__(self, patience: float = HARDWARE_PATIENCE) -> None:
         self.position = np.zeros(3)
@@ -78,19 +105,21 @@ class Sample:
         self.holding = False
         self.asleep = False
         self.clutched = False
+        self.buttons = 0
+        self.stop = False
 
 
 class Device(Protocol):
     """A haptic device, real or virtual.
 
     `read` and `write` are called once a tick. They must not block for longer than a fraction of it and must
-    not allocate. Whatever they raise, best a `DeviceError` or an `OSError`, the loop turns into a fault and zero
-    force.
+    not allocate. Whatever they raise, the loop turns into a fault and zero force: best a `DeviceStopError` where the
+    device's own safety acts, a `DeviceLostError` where it is gone, a `DeviceError` or an `OSError` for the rest.
     """
 
     @property
     def traits(self) -> Traits:
-        """Workspace, force and damping of this kind of device."""
+        """Workspace, force and damping: of this device once it is opened, until then of its kind."""
         ...
 
     def read(self, now: float) -> Sample:

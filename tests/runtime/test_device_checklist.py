@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import contextlib
 import math
+import sys
 import tracemalloc
 
+import evdev_double
 import numpy as np
 import pytest
+from evdev_double import Pad
 from library_double import LibraryDouble
 
 from palpate.errors import UsageError
 from palpate.runtime.device_doubles import DOUBLES
 from palpate.runtime.devices import Sample, device_named, device_names, device_traits
 from palpate.runtime.devices.haply_simulator import HaplySimulator, SimulatorSettings
+
+# settings of the doubles; a thread that calls back must not do so while tracemalloc stops, which Python doesn't bear
+STARTS = {"forcedimension": {"manual": 1}, "openhaptics": {"speed": 20, "manual_after": 50}}
 
 
 @pytest.fixture(params=device_names())
@@ -27,9 +33,12 @@ def served(name, request):
     if name == "haply":
         with HaplySimulator(SimulatorSettings(port=0, events=0)) as service:
             yield f"haply:ws://127.0.0.1:{service.port},events={service.events_port},wait=1"
+    elif name == "gamepad":
+        request.getfixturevalue("monkeypatch").setitem(sys.modules, "evdev", evdev_double.module(Pad()))
+        yield name
     elif name in DOUBLES:
         library = request.getfixturevalue("double")(name)
-        LibraryDouble(library, manual=1)
+        LibraryDouble(library, **STARTS[name])
         yield f"{name}:library={library}"
     else:
         yield name

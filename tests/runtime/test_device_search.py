@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from palpate.runtime import device_search
@@ -57,9 +59,9 @@ def test_an_empty_machine_has_the_devices_of_this_version(empty):
         ("forcedimension", "/home/me/odd-name.so", {"PALPATE_DHD": "/home/me/odd-name.so"}),
         ("forcedimension", "/home/me/libdhd.so", {"PALPATE_DHD": "/home/me"}),
         ("forcedimension", "/a/libdhd.so", {"LD_LIBRARY_PATH": "/nowhere:/a"}),
-        ("hd", "/usr/lib/libHD.so", {}),
-        ("hd", "/opt/OpenHaptics/Developer/3.4-0/lib64/libHD.so.3.4", {}),
-        ("hd", "/kit/lib/libHD.so", {"OH_SDK_BASE": "/kit"}),
+        ("openhaptics", "/usr/lib/libHD.so", {}),
+        ("openhaptics", "/opt/OpenHaptics/Developer/3.4-0/lib64/libHD.so.3.4", {}),
+        ("openhaptics", "/kit/lib/libHD.so", {"OH_SDK_BASE": "/kit"}),
     ],
 )
 def test_a_library_is_found_where_it_lies(empty, device, path, environment):
@@ -102,7 +104,7 @@ def test_gamepads_come_from_the_kernels_list(empty):
     listing = touch(empty.root, "/proc/bus/input/devices")
     listing.write_text(GAMEPAD, encoding="utf-8")
     touch(empty.root, "/dev/input/event7")
-    found = entry("evdev").look(empty)
+    found = entry("gamepad").look(empty)
     assert found.state != "absent"
     assert "Pad of two sticks at /dev/input/event7" in found.detail
     assert "mouse" not in found.detail
@@ -110,7 +112,17 @@ def test_gamepads_come_from_the_kernels_list(empty):
 
 def test_a_gamepad_that_can_not_be_read_says_what_to_do(empty):
     touch(empty.root, "/proc/bus/input/devices").write_text(GAMEPAD, encoding="utf-8")
-    assert "group input" in entry("evdev").look(empty).remedy
+    assert "group input" in entry("gamepad").look(empty).remedy
+
+
+@pytest.mark.parametrize("installed", [False, True])
+def test_a_gamepad_needs_its_package(empty, installed):
+    touch(empty.root, "/proc/bus/input/devices").write_text(GAMEPAD, encoding="utf-8")
+    touch(empty.root, "/dev/input/event7")
+    there = replace(empty, installed=lambda package: installed and package == "evdev")
+    found = entry("gamepad").look(there)
+    assert found.state == ("ready" if installed else "present")
+    assert ("palpate[gamepad]" in found.remedy) is not installed
 
 
 def test_what_is_driven_is_ready_by_its_name(empty, monkeypatch):

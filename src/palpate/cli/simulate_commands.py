@@ -99,6 +99,17 @@ def forcedimension(
     _compile("forcedimension", folder, definitions | {"HOMED": homed, "LOST_AFTER": lost_after}, as_json)
 
 
+@simulate_app.command()
+def openhaptics(
+    folder: Folder = Path("palpate-doubles"),
+    amplitude: Amplitude = 0.03,
+    frequency: Frequency = 0.5,
+    as_json: Json = False,
+) -> None:
+    """Compile a double of 3D Systems' OpenHaptics library, with a Touch behind it."""
+    _compile("openhaptics", folder, {"AMPLITUDE": amplitude, "FREQUENCY": frequency}, as_json)
+
+
 def _compile(device: str, folder: Path, definitions: dict[str, float], as_json: bool) -> None:
     """Compile the double of a library and say how it is used."""
     from palpate.runtime.device_doubles import compile_double

@@ -8,6 +8,7 @@ found is asked of the table in `palpate.runtime.devices`: an entry whose `device
 from __future__ import annotations
 
 import ctypes
+import importlib.util
 import os
 import socket
 import sys
@@ -42,6 +43,10 @@ def _port_answers(host: str, port: int) -> bool:
         return False
 
 
+def _is_installed(package: str) -> bool:
+    return importlib.util.find_spec(package) is not None
+
+
 @dataclass(frozen=True)
 class Surroundings:
     """The machine that is searched; a test lays out one of its own.
@@ -56,12 +61,15 @@ class Surroundings:
         ``linux``, ``darwin`` or ``win32``.
     answers : callable
         Returns whether something listens on a host's port.
+    installed : callable
+        Returns whether a package of Python is there, by its name.
     """
 
     root: Path = Path("/")
     environment: Mapping[str, str] = field(default_factory=lambda: os.environ)
     platform: str = sys.platform
     answers: Callable[[str, int], bool] = _port_answers
+    installed: Callable[[str], bool] = _is_installed
 
     def place(self, path: str) -> Path:
         """Return where an absolute path lies below the root."""
@@ -262,17 +270,19 @@ class GamepadSearch:
     """Gamepads in the Linux kernel's list of input devices: those with a joystick's handler."""
 
     name: str = "Gamepad (evdev)"
-    device: str = "evdev"
+    device: str = "gamepad"
     listing: str = "/proc/bus/input/devices"
 
     def look(self, surroundings: Surroundings) -> Finding:
         """Return the finding on this machine."""
         pads = list(self._pads(surroundings))
         state, driven = _state(bool(pads), self.device)
-        install = "Plug it in; on another system than Linux none is looked for."
+        install = "Plug it in; on another system than Linux use it on the page, palpate view."
         closed = [path for _, path in pads if not os.access(surroundings.place(path), os.R_OK)]
         detail = ", ".join(f"{name} at {path}" for name, path in pads) or "none plugged in"
         remedy = _advice(state, driven, install)
+        if pads and driven and not surroundings.installed("evdev"):
+            state, remedy = "present", "Install the package that reads it: pip install 'palpate[gamepad]'."
         if closed:
             detail += f"; {', '.join(closed)} can't be read"
             remedy = f"Add yourself to the group input, and log in again. {remedy}".strip()
@@ -317,7 +327,7 @@ HARDWARE: tuple[_Search, ...] = (
     ),
     LibrarySearch(
         name="3D Systems Touch, Touch X, Phantom (OpenHaptics HD)",
-        device="hd",
+        device="openhaptics",
         files={
             "linux": ("libHD.so", "libHD.so.3.4", "libHD.so.3.4.0"),
             "darwin": ("HD.framework/HD",),

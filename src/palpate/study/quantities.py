@@ -23,7 +23,6 @@ __all__ = [
     "Record",
     "SquareMetres",
     "Stiffness",
-    "Triple",
     "Unit",
     "in_si",
 ]
@@ -74,7 +73,6 @@ Densities = Annotated[float, Unit("kg/m^3")]
 Stiffness = Annotated[float, Unit("N/m")]
 PadStiffness = Annotated[float, Unit("N/m^3")]
 Pair = tuple[Metres, Metres]
-Triple = tuple[Metres, Metres, Metres]
 
 
 class Record(BaseModel):

@@ -8,7 +8,9 @@ from typing import Protocol
 from palpate.errors import UsageError
 from palpate.runtime.devices.device import Device, Sample, Traits
 from palpate.runtime.devices.force_dimension import ForceDimensionDevice
+from palpate.runtime.devices.gamepad import GamepadDevice
 from palpate.runtime.devices.haply import HaplyDevice
+from palpate.runtime.devices.openhaptics import OpenHapticsDevice
 from palpate.runtime.devices.page import PageDevice
 from palpate.runtime.devices.simulated import SimulatedHand
 from palpate.runtime.devices.stroke import StrokeDevice
@@ -29,6 +31,8 @@ _KINDS: dict[str, _Kind] = {
     "simulated": SimulatedHand,
     "haply": HaplyDevice,
     "forcedimension": ForceDimensionDevice,
+    "openhaptics": OpenHapticsDevice,
+    "gamepad": GamepadDevice,
 }
 
 

@@ -1,0 +1,433 @@
+"""3D Systems Touch and Touch X, and the Phantom devices before them, through the vendor's library OpenHaptics HD.
+
+The library is loaded when a device is opened, see `openhaptics_library`. It has a thread of its own, which calls
+`_frame` a thousand times a second. That and the loop meet in two mailboxes: `_latest` holds what the device said,
+`_wanted` what the loop wants. Each is one immutable tuple, put there by a single assignment, so that neither side ever
+sees half of an entry of the other. A force is therefore up to a frame late; `Traits.delay` says so. Calls begin with
+the first reading: before that, while kernels are compiled, they would only take the interpreter's lock from them.
+
+A force that is older than 20 ms is not sent: the loop must have stopped. After that, and after errors of the motors'
+own limits (warm, too much force, too sudden, too fast), the force is zero until the loop has been told, has answered
+with zero force, and a pause is over. Any other error ends the callback, with zero force, and the loop is told in words.
+
+The library's frame is ours: x right, y up, z towards the user. It has mm, here it is m; the origin here is the middle
+of the usable workspace.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from ctypes import byref, c_double, c_int, c_ubyte
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from palpate.errors import DeviceError, DeviceLostError, DeviceStopError, UsageError
+from palpate.runtime.devices.device import Sample, Traits, settings_from
+from palpate.runtime.devices.openhaptics_library import (
+    DONE,
+    GOING_ON,
+    LOST,
+    NO_DEVICE,
+    Callback,
+    Code,
+    HdError,
+    HdLibrary,
+)
+from palpate.runtime.devices.profiles import DeviceProfile, device_profile
+from palpate.runtime.safety import HARDWARE_PATIENCE
+from palpate.runtime.shared_state import Block
+from palpate.runtime.shared_state import now as loop_clock
+from palpate.runtime.workspace import PLAIN_AXES
+
+__all__ = ["AXES", "OpenHapticsDevice", "OpenHapticsSettings"]
+
+AXES = PLAIN_AXES
+
+# a word in the model's name, and the profile; the Touch X took the Desktop's place in the vendor's range
+_MODELS = {"touch x": "desktop", "touchx": "desktop", "desktop": "desktop", "omni": "omni", "touch": "touch"}
+_UNKNOWN = "touch"  # the least of all
+_DAMPING, _MASS = 0.5, 0.045  # N·s/m, assumed; kg, apparent at the tip of a Touch (3D Systems' data sheet)
+_PRIORITY = 0xFFFF  # of the callback, the highest
+_FIRST, _START, _FASTEST = 50, 2.0, 1.0  # frames at the start, s that they may take, m/s
+_MARGIN, _UNSTATED_REACH = 0.02, 0.4  # m around the largest workspace; m where none is stated
+_PAUSE, _LONGEST_PAUSE, _AGAIN = (
+    0.1,
+    5.0,
+    10.0,
+)  # s of zero force after an error, doubled where it comes again so soon
+_GOODBYE = 0.1  # s for the last frame
+_BUTTONS = 4
+_MM = 1e-3
+
+
+@dataclass(frozen=True)
+class OpenHapticsSettings:
+    """Settings of the connection.
+
+    Attributes
+    ----------
+    device : str
+        Name of the device in the vendor's configuration.
+    library : str
+        File of the vendor's library; empty looks for it.
+    rate : float
+        Frames per second of the library's scheduler, Hz; 500 or 1000.
+    clutch : float
+        Button, 1 to 4, that works as a clutch; 0 for none.
+    inkwell : {"rest", "ignore"}
+        Whether a stylus that stands in its inkwell lets go of the body.
+    switch : {"ignore", "hold"}
+        Whether the force acts only while the device's safety switch is active.
+    """
+
+    device: str = "Default Device"
+    library: str = ""
+    rate: float = 1000.0
+    clutch: float = 0.0
+    inkwell: str = "rest"
+    switch: str = "ignore"
+
+    def __post_init__(self) -> None:
+        words = self.inkwell in {"rest", "ignore"} and self.switch in {"ignore", "hold"}
+        numbers = self.rate in {500.0, 1000.0} and self.clutch in set(range(_BUTTONS + 1))
+        if not (words and numbers and self.device):
+            raise UsageError(
+                "An option of openhaptics is out of range.",
+                why="rate is 500 or 1000 Hz, clutch a button 1 … 4 or 0, inkwell is rest or ignore, switch is ignore "
+                "or hold.",
+                fix="For example openhaptics:clutch=2.",
+            )
+
+
+class OpenHapticsDevice:
+    """One device behind the vendor's library.
+
+    Attributes
+    ----------
+    traits : Traits
+        Of the opened device: of its own figures and those of its profile, the smaller ones.
+    profile : DeviceProfile
+        The profile that its model has.
+    name : str
+        Its model and serial number.
+    frames : int
+        Frames so far.
+
+    Parameters
+    ----------
+    settings : OpenHapticsSettings, optional
+        Settings of the connection.
+    clock : callable
+        Returns the time of the loop's clock, s.
+    """
+
+    traits: ClassVar[Traits] = Traits(
+        0.10,
+        7.9,
+        _DAMPING,
+        "before it is opened: Phantom Desktop's, the largest; damping: none is published, 0.5 N·s/m is assumed",
+        mass=_MASS,
+        delay=1e-3,
+        axes=AXES,
+        buttons=_BUTTONS,
+    )
+
+    def __init__(
+        self, settings: OpenHapticsSettings | None = None, clock: Callable[[], float] = loop_clock
+    ) -> None:
+        from palpate.runtime.device_search import load_library
+
+        self._settings = settings = settings or OpenHapticsSettings()
+        self._clock = clock
+        self._hd = HdLibrary(load_library("openhaptics", settings.library))
+        self.sample, self.frames, self.name = Sample(), 0, f"The OpenHaptics device {settings.device!r}"
+        self._clutch = 1 << int(settings.clutch) >> 1
+        self._rests, self._needs_switch = settings.inkwell == "rest", settings.switch == "hold"
+        self._place, self._speed, self._push = (c_double * 3)(), (c_double * 3)(), (c_double * 3)()
+        self._mask, self._inkwell, self._switch = c_int(), c_ubyte(), c_ubyte()
+        # mailboxes: frames so far, time, place in mm, buttons, whether it is in a hand; force in N and its time
+        self._latest = (0, -math.inf, 0.0, 0.0, 0.0, 0, False)
+        self._wanted = (0.0, 0.0, 0.0, -math.inf)
+        # stops so far, the last one's words, and until when it lasts at least; those that were told and are over
+        self._stop, self._told, self._resumed = (0, "", -math.inf), 0, 0
+        self._lost, self._ended = False, ""
+        self._pause, self._failed, self._leaving, self._closed = _PAUSE, -math.inf, False, False
+        self._first: list[tuple[float, ...]] = []
+        self._callback = Callback(self._called)  # kept: the library has only its address
+        self._handle, self._running, self._calm = 0, False, True
+        self._device = self._connect()
+        try:
+            self._identify()
+            self._calibrate()
+            self._start()
+        except BaseException:
+            self.close()
+            raise
+
+    @classmethod
+    def open(cls, commands: Block, options: Mapping[str, str]) -> OpenHapticsDevice:
+        """Open from texts such as ``{"clutch": "2"}``."""
+        return cls(settings_from(OpenHapticsSettings, options))
+
+    def read(self, now: float) -> Sample:
+        """Return what the device said in its latest frame; one without a new frame keeps the sample's time."""
+        self._check_open()
+        if self._calm:
+            self._calm = False
+            self._schedule()
+        sample = self.sample
+        frame, seen, x, y, z, mask, held = self._latest
+        if frame != self.frames:
+            self.frames = frame
+            centre, position = self._centre, sample.position
+            position[0], position[1], position[2] = (
+                x * _MM - centre[0],
+                y * _MM - centre[1],
+                z * _MM - centre[2],
+            )
+            sample.time = max(sample.time, now - max(0.0, self._clock() - seen))
+            sample.holding, sample.clutched = held, bool(mask & self._clutch)
+            sample.buttons = mask & ~self._clutch
+        if self._ended:
+            kind = DeviceLostError if self._lost else DeviceError
+            raise kind(self._ended, fix="Check cable and power, then start again.")
+        count, words, _ = self._stop
+        if count != self._resumed:
+            self._told = count
+            raise DeviceStopError(words)
+        return sample
+
+    def write(self, force: np.ndarray) -> None:
+        """Leave a force (3,), N, for the next frame; one over the device's maximum is shortened."""
+        self._check_open()
+        x, y, z = force.tolist()
+        norm = math.hypot(x, y, z)
+        if not math.isfinite(norm):
+            raise DeviceError("A force that is not a finite number was kept from the OpenHaptics device.")
+        if norm > self.traits.max_force:  # more than that, and the library turns the forces off
+            share = self.traits.max_force / norm
+            x, y, z = share * x, share * y, share * z
+        moment = self._clock()
+        self._wanted = (x, y, z, moment)
+        count, _, until = self._stop
+        if count != self._resumed and count == self._told and norm == 0.0 and moment >= until:
+            self._resumed = count
+
+    def close(self) -> None:
+        """Zero force in a last frame, then stop the scheduler and let go."""
+        if self._closed:
+            return
+        self._closed = True
+        hd = self._hd
+        self._wanted, self._leaving = (0.0, 0.0, 0.0, -math.inf), True
+        if self._running:
+            end = time.monotonic() + _GOODBYE
+            while hd.hdWaitForCompletion(self._handle, 0) and time.monotonic() < end:
+                time.sleep(1e-3)
+            if hd.hdWaitForCompletion(self._handle, 0):
+                hd.hdUnschedule(self._handle)
+            hd.hdStopScheduler()
+        hd.hdDisable(Code.FORCE_OUTPUT)
+        hd.hdDisableDevice(self._device)
+        hd.errors()  # nobody is left to hear them
+
+    def _called(self, _: object) -> int:
+        """Work for one frame, on the library's thread; returns whether to be called again."""
+        try:
+            going_on = self._frame()
+        except Exception as error:  # noqa: BLE001 - raised here it would be printed, and the callback end in silence
+            self._ended = f"The driver of {self.name} failed: {type(error).__name__}: {error}"
+            going_on = False
+        return GOING_ON if going_on else DONE
+
+    def _frame(self) -> bool:
+        """Open a frame: take what the device says, send what the loop wants; returns whether another may come."""
+        hd, device, moment = self._hd, self._device, self._clock()
+        x, y, z, written = self._wanted
+        if x != 0.0 or y != 0.0 or z != 0.0:
+            if moment - written > HARDWARE_PATIENCE and self._stop[0] == self._resumed:
+                self._hold_back(
+                    f"The loop sent {self.name} no force for {1e3 * HARDWARE_PATIENCE:.0f} ms.", moment
+                )
+            if self._stop[0] != self._resumed or self._leaving:
+                x = y = z = 0.0
+        leaving, push, place = self._leaving, self._push, self._place
+        push[0], push[1], push[2] = x, y, z
+        hd.hdBeginFrame(device)
+        hd.hdGetDoublev(Code.POSITION, place)
+        hd.hdGetIntegerv(Code.BUTTONS, byref(self._mask))
+        if self._rests:
+            hd.hdGetBooleanv(Code.INKWELL, byref(self._inkwell))
+        if self._needs_switch:
+            hd.hdGetBooleanv(Code.SAFETY_SWITCH, byref(self._switch))
+        if self._calm:
+            hd.hdGetDoublev(Code.VELOCITY, self._speed)
+            self._first.append((*place, *self._speed))
+        hd.hdSetDoublev(Code.FORCE, push)
+        hd.hdEndFrame(device)
+        held = not self._inkwell.value and (bool(self._switch.value) or not self._needs_switch)
+        if not self._heed(hd.errors(), moment):
+            return False
+        self._latest = (self._latest[0] + 1, moment, *place, self._mask.value, held)
+        return len(self._first) < _FIRST if self._calm else not leaving
+
+    def _hold_back(self, words: str, moment: float) -> None:
+        """Keep the force at zero until the loop has been told and a pause is over."""
+        again = moment - self._failed < _AGAIN
+        self._pause = min(2.0 * self._pause, _LONGEST_PAUSE) if again else _PAUSE
+        self._failed = moment
+        self._stop = (self._stop[0] + 1, words, moment + self._pause)
+
+    def _heed(self, errors: list[HdError], moment: float) -> bool:
+        """Take the errors of a frame; returns whether the next one may come."""
+        if not errors:
+            return True
+        fatal = next((error for error in errors if not error.survivable), None)
+        if fatal is None:
+            words = f"{self.name} has turned its forces off: {self._hd.in_words(errors[0])}."
+            self._hold_back(words, moment)
+            if not self._hd.hdIsEnabled(Code.FORCE_OUTPUT):
+                self._hd.hdEnable(Code.FORCE_OUTPUT)
+            return True
+        self._lost = fatal.code in LOST
+        self._ended = f"{self.name} has failed: {self._hd.in_words(fatal)}."
+        if all(error.allows_frames for error in errors):
+            self._push[0] = self._push[1] = self._push[2] = 0.0
+            self._hd.hdBeginFrame(self._device)
+            self._hd.hdSetDoublev(Code.FORCE, self._push)
+            self._hd.hdEndFrame(self._device)
+            self._hd.errors()
+        return False
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise DeviceError("The OpenHaptics device is closed.", fix="Open it again.")
+
+    def _refuse(self, errors: list[HdError], what: str, fix: str) -> None:
+        if errors:
+            raise DeviceError(f"{self.name} {what}.", why=self._hd.in_words(errors[0]), fix=fix)
+
+    def _connect(self) -> int:
+        device = int(self._hd.hdInitDevice(self._settings.device.encode()))
+        errors = self._hd.errors()
+        if errors or device == NO_DEVICE:
+            why = self._hd.in_words(errors[0]) if errors else "The library says nothing more."
+            raise DeviceError(
+                f"{self.name} can't be opened.",
+                why=why,
+                fix="Connect it, switch it on and set it up in the vendor's own program (Touch Setup), which also "
+                "gives it its name; close other programs that use it; and check the licence of OpenHaptics.",
+            )
+        self._hd.hdMakeCurrentDevice(device)
+        return device
+
+    def _identify(self) -> None:
+        """Find out which device it is, and what it may do."""
+        hd = self._hd
+        hd.hdBeginFrame(self._device)
+        model, serial = hd.text(Code.MODEL), hd.text(Code.SERIAL)
+        force, continuous, stiffness = (
+            _positive(hd.numbers(code, 1))
+            for code in (Code.MAX_FORCE, Code.CONTINUOUS_FORCE, Code.MAX_STIFFNESS)
+        )
+        usable, largest = (hd.numbers(code, 6) for code in (Code.USABLE_WORKSPACE, Code.MAX_WORKSPACE))
+        hd.hdEndFrame(self._device)
+        self._refuse(hd.errors(), "can't be asked what it is", "Start it again.")
+        known = next((name for word, name in _MODELS.items() if word in model.lower()), "")
+        self.profile: DeviceProfile = device_profile(known or _UNKNOWN)
+        self.name = f"3D Systems {model or 'device'}{f' {serial}' if serial else ''}"
+        self._centre, inner = _middle(usable)
+        outer = [abs(side * _MM - self._centre[i % 3]) for i, side in enumerate(largest)]
+        corner = math.hypot(*(max(outer[i], outer[i + 3]) for i in range(3))) if outer else 0.0
+        self.traits = Traits(  # type: ignore[misc]  # a device's word goes before that of its kind
+            min(self.profile.radius, inner),
+            min(self.profile.max_force, force),
+            _DAMPING,
+            f"the smaller of its own figures and the profile of {self.profile.name}"
+            f"{'' if known else ', since its model is unknown'}; damping: none is published, {_DAMPING:g} N·s/m is "
+            "assumed; mass: the data sheet of a Touch",
+            mass=_MASS,
+            delay=1.0 / self._settings.rate,
+            axes=AXES,
+            max_stiffness=min(self.profile.max_stiffness, stiffness / _MM),
+            continuous_force=continuous,
+            reach=corner + _MARGIN if math.isfinite(corner) and corner > 0.05 else _UNSTATED_REACH,
+            buttons=_BUTTONS,
+            name=self.name,
+        )
+
+    def _calibrate(self) -> None:
+        """Refuse a device whose positions are wrong; one that can be calibrated as it stands is."""
+        hd = self._hd
+        hd.hdBeginFrame(self._device)
+        state = hd.hdCheckCalibration()
+        if state == Code.NEEDS_UPDATE:
+            style = c_int()
+            hd.hdGetIntegerv(Code.CALIBRATION_STYLE, byref(style))
+            for way in (Code.AUTOMATIC, Code.IN_INKWELL):
+                if state != Code.CALIBRATED and style.value & way:
+                    hd.hdUpdateCalibration(way)
+                    state = hd.hdCheckCalibration()
+        hd.hdEndFrame(self._device)
+        errors = hd.errors()
+        if state != Code.CALIBRATED or errors:
+            raise DeviceError(
+                f"{self.name} is not calibrated: its positions are wrong.",
+                why=hd.in_words(errors[0]) if errors else f"It reports 0x{state:04x}.",
+                fix="Put the stylus into its inkwell and start again, or calibrate it in the vendor's own program "
+                "(Touch Diagnostic).",
+            )
+
+    def _start(self) -> None:
+        """Turn the forces on, at zero, and throw the first positions away once they look right."""
+        hd, rate = self._hd, int(self._settings.rate)
+        hd.hdEnable(Code.FORCE_OUTPUT)
+        self._refuse(hd.errors(), "doesn't turn its forces on", "Check its power supply.")
+        hd.hdEnable(Code.CLAMPING)
+        hd.errors()  # a help that is not relied on
+        hd.hdSetSchedulerRate(rate)
+        self._refuse(hd.errors(), f"doesn't run at {rate} Hz", "Try openhaptics:rate=500.")
+        self._schedule()
+        hd.hdStartScheduler()
+        self._running = True
+        self._refuse(hd.errors(), "has no running scheduler", "Close other programs that use it.")
+        end = time.monotonic() + _START
+        while hd.hdWaitForCompletion(self._handle, 0) and time.monotonic() < end:
+            time.sleep(1e-3)
+        if self._ended:
+            raise DeviceError(self._ended, fix="Check cable and power, then start again.")
+        if len(self._first) < _FIRST:
+            raise DeviceError(
+                f"{self.name} gave {len(self._first)} positions in {_START:g} s.", fix="Start it again."
+            )
+        for *place, u, v, w in self._first[_FIRST // 2 :]:  # several drivers deliver garbage at first
+            far = math.hypot(*(p * _MM - c for p, c in zip(place, self._centre, strict=True)))
+            speed = math.hypot(u, v, w) * _MM
+            if not (far <= self.traits.reach and speed <= _FASTEST):
+                raise DeviceError(
+                    f"{self.name} starts {far:.3g} m from its centre with {speed:.3g} m/s.",
+                    why=f"A start is within {self.traits.reach:.3g} m and slower than {_FASTEST:g} m/s.",
+                    fix="Calibrate it, and hold it still while it is opened.",
+                )
+
+    def _schedule(self) -> None:
+        self._handle = self._hd.hdScheduleAsynchronous(self._callback, None, _PRIORITY)
+        self._refuse(self._hd.errors(), "takes no callback", "Close other programs that use it.")
+
+
+def _positive(values: tuple[float, ...]) -> float:
+    """Return a device's own limit; infinite where it states none."""
+    return values[0] if values and math.isfinite(values[0]) and values[0] > 0.0 else math.inf
+
+
+def _middle(box: tuple[float, ...]) -> tuple[tuple[float, float, float], float]:
+    """Return centre and radius, m, of the sphere in a box of the library, mm; one that is none has neither."""
+    sides = [(b - a) * _MM for a, b in zip(box[:3], box[3:], strict=True)]
+    if not sides or not all(0.02 < side < 2.0 for side in sides):
+        return (0.0, 0.0, 0.0), math.inf
+    x, y, z = ((a + b) / 2.0 * _MM for a, b in zip(box[:3], box[3:], strict=True))
+    return (x, y, z), min(sides) / 2.0

@@ -102,6 +102,7 @@ def _run(options: argparse.Namespace) -> int:
         orphaned=orphaned,
         recorder=recorder,
     )
+    loop.out.device(traits.name or options.device.partition(":")[0])
     if recorder is not None:
         recorder.ring.describe(loop_facts(model, loop, limits))
         recorder.begin(loop)

@@ -36,7 +36,7 @@ from palpate.runtime.devices.page import PageDevice
 from palpate.runtime.hand_evaluator import HandEvaluator
 from palpate.runtime.passivity import PassivityController, largest_damping
 from palpate.runtime.publisher import Publisher
-from palpate.runtime.realtime import Metronome
+from palpate.runtime.realtime import Metronome, Rest
 from palpate.runtime.recording import TickRecorder
 from palpate.runtime.safety import HARDWARE_PATIENCE, Fault, Limits, PlaceCheck, Safety, Stop, stalled
 from palpate.runtime.shared_state import MAX_INPUTS, MAX_PLACES, Shared, now
@@ -172,11 +172,11 @@ class Loop:
         self._check = PlaceCheck(traits.reach or 2.0 * traits.radius, traits.speed, self.period)
         self.longest = max(HARDWARE_PATIENCE if self.motors else _PAUSE, 2.5 * self.period)
         self._ticked, self._edge = math.nan, _EDGE * radius
+        self.rest, self._was = Rest(self.period), (0.0, 0.0, 0.0)
         zone = _REST if self.evaluator.holds else _AIR
         self.evaluator.rest_zone = zone * radius * self.workspace.scale
         if self.motors:
             self.evaluator.release()
-        self.out.device(traits.name)
 
     def _prepare(self, limits: Limits, rate: float, stiffness: float, override: bool, control: bool) -> None:
         """Make the coupling and the passivity controller for this device, body and rate."""
@@ -223,7 +223,8 @@ class Loop:
         try:
             metronome.start()
             while not self._quit and self.fault is not Fault.PARENT_GONE:
-                self.tick(metronome.wait(rehearse), metronome.lateness, jumped=metronome.jumped)
+                now = metronome.wait(rehearse, resting=self.rest.resting)
+                self.tick(now, metronome.lateness, jumped=metronome.jumped)
         finally:
             gc.enable()
             gc.unfreeze()
@@ -271,10 +272,26 @@ class Loop:
             stopped=self.stop.stopped,
             released=self.released,
         )
-        self.out.tick(now, lateness, Fault.STOPPED if stopped else self.fault)
+        fault = Fault.STOPPED if stopped else self.fault
+        self.out.tick(now, lateness, fault, resting=self.rest.resting)
+        self._rest(pause)
         if self.recorder is not None:
             self.recorder.tick(self, lateness)
         self.out.worked(time.thread_time() - began)
+
+    def _rest(self, elapsed: float) -> None:
+        """Decide whether the next tick may take its time: see `palpate.runtime.realtime`."""
+        x, y, z = self.out.hand.tolist()
+        u, v, w = self._was
+        self._was = (x, y, z)
+        answer = self.evaluator
+        if self.fault is not Fault.NONE:
+            distance = 0.0
+        elif not self.holding or self.stop.stopped or self.released:
+            distance = math.inf
+        else:
+            distance = 0.0 if answer.holds or answer.waiting else -answer.depth / self.workspace.scale
+        self.rest.see(elapsed, distance, math.hypot(x - u, y - v, z - w))
 
     def fail(self, fault: Fault) -> None:
         """Record what went wrong, and release the body; the first fault of a tick stands."""
@@ -322,7 +339,7 @@ class Loop:
                 self.fail(Fault.IMPOSSIBLE_PLACE)
         if self.fault is Fault.NONE and not self._check.doubts:  # a doubted place: the last good one stays
             self.frame.to_hand(sample.position, self.out.hand, clutched=sample.clutched)
-            if self.motors and not late:
+            if self.motors and not late and not self.rest.resting:
                 self._measure_delay(self.now - sample.time)
 
     def guard(self) -> None:

@@ -53,6 +53,8 @@ class LoopProcess:
     unsoftened : bool
         Whether a body that is too stiff for its device, its rate and delay shall feel so all the same; by default it
         is touched through a spring that makes it as soft as they bear.
+    dead_man : bool
+        Whether the force acts only while the device's first button is held.
     parameters : (p,) floats
         Values of the inputs that the hand doesn't supply; the middle of their ranges by default.
     record : path, optional
@@ -78,6 +80,7 @@ class LoopProcess:
         max_force: float | None = None,
         slew: float = 0.0,
         unsoftened: bool = False,
+        dead_man: bool = False,
         parameters: Sequence[float] = (),
         record: str | os.PathLike[str] | None = None,
         replay: str | os.PathLike[str] | None = None,
@@ -94,6 +97,8 @@ class LoopProcess:
         self._arguments = [os.fspath(model), *(f"{key}={value}" for key, value in settings.items())]
         if unsoftened:
             self._arguments.append("--unsoftened")
+        if dead_man:
+            self._arguments.append("--dead-man")
         if replay is not None:
             self._arguments.append(f"--replay={os.fspath(replay)}")
         self._model, self._record = model, record

@@ -69,10 +69,6 @@ class Publisher:
         self._withheld[()], self._waiting[()] = withheld, waiting
         self._stopped[()], self._released[()] = stopped, released
 
-    def idle(self, resting: bool) -> None:
-        """Take over whether the loop ticks slowly because nobody touches."""
-        self._idle[()] = resting
-
     def input(self, *, holding: bool, late: bool) -> None:
         """Take over whether a hand holds the body, and whether its input is too old."""
         self._grabbed[()], self._stalled[()] = holding, late
@@ -111,11 +107,16 @@ class Publisher:
         """Take over the energy ledger and the damping that it asked for."""
         self._ledger[:] = controller.ledger
 
-    def tick(self, now: float, lateness: float, fault: Fault) -> None:
-        """Close the tick that began at `now` (s), `lateness` (s) behind its schedule, and publish it."""
+    def tick(self, now: float, lateness: float, fault: Fault, *, resting: bool = False) -> None:
+        """Close the tick that began at `now` (s), `lateness` (s) behind its schedule, and publish it.
+
+        The lateness of a `resting` loop, which no hand could feel, is not counted.
+        """
         self._count += 1
         self._tick[()], self._time[()], self._lateness[()] = self._count, now + self.offset, lateness
-        self._late.add(lateness)
+        self._idle[()] = resting
+        if not resting:
+            self._late.add(lateness)
         self._worst[()] = self._late.maximum
         if self._count == 1:
             self._since = now

@@ -46,7 +46,8 @@ def device(dhd):
 
 
 @pytest.fixture
-def loop(device, plain, shared):
+def loop(dhd, device, plain, shared):
+    drive(device, dhd, 1950)  # the hand has gone down and up, and is back at rest: there a force may begin
     return Loop(plain, device, shared, Workspace(0.075, 10.0), Limits(12.0), rate=1000.0)
 
 
@@ -262,8 +263,11 @@ def test_a_force_that_fails_is_noticed_by_the_loop(dhd, loop):
     assert "takes no force" in loop.device_error
     assert "communication error" in loop.device_error
     again = run(loop, dhd, 200)
+    assert all(force == 0.0 for force, _ in again), "still in the body"
     assert again[-1][1] is Fault.NONE
-    assert again[1][0] < 0.5 * again[-1][0], "it ramps in"
+    forces = np.array([force for force, _ in run(loop, dhd, 1000)])
+    assert forces[-1] > 0.5, "the hand was back at rest after a second"
+    assert forces[np.flatnonzero(forces)[:3]].max() < 0.1, "it grew from nothing"
 
 
 def test_a_lost_cable_is_zero_force_and_a_reason(dhd, loop):

@@ -1,14 +1,12 @@
 """3D Systems Touch and Touch X, and the Phantom devices before them, through the vendor's library OpenHaptics HD.
 
-The library is loaded when a device is opened, see `openhaptics_library`. It has a thread of its own, which calls
-`_frame` a thousand times a second. That and the loop meet in two mailboxes: `_latest` holds what the device said,
-`_wanted` what the loop wants. Each is one immutable tuple, put there by a single assignment, so that neither side ever
-sees half of an entry of the other. A force is therefore up to a frame late; `Traits.delay` says so. Calls begin with
-the first reading: before that, while kernels are compiled, they would only take the interpreter's lock from them.
+The library is loaded when a device is opened, see `openhaptics_library`. It has a thread of its own, which calls a
+compiled function a thousand times a second, see `openhaptics_servo`. That and the loop meet in a mailbox. A place is
+therefore up to a frame old, and a force up to a frame late; `Traits.delay` says so.
 
 A force that is older than 20 ms is not sent: the loop must have stopped. After that, and after errors of the motors'
 own limits (warm, too much force, too sudden, too fast), the force is zero until the loop has been told, has answered
-with zero force, and a pause is over. Any other error ends the callback, with zero force, and the loop is told in words.
+with zero force, and a pause is over. Any other error ends the calls, with zero force, and the loop is told in words.
 
 The library's frame is ours: x right, y up, z towards the user. It has mm, here it is m; the origin here is the middle
 of the usable workspace.
@@ -18,8 +16,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
-from ctypes import byref, c_double, c_int, c_ubyte
+from collections.abc import Mapping
+from ctypes import byref, c_int
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -27,20 +25,24 @@ import numpy as np
 
 from palpate.errors import DeviceError, DeviceLostError, DeviceStopError, UsageError
 from palpate.runtime.devices.device import Sample, Traits, settings_from
-from palpate.runtime.devices.openhaptics_library import (
-    DONE,
-    GOING_ON,
-    LOST,
-    NO_DEVICE,
-    Callback,
-    Code,
-    HdError,
-    HdLibrary,
+from palpate.runtime.devices.openhaptics_library import LOST, NO_DEVICE, Code, HdError, HdLibrary
+from palpate.runtime.devices.openhaptics_servo import (
+    CALM,
+    CAUSE,
+    FATAL,
+    FATAL_INTERNAL,
+    FIRST,
+    INTERNAL,
+    LEAVING,
+    RESUMED,
+    SILENCE,
+    STOPS,
+    Mailbox,
+    servo,
 )
 from palpate.runtime.devices.profiles import DeviceProfile, device_profile
 from palpate.runtime.safety import HARDWARE_PATIENCE
 from palpate.runtime.shared_state import Block
-from palpate.runtime.shared_state import now as loop_clock
 from palpate.runtime.workspace import PLAIN_AXES
 
 __all__ = ["AXES", "OpenHapticsDevice", "OpenHapticsSettings"]
@@ -52,7 +54,7 @@ _MODELS = {"touch x": "desktop", "touchx": "desktop", "desktop": "desktop", "omn
 _UNKNOWN = "touch"  # the least of all
 _DAMPING, _MASS = 0.5, 0.045  # N·s/m, assumed; kg, apparent at the tip of a Touch (3D Systems' data sheet)
 _PRIORITY = 0xFFFF  # of the callback, the highest
-_FIRST, _START, _FASTEST = 50, 2.0, 1.0  # frames at the start, s that they may take, m/s
+_START, _FASTEST = 2.0, 1.0  # s that the frames of the start may take, m/s
 _MARGIN, _UNSTATED_REACH = 0.02, 0.4  # m around the largest workspace; m where none is stated
 _PAUSE, _LONGEST_PAUSE, _AGAIN = (
     0.1,
@@ -121,8 +123,6 @@ class OpenHapticsDevice:
     ----------
     settings : OpenHapticsSettings, optional
         Settings of the connection.
-    clock : callable
-        Returns the time of the loop's clock, s.
     """
 
     traits: ClassVar[Traits] = Traits(
@@ -131,35 +131,28 @@ class OpenHapticsDevice:
         _DAMPING,
         "before it is opened: Phantom Desktop's, the largest; damping: none is published, 0.5 N·s/m is assumed",
         mass=_MASS,
-        delay=1e-3,
+        delay=2e-3,
         axes=AXES,
         buttons=_BUTTONS,
     )
 
-    def __init__(
-        self, settings: OpenHapticsSettings | None = None, clock: Callable[[], float] = loop_clock
-    ) -> None:
+    def __init__(self, settings: OpenHapticsSettings | None = None) -> None:
         from palpate.runtime.device_search import load_library
 
         self._settings = settings = settings or OpenHapticsSettings()
-        self._clock = clock
         self._hd = HdLibrary(load_library("openhaptics", settings.library))
         self.sample, self.frames, self.name = Sample(), 0, f"The OpenHaptics device {settings.device!r}"
         self._clutch = 1 << int(settings.clutch) >> 1
         self._rests, self._needs_switch = settings.inkwell == "rest", settings.switch == "hold"
-        self._place, self._speed, self._push = (c_double * 3)(), (c_double * 3)(), (c_double * 3)()
-        self._mask, self._inkwell, self._switch = c_int(), c_ubyte(), c_ubyte()
-        # mailboxes: frames so far, time, place in mm, buttons, whether it is in a hand; force in N and its time
-        self._latest = (0, -math.inf, 0.0, 0.0, 0.0, 0, False)
-        self._wanted = (0.0, 0.0, 0.0, -math.inf)
-        # stops so far, the last one's words, and until when it lasts at least; those that were told and are over
-        self._stop, self._told, self._resumed = (0, "", -math.inf), 0, 0
-        self._lost, self._ended = False, ""
-        self._pause, self._failed, self._leaving, self._closed = _PAUSE, -math.inf, False, False
-        self._first: list[tuple[float, ...]] = []
-        self._callback = Callback(self._called)  # kept: the library has only its address
-        self._handle, self._running, self._calm = 0, False, True
+        self._place, self._now = np.zeros(3), -math.inf
+        # stops that were told and that are over; what was told, and until when it lasts at least
+        self._told, self._resumed, self._words, self._until = 0, 0, "", -math.inf
+        self._pause, self._failed = _PAUSE, -math.inf
+        self._handle, self._running, self._calm, self._closed = 0, False, True, False
         self._device = self._connect()
+        patience = round(HARDWARE_PATIENCE * settings.rate) - 2
+        self._box = Mailbox(self._hd.addresses(), self._device, patience)
+        self._cells = self._box.cells
         try:
             self._identify()
             self._calibrate()
@@ -178,27 +171,22 @@ class OpenHapticsDevice:
         self._check_open()
         if self._calm:
             self._calm = False
+            self._cells[CALM] = 0.0
             self._schedule()
-        sample = self.sample
-        frame, seen, x, y, z, mask, held = self._latest
+        self._now, sample, cells = now, self.sample, self._cells
+        frame, mask, inkwell, switch = self._box.read(self._place)
         if frame != self.frames:
-            self.frames = frame
-            centre, position = self._centre, sample.position
-            position[0], position[1], position[2] = (
-                x * _MM - centre[0],
-                y * _MM - centre[1],
-                z * _MM - centre[2],
-            )
-            sample.time = max(sample.time, now - max(0.0, self._clock() - seen))
-            sample.holding, sample.clutched = held, bool(mask & self._clutch)
-            sample.buttons = mask & ~self._clutch
-        if self._ended:
-            kind = DeviceLostError if self._lost else DeviceError
-            raise kind(self._ended, fix="Check cable and power, then start again.")
-        count, words, _ = self._stop
-        if count != self._resumed:
-            self._told = count
-            raise DeviceStopError(words)
+            self.frames, sample.time = frame, now
+            np.multiply(self._place, _MM, out=sample.position)
+            sample.position -= self._centre
+            sample.holding = not (inkwell and self._rests) and (switch or not self._needs_switch)
+            sample.clutched, sample.buttons = bool(mask & self._clutch), mask & ~self._clutch
+        if cells[FATAL] != 0.0:
+            raise self._failure()
+        if (stops := int(cells[STOPS])) != self._resumed:
+            if stops != self._told:
+                self._take_stop(stops, now)
+            raise DeviceStopError(self._words)
         return sample
 
     def write(self, force: np.ndarray) -> None:
@@ -211,11 +199,11 @@ class OpenHapticsDevice:
         if norm > self.traits.max_force:  # more than that, and the library turns the forces off
             share = self.traits.max_force / norm
             x, y, z = share * x, share * y, share * z
-        moment = self._clock()
-        self._wanted = (x, y, z, moment)
-        count, _, until = self._stop
-        if count != self._resumed and count == self._told and norm == 0.0 and moment >= until:
-            self._resumed = count
+        self._box.write(x, y, z)
+        if self._told != self._resumed and norm == 0.0 and self._now >= self._until:
+            if not self._hd.hdIsEnabled(Code.FORCE_OUTPUT):
+                self._hd.hdEnable(Code.FORCE_OUTPUT)
+            self._cells[RESUMED] = self._resumed = self._told
 
     def close(self) -> None:
         """Zero force in a last frame, then stop the scheduler and let go."""
@@ -223,7 +211,7 @@ class OpenHapticsDevice:
             return
         self._closed = True
         hd = self._hd
-        self._wanted, self._leaving = (0.0, 0.0, 0.0, -math.inf), True
+        self._cells[LEAVING] = 1.0
         if self._running:
             end = time.monotonic() + _GOODBYE
             while hd.hdWaitForCompletion(self._handle, 0) and time.monotonic() < end:
@@ -235,73 +223,25 @@ class OpenHapticsDevice:
         hd.hdDisableDevice(self._device)
         hd.errors()  # nobody is left to hear them
 
-    def _called(self, _: object) -> int:
-        """Work for one frame, on the library's thread; returns whether to be called again."""
-        try:
-            going_on = self._frame()
-        except Exception as error:  # noqa: BLE001 - raised here it would be printed, and the callback end in silence
-            self._ended = f"The driver of {self.name} failed: {type(error).__name__}: {error}"
-            going_on = False
-        return GOING_ON if going_on else DONE
+    def _take_stop(self, stops: int, now: float) -> None:
+        """Keep the force at zero for a pause, longer where the last stop was not long ago."""
+        cause = self._cells[CAUSE]
+        if cause == SILENCE:
+            self._words = f"The loop sent {self.name} no force for {1e3 * HARDWARE_PATIENCE:.0f} ms."
+        else:
+            error = HdError(int(cause), int(self._cells[INTERNAL]), self._device)
+            self._words = f"{self.name} has turned its forces off: {self._hd.in_words(error)}."
+        if stops > self._told + 1 or self._told == self._resumed:  # not the same one, still going on
+            again = now - self._failed < _AGAIN
+            self._pause = min(2.0 * self._pause, _LONGEST_PAUSE) if again else _PAUSE
+        self._failed, self._until, self._told = now, now + self._pause, stops
 
-    def _frame(self) -> bool:
-        """Open a frame: take what the device says, send what the loop wants; returns whether another may come."""
-        hd, device, moment = self._hd, self._device, self._clock()
-        x, y, z, written = self._wanted
-        if x != 0.0 or y != 0.0 or z != 0.0:
-            if moment - written > HARDWARE_PATIENCE and self._stop[0] == self._resumed:
-                self._hold_back(
-                    f"The loop sent {self.name} no force for {1e3 * HARDWARE_PATIENCE:.0f} ms.", moment
-                )
-            if self._stop[0] != self._resumed or self._leaving:
-                x = y = z = 0.0
-        leaving, push, place = self._leaving, self._push, self._place
-        push[0], push[1], push[2] = x, y, z
-        hd.hdBeginFrame(device)
-        hd.hdGetDoublev(Code.POSITION, place)
-        hd.hdGetIntegerv(Code.BUTTONS, byref(self._mask))
-        if self._rests:
-            hd.hdGetBooleanv(Code.INKWELL, byref(self._inkwell))
-        if self._needs_switch:
-            hd.hdGetBooleanv(Code.SAFETY_SWITCH, byref(self._switch))
-        if self._calm:
-            hd.hdGetDoublev(Code.VELOCITY, self._speed)
-            self._first.append((*place, *self._speed))
-        hd.hdSetDoublev(Code.FORCE, push)
-        hd.hdEndFrame(device)
-        held = not self._inkwell.value and (bool(self._switch.value) or not self._needs_switch)
-        if not self._heed(hd.errors(), moment):
-            return False
-        self._latest = (self._latest[0] + 1, moment, *place, self._mask.value, held)
-        return len(self._first) < _FIRST if self._calm else not leaving
-
-    def _hold_back(self, words: str, moment: float) -> None:
-        """Keep the force at zero until the loop has been told and a pause is over."""
-        again = moment - self._failed < _AGAIN
-        self._pause = min(2.0 * self._pause, _LONGEST_PAUSE) if again else _PAUSE
-        self._failed = moment
-        self._stop = (self._stop[0] + 1, words, moment + self._pause)
-
-    def _heed(self, errors: list[HdError], moment: float) -> bool:
-        """Take the errors of a frame; returns whether the next one may come."""
-        if not errors:
-            return True
-        fatal = next((error for error in errors if not error.survivable), None)
-        if fatal is None:
-            words = f"{self.name} has turned its forces off: {self._hd.in_words(errors[0])}."
-            self._hold_back(words, moment)
-            if not self._hd.hdIsEnabled(Code.FORCE_OUTPUT):
-                self._hd.hdEnable(Code.FORCE_OUTPUT)
-            return True
-        self._lost = fatal.code in LOST
-        self._ended = f"{self.name} has failed: {self._hd.in_words(fatal)}."
-        if all(error.allows_frames for error in errors):
-            self._push[0] = self._push[1] = self._push[2] = 0.0
-            self._hd.hdBeginFrame(self._device)
-            self._hd.hdSetDoublev(Code.FORCE, self._push)
-            self._hd.hdEndFrame(self._device)
-            self._hd.errors()
-        return False
+    def _failure(self) -> DeviceError:
+        """Return the error that ended the calls."""
+        error = HdError(int(self._cells[FATAL]), int(self._cells[FATAL_INTERNAL]), self._device)
+        kind = DeviceLostError if error.code in LOST else DeviceError
+        words = f"{self.name} has failed: {self._hd.in_words(error)}."
+        return kind(words, fix="Check cable and power, then start again.")
 
     def _check_open(self) -> None:
         if self._closed:
@@ -351,7 +291,7 @@ class OpenHapticsDevice:
             f"{'' if known else ', since its model is unknown'}; damping: none is published, {_DAMPING:g} N·s/m is "
             "assumed; mass: the data sheet of a Touch",
             mass=_MASS,
-            delay=1.0 / self._settings.rate,
+            delay=2.0 / self._settings.rate,
             axes=AXES,
             max_stiffness=min(self.profile.max_stiffness, stiffness / _MM),
             continuous_force=continuous,
@@ -398,13 +338,16 @@ class OpenHapticsDevice:
         end = time.monotonic() + _START
         while hd.hdWaitForCompletion(self._handle, 0) and time.monotonic() < end:
             time.sleep(1e-3)
-        if self._ended:
-            raise DeviceError(self._ended, fix="Check cable and power, then start again.")
-        if len(self._first) < _FIRST:
+        if self._cells[FATAL] != 0.0:
+            raise self._failure()
+        self.frames = self._box.read(self._place)[0]  # old by the time of the first reading, and not told
+        if self.frames < FIRST:
             raise DeviceError(
-                f"{self.name} gave {len(self._first)} positions in {_START:g} s.", fix="Start it again."
+                f"{self.name} gave {self.frames} positions in {_START:g} s.", fix="Start it again."
             )
-        for *place, u, v, w in self._first[_FIRST // 2 :]:  # several drivers deliver garbage at first
+        for *place, u, v, w in self._box.early()[
+            FIRST // 2 :
+        ].tolist():  # several drivers deliver garbage at first
             far = math.hypot(*(p * _MM - c for p, c in zip(place, self._centre, strict=True)))
             speed = math.hypot(u, v, w) * _MM
             if not (far <= self.traits.reach and speed <= _FASTEST):
@@ -415,7 +358,8 @@ class OpenHapticsDevice:
                 )
 
     def _schedule(self) -> None:
-        self._handle = self._hd.hdScheduleAsynchronous(self._callback, None, _PRIORITY)
+        cells = self._cells.ctypes.data
+        self._handle = self._hd.hdScheduleAsynchronous(servo().address, cells, _PRIORITY)
         self._refuse(self._hd.errors(), "takes no callback", "Close other programs that use it.")
 
 

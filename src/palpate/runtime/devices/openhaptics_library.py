@@ -2,10 +2,6 @@
 
 The library is loaded by whoever makes an `HdLibrary`, and not before. Names, numbers and types are those of the HD
 headers (hdDevice, hdDefines, hdScheduler; 3.30): lengths in mm, velocities in mm/s, forces in N, stiffness in N/mm.
-
-Functions that are called within a frame keep Python's interpreter lock: each of them takes microseconds, and to give
-the lock away would let the loop's thread, which spins before its ticks, in between. All others let it go, since they
-may wait for a callback.
 """
 
 from __future__ import annotations
@@ -17,14 +13,12 @@ from typing import Any
 
 from palpate.errors import DeviceError
 
-__all__ = ["DONE", "GOING_ON", "LOST", "NO_DEVICE", "SURVIVABLE", "Callback", "Code", "HdError", "HdLibrary"]
+__all__ = ["DONE", "GOING_ON", "LOST", "NO_DEVICE", "Code", "HdError", "HdLibrary"]
 
 NO_DEVICE = 0xFFFFFFFF
 DONE, GOING_ON = 0, 1  # what a callback returns
 
-SURVIVABLE = frozenset((0x0200, 0x0201, 0x0202, 0x0203))  # the motors' own limits: force comes back
 LOST = frozenset((0x0104, 0x0300, 0x0302))  # handle, device, communication: the device is gone
-_FRAMES = frozenset((0x0104, 0x0400, 0x0401, 0x0402))  # after these not even a last frame may be opened
 
 _MEANINGS = {
     0x0100: "a parameter that it doesn't know",
@@ -69,22 +63,10 @@ class HdError(ctypes.Structure):
 
     _fields_ = (("code", c_uint), ("internal", c_int), ("device", c_uint))
 
-    @property
-    def survivable(self) -> bool:
-        """Whether the force may come back by itself."""
-        return self.code in SURVIVABLE
-
-    @property
-    def allows_frames(self) -> bool:
-        """Whether another frame may be begun."""
-        return self.code not in _FRAMES
-
-
-Callback = ctypes.CFUNCTYPE(c_uint, c_void_p)
 
 _DOUBLES, _INTEGERS, _BYTES = POINTER(c_double), POINTER(c_int), POINTER(c_ubyte)
 # name: type of the result, types of the arguments
-_WITHIN_A_FRAME: dict[str, tuple[Any, tuple[Any, ...]]] = {
+_SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "hdBeginFrame": (None, (c_uint,)),
     "hdEndFrame": (None, (c_uint,)),
     "hdGetDoublev": (None, (c_uint, _DOUBLES)),
@@ -95,8 +77,6 @@ _WITHIN_A_FRAME: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "hdEnable": (None, (c_uint,)),
     "hdGetError": (HdError, ()),
     "hdGetErrorString": (c_char_p, (c_uint,)),
-}
-_ELSEWHERE: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "hdInitDevice": (c_uint, (c_char_p,)),
     "hdMakeCurrentDevice": (None, (c_uint,)),
     "hdDisableDevice": (None, (c_uint,)),
@@ -107,7 +87,7 @@ _ELSEWHERE: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "hdSetSchedulerRate": (None, (c_ulong,)),
     "hdStartScheduler": (None, ()),
     "hdStopScheduler": (None, ()),
-    "hdScheduleAsynchronous": (c_ulong, (Callback, c_void_p, c_ushort)),
+    "hdScheduleAsynchronous": (c_ulong, (c_void_p, c_void_p, c_ushort)),
     "hdUnschedule": (None, (c_ulong,)),
     "hdWaitForCompletion": (c_ubyte, (c_ulong, c_uint)),
 }
@@ -129,18 +109,16 @@ class HdLibrary:
     """
 
     def __init__(self, library: ctypes.CDLL) -> None:
-        keeping = ctypes.PyDLL(library._name, handle=library._handle)
-        self._functions: dict[str, Callable[..., Any]] = {}
+        self._functions: dict[str, Any] = {}
         missing = []
-        for source, signatures in ((keeping, _WITHIN_A_FRAME), (library, _ELSEWHERE)):
-            for name, (result, arguments) in signatures.items():
-                try:
-                    function = getattr(source, name)
-                except AttributeError:
-                    missing.append(name)
-                    continue
-                function.restype, function.argtypes = result, arguments
-                self._functions[name] = function
+        for name, (result, arguments) in _SIGNATURES.items():
+            try:
+                function = getattr(library, name)
+            except AttributeError:
+                missing.append(name)
+                continue
+            function.restype, function.argtypes = result, arguments
+            self._functions[name] = function
         if missing:
             raise DeviceError(
                 f"The library {library._name} lacks {', '.join(missing)}.",
@@ -152,6 +130,12 @@ class HdLibrary:
             return self._functions[name]
         except KeyError as error:
             raise AttributeError(name) from error
+
+    def addresses(self) -> dict[str, int]:
+        """Return the address of each function."""
+        return {
+            name: ctypes.cast(function, c_void_p).value or 0 for name, function in self._functions.items()
+        }
 
     def errors(self) -> list[HdError]:
         """Return the errors since the last call, the newest first; the library has none left afterwards."""

@@ -7,7 +7,6 @@ headers (hdDevice, hdDefines, hdScheduler; 3.30): lengths in mm, velocities in m
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
 from ctypes import POINTER, c_char_p, c_double, c_int, c_ubyte, c_uint, c_ulong, c_ushort, c_void_p
 from typing import Any
 
@@ -125,7 +124,7 @@ class HdLibrary:
                 fix="Install OpenHaptics for Developers 3.4 or later, of 3D Systems.",
             )
 
-    def __getattr__(self, name: str) -> Callable[..., Any]:
+    def __getattr__(self, name: str) -> Any:
         try:
             return self._functions[name]
         except KeyError as error:

@@ -26,8 +26,9 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import carray, cfunc, njit, types
+from numba import cfunc, njit, types
 from numba.extending import intrinsic
+from numba.np.numpy_support import carray
 
 from palpate.runtime.devices.openhaptics_library import DONE, GOING_ON, Code
 

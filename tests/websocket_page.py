@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 from collections.abc import Iterator
 from typing import Any
 
@@ -19,6 +20,7 @@ class Client:
 
     def __init__(self, socket: ClientConnection) -> None:
         self.socket = socket
+        self.told: list[dict[str, Any]] = []  # all that is no frame
         self.hello = Hello.from_json(str(socket.recv(timeout=5)))
 
     def grant(self, frames: int) -> None:
@@ -26,8 +28,8 @@ class Client:
 
     def frame(self, timeout: float = 5.0) -> Frame:
         """The next frame; TimeoutError where none comes."""
-        data = self.socket.recv(timeout=timeout)
-        assert isinstance(data, bytes)
+        while isinstance(data := self.socket.recv(timeout=timeout), str):
+            self.told.append(json.loads(data))
         return Frame.unpack(data)
 
     def next_frame(self) -> Frame:

@@ -15,6 +15,7 @@ from palpate.errors import UsageError
 from palpate.viewer import messages, typescript
 from palpate.viewer.messages import (
     PROTOCOL,
+    Feel,
     FieldInfo,
     Frame,
     Hello,
@@ -23,6 +24,7 @@ from palpate.viewer.messages import (
     Loop,
     Notice,
     RangeInfo,
+    Reason,
     Recording,
     Shown,
     StepInfo,
@@ -60,12 +62,15 @@ HELLO = Hello(
     max_force=20.0,
     rate=1000.0,
     faults=("no fault", "a bad number"),
+    device="",
     meta={"errors": {"rmse": 1e-5}, "seed": 3},
 )
 PRESSED = dataclasses.replace(HELLO, holds=False, line=None, fields=(FIELD,), radius_parameter=1)
 SHOWN = Shown(PROTOCOL, "block", (FIELD,), (StepInfo("sample 3", {"energy": "1 mJ"}),), 0.01)
 NEWS = Recording(active=True, file="rod.trace", seconds=3.5, size=4e5, lost=0, problem="")
-WRITTEN = (HELLO, PRESSED, SHOWN, Notice("what", "why", "fix"), NEWS)
+REASON = Reason(now="no force", stopped=True, dropped="a bad number", ago=0.25)
+FEEL = Feel(body=900.0, limit=333.0, felt=333.0, override=False, words="softened")
+WRITTEN = (HELLO, PRESSED, SHOWN, Notice("what", "why", "fix"), NEWS, REASON, FEEL)
 
 
 def sample(message: type[Binary]) -> Binary:

@@ -52,8 +52,8 @@ class PressClient:
         words = Hand(0.0, 0.05, tuple(target), held, False, np.asarray(parameters, "f4"))
         self.socket.send(words.pack())
         self.socket.send(Credit(1).pack())
-        data = self.socket.recv(timeout=10)
-        assert isinstance(data, bytes)
+        while isinstance(data := self.socket.recv(timeout=10), str):
+            pass  # news of the force, or of the device
         return Frame.unpack(data)
 
     def held(self, place, parameters=()) -> Frame:

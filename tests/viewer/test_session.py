@@ -7,15 +7,18 @@ import math
 import os
 import signal
 import time
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 from websockets.exceptions import ConnectionClosed
 
+from palpate.runtime.safety import Fault
+from palpate.runtime.stability import FeltStiffness
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import Surrogate
-from palpate.viewer import Viewer
-from palpate.viewer.messages import Frame, Hold, Loop, Notice
+from palpate.viewer import Viewer, session
+from palpate.viewer.messages import Frame, Hold, Loop, Notice, StopWish
 from palpate.viewer.session import MOST_CREDITS
 from websocket_page import Client, client_of
 
@@ -141,6 +144,55 @@ def test_a_hidden_page_lets_go(viewer: Viewer):
         frame = client.frame()
         assert not frame.grabbed
         assert frame.force == (0.0, 0.0, 0.0)
+
+
+def test_a_stop_ends_the_force_and_is_told_to_every_page(viewer: Viewer, rod: Surrogate):
+    y = -0.3 * touchable(rod).reach
+    with client_of(viewer) as client, client_of(viewer) as other:
+        held(client, y)
+        other.socket.send(StopWish(stop=True).pack())
+        assert until(client, lambda frame: not any(frame.force), y)
+        told = next(news for news in reversed(client.told) if news["kind"] == "Reason")
+        assert told["stopped"]
+        assert "until you resume" in told["now"]
+        other.socket.send(StopWish(stop=False).pack())
+        held(client, y)
+        told = next(news for news in reversed(client.told) if news["kind"] == "Reason")
+        assert told == {"kind": "Reason", "now": "", "stopped": False} | {
+            k: told[k] for k in ("dropped", "ago")
+        }
+
+
+def test_the_reason_of_a_drop_is_told_with_its_age(viewer: Viewer, rod: Surrogate):
+    y = -0.3 * touchable(rod).reach
+    with client_of(viewer) as client:
+        held(client, y)
+        time.sleep(0.4)  # no word: a stall
+        client.next_frame()
+        told = next(news for news in reversed(client.told) if news["kind"] == "Reason")
+        assert Fault.INPUT_STALLED.meaning in told["now"]
+        assert told["dropped"] == Fault.INPUT_STALLED.meaning
+        assert 0.0 <= told["ago"] < 0.4
+        client.hand(0.0, 0.0, grabbed=False)
+        held(client, y)
+        told = next(news for news in reversed(client.told) if news["kind"] == "Reason")
+        assert told["now"] == ""
+
+
+def until(client: Client, sought: Callable[[Frame], bool], y: float) -> bool:
+    """Hold the tip at y (m) until a frame is as sought; False where none comes."""
+    return any(sought(hold(client, y, seconds=0.05)) for _ in range(100))
+
+
+@pytest.mark.parametrize("override", [False, True])
+def test_a_body_too_stiff_for_the_device_is_told_with_its_figures(override: bool):
+    told = session.softening(FeltStiffness(900.0, 0.5, 1000.0, 0.001, override))
+    assert (told.body, told.limit) == pytest.approx((900.0, 0.5 / 0.0015))
+    assert told.felt == pytest.approx(900.0 if override else told.limit)
+    assert told.override is override
+    assert ("as asked" if override else "softened to 333 N/m") in told.words
+    assert session.softening(FeltStiffness(300.0, 0.5, 1000.0, 0.001, override)) == session.NOT_SOFTENED
+    assert session.softening(FeltStiffness(900.0, None, 1000.0)) == session.NOT_SOFTENED
 
 
 def test_bytes_that_are_no_message_end_the_conversation(viewer: Viewer):

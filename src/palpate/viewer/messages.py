@@ -13,6 +13,8 @@ The conversation, over one websocket at ``/touch``:
 5. Rare events in plain words are `Notice` (JSON).
 6. A page that wants the touch recorded, or no longer, says `RecordWish`; the server tells all pages how it goes,
    `Recording` (JSON), at each change and once a second.
+7. Before a frame that shows something new of it, the server says why there is no force, or lately was none (`Reason`,
+   JSON), and whether the body is softened for the device (`Feel`, JSON). A page ends all force with `StopWish`.
 
 A body drawn as a line (`Line`) is sent node by node in each frame. Of any other the page asks for the surface once, as
 `Surface` at ``/surface``, and for the modes of each field as `Modes` at ``/fields/N``; a frame carries the coefficients
@@ -41,6 +43,7 @@ from palpate.viewer.wire import Binary, Json, Wire
 __all__ = [
     "PROTOCOL",
     "Credit",
+    "Feel",
     "FieldInfo",
     "Frame",
     "Hand",
@@ -51,16 +54,18 @@ __all__ = [
     "Modes",
     "Notice",
     "RangeInfo",
+    "Reason",
     "RecordWish",
     "Recording",
     "Shown",
     "Step",
     "StepInfo",
+    "StopWish",
     "Surface",
     "Vec3",
 ]
 
-PROTOCOL = 4  # a page of another protocol reloads itself
+PROTOCOL = 5  # a page of another protocol reloads itself
 
 Vec3 = tuple[float, float, float]
 
@@ -216,6 +221,15 @@ class RecordWish(Binary):
     wanted: Annotated[bool, Wire("flag", "start one; otherwise stop it")]
 
 
+@dataclass(frozen=True, eq=False)
+class StopWish(Binary):
+    """A person's wish to end all force, or to end the stop, page to server."""
+
+    KIND: ClassVar[int] = 8
+
+    stop: Annotated[bool, Wire("flag", "end all force; otherwise end the stop")]
+
+
 @dataclass(frozen=True)
 class RangeInfo:
     """A named interval."""
@@ -302,6 +316,8 @@ class Hello(Json):
         Hz, what the loop aims at.
     faults : tuple of str
         Words for fault codes, by code.
+    device : str
+        What the device calls itself that the hand holds; empty where the page's own hand touches the body.
     meta : mapping
         What the model's file says of its making.
     """
@@ -325,6 +341,7 @@ class Hello(Json):
     max_force: float
     rate: float
     faults: tuple[str, ...]
+    device: str
     meta: Mapping[str, Any]
 
 
@@ -400,6 +417,50 @@ class Recording(Json):
     size: float
     lost: int
     problem: str
+
+
+@dataclass(frozen=True)
+class Reason(Json):
+    """The reason why there is no force, or lately was none, server to page.
+
+    Attributes
+    ----------
+    now : str
+        Why there is none now, and what brings it back; empty where it may flow.
+    stopped : bool
+        Whether a person has stopped it, and must end that.
+    dropped : str
+        What made the force drop last; empty where nothing has.
+    ago : float
+        How long ago that was, s.
+    """
+
+    now: str
+    stopped: bool
+    dropped: str
+    ago: float
+
+
+@dataclass(frozen=True)
+class Feel(Json):
+    """A body that is too stiff for the device, the rate and the delay, server to page.
+
+    Attributes
+    ----------
+    body, limit, felt : float
+        The body's largest stiffness, the largest that is passive there, and the largest that the hand feels, N/m in
+        hand metres.
+    override : bool
+        Whether the user has asked for the body as stiff as it is.
+    words : str
+        All of it in a sentence, with the figures that the limit comes from; empty where the body is not too stiff.
+    """
+
+    body: float
+    limit: float
+    felt: float
+    override: bool
+    words: str
 
 
 if __name__ == "__main__":

@@ -67,7 +67,7 @@ class PageModel:
         assert isinstance(self._drawing, SurfaceDrawing)
         return self._drawing.modes(index)
 
-    def hello(self, state: State, rate: float) -> Hello:
+    def hello(self, state: State, rate: float, device: str = "") -> Hello:
         """Return what every page is told first.
 
         Parameters
@@ -76,6 +76,8 @@ class PageModel:
             A tick of the loop, for its settings.
         rate : float
             Ticks per second that the loop aims at, Hz.
+        device : str
+            Name of the device that the hand holds; empty where it is a page's own.
         """
         body = self.body
         return Hello(
@@ -98,6 +100,7 @@ class PageModel:
             max_force=state.max_force,
             rate=rate,
             faults=tuple(f.meaning for f in Fault),
+            device=device,
             meta=_in_words(body.meta),
         )
 

@@ -64,6 +64,12 @@ def application(session: Session) -> Starlette:
     return local_application(routes, lifespan=lifespan)
 
 
+def _driver(device: str) -> str:
+    """Return the device that holds the hand, in words; empty for a page's own hand."""
+    name = device.partition(":")[0]
+    return "" if name == "page" else f"the device {name}"
+
+
 class Viewer(LocalServer):
     """A body to look at and touch, at `url`, while the context lasts.
 
@@ -128,6 +134,7 @@ class Viewer(LocalServer):
         self._loop = functools.partial(
             LoopProcess, device=device, rate=rate, max_force=max_force, replay=replay
         )
+        self._driver = "a recorded touch" if replay is not None else _driver(device)
         self._recordings = Path(recordings) if replay is None else None
 
     @property
@@ -137,7 +144,9 @@ class Viewer(LocalServer):
 
     def _application(self) -> Starlette:
         self.loop = self._closing.enter_context(self._loop(self._file()))
-        return application(Session(PageModel(self.model), self.loop, recordings=self._recordings))
+        return application(
+            Session(PageModel(self.model), self.loop, recordings=self._recordings, device=self._driver)
+        )
 
     def _file(self) -> str | os.PathLike[str]:
         """Return a file of the model, which the real-time process can read."""

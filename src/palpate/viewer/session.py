@@ -13,7 +13,7 @@ import itertools
 import logging
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -24,13 +24,26 @@ from palpate.errors import DeviceError, UsageError
 from palpate.runtime.loop_report import EDGES
 from palpate.runtime.safety import Fault
 from palpate.runtime.shared_state import Shared, State, now
+from palpate.runtime.stability import FeltStiffness
 from palpate.viewer.hand_lock import Command, HandLock
-from palpate.viewer.messages import Credit, Frame, Hand, Hello, Loop, Notice, Recording, RecordWish
+from palpate.viewer.messages import (
+    Credit,
+    Feel,
+    Frame,
+    Hand,
+    Hello,
+    Loop,
+    Notice,
+    Reason,
+    Recording,
+    RecordWish,
+    StopWish,
+)
 from palpate.viewer.page_model import PageModel, vector
 from palpate.viewer.page_recording import PageRecording
 from palpate.viewer.traffic import Bucket, Turns
 
-__all__ = ["LoopLike", "Page", "Session"]
+__all__ = ["NOT_SOFTENED", "LoopLike", "Page", "Session", "softening"]
 
 logger = logging.getLogger("palpate.viewer")
 
@@ -43,8 +56,9 @@ MOST_PAGES = 32
 MESSAGES, MESSAGES_AT_ONCE = 1000.0, 250.0  # of a page, per second and at once; a display at 360 Hz needs 485
 SLICE = 0.02  # s; a page that is owed less than that is heard on
 MAX_U32 = 2**32 - 1
-_NO_FAULT = (Fault.NONE, Fault.INPUT_STALLED)
+_NO_FAULT = (Fault.NONE, Fault.INPUT_STALLED, Fault.STOPPED)
 
+NOT_SOFTENED = Feel(0.0, 0.0, 0.0, override=False, words="")
 ENDED = Notice(
     "The real-time process has ended: the force is zero and nothing moves any more.",
     "It was killed or failed; the terminal that serves this page may say more.",
@@ -83,6 +97,8 @@ class Page:
     credits: int = 0
     echo: float = 0.0  # ms, the page's clock
     histogram: np.ndarray | None = None  # of lateness, as of the frame before
+    reason: tuple[str, bool, int] = ("", False, 0)  # as told last: words, stopped, drops of the force so far
+    feel: Feel = NOT_SOFTENED
     granted: asyncio.Event = field(default_factory=asyncio.Event)
 
     def grant(self, frames: int) -> None:
@@ -112,6 +128,8 @@ class Session:
         Time in s, for the pages' shares.
     recordings : path, optional
         Folder for what pages record; by default nothing is recorded.
+    device : str
+        The device that the hand holds, in words, where it has no name of its own; empty where pages steer the hand.
     """
 
     def __init__(
@@ -120,6 +138,7 @@ class Session:
         loop: LoopLike,
         clock: Callable[[], float] = time.perf_counter,
         recordings: Path | None = None,
+        device: str = "",
     ) -> None:
         self.model, self.loop, self._clock = model, loop, clock
         self._lock = HandLock(np.array([(r.low + r.high) / 2 for r in model.body.parameters]))
@@ -131,6 +150,7 @@ class Session:
         if recordings is not None:
             recordable: Any = loop
             self._recording = PageRecording(recordable, recordings, model.body.name, self._tell_all)
+        self._device = device
         self._wishes: set[asyncio.Task[None]] = set()
         self._state = loop.shared.read_state()
 
@@ -174,7 +194,8 @@ class Session:
 
     def hello(self) -> Hello:
         """Return the first message to every page."""
-        return self.model.hello(self._read()[0], self.loop.rate)
+        state = self._read()[0]
+        return self.model.hello(state, self.loop.rate, self._device and (state.device or self._device))
 
     def frame(self, page: Page) -> Frame:
         """Return the newest state as one page sees it."""
@@ -226,8 +247,28 @@ class Session:
                 await page.spend()
                 async with self._turns.turn():
                     picture = self.frame(page).pack()
+                    news = self._news(page)
+                for message in news:
+                    await page.socket.send_text(message.to_json())
                 await page.socket.send_bytes(picture)  # outside: a page that does not read holds nobody up
                 await asyncio.sleep(self._turns.pause(len(self._pages)))
+
+    def _news(self, page: Page) -> list[Reason | Feel]:
+        """Return what has changed since the page was told last: why there is no force, whether the body is softened."""
+        state, news = self._state, list[Reason | Feel]()
+        drops = [
+            drop for drop in state.onsets if drop[1] is not Fault.STOPPED
+        ]  # that one needs no explaining
+        reason = (state.reason, state.stopped, state.faults)
+        if reason != page.reason:
+            page.reason = reason
+            at, fault = drops[-1] if drops else (now(), Fault.NONE)
+            dropped = fault.meaning if drops else ""
+            news.append(Reason(state.reason, state.stopped, dropped, max(0.0, now() - at)))
+        if (feel := softening(state.felt_stiffness)) != page.feel:
+            page.feel = feel
+            news.append(feel)
+        return news
 
     async def _listen(self, page: Page) -> None:
         """Take a page's messages until it leaves; bytes that are no message end the conversation."""
@@ -247,7 +288,13 @@ class Session:
         if data[:1] == bytes([RecordWish.KIND]):
             self._record(RecordWish.unpack(data).wanted)
             return
+        if data[:1] == bytes([StopWish.KIND]):
+            stop = StopWish.unpack(data).stop
+            self.loop.shared.write_command(stop=stop, resume=not stop)
+            return
         hand = Hand.unpack(data)
+        if self._device and hand.grabbed:  # the hand is not the page's
+            hand = replace(hand, grabbed=False)
         page.echo = hand.sent
         if (command := self._lock.hear(page.number, hand, now())) is not None:
             self._tell(command)
@@ -275,6 +322,13 @@ class Session:
             self.loop.shared.write_command(grabbed=False)
 
 
+def softening(stiffness: FeltStiffness) -> Feel:
+    """Return what a page is told of a body that is too stiff for its device; `NOT_SOFTENED` of any other."""
+    if (words := stiffness.warning) is None:
+        return NOT_SOFTENED
+    return Feel(stiffness.body, stiffness.bound, stiffness.felt, stiffness.override, words)
+
+
 def _latest(state: State, page: Page) -> float:
     """The largest lateness (s) since the page's frame before: the upper edge of the highest bin that grew."""
     before, page.histogram = page.histogram, state.histogram
@@ -287,7 +341,7 @@ def _latest(state: State, page: Page) -> float:
 
 
 def _faults(state: State) -> tuple[int, int, int]:
-    """Fault of the tick, count so far, latest kind; without stalls, which have a flag of their own."""
+    """Fault of the tick, count so far, latest kind; without stalls and stops, which the page tells otherwise."""
     counts = {k: int(c) for k, c in enumerate(state.fault_counts) if c and k not in _NO_FAULT}
     latest = state.last_fault if state.last_fault in counts else max(counts, default=0)
     return (0 if state.fault in _NO_FAULT else state.fault), min(sum(counts.values()), MAX_U32), latest

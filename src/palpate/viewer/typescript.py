@@ -22,8 +22,16 @@ BINARY: tuple[type[Binary], ...] = (
     messages.Step,
     messages.Modes,
     messages.RecordWish,
+    messages.StopWish,
 )
-JSON: tuple[type[Json], ...] = (messages.Hello, messages.Notice, messages.Recording, messages.Shown)
+JSON: tuple[type[Json], ...] = (
+    messages.Hello,
+    messages.Notice,
+    messages.Recording,
+    messages.Reason,
+    messages.Feel,
+    messages.Shown,
+)
 RECORDS: tuple[type, ...] = (messages.RangeInfo, messages.FieldInfo, messages.Line, messages.StepInfo)
 ENUMS: tuple[type[IntEnum], ...] = (messages.Loop, messages.Hold)
 

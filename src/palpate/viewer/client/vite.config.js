@@ -29,6 +29,10 @@ function stamp() {
 export default defineConfig({
   base: "./",
   plugins: [stamp()],
+  worker: {
+    format: "es",
+    rollupOptions: { output: { entryFileNames: "assets/[name].js" } },
+  },
   build: {
     outDir: "../static",
     emptyOutDir: true,
@@ -41,6 +45,7 @@ export default defineConfig({
         page: join(here, "index.html"),
         messages: join(here, "src/messages.ts"),
         field: join(here, "src/field.ts"),
+        gamepad: join(here, "src/gamepad.ts"),
         units: join(here, "src/units.ts"),
       },
       preserveEntrySignatures: "strict",

@@ -1,61 +1,78 @@
-// The websocket: reconnects by itself, grants credits, keeps only the newest frame.
+// The page's end of the connection, whose websocket lives in a worker: grants credits, keeps only the newest frame.
 
-import { decodeFrame, encodeCredit, encodeHand, encodeRecordWish, isHello, isNotice, isRecording, PROTOCOL } from "./messages";
-import type { Frame, Hand, Hello, Notice, Recording } from "./messages";
+import {
+  decodeFrame,
+  encodeCredit,
+  encodeHand,
+  encodeRecordWish,
+  encodeStopWish,
+  isFeel,
+  isHello,
+  isNotice,
+  isReason,
+  isRecording,
+  PROTOCOL,
+} from "./messages";
+import type { Feel, Frame, Hand, Hello, Notice, Reason, Recording } from "./messages";
+import type { Order, Report } from "./socket_worker";
 
 const CREDITS_AT_START = 2; // one frame on its way while one is drawn
-const FIRST_DELAY = 300; // ms until the first new attempt
-const LONGEST_DELAY = 3000; // ms
 
 export interface Listener {
   hello(hello: Hello): void;
   notice(notice: Notice): void;
   recording(recording: Recording): void;
+  reason(reason: Reason): void;
+  feel(feel: Feel): void;
   lost(): void;
 }
 
 export class Connection {
-  private socket: WebSocket | null = null;
-  private delay = FIRST_DELAY;
+  connected = false;
+
+  private readonly worker = new Worker(new URL("./socket_worker.ts", import.meta.url), { type: "module" });
   private newest: Frame | null = null;
   private owed = 0;
 
   constructor(private readonly listener: Listener) {
-    this.open();
+    this.worker.onmessage = ({ data }: MessageEvent<Report>) => {
+      if ("data" in data) this.receive(data.data);
+      else this.connected = data.open;
+      if ("open" in data && !data.open) this.closed();
+    };
+    this.order({ address: `ws://${location.host}/touch` });
   }
 
-  get connected(): boolean {
-    return this.socket?.readyState === WebSocket.OPEN;
-  }
-
+  /** Send the hand; the worker repeats it as a heartbeat. */
   send(hand: Hand): void {
-    if (this.connected) this.socket?.send(encodeHand(hand));
+    if (this.connected) this.order({ hand: encodeHand(hand) });
   }
 
   record(wanted: boolean): void {
-    if (this.connected) this.socket?.send(encodeRecordWish({ wanted }));
+    if (this.connected) this.order({ message: encodeRecordWish({ wanted }) });
+  }
+
+  /** End all force, or the stop. */
+  stop(stop: boolean): void {
+    if (this.connected) this.order({ message: encodeStopWish({ stop }) });
   }
 
   /** The newest frame not drawn yet; taking it grants the server as many more as have come. */
   take(): Frame | null {
     const frame = this.newest;
     if (frame && this.connected) {
-      this.socket?.send(encodeCredit({ frames: this.owed }));
+      this.order({ message: encodeCredit({ frames: this.owed }) });
       this.owed = 0;
     }
     this.newest = null;
     return frame;
   }
 
-  private open(): void {
-    const socket = new WebSocket(`ws://${location.host}/touch`);
-    socket.binaryType = "arraybuffer";
-    socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => this.receive(socket, event.data);
-    socket.onclose = () => this.closed();
-    this.socket = socket;
+  private order(order: Order): void {
+    this.worker.postMessage(order);
   }
 
-  private receive(socket: WebSocket, data: string | ArrayBuffer): void {
+  private receive(data: string | ArrayBuffer): void {
     if (typeof data !== "string") {
       this.newest = decodeFrame(data);
       this.owed += 1;
@@ -64,21 +81,20 @@ export class Connection {
     const message = JSON.parse(data) as { kind: string };
     if (isNotice(message)) this.listener.notice(message);
     if (isRecording(message)) this.listener.recording(message);
+    if (isReason(message)) this.listener.reason(message);
+    if (isFeel(message)) this.listener.feel(message);
     if (!isHello(message)) return;
     if (message.protocol !== PROTOCOL) {
       location.reload(); // the server is of another version than this page
       return;
     }
-    this.delay = FIRST_DELAY;
     this.owed = 0;
     this.listener.hello(message);
-    socket.send(encodeCredit({ frames: CREDITS_AT_START }));
+    this.order({ message: encodeCredit({ frames: CREDITS_AT_START }) });
   }
 
   private closed(): void {
     this.newest = null;
     this.listener.lost();
-    setTimeout(() => this.open(), this.delay);
-    this.delay = Math.min(this.delay * 1.6, LONGEST_DELAY);
   }
 }

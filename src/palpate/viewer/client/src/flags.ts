@@ -23,7 +23,9 @@ export interface Flag {
 export function flags(frame: Frame, hello: Hello, places: Places): Flag[] {
   const list = [...failures(frame, hello), ...limits(frame, hello, places)];
   if (list.length === 0) list.push(ordinary(frame, places));
-  if (frame.hold === Hold.ANOTHER) {
+  if (hello.device) {
+    list.push({ id: "device", tone: "calm", words: `The hand is that of ${hello.device}; the page shows it.` });
+  } else if (frame.hold === Hold.ANOTHER) {
     list.push({ id: "watching", tone: "calm", words: "Another page holds the hand; this one watches." });
   }
   if (frame.faults > 0 && frame.fault === 0) {
@@ -93,10 +95,12 @@ export function status(state: string, words: string): void {
   pill.textContent = words;
 }
 
-export function describe(frame: Frame): void {
+/** The status in few words; `without`: there is no force, for a reason that is shown elsewhere. */
+export function describe(frame: Frame, without: boolean): void {
   if (frame.loop === Loop.ENDED) status("ended", "real-time process ended");
   else if (frame.loop === Loop.FROZEN) status("warn", "real-time process stands still");
   else if (frame.hold === Hold.ANOTHER) status("warn", "watching");
   else if (frame.stalled && frame.grabbed) status("warn", "no word from the hand");
+  else if (without) status("warn", "no force");
   else status("live", frame.grabbed ? "holding" : "live");
 }

@@ -3,6 +3,7 @@
 
 import type { Vector2, Vector3 } from "three";
 import type { Connection } from "./connection";
+import type { Pad } from "./gamepad";
 import type { Hello, Vec3 } from "./messages";
 
 const BEAT = 50; // ms between heartbeats
@@ -22,6 +23,7 @@ export abstract class Hand {
   parameters = new Float32Array();
 
   protected pointer: number | null = null;
+  protected padded = false; // the gamepad holds
   private lastSent = 0;
 
   constructor(
@@ -29,6 +31,8 @@ export abstract class Hand {
     private readonly connection: Connection,
     protected readonly hello: Hello,
   ) {
+    setInterval(() => performance.now() - this.lastSent > 0.9 * BEAT && this.send(), BEAT);
+    if (hello.device) return; // a device holds the hand
     // registered before the view's own handlers, so that a grab can keep the view still
     canvas.addEventListener("pointerdown", (e) => this.down(e));
     canvas.addEventListener("pointermove", (e) => this.move(e));
@@ -39,12 +43,23 @@ export abstract class Hand {
       if (e.key === "Escape") this.release();
       if (this.pointer === null) this.key(e);
     });
-    canvas.addEventListener("blur", () => this.pointer === null && this.release());
+    canvas.addEventListener("blur", () => this.pointer === null && !this.padded && this.release());
     document.addEventListener("visibilitychange", () => {
       this.release();
       this.send();
     });
-    setInterval(() => performance.now() - this.lastSent > 0.9 * BEAT && this.send(), BEAT);
+  }
+
+  /** True while a gamepad holds the body. */
+  get byPad(): boolean {
+    return this.padded && this.grabbed;
+  }
+
+  /** Follow a gamepad (null: there is none), `elapsed` ms after the picture before. */
+  drive(pad: Pad | null, elapsed: number): void {
+    if (this.hello.device || this.pointer !== null || (this.grabbed && !this.padded)) return;
+    if (pad) this.follow(pad, elapsed);
+    else if (this.padded) this.release();
   }
 
   /** Where the hand wants what it holds, or the probe's centre, m from the device's centre in the body's axes. */
@@ -52,6 +67,7 @@ export abstract class Hand {
   protected abstract down(e: PointerEvent): void;
   protected abstract move(e: PointerEvent): void;
   protected abstract key(e: KeyboardEvent): void;
+  protected abstract follow(pad: Pad, elapsed: number): void;
   /** Let the view follow: the hand takes hold or lets go. */
   protected abstract held(on: boolean): void;
 
@@ -62,6 +78,7 @@ export abstract class Hand {
 
   release(): void {
     this.pointer = null;
+    this.padded = false;
     if (!this.grabbed) return;
     this.grabbed = false;
     this.canvas.dataset["cursor"] = "";
@@ -112,6 +129,7 @@ export class PullHand extends Hand {
   private view: Handle | null = null;
   private wanted: Vec3 = [0, 0, 0]; // m, of what is held, from rest
   private gap: Vec3 = [0, 0, 0]; // from the pointer to what is held at the moment of grabbing
+  private taken: Vec3 = [0, 0, 0]; // where the gamepad took hold
 
   attach(view: Handle): void {
     this.release();
@@ -164,6 +182,27 @@ export class PullHand extends Hand {
     const [right, up] = step.map((s) => size * s) as [number, number];
     const [x, y, z] = this.wanted;
     this.want(this.hello.line ? [x + right, y + up, z] : [x + right, y, z + up]);
+  }
+
+  /** The trigger or the first button holds; the left stick pulls along x and upwards, the right one away and back. */
+  protected override follow(pad: Pad): void {
+    if (!pad.hold && !pad.trigger) {
+      if (this.padded) this.release();
+      return;
+    }
+    if (!this.view) return;
+    if (!this.grabbed) {
+      this.taken = this.wanted = this.view.offset();
+      this.padded = true;
+      this.grab();
+    }
+    const reach = this.hello.deepest;
+    const [x, y, z] = this.taken;
+    const [[right, up], [, away]] = [pad.left, pad.right].map(([a, b]) => [reach * a, reach * b] as const) as [
+      readonly [number, number],
+      readonly [number, number],
+    ];
+    this.want(this.hello.line ? [x + right, y + up, z] : [x + right, y + away, z + up]);
   }
 
   private near(e: PointerEvent): boolean {

@@ -2,7 +2,7 @@
 
 import { gradient } from "./colour";
 import type { FieldInfo } from "./messages";
-import { element, multiple, tidy, worded } from "./units";
+import { capital, element, multiple, tidy, worded } from "./units";
 
 /** Show the scale of a quantity; null hides it. */
 export function legend(info: FieldInfo | null): void {
@@ -57,8 +57,4 @@ export function shares(info: FieldInfo, values: Float32Array): Float32Array {
 
 function scale(info: FieldInfo): { size: number; unit: string } {
   return multiple(Math.max(Math.abs(info.low), Math.abs(info.high)), info.unit);
-}
-
-function capital(words: string): string {
-  return words.charAt(0).toUpperCase() + words.slice(1);
 }

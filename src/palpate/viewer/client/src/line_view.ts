@@ -189,8 +189,9 @@ export class LineView extends View {
   /** The left button is the hand's, and the view stays in front. */
   private hold(): void {
     const { controls } = this;
-    controls.mouseButtons = { LEFT: null, MIDDLE: MOUSE.DOLLY, RIGHT: MOUSE.ROTATE };
-    controls.touches = { ONE: null, TWO: TOUCH.DOLLY_ROTATE };
+    const device = this.hello.device !== "";
+    controls.mouseButtons = { LEFT: device ? MOUSE.ROTATE : null, MIDDLE: MOUSE.DOLLY, RIGHT: MOUSE.ROTATE };
+    controls.touches = { ONE: device ? TOUCH.ROTATE : null, TWO: TOUCH.DOLLY_ROTATE };
     controls.enablePan = false;
     // seen edge-on, the plane in which the hand moves would vanish
     [controls.minAzimuthAngle, controls.maxAzimuthAngle] = [-1.2, 1.2];

@@ -6,7 +6,7 @@ import type { Layout } from "./wire";
 
 export type Vec3 = [number, number, number];
 
-export const PROTOCOL = 4;
+export const PROTOCOL = 5;
 
 /** The real-time process as the server sees it. */
 export const Loop = {
@@ -75,6 +75,7 @@ export interface Hello {
   max_force: number;
   rate: number;
   faults: string[];
+  device: string;
   meta: Record<string, unknown>;
 }
 
@@ -93,6 +94,23 @@ export interface Recording {
   size: number;
   lost: number;
   problem: string;
+}
+
+/** The reason why there is no force, or lately was none, server to page. */
+export interface Reason {
+  now: string;
+  stopped: boolean;
+  dropped: string;
+  ago: number;
+}
+
+/** A body that is too stiff for the device, the rate and the delay, server to page. */
+export interface Feel {
+  body: number;
+  limit: number;
+  felt: number;
+  override: boolean;
+  words: string;
 }
 
 /** A body to look at, server to page. */
@@ -114,6 +132,14 @@ export function isNotice(message: { kind: string }): message is Notice & { kind:
 
 export function isRecording(message: { kind: string }): message is Recording & { kind: string } {
   return message.kind === "Recording";
+}
+
+export function isReason(message: { kind: string }): message is Reason & { kind: string } {
+  return message.kind === "Reason";
+}
+
+export function isFeel(message: { kind: string }): message is Feel & { kind: string } {
+  return message.kind === "Feel";
 }
 
 export function isShown(message: { kind: string }): message is Shown & { kind: string } {
@@ -371,3 +397,18 @@ const RECORDWISH_LAYOUT: Layout = [
 
 export const encodeRecordWish = (m: RecordWish): ArrayBuffer => encode(RECORDWISH, RECORDWISH_LAYOUT, m);
 export const decodeRecordWish = (buffer: ArrayBuffer): RecordWish => decode<RecordWish>(RECORDWISH_LAYOUT, buffer);
+
+export const STOPWISH = 8;
+
+/** A person's wish to end all force, or to end the stop, page to server. */
+export interface StopWish {
+  /** end all force; otherwise end the stop */
+  stop: boolean;
+}
+
+const STOPWISH_LAYOUT: Layout = [
+  ["stop", "flag"],
+];
+
+export const encodeStopWish = (m: StopWish): ArrayBuffer => encode(STOPWISH, STOPWISH_LAYOUT, m);
+export const decodeStopWish = (buffer: ArrayBuffer): StopWish => decode<StopWish>(STOPWISH_LAYOUT, buffer);

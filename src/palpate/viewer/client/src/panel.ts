@@ -25,6 +25,12 @@ const PRESSING: Places = {
   outside: "Outside the trained region: the energy is continued, and nothing vouches for the force.",
 };
 
+const DRIVEN: Places = {
+  free: "The device lets the body alone.",
+  inside: PRESSING.inside,
+  outside: PRESSING.outside,
+};
+
 export interface Wishes {
   moved(i: number, value: number): void;
   deeper(depth: number): void;
@@ -53,6 +59,7 @@ export class Panel {
     this.hello = hello;
     element("model-name").textContent = hello.name;
     element("model-line").replaceChildren(...subtitle(hello), hello.remembers ? `; ${hello.remembers}` : "");
+    document.documentElement.toggleAttribute("data-driven", hello.device !== "");
     document.title = `${hello.name} · palpate`;
     sliders(hello.parameters, (i, value) => wishes.moved(i, value));
     const [first, most] = Panel.depths(hello);
@@ -95,7 +102,7 @@ export class Panel {
     this.last = now;
     this.numbers(frame);
     this.timing.show(frame, now);
-    this.list(flags(frame, hello, hello.holds ? PULLING : PRESSING));
+    this.list(flags(frame, hello, hello.device ? DRIVEN : hello.holds ? PULLING : PRESSING));
     follow(frame);
     const peak = round125(Math.max(this.force.peak(frame.time), 0.05 * hello.force_max, 1e-9));
     this.force.draw(frame.time, { unit: "N", low: 0, high: peak, logarithmic: false, stepped: false });

@@ -2,6 +2,7 @@
 // that the wheel and the slider set; moving slides it over the surface.
 
 import type { Connection } from "./connection";
+import type { Pad } from "./gamepad";
 import { Hand } from "./hand";
 import type { Hello, Vec3 } from "./messages";
 import type { PressView, Spot } from "./touch_view";
@@ -11,6 +12,7 @@ const ARRIVED = 1e-4; // of the deepest press: nearer than this is there
 const NOTCH = 0.05; // of the deepest trained depth, a step of the wheel or a key
 const STEP = 12; // px, a step of the arrow keys
 const SMALL_STEP = 3;
+const SPEED = 0.22; // px per ms, of a stick that is pushed all the way
 const KEYS: Record<string, readonly [number, number]> = {
   ArrowLeft: [-1, 0],
   ArrowRight: [1, 0],
@@ -31,11 +33,12 @@ export class PressHand extends Hand {
   private at: [x: number, y: number] | null = null; // px, where the hand points
   private spot: Spot | null = null;
   private depth = 0;
-  private force = NaN; // of a pen, 0 … 1
+  private force = NaN; // of a pen or a trigger, 0 … 1
   private lastTick = 0;
 
   constructor(canvas: HTMLCanvasElement, connection: Connection, hello: Hello) {
     super(canvas, connection, hello);
+    if (hello.device) return; // a device holds the hand
     canvas.addEventListener("pointerleave", () => this.pointer === null && !this.grabbed && this.hover(null));
     canvas.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
     canvas.addEventListener("keyup", (e) => e.key === " " && this.pointer === null && this.release());
@@ -118,6 +121,24 @@ export class PressHand extends Hand {
       const spot = this.view.spotAt(...this.pointed());
       if (spot?.touchable) this.press(spot);
     }
+  }
+
+  /** The left stick moves the probe; the trigger presses as far as it is pulled, the first button as deep as the slider says. */
+  protected override follow(pad: Pad, elapsed: number): void {
+    if (!this.view) return;
+    const [right, up] = pad.left;
+    if (right !== 0 || up !== 0) this.walk([right, -up], SPEED * elapsed);
+    if (!pad.hold && !pad.trigger) {
+      if (this.padded) this.release();
+      return;
+    }
+    if (!this.grabbed) {
+      const spot = this.view.spotAt(...this.pointed());
+      if (!spot?.touchable) return;
+      this.padded = true;
+      this.press(spot);
+    }
+    this.force = pad.hold ? NaN : pad.trigger;
   }
 
   private press(spot: Spot): void {

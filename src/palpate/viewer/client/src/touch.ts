@@ -4,9 +4,11 @@ import { bodyOf } from "./bodies";
 import type { Body } from "./bodies";
 import { Connection } from "./connection";
 import { describe, say, status, warn } from "./flags";
+import { Pads } from "./gamepad";
 import { LineView } from "./line_view";
 import type { Frame, Hello } from "./messages";
 import { Panel } from "./panel";
+import { Drops, feel } from "./reason";
 import { Recorder } from "./recorder";
 import { mode, watch } from "./skeleton";
 import { element, fixed, worded } from "./units";
@@ -22,9 +24,19 @@ export function touch(): void {
   let body: Body | null = null;
   let latest: Frame | null = null;
   let drawn: Frame | null = null;
+  let pads: Pads | null = null; // of the page's own hand
   let lastFrame = 0;
+  let ticked = 0;
 
-  const connection = new Connection({ hello: start, notice: warn, lost, recording: (news) => recorder.show(news) });
+  const connection = new Connection({
+    hello: start,
+    notice: warn,
+    lost,
+    recording: (news) => recorder.show(news),
+    reason: (news) => drops.hear(news),
+    feel,
+  });
+  const drops = new Drops((stop) => connection.stop(stop));
   const recorder = new Recorder((wanted) => connection.record(wanted));
 
   function start(news: Hello): void {
@@ -44,6 +56,7 @@ export function touch(): void {
       deeper: (depth) => body && "wanted" in body.hand && (body.hand.wanted = depth),
     });
     lastFrame = performance.now();
+    if (!news.device) pads ??= new Pads(Math.max(news.force_max, 1e-9), halt);
     if (!body) open(news).catch((error: unknown) => say(`The body can't be shown: ${String(error)}.`, "calm"));
     hello = news;
   }
@@ -70,23 +83,34 @@ export function touch(): void {
     latest = drawn = null;
     body?.hand.release();
     panel.lost();
+    drops.lost();
     recorder.lost();
     element("arrow-label").hidden = true;
     status("lost", "disconnected, trying again");
     say("Disconnected from palpate. This page connects again as soon as the server is back.", "bad");
   }
 
+  /** End the force: let go of what this page holds, stop what any other hand does. */
+  function halt(): void {
+    if (body?.hand.grabbed) body.hand.release();
+    else if (hello?.device || latest?.grabbed) drops.stop();
+  }
+
   function picture(): void {
     requestAnimationFrame(picture);
     if (document.hidden) return; // grants no credit, so nothing is sent either
+    body?.hand.drive(pads?.read() ?? null, Math.min(performance.now() - ticked, 100));
+    ticked = performance.now();
     body?.hand.tick();
     const frame = connection.take();
+    drops.show();
     const now = performance.now();
     if (frame) {
       [latest, lastFrame] = [frame, now];
-      describe(frame);
+      describe(frame, drops.without);
       if (changed(frame, drawn)) show(frame);
       panel.update(frame);
+      if (body?.hand.byPad) pads?.rumble(frame.force, now);
     } else if (connection.connected && latest && now - lastFrame > SILENT) {
       status("warn", "no pictures from the server");
     }
@@ -101,6 +125,8 @@ export function touch(): void {
     () => body?.view ?? null,
     () => panel.recolour(),
   );
+  // before the canvas hears of it, and lets go
+  document.addEventListener("keydown", (event) => event.key === "Escape" && halt(), { capture: true });
   document.addEventListener("visibilitychange", () => {
     if (!document.hidden) return;
     panel.hidden();

@@ -23,7 +23,12 @@ export class PressView extends SurfaceView {
 
   private readonly hover: Mesh<SphereGeometry, MeshLambertMaterial>;
 
-  constructor(canvas: HTMLCanvasElement, surface: Surface, hello: Hello, words: readonly Element[]) {
+  constructor(
+    canvas: HTMLCanvasElement,
+    surface: Surface,
+    private readonly hello: Hello,
+    words: readonly Element[],
+  ) {
     super(canvas, surface, words);
     this.arrow = new Arrow(LONG * this.across(), Math.max(hello.force_max, 1e-9), hello.radius);
     this.hover = new Mesh(
@@ -41,7 +46,7 @@ export class PressView extends SurfaceView {
 
   /** Take over one picture: displacement of each point, colours by each point's share of the scale. */
   touch(frame: Frame, radius: number, moved: Float32Array, shares: ArrayLike<number>, layers: Layers): void {
-    const seen = frame.grabbed;
+    const seen = frame.grabbed || this.hello.device !== ""; // a device's hand is seen in the air, too
     this.deform(moved, 1, shares, seen ? { centre: frame.position, radius } : null, layers);
     this.grip.set(...frame.position);
     this.arrow.resize(radius);

@@ -112,3 +112,8 @@ export function measured(x: number, unit: string): string {
   const { size, unit: name } = multiple(x, unit);
   return `${tidy(x / size)} ${name}`;
 }
+
+/** Words that begin with a capital letter. */
+export function capital(words: string): string {
+  return words.charAt(0).toUpperCase() + words.slice(1);
+}

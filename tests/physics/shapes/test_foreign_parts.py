@@ -38,7 +38,7 @@ def test_shells_apart_are_no_fault(tmp_path, offset):
 
 
 def test_a_crash_of_the_mesher_is_an_error_here(stacked, monkeypatch):
-    monkeypatch.setattr(surface_checks, "_contact", lambda surface: None)
+    monkeypatch.setattr(surface_checks, "touching_shells", lambda surface: None)
     with pytest.raises(SolverError, match="SIGABRT") as caught:
         stacked.mesh()
     assert caught.value.exit_code == 3

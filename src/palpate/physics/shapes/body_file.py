@@ -12,6 +12,7 @@ import contextlib
 import hashlib
 import io
 import math
+import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,6 +35,7 @@ __all__ = [
     "SurfacePatch",
     "apply_patches",
     "digest_of",
+    "named_files",
     "read_with_meshio",
     "require_same",
     "require_unit",
@@ -44,6 +46,11 @@ __all__ = [
 UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
 FEATURE_ANGLE = 40.0  # degrees between neighbouring triangles from which the edge between them is sharp
 WITHIN = 60.0  # degrees from a direction within which a surface faces that way
+# how files name others that are read with them
+_NAMED = {
+    ".xdmf": re.compile(rb">\s*([^<>:\s][^<>:\r\n]*\.(?:h5|hdf5?|hdf)):", re.I),
+    ".inp": re.compile(rb"^\*\s*include\s*,\s*input\s*=\s*([^\r\n,]+)", re.I | re.M),
+}
 Point = tuple[float, float, float]
 Corner = tuple[float | None, float | None, float | None]
 
@@ -58,8 +65,20 @@ def require_unit(unit: Any) -> None:
         )
 
 
+def named_files(path: str) -> tuple[Path, ...]:
+    """Files that are read together with a file: TetGen's others, those of an XDMF file's numbers, included ones."""
+    file = Path(path)
+    ending = file.suffix.lower()
+    if ending in {".node", ".ele"}:
+        return tuple(file.with_suffix(other) for other in (".node", ".ele", ".face") if other != ending)
+    if ending not in _NAMED:
+        return ()
+    names = dict.fromkeys(_NAMED[ending].findall(file.read_bytes()))
+    return tuple(file.parent / name.decode("utf-8", "replace").strip(' "') for name in names)
+
+
 def digest_of(path: str) -> str:
-    """SHA-256 of a file's content, as hexadecimal digits.
+    """SHA-256 of the content of a file and those that it names, as hexadecimal digits.
 
     Raises
     ------
@@ -80,7 +99,11 @@ def digest_of(path: str) -> str:
         raise FileFormatError(
             f"The file {path} is empty.", why="It has no content.", fix="Export the shape again."
         )
-    return hashlib.sha256(content).hexdigest()
+    digest = hashlib.sha256(content)
+    for other in named_files(path):
+        if other.is_file():
+            digest.update(other.read_bytes())
+    return digest.hexdigest()
 
 
 def require_same(path: str, digest: str) -> None:
@@ -131,6 +154,13 @@ def read_with_meshio(path: str) -> Any:
             np.errstate(over="ignore"),
         ):
             return meshio.read(path)
+    except ImportError as error:
+        package = error.name or "h5py"
+        raise UsageError(
+            f"Reading {path} needs the package {package}, which is not installed.",
+            why="The format keeps its numbers in files that this package reads.",
+            fix=f"pip install {package}, or export the mesh as VTU or MSH.",
+        ) from error
     except (meshio.ReadError, SystemExit, struct.error, ParseError) as error:
         raise _unreadable(path, error) from error
     except (

@@ -18,7 +18,7 @@ from palpate.physics.shapes.surface_repair import place
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
-__all__ = ["Shells", "require_closed", "shells_of"]
+__all__ = ["Shells", "require_closed", "shells_of", "touching_shells"]
 
 FLUSH = 1e-6  # of the body's length, below which two faces lie on each other
 PAIRS = 500_000  # pairs of triangles that are compared at a time
@@ -73,7 +73,7 @@ def require_closed(surface: Trimesh, source: str) -> None:
             "an outside everywhere.",
             fix="Unite overlapping parts (Boolean union) in the program that made the file.",
         )
-    if (contact := _contact(surface)) is not None:
+    if (contact := touching_shells(surface)) is not None:
         first, second, centre = contact
         raise UsageError(
             f"Closed shells {first} and {second} of the surface of {source} touch around {place(centre)}.",
@@ -236,7 +236,7 @@ def _pinched(surface: Trimesh) -> np.ndarray:
     return np.asarray(number[count > 1])
 
 
-def _contact(surface: Trimesh) -> tuple[int, int, np.ndarray] | None:
+def touching_shells(surface: Trimesh) -> tuple[int, int, np.ndarray] | None:
     """Two closed shells, counted from 1, with faces in one plane that overlap, and where in m; None without such."""
     from trimesh.graph import connected_component_labels
 

@@ -1,0 +1,221 @@
+"""Meshes of Gmsh in format 4.1, with all groups of each entity.
+
+Layout after the Gmsh reference manual, "MSH file format version 4.1" (Geuzaine & Remacle, https://gmsh.info).
+"""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+
+from palpate.errors import FileFormatError, UsageError
+from palpate.physics.shapes.mesh_groups import FACES, SOLIDS, Group, MeshSource
+from palpate.physics.shapes.naming import plain_name
+
+__all__ = ["is_gmsh_4", "read_gmsh"]
+
+# Gmsh's number of an element: its kind by the corners, and the number of its nodes
+ELEMENTS = {
+    **{15: ("vertex", 1), 1: ("line", 2), 8: ("line", 3), 26: ("line", 4), 27: ("line", 5), 28: ("line", 6)},
+    **{
+        2: ("triangle", 3),
+        9: ("triangle", 6),
+        20: ("triangle", 9),
+        21: ("triangle", 10),
+        23: ("triangle", 15),
+    },
+    **{3: ("quad", 4), 10: ("quad", 9), 16: ("quad", 8), 36: ("quad", 16), 37: ("quad", 25)},
+    **{4: ("tetra", 4), 11: ("tetra", 10), 29: ("tetra", 20), 30: ("tetra", 35), 31: ("tetra", 56)},
+    **{5: ("hexahedron", 8), 12: ("hexahedron", 27), 17: ("hexahedron", 20), 92: ("hexahedron", 64)},
+    **{6: ("wedge", 6), 13: ("wedge", 18), 18: ("wedge", 15), 90: ("wedge", 40)},
+    **{7: ("pyramid", 5), 14: ("pyramid", 14), 19: ("pyramid", 13)},
+}
+NAMES = re.compile(rb'^\s*(\d+)\s+(-?\d+)\s+"(.*)"', re.MULTILINE)
+
+
+def is_gmsh_4(path: str) -> bool:
+    """Tell whether a file is one of Gmsh in format 4.1."""
+    with Path(path).open("rb") as file:
+        return re.match(rb"\s*\$MeshFormat\s+4\.1\b", file.read(200)) is not None
+
+
+class _Numbers:
+    """Numbers of a section one after the other, as text or as bytes."""
+
+    def __init__(self, section: bytes, order: str | None) -> None:
+        """Start at the first number; `order` is that of the bytes, None of text."""
+        self.words = section.split() if order is None else None
+        self.section, self.order, self.at = section, order, 0
+
+    def _take(self, code: str, count: int) -> np.ndarray:
+        if self.words is not None:
+            words = self.words[self.at : self.at + count]
+            self.at += count
+            if len(words) < count:
+                raise ValueError(f"{count - len(words)} numbers are missing")
+            return np.array(words).astype(float if code == "f8" else np.int64)
+        kind = np.dtype(f"{self.order}{code}")
+        taken = np.frombuffer(self.section, dtype=kind, count=count, offset=self.at)
+        self.at += count * kind.itemsize
+        return taken.astype(float if code == "f8" else np.int64)
+
+    def integers(self, count: int) -> np.ndarray:
+        """Return whole numbers of four bytes."""
+        return self._take("i4", count)
+
+    def sizes(self, count: int) -> np.ndarray:
+        """Return whole numbers of eight bytes."""
+        return self._take("u8", count)
+
+    def reals(self, count: int) -> np.ndarray:
+        """Return floating-point numbers."""
+        return self._take("f8", count)
+
+    def size(self) -> int:
+        """Return one whole number of eight bytes."""
+        return int(self.sizes(1)[0])
+
+
+def read_gmsh(path: str) -> MeshSource:
+    """Read a mesh of Gmsh in format 4.1, as text or binary.
+
+    An entity may belong to several physical groups, or to none. Where there is no physical group of a dimension,
+    the geometry's own entities are groups by their numbers.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is cut short or damaged.
+    UsageError
+        If it is one part of a partitioned mesh.
+    """
+    content = Path(path).read_bytes()
+    if b"$PartitionedEntities" in content:
+        raise UsageError(
+            f"The mesh in {path} is partitioned.",
+            why="Its parts were shared out to several processes, and its groups stand with the parts.",
+            fix="Save it without partitions in Gmsh (Mesh.SaveAll = 0, no Mesh.Partition).",
+        )
+    try:
+        return _read(path, content)
+    except (ValueError, IndexError, KeyError, OverflowError, MemoryError) as error:
+        raise FileFormatError(
+            f"The file {path} can't be read as a mesh.",
+            why=f"It is corrupt or cut short ({error}).",
+            fix="Open it in Gmsh and save it again, as Version 4 ASCII for example.",
+        ) from error
+
+
+def _section(content: bytes, name: str) -> bytes:
+    start = content.find(f"${name}".encode())
+    if start < 0:
+        raise ValueError(f"there is no section {name}")
+    start = content.index(b"\n", start) + 1
+    return content[start : content.index(f"$End{name}".encode(), start)]
+
+
+def _read(path: str, content: bytes) -> MeshSource:
+    form = _section(content, "MeshFormat")
+    _, binary, size = form.split()[:3]
+    order = None
+    if binary == b"1":
+        one = form[form.index(b"\n") + 1 :][:4]
+        order = "<" if one == b"\x01\0\0\0" else ">"
+        if size != b"8":
+            raise ValueError(f"sizes of {size.decode()} bytes")
+    groups: dict[tuple[int, int], list[int]] = {}
+    if b"$Entities" in content:
+        groups = _read_entities(_Numbers(_section(content, "Entities"), order))
+    points, row_of = _read_nodes(_Numbers(_section(content, "Nodes"), order))
+    names = {}
+    if b"$PhysicalNames" in content:
+        for dimension, number, name in NAMES.findall(_section(content, "PhysicalNames")):
+            names[int(dimension), int(number)] = plain_name(name.decode("utf-8", "replace"))
+    source = MeshSource(path, points)
+    _read_elements(source, _Numbers(_section(content, "Elements"), order), row_of, groups, names)
+    return source
+
+
+def _read_entities(numbers: _Numbers) -> dict[tuple[int, int], list[int]]:
+    """Physical groups of each entity (dimension, number)."""
+    groups = {}
+    for dimension, count in enumerate(numbers.sizes(4).tolist()):
+        for _ in range(count):
+            tag = int(numbers.integers(1)[0])
+            numbers.reals(3 if dimension == 0 else 6)  # its place
+            groups[dimension, tag] = np.abs(numbers.integers(numbers.size())).tolist()
+            if dimension:
+                numbers.integers(numbers.size())  # what bounds it
+    return groups
+
+
+def _read_nodes(numbers: _Numbers) -> tuple[np.ndarray, np.ndarray]:
+    """Places (n, 3), and the row of each number of a node."""
+    blocks, count, _, _ = numbers.sizes(4).tolist()
+    points, tags = np.empty((count, 3)), np.empty(count, dtype=np.int64)
+    start = 0
+    for _ in range(blocks):
+        dimension, _, parametric = numbers.integers(3).tolist()
+        size = numbers.size()
+        rows = slice(start, start + size)
+        tags[rows] = numbers.sizes(size)
+        # places on a curve or face follow the coordinates
+        width = 3 + (min(dimension, 2) if parametric else 0) + (1 if parametric and dimension == 3 else 0)
+        points[rows] = numbers.reals(width * size).reshape(size, width)[:, :3]
+        start += size
+    if start != count:
+        raise ValueError(f"{count - start} of {count} nodes are missing")
+    row_of = np.full(int(tags.max(initial=0)) + 1, -1, dtype=np.int64)
+    row_of[tags] = np.arange(count)
+    return points, row_of
+
+
+def _read_elements(
+    source: MeshSource,
+    numbers: _Numbers,
+    row_of: np.ndarray,
+    groups: dict[tuple[int, int], list[int]],
+    names: dict[tuple[int, int], str],
+) -> None:
+    """Add the cells, and for each group its members."""
+    blocks = numbers.sizes(4)[0]
+    physical: dict[tuple[int, int], list[np.ndarray]] = defaultdict(list)
+    elementary: dict[tuple[int, int], list[np.ndarray]] = defaultdict(list)
+    solids = 0
+    for _ in range(int(blocks)):
+        dimension, entity, element = numbers.integers(3).tolist()
+        count = numbers.size()
+        if element not in ELEMENTS:
+            raise ValueError(f"{count} elements are of Gmsh's type {element}, which is not read")
+        kind, nodes = ELEMENTS[element]
+        cells = row_of[numbers.sizes(count * (nodes + 1)).reshape(count, nodes + 1)[:, 1:]]
+        if (cells < 0).any():
+            raise ValueError("an element has a node that is not there")
+        if kind in SOLIDS:
+            source.add_solids(kind, cells[:, : SOLIDS[kind]])
+            members = np.arange(solids, solids + count)
+            solids += count
+        elif kind in FACES:
+            corners = cells[:, : FACES[kind]]
+            members = np.column_stack([corners, corners[:, -1]]) if kind == "triangle" else corners
+            source.count_other(kind, count)
+        else:
+            source.count_other(kind, count)
+            continue
+        elementary[dimension, entity].append(members)
+        for group in groups.get((dimension, entity), []):
+            physical[dimension, group].append(members)
+    for dimension, found, word in ((3, source.regions, "region"), (2, source.faces, "surface")):
+        mine = {key: parts for key, parts in physical.items() if key[0] == dimension}
+        if not mine:
+            mine = {key: parts for key, parts in elementary.items() if key[0] == dimension}
+            mine = mine if len(mine) > 1 else {}
+            known: dict[tuple[int, int], str] = {}
+        else:
+            known = names
+        for key in sorted(mine):
+            name = known.get(key, f"{word} {key[1]}")
+            found.append(Group(name, np.concatenate(mine[key]), numbered=key not in known))

@@ -16,6 +16,7 @@ from palpate.cli.console import Console, advice_in_words
 from palpate.cli.device_commands import devices_app
 from palpate.cli.table_commands import correct, fit
 from palpate.cli.table_options import Json, with_table_options
+from palpate.cli.touch_options import DeadMan, Device, Unsoftened
 from palpate.errors import AccuracyError, PalpateError, UsageError
 from palpate.files import explain_system_error, write_file
 from palpate.processes import CASE_LIMIT, end_by_sigterm
@@ -254,9 +255,21 @@ def view(
     ] = False,
     browser: Browser = True,
     token: AskToken = True,
+    device: Device = "page",
+    unsoftened: Unsoftened = False,
+    dead_man: DeadMan = False,
 ) -> None:
-    """Open a page on which you can touch the model. Only this machine can reach it."""
-    _serve(model, port=port, browser=browser, strict_port=strict_port, token=token)
+    """Open a page on which you can touch the model, with the mouse or a device. Only this machine can reach it."""
+    _serve(
+        model,
+        port=port,
+        browser=browser,
+        strict_port=strict_port,
+        token=token,
+        device=device,
+        unsoftened=unsoftened,
+        dead_man=dead_man,
+    )
 
 
 @app.command()
@@ -315,29 +328,19 @@ def ask(
 def run(
     model: ModelFile,
     seconds: Annotated[float, typer.Option(min=0.1, help="Duration in seconds.")] = 5.0,
-    device: Annotated[
-        str,
-        typer.Option(
-            help="Device with its settings, for example stroke:amplitude=0.02,frequency=1 or haply."
-        ),
-    ] = "stroke",
+    device: Device = "stroke",
     rate: Annotated[
         float | None,
         typer.Option(min=10, max=10000, help="Ticks per second (Hz). Default: that of the study."),
     ] = None,
-    unsoftened: Annotated[
-        bool,
-        typer.Option(
-            "--unsoftened",
-            help="Let a body that is too stiff for the device feel so. It may hum or oscillate.",
-        ),
-    ] = False,
+    unsoftened: Unsoftened = False,
+    dead_man: DeadMan = False,
     as_json: Json = False,
 ) -> None:
-    """Run the real-time loop without a page, and print how late its ticks were."""
+    """Run the real-time loop without a page, and print how late its ticks were. In a terminal, Esc stops the force."""
     from palpate.cli.run_command import run_loop
 
-    run_loop(model, seconds, device, rate, Console(as_json), unsoftened=unsoftened)
+    run_loop(model, seconds, device, rate, Console(as_json), unsoftened=unsoftened, dead_man=dead_man)
 
 
 app.command()(fit)
@@ -399,11 +402,23 @@ def doctor(
     report(Console(as_json), seconds)
 
 
-def _serve(model: Path, *, port: int | None, browser: bool, token: bool, strict_port: bool = False) -> None:
+def _serve(
+    model: Path,
+    *,
+    port: int | None,
+    browser: bool,
+    token: bool,
+    strict_port: bool = False,
+    device: str = "page",
+    unsoftened: bool = False,
+    dead_man: bool = False,
+) -> None:
+    from palpate.cli.run_command import aim_device
     from palpate.runtime.touchable import load_touchable
     from palpate.viewer import serve
 
-    settings = load_touchable(model).meta.get("runtime", {})
+    body = load_touchable(model)
+    settings = body.meta.get("runtime", {})
     serve(
         model,
         port=settings.get("port", 8080) if port is None else port,
@@ -412,6 +427,9 @@ def _serve(model: Path, *, port: int | None, browser: bool, token: bool, strict_
         open_browser=browser and sys.stdout.isatty(),
         strict_port=strict_port,
         token=token,
+        device=aim_device(device, body),
+        unsoftened=unsoftened,
+        dead_man=dead_man,
     )
 
 

@@ -6,10 +6,13 @@ import contextlib
 import math
 import sys
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from palpate.cli.console import Console
+from palpate.cli.live_table import live_table
+from palpate.cli.terminal_keys import RESUME, STOP, Keys, terminal_keys
 from palpate.format import share
 from palpate.runtime import LoopProcess
 from palpate.runtime.devices import device_traits
@@ -17,9 +20,10 @@ from palpate.runtime.shared_state import State
 from palpate.runtime.touchable import Touchable, load_touchable
 from palpate.surrogates.surrogate import correction_warning
 
-__all__ = ["run_loop"]
+__all__ = ["aim_device", "run_loop"]
 
 LOOK = 0.02  # s between two looks at the loop
+_REFRESH = 10.0  # Hz, of the live table
 _TOLD = 0.2  # change of the spring in front of a stiff body from which on it is said again: a tenth is hardly felt
 
 
@@ -39,7 +43,7 @@ class _Peak:
         self.depth = max(self.depth, state.depth)
         self.looks += 1
         self.outside += not state.inside
-        self.let_go += state.let_go
+        self.let_go += state.let_go and not state.waiting
 
     def words(self, *, holds: bool) -> str:
         """Return the figures as lines for a person; `holds` says whether the device held the body."""
@@ -75,6 +79,7 @@ def run_loop(
     console: Console,
     *,
     unsoftened: bool = False,
+    dead_man: bool = False,
 ) -> None:
     """Run a model's loop for a while and print its report.
 
@@ -92,29 +97,41 @@ def run_loop(
         Takes what is said.
     unsoftened : bool
         Whether a body that is too stiff for the device shall feel so all the same.
+    dead_man : bool
+        Whether the force acts only while the device's first button is held.
     """
-    touch, traits = load_touchable(model), device_traits(device)
+    touch = load_touchable(model)
     settings = touch.meta.get("runtime", {})
     rate = rate or settings.get("rate", 1000.0)
-    workspace = touch.workspace(traits.radius)
-    device = _aimed(device, touch, workspace.scale)
+    device = aim_device(device, touch)
     if warning := correction_warning(touch.meta):
         console.say(f"its correction was warned of: {warning}")
     limit = settings.get("max_force")
     peak = _Peak()
     # whoever stops it early still wants to know
     with (
-        LoopProcess(model, device=device, rate=rate, max_force=limit, unsoftened=unsoftened) as loop,
+        LoopProcess(
+            model, device=device, rate=rate, max_force=limit, unsoftened=unsoftened, dead_man=dead_man
+        ) as loop,
         contextlib.suppress(KeyboardInterrupt),
+        terminal_keys() as keys,
+        _shown(loop, console, keys, holds=touch.holds) as show,
     ):
-        _wait(loop, seconds, console, peak)
+        _wait(loop, seconds, console, peak, keys, show)
     report = loop.report()  # after the end: only then is it known what the system granted
     console.result(f"{report}\n{peak.words(holds=touch.holds)}", report.as_dict() | peak.as_dict())
 
 
-def _aimed(device: str, touch: Touchable, scale: float) -> str:
-    """Return the device; a scripted stroke without a place presses where the body was trained to be pressed."""
+def aim_device(device: str, touch: Touchable) -> str:
+    """Return the device; a scripted stroke without a place presses where the body was trained to be pressed.
+
+    Raises
+    ------
+    UsageError
+        If there is no device of that name.
+    """
     name, _, text = device.partition(":")
+    scale = touch.workspace(device_traits(device).radius).scale
     if name not in {"stroke", "simulated"} or touch.holds:
         return device
     given = {part.partition("=")[0].strip() for part in text.split(",") if part}
@@ -127,24 +144,43 @@ def _aimed(device: str, touch: Touchable, scale: float) -> str:
     )
 
 
-def _wait(loop: LoopProcess, seconds: float, console: Console, peak: _Peak) -> None:
-    """Look at the force while the loop runs, and show it in a terminal."""
-    end = time.monotonic() + seconds
-    shown = sys.stderr.isatty() and not console.as_json
+@contextlib.contextmanager
+def _shown(
+    loop: LoopProcess, console: Console, keys: Keys, *, holds: bool
+) -> Iterator[Callable[[State], None]]:
+    """Give a function that shows a tick in a terminal, in a table that is renewed in place; elsewhere it is quiet."""
+    if console.as_json or not sys.stderr.isatty():
+        yield lambda _: None
+        return
+    from rich.console import Console as Rich
+    from rich.live import Live
+
+    first = live_table(loop.read(), holds=holds, keys=keys.heard)
+    with Live(first, console=Rich(stderr=True), refresh_per_second=_REFRESH) as live:
+        yield lambda state: live.update(live_table(state, holds=holds, keys=keys.heard))
+
+
+def _wait(
+    loop: LoopProcess,
+    seconds: float,
+    console: Console,
+    peak: _Peak,
+    keys: Keys,
+    show: Callable[[State], None],
+) -> None:
+    """Look at the force while the loop runs, show it, and heed the keys."""
+    end, shown = time.monotonic() + seconds, -math.inf
     coupling = math.nan  # nothing was said yet
     while (left := end - time.monotonic()) > 0:
         time.sleep(min(left, LOOK))
+        if wish := keys.wish():
+            loop.shared.write_command(stop=wish == STOP, resume=wish == RESUME)
         state = loop.read()
         peak.see(state)
         with_motors = state.felt_stiffness.damping is not None
         if with_motors and not math.isclose(state.coupling, coupling, rel_tol=_TOLD):
             coupling = state.coupling
             console.say(state.felt_stiffness.warning or f"{state.felt_stiffness}.")
-        if shown:
-            print(f"\r  force {_vector(state.force)} N   tick {state.tick}", end="", file=sys.stderr)  # noqa: T201
-    if shown:
-        print(file=sys.stderr)  # noqa: T201
-
-
-def _vector(values: object) -> str:
-    return " ".join(f"{v:+7.3f}" for v in values)  # type: ignore[attr-defined]
+        if end - left - shown > 1.0 / _REFRESH:
+            shown = end - left
+            show(state)

@@ -95,6 +95,10 @@ class Viewer(LocalServer):
         Folder for what is recorded by the page's button.
     replay : path, optional
         Recorded touch that is gone through, instead of a device.
+    unsoftened : bool
+        Whether a body that is too stiff for the device shall feel so all the same.
+    dead_man : bool
+        Whether the force acts only while the device's first button is held.
 
     Attributes
     ----------
@@ -124,6 +128,8 @@ class Viewer(LocalServer):
         token: bool = True,
         recordings: str | os.PathLike[str] = ".",
         replay: str | os.PathLike[str] | None = None,
+        unsoftened: bool = False,
+        dead_man: bool = False,
     ) -> None:
         super().__init__(port, host, strict_port=strict_port, token=token)
         self._source = model
@@ -132,7 +138,13 @@ class Viewer(LocalServer):
         else:
             self.model = touchable(model)
         self._loop = functools.partial(
-            LoopProcess, device=device, rate=rate, max_force=max_force, replay=replay
+            LoopProcess,
+            device=device,
+            rate=rate,
+            max_force=max_force,
+            replay=replay,
+            unsoftened=unsoftened,
+            dead_man=dead_man,
         )
         self._driver = "a recorded touch" if replay is not None else _driver(device)
         self._recordings = Path(recordings) if replay is None else None
@@ -168,6 +180,8 @@ def serve(
     token: bool = True,
     recordings: str | os.PathLike[str] = ".",
     replay: str | os.PathLike[str] | None = None,
+    unsoftened: bool = False,
+    dead_man: bool = False,
     open_browser: bool = False,
     on_ready: Callable[[Viewer], object] | None = None,
 ) -> None:
@@ -196,5 +210,7 @@ def serve(
         token=token,
         recordings=recordings,
         replay=replay,
+        unsoftened=unsoftened,
+        dead_man=dead_man,
     )
     wait_until_interrupted(viewer, open_browser=open_browser, on_ready=on_ready)

@@ -1,0 +1,67 @@
+"""Keys of a terminal, read without waiting for a line: Esc or space stops the force, r lets it come back."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import sys
+from collections.abc import Iterator
+
+__all__ = ["RESUME", "STOP", "Keys", "terminal_keys"]
+
+STOP, RESUME = "stop", "resume"
+_MEANINGS = {0x1B: STOP, 0x20: STOP, ord("r"): RESUME, ord("R"): RESUME}
+
+
+class Keys:
+    """The keys pressed since the last look.
+
+    Parameters
+    ----------
+    descriptor : int
+        File descriptor of a terminal in which each key arrives by itself; -1 for none.
+    """
+
+    def __init__(self, descriptor: int = -1) -> None:
+        self._descriptor = descriptor
+
+    @property
+    def heard(self) -> bool:
+        """True where keys can be read."""
+        return self._descriptor >= 0
+
+    def wish(self) -> str:
+        """Return what was asked for since the last look: `STOP`, `RESUME` or nothing; of both, the stop."""
+        if not self.heard or not select.select([self._descriptor], [], [], 0.0)[0]:
+            return ""
+        wishes = {_MEANINGS.get(key, "") for key in os.read(self._descriptor, 256)}
+        return STOP if STOP in wishes else RESUME if RESUME in wishes else ""
+
+
+@contextlib.contextmanager
+def terminal_keys(descriptor: int | None = None) -> Iterator[Keys]:
+    """Read single keys of a terminal while the context lasts; none where there is no terminal that can do so.
+
+    Parameters
+    ----------
+    descriptor : int, optional
+        Of the terminal; standard input by default.
+    """
+    if descriptor is None:
+        try:
+            descriptor = sys.stdin.fileno()
+        except (AttributeError, OSError, ValueError):  # no standard input, or one that is no file
+            descriptor = -1
+    if sys.platform == "win32" or descriptor < 0 or not os.isatty(descriptor):
+        yield Keys()
+        return
+    import termios
+    import tty
+
+    before = termios.tcgetattr(descriptor)
+    try:
+        tty.setcbreak(descriptor)  # Ctrl-C still interrupts
+        yield Keys(descriptor)
+    finally:
+        termios.tcsetattr(descriptor, termios.TCSADRAIN, before)

@@ -1,0 +1,27 @@
+"""Options of the commands that touch a body: the device, and what is asked of it."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+__all__ = ["DeadMan", "Device", "Unsoftened"]
+
+Device = Annotated[
+    str,
+    typer.Option(help="Device with its settings, for example stroke:amplitude=0.02,frequency=1 or haply."),
+]
+Unsoftened = Annotated[
+    bool,
+    typer.Option(
+        "--unsoftened", help="Let a body that is too stiff for the device feel so. It may hum or oscillate."
+    ),
+]
+DeadMan = Annotated[
+    bool,
+    typer.Option(
+        "--dead-man",
+        help="Let the force act only while the device's first button is held. Any other button stops it.",
+    ),
+]

@@ -19,6 +19,16 @@ from palpate.runtime import Fault, LoopProcess, Workspace
 from palpate.runtime.devices import device_named
 from palpate.runtime.devices.openhaptics import AXES, OpenHapticsDevice, OpenHapticsSettings
 from palpate.runtime.devices.openhaptics_library import HdLibrary
+from palpate.runtime.devices.openhaptics_servo import (
+    CAUSE,
+    FATAL,
+    FATAL_INTERNAL,
+    HIDDEN,
+    INTERNAL,
+    STOPS,
+    Mailbox,
+    servo,
+)
 from palpate.runtime.loop import Loop
 from palpate.runtime.safety import Limits
 
@@ -29,7 +39,7 @@ SURVIVABLE = {
     0x202: "too suddenly",
     0x203: "moved too fast",
 }
-FATAL = {
+ENDING = {
     0x104: "handle",
     0x204: "error of the force",
     0x300: "fault of the device",
@@ -67,7 +77,6 @@ def connect(library, clock):
             library.manual_after = 50
             device = OpenHapticsDevice(OpenHapticsSettings(library=str(library.path), **settings))
             library.manual_after, library.manual = 0, 1
-            device.read(clock.time)  # from now on it is called
             stack.callback(device.close)
             stack.callback(setattr, library, "manual", 0)  # the last frame comes by itself
             return device
@@ -203,12 +212,12 @@ def test_an_error_that_comes_again_pauses_longer(device, drive, library, clock):
     assert pauses == pytest.approx([0.1, 0.2, 0.4], abs=0.01)
 
 
-@pytest.mark.parametrize("code", FATAL)
+@pytest.mark.parametrize("code", ENDING)
 def test_any_other_error_ends_the_callback_with_zero_force(device, drive, library, code):
     drive(device, 3, force=(0.0, 1.0, 0.0))
     library.error, library.error_frames = code, 1
     kind = DeviceLostError if code in {0x104, 0x300, 0x302} else DeviceError
-    with pytest.raises(kind, match=FATAL[code]) as caught:
+    with pytest.raises(kind, match=ENDING[code]) as caught:
         drive(device, 5, force=(0.0, 1.0, 0.0))
     assert type(caught.value) is kind
     assert f"0x{code:04x}, internal {code + 7}" in str(caught.value)
@@ -300,13 +309,11 @@ def test_no_memory_is_kept_per_frame(device, drive):
     assert after - before < 1000, "bytes left after a thousand frames"
 
 
-def test_what_the_device_said_at_the_start_is_not_told_later(library):
-    with contextlib.closing(OpenHapticsDevice(OpenHapticsSettings(library=str(library.path)))) as device:
-        library.manual = 1
-        assert math.isinf(device.read(5.0).time)
-        library.library.double_step(1)
-        assert device.read(5.001).time == 5.001
-        library.manual = 0
+def test_the_first_reading_is_where_the_hand_is(connect, library):
+    library.fixed, library.y = 1, -20
+    sample = connect().read(5.0)
+    np.testing.assert_allclose(sample.position, [0.0, -0.020, 0.0])
+    assert (sample.time, sample.holding) == (5.0, True)
 
 
 def test_after_closing_nothing_is_taken(device, drive, library):
@@ -327,6 +334,21 @@ def test_a_force_that_is_no_number_is_kept(device, drive, library):
         device.write(np.array([0.0, math.nan, 0.0]))
     library.library.double_step(1)
     assert felt(library) == [0.0, 1.0, 0.0]
+
+
+def test_a_hand_that_starts_in_the_body_feels_nothing_until_it_has_been_at_rest(
+    connect, drive, library, clock, plain, shared
+):
+    library.fixed, library.y = 1, -20
+    device = connect()
+    loop = Loop(plain, device, shared, Workspace(0.035, 10.0), Limits(device.traits.max_force))
+    for y, pushed in ((-20, False), (-1, True), (-20, True)):
+        for step in np.linspace(library.y, y, 200):
+            clock.time += TICK
+            library.y = step
+            library.library.double_step(1)
+            loop.tick(clock.time)
+        assert bool(felt(library)[1]) is pushed
 
 
 def test_the_loop_pushes_on_the_hand_against_its_way(connect, library, clock, plain, shared):
@@ -382,6 +404,24 @@ def test_a_process_touches_through_the_library(library, spring_file):
     report = loop.report()
     assert report.ticks >= 200
     assert not {"device_error", "device_lost", "impossible_place"} & report.faults.keys()
+
+
+def test_errors_that_come_back_by_a_hidden_pointer_are_taken_too(library):
+    """The calling convention of Windows, by a function of the double."""
+    hd = HdLibrary(library.library)
+    device = hd.hdInitDevice(b"Default Device")
+    into = ctypes.cast(library.library.double_error_into, ctypes.c_void_p).value
+    box = Mailbox(hd.addresses() | {"hdGetError": into}, device, 18)
+    box.cells[HIDDEN] = 1.0
+    call = ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_void_p)(servo().address)
+    assert call(box.cells.ctypes.data) == 1
+    library.error, library.error_frames = 0x202, 1
+    assert call(box.cells.ctypes.data) == 1
+    assert box.cells[[STOPS, CAUSE, INTERNAL]].tolist() == [1, 0x202, 0x202 + 7]
+    library.error, library.error_frames = 0x302, 1
+    assert call(box.cells.ctypes.data) == 0
+    assert box.cells[[FATAL, FATAL_INTERNAL]].tolist() == [0x302, 0x302 + 7]
+    hd.hdDisableDevice(device)
 
 
 def test_a_library_of_something_else_is_refused():

@@ -27,7 +27,6 @@ from palpate.errors import DeviceError, DeviceLostError, DeviceStopError, UsageE
 from palpate.runtime.devices.device import Sample, Traits, settings_from
 from palpate.runtime.devices.openhaptics_library import LOST, NO_DEVICE, Code, HdError, HdLibrary
 from palpate.runtime.devices.openhaptics_servo import (
-    CALM,
     CAUSE,
     FATAL,
     FATAL_INTERNAL,
@@ -148,7 +147,7 @@ class OpenHapticsDevice:
         # stops that were told and that are over; what was told, and until when it lasts at least
         self._told, self._resumed, self._words, self._until = 0, 0, "", -math.inf
         self._pause, self._failed = _PAUSE, -math.inf
-        self._handle, self._running, self._calm, self._closed = 0, False, True, False
+        self._handle, self._running, self._closed = 0, False, False
         self._device = self._connect()
         patience = round(HARDWARE_PATIENCE * settings.rate) - 2
         self._box = Mailbox(self._hd.addresses(), self._device, patience)
@@ -169,10 +168,6 @@ class OpenHapticsDevice:
     def read(self, now: float) -> Sample:
         """Return what the device said in its latest frame; one without a new frame keeps the sample's time."""
         self._check_open()
-        if self._calm:
-            self._calm = False
-            self._cells[CALM] = 0.0
-            self._schedule()
         self._now, sample, cells = now, self.sample, self._cells
         frame, mask, inkwell, switch = self._box.read(self._place)
         if frame != self.frames:
@@ -331,20 +326,19 @@ class OpenHapticsDevice:
         hd.errors()  # a help that is not relied on
         hd.hdSetSchedulerRate(rate)
         self._refuse(hd.errors(), f"doesn't run at {rate} Hz", "Try openhaptics:rate=500.")
-        self._schedule()
+        cells = self._cells.ctypes.data
+        self._handle = hd.hdScheduleAsynchronous(servo().address, cells, _PRIORITY)
+        self._refuse(hd.errors(), "takes no callback", "Close other programs that use it.")
         hd.hdStartScheduler()
         self._running = True
         self._refuse(hd.errors(), "has no running scheduler", "Close other programs that use it.")
         end = time.monotonic() + _START
-        while hd.hdWaitForCompletion(self._handle, 0) and time.monotonic() < end:
+        while self._box.read(self._place)[0] < FIRST and not self._cells[FATAL] and time.monotonic() < end:
             time.sleep(1e-3)
         if self._cells[FATAL] != 0.0:
             raise self._failure()
-        self.frames = self._box.read(self._place)[0]  # old by the time of the first reading, and not told
-        if self.frames < FIRST:
-            raise DeviceError(
-                f"{self.name} gave {self.frames} positions in {_START:g} s.", fix="Start it again."
-            )
+        if (frames := self._box.read(self._place)[0]) < FIRST:
+            raise DeviceError(f"{self.name} gave {frames} positions in {_START:g} s.", fix="Start it again.")
         for *place, u, v, w in self._box.early()[
             FIRST // 2 :
         ].tolist():  # several drivers deliver garbage at first
@@ -356,11 +350,6 @@ class OpenHapticsDevice:
                     why=f"A start is within {self.traits.reach:.3g} m and slower than {_FASTEST:g} m/s.",
                     fix="Calibrate it, and hold it still while it is opened.",
                 )
-
-    def _schedule(self) -> None:
-        cells = self._cells.ctypes.data
-        self._handle = self._hd.hdScheduleAsynchronous(servo().address, cells, _PRIORITY)
-        self._refuse(self._hd.errors(), "takes no callback", "Close other programs that use it.")
 
 
 def _positive(values: tuple[float, ...]) -> float:

@@ -394,6 +394,9 @@ API HDErrorInfo hdGetError(void) {
     return (HDErrorInfo){0, 0, HANDLE};
 }
 
+/* As hdGetError returns its structure on 64-bit Windows. */
+API void double_error_into(HDErrorInfo *place) { *place = hdGetError(); }
+
 API const char *hdGetErrorString(HDerror code) {
     switch (code) {
     case 0: return "no error";

@@ -32,7 +32,20 @@ from numba.np.numpy_support import carray
 
 from palpate.runtime.devices.openhaptics_library import DONE, GOING_ON, Code
 
-__all__ = ["FIRST", "SILENCE", "Mailbox", "servo"]
+__all__ = [
+    "CAUSE",
+    "FATAL",
+    "FATAL_INTERNAL",
+    "FIRST",
+    "HIDDEN",
+    "INTERNAL",
+    "LEAVING",
+    "RESUMED",
+    "SILENCE",
+    "STOPS",
+    "Mailbox",
+    "servo",
+]
 
 FIRST = 50  # frames at the start whose places and velocities are kept
 SILENCE = 1.0  # cause of a stop: the loop was silent; all others are the library's errors
@@ -44,16 +57,9 @@ _MOST_ERRORS = 64  # a list that is longer doesn't end
 
 # cells of 8 bytes; addresses and counts are numbers too, which a double holds exactly up to 2⁵³
 BASE, DEVICE, BEGIN, END, DOUBLES, INTEGERS, BOOLEANS, SET, ERROR, HIDDEN = range(10)
-WRITTEN, FORCE, RESUMED, LEAVING, CALM, PATIENCE = (
-    10,
-    11,
-    14,
-    15,
-    16,
-    17,
-)  # of the loop; FORCE has three cells
-FRAMES, STOPS, CAUSE, INTERNAL, FATAL, FATAL_INTERNAL = range(18, 24)  # of the callback
-SEEN, SILENT, PUSH, FETCHED, SLOTS = 24, 25, 26, 29, 30  # its own; PUSH has three cells
+WRITTEN, RESUMED, LEAVING, PATIENCE, FORCE = 10, 11, 12, 13, 14  # of the loop; FORCE has three cells
+FRAMES, STOPS, CAUSE, INTERNAL, FATAL, FATAL_INTERNAL = range(17, 23)  # of the callback
+SEEN, SILENT, PUSH, FETCHED, SLOTS = 23, 24, 25, 28, 30  # its own; PUSH has three cells, FETCHED two
 PLACE, BUTTONS, INKWELL, SWITCH, _SLOT = 0, 3, 4, 5, 6  # within one of the two slots; PLACE has three cells
 EARLY = SLOTS + 2 * _SLOT  # FIRST times place and velocity
 _CELLS = EARLY + 6 * FIRST
@@ -92,7 +98,6 @@ class Mailbox:
         for cell, name in zip(range(BEGIN, ERROR), names, strict=True):
             cells[cell] = functions[name]
         cells[ERROR], cells[HIDDEN] = functions["hdGetError"], sys.platform == "win32"
-        cells[CALM] = 1.0
 
     def write(self, x: float, y: float, z: float) -> None:
         """Leave a force, N, for the next frame."""
@@ -235,7 +240,7 @@ def _called(data):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     _transfer(np.int64(box[INTEGERS]), np.uint32(_BUTTONS), base + 8 * (slot + BUTTONS))
     _transfer(booleans, np.uint32(_INKWELL), base + 8 * (slot + INKWELL))
     _transfer(booleans, np.uint32(_SWITCH), base + 8 * (slot + SWITCH))
-    if box[CALM] != 0.0 and frames <= FIRST:
+    if frames <= FIRST:
         early = base + 8 * (EARLY + 6 * (frames - 1))
         _transfer(doubles, np.uint32(_POSITION), early)
         _transfer(doubles, np.uint32(_VELOCITY), early + 24)
@@ -250,5 +255,4 @@ def _called(data):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
             _frame(np.int64(box[END]), device)
         return np.uint32(DONE)
     box[FRAMES] = np.float64(frames)
-    over = box[LEAVING] != 0.0 or (box[CALM] != 0.0 and frames >= FIRST)
-    return np.uint32(DONE if over else GOING_ON)
+    return np.uint32(DONE if box[LEAVING] != 0.0 else GOING_ON)

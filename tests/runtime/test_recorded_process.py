@@ -9,16 +9,18 @@ import signal
 import subprocess
 import sys
 import time
+import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from palpate.errors import ResourceError, UsageError
+from palpate.errors import FileFormatError, ResourceError, UsageError
 from palpate.runtime import LoopProcess, now
+from palpate.runtime.recording import TICK
 from palpate.runtime.replay import Replay, is_recorded_model
 from palpate.runtime.touchable import load_touchable
-from palpate.runtime.trace_file import TraceWriter, read_trace
+from palpate.runtime.trace_file import COLUMNS, TraceWriter, read_trace
 
 
 def wait_for(condition, seconds=20.0):
@@ -101,17 +103,26 @@ def test_a_killed_recorder_loses_less_than_a_second(spring_file, tmp_path):
     assert Replay(trace, load_touchable(spring_file)).run().identical
 
 
-def test_an_unfinished_chunk_is_left_out_with_a_note(spring_file, tmp_path):
-    path = tmp_path / "a.trace"
-    with LoopProcess(spring_file, device="stroke", record=path) as loop:
-        wait_for(lambda: loop.recording.ticks > 700)
-    whole, data = read_trace(path), path.read_bytes()
-    cut = data.index(b"ticks-000002.npz") + 100
-    path.write_bytes(data[:cut])
-    trace = read_trace(path)
-    assert 0 < len(trace) < len(whole)
-    np.testing.assert_array_equal(trace.ticks, whole.ticks[: len(trace)])
-    assert "unfinished chunk" in trace.notes[0]
+def test_an_unfinished_chunk_is_left_out_with_a_note(tmp_path):
+    path, ticks = tmp_path / "a.trace", np.zeros(300, TICK)
+    ticks["tick"], ticks["force"] = np.arange(300), np.random.default_rng(0).normal(size=(300, 3))
+    writer = TraceWriter(path, {"name": "nobody"})
+    for part in (ticks[:200], ticks[200:]):
+        writer.add_ticks(part)
+    writer.close({})
+    assert not read_trace(path).notes
+    with zipfile.ZipFile(path) as archive:  # with its directory it is a plain archive
+        assert archive.testzip() is None
+        assert len(archive.namelist()) == 4
+    data = path.read_bytes()
+    for cut in (data.index(b"ticks-000002.npz") + 100, data.index(b"ticks-000002.npz") - 3):
+        path.write_bytes(data[:cut])
+        trace = read_trace(path)
+        np.testing.assert_array_equal(trace.ticks[list(COLUMNS)], ticks[:200][list(COLUMNS)])
+        assert "unfinished chunk" in trace.notes[0]
+    path.write_bytes(data[:20])
+    with pytest.raises(FileFormatError, match="is no recording"):
+        read_trace(path)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="limits of a process are POSIX's")

@@ -17,6 +17,7 @@ from palpate.cli.device_commands import devices_app
 from palpate.cli.table_commands import correct, fit
 from palpate.cli.table_options import Json, with_table_options
 from palpate.cli.touch_options import DeadMan, Device, Unsoftened
+from palpate.cli.trace_commands import replay, trace_app
 from palpate.errors import AccuracyError, PalpateError, UsageError
 from palpate.files import explain_system_error, write_file
 from palpate.processes import CASE_LIMIT, end_by_sigterm
@@ -35,6 +36,7 @@ app = typer.Typer(
 dataset_app = typer.Typer(help="Datasets of solves.", no_args_is_help=True)
 app.add_typer(dataset_app, name="dataset")
 app.add_typer(devices_app, name="devices")
+app.add_typer(trace_app, name="trace")
 
 StudyFile = Annotated[Path, typer.Argument(help="Study file, as [bold]palpate init[/] writes it.")]
 ModelFile = Annotated[
@@ -227,6 +229,12 @@ def validate(
             help="For a model file: solves at some of these places on a finer mesh. They show the error of the mesh."
         ),
     ] = None,
+    trace: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="For a study file: recorded touch; the full model is solved under the same hand. Several times."
+        ),
+    ] = None,
     report: Annotated[
         bool, typer.Option("--report/--no-report", help="Write a report as an HTML page.")
     ] = True,
@@ -237,13 +245,18 @@ def validate(
 
     console = Console(as_json)
     if is_archive(study):
+        if trace:
+            raise UsageError(
+                "A recorded touch is compared with the full model of a study.",
+                fix="Name the study file instead of the model.",
+            )
         validate_model(study, test, refined, report, console)
         return
     if test is not None or refined is not None:
         raise UsageError(
             "A study file already names the solves that test it.", fix="Leave out --test and --refined."
         )
-    validate_study_file(study, report, console)
+    validate_study_file(study, report, console, trace or ())
 
 
 @app.command()
@@ -335,14 +348,27 @@ def run(
     ] = None,
     unsoftened: Unsoftened = False,
     dead_man: DeadMan = False,
+    record: Annotated[
+        Path | None, typer.Option(help="New file that takes every tick; see [bold]palpate replay[/].")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Run the real-time loop without a page, and print how late its ticks were. In a terminal, Esc stops the force."""
     from palpate.cli.run_command import run_loop
 
-    run_loop(model, seconds, device, rate, Console(as_json), unsoftened=unsoftened, dead_man=dead_man)
+    run_loop(
+        model,
+        seconds,
+        device,
+        rate,
+        Console(as_json),
+        unsoftened=unsoftened,
+        dead_man=dead_man,
+        record=record,
+    )
 
 
+app.command()(replay)
 app.command()(fit)
 app.command()(correct)
 

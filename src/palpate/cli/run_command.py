@@ -80,6 +80,7 @@ def run_loop(
     *,
     unsoftened: bool = False,
     dead_man: bool = False,
+    record: Path | None = None,
 ) -> None:
     """Run a model's loop for a while and print its report.
 
@@ -99,6 +100,13 @@ def run_loop(
         Whether a body that is too stiff for the device shall feel so all the same.
     dead_man : bool
         Whether the force acts only while the device's first button is held.
+    record : Path, optional
+        New file that takes every tick.
+
+    Raises
+    ------
+    ResourceError
+        If the recording stopped by itself; the loop has run on, and its report is printed.
     """
     touch = load_touchable(model)
     settings = touch.meta.get("runtime", {})
@@ -111,7 +119,13 @@ def run_loop(
     # whoever stops it early still wants to know
     with (
         LoopProcess(
-            model, device=device, rate=rate, max_force=limit, unsoftened=unsoftened, dead_man=dead_man
+            model,
+            device=device,
+            rate=rate,
+            max_force=limit,
+            unsoftened=unsoftened,
+            dead_man=dead_man,
+            record=record,
         ) as loop,
         contextlib.suppress(KeyboardInterrupt),
         terminal_keys() as keys,
@@ -119,7 +133,28 @@ def run_loop(
     ):
         _wait(loop, seconds, console, peak, keys, show)
     report = loop.report()  # after the end: only then is it known what the system granted
-    console.result(f"{report}\n{peak.words(holds=touch.holds)}", report.as_dict() | peak.as_dict())
+    words, facts = _recording(loop)
+    console.result(
+        f"{report}\n{peak.words(holds=touch.holds)}{words}", report.as_dict() | peak.as_dict() | facts
+    )
+    if loop.recording is not None and loop.recording.error is not None:
+        raise loop.recording.error
+
+
+def _recording(loop: LoopProcess) -> tuple[str, dict[str, object]]:
+    """Return in words and as data what was recorded; nothing where nothing was."""
+    recording = loop.recording
+    if recording is None:
+        return "", {}
+    lost = f", {recording.lost} lost" if recording.lost else ""
+    words = f"\n  recorded   {recording.ticks} ticks{lost}, {recording.size / 1e6:.2f} MB in {recording.path}"
+    facts = {
+        "file": str(recording.path),
+        "ticks": recording.ticks,
+        "lost": recording.lost,
+        "bytes": recording.size,
+    }
+    return words, {"recording": facts}
 
 
 def aim_device(device: str, touch: Touchable) -> str:

@@ -11,7 +11,11 @@ from palpate.errors import AccuracyError, UsageError
 from palpate.processes import CASE_LIMIT
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from palpate.study import Study
     from palpate.sweeps import Scheduler
+    from palpate.validation.touch_comparison import TouchComparison
 
 __all__ = [
     "is_archive",
@@ -105,8 +109,19 @@ _HEADLINES = {"rmse", "filter_rmse", "force_median", "force_p95", "history_force
 """Values of a validation that `palpate learn` prints."""
 
 
-def validate_study_file(study: Path, report: bool, console: Console) -> None:
+def validate_study_file(study: Path, report: bool, console: Console, traces: Sequence[Path] = ()) -> None:
     """Judge the model of a study file by its unseen solves, print, and write the report.
+
+    Parameters
+    ----------
+    study : Path
+        Study file, whose model is learnt.
+    report : bool
+        Whether to write the report.
+    console : Console
+        Printer of the result.
+    traces : sequence of Path
+        Recorded touches, beside which the full model is solved for the report.
 
     Raises
     ------
@@ -121,12 +136,31 @@ def validate_study_file(study: Path, report: bool, console: Console) -> None:
     train, test = load_data(record, paths)
     model, history = load_model(paths, train)
     validation = validate_study(record, model, test, history)
-    text = str(validation)
+    beside = _beside_full_model(record, traces, console)
+    text = "\n".join([str(validation), *map(str, beside)])
     if report:
-        report_study(paths.report, [Outcome(record, model, train, test, validation, history)])
+        outcome = Outcome(record, model, train, test, validation, history, comparisons=beside)
+        report_study(paths.report, [outcome])
         text += f"\nreport: {paths.report}"
-    console.result(text, validation.as_dict() | {"report": str(paths.report) if report else None})
+    content = validation.as_dict() | {"report": str(paths.report) if report else None}
+    if beside:
+        content["traces"] = [comparison.as_dict() for comparison in beside]
+    console.result(text, content)
     validation.raise_if_failed()
+
+
+def _beside_full_model(record: Study, traces: Sequence[Path], console: Console) -> list[TouchComparison]:
+    if not traces:
+        return []
+    from palpate.runtime.trace_file import read_trace
+    from palpate.validation.full_model import compare_full_model
+
+    problem = record.problem(whole=True)
+    made = []
+    for path in traces:
+        console.say(f"Solving the full model under the hand of {path} …")
+        made.append(compare_full_model(read_trace(path), problem))
+    return made
 
 
 def learn_dataset_file(path: Path, effort: float, console: Console) -> None:

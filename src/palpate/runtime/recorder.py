@@ -213,7 +213,7 @@ def _processor() -> str:
 
 
 def model_facts(path: str | os.PathLike[str]) -> dict[str, str]:
-    """Return name and checksum of a model's file, by which a replay knows it again.
+    """Return name, path as given, and checksum of a model's file, by which a replay finds it and knows it again.
 
     Raises
     ------
@@ -221,4 +221,4 @@ def model_facts(path: str | os.PathLike[str]) -> dict[str, str]:
         If the file can't be read.
     """
     path = Path(path)
-    return {"file": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
+    return {"file": path.name, "path": str(path), "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}

@@ -291,6 +291,11 @@ class TickRecorder:
     ----------
     ring : Ring
         Takes the ticks.
+
+    Attributes
+    ----------
+    record : record of dtype `TICK`, shape ()
+        The tick that was written last.
     """
 
     def __init__(self, ring: Ring) -> None:
@@ -299,12 +304,12 @@ class TickRecorder:
         record = self._bytes.view(TICK).reshape(())
         self._covered = self._bytes[:-4].data
         self._views = {name: record[name] for name in TICK.names or ()}
-        self._record = record
+        self.record = record
         self._device: Any = None
 
     def watch(self, device: Device) -> RecordedDevice:
         """Return the device to be used in place of `device`."""
-        self._device = RecordedDevice(device, self._record)
+        self._device = RecordedDevice(device, self.record)
         return self._device  # type: ignore[no-any-return]
 
     def begin(self, loop: Loop) -> None:

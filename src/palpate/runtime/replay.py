@@ -22,16 +22,17 @@ from palpate.errors import DeviceError, DeviceLostError, DeviceStopError, UsageE
 from palpate.runtime.devices.device import Sample, Traits
 from palpate.runtime.loop import Loop
 from palpate.runtime.recorder import machine_facts, model_facts
-from palpate.runtime.recording import FLAGS
+from palpate.runtime.recording import FLAGS, Ring, TickRecorder
 from palpate.runtime.safety import Fault, Limits
 from palpate.runtime.shared_state import Shared, now
 from palpate.runtime.snapshot import restore
 from palpate.runtime.touchable import Touchable
-from palpate.runtime.trace_file import Trace
+from palpate.runtime.trace_file import Trace, TraceWriter
 from palpate.runtime.workspace import Workspace
 
 __all__ = ["Replay", "ReplayDevice", "Replayed", "is_recorded_model", "loop_facts", "play"]
 
+_CHUNK = 1000  # ticks
 _LEAD, _IDLE = 0.2, 0.02  # s before a replay that is looked at begins, and between two looks at its end
 
 _ERRORS: dict[int, type[DeviceError]] = {
@@ -184,7 +185,7 @@ class Replay:
                 why=f"The recorded body was {how}, this one is {'held' if model.holds else 'pressed'}.",
                 fix="Take a model of the same kind.",
             )
-        self.trace, self.model = trace, model
+        self.trace, self.model, self.same = trace, model, same
         traits = header["traits"]
         known = Traits(**traits | {"axes": _axes(traits["axes"])})
         self.device = ReplayDevice(known, dead_man=bool(header["dead_man"]))
@@ -198,7 +199,9 @@ class Replay:
         blocks: Any = SimpleNamespace(
             state=seen.state, indentation=seen.indentation, command=self._commands.command
         )
-        self._orphaned = False
+        self._orphaned, ring = False, Ring.private()
+        self._recorder = TickRecorder(ring)
+        ring.asked[()] = ring.begun[()] = 1  # what is recorded is compared with what was
         self.loop = Loop(
             model,
             self.device,
@@ -211,6 +214,7 @@ class Replay:
             control=bool(header["control"]),
             dead_man=bool(header["dead_man"]),
             orphaned=lambda: self._orphaned,
+            recorder=self._recorder,
         )
         if same and trace.state is not None:
             restore(self.loop, trace.state)
@@ -234,17 +238,12 @@ class Replay:
 
     def run(self) -> Replayed:
         """Pass through all ticks, as fast as they can be computed, and compare them with the recorded ones."""
-        count = len(self.trace)
-        force, wanted, sent = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3))
-        fault, depth = np.zeros(count, np.uint8), np.zeros(count, np.float32)
-        for k in range(count):
-            self.tick(k)
-            force[k], wanted[k], sent[k] = self.loop.out.force, self.loop.wanted, self.device.sent
-            fault[k], depth[k] = self.loop.fault, self.loop.out.record["depth"]
         ticks = self.trace.ticks.copy()
-        ticks["force"], ticks["wanted"], ticks["sent"] = force, wanted, sent
-        ticks["fault"], ticks["depth"] = fault, depth
-        return Replayed(self.trace, ticks, self.model.name)
+        for k in range(len(ticks)):
+            self.tick(k)
+            ticks[k] = self._recorder.record
+        ticks["tick"] = self.trace.ticks["tick"]  # the replay counts its own
+        return Replayed(self.trace, ticks, self.model.name, self.same)
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,14 +255,17 @@ class Replayed:
     trace : Trace
         What was recorded.
     ticks : (N,) of dtype `TICK`
-        The same samples with the forces, faults and depths of the replay.
+        The ticks of the replay.
     name : str
         Of the body that answered in the replay.
+    same : bool
+        Whether it is the recorded one.
     """
 
     trace: Trace
     ticks: np.ndarray
     name: str
+    same: bool = True
 
     @property
     def differing(self) -> np.ndarray:
@@ -312,6 +314,30 @@ class Replayed:
             f"{count} ticks replayed on {self.name}: {self.differing.size} forces differ, the first at tick "
             f"{int(self.ticks['tick'][first])} ({self.trace.time[first]:.3f} s), by up to {self.largest:.3g} N{because}"
         )
+
+    def save(self, path: str | os.PathLike[str], model: str | os.PathLike[str]) -> None:
+        """Write the replay as a trace of its own.
+
+        Parameters
+        ----------
+        path : path
+            A new file.
+        model : path
+            File of the body that answered.
+
+        Raises
+        ------
+        UsageError, ResourceError
+            As for `palpate.runtime.trace_file.TraceWriter`.
+        """
+        header = dict(self.trace.header) | machine_facts()
+        header |= {"name": self.name, "model": model_facts(model), "replay_of": self.trace.path.name}
+        writer = TraceWriter(path, header)
+        if self.same and self.trace.state is not None:
+            writer.add_state(self.trace.state)
+        for start in range(0, len(self.ticks), _CHUNK):
+            writer.add_ticks(self.ticks[start : start + _CHUNK])
+        writer.close({"ticks": len(self.ticks), "lost": self.trace.lost})
 
     def as_dict(self) -> dict[str, Any]:
         """Return the outcome as data for a program."""

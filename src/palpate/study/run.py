@@ -30,6 +30,7 @@ from palpate.study.study import Study
 from palpate.surrogates import Surrogate
 from palpate.sweeps import sweep
 from palpate.validation import Chapter, Validation, validate, write_report
+from palpate.validation.touch_comparison import TouchComparison
 
 __all__ = [
     "Outcome",
@@ -114,6 +115,8 @@ class Outcome:
         The founding form of the filter beside ours, for studies with one input.
     timings : mapping of stage to seconds
         Duration of each stage.
+    comparisons : sequence of TouchComparison
+        Recorded touches beside the full model.
     """
 
     study: Study
@@ -124,6 +127,7 @@ class Outcome:
     history: Any = None
     rivals: Mapping[str, Any] = field(default_factory=dict)
     timings: Mapping[str, float] = field(default_factory=dict)
+    comparisons: Sequence[TouchComparison] = ()
 
     def chapter(self) -> Chapter:
         """Return the outcome as a chapter of a report."""
@@ -137,6 +141,7 @@ class Outcome:
             rivals=self.rivals,
             settings=self.study.model_dump(mode="json", exclude_none=True),
             timings=self.timings,
+            comparisons=self.comparisons,
         )
 
 

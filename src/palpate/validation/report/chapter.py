@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -11,6 +11,7 @@ from palpate.learning import History
 from palpate.learning.learn_dataset import filter_record
 from palpate.validation.figures.history_following import Followed, follow_unseen
 from palpate.validation.subject import Subject
+from palpate.validation.touch_comparison import TouchComparison
 from palpate.validation.validate import Validation
 
 __all__ = ["Chapter"]
@@ -42,6 +43,8 @@ class Chapter:
         Seconds of each stage.
     provenance : mapping, optional
         By default the training set's own, else that of the model.
+    comparisons : sequence of TouchComparison
+        Recorded touches beside the full model.
     """
 
     name: str
@@ -54,6 +57,7 @@ class Chapter:
     settings: Mapping[str, Any] = field(default_factory=dict)
     timings: Mapping[str, float] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    comparisons: Sequence[TouchComparison] = ()
 
     @property
     def filter(self) -> History | None:

@@ -20,6 +20,7 @@ from palpate.validation.report.style import Picture
 from palpate.validation.report.summary import story
 from palpate.validation.report.tables import check_rows, flat, sources, tables, timing_rows
 from palpate.validation.report.touch_pictures import touch_pictures
+from palpate.validation.report.trace_pictures import comparison_pictures
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -33,6 +34,7 @@ PICTURES: tuple[Callable[[Chapter, str], list[Picture]], ...] = (
     touch_pictures,
     history_pictures,
     hand_pictures,
+    comparison_pictures,
 )
 """Groups of pictures in the order of the page; each draws what it can of a chapter."""
 

@@ -1,0 +1,152 @@
+"""The full finite-element model under a recorded hand, beside the surrogate that was felt.
+
+The recorded stroke is thinned to moments that lie evenly along the way of the hand. They are solved in passes from its
+beginning to its end, each pass twice as fine as the one before: a comparison that runs out of time still covers the
+whole stroke. Each solve starts from the nearest equilibrium that is known.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import SolverError, UsageError
+from palpate.runtime.trace_file import Trace
+from palpate.validation.touch_comparison import TouchComparison
+
+__all__ = ["compare_full_model", "stroke_moments"]
+
+Progress = Callable[[int, int, float], None]
+_EVERY = 5.0  # s between two words on the progress
+
+
+def stroke_moments(trace: Trace, most: int) -> np.ndarray:
+    """Return indices of the ticks that are solved, in order: at most `most`, evenly along the way of the hand.
+
+    Only moments count at which the body was held, without a fault, and was felt.
+
+    Parameters
+    ----------
+    trace : Trace
+        A recorded touch.
+    most : int
+        At least 2.
+    """
+    felt = trace.flag("grabbed") & (trace.ticks["fault"] == 0) & trace.ticks["wanted"].any(axis=1)
+    rows = np.flatnonzero(felt)
+    if len(rows) <= most:
+        return rows
+    places = np.hstack([trace.ticks["contact"], trace.parameters])[rows]
+    reach = np.ptp(places, axis=0)
+    steps = np.linalg.norm(np.diff(places / np.where(reach > 0.0, reach, 1.0), axis=0), axis=1)
+    # a resting hand counts too, by its time
+    way = np.concatenate([[0.0], np.cumsum(steps / max(steps.sum(), 1e-300) + 1.0 / len(steps))])
+    chosen = np.searchsorted(way, np.linspace(0.0, way[-1], most - 1))
+    deepest = int(np.argmax(trace.ticks["depth"][rows]))
+    return np.asarray(rows[np.unique(np.append(np.minimum(chosen, len(rows) - 1), deepest))])
+
+
+def compare_full_model(
+    trace: Trace,
+    problem: Any,
+    *,
+    limit: float = 300.0,
+    most: int = 200,
+    progress: Progress = lambda *_: None,
+    clock: Callable[[], float] = time.monotonic,
+) -> TouchComparison:
+    """Solve the full model under a recorded hand, and compare the force before limits and controller with it.
+
+    Parameters
+    ----------
+    trace : Trace
+        Of a body pressed by a probe or held by a pad.
+    problem : Problem
+        The body and its interaction, such as `palpate.study.Study.problem` returns.
+    limit : float
+        Time in s for all solves; the stroke is covered as evenly as the time allows.
+    most : int
+        Moments that are solved at most.
+    progress : callable
+        Told (done, total, seconds) every few seconds.
+    clock : callable
+        Time in s.
+
+    Raises
+    ------
+    UsageError
+        If the full model has other inputs, or the trace holds no touch.
+    SolverError
+        If no moment has an equilibrium, or not two of them are solved in time.
+    """
+    columns = _columns(trace, problem)
+    moments = stroke_moments(trace, most)
+    if len(moments) < 2:
+        raise UsageError(f"{trace.path.name} holds no touch.", fix="Record one in which the body is felt.")
+    places = np.hstack([trace.ticks["contact"].astype(float), trace.parameters])[moments][:, columns]
+    solver, began, told = problem.open(), clock(), clock()
+    forces = np.full((len(moments), 3), np.nan)
+    failed, done = 0, 0
+    for row in _passes(len(moments)):
+        if clock() - began > limit:
+            break
+        answer = solver.solve(places[row])
+        done += 1
+        if answer.converged:
+            forces[row] = np.asarray(answer.response)[:3]
+        else:
+            failed += 1
+        if clock() - told > _EVERY:
+            told = clock()
+            progress(done, len(moments), told - began)
+    spent = clock() - began
+    good = np.isfinite(forces).all(axis=1)
+    if good.sum() < 2:
+        raise SolverError(
+            f"Of {done} moments of the stroke {good.sum()} have an equilibrium.",
+            why="The full model was too slow, or the hand was where it has none.",
+            fix="Give more time with --limit, or record a gentler stroke.",
+        )
+    rate = done / max(spent, 1e-9)
+    note = f"the full model reached {rate:.3g} solves a second ({done} of {len(moments)} moments in {spent:.1f} s)"
+    if failed:
+        note += f"; {failed} had no equilibrium"
+    rows = moments[good]
+    return TouchComparison(
+        ("finite elements", str(trace.header.get("name", "surrogate"))),
+        trace.time[rows],
+        trace.ticks["depth"][rows].astype(float),
+        forces[good],
+        trace.ticks["wanted"][rows],
+        note,
+    )
+
+
+def _columns(trace: Trace, problem: Any) -> list[int]:
+    """Return, for each input of the problem, its column among the recorded contact and further inputs."""
+    known = [row[0] for row in trace.header["inputs"]]
+    felt = len(known) - len(trace.header["parameters"])
+    wanted = [r.name for r in problem.ranges]
+    if felt != 3 or sorted(wanted) != sorted(known):
+        raise UsageError(
+            "This full model can't be put under the recorded hand.",
+            why=f"Its inputs are {', '.join(wanted)}; those of the recorded body are {', '.join(known)}.",
+            fix="Give the study from which the recorded model was learnt, of a body that is pressed or held by a pad.",
+        )
+    return [known.index(name) for name in wanted]
+
+
+def _passes(count: int) -> list[int]:
+    """Return 0 … count − 1 in passes along the stroke, each twice as fine as the one before."""
+    step = 1 << max(0, (count - 1).bit_length() - 3)
+    order, seen = [], set()
+    while step:
+        for row in [*range(0, count, step), count - 1]:
+            if row not in seen:
+                seen.add(row)
+                order.append(row)
+        step //= 2
+    return order

@@ -17,6 +17,8 @@ from palpate.errors import UsageError
 from palpate.runtime.device_doubles import DOUBLES
 from palpate.runtime.devices import Sample, device_named, device_names, device_traits
 from palpate.runtime.devices.haply_simulator import HaplySimulator, SimulatorSettings
+from palpate.runtime.recording import FLAGS, TICK
+from palpate.runtime.trace_file import TraceWriter
 
 # settings of the doubles; a thread that calls back must not do so while tracemalloc stops, which Python doesn't bear
 STARTS = {"forcedimension": {"manual": 1}, "openhaptics": {"speed": 20, "manual_after": 50}}
@@ -25,6 +27,21 @@ STARTS = {"forcedimension": {"manual": 1}, "openhaptics": {"speed": 20, "manual_
 @pytest.fixture(params=device_names())
 def name(request):
     return request.param
+
+
+@pytest.fixture
+def recorded_stroke(tmp_path):
+    """A file of a stroke of 40 ms."""
+    ticks = np.zeros(41, TICK)
+    ticks["tick"], ticks["time"] = np.arange(41), 1e-3 * np.arange(41)
+    ticks["hand"][:, 1] = -0.03 * np.sin(np.linspace(0.0, np.pi, 41))
+    ticks["flags"] = 1 << FLAGS.index("holding")
+    writer = TraceWriter(
+        tmp_path / "a.trace", {"workspace": {"radius": 0.075}, "limits": {"max_force": 12.0}}
+    )
+    writer.add_ticks(ticks)
+    writer.close({})
+    return writer.path
 
 
 @contextlib.contextmanager
@@ -36,6 +53,8 @@ def served(name, request):
     elif name == "gamepad":
         request.getfixturevalue("monkeypatch").setitem(sys.modules, "evdev", evdev_double.module(Pad()))
         yield name
+    elif name == "trace":
+        yield f"trace:file={request.getfixturevalue('recorded_stroke')},repeat=1"
     elif name in DOUBLES:
         library = request.getfixturevalue("double")(name)
         LibraryDouble(library, **STARTS[name])

@@ -8,7 +8,8 @@ import pytest
 import held
 import pressed
 from models import spring_beam
-from palpate.errors import DeviceError
+from palpate.errors import DeviceError, UsageError
+from palpate.runtime.devices import device_named, device_traits
 from palpate.runtime.devices.device import Sample, Traits
 from palpate.runtime.devices.page import PageDevice
 from palpate.runtime.devices.simulated import SimulatedHand, SimulatedSettings
@@ -17,7 +18,7 @@ from palpate.runtime.loop import Loop
 from palpate.runtime.recorder import TraceRecorder
 from palpate.runtime.recording import Ring, TickRecorder
 from palpate.runtime.replay import Replay, loop_facts
-from palpate.runtime.safety import Limits
+from palpate.runtime.safety import Fault, Limits
 from palpate.runtime.shared_state import Shared
 from palpate.runtime.touchable import touchable
 from palpate.runtime.trace_file import read_trace
@@ -189,6 +190,36 @@ def test_another_body_under_the_same_hand_differs_and_says_by_how_much(tmp_path)
     assert 0.0 < replayed.largest == pytest.approx(0.05 * force, rel=0.1)
     assert f"{replayed.differing.size} forces differ" in str(replayed)
     assert replayed.as_dict()["first"] == replayed.differing[0]
+
+
+def test_a_recorded_hand_drives_another_body(tmp_path):
+    """At the recorded places, in straight lines between them, twice as fast where that is asked for."""
+    body = touchable(spring_beam(200.0))
+    touch = Recorded(tmp_path / "a.trace", body, StrokeDevice(StrokeSettings(frequency=2.0)))
+    touch.tick(400)
+    trace = touch.trace()
+    hand = device_named(f"trace:file={trace.path}", Shared.private().command)
+    assert hand.traits.radius == 0.075
+    assert device_traits(f"trace:file={trace.path}") == hand.traits
+    for k in (0, 1, 200, 399):
+        np.testing.assert_allclose(
+            hand.read(2.0 + trace.time[k]).position, trace.ticks["hand"][k], atol=1e-15
+        )
+        assert hand.sample.holding
+    assert not hand.read(2.0 + trace.time[-1] + 0.01).holding
+    fast = device_named(f"trace:file={trace.path},speed=2,repeat=1", Shared.private().command)
+    fast.read(0.0)
+    middle = (trace.ticks["hand"][100] + trace.ticks["hand"][101]) / 2
+    seen = fast.read((trace.time[100] + trace.time[101]) / 4).position
+    np.testing.assert_allclose(seen, middle, atol=1e-12)
+    assert fast.read(trace.time[-1]).holding
+    other = touchable(spring_beam(100.0))
+    loop = Loop(other, hand := device_named(f"trace:file={trace.path}", Shared.private().command),
+                Shared.private(), other.workspace(hand.traits.radius), LIMITS)  # fmt: skip
+    loop.run_for(0.4)
+    assert loop.fault is Fault.NONE
+    with pytest.raises(UsageError, match="needs the file"):
+        device_named("trace:speed=2", Shared.private().command)
 
 
 def test_a_ring_that_nobody_empties_counts_what_it_loses():

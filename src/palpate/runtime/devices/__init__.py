@@ -12,6 +12,7 @@ from palpate.runtime.devices.gamepad import GamepadDevice
 from palpate.runtime.devices.haply import HaplyDevice
 from palpate.runtime.devices.openhaptics import OpenHapticsDevice
 from palpate.runtime.devices.page import PageDevice
+from palpate.runtime.devices.recorded import RecordedHand
 from palpate.runtime.devices.simulated import SimulatedHand
 from palpate.runtime.devices.stroke import StrokeDevice
 from palpate.runtime.shared_state import Block
@@ -29,6 +30,7 @@ _KINDS: dict[str, _Kind] = {
     "page": PageDevice,
     "stroke": StrokeDevice,
     "simulated": SimulatedHand,
+    "trace": RecordedHand,
     "haply": HaplyDevice,
     "forcedimension": ForceDimensionDevice,
     "openhaptics": OpenHapticsDevice,
@@ -49,7 +51,10 @@ def device_traits(device: str) -> Traits:
     UsageError
         If there is no device of that name.
     """
-    return _kind(device.partition(":")[0]).traits
+    name, _, text = device.partition(":")
+    kind = _kind(name)
+    by_options = getattr(kind, "traits_of", None)  # of a device whose file or settings say more than its kind
+    return kind.traits if by_options is None else by_options(_options(text))
 
 
 def device_named(device: str, commands: Block) -> Device:
@@ -71,8 +76,12 @@ def device_named(device: str, commands: Block) -> Device:
     """
     name, _, text = device.partition(":")
     kind = _kind(name)
+    return kind.open(commands, _options(text))
+
+
+def _options(text: str) -> dict[str, str]:
     pairs = [part.partition("=") for part in text.split(",") if part]
-    return kind.open(commands, {key.strip(): value.strip() for key, _, value in pairs})
+    return {key.strip(): value.strip() for key, _, value in pairs}
 
 
 def _kind(name: str) -> _Kind:

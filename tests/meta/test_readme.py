@@ -99,8 +99,9 @@ def commands() -> dict[str, set[str]]:
 
 
 def _below(command) -> list:
-    """Every command of a group, as `palpate dataset import`."""
-    return list(getattr(command, "commands", {}).values())
+    """Every command of a group and of groups in it, as `palpate dataset import`."""
+    own = list(getattr(command, "commands", {}).values())
+    return own + [deeper for each in own for deeper in _below(each)]
 
 
 def code(text: str) -> str:

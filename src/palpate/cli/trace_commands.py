@@ -96,7 +96,7 @@ def _model_of(trace: Trace) -> Path:
     from palpate.runtime.replay import is_recorded_model
 
     known = trace.header.get("model", {})
-    places = [Path(known.get("path", "")), trace.path.parent / known.get("file", "")]
+    places: list[Path] = [Path(known.get("path", "")), trace.path.parent / known.get("file", "")]
     for place in places:
         if place.is_file() and is_recorded_model(trace, place):
             return place

@@ -6,15 +6,15 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
 from palpate.cli.console import Console
 from palpate.cli.table_options import Json
 from palpate.errors import UsageError
-from palpate.format import count
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from palpate.runtime.trace_file import Trace
     from palpate.validation.touch_comparison import TouchComparison
 
@@ -110,6 +110,9 @@ def _model_of(trace: Trace) -> Path:
 @trace_app.command()
 def info(file: TraceFile, as_json: Json = False) -> None:
     """Print what a trace holds: device, body, rate, duration, largest force, faults, size on disk and in memory."""
+    import numpy as np
+
+    from palpate.format import count
     from palpate.runtime.safety import Fault
 
     console = Console(as_json)
@@ -179,6 +182,7 @@ def export(
     as_json: Json = False,
 ) -> None:
     """Write a trace as a table for other programs: CSV, NumPy's NPZ, or Parquet (with palpate[results])."""
+    from palpate.format import count
     from palpate.runtime.trace_export import export_trace
 
     console = Console(as_json)
@@ -212,6 +216,8 @@ def plot(
 
 def _solved(trace: Trace, data: Path, model: Path | None) -> tuple[np.ndarray, np.ndarray, str]:
     """Return depths (m), sizes of the forces (N) and words for the solves beside a stroke."""
+    import numpy as np
+
     from palpate.dataset import Dataset
     from palpate.runtime.touchable import load_touchable
     from palpate.units import bounds

@@ -110,65 +110,75 @@ def _model_of(trace: Trace) -> Path:
 @trace_app.command()
 def info(file: TraceFile, as_json: Json = False) -> None:
     """Print what a trace holds: device, body, rate, duration, largest force, faults, size on disk and in memory."""
-    import numpy as np
-
-    from palpate.format import count
-    from palpate.runtime.safety import Fault
-
     console = Console(as_json)
     trace = _read(file, console)
+    facts = _facts(trace)
+    console.result(_in_words(trace, facts), facts)
+
+
+def _facts(trace: Trace) -> dict[str, Any]:
+    """Return what a trace holds, as data for a program."""
+    import numpy as np
+
     header, ticks = trace.header, trace.ticks
-    onsets = {}
-    for fault in Fault:
-        bad = ticks["fault"] == fault
-        starts = int(bad[:1].sum() + (np.diff(bad.astype(int)) == 1).sum())
-        if fault is not Fault.NONE and starts:
-            onsets[fault.name.lower()] = starts
-    largest = float(np.linalg.norm(ticks["force"], axis=1).max(initial=0.0))
-    lateness = float(np.quantile(ticks["lateness"], 0.99)) if len(ticks) else 0.0
-    per_minute = trace.size / max(trace.seconds, 1e-9) * 60.0
-    facts: dict[str, Any] = {
-        "file": str(file),
+    told = ("palpate", "recorded", "model", "device", "rate", "limits", "workspace")
+    return {
+        "file": str(trace.path),
         "format": header["version"],
-        "palpate": header.get("palpate"),
-        "recorded": header.get("recorded"),
         "body": header.get("name"),
-        "model": header.get("model"),
-        "device": header.get("device"),
-        "rate": header.get("rate"),
-        "limits": header.get("limits"),
-        "workspace": header.get("workspace"),
+        **{name: header.get(name) for name in told},
         "ticks": len(ticks),
         "seconds": trace.seconds,
         "lost": trace.lost,
         "complete": trace.end is not None,
         "replayable": trace.state is not None and not trace.lost,
-        "largest_force": largest,
-        "lateness_p99": lateness,
-        "faults": onsets,
+        "largest_force": float(np.linalg.norm(ticks["force"], axis=1).max(initial=0.0)),
+        "lateness_p99": float(np.quantile(ticks["lateness"], 0.99)) if len(ticks) else 0.0,
+        "faults": _onsets(ticks["fault"]),
         "events": [dict(event) for event in trace.events],
         "bytes": trace.size,
+        "bytes_a_minute": trace.size / max(trace.seconds, 1e-9) * 60.0,
         "bytes_in_memory": int(ticks.nbytes),
         "notes": list(trace.notes),
     }
-    faults = ", ".join(f"{n} × {name.replace('_', ' ')}" for name, n in onsets.items())
-    model = header.get("model", {})
-    text = [
-        f"{file}: {count(len(ticks), 'tick')} in {trace.seconds:.3f} s, recorded {header.get('recorded', '')[:19]} UTC",
-        f"  body       {header.get('name')}, {model.get('file')} ({model.get('sha256', '')[:12]}…)",
-        f"  device     {header.get('device')} at {header.get('rate'):g} Hz, "
-        f"at most {header['limits']['max_force']:g} N",
-        f"  force      up to {largest:.3g} N",
-        f"  lateness   {1e6 * lateness:.0f} µs (p99)",
+
+
+def _onsets(faults: np.ndarray) -> dict[str, int]:
+    """Return how often each fault began."""
+    import numpy as np
+
+    from palpate.runtime.safety import Fault
+
+    onsets = {}
+    for fault in Fault:
+        bad = faults == fault
+        begun = int(bad[:1].sum() + (np.diff(bad.astype(int)) == 1).sum())
+        if fault is not Fault.NONE and begun:
+            onsets[fault.name.lower()] = begun
+    return onsets
+
+
+def _in_words(trace: Trace, facts: dict[str, Any]) -> str:
+    from palpate.format import count
+
+    faults = ", ".join(f"{n} × {name.replace('_', ' ')}" for name, n in facts["faults"].items())
+    model = facts["model"] or {}
+    lines = [
+        f"{trace.path}: {count(len(trace), 'tick')} in {trace.seconds:.3f} s, "
+        f"recorded {(facts['recorded'] or '')[:19]} UTC",
+        f"  body       {facts['body']}, {model.get('file')} ({model.get('sha256', '')[:12]}…)",
+        f"  device     {facts['device']} at {facts['rate']:g} Hz, at most {facts['limits']['max_force']:g} N",
+        f"  force      up to {facts['largest_force']:.3g} N",
+        f"  lateness   {1e6 * facts['lateness_p99']:.0f} µs (p99)",
         f"  faults     {faults or 'none'}",
         f"  lost       {count(trace.lost, 'tick') if trace.lost else 'nothing'}",
         f"  replay     {'to the last bit' if facts['replayable'] else 'not to the last bit: ' + _why_not(trace)}",
-        f"  size       {trace.size / 1e6:.2f} MB ({per_minute / 1e6:.1f} MB a minute), "
-        f"{ticks.nbytes / 1e6:.1f} MB in memory",
-        f"  made by    palpate {header.get('palpate')}, layout {header['version']}",
+        f"  size       {trace.size / 1e6:.2f} MB ({facts['bytes_a_minute'] / 1e6:.1f} MB a minute), "
+        f"{facts['bytes_in_memory'] / 1e6:.1f} MB in memory",
+        f"  made by    palpate {facts['palpate']}, layout {facts['format']}",
     ]
-    text += [f"  event      tick {e.get('tick')}: {e.get('kind')} {e.get('text', '')}" for e in trace.events]
-    console.result("\n".join(text), facts)
+    events = [f"  event      tick {e.get('tick')}: {e.get('kind')} {e.get('text', '')}" for e in trace.events]
+    return "\n".join(lines + events)
 
 
 def _why_not(trace: Trace) -> str:

@@ -160,6 +160,9 @@ def test_a_simulated_device_says_where_it_listens(palpate):
     answer = palpate("devices", "simulate", "haply", "--port", 0, "--events", 0, "--seconds", 0.1, "--json")
     assert answer.code == 0, answer.err
     assert json.loads(answer.out)["device"].startswith("haply:ws://localhost:")
+    answer = palpate("devices", "simulate", "crtk", "--port", 0, "--seconds", 0.1, "--json")
+    assert answer.code == 0, answer.err
+    assert json.loads(answer.out)["device"].startswith("crtk:ws://localhost:")
     assert palpate("devices", "simulate", "omega").code == 2
 
 

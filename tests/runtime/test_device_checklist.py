@@ -16,6 +16,7 @@ from library_double import LibraryDouble
 from palpate.errors import UsageError
 from palpate.runtime.device_doubles import DOUBLES
 from palpate.runtime.devices import Sample, device_named, device_names, device_traits
+from palpate.runtime.devices.crtk_simulator import CrtkSimulator, CrtkSimulatorSettings
 from palpate.runtime.devices.haply_simulator import HaplySimulator, SimulatorSettings
 from palpate.runtime.recording import FLAGS, TICK
 from palpate.runtime.trace_file import TraceWriter
@@ -46,28 +47,36 @@ def recorded_stroke(tmp_path):
 
 @contextlib.contextmanager
 def served(name, request):
-    """The device's address; one of hardware is that of its double."""
+    """The device's address, that of its double if it is hardware, and what to call once it is open."""
     if name == "haply":
         with HaplySimulator(SimulatorSettings(port=0, events=0)) as service:
-            yield f"haply:ws://127.0.0.1:{service.port},events={service.events_port},wait=1"
+            yield f"haply:ws://127.0.0.1:{service.port},events={service.events_port},wait=1", no_more
+    elif name == "crtk":
+        with CrtkSimulator(CrtkSimulatorSettings(port=0)) as service:
+            yield f"crtk:ws://127.0.0.1:{service.port},arm=arm,delay=0.002,search=10", service.hang
     elif name == "gamepad":
         request.getfixturevalue("monkeypatch").setitem(sys.modules, "evdev", evdev_double.module(Pad()))
-        yield name
+        yield name, no_more
     elif name == "trace":
-        yield f"trace:file={request.getfixturevalue('recorded_stroke')},repeat=1"
+        yield f"trace:file={request.getfixturevalue('recorded_stroke')},repeat=1", no_more
     elif name in DOUBLES:
         library = request.getfixturevalue("double")(name)
         LibraryDouble(library, **STARTS[name])
-        yield f"{name}:library={library}"
+        yield f"{name}:library={library}", no_more
     else:
-        yield name
+        yield name, no_more
+
+
+def no_more():
+    """Nothing that goes on by itself has to be stopped."""
 
 
 @pytest.fixture
 def device(name, shared, request):
     shared.write_command(beat=0.0, grabbed=True, target=(0.0, -0.01, 0.0), period=0.1)
-    with served(name, request) as address:
+    with served(name, request) as (address, opened):
         device = device_named(address, shared.command)
+        opened()
         yield device
         device.close()
 
@@ -120,8 +129,8 @@ def test_keeps_no_memory_per_tick(device):
     force = np.ones(3)
     device.read(0.0)
     tracemalloc.start()
-    before = kept_after(range(50))
-    after = kept_after(range(50, 1050))
+    before = kept_after(range(200))
+    after = kept_after(range(200, 1200))
     tracemalloc.stop()
     assert after - before < 1000, "bytes left after a thousand ticks"
 

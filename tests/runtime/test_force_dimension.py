@@ -46,9 +46,13 @@ def device(dhd):
 
 
 @pytest.fixture
-def loop(dhd, device, plain, shared):
-    drive(device, dhd, 1950)  # the hand has gone down and up, and is back at rest: there a force may begin
-    return Loop(plain, device, shared, Workspace(0.075, 10.0), Limits(12.0), rate=1000.0)
+def loop(dhd, plain, shared):
+    """A loop with the hand at rest: a force begins only there."""
+    dhd.amplitude = 0
+    device = connect(dhd)
+    dhd.amplitude = 0.03
+    yield Loop(plain, device, shared, Workspace(0.075, 10.0), Limits(12.0), rate=1000.0)
+    device.close()
 
 
 def drive(device, dhd, ticks, force=(0.0, 0.0, 0.0)):
@@ -275,7 +279,7 @@ def test_a_lost_cable_is_zero_force_and_a_reason(dhd, loop):
     dhd.lost_after = dhd.commands + 50
     seen = run(loop, dhd, 100)
     assert seen[40][1] is Fault.NONE
-    assert all(force == 0.0 and fault is not Fault.NONE for force, fault in seen[52:])
+    assert all(force == 0.0 and fault is Fault.DEVICE_LOST for force, fault in seen[52:])
     assert "error 2" in loop.device_error
     loop.end()
     assert dhd.force_on == 0.0
@@ -294,7 +298,7 @@ def test_the_firmwares_watchdog_is_noticed_and_forces_return_at_rest(dhd, loop):
     run(loop, dhd, 300)
     dhd.time += 0.1  # the program was asleep: 20 ms are too long for the firmware
     seen = run(loop, dhd, 400)
-    assert all(force == 0.0 and fault is not Fault.NONE for force, fault in seen[5:])
+    assert all(force == 0.0 and fault is Fault.DEVICE_STOPPED for force, fault in seen[5:])
     assert dhd.force_on == 0.0
     assert FORCES_OFF[3] in loop.device_error
     again = run(loop, dhd, 400)
@@ -307,7 +311,7 @@ def test_the_velocity_brake_is_noticed_and_let_go_at_rest(dhd, loop):
     dhd.brake_speed = 0.0
     seen = run(loop, dhd, 20)
     assert (dhd.force_on, dhd.brakes, dhd.cause) == (0.0, 1.0, 2.0)
-    assert seen[-1][0] == 0.0
+    assert seen[-1] == (0.0, Fault.DEVICE_STOPPED)
     assert FORCES_OFF[2] in loop.device_error
     dhd.brake_speed = 2.5
     assert run(loop, dhd, 700)[-1][1] is Fault.NONE
@@ -319,7 +323,7 @@ def test_other_causes_wait_for_the_user(dhd, loop, cause):
     run(loop, dhd, 100)
     dhd.force_on, dhd.cause = 0, cause
     seen = run(loop, dhd, 1000)
-    assert all(force == 0.0 and fault is not Fault.NONE for force, fault in seen[5:])
+    assert all(force == 0.0 and fault is Fault.DEVICE_STOPPED for force, fault in seen[5:])
     assert FORCES_OFF[cause] in loop.device_error
     assert dhd.force_on == 0.0, "nothing turns them on again behind the user's back"
     dhd.force_on = 1  # by the button of the device
@@ -330,7 +334,7 @@ def test_power_that_is_lost_is_a_fault(dhd, loop):
     run(loop, dhd, 100)
     dhd.powered = 0
     seen = run(loop, dhd, 10)
-    assert seen[-1][0] == 0.0
+    assert seen[-1] == (0.0, Fault.DEVICE_STOPPED)
     assert "has no power" in loop.device_error
 
 
@@ -368,13 +372,21 @@ def test_a_clock_that_stands_still_is_refused(dhd):
         connect(dhd)
 
 
-def test_a_clutch_is_a_button(dhd):
+def test_a_clutch_is_a_button_and_the_others_are_passed_on(dhd):
     device = connect(dhd, clutch=1.0)
-    dhd.buttons = 0b01
-    assert not drive(device, dhd, 2).clutched
-    dhd.buttons = 0b10
-    assert drive(device, dhd, 2).clutched
+    dhd.buttons = 0b101
+    sample = drive(device, dhd, 2)
+    assert (sample.clutched, sample.buttons) == (False, 0b101)
+    dhd.buttons = 0b110
+    sample = drive(device, dhd, 2)
+    assert (sample.clutched, sample.buttons) == (True, 0b100)
     device.close()
+
+
+def test_a_button_of_the_device_stops_the_force(dhd, loop):
+    assert run(loop, dhd, 200)[-1][0] > 0.0
+    dhd.buttons = 1
+    assert run(loop, dhd, 2)[-1][0] == 0.0
 
 
 @pytest.mark.parametrize("left", [0, 1])

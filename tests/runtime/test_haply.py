@@ -263,7 +263,7 @@ def test_a_closed_connection_is_a_fault_with_its_reason(service, loop, clock):
     run(loop, clock, 200)
     service.faults.closing = True
     seen = run(loop, clock, 50)
-    assert all(force == 0.0 and fault is Fault.DEVICE_ERROR for force, fault in seen[20:])
+    assert all(force == 0.0 and fault is Fault.DEVICE_LOST for force, fault in seen[20:])
     assert "Haply Inverse Service" in loop.device_error
 
 
@@ -300,7 +300,8 @@ def test_events_of_safety_are_zero_force_and_a_reason(service, loop, clock, name
     run(loop, clock, 100)
     service.send_event(name, "as the test wants", **data)
     seen = run(loop, clock, 20)
-    assert all(force == 0.0 and fault is Fault.DEVICE_ERROR for force, fault in seen)
+    kind = Fault.DEVICE_LOST if name == "device-disconnected" else Fault.DEVICE_STOPPED
+    assert all(force == 0.0 and fault is kind for force, fault in seen)
     assert data.get("safety_type", name) in loop.device_error
     assert "as the test wants" in loop.device_error
 
@@ -308,7 +309,7 @@ def test_events_of_safety_are_zero_force_and_a_reason(service, loop, clock, name
 def test_a_released_brake_lets_the_loop_go_on(service, loop, clock):
     run(loop, clock, 100)
     service.send_event("device-safety-triggered", safety_type="ebrake_triggered")
-    assert run(loop, clock, 5)[-1] == (0.0, Fault.DEVICE_ERROR)
+    assert run(loop, clock, 5)[-1] == (0.0, Fault.DEVICE_STOPPED)
     service.send_event("device-safety-triggered", safety_type="ebrake_released")
     assert run(loop, clock, 100)[-1][1] is Fault.NONE
 
@@ -326,7 +327,7 @@ def test_a_device_that_is_unplugged_is_a_fault(service, loop, clock):
     run(loop, clock, 100)
     service.faults.absent = -1
     seen = run(loop, clock, 20)
-    assert all(force == 0.0 and fault is Fault.DEVICE_ERROR for force, fault in seen[1:])
+    assert all(force == 0.0 and fault is Fault.DEVICE_LOST for force, fault in seen[1:])
     assert "04C2 is no longer there" in loop.device_error
     service.faults.absent = 0
     assert run(loop, clock, 100)[-1][1] is Fault.NONE
@@ -364,7 +365,7 @@ def test_what_is_wrong_at_the_start_is_refused(service, fault, value, message):
 def test_power_that_is_lost_is_a_fault(service, loop, clock):
     run(loop, clock, 100)
     service.faults.powered = False
-    assert run(loop, clock, 5)[-1] == (0.0, Fault.DEVICE_ERROR)
+    assert run(loop, clock, 5)[-1] == (0.0, Fault.DEVICE_STOPPED)
     assert "power supply" in loop.device_error
 
 

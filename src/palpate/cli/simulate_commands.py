@@ -73,6 +73,34 @@ def haply(
 
 
 @simulate_app.command()
+def crtk(
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the ROS bridge.")] = 9090,
+    arm: Annotated[str, typer.Option(help="Namespace of the arm.")] = "arm",
+    rate: Annotated[float, typer.Option(min=1.0, max=10000.0, help="Positions per second, Hz.")] = 1000.0,
+    ros: Annotated[int, typer.Option(min=1, max=2, help="Version of ROS, whose types are understood.")] = 2,
+    amplitude: Amplitude = 0.03,
+    frequency: Frequency = 0.5,
+    seconds: Seconds = 86400.0,
+    as_json: Json = False,
+) -> None:
+    """Run a double of a CRTK arm behind a ROS bridge, until Ctrl-C."""
+    from palpate.runtime.devices.crtk_simulator import CrtkSimulator, CrtkSimulatorSettings
+
+    settings = CrtkSimulatorSettings(
+        port=port, arm=arm, rate=rate, ros=ros, amplitude=amplitude, frequency=frequency
+    )
+    console = Console(as_json)
+    with CrtkSimulator(settings) as service:
+        device = f"crtk:ws://localhost:{service.port},arm={arm}"
+        console.say(f"A simulated CRTK arm moves. Next: palpate run MODEL --device {device}")
+        with contextlib.suppress(KeyboardInterrupt):
+            time.sleep(seconds)
+    console.result(
+        f"{service.wrenches} wrenches were taken.", {"device": device, "wrenches": service.wrenches}
+    )
+
+
+@simulate_app.command()
 def forcedimension(
     folder: Folder = Path("palpate-doubles"),
     kind: Annotated[

@@ -342,7 +342,8 @@ HARDWARE: tuple[_Search, ...] = (
         name="CRTK robots over the ROS bridge",
         device="crtk",
         ports={9090: "rosbridge"},
-        install="Start the bridge: ros2 launch rosbridge_server rosbridge_websocket_launch.xml",
+        install="Start the bridge, ros2 launch rosbridge_server rosbridge_websocket_launch.xml, or a double of it and "
+        "an arm: palpate devices simulate crtk.",
     ),
     GamepadSearch(),
 )

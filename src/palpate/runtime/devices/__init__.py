@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from palpate.errors import UsageError
+from palpate.runtime.devices.crtk import CrtkDevice
 from palpate.runtime.devices.device import Device, Sample, Traits
 from palpate.runtime.devices.force_dimension import ForceDimensionDevice
 from palpate.runtime.devices.gamepad import GamepadDevice
@@ -35,6 +36,7 @@ _KINDS: dict[str, _Kind] = {
     "forcedimension": ForceDimensionDevice,
     "openhaptics": OpenHapticsDevice,
     "gamepad": GamepadDevice,
+    "crtk": CrtkDevice,
 }
 
 

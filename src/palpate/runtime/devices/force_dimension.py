@@ -25,7 +25,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from palpate.errors import DeviceError, UsageError
+from palpate.errors import DeviceError, DeviceLostError, DeviceStopError, UsageError
 from palpate.runtime.devices.device import Sample, Traits, settings_from
 from palpate.runtime.devices.force_dimension_library import FORCES_OFF, LOST, DhdLibrary, Status
 from palpate.runtime.devices.profiles import DeviceProfile, device_profile
@@ -46,6 +46,7 @@ _UNKNOWN = "falcon"  # the least of all: a type that is not in the table gets it
 WATCHDOG = 160  # times 125 µs: 20 ms without a force command, and the firmware turns the forces off
 _DAMPING = 0.5  # N·s/m, assumed
 _DELAY = 0.00025  # s: one exchange at the 4 kHz of the link
+_BUTTONS, _MASK = 8, 0xFF  # bits of the mask that are looked at; most devices have one button
 _FIRST, _STEP, _FASTEST = 100, 0.001, 1.0  # samples at the start, s between them, m/s
 _TOLERANCE = 1.01  # of the force limit that is read back
 _LOOK, _REST = 0.005, 0.5  # s between looks at the status; s of zero force before forces come back
@@ -71,7 +72,8 @@ class ForceDimensionSettings:
     mass : float
         Mass of what is mounted on the handle, kg; negative keeps the device's own value.
     clutch : float
-        Button, counted from 0, that works as a clutch; -1 for none.
+        Button, counted from 0, that works as a clutch; -1 for none. Of the others the first is the dead-man button
+        where one is asked for, and each stops the force else.
     """
 
     serial: float = 0.0
@@ -86,11 +88,11 @@ class ForceDimensionSettings:
         whole = all(map(float.is_integer, (self.serial, self.clutch)))
         switches = all(value in {0.0, 1.0} for value in (self.simulator, self.home, self.gravity))
         if not (
-            whole and switches and 0 <= self.serial <= 65535 and -1 <= self.clutch < 16 and self.mass < 1.0
+            whole and switches and 0 <= self.serial <= 65535 and -1 <= self.clutch < 8 and self.mass < 1.0
         ):
             raise UsageError(
                 "An option of forcedimension is out of range.",
-                why="serial is 0 … 65535, clutch is a button 0 … 15 or -1, mass is below 1 kg, simulator, home and "
+                why="serial is 0 … 65535, clutch is a button 0 … 7 or -1, mass is below 1 kg, simulator, home and "
                 "gravity are 0 or 1.",
                 fix="For example forcedimension:serial=4711,home=1.",
             )
@@ -174,8 +176,8 @@ class ForceDimensionDevice:
             self.guarded += 1
         else:
             raise self._failure("tells no position", code)
-        mask = self._dhd.dhdGetButtonMask(self._id)
-        sample.clutched = bool(mask & self._clutch)
+        mask = self._dhd.dhdGetButtonMask(self._id) & _MASK
+        sample.clutched, sample.buttons = bool(mask & self._clutch), mask & ~self._clutch
         return sample
 
     def write(self, force: np.ndarray) -> None:
@@ -214,13 +216,13 @@ class ForceDimensionDevice:
         if code != 0:
             raise self._failure("tells no status", code)
         if not status.powered:
-            raise DeviceError(f"{self.name} has no power.", fix="Plug in its supply and switch it on.")
+            raise DeviceStopError(f"{self.name} has no power.", fix="Plug in its supply and switch it on.")
         if status.forces:
             self._on, self._cause = True, 0
         elif self._on or self._cause >= 0:
             if self._on:
                 self._on, self._cause, self._pushed = False, status.cause, self._now
-            raise DeviceError(
+            raise DeviceStopError(
                 f"{self.name} has turned its forces off: {FORCES_OFF.get(self._cause, 'unknown cause')}.",
                 fix=_remedy(self._cause),
             )
@@ -240,8 +242,10 @@ class ForceDimensionDevice:
         number, words = self._dhd.last_error()
         if code != -1:
             words = f"it returned {code}, which is no code of its own"
-        fix = "Check cable and power, then start again." if number in LOST else "Start again."
-        return DeviceError(f"{self.name} {what}.", why=f"{words} (error {number})", fix=fix)
+        gone = code == -1 and number in LOST
+        kind = DeviceLostError if gone else DeviceError
+        fix = "Check cable and power, then start again." if gone else "Start again."
+        return kind(f"{self.name} {what}.", why=f"{words} (error {number})", fix=fix)
 
     def _check_open(self) -> None:
         if self._closed:
@@ -299,6 +303,9 @@ class ForceDimensionDevice:
             f"{_DAMPING:g} N·s/m is assumed",
             delay=_DELAY,
             axes=AXES,
+            max_stiffness=self.profile.max_stiffness,
+            buttons=_BUTTONS,
+            name=self.name,
         )
 
     def _home(self) -> None:

@@ -26,7 +26,7 @@ from urllib.parse import urlsplit
 
 import numpy as np
 
-from palpate.errors import DeviceError, UsageError
+from palpate.errors import DeviceError, DeviceLostError, DeviceStopError, UsageError
 from palpate.runtime.devices.device import Sample, Traits, settings_from
 from palpate.runtime.devices.websocket_channel import WebsocketChannel
 from palpate.runtime.shared_state import Block
@@ -133,7 +133,7 @@ class HaplyDevice:
         self._outstanding, self._closed, self._switched = 0, False, False
         self._now, self._asked, self._sent = -math.inf, -math.inf, 0.0
         self._unproven, self._impossible = 0, 0
-        self._stop, self._stopped_by = "", ""
+        self._stop, self._stopped_by, self._stop_kind = "", "", DeviceError
         self._scale = 1.0 / _force_scale(settings)
         self._channel = WebsocketChannel(settings.url, "Haply Inverse Service")
         self._events: WebsocketChannel | None = None
@@ -162,7 +162,7 @@ class HaplyDevice:
             self._outstanding = max(0, self._outstanding - len(frames))
             self._take(self._entry(_decoded(frames[-1])))
         if self._stop:
-            raise DeviceError(self._stop, fix="Free the device, then start again.")
+            raise self._stop_kind(self._stop, fix="Free the device, then start again.")
         if math.isinf(self._asked):
             self.sample.time = now  # nothing has been asked of it since it was opened
         return self.sample
@@ -218,7 +218,7 @@ class HaplyDevice:
         state, sample = entry.get("state") or {}, self.sample
         for name in _NEEDED:
             if (entry.get("status") or {}).get(name, True) is False:
-                raise DeviceError(
+                raise DeviceStopError(
                     f"Haply device {self.device_id} reports that it is not {name.replace('_', ' ')}.",
                     fix="Check its power supply and calibrate it in the Haply Hub.",
                 )
@@ -281,7 +281,7 @@ class HaplyDevice:
             if entry.get("device_id") == self.device_id:
                 return entry  # type: ignore[no-any-return]
         self.sample.holding = False
-        raise DeviceError(
+        raise DeviceLostError(
             f"Haply device {self.device_id} is no longer there.", fix="Connect it, then start again."
         )
 
@@ -309,6 +309,7 @@ class HaplyDevice:
                 self._stop = self._stopped_by = ""
             elif name in _STOPS or event.get("level") in {"critical", "panic"}:
                 self._stopped_by = name
+                self._stop_kind = DeviceLostError if name == "device-disconnected" else DeviceStopError
                 self._stop = f"The Haply service reports {name}: {event.get('message') or 'no message'}"
 
     def _find(self) -> str:

@@ -10,20 +10,17 @@ x right, y away from the user, z up.
 
 from __future__ import annotations
 
-import asyncio
 import json
-import math
-import threading
 import time
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable
 from dataclasses import dataclass
 from http import HTTPStatus
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.errors import PortInUseError, UsageError
+from palpate.errors import UsageError
+from palpate.runtime.devices.service_double import HandSettings, MovedMass, ServiceDouble
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -32,7 +29,7 @@ if TYPE_CHECKING:
 __all__ = ["EVENTS", "HaplySimulator", "SimulatorFaults", "SimulatorSettings"]
 
 _BASE = np.array([0.0, -0.12, 0.15])  # m, the resting cursor as seen from the device's base
-_LARGEST_FORCE, _STEP = 1000.0, 1e-3  # N that is refused as a slip of units; s of the hand's integration
+_LARGEST_FORCE = 1000.0  # N that is refused as a slip of units
 
 EVENTS = {
     "device-connected": "info",
@@ -49,7 +46,7 @@ EVENTS = {
 
 
 @dataclass(frozen=True)
-class SimulatorSettings:
+class SimulatorSettings(HandSettings):
     """Settings of the service and its hand.
 
     Attributes
@@ -60,14 +57,8 @@ class SimulatorSettings:
         Address to listen at.
     spellings : tuple of str
         Spellings of a force that are understood; any other is ignored in silence.
-    silence : float
-        Time without a command after which the force lapses, s.
     force_scale : float
         Factor on every force.
-    amplitude, frequency : float
-        Stroke of the hand, m and Hz; downwards first.
-    mass, damping, stiffness : float
-        Of the hand: kg, N·s/m, N/m.
     """
 
     port: int = 10001
@@ -75,20 +66,13 @@ class SimulatorSettings:
     legacy: int = 0
     host: str = "127.0.0.1"
     spellings: tuple[str, ...] = ("vector", "values")
-    silence: float = 0.1
     force_scale: float = 1.0
-    amplitude: float = 0.03
-    frequency: float = 0.5
-    mass: float = 0.3
-    damping: float = 5.0
-    stiffness: float = 300.0
 
     def __post_init__(self) -> None:
-        known = all(s in {"vector", "values"} for s in self.spellings)
-        if not (known and self.mass > 0.0 and self.silence > 0.0 and abs(self.amplitude) <= 0.1):
+        super().__post_init__()
+        if any(s not in {"vector", "values"} for s in self.spellings):
             raise UsageError(
-                "The simulated Haply can't be as asked.",
-                fix="Spellings are vector and values; mass and silence are positive; a stroke is 0.1 m at most.",
+                "The simulated Haply knows no such spelling.", fix="Spellings are vector and values."
             )
 
 
@@ -135,41 +119,15 @@ class SimulatorFaults:
     device_type: str = "inverse3"
 
 
-class _Hand:
-    """The mass on a moving spring, m from the middle of the reach, and the force on it, N."""
-
-    def __init__(self, settings: SimulatorSettings) -> None:
-        self._settings = settings
-        self.position, self.velocity, self.force = np.zeros(3), np.zeros(3), np.zeros(3)
-        self.commanded = -math.inf
-        self._began = self._time = math.nan
-
-    def advance(self, now: float) -> None:
-        """Move on to `now`, s, in steps of 1 ms at most; a pause of more than 0.1 s is cut to that."""
-        s = self._settings
-        if math.isnan(self._time):
-            self._began = self._time = now
-        self._time = max(self._time, now - 0.1)
-        while (step := min(_STEP, now - self._time)) > 1e-9:
-            self._time += step
-            if self._time - self.commanded > s.silence:
-                self.force[:] = 0.0
-            pull = -s.stiffness * self.position - s.damping * self.velocity + self.force
-            phase = 2.0 * math.pi * s.frequency * (self._time - self._began)
-            pull[2] -= s.stiffness * s.amplitude * math.sin(phase)
-            self.velocity += step / s.mass * pull
-            self.position += step * self.velocity
-
-
 @dataclass
 class _Device:
     device_id: str
-    hand: _Hand
+    hand: MovedMass
     centred: bool = False
 
 
-class HaplySimulator:
-    """The service on a thread of its own; a context manager.
+class HaplySimulator(ServiceDouble):
+    """The service.
 
     Parameters
     ----------
@@ -198,51 +156,20 @@ class HaplySimulator:
         clock: Callable[[], float] = time.monotonic,
         devices: tuple[str, ...] = ("04C2",),
     ) -> None:
+        super().__init__("Haply")
         self.settings, self._clock = settings or SimulatorSettings(), clock
         self.faults = SimulatorFaults()
         self.received, self.session = 0, 1
         self.port = self.events_port = self.legacy_port = 0
         self.buttons = {"a": False, "b": False, "c": False}
-        self._devices = [_Device(name, _Hand(self.settings)) for name in devices]
+        self._devices = [_Device(name, MovedMass(self.settings)) for name in devices]
         self._watchers: set[ServerConnection] = set()
         self._clients: set[ServerConnection] = set()
         self._kept: list[tuple[ServerConnection, str]] = []
-        self._loop = asyncio.new_event_loop()
-        self._servers: list[Any] = []
 
     def force(self, device: int = 0) -> np.ndarray:
         """Return the force (3,) on the hand, N, in the service's axes, after its scale."""
         return self._devices[device].hand.force.copy()
-
-    def start(self) -> Self:
-        """Listen.
-
-        Raises
-        ------
-        PortInUseError
-            If a port is taken.
-        """
-        self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
-        self._thread.start()
-        try:
-            self._do(self._listen())
-        except OSError as error:
-            self.stop()
-            raise PortInUseError(
-                f"The simulated Haply can't listen at port {self.settings.port} or {self.settings.events}.",
-                why=str(error),
-                fix="Another service uses it: choose other ports.",
-            ) from error
-        return self
-
-    def stop(self) -> None:
-        """Close all connections and end; harmless when repeated."""
-        if self._loop.is_closed():
-            return
-        self._do(self._end())
-        self._loop.call_soon_threadsafe(self._loop.stop)
-        self._thread.join()
-        self._loop.close()
 
     def release(self) -> None:
         """Send the answers that were held, in their order."""
@@ -261,35 +188,11 @@ class HaplySimulator:
         self.session += 1
         self._devices.reverse()
 
-    def __enter__(self) -> Self:
-        return self.start()
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.stop()
-
-    def _do(self, work: Coroutine[Any, Any, None]) -> None:
-        asyncio.run_coroutine_threadsafe(work, self._loop).result(10.0)
-
     async def _listen(self) -> None:
-        from websockets.asyncio.server import serve
-
-        s = self.settings
-        # answers must not wait for a compressor, nor the loop for a ping
-        plain: dict[str, Any] = {"compression": None, "ping_interval": None, "close_timeout": 0.05}
-        for handler, port in ((self._simulate, s.port), (self._watch, s.events), (self._legacy, s.legacy)):
-            server = await serve(handler, s.host, port, process_request=self._answer_http, **plain)
-            self._servers.append(server)
-        self.port, self.events_port, self.legacy_port = (
-            next(iter(server.sockets)).getsockname()[1] for server in self._servers
-        )
-
-    async def _end(self) -> None:
-        for server in self._servers:
-            server.close()
-        for server in self._servers:
-            await server.wait_closed()
+        s, routes = self.settings, {"process_request": self._answer_http}
+        self.port = await self._serve(self._simulate, s.host, s.port, **routes)
+        self.events_port = await self._serve(self._watch, s.host, s.events, **routes)
+        self.legacy_port = await self._serve(self._legacy, s.host, s.legacy, **routes)
 
     async def _drop_clients(self) -> None:
         for client in [*self._clients, *self._watchers]:

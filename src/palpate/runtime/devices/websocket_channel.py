@@ -12,12 +12,13 @@ import socket
 from collections.abc import Sequence
 from urllib.parse import urlsplit
 
-from palpate.errors import DeviceError, UsageError
+from palpate.errors import DeviceError, DeviceLostError, UsageError
 
 __all__ = ["WebsocketChannel"]
 
 _OPENING = 2.0  # s
 _CHUNK = 65536  # bytes
+_REMEDY = "Check that it runs, and start again."
 
 
 class WebsocketChannel:
@@ -93,21 +94,21 @@ class WebsocketChannel:
 
         Raises
         ------
-        DeviceError
+        DeviceLostError
             If the connection is gone, or takes no more.
         """
         try:
             self._protocol.send_text(text.encode())
             self._flush()
         except Exception as error:
-            raise self._failure("takes no message", f"{type(error).__name__}: {error}") from error
+            raise self._lost("takes no message", f"{type(error).__name__}: {error}") from error
 
     def receive(self, wait: float) -> list[str]:
         """Return the messages that have arrived, waiting for the first at most `wait`, s.
 
         Raises
         ------
-        DeviceError
+        DeviceLostError
             If the connection is gone and nothing is left to read.
         """
         messages = self._messages(self._early)
@@ -121,7 +122,7 @@ class WebsocketChannel:
             except BlockingIOError:
                 break
             except OSError as error:
-                raise self._failure("is gone", str(error)) from error
+                raise self._lost("is gone", str(error)) from error
             if data:
                 self._protocol.receive_data(data)
             else:
@@ -131,7 +132,7 @@ class WebsocketChannel:
             self._answer_pings()
         closing = self._protocol.close_rcvd is not None or self._protocol.parser_exc is not None
         if (ended or closing) and not messages:
-            raise self._failure("closed the connection")
+            raise self._lost("closed the connection")
         return messages
 
     def close(self) -> None:
@@ -163,4 +164,7 @@ class WebsocketChannel:
                 self._socket.sendall(data)
 
     def _failure(self, what: str, why: str = "") -> DeviceError:
-        return DeviceError(f"{self._name} {what}.", why=why, fix="Check that it runs, and start again.")
+        return DeviceError(f"{self._name} {what}.", why=why, fix=_REMEDY)
+
+    def _lost(self, what: str, why: str = "") -> DeviceLostError:
+        return DeviceLostError(f"{self._name} {what}.", why=why, fix=_REMEDY)

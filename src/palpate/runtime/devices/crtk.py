@@ -1,0 +1,497 @@
+"""Robots and haptic devices that speak CRTK, through the ROS bridge's websocket: no ROS is needed here.
+
+Below the arm's namespace the driver subscribes to ``measured_cp``, ``operating_state`` and, while it opens,
+``measured_cv``, without a throttle and with a queue of one. It publishes the force on the hand as a wrench, in the
+axes of the arm's base, and says so by ``body/set_cf_orientation_absolute``. ROS 1 and ROS 2 spell types in two ways;
+where the bridge doesn't know one, the other is tried, once.
+
+The bridge takes milliseconds, so the delay is measured and the loop softens bodies that are too stiff for it. Opening
+measures the round trip of short messages through the bridge: half of it is the way of a position, half that of a
+force. In the loop the time of a sample comes from the stamp of its header: the smallest difference ever seen between
+the loop's clock and the stamps belongs to a message that took the shortest way. A message whose stamp is not newer
+than the last is a duplicate or late, and no fresh sample.
+
+One wrench is sent for each fresh position, the zero force at once, and either again after 50 ms. Only the thread that
+calls `read` and `write` is used.
+
+References: *Collaborative Robotics Toolkit (CRTK) API*; *rosbridge v2.0 protocol specification*.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from palpate.errors import DeviceError, DeviceStopError, UsageError
+from palpate.runtime.devices.device import Sample, Traits, settings_from
+from palpate.runtime.devices.websocket_channel import WebsocketChannel
+from palpate.runtime.shared_state import Block
+from palpate.runtime.workspace import Axes
+
+__all__ = ["STATES", "CrtkDevice", "CrtkSettings", "axes_in_words"]
+
+STATES = {
+    "DISABLED": "its motors are off",
+    "PAUSED": "it is paused",
+    "FAULT": "it has a fault",
+}
+_WRENCHES = ("body/servo_cf", "servo_cf")
+_TYPES = {
+    "measured_cp": "geometry_msgs/PoseStamped",
+    "measured_cv": "geometry_msgs/TwistStamped",
+    "operating_state": "crtk_msgs/OperatingState",
+    "state_command": "crtk_msgs/StringStamped",
+    "body/set_cf_orientation_absolute": "std_msgs/Bool",
+    "palpate_echo": "std_msgs/String",
+    "servo_cf": "geometry_msgs/WrenchStamped",
+    "body/servo_cf": "geometry_msgs/WrenchStamped",
+}
+_RECEIVED = ("measured_cp", "measured_cv", "operating_state")
+_ABSOLUTE, _ECHO = "body/set_cf_orientation_absolute", "palpate_echo"
+_ECHOES = 20  # messages, of whose round trips the median counts
+_FIRST, _FASTEST, _REACH = 50, 1.0, 0.3  # poses that are checked and thrown away, m/s, m from the first one
+_AGAIN = 0.05  # s after which a force is sent again
+_DRIFT = 2e-4  # by which two clocks may part: four times what a bad crystal does
+_DAMPING = 0.5  # N·s/m, assumed
+_LONGEST_DELAY = 0.02  # s
+
+
+@dataclass(frozen=True)
+class CrtkSettings:
+    """Settings of the connection.
+
+    Attributes
+    ----------
+    url : str
+        Address of the ROS bridge.
+    arm : str
+        Namespace of the arm, such as MTMR; empty for none.
+    wrench : {"body/servo_cf", "servo_cf"}
+        Topic of the force.
+    types : {"auto", "ros1", "ros2"}
+        Spelling of types: ``geometry_msgs/PoseStamped`` or ``geometry_msgs/msg/PoseStamped``; "auto" tries both.
+    axes : str
+        Where right, up and towards the user lie in the axes of the arm's base, such as -y+z-x.
+    origin : {"here", "base"}
+        Centre of the workspace: where the handle is while it is opened, or the arm's own origin.
+    radius : float
+        Workspace, m.
+    force : float
+        Largest force, N.
+    delay : float
+        Round trip through the bridge, s; negative measures it.
+    state : float
+        0 does without the arm's operating state.
+    enable, home : float
+        1 lets the driver enable an arm, and home it: it moves by itself.
+    wait : float
+        Longest wait of a tick for a position, s.
+    search : float
+        Time to wait for the arm while opening, s.
+    """
+
+    url: str = "ws://localhost:9090"
+    arm: str = ""
+    wrench: str = "body/servo_cf"
+    types: str = "auto"
+    axes: str = "-y+z-x"
+    origin: str = "here"
+    radius: float = 0.05
+    force: float = 3.0
+    delay: float = -1.0
+    state: float = 1.0
+    enable: float = 0.0
+    home: float = 0.0
+    wait: float = 0.0
+    search: float = 2.0
+
+    def __post_init__(self) -> None:
+        words = (
+            self.types in {"auto", "ros1", "ros2"}
+            and self.origin in {"here", "base"}
+            and self.wrench in _WRENCHES
+        )
+        if not words:
+            raise UsageError(
+                "An option of crtk is none of its words.",
+                fix=f"types is auto, ros1 or ros2; origin is here or base; wrench is {' or '.join(_WRENCHES)}.",
+            )
+        switches = all(value in {0.0, 1.0} for value in (self.state, self.enable, self.home))
+        if not (
+            switches
+            and 0.0 < self.radius <= CrtkDevice.traits.radius
+            and 0.0 < self.force <= CrtkDevice.traits.max_force
+            and self.delay <= _LONGEST_DELAY
+            and 0.0 <= self.wait <= 1.0
+            and 0.0 < self.search <= 60.0
+        ):
+            raise UsageError(
+                "An option of crtk is out of range.",
+                why=f"radius is at most {CrtkDevice.traits.radius:g} m, force {CrtkDevice.traits.max_force:g} N, delay "
+                f"{_LONGEST_DELAY:g} s, wait 1 s, search 60 s; state, enable and home are 0 or 1.",
+                fix="For example crtk:ws://localhost:9090,arm=MTMR,radius=0.05,force=3.",
+            )
+        axes_in_words(self.axes)
+
+
+def axes_in_words(text: str) -> Axes:
+    """Return the rotation of three signed letters: where right, up and towards the user lie in the arm's axes.
+
+    Raises
+    ------
+    UsageError
+        If they are no rotation.
+    """
+    rows = np.zeros((3, 3))
+    good = len(text) == 6 and all(text[k] in "+-" and text[k + 1] in "xyz" for k in (0, 2, 4))
+    for k in range(3 if good else 0):
+        rows[k, "xyz".index(text[2 * k + 1])] = 1.0 if text[2 * k] == "+" else -1.0
+    if not (good and np.isclose(np.linalg.det(rows), 1.0)):
+        raise UsageError(
+            f"The axes {text!r} are no rotation.",
+            fix="Write right, up and towards you in the arm's axes, such as -y+z-x; they must be right-handed.",
+        )
+    (a, b, c), (d, e, f), (g, h, i) = rows.tolist()
+    return (a, b, c), (d, e, f), (g, h, i)
+
+
+class CrtkDevice:
+    """One arm behind the bridge.
+
+    Attributes
+    ----------
+    traits : Traits
+        With the radius and force of the settings and the measured delay.
+    types : {"ros1", "ros2"}
+        Spelling of types in use.
+    round_trip : float
+        Measured through the bridge, s.
+    repeated : int
+        Positions whose stamp was not newer than the last one's.
+    published : int
+        Wrenches sent.
+    operating : str
+        State that the arm reports.
+    """
+
+    traits: ClassVar[Traits] = Traits(
+        0.15,
+        12.0,
+        _DAMPING,
+        "before it is opened: the most that its options allow; damping: none is published, 0.5 N·s/m is assumed",
+        axes=((0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (-1.0, 0.0, 0.0)),
+    )
+
+    def __init__(self, settings: CrtkSettings | None = None) -> None:
+        s = self._settings = settings or CrtkSettings()
+        self.sample = Sample()
+        self.repeated = self.published = 0
+        self.operating, self.round_trip = "", 0.0
+        self._homed, self._busy, self._complaint = True, False, ""
+        self._closed, self._fresh = False, False
+        self._now, self._sent, self._sent_at = -math.inf, 0.0, -math.inf
+        self._stamp, self._stamp_text, self._offset, self._one_way = -math.inf, "{}", math.inf, 0.0
+        self._echoes: list[int] = []
+        self._asked = ""  # id of the latest subscriptions, which complaints about them repeat
+        self._velocity = [0.0, 0.0, 0.0]
+        self._origin, self._place = np.zeros(3), np.zeros(3)
+        arm = s.arm.strip("/")
+        self._prefix = f"/{arm}/" if arm else "/"
+        self.name = f"CRTK arm {arm}" if arm else "The CRTK arm"
+        self._pose, self._twist, self._state = (self._prefix + topic for topic in _RECEIVED)
+        self._echo, self._wrench = self._prefix + _ECHO, self._prefix + s.wrench
+        self._channel = WebsocketChannel(s.url, "ROS bridge")
+        try:
+            self.types = self._subscribe()
+            self._advertise()
+            self._make_ready()
+            self._measure_round_trip()
+            self._check_start()
+        except BaseException:
+            self._channel.close()
+            raise
+        self.traits = Traits(  # type: ignore[misc]  # a device's word goes before that of its kind
+            s.radius,
+            s.force,
+            _DAMPING,
+            "radius and force: its options; damping: none is published, 0.5 N·s/m is assumed",
+            delay=self._one_way,
+            axes=axes_in_words(s.axes),
+            reach=_REACH,
+            name=self.name,
+        )
+
+    @classmethod
+    def open(cls, commands: Block, options: Mapping[str, str]) -> CrtkDevice:
+        """Open from texts such as ``{"ws://localhost:9090": "", "arm": "MTMR"}``; the address needs no key."""
+        urls = [key for key in options if key.startswith("ws:")]
+        texts = {key: text for key, text in options.items() if key not in urls}
+        return cls(settings_from(CrtkSettings, texts | ({"url": urls[0]} if urls else {})))
+
+    def read(self, now: float) -> Sample:
+        """Return the newest position, at the time of its stamp as the loop's clock has it."""
+        self._check_open()
+        if self._now > -math.inf:
+            self._offset += _DRIFT * max(0.0, now - self._now)
+        else:
+            self._offset, self._stamp = math.inf, -math.inf  # those of another clock, while it was opened
+            self.sample.time = now - self._one_way
+        self._now = now
+        self._take(self._channel.receive(self._settings.wait))
+        if self._complaint:
+            words, self._complaint = self._complaint, ""
+            raise DeviceError("The ROS bridge complains.", why=words, fix="See its log.")
+        self._check_state()
+        np.subtract(self._place, self._origin, out=self.sample.position)
+        return self.sample
+
+    def write(self, force: np.ndarray) -> None:
+        """Publish a force (3,), N, where a fresh position asks for one; a zero force in any case."""
+        self._check_open()
+        x, y, z = force.tolist()
+        norm = math.hypot(x, y, z)
+        if not math.isfinite(norm):
+            raise DeviceError("A force that is not a finite number was kept from the CRTK arm.")
+        stops = norm == 0.0 and self._sent > 0.0
+        if self._fresh or stops or self._now - self._sent_at >= _AGAIN:
+            self._publish_force(x, y, z)
+            self._fresh, self._sent, self._sent_at = False, norm, self._now
+
+    def close(self) -> None:
+        """Publish zero force twice, since ROS may lose one, and let go."""
+        if self._closed:
+            return
+        self._closed = True
+        try:
+            self._publish_force(0.0, 0.0, 0.0)
+            self._publish_force(0.0, 0.0, 0.0)
+            for topic in _RECEIVED:
+                self._send(op="unsubscribe", topic=self._prefix + topic)
+            self._send(op="unadvertise", topic=self._wrench)
+        except DeviceError:
+            pass  # the bridge is gone
+        finally:
+            self._channel.close()
+
+    def _publish_force(self, x: float, y: float, z: float) -> None:
+        self._channel.send(
+            f'{{"op":"publish","topic":"{self._wrench}","msg":{{"header":{{"stamp":{self._stamp_text}}},"wrench":'
+            f'{{"force":{{"x":{x:.6g},"y":{y:.6g},"z":{z:.6g}}},"torque":{{"x":0.0,"y":0.0,"z":0.0}}}}}}}}'
+        )
+        self.published += 1
+
+    def _take(self, texts: list[str]) -> None:
+        for text in texts:
+            try:
+                frame = json.loads(text)
+            except ValueError as error:
+                raise DeviceError("The ROS bridge sent what is not JSON.", why=text[:100]) from error
+            if not isinstance(frame, dict):
+                continue
+            message = frame.get("msg")
+            if frame.get("op") == "status":
+                if frame.get("level") == "error" and frame.get("id", self._asked) == self._asked:
+                    self._complaint = str(message)
+            elif isinstance(message, dict):
+                self._take_message(frame.get("topic"), message)
+
+    def _take_message(self, topic: object, message: Mapping[str, Any]) -> None:
+        if topic == self._pose:
+            self._take_pose(message)
+        elif topic == self._state:
+            self.operating = str(message.get("state", ""))
+            self._homed = bool(message.get("is_homed", True))
+            self._busy = bool(message.get("is_busy", False))
+        elif topic == self._twist:
+            self._velocity = _vector((message.get("twist") or {}).get("linear"))
+        elif topic == self._echo:
+            self._echoes.append(int(message.get("data") or -1))
+
+    def _take_pose(self, message: Mapping[str, Any]) -> None:
+        """Take a position, and its time from its stamp: one that is not newer than the last is passed over."""
+        stamp = (message.get("header") or {}).get("stamp") or {}
+        # secs and nsecs of ROS 1, sec and nanosec of ROS 2
+        seconds = stamp.get("secs", stamp.get("sec", 0)) + 1e-9 * stamp.get("nsecs", stamp.get("nanosec", 0))
+        if seconds > 0.0:
+            if seconds <= self._stamp:
+                self.repeated += 1
+                return
+            self._stamp, self._stamp_text = seconds, json.dumps(stamp)
+            self._offset = min(self._offset, self._now - seconds)
+            taken = seconds + self._offset - self._one_way
+        else:
+            taken = self._now - self._one_way
+        self.sample.time = max(self.sample.time, taken)
+        self._place[:] = _vector((message.get("pose") or {}).get("position"))
+        self._fresh = True
+
+    def _check_state(self) -> None:
+        self.sample.holding = self._settings.state == 0.0 or (self.operating == "ENABLED" and self._homed)
+        if not self.sample.holding:
+            raise DeviceStopError(f"{self.name} {self._state_in_words()}.", fix="Free it in its own program.")
+
+    def _state_in_words(self) -> str:
+        if self.operating != "ENABLED":
+            words = STATES.get(self.operating, "which is no state to touch in")
+            return f"reports {self.operating or 'no state'}: {words}"
+        return "has not been homed: its positions are wrong" if not self._homed else "is ready"
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise DeviceError("The CRTK arm is closed.", fix="Open it again.")
+
+    def _send(self, **message: object) -> None:
+        self._channel.send(json.dumps(message))
+
+    def _until(self, seconds: float) -> Iterator[None]:
+        """Receive while opening, for at most `seconds`; the caller leaves when it has what it waits for."""
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0.0:
+            yield
+            self._now = time.monotonic()
+            self._take(self._channel.receive(left))
+
+    def _type(self, topic: str, types: str) -> str:
+        name = _TYPES[topic]
+        return name if types == "ros1" else name.replace("/", "/msg/")
+
+    def _subscribe(self) -> str:
+        """Subscribe in one spelling of types or the other; return the one that brought a position."""
+        s, complaints = self._settings, []
+        for types in ("ros1", "ros2") if s.types == "auto" else (s.types,):
+            self._asked = f"palpate-{types}"
+            for topic in _RECEIVED if s.state else _RECEIVED[:2]:
+                self._send(
+                    op="subscribe",
+                    id=self._asked,
+                    topic=self._prefix + topic,
+                    type=self._type(topic, types),
+                    throttle_rate=0,
+                    queue_length=1,
+                )
+            self._complaint = ""
+            for _ in self._until(s.search):
+                if self._fresh or self._complaint:
+                    break
+            if self._fresh:
+                self._complaint = ""
+                return types
+            complaints.append(f"as {self._type('measured_cp', types)}: {self._complaint or 'silence'}")
+            for topic in _RECEIVED:
+                self._send(op="unsubscribe", id=self._asked, topic=self._prefix + topic)
+        raise DeviceError(
+            f"No position comes from {self._pose}.",
+            why=f"The ROS bridge at {s.url} answered, {'; '.join(complaints)}.",
+            fix="Start the arm, name it with arm=NAMESPACE, and see `ros2 topic list` or `rostopic list`.",
+        )
+
+    def _advertise(self) -> None:
+        for topic in (self._settings.wrench, _ABSOLUTE, "state_command", _ECHO):
+            self._send(
+                op="advertise",
+                topic=self._prefix + topic,
+                type=self._type(topic, self.types),
+                latch=topic == _ABSOLUTE,
+                queue_size=1,
+            )
+        self._send(op="subscribe", topic=self._echo, type=self._type(_ECHO, self.types), throttle_rate=0)
+
+    def _make_ready(self) -> None:
+        """Wait for an arm that is enabled and homed; ask for either where the settings say so."""
+        s = self._settings
+        if not s.state:
+            return
+        asked = ""
+        for _ in self._until(s.search if not s.home else 60.0):
+            ready = self.operating == "ENABLED" and self._homed and not self._busy
+            if ready:
+                return
+            if not self.operating or self._busy:
+                continue
+            if self.operating == "DISABLED" and s.enable:
+                wish = "enable"
+            elif self.operating == "ENABLED" and s.home:
+                wish = "home"
+            else:
+                break
+            if wish != asked:
+                asked = wish
+                self._send(op="publish", topic=self._prefix + "state_command", msg={"string": wish})
+        if not self.operating:
+            raise DeviceError(
+                f"{self.name} tells no operating state.", fix="Start it, or go without by crtk:state=0."
+            )
+        raise DeviceError(
+            f"{self.name} {'is busy' if self._busy else self._state_in_words()}.",
+            fix="Enable and home it in its own program, or with enable=1 and home=1: it then moves by itself.",
+        )
+
+    def _measure_round_trip(self) -> None:
+        """Time short messages on their way through the bridge and back."""
+        s, trips = self._settings, []
+        for k in range(_ECHOES):
+            # repeated: a subscriber may hear a new publisher late
+            self._send(op="publish", topic=self._prefix + _ABSOLUTE, msg={"data": True})
+            if s.delay >= 0.0:
+                continue
+            sent = time.monotonic()
+            self._send(op="publish", topic=self._echo, msg={"data": str(k + 1)})
+            for _ in self._until(s.search):
+                if k + 1 in self._echoes:
+                    trips.append(time.monotonic() - sent)
+                    break
+            else:
+                raise DeviceError(
+                    "The ROS bridge sends nothing back of what is published to it.",
+                    why=f"A message on {self._echo} did not return within {s.search:g} s, so the delay is not known.",
+                    fix="Let the bridge pass that topic, or give the round trip: crtk:delay=SECONDS.",
+                )
+        self._send(op="unsubscribe", topic=self._echo)
+        self._send(op="unadvertise", topic=self._echo)
+        self.round_trip = s.delay if s.delay >= 0.0 else sorted(trips)[len(trips) // 2]
+        if self.round_trip > _LONGEST_DELAY:
+            raise DeviceError(
+                f"The way through the ROS bridge and back takes {1e3 * self.round_trip:.0f} ms.",
+                why=f"A hand is not pushed on over more than {1e3 * _LONGEST_DELAY:g} ms.",
+                fix="Run the bridge on this machine or by cable, with nothing else on it.",
+            )
+        self._one_way = 0.5 * self.round_trip
+
+    def _check_start(self) -> None:
+        """Throw the first positions away once they look right; the last one is the centre, if that was asked for."""
+        first: np.ndarray | None = None
+        seen = 0
+        for _ in self._until(self._settings.search):
+            if self._fresh:
+                self._fresh, seen = False, seen + 1
+                first = self._place.copy() if first is None else first
+            if seen >= _FIRST:
+                break
+        if seen < _FIRST or first is None:
+            raise DeviceError(
+                f"{self.name} sent {seen} positions within {self._settings.search:g} s.",
+                fix=f"It must send {_FIRST} in that time; 200 a second or more are right for touch.",
+            )
+        way, speed = math.dist(self._place, first), math.hypot(*self._velocity)
+        if not (way <= _REACH and speed <= _FASTEST):
+            raise DeviceError(
+                f"{self.name} starts with {speed:.3g} m/s and moved by {way:.3g} m.",
+                why=f"A start is slower than {_FASTEST:g} m/s and within {_REACH:g} m.",
+                fix="Hold it still while it is opened.",
+            )
+        self._send(op="unsubscribe", topic=self._twist)
+        if self._settings.origin == "here":
+            self._origin[:] = self._place
+        self._now = -math.inf  # from here on the loop's clock counts
+
+
+def _vector(value: Any) -> list[float]:
+    """Return x, y, z; NaN where one is missing or null, as JSON writes it."""
+    entries = value if isinstance(value, dict) else {}
+    return [math.nan if entries.get(axis) is None else float(entries[axis]) for axis in "xyz"]

@@ -1,0 +1,163 @@
+"""What the doubles of device services share: a thread that serves, and a hand that moves by itself.
+
+The hand is a mass on a spring whose other end moves up and down by a sine, with damping; its axes are the service's.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import threading
+from collections.abc import Coroutine
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+from palpate.errors import PortInUseError, UsageError
+
+__all__ = ["HandSettings", "MovedMass", "ServiceDouble"]
+
+_STEP = 1e-3  # s of the hand's integration
+
+
+@dataclass(frozen=True)
+class HandSettings:
+    """Settings of the hand.
+
+    Attributes
+    ----------
+    amplitude, frequency : float
+        Stroke, m and Hz; downwards first.
+    mass, damping, stiffness : float
+        kg, N·s/m, N/m.
+    silence : float
+        Time without a command after which the force on it lapses, s.
+    """
+
+    amplitude: float = 0.03
+    frequency: float = 0.5
+    mass: float = 0.3
+    damping: float = 5.0
+    stiffness: float = 300.0
+    silence: float = 0.1
+
+    def __post_init__(self) -> None:
+        if not (self.mass > 0.0 and self.silence > 0.0 and abs(self.amplitude) <= 0.1):
+            raise UsageError(
+                "No hand can be simulated with these settings.",
+                fix="Mass and silence are positive; a stroke is 0.1 m at most.",
+            )
+
+
+class MovedMass:
+    """The mass on a moving spring, in axes with z up.
+
+    Attributes
+    ----------
+    position, velocity : (3,)
+        m from the middle of the reach, m/s.
+    force : (3,)
+        On the hand, N; lapses after the silence of the settings.
+    commanded : float
+        When it was last set, s.
+    """
+
+    def __init__(self, settings: HandSettings) -> None:
+        self._settings = settings
+        self.position, self.velocity, self.force = np.zeros(3), np.zeros(3), np.zeros(3)
+        self.commanded = -math.inf
+        self._began = self._time = math.nan
+
+    def advance(self, now: float) -> None:
+        """Move on to `now`, s, in steps of 1 ms at most; a pause of more than 0.1 s is cut to that."""
+        s = self._settings
+        if math.isnan(self._time):
+            self._began = self._time = now
+        self._time = max(self._time, now - 0.1)
+        while (step := min(_STEP, now - self._time)) > 1e-9:
+            self._time += step
+            if self._time - self.commanded > s.silence:
+                self.force[:] = 0.0
+            pull = -s.stiffness * self.position - s.damping * self.velocity + self.force
+            phase = 2.0 * math.pi * s.frequency * (self._time - self._began)
+            pull[2] -= s.stiffness * s.amplitude * math.sin(phase)
+            self.velocity += step / s.mass * pull
+            self.position += step * self.velocity
+
+
+class ServiceDouble:
+    """A service on a thread of its own; a context manager. Its kinds open their ports in `_listen`.
+
+    Parameters
+    ----------
+    name : str
+        What is simulated, for messages.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._loop = asyncio.new_event_loop()
+        self._servers: list[Any] = []
+
+    def start(self) -> Self:
+        """Listen.
+
+        Raises
+        ------
+        PortInUseError
+            If a port is taken.
+        """
+        self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
+        self._thread.start()
+        try:
+            self._do(self._listen())
+        except OSError as error:
+            self.stop()
+            raise PortInUseError(
+                f"The simulated {self._name} can't listen at the ports asked for.",
+                why=str(error),
+                fix="Another service uses them: choose other ports.",
+            ) from error
+        return self
+
+    def stop(self) -> None:
+        """Close all connections and end; harmless when repeated."""
+        if self._loop.is_closed():
+            return
+        self._do(self._end())
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+        self._loop.close()
+
+    def __enter__(self) -> Self:
+        return self.start()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+
+    def _do(self, work: Coroutine[Any, Any, None]) -> None:
+        """Run a coroutine on the service's thread and wait for it."""
+        asyncio.run_coroutine_threadsafe(work, self._loop).result(10.0)
+
+    async def _serve(self, handler: Any, host: str, port: int, **settings: Any) -> int:
+        """Open a websocket server and return its port."""
+        from websockets.asyncio.server import serve
+
+        # answers must not wait for a compressor, nor the loop for a ping
+        plain: dict[str, Any] = {"compression": None, "ping_interval": None, "close_timeout": 0.05}
+        server = await serve(handler, host, port, **plain, **settings)
+        self._servers.append(server)
+        return int(next(iter(server.sockets)).getsockname()[1])
+
+    async def _listen(self) -> None:
+        raise NotImplementedError
+
+    async def _end(self) -> None:
+        for server in self._servers:
+            server.close()
+        for server in self._servers:
+            await server.wait_closed()

@@ -71,6 +71,8 @@ def test_shear_modulus():
         lambda: PointLoad("P", 1.0, 5.0, 0.0),
         lambda: TipLoad(0, 1, direction=(0, 0)),
         lambda: Cantilever(-1, Circle(1), NYLON),
+        lambda: Cantilever(1000, Circle(0.005), NYLON),
+        lambda: Cantilever(1, Circle(5), NYLON),
         lambda: Cantilever(1, Circle(1), NYLON, order=1),
         lambda: Cantilever(1, Circle(1), NYLON, kinematics="medium"),
         lambda: Cantilever(1, Circle(1), NYLON, nodes=(0.5, 1.5)),

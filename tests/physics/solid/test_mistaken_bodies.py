@@ -147,8 +147,25 @@ def test_progress_is_logged(caplog):
     assert "load step to 100.0% of the path" in caplog.messages[-1]
 
 
-def test_a_large_sphere_is_a_flat_one():
-    assert BODY.problem(SphereProbe(radius=0.4, depth=(0.0, 0.001))).interactions[0].radius == 0.4
+def test_a_sphere_that_is_larger_than_the_body_is_warned_of():
+    with pytest.warns(ModelWarning, match=r"radius of 400 mm and is larger than the body, 40 mm"):
+        assert BODY.problem(SphereProbe(radius=0.4, depth=(0.0, 0.001))).interactions[0].radius == 0.4
+
+
+def test_elements_that_are_larger_than_the_probe_are_warned_of():
+    with pytest.warns(
+        ModelWarning, match=r"under the SphereProbe measure 20 mm, the SphereProbe itself 12 mm"
+    ):
+        BODY.problem(SphereProbe(radius=0.006, depth=(0.0, 0.004)), element=0.02)
+
+
+def test_a_hopeless_solve_is_given_up(monkeypatch):
+    """A ball that is pressed through nearly all of a body: several tries in a row fail, and it says so."""
+    monkeypatch.setattr("palpate.physics.solid.solid_path.FUTILE_SECONDS", 0.0)
+    probe = SphereProbe(radius=0.004, stop=None, pad=1e8, depth=(0.0, 0.019))
+    answer = BODY.problem(probe, element=0.008).solve((0.02, 0.02, 0.02 - 0.0185 + 0.004))
+    assert not answer.converged
+    assert "given up after 4 tries in a row" in answer.message
 
 
 def test_what_is_near_the_ranges_or_in_other_units_is_solved():

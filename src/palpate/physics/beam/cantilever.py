@@ -11,6 +11,7 @@ import numpy as np
 
 from palpate import checks
 from palpate.errors import UsageError
+from palpate.physics.advice import advise_on_modulus
 from palpate.physics.beam.beam_loads import Load, LoadAndUnload, StepAndHold, as_loads
 from palpate.physics.beam.beam_problem import BeamProblem
 from palpate.physics.beam.cross_section import CrossSection
@@ -21,6 +22,7 @@ __all__ = ["Cantilever"]
 Kinematics = Literal["large", "small"]
 FIBRES = 48  # with them the plastic moment of a circle is right to 5e-4
 TOLERANCE = 1e-5
+LONGEST = 100.0  # m: a longer beam was meant in mm
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,9 @@ class Cantilever:
         checks.one_of("The cantilever's kinematics", self.kinematics, get_args(Kinematics))
         checks.positive("The cantilever's strain limit", self.strain_limit, infinite=True)
         _check_section(self.section)
+        _check_sizes(self.length, self.section)
         _check_material(self.material)
+        advise_on_modulus("of the cantilever", self.material)
         self._check_memory()
         nodes = tuple(self.nodes) or tuple(float(x) for x in np.linspace(0, self.length, 6))
         for x in nodes:
@@ -160,6 +164,22 @@ def _check_section(section: object) -> None:
             f"The cantilever's section is {section!r}, of type {type(section).__name__}.",
             why="It must be a cross-section, with its measures in m.",
             fix="Pass Circle(radius=0.005), Rectangle(width=0.02, height=0.004) or a Section of its numbers.",
+        )
+
+
+def _check_sizes(length: float, section: Any) -> None:
+    """Refuse lengths in m that tell of millimetres."""
+    if length > LONGEST:
+        raise UsageError(
+            f"The cantilever would be {length:g} m long.",
+            why=f"Lengths are in m, and a beam to be touched measures at most {LONGEST:g} m.",
+            fix=f"Pass length={length / 1000:g} for {length:g} mm.",
+        )
+    if section.half_height > length:
+        raise UsageError(
+            f"The cantilever's section is {2 * section.half_height:g} m high, the beam {length:g} m long.",
+            why="Lengths are in m, and a beam is longer than its section is high.",
+            fix=f"Pass {section.half_height / 1000:g} for {section.half_height:g} mm.",
         )
 
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 from palpate import checks
 from palpate.errors import UsageError
 from palpate.format import number
+from palpate.physics.advice import advise_on_modulus
 from palpate.physics.interactions.interaction import Fixed, Interaction
 from palpate.physics.solid.solid_checks import (
-    advise_on_modulus,
     by_region,
     require_geometry,
     require_held_values,
@@ -97,7 +97,7 @@ class Body:
         checks.positive("The error of a step", self.step_error, "", infinite=True)
         for region, material in self.materials.items():
             self.formulation_of(region)
-            advise_on_modulus(region, material)
+            advise_on_modulus(f"in the region {region!r}", material)
 
     @property
     def materials(self) -> dict[str, Material]:

@@ -15,13 +15,14 @@ import numpy as np
 
 from palpate import checks
 from palpate.errors import UsageError
+from palpate.format import millimetres
 from palpate.physics.advice import advise
 from palpate.physics.interactions.interaction import Fixed, Interaction
 from palpate.physics.shapes.naming import members, require_known
 from palpate.units import Range, bounds
 
 __all__ = [
-    "advise_on_modulus",
+    "advise_on_sizes",
     "by_region",
     "longest_side",
     "require_element",
@@ -35,8 +36,6 @@ __all__ = [
     "surfaces_of",
 ]
 
-# Pa: tissue by its number of kPa is mostly below, the softest gels that keep a shape are above
-SOFTEST = 50.0
 # radius over the body's longest side: larger spheres are flat, millimetres taken for metres larger
 FLATTEST = 20.0
 # lengths of interactions in m, and how many times the body's longest side they may be
@@ -153,18 +152,6 @@ def require_weight(materials: Mapping[str, Any]) -> None:
             )
 
 
-def advise_on_modulus(region: str, material: Any) -> None:
-    """Warn of a Young's modulus below those of solids, which tells of kPa or MPa taken for Pa."""
-    young = 2 * material.shear_modulus * (1 + material.poisson)
-    if young < SOFTEST:
-        advise(
-            f"Young's modulus in the region {region!r} is {young:.4g} Pa.",
-            why="Fat and brain have some hundred Pa, the softest gels in use some ten; "
-            "a number of kPa taken for Pa looks like this.",
-            fix=f"Moduli are in Pa: pass {young:.4g}e3 for {young:.4g} kPa.",
-        )
-
-
 def _require_material(thing: Any, needed: tuple[str, ...]) -> None:
     if not _lacks(thing, needed) and not isinstance(thing, type):
         return
@@ -197,6 +184,37 @@ def require_lengths(interaction: Any, longest: float) -> None:
         for length in _numbers(getattr(interaction, what, None)):
             if abs(length) > share * longest:
                 raise _too_long(f"The {what} of the {_kind(interaction)}", length, longest)
+
+
+def advise_on_sizes(interaction: Any, element: float | None, longest: float) -> None:
+    """Warn of a ball that is larger than the body, and of elements that are larger than the ball.
+
+    Parameters
+    ----------
+    interaction : Interaction
+        What acts; one without a radius passes.
+    element : float or None
+        Element size under it in m; None where the interaction chooses its own.
+    longest : float
+        The body's longest side in m.
+    """
+    radius = getattr(interaction, "radius", None)
+    if radius is None:
+        return
+    what = _kind(interaction)
+    if 2 * radius > longest:
+        advise(
+            f"The {what} has a radius of {millimetres(radius)} and is larger than the body, {millimetres(longest)}.",
+            why="Such a ball is nearly a flat plate: it touches the body's rim first, and its place says little.",
+            fix="Lengths are in m: pass 0.005 for 5 mm.",
+        )
+    size = element if element is not None else getattr(interaction, "element", None)
+    if size is not None and size > 2 * radius:
+        advise(
+            f"The elements under the {what} measure {millimetres(size)}, the {what} itself {millimetres(2 * radius)}.",
+            why="Elements larger than what touches them do not resolve the contact: forces are far too large.",
+            fix=f"Pass element={radius / 2:.2g} (m), or leave it out.",
+        )
 
 
 def require_element(element: Any, longest: float) -> None:

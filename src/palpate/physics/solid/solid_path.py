@@ -14,6 +14,8 @@ time.
 from __future__ import annotations
 
 import logging
+import sys
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -21,6 +23,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.physics.stop import Stop, Verdict
+from palpate.processes import is_supervised
 
 if TYPE_CHECKING:
     from palpate.physics.solid.solid_model import SolidModel
@@ -44,6 +47,10 @@ SMALLEST_REFUSED = 2.0**-4
 SMALLEST_IN_TIME = 2.0**-30
 # Of steps that led nowhere, and of all where nothing is remembered: bounds the time that pointless inputs cost
 MOST_ITERATIONS = 200
+# Tries in a row that led nowhere, and the CPU time in s that they took, from which on a path is given up: so many
+# halvings of a step are hardly ever followed by one that succeeds, and small bodies try them all within that time
+FUTILE_TRIES, FUTILE_SECONDS = 4, 15.0
+TOLD_AFTER, TOLD_EVERY = 5.0, 1.0  # s of a solve from which on its progress is shown, and between two lines
 MOST_STEPS = 400  # a body that flows without end, near collapse, is followed in ever shorter steps
 EASY, HARD = 3, 6  # factorisations of a search up to which steps grow, beyond which they shrink
 GROWTH, SHRINKAGE = 1.6, 0.7
@@ -282,6 +289,7 @@ def follow(model: SolidModel, start: PathPoint, target: np.ndarray) -> PathResul
         With `Stop.CONVERGED` where it arrived, else with the reason and the last equilibrium before it.
     """
     here, position, log = _with_slope(model, start), 0.0, list[LoadStep]()
+    watch = _Watch()
     length = model.distance(start.q, target)
     step = min(1.0, model.first_step() / length) if length > 0 else 1.0
     while True:
@@ -291,10 +299,12 @@ def follow(model: SolidModel, start: PathPoint, target: np.ndarray) -> PathResul
         tried = take_step(model, here, q, end - position)
         log.append(_record(end, end - position, tried))
         logger.info("%s", log[-1])
+        watch.see(tried, position, sum(entry.iterations for entry in log))
         if len(log) == 1 and here is not start:
             log[0] = replace(log[0], iterations=log[0].iterations + 1)  # the tangent that gave the slope
         if tried.good:
             if end == 1.0:
+                watch.end()
                 return PathResult(
                     PathPoint(q, tried.z, None, here.without_previous()), tried.verdict, tuple(log)
                 )
@@ -305,8 +315,52 @@ def follow(model: SolidModel, start: PathPoint, target: np.ndarray) -> PathResul
         else:
             model.restore(before)
             step = (end - position) * min(_growth_in_time(tried.error), 0.5)
-        if step < _smallest(tried) or _spent(model, log) >= MOST_ITERATIONS or len(log) >= MOST_STEPS:
-            return PathResult(here, _given_up(tried, _spent(model, log), len(log)), tuple(log))
+        spent = _spent(model, log)
+        if step < _smallest(tried) or spent >= MOST_ITERATIONS or len(log) >= MOST_STEPS or watch.futile:
+            watch.end()
+            return PathResult(here, _given_up(tried, spent, len(log), watch.reason), tuple(log))
+
+
+class _Watch:
+    """The clock of a path: how long nothing has succeeded, and a line of progress on a terminal."""
+
+    def __init__(self) -> None:
+        self._began = self._shown = time.monotonic()
+        self._since, self._tries = time.process_time(), 0
+        self._line = sys.stderr is not None and sys.stderr.isatty() and not is_supervised()
+        self._open = False
+
+    @property
+    def futile(self) -> bool:
+        """True where several tries in a row led nowhere and took long."""
+        return self._tries >= FUTILE_TRIES and time.process_time() - self._since > FUTILE_SECONDS
+
+    @property
+    def reason(self) -> str:
+        """The tries in words, where they are futile; else empty."""
+        if not self.futile:
+            return ""
+        return f"given up after {self._tries} tries in a row, {time.process_time() - self._since:.0f} s of CPU time"
+
+    def see(self, tried: StepResult, position: float, iterations: int) -> None:
+        """Take note of a try from a position (a share of the path), and show how far the solve is."""
+        found = tried.verdict.stop is Stop.CONVERGED  # one that errs too much in time is no failure
+        self._tries = 0 if found else self._tries + 1
+        if found:
+            self._since = time.process_time()
+        now = time.monotonic()
+        if self._line and now - self._began > TOLD_AFTER and now - self._shown > TOLD_EVERY:
+            self._shown, self._open = now, True
+            failed = f", {self._tries} tries without a step" if self._tries else ""
+            text = f"solving: {position:.0%} of the path, {iterations} iterations, {now - self._began:.0f} s{failed}"
+            sys.stderr.write(f"\r{text:<78}")
+            sys.stderr.flush()
+
+    def end(self) -> None:
+        """Wipe the line of progress."""
+        if self._open:
+            sys.stderr.write("\r" + " " * 78 + "\r")
+            sys.stderr.flush()
 
 
 def _with_slope(model: SolidModel, start: PathPoint) -> PathPoint:
@@ -348,10 +402,11 @@ def _spent(model: SolidModel, log: list[LoadStep]) -> int:
     return sum(entry.iterations for entry in counted)
 
 
-def _given_up(last: StepResult, spent: int, steps: int) -> Verdict:
+def _given_up(last: StepResult, spent: int, steps: int, futile: str) -> Verdict:
     """Return the verdict on a path that ends before its target: never that of a good step on the way."""
     if last.verdict.stop is not Stop.CONVERGED:
-        return last.verdict
+        detail = "; ".join(part for part in (last.verdict.detail, futile) if part)
+        return replace(last.verdict, detail=detail)
     if spent >= MOST_ITERATIONS:
         return Verdict(Stop.ITERATION_LIMIT, f"{spent} iterations along the path")
     if steps >= MOST_STEPS:

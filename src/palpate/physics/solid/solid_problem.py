@@ -21,6 +21,7 @@ from palpate.physics.interactions.sphere import SphereProbe
 from palpate.physics.shapes.naming import require_known
 from palpate.physics.solid.body_symmetry import symmetry_of
 from palpate.physics.solid.solid_checks import (
+    advise_on_sizes,
     longest_side,
     require_element,
     require_finite,
@@ -84,6 +85,7 @@ class SolidProblem:
         if self.element is not None:
             require_element(self.element, self.longest)
         for interaction in self.interactions:
+            advise_on_sizes(interaction, self.element, self.longest)
             if isinstance(interaction, SphereProbe):
                 advise_on_pad(interaction, self.body.materials)
 

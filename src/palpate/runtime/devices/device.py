@@ -1,7 +1,8 @@
 """The contract of a haptic device in the loop: `read`, `write`, `close`.
 
 To add one, copy the nearest file of this folder and enter it in the table of ``devices/__init__.py``; the
-checklist in ``tests/runtime/test_device_checklist.py`` then holds it to this contract.
+checklist in ``tests/runtime/test_device_checklist.py`` then holds it to this contract. A page of the guide, "Adding a
+device", goes through the steps.
 """
 
 from __future__ import annotations

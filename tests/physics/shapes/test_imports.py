@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from palpate.errors import FileFormatError, UsageError
+from palpate.physics.advice import ModelWarning
 from palpate.physics.shapes import (
     Block,
     Cylinder,
@@ -305,3 +306,74 @@ def test_faces_say_where_they_are(tmp_path: Path):
     round_faces = {face.name: face for face in Cylinder(0.01, 0.05).faces}
     assert "facing all ways" in str(round_faces["side"])
     assert round_faces["top"].lower[2] == pytest.approx(0.05)
+
+
+def write_limb(path: Path) -> None:
+    """A tube of muscle of radii 6 and 20 mm and height 40 mm around a bone."""
+    from netgen.occ import Compound, Cylinder, Pnt, Z
+
+    muscle = Cylinder(Pnt(0, 0, 0), Z, r=20, h=40) - Cylinder(Pnt(0, 0, 0), Z, r=6, h=40)
+    muscle.faces.name = "skin"
+    muscle.faces.Max(Z).name, muscle.faces.Min(Z).name = "cut top", "cut bottom"
+    bone = Cylinder(Pnt(0, 0, 0), Z, r=6, h=40)
+    muscle.solids.name, bone.solids.name = "muscle", "bone"
+    Compound([muscle, bone]).WriteStep(str(path))
+
+
+def test_concentric_solids_keep_their_faces(tmp_path: Path):
+    """All faces around the axis have one centre; only the wall between the solids is none of the surface."""
+    write_limb(tmp_path / "limb.step")
+    limb = ImportedSolid(tmp_path / "limb.step", element=0.02)
+    assert limb.regions == ("muscle", "bone")
+    assert set(limb.surfaces) > {"skin", "cut top", "cut bottom"}
+    assert sum(name.startswith("bone face") for name in limb.surfaces) == 2
+    mesh = limb.mesh()
+
+    def area(name: str) -> float:
+        return 1e6 * ngsolve.Integrate(1, mesh, definedon=mesh.Boundaries(name))
+
+    assert area("skin") == pytest.approx(2 * np.pi * 20 * 40, rel=5e-3)
+    assert area("between regions") == pytest.approx(2 * np.pi * 6 * 40, rel=5e-3)
+    assert area("cut top") == pytest.approx(np.pi * (20**2 - 6**2), rel=5e-3)
+    assert not any(limb.rest().parts[0])
+
+
+def write_boxes(path: Path, *boxes: tuple[str, tuple, tuple]) -> None:
+    from netgen.occ import Box, Compound, Pnt
+
+    solids = []
+    for name, low, high in boxes:
+        solid = Box(Pnt(*low), Pnt(*high))
+        solid.solids.name = name
+        solids.append(solid)
+    Compound(solids).WriteStep(str(path))
+
+
+def test_a_face_that_is_covered_in_part_keeps_the_rest(tmp_path: Path):
+    write_boxes(tmp_path / "a.step", ("fat", (0, 0, 0), (40, 40, 20)), ("lump", (10, 10, 20), (30, 30, 28)))
+    shape = ImportedSolid(tmp_path / "a.step", element=0.02)
+    areas = {name: 1e6 * area for name, area in shape.rest().areas.items()}
+    assert len(areas) == 11
+    assert sum(areas.values()) == pytest.approx(1600 * 2 + 4 * 800 - 400 + 400 + 4 * 160)
+    ring = next(face for face in shape.faces if face.lower[2] == face.upper[2] == pytest.approx(0.02))
+    assert ring.name.startswith("fat face")
+    assert 1e6 * ring.area == pytest.approx(1600 - 400)
+
+
+def test_solids_that_share_a_volume(tmp_path: Path):
+    low = ("low", (0, 0, 0), (40, 40, 20))
+    write_boxes(tmp_path / "a.step", low, ("high", (10, 10, 15), (30, 30, 25)))
+    said = failure(lambda: ImportedSolid(tmp_path / "a.step").surfaces)
+    assert "'low' and 'high'" in said
+    assert "overlap by 2e+03 mm³" in said
+    assert "around (20, 20, 17.5) mm" in said
+    write_boxes(tmp_path / "b.step", low, ("core", (10, 10, 5), (30, 30, 15)))
+    assert "inside the other, around (20, 20, 10) mm" in failure(
+        lambda: ImportedSolid(tmp_path / "b.step").surfaces
+    )
+    write_boxes(tmp_path / "c.step", low, ("again", low[1], low[2]))
+    twice = ImportedSolid(tmp_path / "c.step", element=0.02)
+    with pytest.warns(ModelWarning, match="'again' is the same as 'low'"):
+        assert len(twice.surfaces) == 6
+    assert twice.regions == ("low",)
+    assert twice.rest().volume == pytest.approx(32e-6)

@@ -123,6 +123,27 @@ class BodyMesh:
         """Shape of the worst elements."""
         return mesh_quality(self.points, self.tetrahedra)
 
+    @cached_property
+    def parts(self) -> tuple[np.ndarray, np.ndarray]:
+        """Number of the part of each tetrahedron (e,) and of each outer triangle (t,): what common faces join."""
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        count = len(self.tetrahedra)
+        faces = np.sort(np.concatenate([self.tetrahedra[:, FACES].reshape(-1, 3), self.triangles]), axis=1)
+        # one number for the three nodes of a face, which sorts faster than rows
+        key = (faces[:, 0] * len(self.points) + faces[:, 1]) * len(self.points) + faces[:, 2]
+        order = np.argsort(key, kind="stable")
+        # tetrahedra, and behind them the triangles as if they were some
+        owner = np.concatenate([np.repeat(np.arange(count), 4), count + np.arange(len(self.triangles))])[
+            order
+        ]
+        same = np.flatnonzero(key[order][1:] == key[order][:-1])
+        size = count + len(self.triangles)
+        graph = coo_array((np.ones(len(same)), (owner[same], owner[same + 1])), shape=(size, size))
+        part = connected_components(graph, directed=False)[1]
+        return part[:count], part[count:]
+
     def on(self, surface: str) -> np.ndarray:
         """Mask of the triangles that belong to a surface or a group of surfaces, bool of shape (t,).
 

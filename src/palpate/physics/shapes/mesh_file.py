@@ -164,8 +164,9 @@ def _volume(source: MeshSource, shape: ImportedMesh) -> tuple[BodyMesh, np.ndarr
     node, apart = merge_nodes(points[corners], shortest_edge(points, source.solids))
     merged[corners] = corners[node]
     if twins := int((merged != np.arange(len(points))).sum()):
+        lie = "1 node lies on another" if twins == 1 else f"{twins} nodes lie on others"
         source.notes.append(
-            f"{twins} nodes lie on others, at most {1e3 * apart:.2g} mm apart, and were united: their cells are bonded."
+            f"{lie}, at most {1e3 * apart:.2g} mm apart, and were united: their cells are bonded."
         )
     solids = [(kind, merged[cells]) for kind, cells in source.solids]
     points, tetrahedra, origin = split_cells(points, solids)

@@ -13,6 +13,7 @@ import numpy as np
 
 from palpate import checks
 from palpate.errors import FileFormatError, UsageError
+from palpate.format import number
 from palpate.physics.apart import mesh_apart, read_apart
 from palpate.physics.shapes.body_file import (
     FEATURE_ANGLE,
@@ -27,22 +28,24 @@ from palpate.physics.shapes.mesh import BodyMesh, Face, faces_of, to_ngsolve
 from palpate.physics.shapes.meshing import FineMesh, mesh_solid
 from palpate.physics.shapes.naming import INTERFACE, plain_name
 from palpate.physics.shapes.shape import Shape, require_size
-from palpate.physics.shapes.stl_file import fill_surface, name_parts, read_stl
+from palpate.physics.shapes.stl_file import bodies_apart, fill_surface, name_parts, read_stl
 
 __all__ = [
     "ImportedSolid",
     "read_step",
 ]
 
+SHARED = 1e-6  # of a solid's volume: what two solids may have in common by rounding
 MILLIMETRE = 1e-3  # the CAD kernel turns every unit that a STEP file states into mm
 STEP, STL = (".step", ".stp"), (".stl",)
 
 
-def read_step(path: str, patches: tuple[SurfacePatch, ...]) -> Any:
+def read_step(path: str, patches: tuple[SurfacePatch, ...]) -> tuple[Any, tuple[str, ...]]:
     """Read the solids of a STEP file, glued where they touch.
 
     A face is called by its name, else by its colour (``colour ff0000``), else ``face 1``, ``face 2``, … in the
-    order of the file; a solid by its name, else ``body``, or ``body 1``, ``body 2``, … where there are several.
+    order of the file, with the solid's name before it where there are several; a solid by its name, else ``body``,
+    or ``body 1``, ``body 2``, …. Where a face is covered in part, the rest keeps its name.
 
     Parameters
     ----------
@@ -53,30 +56,64 @@ def read_step(path: str, patches: tuple[SurfacePatch, ...]) -> Any:
 
     Returns
     -------
-    netgen.occ.TopoDS_Shape
+    body : netgen.occ.TopoDS_Shape
         In m.
+    notes : tuple of str
+        A sentence about each solid that was left out.
 
     Raises
     ------
     FileFormatError
         If the file is no STEP file.
     UsageError
-        If it holds no closed solid, or its size tells of mistaken units.
+        If it holds no closed solid, solids overlap, or its size tells of mistaken units.
     """
     shape = _load(path)
     solids = list(shape.solids)
     if not solids:
         raise _not_a_solid(path, shape)
-    for number, solid in enumerate(solids):
-        _name_faces(solid)
-        name = plain_name(solid.name) if solid.name else "body" if len(solids) == 1 else f"body {number + 1}"
+    for index, solid in enumerate(solids):
+        name = plain_name(solid.name) if solid.name else "body" if len(solids) == 1 else f"body {index + 1}"
+        _name_faces(solid, "" if len(solids) == 1 else f"{name} ")
         solid.mat(name)
+    solids, notes = _without_overlap(path, solids)
     body = _scale_to_metres(solids)
     low, high = body.bounding_box
     require_size(path, max(high[i] - low[i] for i in range(3)), "stated in the file")
     _name_interfaces(body)
     _name_patches(patches, body)
-    return body
+    return body, notes
+
+
+def _without_overlap(path: str, solids: list[Any]) -> tuple[list[Any], tuple[str, ...]]:
+    """Leave out solids that are there twice, and refuse those that share a volume; names are set."""
+    kept: list[Any] = []
+    notes = []
+    for solid in solids:
+        for other in kept:
+            if not _boxes_meet(solid, other):
+                continue
+            common = solid * other
+            if common.mass <= SHARED * min(solid.mass, other.mass):
+                continue
+            if common.mass >= (1 - SHARED) * max(solid.mass, other.mass):
+                notes.append(f"The solid {solid.name!r} is the same as {other.name!r}, and was left out.")
+                break
+            nested = common.mass >= (1 - SHARED) * min(solid.mass, other.mass)
+            raise UsageError(
+                f"The solids {other.name!r} and {solid.name!r} of {path} overlap by {number(common.mass, 3)} mm³.",
+                why=f"{'One lies inside the other, around' if nested else 'They do so around'} "
+                f"({', '.join(number(v, 4) for v in common.center)}) mm; a place can have one material only.",
+                fix="Cut one out of the other in the CAD program (subtract, keep both), so that they touch in a face.",
+            )
+        else:
+            kept.append(solid)
+    return kept, tuple(notes)
+
+
+def _boxes_meet(solid: Any, other: Any) -> bool:
+    (low, high), (other_low, other_high) = solid.bounding_box, other.bounding_box
+    return all(low[i] < other_high[i] and other_low[i] < high[i] for i in range(3))
 
 
 def _load(path: str) -> Any:
@@ -110,15 +147,16 @@ def _not_a_solid(path: str, shape: Any) -> UsageError:
     )
 
 
-def _name_faces(solid: Any) -> None:
-    for number, face in enumerate(solid.faces):
+def _name_faces(solid: Any, before: str) -> None:
+    """Name the faces of a solid; `before` stands before the number of one that the file tells nothing about."""
+    for index, face in enumerate(solid.faces):
         if face.name:
             face.name = plain_name(face.name)
         elif face.col is not None:
             red, green, blue = (round(255 * v) for v in tuple(face.col)[:3])
             face.name = f"colour {red:02x}{green:02x}{blue:02x}"
         else:
-            face.name = f"face {number + 1}"
+            face.name = f"{before}face {index + 1}"
 
 
 def _scale_to_metres(solids: list[Any]) -> Any:
@@ -135,10 +173,10 @@ def _scale_to_metres(solids: list[Any]) -> Any:
 
 
 def _name_interfaces(body: Any) -> None:
-    """Name the faces that belong to two solids."""
-    owners = Counter(tuple(round(v, 9) for v in face.center) for solid in body.solids for face in solid.faces)
+    """Name the faces that belong to two solids: by their identity, since many have the same centre."""
+    owners = Counter(face for solid in body.solids for face in solid.faces)
     for face in body.faces:
-        if owners[tuple(round(v, 9) for v in face.center)] > 1:
+        if owners[face] > 1:
             face.name = INTERFACE
 
 
@@ -261,7 +299,7 @@ class ImportedSolid(Shape):
     @property
     def notes(self) -> tuple[str, ...]:
         """A sentence about each thing in the file that was repaired or passed over."""
-        return () if self.is_step else _skin(self)[2]
+        return _names(self)[2] if self.is_step else _skin(self)[2]
 
     def describe(self) -> dict[str, Any]:
         """Everything that decides the mesh, as plain data."""
@@ -290,25 +328,27 @@ class ImportedSolid(Shape):
 
 
 def _mesh_step(shape: ImportedSolid, refinements: tuple[FineMesh, ...]) -> Any:
-    solid = _read_solid(shape)
+    solid, _ = _read_solid(shape)
     return mesh_solid(solid, shape.coarse(*solid.bounding_box), refinements)
 
 
-def _read_solid(shape: ImportedSolid) -> Any:
+def _read_solid(shape: ImportedSolid) -> tuple[Any, tuple[str, ...]]:
     require_same(shape.path, shape.digest)
     return read_step(shape.path, shape.patches)
 
 
 @lru_cache(maxsize=8)
-def _names(shape: ImportedSolid) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names of the surfaces and regions of a STEP file."""
-    return read_apart(_read_names, shape, doing=f"reading the {shape}")
+def _names(shape: ImportedSolid) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+    """Names of the surfaces and regions of a STEP file, and notes about it."""
+    surfaces, regions, notes = read_apart(_read_names, shape, doing=f"reading the {shape}")
+    tell_repairs(shape.path, notes)
+    return surfaces, regions, notes
 
 
-def _read_names(shape: ImportedSolid) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    solid = _read_solid(shape)
+def _read_names(shape: ImportedSolid) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+    solid, notes = _read_solid(shape)
     surfaces = dict.fromkeys(face.name for face in solid.faces if face.name != INTERFACE)
-    return tuple(surfaces), tuple(dict.fromkeys(part.name for part in solid.solids))
+    return tuple(surfaces), tuple(dict.fromkeys(part.name for part in solid.solids)), notes
 
 
 @lru_cache(maxsize=8)
@@ -318,4 +358,4 @@ def _skin(shape: ImportedSolid) -> tuple[BodyMesh, float, tuple[str, ...]]:
     topology, surface = read_stl(shape.path, shape.unit or "m")
     skin = name_parts(topology, surface, shape.patches, shape.feature_angle)
     tell_repairs(shape.path, surface.notes)
-    return skin, float(topology.volume), surface.notes
+    return skin, float(topology.volume), (*surface.notes, *bodies_apart(topology))

@@ -10,6 +10,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.files import TemporaryFolder
+from palpate.format import millimetres
 from palpate.physics.apart import read_apart
 from palpate.physics.shapes.body_file import UNITS, SurfacePatch, apply_patches, segments
 from palpate.physics.shapes.mesh import BodyMesh, body_mesh
@@ -23,13 +24,13 @@ from palpate.physics.shapes.meshing import (
 )
 from palpate.physics.shapes.shape import require_size
 from palpate.physics.shapes.stl_text import parse_stl
-from palpate.physics.shapes.surface_checks import require_closed
-from palpate.physics.shapes.surface_repair import Surface, open_edges, repair_surface
+from palpate.physics.shapes.surface_checks import require_closed, shells_of, surface_gap
+from palpate.physics.shapes.surface_repair import Surface, open_edges, place, repair_surface
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
-__all__ = ["fill_surface", "name_parts", "read_stl"]
+__all__ = ["bodies_apart", "fill_surface", "name_parts", "read_stl"]
 
 LENGTH = 100.0  # longest side in the units in which Netgen meshes: its tolerances are those of millimetres
 SHARP = (
@@ -70,6 +71,21 @@ def read_stl(path: str, unit: str) -> tuple[Trimesh, Surface]:
     topology = Trimesh(surface.points, surface.triangles, process=False)
     require_closed(topology, path)
     return topology, surface
+
+
+def bodies_apart(topology: Trimesh) -> tuple[str, ...]:
+    """Return a sentence for each body after the first that hangs apart from those before it."""
+    shells = shells_of(topology)
+    bodies = [number for number, volume in enumerate(shells.volumes) if volume > 0]
+    corners = np.asarray(topology.triangles)
+    notes = []
+    for rank, number in enumerate(bodies[1:], 1):
+        others = np.isin(shells.shell_of, bodies[:rank])
+        gap, where = surface_gap(corners[shells.shell_of == number], corners[others])
+        notes.append(
+            f"Closed shell {number + 1} is a body of its own, {millimetres(gap)} from the others around {place(where)}."
+        )
+    return tuple(notes)
 
 
 def name_parts(

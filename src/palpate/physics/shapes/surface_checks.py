@@ -18,9 +18,10 @@ from palpate.physics.shapes.surface_repair import place
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
-__all__ = ["Shells", "require_closed", "shells_of", "touching_shells"]
+__all__ = ["Shells", "require_closed", "shells_of", "surface_gap", "touching_shells"]
 
 FLUSH = 1e-6  # of the body's length, below which two faces lie on each other
+CLOSE = 64  # triangles whose distance to a point is measured
 PAIRS = 500_000  # pairs of triangles that are compared at a time
 
 
@@ -185,6 +186,28 @@ def _winding(point: np.ndarray, corners: np.ndarray) -> float:
     ab, bc, ca = (np.einsum("ti,ti->t", u, v) for u, v in ((a, b), (b, c), (c, a)))
     below = la * lb * lc + ab * lc + bc * la + ca * lb
     return float(2 * np.arctan2(above, below).sum() / (4 * np.pi))
+
+
+def surface_gap(corners: np.ndarray, others: np.ndarray) -> tuple[float, np.ndarray]:
+    """Return the least distance in m from triangles (t, 3, 3) to others (u, 3, 3), and the place (3,) on the former.
+
+    Distances are those of corners to triangles, of the `CLOSE` triangles whose centres are nearest.
+    """
+    from scipy.spatial import cKDTree
+    from trimesh.triangles import closest_point
+
+    least, where = np.inf, corners[0, 0]
+    for points, triangles, turned in ((corners, others, False), (others, corners, True)):
+        nodes = np.unique(points.reshape(-1, 3), axis=0)
+        count = min(CLOSE, len(triangles))
+        near = cKDTree(triangles.mean(axis=1)).query(nodes, k=count)[1].reshape(len(nodes), count)
+        start = np.repeat(nodes, count, axis=0)
+        end = closest_point(triangles[near.ravel()], start)
+        distance = np.linalg.norm(end - start, axis=1)
+        best = int(distance.argmin())
+        if distance[best] < least:
+            least, where = float(distance[best]), (end if turned else start)[best]
+    return least, where
 
 
 def _require_outside(surface: Trimesh, shells: Shells, source: str) -> None:

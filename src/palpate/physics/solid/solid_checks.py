@@ -18,7 +18,11 @@ from palpate.errors import UsageError
 from palpate.format import millimetres
 from palpate.physics.advice import advise
 from palpate.physics.interactions.interaction import Fixed, Interaction
+from palpate.physics.interactions.loads import BodyForce, PointForce, Pressure, SurfaceTraction
+from palpate.physics.interactions.sphere import SphereProbe
 from palpate.physics.shapes.naming import members, require_known
+from palpate.physics.shapes.surface_checks import surface_gap
+from palpate.physics.shapes.surface_repair import place
 from palpate.units import Range, bounds
 
 __all__ = [
@@ -31,6 +35,7 @@ __all__ = [
     "require_held_values",
     "require_lengths",
     "require_near",
+    "require_no_loose_part",
     "require_order",
     "require_weight",
     "surfaces_of",
@@ -40,6 +45,8 @@ __all__ = [
 FLATTEST = 20.0
 # lengths of interactions in m, and how many times the body's longest side they may be
 LENGTHS = {"radius": FLATTEST, "depth": 1.0, "stop": 1.0, "displacement": 1.0, "element": 1.0}
+# interactions that push and hold nothing
+PUSHING = (SphereProbe, PointForce, SurfaceTraction, BodyForce, Pressure)
 GEOMETRY = ("surfaces", "regions", "mesh", "rest", "describe")
 MATERIAL = ("poisson", "density", "kinematics", "states", "volumetric", "energy", "advance", "describe")
 
@@ -252,6 +259,57 @@ def require_near(points: np.ndarray, ranges: Sequence[Range], longest: float) ->
         why=f"Its range is {given.low:.4g} … {given.high:.4g} m, the body's longest side "
         f"{longest:.4g} m: out there nothing touches.",
         fix="Lengths are in m: pass 0.030 for 30 mm.",
+    )
+
+
+def require_no_loose_part(body: Any, interactions: Sequence[Any]) -> None:
+    """Refuse a body from a file of which a part is held by nothing: no surface of it is fixed, led or glued.
+
+    Raises
+    ------
+    UsageError
+        With the part's place, and the gap to the rest.
+    """
+    geometry = body.geometry
+    if not getattr(geometry, "foreign", False):
+        return  # palpate's own shapes are of one piece
+    mesh = geometry.rest()
+    part_of, part_of_triangle = mesh.parts
+    if not part_of.any():
+        return
+    holding = [
+        *(held.interaction for held in body.held),
+        *(i for i in interactions if not isinstance(i, PUSHING)),
+    ]
+    named = [getattr(part, "touches", getattr(part, "surface", None)) for part in holding]
+    if not all(isinstance(name, str) for name in named):
+        return  # where one's own interaction acts is not known
+    surfaces = {member for name in (*body.fixed, *named) for member in members(name, mesh.surfaces)}
+    held = np.isin(mesh.surface_of, [mesh.surfaces.index(name) for name in surfaces if name in mesh.surfaces])
+    for part in np.unique(part_of).tolist():
+        mine = part_of_triangle == part
+        if not held[mine].any():
+            raise _loose_part(mesh, part)
+
+
+def _loose_part(mesh: Any, part: int) -> UsageError:
+    part_of, part_of_triangle = mesh.parts
+    mine = part_of_triangle == part
+    corners = mesh.points[mesh.triangles]
+    gap, where = surface_gap(corners[mine], corners[~mine])
+    middle = (corners[mine].min(axis=(0, 1)) + corners[mine].max(axis=(0, 1))) / 2
+    regions = [mesh.regions[i] for i in np.unique(mesh.region_of[part_of == part])]
+    names = [mesh.surfaces[i] for i in np.unique(mesh.surface_of[mine])]
+    distance = (
+        f"It is {millimetres(gap)} from the rest"
+        if gap > 0
+        else "It meets the rest in an edge or point only,"
+    )
+    return UsageError(
+        f"The part of {' and '.join(map(repr, regions))} around {place(middle)} hangs on nothing.",
+        why=f"{distance} around {place(where)}, and no surface of it is held: it would fly away at a touch.",
+        fix="If the parts should be one, let them touch and unite them in the program that made the file; else hold a "
+        f"surface of it: {', '.join(map(repr, names[:4]))}{', …' if len(names) > 4 else ''}.",
     )
 
 

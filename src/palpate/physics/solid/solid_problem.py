@@ -27,6 +27,7 @@ from palpate.physics.solid.solid_checks import (
     require_finite,
     require_lengths,
     require_near,
+    require_no_loose_part,
 )
 from palpate.units import Range
 
@@ -84,6 +85,7 @@ class SolidProblem:
             require_lengths(interaction, self.longest)
         if self.element is not None:
             require_element(self.element, self.longest)
+        require_no_loose_part(self.body, self.interactions)
         for interaction in self.interactions:
             advise_on_sizes(interaction, self.element, self.longest)
             if isinstance(interaction, SphereProbe):

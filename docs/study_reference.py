@@ -15,12 +15,17 @@ from palpate.study.body_records import (
     BodyRecord,
     InclusionRecord,
     LayerRecord,
-    MaterialRecord,
     SectionRecord,
     SkinRecord,
-    SoftRecord,
 )
 from palpate.study.interaction_records import InteractionRecord, LoadRecord, MemoryRecord, VariedRecord
+from palpate.study.material_records import (
+    FibreRecord,
+    HardeningRecord,
+    MaterialRecord,
+    SolidMaterialRecord,
+)
+from palpate.study.part_records import PartSurfaceRecord
 from palpate.study.quantities import Unit
 from palpate.study.stage_records import SECTIONS, RuntimeRecord
 
@@ -41,7 +46,10 @@ def _tables() -> Iterator[str]:
     for title, record in (
         ("`[body.section]`, of a cantilever", SectionRecord),
         ("`[body.material]` of a cantilever, in place of a name", MaterialRecord),
-        ("`[body.material]` and other materials of a solid body, in place of a name", SoftRecord),
+        ("`[body.material]` and other materials of a solid body, in place of a name", SolidMaterialRecord),
+        ("`[[body.material.fibres]]`, once per family", FibreRecord),
+        ("`[body.material.hardening]`", HardeningRecord),
+        ("`[[body.surfaces]]` of a part, once per surface", PartSurfaceRecord),
         ("`[[body.layers]]`, once per layer", LayerRecord),
         ("`[body.skin]`, of a dome", SkinRecord),
         ("`[body.inclusion]`, of a dome", InclusionRecord),
@@ -89,9 +97,16 @@ def _table(title: str, record: type[BaseModel], about: str) -> Iterator[str]:
 
 
 def _is_table(name: str, annotation: Any) -> bool:
-    parts = (annotation, *get_args(annotation))
-    own = name != "material" and any(isinstance(p, type) and issubclass(p, BaseModel) for p in parts)
-    return own or name in {"loads", "layers", "varied", "body", "interaction"}
+    return (name not in {"material", "materials"} and _has_record(annotation)) or name in {
+        "body",
+        "interaction",
+    }
+
+
+def _has_record(annotation: Any) -> bool:
+    """Whether an annotation names a record, however deep."""
+    own = isinstance(annotation, type) and issubclass(annotation, BaseModel)
+    return own or any(_has_record(part) for part in get_args(annotation))
 
 
 def _unit(parts: Any) -> str:

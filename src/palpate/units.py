@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import functools
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -17,6 +19,8 @@ import numpy as np
 from palpate.errors import UsageError
 
 __all__ = ["Quantity", "Range", "bounds", "registry", "to_si"]
+
+_DIGITS = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?")
 
 
 @dataclass(frozen=True)
@@ -75,6 +79,21 @@ class Range:
         return f"{self.name} {self.low + 0.0:g} … {self.high:g} {self.unit}".rstrip()
 
 
+def _rounded_once(text: str, quantity: Any, unit: str) -> float:
+    """Return a quantity in a unit; its digits are rounded once where one unit is a whole number of the other.
+
+    So "0.12 mm" is 0.00012 to the last bit, and not a rounded number times a rounded thousandth.
+    """
+    value = float(quantity.to(unit).magnitude)
+    digits = _DIGITS.match(text)
+    if not value or digits is None:
+        return value
+    share = float(registry().Quantity(1.0, unit).to(quantity.units).magnitude)
+    factor = Fraction(1, round(share)) if share >= 1 else Fraction(round(1 / share)) if share > 0 else 0
+    exact = float(Fraction(digits.group()) * factor)
+    return exact if math.isclose(exact, value, rel_tol=1e-14) else value
+
+
 def bounds(ranges: Sequence[Range]) -> tuple[np.ndarray, np.ndarray]:
     """Return the lower and the upper ends of n ranges, each of shape (n,)."""
     return np.array([r.low for r in ranges]), np.array([r.high for r in ranges])
@@ -120,7 +139,7 @@ def to_si(value: str | float, unit: str) -> float:
                 why=f"As text a quantity needs one; as a number, without quotes, it is in {unit}.",
                 fix=f'Write "{value.strip()} {unit}", or the number without quotes.',
             )
-        return float(quantity.to(unit or "dimensionless").magnitude)
+        return _rounded_once(value.strip(), quantity, unit or "dimensionless")
     except (pint.errors.PintError, ValueError, TypeError, AttributeError, AssertionError) as error:
         raise UsageError(
             f"{value!r} is not a quantity in {unit or 'pure numbers'}.",

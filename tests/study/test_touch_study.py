@@ -74,7 +74,8 @@ def test_units_are_allowed_and_kept_in_si(tmp_path):
     [
         (
             '[body]\nkind = "blok"',
-            "no kind of body 'blok'; there are cantilever, block, layered, dome, cylinder, organ; did you mean 'block'",
+            "no kind of body 'blok'; there are cantilever, block, layered, dome, cylinder, organ, part; "
+            "did you mean 'block'",
         ),
         ('[body]\nkind = "block"\nsiez = [1, 1, 1]', "did you mean 'size'"),
         # of the keys of that table, though another has a nearer one

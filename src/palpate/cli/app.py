@@ -19,7 +19,7 @@ from palpate.cli.table_options import Json, with_table_options
 from palpate.cli.touch_options import DeadMan, Device, Unsoftened
 from palpate.cli.trace_commands import replay, trace_app
 from palpate.errors import AccuracyError, PalpateError, UsageError
-from palpate.files import explain_system_error, write_file
+from palpate.files import explain_system_error
 from palpate.processes import CASE_LIMIT, end_by_sigterm
 
 __all__ = ["app", "main"]
@@ -120,34 +120,31 @@ def demo(
 
 @app.command()
 def init(
-    path: Annotated[Path, typer.Argument(help="File to write.")] = STUDY,
+    path: Annotated[
+        Path,
+        typer.Argument(
+            help="File to write. Or a part (STL, STEP, VTU, MSH, INP and others): its study is written beside it."
+        ),
+    ] = STUDY,
     preset: Annotated[
         str,
         typer.Option(
             help="Named study to start from, such as block, layered, liver, grasp, beam-copper or beam-plastic."
         ),
     ] = "beam-nylon",
+    unit: Annotated[
+        str | None, typer.Option(help="For a part: unit of the file's numbers. Default: mm, or what fits.")
+    ] = None,
+    sample: Annotated[
+        bool, typer.Option("--sample", help="Write a part to try: a kidney-like organ, such as kidney.stl.")
+    ] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace a file that exists.")] = False,
     show: Annotated[bool, typer.Option("--print", help="Print the study instead of writing a file.")] = False,
 ) -> None:
-    """Write a study file with a comment for every key."""
-    from palpate.study import preset_study, to_toml
+    """Write a study file with a comment for every key: of a named study, or of a part."""
+    from palpate.cli.init_command import init_study
 
-    if path.is_dir():
-        raise UsageError(f"{path} is a folder.", fix=f"Name a file, such as {path / STUDY}.")
-    record = preset_study(preset)
-    if (
-        path != STUDY and not show
-    ):  # a file with a name of its own gives the study, and so its files, that name
-        record = record.renamed(path.stem)
-    text = to_toml(record)
-    if show:
-        typer.echo(text, nl=False)
-        return
-    if path.exists() and not force:
-        raise UsageError(f"{path} exists already.", fix="Choose another name, or replace it with --force.")
-    write_file(path, text)
-    typer.echo(f"{path}: a study called {record.name}. Next: palpate sweep {path}")
+    init_study(path, preset, unit, default=path == STUDY, sample=sample, force=force, show=show)
 
 
 @app.command()

@@ -2,10 +2,12 @@
 
 study                the record: a body, what acts on it, and the tables of its stages
 body_records         `[body]`          interaction_records   `[interaction]`, `[memory]`, `[[varied]]`
+material_records     materials         part_records          `[body]` of a part, and names for its surfaces
 stage_records        `[sweep]`, `[test]`, `[filter]`, `[learning]`, `[target]`, `[runtime]`
 quantities           frozen tables with quantities that may carry units
 toml                 the record as a TOML file with comments, and back
 named_studies        studies that have a name
+part_study           study of a part that the user has
 run                  the stages: sweep, load the data, learn, validate, report
 """
 

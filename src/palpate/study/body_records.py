@@ -5,11 +5,10 @@ Each record builds the body that it describes.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal, TypeAlias
+from typing import ClassVar, Literal, TypeAlias
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
-from palpate.errors import UsageError
 from palpate.physics import (
     Block,
     Body,
@@ -20,13 +19,18 @@ from palpate.physics import (
     Inclusion,
     LayeredBlock,
     LinearElastic,
-    NeoHookean,
     Organ,
     Rectangle,
     Section,
-    named_material,
 )
-from palpate.study.quantities import Densities, Metres, Pair, Pascals, QuarticMetres, Record, SquareMetres
+from palpate.study.material_records import (
+    BeamMaterial,
+    SolidMaterial,
+    SolidMaterialRecord,
+    build_material,
+)
+from palpate.study.part_records import PartRecord
+from palpate.study.quantities import Metres, Pair, QuarticMetres, Record, SquareMetres
 
 __all__ = [
     "BODIES",
@@ -38,66 +42,14 @@ __all__ = [
     "InclusionRecord",
     "LayerRecord",
     "LayeredRecord",
-    "MaterialRecord",
     "OrganRecord",
     "SectionRecord",
     "SkinRecord",
-    "SoftRecord",
 ]
 
 
-class MaterialRecord(Record):
-    """A linear elastic material, which creeps if it has Prony terms."""
-
-    name: str = Field("own material", description="for the report")
-    young: Pascals = Field(description="Young's modulus; of a material that creeps, at once after a load")
-    poisson: float = Field(0.3, description="Poisson's ratio")
-    density: Densities = Field(0.0, description="only matters with self-weight")
-    prony: tuple[tuple[float, float], ...] = Field(
-        (), description="terms of creep: share of the stiffness that relaxes, and its time in s"
-    )
-
-    def build(self) -> Any:
-        """Return the material."""
-        elastic = LinearElastic(self.young, self.poisson, self.density, self.name)
-        if not self.prony:
-            return elastic
-        from palpate.physics.materials.viscous import Viscoelastic
-
-        return Viscoelastic(elastic, self.prony, part="all", name=self.name)
-
-
-class SoftRecord(Record):
-    """A neo-Hookean material."""
-
-    name: str = Field("own material", description="for the report")
-    young: Pascals = Field(gt=0, description="Young's modulus at small strains")
-    poisson: float = Field(0.45, ge=0, lt=0.5, description="Poisson's ratio")
-    density: Densities = Field(0.0, ge=0, description="for the record")
-
-    def build(self) -> Any:
-        """Return the material."""
-        return NeoHookean(self.young, self.poisson, density=self.density, name=self.name)
-
-
-def _require_known(value: Any) -> Any:
-    """Return a material record, or the name of a material, unchanged; refuse a name that is not known."""
-    if isinstance(value, str):
-        try:
-            named_material(value)
-        except UsageError as error:
-            raise ValueError(" ".join(str(error).split("\n"))) from error
-    return value
-
-
-BeamMaterial = Annotated[str | MaterialRecord, AfterValidator(_require_known)]
-SoftMaterial = Annotated[str | SoftRecord, AfterValidator(_require_known)]
 _SOFT_MATERIAL = 'a name, or { young = "9 kPa", poisson = 0.45 }'
-_SOFT = SoftRecord(young=9e3)
-
-
-def _material(value: str | MaterialRecord | SoftRecord) -> Any:
-    return named_material(value) if isinstance(value, str) else value.build()
+_SOFT = SolidMaterialRecord(young=9e3)
 
 
 class SectionRecord(Record):
@@ -176,7 +128,7 @@ class CantileverRecord(Record):
     @property
     def has_memory(self) -> bool:
         """True if the material yields or creeps, so that the answer depends on the history."""
-        return not isinstance(_material(self.material), LinearElastic)
+        return not isinstance(build_material(self.material), LinearElastic)
 
     def surface_names(self) -> tuple[str, ...]:
         """Return the names of the surfaces that can be touched: none."""
@@ -191,7 +143,7 @@ class CantileverRecord(Record):
         return Cantilever(
             length=self.length,
             section=self.section.build(),
-            material=_material(self.material),
+            material=build_material(self.material),
             elements=self.elements,
             order=self.order,
             kinematics=self.kinematics,
@@ -237,12 +189,12 @@ class BlockRecord(_SolidRecord):
     SURFACES: ClassVar[tuple[str, ...]] = _BOX
     kind: Literal["block"] = "block"
     size: tuple[Metres, Metres, Metres] = Field((0.10, 0.10, 0.05), description="along x, y and z, m")
-    material: SoftMaterial = Field(_SOFT, description=_SOFT_MATERIAL)
+    material: SolidMaterial = Field(_SOFT, description=_SOFT_MATERIAL)
     fixed: str | tuple[str, ...] = Field("bottom", description=_FIXED)
 
     def build(self) -> Body:
         """Return the body."""
-        return Body(Block(self.size, element=self.element), _material(self.material), fixed=self.fixed)
+        return Body(Block(self.size, element=self.element), build_material(self.material), fixed=self.fixed)
 
 
 class LayerRecord(Record):
@@ -250,7 +202,7 @@ class LayerRecord(Record):
 
     name: str = Field(min_length=1, description="of the layer")
     thickness: Metres = Field(gt=0, description="in the direction of z")
-    material: SoftMaterial = Field(description=_SOFT_MATERIAL)
+    material: SolidMaterial = Field(description=_SOFT_MATERIAL)
 
 
 class LayeredRecord(_SolidRecord):
@@ -265,7 +217,7 @@ class LayeredRecord(_SolidRecord):
     def build(self) -> Body:
         """Return the body."""
         layers = tuple((layer.name, layer.thickness) for layer in self.layers)
-        materials = {layer.name: _material(layer.material) for layer in self.layers}
+        materials = {layer.name: build_material(layer.material) for layer in self.layers}
         return Body(LayeredBlock(self.extent, layers, element=self.element), materials, fixed=self.fixed)
 
 
@@ -273,7 +225,7 @@ class SkinRecord(Record):
     """A skin over a dome."""
 
     thickness: Metres = Field(gt=0, description="at the top and at the base")
-    material: SoftMaterial = Field(description=_SOFT_MATERIAL)
+    material: SolidMaterial = Field(description=_SOFT_MATERIAL)
 
 
 class InclusionRecord(Record):
@@ -281,7 +233,7 @@ class InclusionRecord(Record):
 
     centre: tuple[Metres, Metres, Metres] = Field(description="x, y and z, m")
     radius: Metres = Field(gt=0, description="of the ball")
-    material: SoftMaterial = Field(description=_SOFT_MATERIAL)
+    material: SolidMaterial = Field(description=_SOFT_MATERIAL)
 
 
 class DomeRecord(_SolidRecord):
@@ -290,18 +242,18 @@ class DomeRecord(_SolidRecord):
     kind: Literal["dome"] = "dome"
     radius: Metres = Field(0.06, gt=0, description="of the base")
     height: Metres = Field(0.045, gt=0, description="of the top")
-    material: SoftMaterial = Field(_SOFT, description=_SOFT_MATERIAL)
+    material: SolidMaterial = Field(_SOFT, description=_SOFT_MATERIAL)
     fixed: str | tuple[str, ...] = Field("bottom", description=_FIXED)
     skin: SkinRecord | None = Field(None)
     inclusion: InclusionRecord | None = Field(None)
 
     def build(self) -> Body:
         """Return the body."""
-        materials, thickness, ball = {"body": _material(self.material)}, 0.0, None
+        materials, thickness, ball = {"body": build_material(self.material)}, 0.0, None
         if self.skin:
-            materials["skin"], thickness = _material(self.skin.material), self.skin.thickness
+            materials["skin"], thickness = build_material(self.skin.material), self.skin.thickness
         if self.inclusion:
-            materials["inclusion"] = _material(self.inclusion.material)
+            materials["inclusion"] = build_material(self.inclusion.material)
             ball = Inclusion(self.inclusion.centre, self.inclusion.radius)
         shape = Dome(self.radius, self.height, thickness, ball, element=self.element)
         return Body(shape, materials, fixed=self.fixed)
@@ -314,13 +266,13 @@ class CylinderRecord(_SolidRecord):
     kind: Literal["cylinder"] = "cylinder"
     radius: Metres = Field(0.05, gt=0, description="of the cylinder")
     height: Metres = Field(0.05, gt=0, description="along z")
-    material: SoftMaterial = Field(_SOFT, description=_SOFT_MATERIAL)
+    material: SolidMaterial = Field(_SOFT, description=_SOFT_MATERIAL)
     fixed: str | tuple[str, ...] = Field("bottom", description=_FIXED)
 
     def build(self) -> Body:
         """Return the body."""
         shape = Cylinder(self.radius, self.height, element=self.element)
-        return Body(shape, _material(self.material), fixed=self.fixed)
+        return Body(shape, build_material(self.material), fixed=self.fixed)
 
 
 class OrganRecord(_SolidRecord):
@@ -330,17 +282,17 @@ class OrganRecord(_SolidRecord):
     kind: Literal["organ"] = "organ"
     length: Metres = Field(0.20, gt=0, description="along x")
     seed: int = Field(0, ge=0, description="which of the similar organs")
-    material: SoftMaterial = Field(_SOFT, description=_SOFT_MATERIAL)
+    material: SolidMaterial = Field(_SOFT, description=_SOFT_MATERIAL)
     fixed: str | tuple[str, ...] = Field("attached", description=_FIXED)
 
     def build(self) -> Body:
         """Return the body."""
         shape = Organ(self.length, self.seed, element=self.element)
-        return Body(shape, _material(self.material), fixed=self.fixed)
+        return Body(shape, build_material(self.material), fixed=self.fixed)
 
 
 BodyRecord: TypeAlias = (
-    CantileverRecord | BlockRecord | LayeredRecord | DomeRecord | CylinderRecord | OrganRecord
+    CantileverRecord | BlockRecord | LayeredRecord | DomeRecord | CylinderRecord | OrganRecord | PartRecord
 )
-BODIES = ("cantilever", "block", "layered", "dome", "cylinder", "organ")
+BODIES = ("cantilever", "block", "layered", "dome", "cylinder", "organ", "part")
 """Kinds of bodies that a study file can describe."""

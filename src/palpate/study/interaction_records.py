@@ -11,7 +11,7 @@ from palpate.physics.shapes.naming import members
 from palpate.physics.solid.body_family import BESIDE, UNITS
 from palpate.physics.solid.body_symmetry import fundamental_part
 from palpate.study.body_records import BodyRecord
-from palpate.study.quantities import Metres, Newtons, PadStiffness, Pair, Record, in_si
+from palpate.study.quantities import Metres, Newtons, PadStiffness, Pair, Record, Triple, in_si
 
 __all__ = [
     "INTERACTIONS",
@@ -92,9 +92,10 @@ class ProbeRecord(_OnSurface):
     pad: PadStiffness = Field(2e6, gt=0, description="stiffness of the pad")
     stop: Metres = Field(0.004, gt=0, description="penetration at which the pad is fully pressed")
     depth: Pair = Field((2e-4, 0.012), description="least and largest depth of the ball's tip, m")
-    over: tuple[Pair, Pair] | None = Field(
+    over: tuple[Pair, Pair] | tuple[Triple, Triple] | None = Field(
         None,
-        description="lower and upper corner of the touched part, m; left out: the surface less a margin of 3 radii",
+        description="lower and upper corner of the touched part, x and y or x, y and z, m; left out: the surface less "
+        "a margin of 3 radii",
         examples=[((0.03, 0.03), (0.07, 0.07))],
     )
 
@@ -123,6 +124,11 @@ class PadRecord(_OnSurface):
         ((0.03, 0.03), (0.07, 0.07)),
         description="lower and upper corner of the places of the pad's middle, m",
     )
+    facing: Literal["+x", "-x", "+y", "-y", "+z", "-z"] | None = Field(
+        None,
+        description="axis along which a surface is seen that faces all ways; left out: the nearest to its normals",
+        examples=["+z"],
+    )
     displacement: tuple[Pair, Pair, Pair] = Field(
         ((-0.004, 0.004), (-0.004, 0.004), (-0.004, 0.004)), description="ranges along x, y and z, m"
     )
@@ -143,6 +149,7 @@ class PadRecord(_OnSurface):
             over=self.over,
             pad=self.pad,
             displacement=self.displacement,
+            facing=self.facing,
         )
 
 

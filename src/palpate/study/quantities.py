@@ -23,6 +23,7 @@ __all__ = [
     "Record",
     "SquareMetres",
     "Stiffness",
+    "Triple",
     "Unit",
     "in_si",
 ]
@@ -73,6 +74,7 @@ Densities = Annotated[float, Unit("kg/m^3")]
 Stiffness = Annotated[float, Unit("N/m")]
 PadStiffness = Annotated[float, Unit("N/m^3")]
 Pair = tuple[Metres, Metres]
+Triple = tuple[Metres, Metres, Metres]
 
 
 class Record(BaseModel):

@@ -20,11 +20,17 @@ from palpate.study.body_records import BODIES
 from palpate.study.interaction_records import INTERACTIONS
 from palpate.study.quantities import Unit
 from palpate.study.study import Study
+from palpate.units import to_si
 
 __all__ = ["read_study", "study_schema", "to_toml"]
 
 _EXAMPLES = {"cantilever": "beam-nylon", "layered": "layered", "dome": "breast-dome", "organ": "liver"}
 """Presets that show every key of a kind of body; the block shows those of the others."""
+
+_READABLE = {"m": (("m", 1.0), ("mm", 1e-3)), "Pa": (("GPa", 1e9), ("MPa", 1e6), ("kPa", 1e3))}
+"""Units, from large to small, in which a quantity is written instead of its SI unit."""
+
+_WRITTEN_OUT = 1e9  # whole numbers below it are written without an exponent
 
 
 def read_study(path: str | os.PathLike[str]) -> Study:
@@ -58,12 +64,12 @@ def read_study(path: str | os.PathLike[str]) -> Study:
         fix = "A key or a table stands there twice: keep one." if twice else "Correct that line."
         raise StudyError(f"{path} is not valid TOML.", why=f"{error}.", fix=fix) from error
     try:
-        return Study.model_validate(_from_first_version(content))
+        return Study.model_validate(_beside(path.parent, _from_first_version(content)))
     except ValidationError as error:
         raise StudyError(
             f"{path} does not describe a study:",
             why="\n".join(f"  {line}" for line in _complaints(error)),
-            fix=f"`palpate init --preset {_example_of(content)} --print` shows every key with its meaning; "
+            fix=f"`palpate init {_example_of(content)} --print` shows every key with its meaning; "
             "`palpate schema` is for editors.",
         ) from error
 
@@ -85,13 +91,38 @@ def _from_first_version(content: dict[str, Any]) -> dict[str, Any]:
     return content
 
 
+def _beside(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
+    """Return the content of a file with the files that it names as paths that start from where the program runs."""
+    body = content.get("body")
+    if not isinstance(body, dict):
+        return content
+    body = _with_modules(folder, body)
+    if isinstance(body.get("file"), str):
+        body["file"] = str(folder / body["file"])
+    return content | {"body": body}
+
+
+def _with_modules(folder: Path, part: Any) -> Any:
+    """Return a part of `[body]` with the paths of modules of materials."""
+    if isinstance(part, list):
+        return [_with_modules(folder, item) for item in part]
+    if not isinstance(part, dict):
+        return part
+    part = {key: _with_modules(folder, value) for key, value in part.items()}
+    if isinstance(module := part.get("module"), str) and module.endswith(".py"):
+        part["module"] = str(folder / module)
+    return part
+
+
 def _example_of(content: dict[str, Any]) -> str:
-    """Return the preset that shows the keys of a file's body."""
+    """Return what `palpate init` is told to show the keys of a file's body: a preset, or the part's file."""
     body, acting = content.get("body"), content.get("interaction")
+    if isinstance(body, dict) and body.get("kind") == "part":
+        return str(body.get("file", "PART.stl"))
     if isinstance(acting, dict) and acting.get("kind") == "pad":
-        return "grasp"
+        return "--preset grasp"
     kind = body.get("kind", "cantilever") if isinstance(body, dict) else "cantilever"
-    return _EXAMPLES.get(str(kind), "block")
+    return f"--preset {_EXAMPLES.get(str(kind), 'block')}"
 
 
 def study_schema() -> str:
@@ -99,11 +130,21 @@ def study_schema() -> str:
     return json.dumps(Study.model_json_schema(), indent=2)
 
 
-def to_toml(study: Study) -> str:
-    """Return the study as a TOML file with a comment for each key, which `read_study` reads back as the same study."""
+def to_toml(study: Study, notes: Iterable[str] = ()) -> str:
+    """Return the study as a TOML file with a comment for each key, which `read_study` reads back as the same study.
+
+    Parameters
+    ----------
+    study : Study
+        The study to write.
+    notes : iterable of str
+        Lines of further comments for the head of the file.
+    """
     document = tomlkit.document()
     document.add(tomlkit.comment("A palpate study: what is solved, learnt, checked and touched."))
     document.add(tomlkit.comment('Quantities are numbers in SI units, or text with a unit: "5 mm", "2 GPa".'))
+    for note in notes:
+        document.add(tomlkit.comment(note) if note else tomlkit.nl())
     document.add(tomlkit.nl())
     _fill(document, study)
     # tomlkit parts a table from the comment above it
@@ -115,7 +156,10 @@ def _fill(table: Any, record: BaseModel) -> None:
     # the kind of a table comes first
     for name, field in sorted(type(record).model_fields.items(), key=lambda item: item[0] != "kind"):
         value = getattr(record, name)
-        if not isinstance(value, BaseModel) and not _record_of(type(record), name, value):
+        tables = (
+            isinstance(value, BaseModel) or _record_of(type(record), name, value) or _holds_records(value)
+        )
+        if not tables and name not in getattr(record, "unused_keys", ()):
             _add_key(table, name, field, value)
     for name in type(record).model_fields:
         value = getattr(record, name)
@@ -124,8 +168,28 @@ def _fill(table: Any, record: BaseModel) -> None:
             inner = tomlkit.table()
             _fill(inner, value)
             table.add(name, inner)
+        elif _holds_records(value):
+            inner = tomlkit.table()
+            _fill_by_name(inner, value)
+            table.add(name, inner)
         elif (item := _record_of(type(record), name, value)) and (value or _can_vary(record)):
             _add_tables(table, name, item, value)
+
+
+def _holds_records(value: Any) -> bool:
+    """Return whether a value is a table of records by name."""
+    return isinstance(value, dict) and any(isinstance(entry, BaseModel) for entry in value.values())
+
+
+def _fill_by_name(table: Any, records: dict[str, Any]) -> None:
+    """Write records and texts by their names; texts first, as TOML wants it."""
+    for name, value in sorted(records.items(), key=lambda item: isinstance(item[1], BaseModel)):
+        if isinstance(value, BaseModel):
+            inner = tomlkit.table()
+            _fill(inner, value)
+            table.add(name, inner)
+        else:
+            table.add(name, value)
 
 
 def _can_vary(record: BaseModel) -> bool:
@@ -171,11 +235,30 @@ def _add_key(table: Any, name: str, field: Any, value: Any) -> None:
         item: Any = tomlkit.inline_table()
         item.update(value)
     else:
-        unit = None if isinstance(value, (str, tuple)) else _unit((*field.metadata, field.annotation))
-        item = tomlkit.item(_plain(value) if unit is None else f"{value!r} {unit}")
+        unit = None if isinstance(value, str) else _unit((*field.metadata, field.annotation))
+        item = tomlkit.item(_plain(value) if unit is None else _with_units(value, unit))
     if comment:
         item.comment(comment)
     table.add(name, item)
+
+
+def _with_units(value: Any, unit: str) -> Any:
+    """Return a quantity in SI units, or a list of them, as text that reads well and back to the same number."""
+    if isinstance(value, (list, tuple)):
+        return [_with_units(part, unit) for part in value]
+    units = _READABLE.get(unit, ())
+    for name, size in units:
+        text = f"{_digits(round(value / size, 9))} {name}"
+        if (abs(value) >= size or name == units[-1][0]) and to_si(text, unit) == value:
+            return text
+    return f"{_digits(float(value))} {unit}"
+
+
+def _digits(value: float) -> str:
+    """Return a number with no more digits than it needs to be read back."""
+    if value.is_integer() and abs(value) < _WRITTEN_OUT:
+        return f"{value:.0f}"
+    return next((text for n in range(1, 17) if float(text := f"{value:.{n}g}") == value), repr(value))
 
 
 def _plain(value: Any) -> Any:

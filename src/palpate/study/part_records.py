@@ -1,0 +1,262 @@
+"""A part from a file as the body of a study: `[body] kind = "part"`, and names for parts of its surface."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, field_validator, model_validator
+
+from palpate.errors import UsageError
+from palpate.physics import Body, ImportedMesh, ImportedSolid, SurfacePatch
+from palpate.physics.shapes.body_file import FEATURE_ANGLE, WITHIN
+from palpate.physics.shapes.mesh import Face
+from palpate.physics.shapes.naming import require_known, require_name
+from palpate.study.material_records import SolidMaterial, build_material
+from palpate.study.quantities import Metres, Record
+
+__all__ = ["CAD_ENDINGS", "MESH_ENDINGS", "PartRecord", "PartSurfaceRecord", "part_shape"]
+
+STEP_ENDINGS = (".step", ".stp")
+CAD_ENDINGS = (*STEP_ENDINGS, ".stl")
+"""Ends of the names of files that hold a surface or solids, which are meshed here."""
+
+MESH_ENDINGS = (
+    *(".vtu", ".vtk", ".msh", ".mesh", ".meshb", ".inp", ".bdf", ".nas", ".fem", ".xdmf", ".xmf"),
+    *(".node", ".ele", ".med", ".exo", ".e", ".h5m", ".avs", ".su2", ".f3grid", ".ugrid"),
+)
+"""Ends of the names of files that hold a volume mesh, which keeps its elements."""
+
+_DIRECTIONS: dict[str, tuple[float, float, float]] = {
+    "up": (0.0, 0.0, 1.0),
+    "down": (0.0, 0.0, -1.0),
+    **{
+        sign + axis: (s * (axis == "x"), s * (axis == "y"), s * (axis == "z"))
+        for axis in "xyz"
+        for sign, s in (("+", 1.0), ("-", -1.0))
+    },
+}
+Corner = tuple[Metres, Metres, Metres]
+
+
+class PartSurfaceRecord(Record):
+    """A surface with a name of your own: what keeps all bounds given here; without any, what the others leave."""
+
+    name: str = Field(min_length=1, description="for `fixed` and `touches`")
+    faces: str | tuple[str, ...] = Field((), description="surfaces of the file, by name")
+    below: Metres | None = Field(
+        None, description="what lies below this height along the axis", examples=["5 mm"]
+    )
+    above: Metres | None = Field(None, description="what lies above it", examples=["30 mm"])
+    axis: Literal["x", "y", "z"] = Field("z", description="of `below` and `above`")
+    lower: Corner | None = Field(
+        None, description="lower corner of a box", examples=[["0 mm", "0 mm", "0 mm"]]
+    )
+    upper: Corner | None = Field(None, description="upper corner", examples=[["20 mm", "20 mm", "5 mm"]])
+    facing: str | tuple[float, float, float] | None = Field(
+        None, description="up, down, +x, -x, +y, -y, or (x, y, z): what faces that way", examples=["up"]
+    )
+    within: float = Field(WITHIN, gt=0, le=180, description="largest angle from that direction, degrees")
+
+    @field_validator("name")
+    @classmethod
+    def _plain(cls, name: str) -> str:
+        try:
+            require_name("The name of a surface", name)
+        except UsageError as error:
+            raise ValueError(" ".join(str(error).split("\n"))) from error
+        return name
+
+    @field_validator("facing")
+    @classmethod
+    def _a_direction(cls, facing: Any) -> Any:
+        if isinstance(facing, str) and facing not in _DIRECTIONS:
+            raise ValueError(f"{facing!r} is no direction; there are {', '.join(_DIRECTIONS)}, and (x, y, z)")
+        if isinstance(facing, tuple) and not any(facing):
+            raise ValueError("its direction (0, 0, 0) points nowhere")
+        return facing
+
+    @model_validator(mode="after")
+    def _not_empty(self) -> PartSurfaceRecord:
+        low, high = self._corners()
+        for axis, a, b in zip("xyz", low, high, strict=True):
+            if a is not None and b is not None and not a < b:
+                raise ValueError(f"it is empty: along {axis} {a:g} m is not below {b:g} m")
+        return self
+
+    @property
+    def is_rest(self) -> bool:
+        """True for a surface without bounds: what the others leave."""
+        low, high = self._corners()
+        return not (self.faces or self.facing) and not any(value is not None for value in (*low, *high))
+
+    def _corners(self) -> tuple[list[float | None], list[float | None]]:
+        """Return the bounds along x, y and z in m, None where there is none."""
+        low: list[float | None] = list(self.lower or (None,) * 3)
+        high: list[float | None] = list(self.upper or (None,) * 3)
+        i = "xyz".index(self.axis)
+        if self.above is not None:
+            low[i] = self.above if low[i] is None else max(low[i] or 0.0, self.above)
+        if self.below is not None:
+            high[i] = self.below if high[i] is None else min(high[i] or 0.0, self.below)
+        return low, high
+
+    def patch(self, bare: ImportedSolid | ImportedMesh) -> SurfacePatch:
+        """Return the patch of the surface of a part without patches."""
+        low, high = self._corners()
+        facing = _DIRECTIONS[self.facing] if isinstance(self.facing, str) else self.facing
+        faces = (self.faces,) if isinstance(self.faces, str) else self.faces
+        if facing is not None and getattr(bare, "is_step", False):
+            # faces of a STEP file are named whole, by the mean of their normals
+            known = {face.name: face for face in bare.faces}
+            for name in faces:
+                require_known("surface", name, tuple(known))
+            faces = tuple(
+                name for name in faces or known if _faces_that_way(known[name], facing, self.within)
+            )
+            facing = None
+            if not faces:
+                normals = ", ".join(f"{face.name}: {_rounded(face.normal)}" for face in known.values())
+                raise UsageError(
+                    f"No face of {bare.path} faces the way of the surface {self.name!r}.",
+                    why=f"Their mean normals are {normals}.",
+                    fix="Enlarge `within`, or name the faces.",
+                )
+        return SurfacePatch(
+            self.name, (low[0], low[1], low[2]), (high[0], high[1], high[2]), None, facing, self.within, faces
+        )
+
+
+def _faces_that_way(face: Face, facing: tuple[float, float, float], within: float) -> bool:
+    length = float(np.linalg.norm(face.normal)) * math.hypot(*facing)
+    return length > 0 and float(np.dot(face.normal, facing)) >= length * math.cos(math.radians(within)) - 1e-7
+
+
+def _rounded(values: tuple[float, float, float]) -> str:
+    return f"({', '.join(f'{value + 0.0:.2g}' for value in values)})"
+
+
+class PartRecord(Record):
+    """A part from a file: STL, STEP, or a volume mesh such as VTU, MSH or INP."""
+
+    INTERACTIONS: ClassVar[tuple[str, ...]] = ("probe", "pad")
+
+    kind: Literal["part"] = "part"
+    file: str = Field(min_length=1, description="beside the study file", examples=["part.stl"])
+    unit: Literal["m", "dm", "cm", "mm", "um", "in"] | None = Field(
+        None, description="of the file's numbers; a STEP file states its own", examples=["mm"]
+    )
+    element: Metres | None = Field(
+        None,
+        gt=0,
+        description="largest element, where none touches; a mesh keeps its own",
+        examples=["15 mm"],
+    )
+    feature_angle: float | None = Field(
+        None,
+        gt=0,
+        le=180,
+        description=f"STL: from which angle on an edge is sharp, degrees; left out: {FEATURE_ANGLE:g}",
+        examples=[FEATURE_ANGLE],
+    )
+    material: SolidMaterial | None = Field(
+        None, description="of each region that `materials` doesn't name", examples=["ecoflex 00-30"]
+    )
+    materials: dict[str, SolidMaterial] = Field(default_factory=dict, description="by name of the region")
+    fixed: str | tuple[str, ...] = Field(description="surfaces that don't move")
+    surfaces: tuple[PartSurfaceRecord, ...] = ()
+
+    @model_validator(mode="after")
+    def _fits_its_file(self) -> PartRecord:
+        names = [surface.name for surface in self.surfaces]
+        if len(set(names)) < len(names):
+            raise ValueError("two surfaces share a name")
+        if sum(surface.is_rest for surface in self.surfaces) > 1:
+            raise ValueError("two surfaces have no bounds; one alone can be what the others leave")
+        ending = Path(self.file).suffix.lower()
+        if self.element is not None and ending not in CAD_ENDINGS:
+            raise ValueError(f"{self.file} is a mesh and keeps its elements: leave out element")
+        if self.feature_angle is not None and ending != ".stl":
+            raise ValueError("feature_angle is for STL files")
+        regions = self.shape().regions  # its errors say more than a line of a list
+        for region in self.materials:
+            if region not in regions:
+                raise ValueError(f"{self.file} has no region {region!r}; it has {', '.join(regions)}")
+        missing = [region for region in regions if region not in self.materials]
+        if missing and self.material is None:
+            raise ValueError(
+                f"the region {missing[0]!r} has no material: give `material`, or {missing[0]!r} in `materials`"
+            )
+        return self
+
+    @property
+    def has_memory(self) -> bool:
+        """True if the answer depends on the history: not for a solid body, whose solves start from rest."""
+        return False
+
+    def surface_names(self) -> tuple[str, ...]:
+        """Return the names of the body's surfaces."""
+        return self.shape().surfaces
+
+    def fixed_names(self) -> tuple[str, ...]:
+        """Return the names of the surfaces that are fixed."""
+        return (self.fixed,) if isinstance(self.fixed, str) else self.fixed
+
+    def shape(self) -> ImportedSolid | ImportedMesh:
+        """Return the shape, with names for parts of its surface.
+
+        Raises
+        ------
+        PalpateError
+            If the file is missing or no body, or a surface's bounds hold nothing.
+        """
+        bare = part_shape(self.file, self.unit, self.element, self.feature_angle)
+        # what the others leave comes first, since later patches go over earlier ones
+        ordered = sorted(self.surfaces, key=lambda surface: not surface.is_rest)
+        patches = tuple(surface.patch(bare) for surface in ordered)
+        return part_shape(self.file, self.unit, self.element, self.feature_angle, patches)
+
+    def build(self) -> Body:
+        """Return the body."""
+        shape = self.shape()
+        others = None if self.material is None else build_material(self.material)
+        materials = {
+            region: build_material(self.materials[region]) if region in self.materials else others
+            for region in shape.regions
+        }
+        return Body(shape, materials, fixed=self.fixed)
+
+
+def part_shape(
+    file: str,
+    unit: str | None = None,
+    element: float | None = None,
+    feature_angle: float | None = None,
+    patches: tuple[SurfacePatch, ...] = (),
+) -> ImportedSolid | ImportedMesh:
+    """Return the shape of a part's file: a solid of STEP or STL, else a volume mesh.
+
+    Parameters
+    ----------
+    file : str
+        Path of the file; its ending tells the format.
+    unit : str, optional
+        Unit of its numbers; a STEP file states its own, a mesh is in m by default.
+    element : float, optional
+        Largest element in m, of a STEP or STL file.
+    feature_angle : float, optional
+        Angle in degrees from which on an edge of an STL file is sharp.
+    patches : tuple of SurfacePatch
+        Names for parts of the surface.
+
+    Raises
+    ------
+    UsageError, FileFormatError
+        If the file is missing, empty or of another format, or its unit is.
+    """
+    if Path(file).suffix.lower() not in CAD_ENDINGS:
+        return ImportedMesh(file, unit or "m", patches)
+    angle = FEATURE_ANGLE if feature_angle is None else feature_angle
+    return ImportedSolid(file, unit, element, patches, angle)

@@ -1,0 +1,185 @@
+"""A study of a part that somebody has: what the file holds, and settings that suit its size."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import PalpateError, UsageError
+from palpate.physics.shapes.mesh import Face
+from palpate.study.part_records import STEP_ENDINGS, part_shape
+from palpate.study.study import Study
+
+__all__ = ["part_study"]
+
+HELD, TOUCHED = "held", "touched"
+YOUNG = 10e3  # Pa, of soft tissue, until the user says what it is
+SMALL = 5e-3  # m: a part that would be smaller in mm was probably drawn in m
+FLAT, LEVEL = (
+    0.999,
+    0.02,
+)  # length of a plane's mean normal, and share of the height within which it is lowest
+FOOT = 0.05  # share of the box's footprint that a face has at least to stand on
+HOLD = 0.12  # share of the height that is held where no flat face is below
+RADIUS, DEPTH = 0.18, 0.5  # radius of the probe over the least extent, and its depth over the radius
+LEAST_DEPTH = 1 / 25  # of the depth
+NICE = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+LISTED = 20  # faces in the comments
+
+
+def part_study(
+    file: str | os.PathLike[str], *, unit: str | None = None, young: float = YOUNG, name: str | None = None
+) -> tuple[Study, tuple[str, ...]]:
+    """Return a study of a part, and what its file holds as lines of text.
+
+    The part is held at its flat face below, or where it has none at the lowest eighth of its height; it is pressed
+    where it faces up. Probe and depth follow from its least extent, the material is neo-Hookean.
+
+    Parameters
+    ----------
+    file : path
+        STL, STEP or a volume mesh.
+    unit : str, optional
+        Unit of the file's numbers. By default mm, or m where the part would be smaller than 5 mm.
+    young : float
+        Young's modulus in Pa.
+    name : str, optional
+        Of the study; by default that of the file.
+
+    Raises
+    ------
+    UsageError, FileFormatError
+        If the file is missing, or no body.
+    """
+    path = Path(file)
+    unit, faces = _read(path, unit)
+    low = np.min([face.lower for face in faces], axis=0)
+    high = np.max([face.upper for face in faces], axis=0)
+    radius = _nice(RADIUS * float((high - low).min()))
+    deepest = _nice(DEPTH * radius)
+    fixed, held = _support(faces, float(low[2]), float(high[2] - low[2]))
+    content: dict[str, Any] = {
+        "name": name or _study_name(path.stem),
+        "body": {
+            "kind": "part",
+            "file": str(path),
+            "unit": unit,
+            "material": {"young": young, "poisson": 0.45, "name": "neo-Hookean"},
+            "fixed": fixed,
+        },
+        "interaction": {
+            "kind": "probe",
+            "touches": TOUCHED,
+            "radius": radius,
+            "depth": (_nice(LEAST_DEPTH * deepest), deepest),
+        },
+        "sweep": {"samples": 60, "depths": 3},
+        "test": {"samples": 40, "depths": 4},
+    }
+    study = _with_touched(content, held)
+    regions = study.body.shape().regions  # type: ignore[union-attr]  # it is a part
+    return study, tuple(_notes(path, unit, faces, regions, low, high))
+
+
+def _read(path: Path, unit: str | None) -> tuple[str | None, Sequence[Face]]:
+    """Return the unit, and the faces of the part."""
+    if path.suffix.lower() in STEP_ENDINGS or unit is not None:
+        return unit, part_shape(str(path), unit).faces
+    try:
+        faces = part_shape(str(path), "mm").faces
+        if max(np.ptp([face.lower, face.upper], axis=0).max() for face in faces) >= SMALL:
+            return "mm", faces
+    except UsageError as error:
+        try:
+            return "m", part_shape(str(path), "m").faces
+        except PalpateError:
+            raise error from None
+    return "m", part_shape(str(path), "m").faces
+
+
+def _support(faces: Sequence[Face], low: float, height: float) -> tuple[str | tuple[str, ...], list[Any]]:
+    """Return what is fixed, and the surfaces that this needs names for."""
+    below = [f for f in faces if f.normal[2] < -FLAT and f.upper[2] < low + LEVEL * height]
+    lower, upper = (
+        np.array(pick([getattr(f, end) for f in faces], axis=0))
+        for pick, end in ((np.min, "lower"), (np.max, "upper"))
+    )
+    footprint = float(np.prod((upper - lower)[:2]))
+    if sum(face.area for face in below) > FOOT * footprint:
+        names = tuple(face.name for face in below)
+        return (names[0] if len(names) == 1 else names), []
+    top = low + HOLD * height
+    digits = 3 - math.floor(math.log10(height))  # to a thousandth of the height or so
+    return HELD, [{"name": HELD, "below": round(top, digits)}]
+
+
+def _with_touched(content: dict[str, Any], held: list[Any]) -> Study:
+    """Return the study whose touched surface faces up, or is all that is not held where nothing does."""
+    failure: UsageError | None = None
+    for touched in ({"name": TOUCHED, "facing": "up"}, {"name": TOUCHED}):
+        # what is held goes over what is touched
+        body = content["body"] | {"surfaces": (touched, *held)}
+        try:
+            return Study.model_validate(content | {"body": body})
+        except UsageError as error:
+            failure = failure or error
+    assert failure is not None
+    raise failure
+
+
+def _study_name(stem: str) -> str:
+    """Return a name for files, made of the name of a part's file."""
+    return re.sub(r"[^A-Za-z0-9._-]+", "-", stem).strip("-._") or "part"
+
+
+def _nice(value: float) -> float:
+    """Return the largest number that reads well and is no larger."""
+    power = 10.0 ** math.floor(math.log10(value))
+    digit = max(number for number in NICE if number <= value / power + 1e-9)
+    return float(f"{digit * power:.3g}")
+
+
+def _notes(
+    path: Path,
+    unit: str | None,
+    faces: Sequence[Face],
+    regions: tuple[str, ...],
+    low: np.ndarray,
+    high: np.ndarray,
+) -> Iterator[str]:
+    taken = "" if unit is None else f", numbers taken as {unit}"
+    size = " × ".join(f"{1e3 * side:.4g}" for side in high - low)
+    yield ""
+    yield f"The part {path.name}{taken}: {size} mm, from {_millimetres(low)} to {_millimetres(high)}."
+    yield f"Regions: {', '.join(regions)}."
+    yield "Surfaces of the file; [[body.surfaces]] gives names to other parts of the surface:"
+    ordered = sorted(faces, key=lambda face: -face.area)
+    for face in ordered[:LISTED]:
+        length = float(np.linalg.norm(face.normal))
+        facing = "facing all ways" if length < 0.1 else f"facing {_direction(face.normal)}"
+        yield f"  {face.name}: {1e6 * face.area:.4g} mm² around {_millimetres(face.centre)}, {facing}"
+    if len(ordered) > LISTED:
+        yield f"  and {len(ordered) - LISTED} smaller ones"
+
+
+def _millimetres(values: Any) -> str:
+    return f"({', '.join(f'{_clean(1e3 * float(value), 4)}' for value in values)}) mm"
+
+
+def _direction(normal: tuple[float, float, float]) -> str:
+    """Return a direction as an axis, where it is one, else its parts."""
+    axis = int(np.argmax(np.abs(normal)))
+    if abs(normal[axis]) > FLAT:
+        sign = "+" if normal[axis] > 0 else "-"
+        return {"+z": "up", "-z": "down"}.get(sign + "xyz"[axis], sign + "xyz"[axis])
+    return f"({', '.join(_clean(float(value), 2) for value in normal)})"
+
+
+def _clean(value: float, digits: int) -> str:
+    return f"{0.0 if abs(value) < 1e-9 else value:.{digits}g}"

@@ -174,7 +174,9 @@ def test_the_double_of_a_library_says_how_it_is_used(palpate, c_compiler, tmp_pa
     content = json.loads(answer.out)
     assert Path(content["library"]).is_file()
     assert content["device"] == f"forcedimension:library={content['library']}"
-    answer = palpate("devices", "simulate", "openhaptics", "--folder", tmp_path / "new", "--json")
+    answer = palpate(
+        "devices", "simulate", "openhaptics", "--folder", tmp_path / "new", "--type", "omni", "--json"
+    )
     assert answer.code == 0, answer.err
     assert Path(json.loads(answer.out)["library"]).is_file()
     answer = palpate("devices", "simulate", "forcedimension", "--folder", tmp_path, "--type", "omega.9")

@@ -228,6 +228,24 @@ def test_any_other_error_ends_the_callback_with_zero_force(device, drive, librar
         device.read(0.0)
 
 
+def test_a_user_can_try_its_faults(double, shared):
+    """As `palpate devices simulate openhaptics` compiles it."""
+    simulated = LibraryDouble(double("openhaptics", MODEL=3.0, LOST_AFTER=200.0, WARM_EVERY=120.0), speed=50)
+    device = device_named(f"openhaptics:library={simulated.path}", shared.command)
+    assert device.profile.name == "omni"
+    words, now = [], 0.0
+    while "connection" not in str(words[-1:]):
+        now += TICK
+        try:
+            device.read(now)
+        except DeviceError as error:
+            if str(error) not in words:
+                words.append(str(error))
+    device.close()
+    assert len(words) == 2
+    assert "too warm" in words[0]
+
+
 def test_of_several_errors_none_is_left(device, drive, library):
     library.error, library.error_frames, library.lost = 0x200, 1, 1
     with pytest.raises(DeviceLostError, match="connection"):

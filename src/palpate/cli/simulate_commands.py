@@ -130,12 +130,29 @@ def forcedimension(
 @simulate_app.command()
 def openhaptics(
     folder: Folder = Path("palpate-doubles"),
+    kind: Annotated[
+        str, typer.Option("--type", help="Type of the device: touch, touchx, desktop or omni.")
+    ] = "touch",
     amplitude: Amplitude = 0.03,
     frequency: Frequency = 0.5,
+    lost_after: Annotated[
+        int, typer.Option(min=0, help="Frames, of 1 ms, after which the cable is pulled; 0 for never.")
+    ] = 0,
+    warm_every: Annotated[
+        int, typer.Option(min=0, help="Frames from one complaint of warm motors to the next; 0 for none.")
+    ] = 0,
     as_json: Json = False,
 ) -> None:
-    """Compile a double of 3D Systems' OpenHaptics library, with a Touch behind it."""
-    _compile("openhaptics", folder, {"AMPLITUDE": amplitude, "FREQUENCY": frequency}, as_json)
+    """Compile a double of 3D Systems' OpenHaptics library, with a device behind it."""
+    from palpate.errors import UsageError
+
+    kinds = ("touch", "touchx", "desktop", "omni")  # in the order of the double's models
+    if kind not in kinds:
+        raise UsageError(f"There is no simulated {kind!r}.", fix=f"Choose one of {', '.join(kinds)}.")
+    definitions = {"MODEL": kinds.index(kind), "AMPLITUDE": amplitude, "FREQUENCY": frequency}
+    _compile(
+        "openhaptics", folder, definitions | {"LOST_AFTER": lost_after, "WARM_EVERY": warm_every}, as_json
+    )
 
 
 def _compile(device: str, folder: Path, definitions: dict[str, float], as_json: bool) -> None:

@@ -19,6 +19,15 @@
 #ifndef FREQUENCY
 #define FREQUENCY 0.5 /* Hz */
 #endif
+#ifndef MODEL
+#define MODEL 0 /* Touch; see `models` below */
+#endif
+#ifndef LOST_AFTER
+#define LOST_AFTER 0 /* frames after which the cable is pulled; 0 for never */
+#endif
+#ifndef WARM_EVERY
+#define WARM_EVERY 0 /* frames from one complaint of warm motors to the next; 0 for none */
+#endif
 #if defined(_WIN32)
 #define API __declspec(dllexport)
 #else
@@ -51,12 +60,14 @@ enum { CALIBRATION_OK = 0x5000 };
 static struct {
     double present, licence, manual, manual_after, speed, gives_limits, max_force, continuous, stiffness, clamps, offset_y;
     double calibration, calibration_style, calibrates, inkwell, safety_switch, buttons, model;
-    double error, error_frames, off_frames, lost, garbage, fixed, x, y, z, counting;
+    double error, error_frames, off_frames, lost, garbage, fixed, x, y, z, counting,
+        lost_after, warm_every;
     double frames, begins, illegal, outside, invalid, null_names, largest, force_x, force_y, force_z, enabled, open,
         scheduled, running, rate, exceeded, uneven;
 } s, fresh = {.present = 1, .licence = 1, .speed = 1, .gives_limits = 1, .max_force = 3.3, .continuous = 0.88,
               .stiffness = 1.26, .clamps = 1, .calibration = CALIBRATION_OK, .calibration_style = 4, .calibrates = 1,
-              .off_frames = 50, .rate = 1000};
+              .off_frames = 50, .rate = 1000, .model = MODEL, .lost_after = LOST_AFTER,
+              .warm_every = WARM_EVERY};
 #define ENTRY(name) {#name, &s.name}
 static const struct {
     const char *name;
@@ -79,6 +90,7 @@ static const struct {
     ENTRY(error), ENTRY(error_frames), /* code of an error, and the number of next frames that raise it */
     ENTRY(off_frames),   /* frames without force after an error 0200 ... 0203 */
     ENTRY(lost),         /* 1: communication lost for good */
+    ENTRY(lost_after), ENTRY(warm_every), /* frames */
     ENTRY(garbage),      /* number of next frames with nonsense as position */
     ENTRY(fixed), ENTRY(x), ENTRY(y), ENTRY(z), /* 1: reports this position, mm */
     ENTRY(counting),     /* 1: reports the number of the frame, modulo 100, as x, y and z */
@@ -154,6 +166,8 @@ static void move(double step) {
 static void call_back(void) {
     s.frames++;
     move(1.0 / s.rate);
+    if (s.lost_after > 0 && s.frames >= s.lost_after) s.lost = 1;
+    if (s.warm_every > 0 && fmod(s.frames, s.warm_every) == 0) s.error = WARM_MOTORS, s.error_frames = 1;
     if (off > 0) off--;
     int called[CALLBACKS] = {0};
     for (int n = 0; n < CALLBACKS; n++) {

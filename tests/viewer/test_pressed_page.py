@@ -151,6 +151,22 @@ def test_space_presses_arrows_slide_and_escape_lets_go(page: Page, slab: Surroga
     page.keyboard.press("PageUp")
 
 
+def test_a_pen_presses_as_hard_as_its_tip_is_pressed(page: Page, slab: Surrogate):
+    x, y = middle(page)
+    pen = page.context.new_cdp_session(page)
+    event = {"x": x, "y": y + 10, "button": "left", "buttons": 1, "pointerType": "pen", "clickCount": 1}
+    pen.send("Input.dispatchMouseEvent", {**event, "type": "mousePressed", "force": 0.3})
+    soft = slab.energy.depth(check(slab, stand_still(page, "inside")))[0]
+    pen.send("Input.dispatchMouseEvent", {**event, "type": "mouseMoved", "force": 0.6})
+    hard = slab.energy.depth(check(slab, stand_still(page, "inside")))[0]
+    assert (soft, hard) == pytest.approx(
+        (0.3 * 1.25 * pressed.DEEPEST, 0.6 * 1.25 * pressed.DEEPEST), rel=0.01
+    )
+    pen.send("Input.dispatchMouseEvent", {**event, "type": "mouseReleased", "buttons": 0, "force": 0.0})
+    assert number(stand_still(page, "free")["text"]["force-norm"]) == 0.0
+    pen.detach()
+
+
 def test_beside_the_touched_surface_the_view_turns_instead(page: Page):
     x, y = middle(page)
     box = page.locator("#view").bounding_box()

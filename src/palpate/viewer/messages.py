@@ -115,6 +115,9 @@ class Frame(Binary):
     inside: Annotated[bool, Wire("flag", "the hand is within the trained range")]
     clamped: Annotated[bool, Wire("flag", "the force limit acted")]
     grabbed: Annotated[bool, Wire("flag", "a hand holds the body")]
+    resting: Annotated[
+        bool, Wire("flag", "nobody touches, and the loop ticks more slowly, or did so just now")
+    ]
     stalled: Annotated[bool, Wire("flag", "the input is older than the loop allows")]
     parameters: Annotated[np.ndarray, Wire("floats", "current values of the parameters")]
     contact: Annotated[

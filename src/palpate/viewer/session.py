@@ -11,6 +11,7 @@ import asyncio
 import contextlib
 import itertools
 import logging
+import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
@@ -50,6 +51,7 @@ logger = logging.getLogger("palpate.viewer")
 MOST_CREDITS = 4
 SHORTEST = 1.0 / 125.0  # s between frames to one page: no display that matters is faster
 STALE = 0.25  # s without a tick until the loop counts as frozen
+RATE_KNOWN = 0.5  # s after the loop has rested until its rate is that of a touched body again
 WATCH = 0.1  # s between looks at the real-time process
 GRACE = 0.5  # s; a signal that ends the whole program may reach the real-time process first
 MOST_PAGES = 32
@@ -145,7 +147,7 @@ class Session:
         self._pages: dict[int, Page] = {}
         self._numbers: Iterator[int] = itertools.count(1)
         self._turns = Turns(SHORTEST, clock)
-        self._ended = False
+        self._ended, self._rested = False, -math.inf
         self._recording: PageRecording | None = None
         if recordings is not None:
             recordable: Any = loop
@@ -226,6 +228,7 @@ class Session:
             "inside": state.inside or not held,
             "clamped": state.clamped and held,
             "grabbed": state.grabbed and loop is Loop.RUNNING,
+            "resting": now() - self._rested < RATE_KNOWN,
             "stalled": state.stalled,
             "parameters": self._lock.parameters,
         }
@@ -238,6 +241,8 @@ class Session:
             self._state = self.loop.shared.read_state()
         except DeviceError:  # stopped, or just killed, while publishing; `watch` says which
             return self._state, Loop.FROZEN
+        if self._state.idle:
+            self._rested = now()
         return self._state, Loop.RUNNING if now() - self._state.time < STALE else Loop.FROZEN
 
     async def _show(self, page: Page) -> None:
@@ -256,15 +261,17 @@ class Session:
     def _news(self, page: Page) -> list[Reason | Feel]:
         """Return what has changed since the page was told last: why there is no force, whether the body is softened."""
         state, news = self._state, list[Reason | Feel]()
-        drops = [
-            drop for drop in state.onsets if drop[1] is not Fault.STOPPED
-        ]  # that one needs no explaining
-        reason = (state.reason, state.stopped, state.faults)
+        words = state.reason
+        if state.waiting and not state.stopped and not state.fault and not self._device:
+            words = f"{words} Let go, and take hold again."
+        reason = (words, state.stopped, state.faults)
         if reason != page.reason:
             page.reason = reason
+            # a stop needs no explaining
+            drops = [drop for drop in state.onsets if drop[1] is not Fault.STOPPED]
             at, fault = drops[-1] if drops else (now(), Fault.NONE)
             dropped = fault.meaning if drops else ""
-            news.append(Reason(state.reason, state.stopped, dropped, max(0.0, now() - at)))
+            news.append(Reason(words, state.stopped, dropped, max(0.0, now() - at)))
         if (feel := softening(state.felt_stiffness)) != page.feel:
             page.feel = feel
             news.append(feel)

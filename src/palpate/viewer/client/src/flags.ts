@@ -65,7 +65,7 @@ function limits(frame: Frame, hello: Hello, places: Places): Flag[] {
   if (frame.clamped) {
     list.push({ id: "clamped", tone: "warn", words: `Force limited to ${tidy(hello.max_force)} N.` });
   }
-  if (frame.rate < SLOW * hello.rate && frame.tick > hello.rate) {
+  if (!frame.resting && frame.rate < SLOW * hello.rate && frame.tick > hello.rate) {
     const words = `The real-time loop reaches only ${tidy(frame.rate)} of ${tidy(hello.rate)} ticks per second.`;
     list.push({ id: "slow", tone: "warn", words });
   }

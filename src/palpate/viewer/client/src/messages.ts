@@ -188,6 +188,8 @@ export interface Frame {
   clamped: boolean;
   /** a hand holds the body */
   grabbed: boolean;
+  /** nobody touches, and the loop ticks more slowly, or did so just now */
+  resting: boolean;
   /** the input is older than the loop allows */
   stalled: boolean;
   /** m, where a line's node is, as an offset from rest; else the contact point at rest */
@@ -232,6 +234,7 @@ const FRAME_LAYOUT: Layout = [
   ["inside", "flag"],
   ["clamped", "flag"],
   ["grabbed", "flag"],
+  ["resting", "flag"],
   ["stalled", "flag"],
   ["contact", "vec3"],
   ["normal", "vec3"],

@@ -175,6 +175,7 @@ class Timing {
     duration("lateness-p99", frame.lateness_p99);
     duration("lateness-max", frame.lateness_max);
     put("rate", frame.rate, 0);
+    element("rate-note").textContent = frame.resting ? "ticks, nobody touches" : "ticks";
     this.delay += 0.2 * (now - frame.echo - this.delay);
     if (!frame.grabbed || frame.hold !== Hold.YOURS) this.delay = NaN;
     else if (Number.isNaN(this.delay)) this.delay = now - frame.echo;

@@ -48,7 +48,7 @@ export class SurfaceView extends View {
   private readonly geometry = new BufferGeometry();
   private readonly position: BufferAttribute;
   private readonly colour: BufferAttribute;
-  private readonly body: Mesh<BufferGeometry, MeshPhongMaterial>;
+  protected readonly body: Mesh<BufferGeometry, MeshPhongMaterial>;
   private readonly wires: Mesh<BufferGeometry, MeshBasicMaterial>;
   private readonly creases: LineSegments<BufferGeometry, LineBasicMaterial>;
   private readonly ghost: LineSegments<BufferGeometry, LineBasicMaterial>;

@@ -101,6 +101,7 @@ export class PadView extends SurfaceView {
     this.arrow = new Arrow(LONG * this.across(), Math.max(hello.force_max, 1e-9), 0.4 * radius);
     const disc = new CylinderGeometry(radius, radius, 0.25 * radius, 48).rotateX(Math.PI / 2);
     this.pad = new Mesh(disc, new MeshLambertMaterial());
+    [this.body.material.transparent, this.body.material.opacity] = [true, 0.6]; // a pad pushed in is seen below the face
     this.arrow.group.visible = false;
     this.scene.add(this.pad, this.arrow.group);
     this.roof = hello.deepest + LONG * this.across();

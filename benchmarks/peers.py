@@ -122,7 +122,7 @@ def _set_rows(data: PeerSet, quick: bool) -> list[dict[str, Any]]:
     inputs = [Range(f"x{i}", -1.0, 1.0) for i in range(data.X.shape[1])]
     outputs = [Quantity(f"y{i}") for i in range(data.Y.shape[1])]
     began = time.perf_counter()
-    ours = fit(data.X, data.Y, inputs, outputs, effort=0.07 if quick else 1.0)
+    ours = fit(data.X, data.Y, inputs, outputs, effort=0.02 if quick else 1.0)
     spent = time.perf_counter() - began
     network, evaluator, plain = ours.network, ours.network.evaluator(), PlainNetwork(ours.network)
     x = np.ascontiguousarray(data.X_test[0])

@@ -13,10 +13,10 @@ loads = [
     pp.TipLoad(-0.5, 0.5, direction=(1, 0), name="P_x"),
     pp.TipLoad(-1.0, 1.0, direction=(0, 1), name="P_y"),
 ]
-data = pp.sweep(beam, loads, samples=128, seed=0, workers=2)
+data = pp.sweep(beam, loads, samples=96, seed=0)
 train, test = data.split(test=0.25, seed=1)
 touch, _ = pp.learn(
-    train, passes=1, refinement=pp.Refinement(samples=96, units_max=11, target=1e-5, starts=1)
+    train, passes=1, refinement=pp.Refinement(samples=72, units_max=11, target=1e-5, starts=1)
 )
 
 print(touch)

@@ -18,9 +18,9 @@ rest = strip.problem(lift).solve(0.0)
 print(f"sag at the tip under its own weight: {-1000 * rest.displacement[-1, 1]:.1f} mm")
 print(f"the clamp carries {1000 * rest.root_reaction[1]:.1f} mN")
 
-data = pp.sweep(strip, lift, samples=32, seed=0, workers=2)
+data = pp.sweep(strip, lift, samples=32, seed=0)
 train, test = data.split(test=0.25, seed=1)
-touch, _ = pp.learn(train, name="strip")
+touch, _ = pp.learn(train, name="strip", passes=1)
 print(touch)
 print(pp.validate(touch, test))
 

@@ -8,8 +8,8 @@ import palpate as pp
 from palpate.runtime import LoopProcess
 
 beam = pp.Cantilever(length=1.0, section=pp.Circle(radius=0.005), material=pp.named_material("copper"))
-data = pp.sweep(beam, pp.TipLoad(0.0, 5.0), samples=32, seed=0, workers=2)
-touch, _ = pp.learn(data, name="copper")
+data = pp.sweep(beam, pp.TipLoad(0.0, 5.0), samples=32, seed=0)
+touch, _ = pp.learn(data, name="copper", passes=1)
 path = touch.save("copper.palpate")
 
 answer = touch.energy.evaluator()  # allocates nothing per call: what the loop uses

@@ -65,8 +65,8 @@ def tables(*, quick: bool) -> list[Table]:
     """Size against error for both forms, by the filter and refined."""
     draws = range(1 if quick else 3)
     few, many = (
-        [problem(s, 500 if quick else 2000) for s in draws],
-        [problem(s, 1000 if quick else 10201) for s in draws],
+        [problem(s, 200 if quick else 2000) for s in draws],
+        [problem(s, 300 if quick else 10201) for s in draws],
     )
     distances, sizes = (_DISTANCES[:2], _SIZES[:2]) if quick else (_DISTANCES, _SIZES)
     by_filter = {

@@ -65,7 +65,7 @@ def problem(train: int = 4000) -> Problem:
 
 def tables(*, quick: bool) -> list[Table]:
     """Ours beside the published figures, and size against error."""
-    p = problem(400 if quick else 4000)
+    p = problem(200 if quick else 4000)
     found = {name: filtered(p, s) for name, s in SETTINGS.items()}
     persistence = Score(0, p.error(p.X_test[:, :1]), 0.0)
     rows = [

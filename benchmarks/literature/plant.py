@@ -66,7 +66,7 @@ def problem(seed: int, samples: int = 1000) -> Problem:
 
 def table(*, quick: bool) -> Table:
     """Ours beside the published figures."""
-    problems = [problem(0, 200)] if quick else [problem(s) for s in range(30)]
+    problems = [problem(0, 100)] if quick else [problem(s) for s in range(30)]
     p = problems[0]
     persistence = Score(0, p.error(p.X_test[:, :1]), 0.0)
     found = {name: scores(problems, partial(filtered, settings=s)) for name, s in SETTINGS.items()}

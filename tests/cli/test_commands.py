@@ -18,6 +18,7 @@ from palpate.learning.loading import load
 from palpate.physics.advice import advise
 from palpate.runtime import LoopReport
 from palpate.study import Study, preset_names, preset_study, read_study
+from programs import one_core
 
 from .conftest import SMALL
 
@@ -187,7 +188,8 @@ def test_the_double_of_a_library_says_how_it_is_used(palpate, c_compiler, tmp_pa
 @pytest.mark.slow
 def test_demo_runs_both_founding_beams(tmp_path):
     command = [sys.executable, "-m", "palpate", "demo", "--folder", str(tmp_path / "d"), "--json"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=280)
+    with one_core():
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=280)
     assert done.returncode == 0, done.stderr
     content = json.loads(done.stdout)
     assert set(content["studies"]) == {"beam-copper", "beam-nylon"}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 import pytest
 
@@ -41,12 +43,18 @@ def follow(truth, N=400, *, outliers=0.0, noise=lambda x: NOISE, seed=0, learner
     return learner, events
 
 
+@functools.cache
+def followed():
+    """A learner of the still map, and its events; several tests compare with it."""
+    return follow(lambda x, t: bend(x))
+
+
 def rms(learner, truth):
     return float(np.sqrt(((learner.network.predict(GRID) - truth(GRID)) ** 2).mean()))
 
 
 def test_outliers_are_named_and_leave_the_network_as_it_would_be_without_them():
-    clean, _ = follow(lambda x, t: bend(x))
+    clean, _ = followed()
     dirty, events = follow(lambda x, t: bend(x), outliers=0.05)
     assert rms(dirty, bend) < 2.0 * rms(clean, bend) < 0.5 * NOISE
     assert 10 <= sum(e.outlier for e in events) <= 30
@@ -65,7 +73,7 @@ def test_a_jump_is_told_where_it_was_and_followed():
 
 
 def test_drift_is_told_and_followed():
-    still, _ = follow(lambda x, t: bend(x))
+    still, _ = followed()
     moving, events = follow(lambda x, t: (1.0 - t / 600.0) * bend(x), N=600)
     assert moving.state.drifts > 0.8 > 0.5 > still.state.drifts
     assert not any(e.changed for e in events)

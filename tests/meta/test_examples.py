@@ -2,35 +2,17 @@
 
 from __future__ import annotations
 
-import os
 import re
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from programs import run_file
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 pytestmark = pytest.mark.timeout(240)
-
-
-def run(name: str, folder: Path) -> str:
-    """Standard output of an example that was run in `folder`."""
-    done = subprocess.run(
-        [sys.executable, str(EXAMPLES / name)],
-        check=False,
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        encoding="utf-8",
-        env=os.environ | {"PYTHONIOENCODING": "utf-8", "PYTHONWARNINGS": ""},
-        stdin=subprocess.DEVNULL,
-        timeout=200,
-    )
-    assert done.returncode == 0, done.stderr[-3000:]
-    return done.stdout
 
 
 def cantilever(text: str, folder: Path) -> None:
@@ -246,4 +228,5 @@ def test_every_example_is_checked():
     "name", [pytest.param(n, marks=[] if n in QUICK else pytest.mark.slow) for n in sorted(CHECKS)]
 )
 def test_example(name: str, tmp_path: Path):
-    CHECKS[name](run(name, tmp_path), tmp_path)
+    printed = run_file(EXAMPLES / name, tmp_path, 200, PYTHONWARNINGS="")
+    CHECKS[name](printed, tmp_path)

@@ -45,7 +45,7 @@ def test_the_program_runs_as_a_file_without_a_guard(tmp_path: Path):
     site = tmp_path / "site"
     site.mkdir()
     (site / "sitecustomize.py").write_text(STANDS_IN, encoding="utf-8")
-    printed = run_program(text, tmp_path, 200, site=site)
+    printed = run_program(text, tmp_path, 200, site=site, alone=False)
     assert "served: Surrogate" in printed
     assert (tmp_path / "beam.palpate").is_file()
 

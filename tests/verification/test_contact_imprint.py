@@ -24,7 +24,7 @@ def centre(x, y, depth):
 def slid(places, element=None):
     """Forces (place, 3) in N at a depth of 2 mm, on the mesh that the probe asks for or on a given one."""
     probe = SphereProbe(RADIUS, over=((0.046, ASIDE), (0.054, ASIDE + 1e-4)), depth=(0.0, 0.005))
-    solver = Body(Block(SIZE), GEL).problem(probe, element=element).open()
+    solver = Body(Block(SIZE, element=0.03), GEL).problem(probe, element=element).open()
     found = [solver.solve(centre(x, ASIDE, 0.002)) for x in places]
     assert all(one.converged for one in found)
     return np.array([one.response for one in found])

@@ -88,6 +88,7 @@ _COARSE: dict[str, tuple[float, float, dict[str, Any]]] = {
 # thin layers and round bodies keep more elements, so that a solve takes longer; of liver and phantom it takes 5 s, and
 # a part is pressed. The liver's elements are coarse even so: a larger ball feels less of them
 _LESS: dict[str, dict[str, dict[str, Any]]] = {
+    "block": {"sweep": {"samples": 24}, "test": {"samples": 12}},
     "layered": {"sweep": {"samples": 24}, "test": {"samples": 12}},
     "breast-dome": {"sweep": {"samples": 24}, "test": {"samples": 12}},
     "liver": {

@@ -2,7 +2,7 @@
 
 The recorded stroke is thinned to moments that lie evenly along the way of the hand. They are solved in passes from its
 beginning to its end, each pass twice as fine as the one before: a comparison that runs out of time still covers the
-whole stroke. Each solve starts from the nearest equilibrium that is known.
+whole stroke, its deepest moment first of all. Each solve starts from the nearest equilibrium that is known.
 """
 
 from __future__ import annotations
@@ -90,7 +90,8 @@ def compare_full_model(
     solver, began, told = problem.open(), clock(), clock()
     forces = np.full((len(moments), 3), np.nan)
     failed, done = 0, 0
-    for row in _passes(len(moments)):
+    deepest = int(np.argmax(trace.ticks["depth"][moments]))
+    for row in _passes(len(moments), deepest):
         if clock() - began > limit:
             break
         answer = solver.solve(places[row])
@@ -139,10 +140,10 @@ def _columns(trace: Trace, problem: Any) -> list[int]:
     return [known.index(name) for name in wanted]
 
 
-def _passes(count: int) -> list[int]:
-    """Return 0 … count − 1 in passes along the stroke, each twice as fine as the one before."""
+def _passes(count: int, first: int) -> list[int]:
+    """Return 0 … count − 1, `first` ahead, in passes along the stroke, each twice as fine as the one before."""
     step = 1 << max(0, (count - 1).bit_length() - 3)
-    order, seen = [], set()
+    order, seen = [first], {first}
     while step:
         for row in [*range(0, count, step), count - 1]:
             if row not in seen:

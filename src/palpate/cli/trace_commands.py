@@ -246,7 +246,7 @@ def _solved(trace: Trace, data: Path, model: Path | None) -> tuple[Solved, float
     rows, apart = solves_beside(trace, solves, (np.asarray(high) - np.asarray(low)) / 2.0)
     X = solves.X[rows]
     sizes = (np.linalg.norm(force, axis=1) for force in (solves.force[rows], touch.energy.force(X)))
-    return (touch.depth(X), *sizes), apart  # type: ignore[return-value]
+    return (touch.depth(X), *sizes), apart
 
 
 @trace_app.command()

@@ -133,7 +133,7 @@ class LoopProcess:
         self._stderr = tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace")  # noqa: SIM115
         try:
             if self._record is not None:
-                self.recording = self._recorder(self._record, running=False)
+                self.recording = self._recorder(self._record)
             self._process = self._popen()
             self._await_first_tick()
         except BaseException:
@@ -164,7 +164,7 @@ class LoopProcess:
         """
         if self.recording is not None and self.recording.active:
             raise UsageError(f"{self.recording.path} is being recorded.", fix="Stop that recording first.")
-        self.recording = self._recorder(path, running=True)
+        self.recording = self._recorder(path)
         self.recording.start()
         return self.recording
 
@@ -174,9 +174,9 @@ class LoopProcess:
             self.recording.stop()
         return self.recording
 
-    def _recorder(self, path: str | os.PathLike[str], *, running: bool) -> TraceRecorder:
+    def _recorder(self, path: str | os.PathLike[str]) -> TraceRecorder:
         header = {"device": self.device, "model": model_facts(self._model)}
-        return TraceRecorder(_started(self._ring), path, header, running=running)
+        return TraceRecorder(_started(self._ring), path, header)
 
     def _popen(self) -> subprocess.Popen[str]:
         modules = (f"--module={name}" for name in outside_modules())

@@ -180,19 +180,7 @@ class Replay:
         if not len(trace):
             raise UsageError(f"{trace.path.name} holds no tick.", why=" ".join(trace.notes))
         header = trace.header
-        if missing := [name for name in _NEEDED if name not in header]:
-            raise FileFormatError(
-                f"{trace.path.name} can't be replayed.",
-                why=f"It doesn't say {', '.join(missing)}: its loop had not begun, or another program wrote it.",
-                fix="Record it anew.",
-            )
-        if bool(header["holds"]) != model.holds:
-            how = "held" if header["holds"] else "pressed"
-            raise UsageError(
-                f"{model.name} can't be touched by this hand.",
-                why=f"The recorded body was {how}, this one is {'held' if model.holds else 'pressed'}.",
-                fix="Take a model of the same kind.",
-            )
+        _require_loop(trace, model)
         self.trace, self.model, self.same = trace, model, same
         traits = header["traits"]
         known = Traits(**traits | {"axes": _axes(traits["axes"])})
@@ -407,6 +395,24 @@ def play(
     while wanted():
         out.stay(now())
         time.sleep(_IDLE)
+
+
+def _require_loop(trace: Trace, model: Touchable) -> None:
+    """Refuse a trace that doesn't say what its loop was, or whose hand can't touch this body."""
+    header = trace.header
+    if missing := [name for name in _NEEDED if name not in header]:
+        raise FileFormatError(
+            f"{trace.path.name} can't be replayed.",
+            why=f"It doesn't say {', '.join(missing)}: its loop had not begun, or another program wrote it.",
+            fix="Record it anew.",
+        )
+    if bool(header["holds"]) != model.holds:
+        how = "held" if header["holds"] else "pressed"
+        raise UsageError(
+            f"{model.name} can't be touched by this hand.",
+            why=f"The recorded body was {how}, this one is {'held' if model.holds else 'pressed'}.",
+            fix="Take a model of the same kind.",
+        )
 
 
 def _axes(rows: Any) -> Any:

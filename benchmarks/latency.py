@@ -22,7 +22,7 @@ from benchmarks.cases import FEW, Case, case, touch_model
 from benchmarks.marks import NUMPY, OURS, Contenders, Mark, marks
 from benchmarks.rivals import RIVALS
 from benchmarks.runner import main
-from benchmarks.table import Claim, Column, Table
+from benchmarks.table import Claim, Column, Table, quick_mark
 from palpate.network import Network, Scaling
 from palpate.network.radial import radial
 from palpate.runtime.touchable import touchable
@@ -116,7 +116,7 @@ def tables(*, quick: bool = False) -> list[Table]:
     return [
         Table(
             "latency",
-            f"One query, called from Python{' (quick)' if quick else ''}",
+            f"One query, called from Python{quick_mark(quick)}",
             (
                 Column("query", "query"),
                 Column("who", "by"),

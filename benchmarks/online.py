@@ -17,7 +17,7 @@ import numpy as np
 from benchmarks import peer_data
 from benchmarks.cases import BEAMS, case
 from benchmarks.runner import main
-from benchmarks.table import Claim, Column, Table
+from benchmarks.table import Claim, Column, Table, quick_mark
 from palpate.learning import Settings, default, refine
 from palpate.learning.stream.learner import Learner
 from palpate.learning.stream.refining import Refining
@@ -97,7 +97,7 @@ def tables(*, quick: bool = False) -> list[Table]:
         if not quick:
             ratios = tuple(e / statistics.median(batch) for e in errors)
             claims.append(Claim(f"{stream.name}, error over the batch refinement's", ratios, RATIO, ".2f"))
-    return [_table(rows, claims, len(seeds), " (quick)" * quick)]
+    return [_table(rows, claims, len(seeds), quick_mark(quick))]
 
 
 def streams(*, quick: bool = False) -> list[Stream]:

@@ -25,7 +25,7 @@ from benchmarks.latency import interleaved
 from benchmarks.peer_rivals import MISSING, RIVALS
 from benchmarks.plain import PlainNetwork
 from benchmarks.runner import main
-from benchmarks.table import Claim, Column, Table
+from benchmarks.table import Claim, Column, Table, quick_mark
 from palpate.learning.arrays.fit import fit
 from palpate.network import Network
 from palpate.units import Quantity, Range
@@ -79,7 +79,7 @@ def tables(*, quick: bool = False) -> list[Table]:
     return [
         Table(
             "peers",
-            f"Five maps: error, one query, model and fit of each surrogate{' (quick)' if quick else ''}",
+            f"Five maps: error, one query, model and fit of each surrogate{quick_mark(quick)}",
             (
                 Column("set", "set"),
                 Column("who", "by"),

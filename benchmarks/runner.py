@@ -21,7 +21,6 @@ __all__ = ["BENCHMARKS", "Benchmark", "main"]
 
 BENCHMARKS = (
     "cantilever",
-    "faults",
     "filters",
     "hand_drives",
     "latency",

@@ -13,7 +13,7 @@ from typing import Any
 
 from benchmarks.cases import BEAMS, touch_model
 from benchmarks.runner import main
-from benchmarks.table import Claim, Column, Table
+from benchmarks.table import Claim, Column, Table, quick_mark
 from palpate.runtime import LoopProcess, LoopReport
 
 __all__ = ["tables"]
@@ -32,7 +32,7 @@ def tables(*, quick: bool = False) -> list[Table]:
     return [
         Table(
             "runtime",
-            f"Real-time process at 1 kHz for {seconds:g} s{' (quick)' if quick else ''}, µs",
+            f"Real-time process at 1 kHz for {seconds:g} s{quick_mark(quick)}, µs",
             (
                 Column("beam", "beam"),
                 Column("ticks", "ticks"),

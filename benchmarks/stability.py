@@ -15,7 +15,7 @@ from typing import Any
 
 from benchmarks.cases import BEAMS, Case, case
 from benchmarks.runner import main
-from benchmarks.table import Claim, Column, Table
+from benchmarks.table import Claim, Column, Table, quick_mark
 from palpate.learning import Settings, default, learn
 
 __all__ = ["run", "scaled", "tables"]
@@ -55,7 +55,7 @@ def tables(*, quick: bool = False) -> list[Table]:
             some = [r for r, (d, f, _) in zip(runs, jobs, strict=True) if d is c and f == factor]
             rows.append(_row(c.name, factor, some))
             claims += _claims(c.name, factor, some, quick=quick)
-    return [_table(rows, claims, len(seeds), " (quick)" * quick)]
+    return [_table(rows, claims, len(seeds), quick_mark(quick))]
 
 
 def run(c: Case, factor: float, seed: int) -> Run:

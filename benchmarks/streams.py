@@ -15,7 +15,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from benchmarks.runner import main
-from benchmarks.table import Claim, Column, Table
+from benchmarks.table import Claim, Column, Table, quick_mark
 from palpate.learning import Learner
 from palpate.units import Range
 
@@ -189,7 +189,7 @@ def tables(*, quick: bool = False) -> list[Table]:
             ".2f",
         )
     )
-    return [_table(rows, [] if quick else claims, " (quick)" * quick)]
+    return [_table(rows, [] if quick else claims, quick_mark(quick))]
 
 
 def _table(rows: list[dict[str, Any]], claims: list[Claim], shape: str) -> Table:

@@ -11,7 +11,7 @@ import numpy as np
 
 from benchmarks.plain_field import NODES, PlainField, made
 from benchmarks.plain_query import PlainQuery, example
-from benchmarks.table import Claim, Column, Table
+from benchmarks.table import Claim, Column, Table, quick_mark
 from palpate.units import bounds
 
 __all__ = ["query_table"]
@@ -70,7 +70,7 @@ def query_table(quick: bool) -> Table:
         rows.append({"what": f"deviation at {NODES} places, {units} units", "ours": took, "about": FRAME})
     return Table(
         "surrogates-query",
-        f"One answer of a surrogate{' (quick)' if quick else ''}",
+        f"One answer of a surrogate{quick_mark(quick)}",
         (
             Column("what", "answer"),
             Column("ours", "µs", ".1f"),

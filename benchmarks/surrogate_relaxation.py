@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.surrogate_cases import DATA
-from benchmarks.table import Claim, Column, Table
+from benchmarks.table import Claim, Column, Table, quick_mark
 from palpate.learning.relaxation import Record, identify_behind_pad
 from palpate.surrogates.memories import Patches, RelaxationState, course
 from palpate.surrogates.memories.patches import LEAST
@@ -46,7 +46,7 @@ def relaxation_table(quick: bool) -> list[Table]:
     return [
         Table(
             "surrogates-relaxation",
-            f"Relaxation against transient finite elements{' (quick)' if quick else ''}",
+            f"Relaxation against transient finite elements{quick_mark(quick)}",
             (
                 Column("drive", "drive"),
                 Column("seconds", "s", ".0f"),

@@ -21,7 +21,7 @@ from benchmarks.surrogate_fields import field_table
 from benchmarks.surrogate_measure import OURS, SIZES, Measured, measured, sprung
 from benchmarks.surrogate_queries import query_table
 from benchmarks.surrogate_relaxation import relaxation_table
-from benchmarks.table import Claim, Column, Table
+from benchmarks.table import Claim, Column, Table, quick_mark
 from benchmarks.touch_studies import STUDIES
 from palpate.format import criterion_figure
 from palpate.validation import validate
@@ -70,7 +70,7 @@ def _study(case: Case, quick: bool) -> list[Table]:
         report=lambda line: print(f"  {line}", file=sys.stderr, flush=True),
     )
     beside = [] if quick else [sprung(case, detailed, lambda line: print(f"  {line}", file=sys.stderr))]
-    mark = " (quick)" if quick else ""
+    mark = quick_mark(quick)
     return [
         _curve_table(result, sizes, mark),
         _rival_table(result, beside, detailed, mark),

@@ -14,7 +14,7 @@ import numpy as np
 
 import palpate
 from benchmarks.runner import main
-from benchmarks.table import Column, Table
+from benchmarks.table import Column, Table, quick_mark
 from palpate.physics.beam.beam_presets import Preset, preset
 
 __all__ = ["tables"]
@@ -35,7 +35,7 @@ def tables(*, quick: bool = False) -> list[Table]:
     return [
         Table(
             "sweep",
-            f"Solves per second{' (quick)' if quick else ''}",
+            f"Solves per second{quick_mark(quick)}",
             (
                 Column("preset", "preset"),
                 Column("how", "how"),

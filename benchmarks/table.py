@@ -11,7 +11,12 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table as RichTable
 
-__all__ = ["Claim", "Column", "Table"]
+__all__ = ["Claim", "Column", "Table", "quick_mark"]
+
+
+def quick_mark(quick: bool) -> str:
+    """Return what ends the title of a table whose figures mean nothing, since only few things were measured."""
+    return " (quick)" if quick else ""
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ import numpy as np
 
 from benchmarks.plain_touch import PlainAnswer, PlainTouch, Setting
 from benchmarks.runner import main
-from benchmarks.table import Claim, Column, Table
+from benchmarks.table import Claim, Column, Table, quick_mark
 from benchmarks.touching_check import Inspection, Inspector
 from palpate.physics.interactions import SphereProbe
 from palpate.physics.materials import NeoHookean
@@ -96,7 +96,7 @@ def tables(*, quick: bool = False) -> list[Table]:
         "loose before the last step": (chosen, _pressed(problem, points[chosen], Setting(between=1e-3))),
         "one tolerance": (some, _pressed(problem, points[some], Setting())),
     }
-    return [_table(ours, rivals, points, " (quick)" if quick else "")]
+    return [_table(ours, rivals, points, quick_mark(quick))]
 
 
 def _table(ours: Swept, rivals: dict[str, Any], points: np.ndarray, mark: str) -> Table:

@@ -16,7 +16,7 @@ import numpy as np
 
 from benchmarks.machine import gigabytes
 from benchmarks.runner import main
-from benchmarks.table import Claim, Column, Table
+from benchmarks.table import Claim, Column, Table, quick_mark
 from benchmarks.touching import HEIGHT, RADIUS, block, probe
 from palpate.physics.solid.solid_model import open_problem
 from palpate.physics.solid.solid_system import sparse_solver
@@ -43,7 +43,7 @@ def tables(*, quick: bool = False) -> list[Table]:
     return [
         Table(
             "touching-cost",
-            f"A solve over the number of unknowns{' (quick)' if quick else ''}",
+            f"A solve over the number of unknowns{quick_mark(quick)}",
             (
                 Column("form", "form"),
                 Column("size", "elements under the probe, mm", ".1f"),

@@ -14,7 +14,7 @@ import numpy as np
 
 from benchmarks.massspring import MassSpringBody, MassSpringMotion
 from benchmarks.runner import main
-from benchmarks.table import Column, Table
+from benchmarks.table import Column, Table, quick_mark
 from benchmarks.touching import HEIGHT, RADIUS, block, probe
 from palpate.physics.interactions import pad_share
 
@@ -35,7 +35,7 @@ def _spring_table(quick: bool) -> Table:
     rows, motion = _sprung(0.025 if quick else None, DEPTHS[:1] if quick else DEPTHS)
     return Table(
         "touching-springs",
-        f"Points and springs on the same mesh, beside finite elements{' (quick)' if quick else ''}",
+        f"Points and springs on the same mesh, beside finite elements{quick_mark(quick)}",
         (
             Column("depth", "depth, mm", ".0f"),
             Column("force", "finite elements: F_z, N", ".4f"),
@@ -112,7 +112,7 @@ def _pad_table(quick: bool) -> Table:
     ]
     return Table(
         "touching-pad",
-        f"What the pad takes{' (quick)' if quick else ''}: shares of a change of ln k",
+        f"What the pad takes{quick_mark(quick)}: shares of a change of ln k",
         (
             Column("depth", "depth, mm", ".0f"),
             Column("force", "F_z at k, N", ".4f"),

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.runner import main
-from benchmarks.table import Claim, Column, Table
+from benchmarks.table import Claim, Column, Table, quick_mark
 from benchmarks.touching import HEIGHT, RADIUS, block, probe
 
 __all__ = ["tables"]
@@ -43,7 +43,7 @@ def _imprint_table(quick: bool) -> Table:
     named = [row for row in rows if row["size"] == 1e3 * DEFAULT]
     return Table(
         "touching-imprint",
-        f"What the mesh prints on the force while the sphere slides{' (quick)' if quick else ''}",
+        f"What the mesh prints on the force while the sphere slides{quick_mark(quick)}",
         (
             Column("size", "elements under the probe, mm", "g"),
             Column("unknowns", "unknowns"),
@@ -123,7 +123,7 @@ def _size_table(quick: bool) -> Table:
             row[f"{form}_off"] = 100 * (row[form] / fine[row["poisson"]] - 1)
     return Table(
         "touching-sizes",
-        f"Normal force at 5 mm depth over element size and Poisson's ratio{' (quick)' if quick else ''}",
+        f"Normal force at 5 mm depth over element size and Poisson's ratio{quick_mark(quick)}",
         (
             Column("poisson", "ν", "g"),
             Column("size", "elements under the probe, mm", "g"),

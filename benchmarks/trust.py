@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 import palpate as pp
-from benchmarks.table import Claim, Column, Table
+from benchmarks.table import Claim, Column, Table, quick_mark
 from benchmarks.trust_data import STANDARDS, correlated, real_tables
 from benchmarks.trust_rivals import RIVALS
 from palpate.errors import FitWarning
@@ -34,10 +34,6 @@ RATIO = (0.8, 1.3)
 def tables(*, quick: bool = False) -> list[Table]:
     """Return the tables; `quick` takes one seed of a few cases, with little effort."""
     return [_coverage(quick), _diabetes(quick), _ranks(quick)]
-
-
-def _mark(quick: bool) -> str:
-    return " (quick)" if quick else ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +71,8 @@ def _coverage(quick: bool) -> Table:
         off.append(float(max(RATIO[0] - np.median(ratio), np.median(ratio) - RATIO[1])))
     return Table(
         "trust_coverage",
-        f"Intervals of {LEVEL:.0%} and held-out errors of palpate.fit against new rows, {SEEDS} seeds{_mark(quick)}",
+        f"Intervals of {LEVEL:.0%} and held-out errors of palpate.fit against new rows, {SEEDS} seeds"
+        f"{quick_mark(quick)}",
         [
             Column("case", "data"),
             Column("rows", "rows", ",d"),
@@ -157,7 +154,7 @@ def _diabetes(quick: bool) -> Table:
         rows.append({"seed": seed, "inside": 100 * one.inside, "ratio": one.ratio, "worst": one.worst})
     return Table(
         "trust_diabetes",
-        f"scikit-learn's diabetes, one split a seed{_mark(quick)}",
+        f"scikit-learn's diabetes, one split a seed{quick_mark(quick)}",
         [
             Column("seed", "seed", "d"),
             Column("inside", "inside, %", ".0f"),
@@ -199,7 +196,7 @@ def _ranks(quick: bool) -> Table:
             )
     return Table(
         "trust_ranks",
-        f"Error on 4,000 new places over the answers' spread, median of {RANK_SEEDS} seeds{_mark(quick)}",
+        f"Error on 4,000 new places over the answers' spread, median of {RANK_SEEDS} seeds{quick_mark(quick)}",
         [
             Column("case", "standard"),
             Column("rows", "rows", "d"),

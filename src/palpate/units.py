@@ -18,7 +18,15 @@ import numpy as np
 
 from palpate.errors import UsageError
 
-__all__ = ["Quantity", "Range", "bounds", "registry", "to_si"]
+__all__ = ["Quantity", "Range", "bounds", "registry", "si_conversion", "to_si"]
+
+# units in which quantities are stated, by what they measure; the first that fits is taken
+_STATED: tuple[str, ...] = ("m", "m/s", "m/s²", "N", "N/m", "Pa", "J", "s", "Hz", "kg", "kg/m³", "m²", "m³")
+_STATED += ("K", "rad", "rad/s", "W", "V", "A", "Pa s", "mol")
+_ANGLE = re.compile(r"\b(rad|deg(?!C|F|_)|rpm|rev|turn|cycle)", re.IGNORECASE)
+_SPELT = str.maketrans(
+    {"µ": "u", "μ": "u", "·": "*", "⋅": "*", "²": "**2", "³": "**3", "^": "**", "°": "deg", "%": "percent"}
+)
 
 _DIGITS = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?")
 
@@ -107,6 +115,52 @@ def registry() -> Any:
     return pint.UnitRegistry()
 
 
+@functools.cache
+def si_conversion(unit: str) -> tuple[float, float, str]:
+    """Return factor, offset and SI unit: a value v in `unit` is factor · v + offset in the SI unit.
+
+    Parameters
+    ----------
+    unit : str
+        For example ``"mm"``, ``"N/mm²"`` or ``"°C"``; "" and "1" are pure numbers, whose SI unit is "".
+
+    Raises
+    ------
+    UsageError
+        If there is no such unit.
+    """
+    if unit.strip() in {"", "1"}:
+        return 1.0, 0.0, ""
+    import pint
+
+    text = re.sub(r"\b(rev|cycles)\b", "turn", unit.translate(_SPELT))
+    try:
+        zero, one = (registry().Quantity(value, text).to_base_units() for value in (0.0, 1.0))
+    except _no_quantity(pint) as error:
+        raise UsageError(
+            f"{unit!r} is no unit that is known.",
+            why=f"{error}.",
+            fix="Write it as mm, N, kPa, N/mm^2, 1/s, or 1 for a pure number.",
+        ) from error
+    factor, offset = float(one.magnitude - zero.magnitude), float(zero.magnitude)
+    angular = bool(_ANGLE.search(text))
+    for name in _STATED:
+        if ("rad" in name) == angular and _stated(name).dimensionality == one.dimensionality:
+            return factor, offset, name
+    if one.dimensionless:
+        return factor, offset, ""
+    return factor, offset, unit if (factor, offset) == (1.0, 0.0) else f"{one.units:~C}".replace("**", "^")
+
+
+def _stated(name: str) -> Any:
+    return registry().Unit(name.translate(_SPELT).replace(" ", "*"))
+
+
+def _no_quantity(pint: Any) -> tuple[type[Exception], ...]:
+    """Return what Pint raises of a text that is no quantity."""
+    return (pint.errors.PintError, ValueError, TypeError, AttributeError, AssertionError, SyntaxError)
+
+
 def to_si(value: str | float, unit: str) -> float:
     """Convert a quantity such as ``"110 GPa"`` to a number in `unit`.
 
@@ -140,7 +194,7 @@ def to_si(value: str | float, unit: str) -> float:
                 fix=f'Write "{value.strip()} {unit}", or the number without quotes.',
             )
         return _rounded_once(value.strip(), quantity, unit or "dimensionless")
-    except (pint.errors.PintError, ValueError, TypeError, AttributeError, AssertionError) as error:
+    except _no_quantity(pint) as error:
         raise UsageError(
             f"{value!r} is not a quantity in {unit or 'pure numbers'}.",
             why=f"{error}.",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import os
 from collections.abc import Callable
@@ -12,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from palpate.cli import main
+from programs import one_core
 
 SMALL = """\
 name = "small"
@@ -50,7 +52,8 @@ Palpate = Callable[..., Answer]
 def palpate(capsys) -> Palpate:
     def run(*words: object) -> Answer:
         capsys.readouterr()
-        with pytest.raises(SystemExit) as stop:
+        alone = one_core() if words and words[0] in {"demo", "sweep", "learn"} else contextlib.nullcontext()
+        with alone, pytest.raises(SystemExit) as stop:
             main([str(w) for w in words])
         captured = capsys.readouterr()
         return Answer(int(stop.value.code or 0), captured.out, captured.err)
@@ -71,7 +74,12 @@ def carried_out(tmp_path_factory) -> Path:
     try:
         for command in ("sweep", "learn"):
             out, err = io.StringIO(), io.StringIO()
-            with redirect_stdout(out), redirect_stderr(err), pytest.raises(SystemExit) as stop:
+            with (
+                one_core(),
+                redirect_stdout(out),
+                redirect_stderr(err),
+                pytest.raises(SystemExit) as stop,
+            ):
                 main([command])
             assert not stop.value.code, err.getvalue()
         Path("learn.out").write_text(out.getvalue(), encoding="utf-8")

@@ -19,6 +19,7 @@ from palpate.units import Quantity
 
 pytestmark = pytest.mark.slow
 SEEDS = (0, 1, 2)
+TIGHT_SEEDS = (0, 1)  # a tightened filter grows many units: each run takes as long as four others
 
 
 class Beam:
@@ -83,7 +84,8 @@ def test_founding_form(beam):
 
 def test_tightened_tenfold_the_default_form_regresses_less_than_the_founding_one(beam):
     worst = [
-        max(beam.filtered(f, s).history.regression for s in SEEDS) for f in (tight_default, tight_founding)
+        max(beam.filtered(f, s).history.regression for s in TIGHT_SEEDS)
+        for f in (tight_default, tight_founding)
     ]
     assert worst[0] < 0.5 * worst[1]
 
@@ -101,7 +103,7 @@ def test_default_form(beam, request):
 
 
 def test_default_form_is_stable_when_its_thresholds_are_tightened_tenfold(beam):
-    for seed in SEEDS:
+    for seed in TIGHT_SEEDS:
         assert beam.filtered(tight_default, seed).history.regression < 2.0
 
 

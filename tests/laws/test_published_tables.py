@@ -22,7 +22,7 @@ def middle(found):
 
 @pytest.fixture(scope="module")
 def hermite_scores():
-    problems = [hermite.problem(seed) for seed in range(15)]
+    problems = [hermite.problem(seed) for seed in range(9)]
     return {name: scores(problems, partial(filtered, settings=s)) for name, s in hermite.SETTINGS.items()}
 
 
@@ -74,13 +74,13 @@ def test_refinement_of_frankes_surface():
 
 
 def test_a_stream_over_frankes_surface_with_bounded_refinement():
-    units, error = middle(scores([franke.problem(s, 200) for s in range(5)], partial(streamed, every=1)))
+    units, error = middle(scores([franke.problem(s, 200) for s in range(3)], partial(streamed, every=1)))
     assert units <= 40
     assert error <= 0.05
 
 
 def test_ten_passes_over_frankes_surface():
     found = scores(
-        [franke.problem(s, 200, 10) for s in range(5)], partial(filtered, settings=franke.SETTINGS["MRAN"])
+        [franke.problem(s, 200, 10) for s in range(3)], partial(filtered, settings=franke.SETTINGS["MRAN"])
     )
     assert middle(found)[1] <= 0.02

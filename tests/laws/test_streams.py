@@ -19,7 +19,7 @@ def test_bounded_refinement_ends_within_three_times_the_batch_error_at_equal_uni
     assert error < RATIO * batch[0]
 
 
-# orders in which the filter regressiond while it remembered 50 observations, judged each step by itself, or gave
+# orders in which the filter regressed while it remembered 50 observations, judged each step by itself, or gave
 # every new unit its weight at once
 @pytest.mark.parametrize(
     ("beam", "factor", "seed"),

@@ -26,7 +26,6 @@ __all__ = ["FORMATS", "UNITS", "export_trace", "trace_table"]
 
 _VECTORS = {
     "hand": ("hand", "m"),
-    "position": ("position", "m"),
     "contact": ("contact", "m"),
     "wanted": ("force_wanted", "N"),
     "force": ("force", "N"),

@@ -10,7 +10,7 @@ import functools
 import re
 
 from palpate.errors import UsageError
-from palpate.units import registry
+from palpate.units import si_conversion
 
 __all__ = ["is_unit", "name_and_unit", "plain_unit", "si_unit"]
 
@@ -26,28 +26,6 @@ _SYMBOL = re.compile(rf"(?:(?:da|[fpnuµmcdhkMGT])?(?:{_PREFIXED})|{_BARE})")
 _PARTS = re.compile(r"[\s·⋅*/().]+")
 _POWER = re.compile(r"(?:\*\*|\^)?[-⁻]?[\d²³¹⁰⁴-⁹]+$")
 _NO_UNIT_ALONE = {"C", "h", "A", "K", "l", "L", "in"}  # in a row of words one of these is a word
-
-# units in which quantities are stated, by what they measure; the first that fits is taken
-_STATED: tuple[str, ...] = (
-    "m",
-    "s",
-    "kg",
-    "N",
-    "Pa",
-    "J",
-    "W",
-    "V",
-    "A",
-    "K",
-    "rad",
-    "Hz",
-    "m/s",
-    "m/s^2",
-    "N/m",
-    "m^2",
-    "m^3",
-)
-_STATED += ("kg/m^3", "Pa*s", "rad/s", "Ohm", "mol")
 
 
 def name_and_unit(cell: str) -> tuple[str, str]:
@@ -115,7 +93,6 @@ def si_unit(unit: str) -> tuple[float, float, str]:
             "'C' may be degrees Celsius or coulombs.",
             fix="Write °C, or A s: in the head or by units= (--unit).",
         )
-    text = {"°C": "degC", "°F": "degF", "°": "deg"}.get(text, text)
     if not is_unit(text):
         raise UsageError(
             f"{unit!r} is no unit that is known.",
@@ -123,23 +100,7 @@ def si_unit(unit: str) -> tuple[float, float, str]:
             fix="Write it as mm, N, kPa, N/mm^2, 1/s or 1, or name the column's unit: units={'NAME': 'mm'} "
             "(--unit NAME=mm).",
         )
-    pint = registry()
-    spelt = re.sub(r"[·⋅]", "*", text).replace("^", "**")
-    zero, one = (pint.Quantity(value, spelt).to_base_units() for value in (0.0, 1.0))
-    factor, offset = float(one.magnitude - zero.magnitude), float(zero.magnitude)
-    if factor == 1.0 and offset == 0.0 and not one.unitless:
+    factor, offset, name = si_conversion(text)
+    if name and (factor, offset) == (1.0, 0.0):
         return factor, offset, text  # as it is written: N m is not J
-    if one.dimensionless:
-        return factor, offset, "rad" if re.search(r"rad|deg|rev|cycle", text) else ""
-    angular = re.search(r"rad|deg|rpm|rev|cycle", text)
-    for stated in _STATED:
-        if ("rad" in stated) == bool(angular) and pint.Unit(stated).dimensionality == one.dimensionality:
-            scale = float(pint.Quantity(1.0, one.units).to(stated).magnitude)
-            if stated == "J" and "N" in text:
-                stated = "N m"
-            return (
-                factor * scale,
-                offset * scale,
-                stated.replace("*", " ").replace("^2", "²").replace("^3", "³"),
-            )
-    return factor, offset, f"{one.units:~C}".replace("**", "^")
+    return factor, offset, "N m" if name == "J" and "N" in text else name

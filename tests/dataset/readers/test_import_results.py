@@ -9,7 +9,6 @@ import pytest
 
 import palpate as pp
 from palpate.dataset.readers import read_mapping
-from palpate.dataset.readers.result_units import to_si_units
 from palpate.errors import FileFormatError, UsageError
 
 LENGTH, STIFFNESS = 0.1, 2.0  # m; EI in N m²
@@ -315,29 +314,6 @@ def test_a_body_that_remembers_has_no_energy(tmp_path):
     imported = pp.import_results(arrays(tmp_path, **{"P [mN]": P, "u [mm]": u}), ARRAYS)
     assert "potential_energy" not in imported.dataset
     assert any("remembers" in note for note in imported.notes)
-
-
-@pytest.mark.parametrize(
-    ("unit", "expected"),
-    [
-        ("mm", (1e-3, 0.0, "m")),
-        ("µm", (1e-6, 0.0, "m")),
-        ("μm", (1e-6, 0.0, "m")),
-        ("N/m^2", (1.0, 0.0, "Pa")),
-        ("N/mm²", (1e6, 0.0, "Pa")),
-        ("mJ", (1e-3, 0.0, "J")),
-        ("degC", (1.0, 273.15, "K")),
-        ("rpm", (np.pi / 30, 0.0, "rad/s")),
-        ("°", (np.pi / 180, 0.0, "rad")),
-        ("kN", (1e3, 0.0, "N")),
-        ("%", (0.01, 0.0, "")),
-        ("1", (1.0, 0.0, "")),
-    ],
-)
-def test_units_become_si(unit, expected):
-    factor, offset, name = to_si_units(unit)
-    assert (factor, offset) == (pytest.approx(expected[0], rel=1e-12), pytest.approx(expected[1]))
-    assert name == expected[2]
 
 
 def test_a_mapping_is_read_from_a_file(tmp_path):

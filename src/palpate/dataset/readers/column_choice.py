@@ -10,10 +10,11 @@ from dataclasses import replace
 import numpy as np
 
 from palpate.dataset.readers.mapping import ImportMapping, Input, Output
-from palpate.dataset.readers.result_units import to_si_units, values_in_si
+from palpate.dataset.readers.result_units import values_in_si
 from palpate.dataset.readers.results import Column, Places, Results
 from palpate.errors import UsageError
-from palpate.units import to_si
+from palpate.tables import plain_unit
+from palpate.units import si_conversion, to_si
 
 __all__ = ["chosen_columns", "find_columns", "index_of_place", "places_in_metres"]
 
@@ -181,7 +182,7 @@ def _factor(times: float | str) -> tuple[float, str]:
     match = re.match(r"^\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*)$", times)
     if match is None:
         raise UsageError(f"{times!r} is no factor.", fix='Write a number, or a quantity such as "5 N".')
-    scale, offset, unit = to_si_units(match[2])
+    scale, offset, unit = si_conversion(plain_unit(match[2]))
     return to_si(match[1], "") * scale + offset, unit
 
 

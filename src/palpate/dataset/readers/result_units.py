@@ -2,47 +2,19 @@
 
 from __future__ import annotations
 
-import functools
-import re
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from palpate.dataset.readers.results import Column
 from palpate.errors import UsageError
 from palpate.tables.unit_names import plain_unit
-from palpate.units import registry
+from palpate.units import si_conversion
 
-__all__ = ["SYSTEM", "to_si_units", "unit_of", "values_in_si"]
+__all__ = ["SYSTEM", "unit_of", "values_in_si"]
 
 SYSTEM = ("length", "force", "time")
 """Base quantities of a consistent system of units, for files that state none."""
-
-# units in which palpate states quantities, by what they measure; the first that fits is taken
-_SI = (
-    "m",
-    "m/s",
-    "m/s²",
-    "N",
-    "N/m",
-    "Pa",
-    "J",
-    "s",
-    "Hz",
-    "kg",
-    "kg/m³",
-    "m²",
-    "m³",
-    "K",
-    "rad",
-    "rad/s",
-    "W",
-    "V",
-    "A",
-)
-_ANGLE = re.compile(r"\b(rad|radian|deg|degree|rpm|rev|turn)", re.IGNORECASE)
-_SIGNS = str.maketrans({"µ": "u", "μ": "u", "·": "*", "⋅": "*", "²": "**2", "³": "**3", "°": "deg"})
 
 
 def unit_of(column: Column, units: Mapping[str, str]) -> str | None:
@@ -66,50 +38,6 @@ def unit_of(column: Column, units: Mapping[str, str]) -> str | None:
     return column.measure.format(**base)
 
 
-@functools.cache
-def to_si_units(unit: str) -> tuple[float, float, str]:
-    """Return factor, offset and SI unit: a value v in `unit` is factor · v + offset in the SI unit.
-
-    Raises
-    ------
-    UsageError
-        If there is no such unit.
-    """
-    if unit.strip() in {"", "1"}:
-        return 1.0, 0.0, ""
-    import pint
-
-    text = re.sub(r"\brev\b", "turn", plain_unit(unit).replace("^", "**").replace("%", "percent"))
-    text = text.translate(_SIGNS)
-    try:
-        zero, one = (registry().Quantity(value, text).to_base_units() for value in (0.0, 1.0))
-    except (
-        pint.errors.PintError,
-        ValueError,
-        TypeError,
-        AttributeError,
-        AssertionError,
-        SyntaxError,
-    ) as error:
-        raise UsageError(
-            f"{unit!r} is no unit that is known.",
-            why=f"{error}.",
-            fix='Name the unit in the mapping, such as "mm", "N", "N/mm^2" or "1" for a pure number.',
-        ) from error
-    factor, offset = float(one.magnitude - zero.magnitude), float(zero.magnitude)
-    angular = bool(_ANGLE.search(text))
-    names = [n for n in _SI if ("rad" in n) == angular and _unit(n).dimensionality == one.dimensionality]
-    if names:
-        return factor, offset, names[0]
-    if one.dimensionless:
-        return factor, offset, ""
-    return factor, offset, unit if (factor, offset) == (1.0, 0.0) else f"{one.units:~C}".replace("**", "^")
-
-
-def _unit(name: str) -> Any:
-    return registry().Unit(name.translate(_SIGNS))
-
-
 def values_in_si(
     column: Column, units: Mapping[str, str], wanted: str | None = None
 ) -> tuple[np.ndarray, str]:
@@ -131,7 +59,7 @@ def values_in_si(
     """
     unit = unit_of(column, units)
     if unit is None:
-        example = wanted or to_si_units(column.measure.format(length="m", force="N", time="s"))[2] or "mm"
+        example = wanted or si_conversion(column.measure.format(length="m", force="N", time="s"))[2] or "mm"
         fix = f'Name it in the mapping: [units] "{column.name}" = "{example}"'
         parts = [key for key in SYSTEM if f"{{{key}}}" in column.measure]
         if parts:
@@ -141,7 +69,7 @@ def values_in_si(
             why="A guessed one would be wrong in silence.",
             fix=f"{fix}.",
         )
-    factor, offset, own = to_si_units(unit)
+    factor, offset, own = si_conversion(plain_unit(unit))
     if wanted is not None and own != wanted:
         raise UsageError(
             f"{column.name!r} is in {unit or 'pure numbers'}.",

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from relaxing import RADIUS, TERMS
 
 from palpate.learning.relaxation import Record, identify
 from palpate.physics.interactions import SphereProbe
@@ -15,6 +14,8 @@ from palpate.physics.shapes import Block
 from palpate.physics.solid import Body
 from palpate.surrogates.memories import Patches, course
 
+TERMS = ((0.3, 0.1), (0.2, 2.0))  # share and time in s of each
+RADIUS = 0.01
 SIZE, DEPTH, HELD, SLID = (0.048, 0.048, 0.024), 0.003, 8, 2
 GEL = NeoHookean(young=9e3, poisson=0.45)
 

@@ -21,6 +21,7 @@ __all__ = ["BENCHMARKS", "Benchmark", "main"]
 
 BENCHMARKS = (
     "cantilever",
+    "faults",
     "filters",
     "hand_drives",
     "latency",

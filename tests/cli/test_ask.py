@@ -199,13 +199,20 @@ def test_what_is_no_place_is_told_what_is(palpate, file, place):
     assert "--at" in answer.err
 
 
-def test_a_body_held_at_a_node_is_asked_at_its_displacement(palpate, tmp_path):
+def test_a_beam_is_asked_at_its_loads(palpate, tmp_path):
+    """The spring of 20 N/m moves by 0.1 m under 2 N, each node as x²."""
     path = spring_beam(stiffness=20.0).save(tmp_path / "beam.palpate")
     assert "displacement at 21 nodes" in palpate("ask", path).out
-    answer = palpate("ask", path, "--at", "0.1", "--json")
+    answer = palpate("ask", path, "--at", "2", "--json")
     assert answer.code == 0, answer.err
     (told,) = json.loads(answer.out)["answers"]
-    assert told["force"] == pytest.approx([0.0, 2.0, 0.0])
+    x, moved = np.array(told["nodes"])[:, 0], np.array(told["displacement"])
+    np.testing.assert_allclose(moved[:, 1], -0.1 * x**2, atol=1e-12)
+    assert told["beyond"] == []
+    words = palpate("ask", path, "--at", "2.5").out
+    assert "at tip 2.5 N" in words
+    assert "at 1 m  u_x 0 mm, u_y -125 mm" in words
+    assert "beyond the range" in palpate("ask", path, "--at", "7").out
     assert palpate("ask", path, "--at", "0,0,0").code == 2
 
 

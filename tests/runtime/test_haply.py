@@ -399,6 +399,17 @@ def test_a_dead_mans_button_holds(service, clock):
     device.close()
 
 
+def test_buttons_of_the_grip_reach_the_loop(service, clock):
+    device = connect(service, hold="a")
+    service.buttons.update(a=True, c=True)
+    drive(device, clock, 3)
+    assert (device.sample.holding, device.sample.buttons) == (True, 0b100)
+    service.buttons.update(a=False, c=False)
+    drive(device, clock, 3)
+    assert (device.sample.holding, device.sample.buttons) == (False, 0)
+    device.close()
+
+
 def test_addresses_that_are_none_of_the_service(service, clock):
     with pytest.raises(DeviceError, match="legacy format"):
         HaplyDevice(

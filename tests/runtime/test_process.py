@@ -144,6 +144,11 @@ def test_a_hardware_like_failure_is_recorded(spring_file):
     assert loop.report().faults["device_error"] == 1
 
 
+def test_a_dead_man_button_needs_a_button(spring_file):
+    with pytest.raises(UsageError, match="no button to hold"):
+        LoopProcess(spring_file, device="page", dead_man=True)
+
+
 def test_a_python_that_cannot_run_is_explained(spring_file, monkeypatch):
     monkeypatch.setattr(sys, "executable", os.devnull)
     loop = LoopProcess(spring_file)
@@ -153,9 +158,11 @@ def test_a_python_that_cannot_run_is_explained(spring_file, monkeypatch):
 
 
 @POSIX
-def test_a_killed_loop_is_noticed(spring_file):
-    with LoopProcess(spring_file) as loop:
-        block = Path(loop.shared.name)
+def test_the_opened_devices_own_limits_count_and_a_killed_loop_is_noticed(spring_file):
+    with LoopProcess(spring_file, device="simulated:profile=falcon", max_force=100.0) as loop:
+        block, state = Path(loop.shared.name), loop.read()
+        assert (state.max_force, state.radius, state.device_stiffness) == (8.0, 0.04, 3000.0)
+        assert state.device == "simulated falcon"
         os.kill(loop.pid, signal.SIGKILL)
         wait_for(lambda: not loop.alive)
         with pytest.raises(DeviceError, match="has ended"):

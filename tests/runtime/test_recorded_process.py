@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
+import io
 import itertools
+import json
 import os
 import signal
 import subprocess
@@ -20,7 +23,7 @@ from palpate.runtime import LoopProcess, now
 from palpate.runtime.recording import TICK
 from palpate.runtime.replay import Replay, is_recorded_model
 from palpate.runtime.touchable import load_touchable
-from palpate.runtime.trace_file import COLUMNS, TraceWriter, read_trace
+from palpate.runtime.trace_file import COLUMNS, FORMAT, VERSION, TraceWriter, read_trace
 
 
 def wait_for(condition, seconds=20.0):
@@ -158,3 +161,38 @@ def test_a_folder_that_nobody_may_write_to_is_an_error_before_the_loop(spring_fi
     monkeypatch.setattr(Path, "open", refuse)
     with pytest.raises(ResourceError, match="could not be begun"):
         TraceWriter(tmp_path / "a.trace", {})
+
+
+def test_a_damaged_or_forged_file_is_no_more_than_an_error(tmp_path):
+    path, ticks = tmp_path / "a.trace", np.zeros(300, TICK)
+    ticks["tick"] = np.arange(300)
+    writer = TraceWriter(path, {"name": "nobody"})
+    writer.add_ticks(ticks[:200])
+    writer.add_ticks(ticks[200:])
+    writer.close({})
+    data, rng = path.read_bytes(), np.random.default_rng(0)
+    middle = data.index(b"ticks-000002.npz") + 60
+    path.write_bytes(data[:middle] + b"X" + data[middle + 1 :])
+    assert len(read_trace(path)) == 200
+    assert "damaged at byte" in read_trace(path).notes[0]
+    for _ in range(100):
+        mutant = bytearray(data)
+        mutant[rng.integers(len(data))] = rng.integers(256)
+        path.write_bytes(mutant)
+        with contextlib.suppress(FileFormatError):
+            assert len(read_trace(path)) in {0, 200, 300}
+    for forged in (
+        {"count": 10**15, "same": []},
+        {"count": -1},
+        {"count": 3, "same": [], "tick": np.zeros(7)},
+    ):
+        chunk = io.BytesIO()
+        np.savez(chunk, **forged)
+        with zipfile.ZipFile(path, "w") as archive:  # by another program
+            archive.writestr("header.json", json.dumps({"format": FORMAT, "version": VERSION}))
+            archive.writestr("ticks-000001.npz", chunk.getvalue())
+        with pytest.raises(FileFormatError, match="damaged"):
+            read_trace(path)
+    path.write_bytes(data)
+    with pytest.raises(FileFormatError, match="can't be replayed"):
+        Replay(read_trace(path), None)

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from palpate.errors import UsageError
-from palpate.runtime.safety import Limits, Safety, stalled
+from palpate.runtime.safety import Limits, PlaceCheck, Safety, Stop, stalled
 
 PERIOD = 1e-3
 component = st.floats(-1e3, 1e3)
@@ -88,3 +88,75 @@ def test_stall_is_an_age():
     assert stalled(1.0, -math.inf, 0.02), "never heard of"
     assert stalled(1.0, math.nan, 0.02)
     assert stalled(1.0, 1.0, math.nan)
+
+
+def test_warm_motors_get_their_continuous_force():
+    """At the limit for a minute: at first the largest force, at last no more than the motors bear for long."""
+    period, limits = 0.01, Limits(10.0, continuous=4.0)
+    safety = Safety(limits, period, np.zeros(3))
+    squares = []
+    for _ in range(6000):
+        safety.apply(np.array([0.0, 20.0, 0.0]), gate=True)
+        squares.append(float(safety.force @ safety.force))
+    assert max(squares) == pytest.approx(limits.max_force**2)
+    mean = np.convolve(squares, np.ones(1000) / 1000, mode="valid")  # of ten seconds
+    assert math.sqrt(squares[-1]) == pytest.approx(limits.continuous, rel=0.05)
+    assert mean[-1] <= limits.continuous**2 * 1.1
+    for _ in range(6000):
+        safety.apply(np.zeros(3), gate=False)
+    for _ in range(20):
+        safety.apply(np.array([0.0, 20.0, 0.0]), gate=True)
+    assert np.linalg.norm(safety.force) == pytest.approx(limits.max_force), "they have cooled"
+
+
+def seen(check, places, time=0.0):
+    """Doubts and fault after each place (x along one axis, m), a millisecond apart."""
+    found = []
+    for k, x in enumerate(places):
+        check.see(x, 0.0, 0.0, time + 1e-3 * k, time + 1e-3 * k)
+        found.append((check.doubts, check.fault))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("places", "faults"),
+    [
+        ([0.0, 0.004, 0.008, 0.004], [False] * 4),  # 4 m/s
+        ([0.0, 0.05, 0.0, 0.05, 0.0], [False] * 5),  # single bad samples
+        ([0.0, 0.05, 0.05, 0.0], [False] * 4),
+        (
+            [0.0, 0.05, 0.05, 0.05, 0.05, 0.052],
+            [False, False, False, True, False, False],
+        ),  # then it is the place
+        ([0.2, 0.2, 0.2, 0.2], [False, False, True, True]),  # out of reach from the start
+        ([0.0, 0.2, 0.2, 0.2, 0.2, 0.0, 0.0], [False] * 3 + [True] * 3 + [False]),
+    ],
+    ids=["fast", "sparks", "two", "leap", "far", "far and back"],
+)
+def test_places_that_cannot_be_are_doubted_and_then_a_fault(places, faults):
+    assert [fault for _, fault in seen(PlaceCheck(0.15, 5.0, PERIOD), places)] == faults
+
+
+def test_doubts_end_in_a_fault_after_15_ms_also_of_a_slow_source():
+    check = PlaceCheck(0.15, 5.0, PERIOD)
+    check.see(0.0, 0.0, 0.0, 1.0, 1.0)
+    faults = []
+    for k in range(1, 21):  # one bad sample, 20 ticks
+        check.see(0.5, 0.0, 0.0, 1.001, 1.0 + 1e-3 * k)
+        faults.append(check.fault)
+    assert faults.index(True) in {15, 16}
+
+
+def test_a_stop_wins_over_a_resume_and_needs_no_held_button():
+    stop = Stop()
+    stop.heed(0, 0, pressed=False)
+    assert not stop.stopped
+    stop.heed(0, 0, pressed=True)
+    stop.heed(0, 0, pressed=False)
+    assert stop.stopped
+    stop.heed(0, 1, pressed=True)
+    assert stop.stopped, "resumed while the button is pressed"
+    stop.heed(0, 2, pressed=False)
+    assert not stop.stopped
+    stop.heed(1, 3, pressed=False)
+    assert stop.stopped, "of both the stop counts"

@@ -7,12 +7,12 @@ import time
 
 import numpy as np
 import pytest
-from sweep_problems import Spring
+from sweep_problems import LoneSpring, Spring
 
 from palpate.dataset import Dataset
 from palpate.errors import FileFormatError, SolverError, UsageError
 from palpate.physics import Cantilever, Circle, LinearElastic, TipLoad, preset
-from palpate.sweeps import Scheduler, sweep
+from palpate.sweeps import Scheduler, grow, sweep
 from palpate.sweeps.sweep import reporter
 
 BODY = Cantilever(1.0, Circle(0.005), LinearElastic(2e9, 0.43), elements=5)
@@ -163,6 +163,25 @@ def test_another_sweep_at_the_same_path_is_refused(cluster, tmp_path, change):
     with pytest.raises(UsageError, match="belongs to another sweep"):
         sweep(**arguments | change)
     assert Dataset.open(tmp_path / "a.zarr").hash == first.hash
+
+
+def test_a_finished_sweep_grows_by_what_is_missing(cluster, tmp_path):
+    """Sobol's first points are those of a smaller design: the larger sweep is the same as one made at once."""
+    (tmp_path / "log").mkdir()
+    spring, path = LoneSpring(log=str(tmp_path / "log")), tmp_path / "a.zarr"
+    assert grow(path, spring, {"samples": 16}) is None
+    small = sweep(spring, samples=8, cluster=cluster, path=path)
+    assert grow(path, spring, {"samples": 8}) is None
+    assert grow(path, spring, {"samples": 16}) is None
+    grown = sweep(spring, samples=16, cluster=cluster, path=path)
+    assert len(list((tmp_path / "log").iterdir())) == 16
+    assert grown.hash == sweep(spring, samples=16, cluster=cluster).hash
+    np.testing.assert_array_equal(grown.X[:8], small.X)
+    # a larger one serves where fewer are asked for; another seed is another sweep
+    assert grow(path, spring, {"samples": 8}).hash == grown.hash
+    assert grow(path, spring, {"samples": 32, "seed": 1}) is None
+    with pytest.raises(UsageError, match="belongs to another sweep"):
+        sweep(spring, samples=32, seed=1, cluster=cluster, path=path)
 
 
 def test_an_interrupted_sweep_goes_on_where_it_stopped(cluster, tmp_path):

@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 
 import palpate as pp
+from palpate.physics import Cantilever, Circle, LinearElastic, PointLoad
 from palpate.runtime.recording import TICK
 from palpate.runtime.trace_file import Trace
 from palpate.validation.full_model import compare_full_model
 from palpate.validation.report import write
 from palpate.validation.report.trace_pictures import comparison_pictures
+from palpate.validation.unseen_solves import force_jnd
 
 
 @pytest.fixture(scope="module")
@@ -50,3 +52,21 @@ def test_a_stroke_is_solved_from_each_equilibrium_to_the_next(problem, trace):
     (drawn,) = comparison_pictures(SimpleNamespace(comparisons=[comparison]), "c1")
     assert drawn.title == "A recorded touch: spring beside finite elements"
     assert "difference / JND" in drawn.svg
+
+
+def test_a_beam_is_led_to_where_the_hand_holds_it():
+    """The load is found for each place; a surrogate that is 5 % off is 5 % off, up and down."""
+    beam = Cantilever(1.0, Circle(0.005), LinearElastic(2e9, 0.43, 1150.0))
+    problem = beam.problem([PointLoad("P", 1.0, 0.0, 5.0)])
+    loads = np.linspace(0.5, 5.0, 6)
+    tips = np.array([problem.solve([p]).displacement[-1, :2] for p in loads])
+    ticks = np.zeros(12, TICK)
+    ticks["time"], ticks["coupling"], ticks["flags"] = 1e-3 * np.arange(12), np.inf, 1 << 5
+    ticks["position"][:6, 1], ticks["position"][6:, 1] = tips[:, 1], -tips[:, 1]
+    ticks["wanted"][:6, 1], ticks["wanted"][6:, 1] = 1.05 * loads, -1.05 * loads
+    header = {"name": "beam", "inputs": [["h", -1.0, 1.0, "m"]], "parameters": []}
+    trace = Trace(Path("beam.trace"), header, ticks)
+    comparison = compare_full_model(trace, problem)
+    np.testing.assert_allclose(comparison.reference[:, 1], np.concatenate([loads, -loads]), rtol=1e-7)
+    size = np.abs(comparison.reference[:, 1])
+    np.testing.assert_allclose(comparison.jnd, 0.05 / force_jnd(size), rtol=1e-5)

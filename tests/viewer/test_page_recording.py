@@ -54,6 +54,16 @@ def test_a_page_records_a_touch_from_its_midst(recording_viewer, rod, tmp_path):
     assert np.abs(trace.ticks["force"]).max() > 0.01
     replayed = Replay(trace, recording_viewer.model).run()
     assert replayed.identical, str(replayed)
+    with Viewer(rod, port=0, replay=trace.path) as shown, client_of(shown) as client:
+        forces = []
+        until = time.monotonic() + 20.0
+        while len(forces) < 5:
+            assert time.monotonic() < until, "the touch is shown"
+            frame = client.next_frame()
+            if frame.grabbed and any(frame.force):
+                forces.append(np.array(frame.force))
+    apart = [np.abs(trace.ticks["force"] - force).max(axis=1).min() for force in forces]
+    np.testing.assert_allclose(apart, 0.0, atol=1e-5)  # pages get 32 bits
 
 
 def test_a_folder_that_is_gone_is_told_to_the_page(recording_viewer, tmp_path):

@@ -14,7 +14,7 @@ from palpate.learning import Fitted
 from palpate.network import Network
 from palpate.units import Quantity, Range, bounds
 
-__all__ = ["Answer", "Prediction", "outside", "predictions"]
+__all__ = ["Answer", "Deflection", "Prediction", "outside", "predictions"]
 
 _NOTHING = 1e-9  # N: first touch, but for round-off
 
@@ -153,6 +153,47 @@ class Prediction:
             "outputs": {output.name: float(v) for output, v in zip(self.outputs, self.values, strict=True)},
             "deviations": None if self.deviations is None else self.deviations.tolist(),
             "inside": self.inside,
+            "beyond": _names_beyond(self.inputs, names),
+        }
+
+
+@dataclass(frozen=True)
+class Deflection:
+    """Displacement of a beam under its loads.
+
+    Attributes
+    ----------
+    inputs : (n,)
+        Loads in N.
+    nodes : (k, 3)
+        Nodes of interest at rest, m.
+    displacement : (k, 3)
+        Their displacement, m.
+    """
+
+    inputs: np.ndarray
+    nodes: np.ndarray
+    displacement: np.ndarray
+
+    def words(self, names: Sequence[Range]) -> str:
+        """Return the displacement of each node of interest as lines for a person."""
+        lines = [_place_in_words(self.inputs, names)]
+        for place, moved in zip(self.nodes, self.displacement, strict=True):
+            lines.append(f"  at {place[0]:.4g} m  u_x {1e3 * moved[0]:.4g} mm, u_y {1e3 * moved[1]:.4g} mm")
+        beyond = _names_beyond(self.inputs, names)
+        trust = (
+            f"{', '.join(beyond)} beyond the range, taken at its end"
+            if beyond
+            else "within the range of the loads"
+        )
+        return "\n".join([*lines, f"  trust: {trust}"])
+
+    def as_dict(self, names: Sequence[Range]) -> dict[str, Any]:
+        """Return the displacement as data for a program; `beyond` are the loads out of range."""
+        return {
+            "inputs": self.inputs.tolist(),
+            "nodes": self.nodes.tolist(),
+            "displacement": self.displacement.tolist(),
             "beyond": _names_beyond(self.inputs, names),
         }
 

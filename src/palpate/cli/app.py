@@ -158,6 +158,13 @@ def schema() -> None:
 @app.command()
 def sweep(
     study: StudyFile = STUDY,
+    samples: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help="Solves to learn from. Default: those of the study. A finished sweep is continued, not repeated.",
+        ),
+    ] = None,
     workers: Workers = None,
     case_limit: CaseLimit = CASE_LIMIT,
     scheduler: Annotated[
@@ -189,7 +196,7 @@ def sweep(
         raise UsageError("Certificates belong to a scheduler.", fix="Give its address with --scheduler.")
     else:
         own = None
-    sweep_file(study, workers, Console(as_json), own, case_limit=case_limit)
+    sweep_file(study, workers, Console(as_json), own, case_limit=case_limit, samples=samples)
 
 
 @app.command()

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.cli.answer_at_place import Answer, outside, predictions
+from palpate.cli.answer_at_place import Answer, Deflection, outside, predictions
 from palpate.cli.console import Console
 from palpate.errors import UsageError
 from palpate.learning import Fitted
@@ -18,10 +18,11 @@ from palpate.learning.plastic.load_histories import LoadHistories
 from palpate.network import Network
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import LearntEnergy, Surrogate
+from palpate.surrogates.fields.node_field import NodeField
 from palpate.surrogates.surrogate import correction_warning
 from palpate.units import Range
 
-__all__ = ["answers_at", "ask", "inputs_of"]
+__all__ = ["answers_at", "ask", "deflections", "inputs_of"]
 
 _STEPS = 16  # in a radius
 
@@ -44,9 +45,14 @@ def ask(model: Path, at: Sequence[str], console: Console) -> None:
         warning = _warning(contents)
         console.result("\n".join([f"{what} in {model}\n{contents}", *warning]), content | _as_field(warning))
         return
-    if isinstance(contents, Surrogate):
+    line = _line_under_loads(contents)
+    if line is not None:
+        inputs = line.inputs
+        answers: Sequence[Any] = deflections(line, _places(at, inputs))
+        words = [one.words(inputs) for one in answers]
+    elif isinstance(contents, Surrogate):
         X = _places(at, inputs)
-        answers: Sequence[Any] = answers_at(contents, X)
+        answers = answers_at(contents, X)
         words = [one.words(inputs) for one in answers] + _reservations(contents)
     elif isinstance(contents, Fitted | Network):
         answers = predictions(contents, _places(at, inputs))
@@ -60,6 +66,20 @@ def ask(model: Path, at: Sequence[str], console: Console) -> None:
         )
     content = {"model": str(model), "answers": [one.as_dict(inputs) for one in answers]}
     console.result("\n".join(words), content | _as_field(_warning(contents)))
+
+
+def _line_under_loads(contents: Any) -> NodeField | None:
+    """Return the displacement of a beam that answers to its loads alone; None of anything else."""
+    shown = contents.fields.get("displacement") if isinstance(contents, Surrogate) else None
+    if isinstance(shown, NodeField) and shown.asked_by == "load" and contents.memory is None:
+        return shown
+    return None
+
+
+def deflections(line: NodeField, X: np.ndarray) -> list[Deflection]:
+    """Return the displacement of the nodes of interest under loads X (N, n) in N."""
+    chosen = line.of_interest if len(line.of_interest) else np.arange(len(line.points))
+    return [Deflection(x, line.points[chosen], u[chosen]) for x, u in zip(X, line.values(X), strict=True)]
 
 
 def inputs_of(asked: Any) -> tuple[Range, ...]:

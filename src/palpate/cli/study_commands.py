@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import statistics
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from palpate.cli.console import Console
 from palpate.errors import AccuracyError, UsageError
+from palpate.format import count, duration
 from palpate.processes import CASE_LIMIT
 
 if TYPE_CHECKING:
@@ -41,14 +44,33 @@ def sweep_file(
     scheduler: Scheduler | None = None,
     *,
     case_limit: float = CASE_LIMIT,
+    samples: int | None = None,
 ) -> None:
-    """Solve what a study file describes, here or on a scheduler, and print where the solves are."""
+    """Solve what a study file describes, here or on a scheduler, and print where the solves are.
+
+    Parameters
+    ----------
+    study : Path
+        Study file.
+    workers : int, optional
+        Processes of this machine; by default those of the study.
+    console : Console
+        Printer of the result.
+    scheduler : Scheduler, optional
+        Running scheduler to solve on instead.
+    case_limit : float
+        Time in s after which a single solve has failed.
+    samples : int, optional
+        Solves to learn from, in place of the study's own number; a finished sweep is continued.
+    """
+    from palpate.dataset import Dataset
     from palpate.study import read_study
     from palpate.study.run import Paths, sweep_study
     from palpate.sweeps import Scheduler
 
-    record = read_study(study).with_workers(workers)
+    record = read_study(study).with_workers(workers).with_samples(samples)
     paths = Paths(study.parent, record.name)
+    began = time.monotonic()
     if paths.data.with_name(paths.data.name + ".parts").exists():
         console.say(f"Going on with the interrupted sweep in {paths.data} …")
     if scheduler is None and record.sweep is not None and record.sweep.scheduler is not None:
@@ -61,7 +83,12 @@ def sweep_file(
     if scheduler is not None and scheduler.warning:
         console.say(f"Warning: {scheduler.warning}")
     data, further = sweep_study(
-        record, paths, cluster=scheduler, progress=not console.as_json, case_limit=case_limit
+        record,
+        paths,
+        cluster=scheduler,
+        progress=not console.as_json,
+        case_limit=case_limit,
+        log=lambda stage: console.say(f"Solving: {stage} …"),
     )
     target, other = (
         (paths.data, paths.random) if record.memory is None else (paths.histories, paths.unseen_histories)
@@ -72,6 +99,12 @@ def sweep_file(
     if further is not None:
         what = "solves" if record.memory is None else "histories"
         text += f"\n{other}: {len(further)} further {what} for testing"
+    seconds = [float(s) for part in parts if isinstance(part, Dataset) for s in part["solve_seconds"]]
+    if seconds:
+        text += (
+            f"\n{count(len(seconds), 'solve')}, {duration(statistics.median(seconds))} each at the median; "
+            f"this took {duration(time.monotonic() - began)}"
+        )
     content = {"data": str(target), "random": None if further is None else str(other)}
     console.result(text, content | {"rows": sum(map(len, parts)), "failed": failed})
 
@@ -87,6 +120,7 @@ def learn_file(study: Path, console: Console) -> None:
         validate_study,
         with_validation,
     )
+    from palpate.study.study_advice import earlier_curve
 
     record = read_study(study)
     paths = Paths(study.parent, record.name)
@@ -94,7 +128,8 @@ def learn_file(study: Path, console: Console) -> None:
     console.say(f"Learning from {len(train)} {'solves' if record.memory is None else 'histories'} …")
     model, history = learn_study(record, train, test, log=lambda stage: console.say(f"{stage} …"))
     validation = validate_study(record, model, test, history)
-    model = with_validation(model, validation)
+    curve = earlier_curve(paths, record.name)
+    model = with_validation(model, validation, curve, len(train) if record.memory is None else 0)
     save_model(paths, model, history)
     lines = [f"  {check}" for check in validation.checks if check.criterion.key in _HEADLINES]
     values = {check.criterion.key: check.measured for check in validation.checks}
@@ -130,23 +165,33 @@ def validate_study_file(study: Path, report: bool, console: Console, traces: Seq
     """
     from palpate.study import read_study
     from palpate.study.run import Outcome, Paths, load_data, load_model, report_study, validate_study
+    from palpate.study.study_advice import advice_after
+    from palpate.validation.report.body_words import solid_words
 
     record = read_study(study)
     paths = Paths(study.parent, record.name)
     train, test = load_data(record, paths)
     model, history = load_model(paths, train)
     validation = validate_study(record, model, test, history)
+    advice = advice_after(record, model, train, validation, study)
+    if advice:
+        validation = replace(validation, notes=(f"{advice}.", *validation.notes))
     beside = _beside_full_model(record, traces, console)
-    text = "\n".join([str(validation), *map(str, beside)])
+    text = "\n".join(filter(None, [solid_words(train), str(validation), *map(str, beside)]))
     if report:
         outcome = Outcome(record, model, train, test, validation, history, comparisons=beside)
         report_study(paths.report, [outcome])
         text += f"\nreport: {paths.report}"
-    content = validation.as_dict() | {"report": str(paths.report) if report else None}
+    content = validation.as_dict() | {"report": str(paths.report) if report else None, "advice": advice}
     if beside:
         content["traces"] = [comparison.as_dict() for comparison in beside]
     console.result(text, content)
-    validation.raise_if_failed()
+    try:
+        validation.raise_if_failed()
+    except AccuracyError as error:
+        if not advice:
+            raise
+        raise AccuracyError(error.what, why=error.why, fix=f"{advice}, then palpate learn {study}") from None
 
 
 def _beside_full_model(record: Study, traces: Sequence[Path], console: Console) -> list[TouchComparison]:
@@ -227,13 +272,15 @@ def validate_model(
     from palpate.surrogates import Surrogate
     from palpate.surrogates.surrogate import correction_count
     from palpate.validation import Chapter, validate, write_report
+    from palpate.validation.report.body_words import solid_words
 
     model = Surrogate.load(path)
     data, fine = _test_set(path, test), None if refined is None else Dataset.open(refined)
     validation = replace(validate(model, data, refined=fine), name=path.stem)
     if touches := correction_count(model.meta):
         validation = replace(validation, notes=(*validation.notes, _CORRECTED.format(touches)))
-    text, target = str(validation), path.with_suffix(".html") if report else None
+    body = solid_words(data)
+    text, target = f"{body}\n{validation}".lstrip(), path.with_suffix(".html") if report else None
     if target is not None:
         origin = getattr(data, "provenance", {})
         write_report(

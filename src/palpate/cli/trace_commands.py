@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from palpate.runtime.trace_file import Trace
+    from palpate.validation.report.trace_pictures import Solved
     from palpate.validation.touch_comparison import TouchComparison
 
 __all__ = ["replay", "trace_app"]
@@ -218,14 +219,19 @@ def plot(
     trace = _read(file, console)
     if not len(trace):
         raise UsageError(f"{file.name} holds no tick.", why=" ".join(trace.notes))
-    solved = None if data is None else _solved(trace, data, model)
+    solved, apart = (None, 0.0) if data is None else _solved(trace, data, model)
     path = save_figure(out or file.with_suffix(".svg"), lambda: plot_trace(trace, solved))
-    words = "" if solved is None else f": {solved[2]}"
-    console.result(f"{path}{words}", {"file": str(path), "solves": 0 if solved is None else len(solved[0])})
+    words = (
+        ""
+        if solved is None
+        else f"\n{len(solved[0])} solves within {100 * apart / 2:.2g} % of the inputs' ranges"
+    )
+    facts = {"solves": 0 if solved is None else len(solved[0]), "within": apart / 2}
+    console.result(f"{path}{words}", {"file": str(path)} | facts)
 
 
-def _solved(trace: Trace, data: Path, model: Path | None) -> tuple[np.ndarray, np.ndarray, str]:
-    """Return depths (m), sizes of the forces (N) and words for the solves beside a stroke."""
+def _solved(trace: Trace, data: Path, model: Path | None) -> tuple[Solved, float]:
+    """Return the solves beside a stroke, and how far from it the farthest is, in half ranges of the inputs."""
     import numpy as np
 
     from palpate.dataset import Dataset
@@ -238,8 +244,9 @@ def _solved(trace: Trace, data: Path, model: Path | None) -> tuple[np.ndarray, n
     solves = TouchSolves.of(Dataset.open(data), touch.inputs)
     low, high = bounds(touch.inputs)
     rows, apart = solves_beside(trace, solves, (np.asarray(high) - np.asarray(low)) / 2.0)
-    X, size = solves.X[rows], np.linalg.norm(solves.force[rows], axis=1)
-    return touch.depth(X), size, f"finite elements, within {100 * apart / 2:.2g} % of the ranges"
+    X = solves.X[rows]
+    sizes = (np.linalg.norm(force, axis=1) for force in (solves.force[rows], touch.energy.force(X)))
+    return (touch.depth(X), *sizes), apart
 
 
 @trace_app.command()

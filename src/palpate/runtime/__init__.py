@@ -8,6 +8,9 @@
     stability, coupling               how stiff a body may feel, and the spring in front of one that is stiffer
     workspace, devices                where the hand is
     touchable, hand_evaluator         what it is laid on, and what answers it
+    recording, recorder, snapshot     every tick on its way into a file, from any moment on
+    trace_file, trace_export          that file, and tables made of it
+    replay                            the same loop on recorded samples
 
 Names are loaded when asked for, so that the loop's process imports nothing it doesn't need.
 """

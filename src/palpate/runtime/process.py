@@ -86,6 +86,12 @@ class LoopProcess:
         replay: str | os.PathLike[str] | None = None,
     ) -> None:
         traits = device_traits(device)
+        if dead_man and not traits.buttons:
+            raise UsageError(
+                f"The device {device.partition(':')[0]!r} has no button to hold.",
+                why="A dead-man button is the first button of a device.",
+                fix="Leave it out; with the page the mouse button itself has to be held.",
+            )
         self.device, self.rate = device, rate
         settings = {
             "--device": device,
@@ -127,7 +133,7 @@ class LoopProcess:
         self._stderr = tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace")  # noqa: SIM115
         try:
             if self._record is not None:
-                self.recording = self._recorder(self._record, running=False)
+                self.recording = self._recorder(self._record)
             self._process = self._popen()
             self._await_first_tick()
         except BaseException:
@@ -158,7 +164,7 @@ class LoopProcess:
         """
         if self.recording is not None and self.recording.active:
             raise UsageError(f"{self.recording.path} is being recorded.", fix="Stop that recording first.")
-        self.recording = self._recorder(path, running=True)
+        self.recording = self._recorder(path)
         self.recording.start()
         return self.recording
 
@@ -168,9 +174,9 @@ class LoopProcess:
             self.recording.stop()
         return self.recording
 
-    def _recorder(self, path: str | os.PathLike[str], *, running: bool) -> TraceRecorder:
+    def _recorder(self, path: str | os.PathLike[str]) -> TraceRecorder:
         header = {"device": self.device, "model": model_facts(self._model)}
-        return TraceRecorder(_started(self._ring), path, header, running=running)
+        return TraceRecorder(_started(self._ring), path, header)
 
     def _popen(self) -> subprocess.Popen[str]:
         modules = (f"--module={name}" for name in outside_modules())

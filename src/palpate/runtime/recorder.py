@@ -39,8 +39,6 @@ class TraceRecorder:
         A new file.
     header : mapping
         What is known of model, device and rate before the loop says more.
-    running : bool
-        Whether the loop ticks already. Then the recording begins with one of its next ticks; otherwise with its first.
 
     Attributes
     ----------
@@ -55,19 +53,16 @@ class TraceRecorder:
         If the file can't be made.
     """
 
-    def __init__(
-        self, ring: Ring, path: str | os.PathLike[str], header: Mapping[str, Any], *, running: bool = True
-    ) -> None:
+    def __init__(self, ring: Ring, path: str | os.PathLike[str], header: Mapping[str, Any]) -> None:
         self.path, self.ticks = Path(path), 0
         self.error: PalpateError | None = None
-        self._ring, self._running = ring, running
+        self._ring = ring
         self._writer = TraceWriter(
             self.path, dict(header) | machine_facts() | {"recorded": datetime.now(UTC).isoformat()}
         )
         self._rows: list[np.ndarray] = []
         self._events: list[dict[str, Any]] = []
         self._lost = ring.lost
-        self._known: Mapping[str, Any] = header
         self._ending, self._end = threading.Event(), threading.Event()
         ring.read = int(ring.head)
         self._number = int(ring.begun) + 1
@@ -159,7 +154,7 @@ class TraceRecorder:
     def _collect(self) -> None:
         before = self.lost
         rows = self._ring.take()
-        if self.lost > before and self._running:
+        if self.lost > before:
             self.add_event("lost", count=self.lost - before)
         if len(rows):
             self._rows.append(rows)

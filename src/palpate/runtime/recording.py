@@ -65,6 +65,7 @@ TICK = np.dtype(
         ("sample_time", "f8"),  # s
         ("patience", "f8"),  # s
         ("hand", "f8", 3),  # m, x right, y up, z towards the user
+        ("position", "f8", 3),  # m, body: the hand there, or how far it has displaced what it holds
         ("contact", "f8", 3),  # m, body: where it is touched
         ("wanted", "f8", 3),  # N on the hand, body axes: before limits and controller
         ("force", "f8", 3),  # N on the hand, body axes, as sent
@@ -333,7 +334,17 @@ class TickRecorder:
         for name in FLAGS[5:]:
             if published[name]:
                 flags |= _BIT[name]
-        for name in ("tick", "hand", "contact", "force", "depth", "stiffness", "delay", "coupling"):
+        for name in (
+            "tick",
+            "hand",
+            "position",
+            "contact",
+            "force",
+            "depth",
+            "stiffness",
+            "delay",
+            "coupling",
+        ):
             views[name][...] = published[name]
         views["time"][()], views["lateness"][()] = loop.now, lateness
         views["wanted"][:] = loop.wanted

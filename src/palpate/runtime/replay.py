@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.errors import DeviceError, DeviceLostError, DeviceStopError, UsageError
+from palpate.errors import DeviceError, DeviceLostError, DeviceStopError, FileFormatError, UsageError
 from palpate.runtime.devices.device import Sample, Traits
 from palpate.runtime.loop import Loop
 from palpate.runtime.recorder import machine_facts, model_facts
@@ -39,6 +39,8 @@ _ERRORS: dict[int, type[DeviceError]] = {
     Fault.DEVICE_LOST: DeviceLostError,
     Fault.DEVICE_STOPPED: DeviceStopError,
 }
+_NEEDED = ("holds", "traits", "workspace", "body_stiffness", "limits", "rate", "override", "control",
+           "dead_man", "parameters", "inputs")  # fmt: skip
 _BIT = {name: 1 << k for k, name in enumerate(FLAGS)}
 
 
@@ -163,7 +165,7 @@ class Replay:
     UsageError
         If the trace holds no tick, or the body is held where the recorded one was pressed.
     FileFormatError
-        If the recorded state doesn't fit the body.
+        If the recorded state doesn't fit the body, or the trace doesn't say what its loop was.
     """
 
     def __init__(
@@ -178,13 +180,7 @@ class Replay:
         if not len(trace):
             raise UsageError(f"{trace.path.name} holds no tick.", why=" ".join(trace.notes))
         header = trace.header
-        if bool(header["holds"]) != model.holds:
-            how = "held" if header["holds"] else "pressed"
-            raise UsageError(
-                f"{model.name} can't be touched by this hand.",
-                why=f"The recorded body was {how}, this one is {'held' if model.holds else 'pressed'}.",
-                fix="Take a model of the same kind.",
-            )
+        _require_loop(trace, model)
         self.trace, self.model, self.same = trace, model, same
         traits = header["traits"]
         known = Traits(**traits | {"axes": _axes(traits["axes"])})
@@ -298,6 +294,8 @@ class Replayed:
             for name in here
             if header.get(name) not in {None, here[name]}
         ]
+        swaps = [event for event in self.trace.events if event.get("kind") == "swap"]
+        causes += [f"another surrogate answers from tick {event.get('tick')} on" for event in swaps]
         if self.trace.lost:
             causes.append(f"the recording is without {self.trace.lost} ticks")
         if self.trace.state is None:
@@ -397,6 +395,24 @@ def play(
     while wanted():
         out.stay(now())
         time.sleep(_IDLE)
+
+
+def _require_loop(trace: Trace, model: Touchable) -> None:
+    """Refuse a trace that doesn't say what its loop was, or whose hand can't touch this body."""
+    header = trace.header
+    if missing := [name for name in _NEEDED if name not in header]:
+        raise FileFormatError(
+            f"{trace.path.name} can't be replayed.",
+            why=f"It doesn't say {', '.join(missing)}: its loop had not begun, or another program wrote it.",
+            fix="Record it anew.",
+        )
+    if bool(header["holds"]) != model.holds:
+        how = "held" if header["holds"] else "pressed"
+        raise UsageError(
+            f"{model.name} can't be touched by this hand.",
+            why=f"The recorded body was {how}, this one is {'held' if model.holds else 'pressed'}.",
+            fix="Take a model of the same kind.",
+        )
 
 
 def _axes(rows: Any) -> Any:

@@ -26,6 +26,7 @@ __all__ = ["FORMATS", "UNITS", "export_trace", "trace_table"]
 
 _VECTORS = {
     "hand": ("hand", "m"),
+    "position": ("position", "m"),
     "contact": ("contact", "m"),
     "wanted": ("force_wanted", "N"),
     "force": ("force", "N"),

@@ -23,6 +23,7 @@ import io
 import json
 import os
 import struct
+import zipfile
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -43,6 +44,8 @@ _LOCAL = struct.Struct("<4s5H3I2H")  # of APPNOTE.TXT 4.3.7, the header of a ZIP
 _CENTRAL = struct.Struct("<4s6H3I5H2I")
 _END = struct.Struct("<4s4H2IH")
 _DATE = 0x21  # 1 January 1980, as early as a ZIP can say
+_LARGEST_CHUNK = 256 * 1024 * 1024  # bytes of what is decoded at once: more is no half second
+_DAMAGE = (ValueError, KeyError, TypeError, EOFError, OSError, zlib.error, zipfile.BadZipFile)
 _MOST_ENTRIES, _LARGEST = 0xFFFF, 0xFFFFFFFF  # for which an archive can have a plain directory
 
 
@@ -255,7 +258,7 @@ def read_trace(path: str | os.PathLike[str]) -> Trace:
                 events += json.loads(content)
             elif name.startswith("ticks-"):
                 chunks.append(_unfold(_arrays(content)))
-    except (ValueError, KeyError, TypeError, zlib.error) as error:
+    except _DAMAGE as error:
         raise FileFormatError(
             f"{path} is damaged.", why=str(error), fix="Copy the file again, or record it anew."
         ) from error
@@ -273,6 +276,8 @@ def _missing(data: bytes, used: int, end: Mapping[str, Any] | None) -> tuple[str
     if end is not None:
         return ()
     rest = len(data) - used
+    if data.find(b"PK\5\6", used) >= 0:  # the directory that ends a whole one
+        return (f"The recording is damaged at byte {used}: the {rest} bytes from there on were left out.",)
     cut = f"; the last {rest} bytes are an unfinished chunk and were left out" if rest else ""
     return (f"The recording has no end: its program was killed, or still records{cut}.",)
 
@@ -313,6 +318,10 @@ def _npz(arrays: Mapping[str, Any]) -> bytes:
 
 
 def _arrays(content: bytes) -> dict[str, np.ndarray]:
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        size = sum(entry.file_size for entry in archive.infolist())
+        if size > _LARGEST_CHUNK:
+            raise ValueError(f"A chunk claims to be {size} bytes long.")
     with np.load(io.BytesIO(content), allow_pickle=False) as archive:
         return {name: archive[name] for name in archive.files}
 
@@ -337,10 +346,13 @@ def _fold(ticks: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _unfold(columns: Mapping[str, np.ndarray]) -> np.ndarray:
-    ticks = np.zeros(int(columns["count"]), TICK)
+    count = int(columns["count"])
+    if not 0 <= count <= _LARGEST_CHUNK // TICK.itemsize:
+        raise ValueError(f"A chunk claims to hold {count} ticks.")
+    ticks = np.zeros(count, TICK)
     for name in COLUMNS:
         if name in columns:
             ticks[name] = columns[name]
-    for name, twin in columns["same"].tolist():
+    for name, twin in np.asarray(columns["same"], dtype=str).tolist():
         ticks[name] = ticks[twin]
     return ticks

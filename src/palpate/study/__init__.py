@@ -9,6 +9,7 @@ toml                 the record as a TOML file with comments, and back
 named_studies        studies that have a name
 part_study           study of a part that the user has
 run                  the stages: sweep, load the data, learn, validate, report
+study_advice         number of solves that would keep the limits
 """
 
 from palpate.study.named_studies import preset_names, preset_study

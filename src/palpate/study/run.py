@@ -20,6 +20,7 @@ import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
+from palpate.format import count
 from palpate.learning import History, Settings, founding, learn_dataset, node_outputs
 from palpate.learning import learn as learn_samples
 from palpate.learning.learn_dataset import filter_record
@@ -28,8 +29,9 @@ from palpate.processes import CASE_LIMIT
 from palpate.study.memory_stages import learn_histories, sweep_histories
 from palpate.study.study import Study
 from palpate.surrogates import Surrogate
-from palpate.sweeps import sweep
+from palpate.sweeps import grow, sweep
 from palpate.validation import Chapter, Validation, validate, write_report
+from palpate.validation.more_solves import learning_curve
 from palpate.validation.touch_comparison import TouchComparison
 
 __all__ = [
@@ -152,6 +154,7 @@ def sweep_study(
     cluster: Any = None,
     progress: Any = True,
     case_limit: float = CASE_LIMIT,
+    log: Log = lambda _: None,
 ) -> tuple[Rows, Rows | None]:
     """Solve the study's design, and what is solved for testing only.
 
@@ -167,6 +170,8 @@ def sweep_study(
         A bar on standard error; or a function (done, total).
     case_limit : float
         Time in s after which a single solve has failed.
+    log : callable
+        Gets a line before each of the two sweeps.
 
     Returns
     -------
@@ -193,11 +198,25 @@ def sweep_study(
         "progress": progress,
         "case_limit": case_limit,
     }
-    data = sweep(problem, path=paths.data if paths else None, **study.sweep.arguments(problem), **common)
+    log(f"{count(study.sweep.samples, 'solve')} to learn from{_solved_part(study, problem)}")
+    wanted = study.sweep.arguments(problem)
+    data = grow(paths.data, problem, wanted) if paths else None
+    if data is None:
+        data = sweep(problem, path=paths.data if paths else None, **wanted, **common)
     further = study.test.arguments(problem)
     if further is None:
         return data, None
+    log("further solves for testing only, which learning never sees")
     return data, sweep(problem, path=paths.random if paths else None, **further, **common)
+
+
+def _solved_part(study: Study, problem: Any) -> str:
+    """Return in words that only a part of the touched surface is solved, where symmetry gives the rest."""
+    given = getattr(problem, "symmetry", None)
+    images = len(given["isometries"]) if given and study.sweep and study.sweep.symmetric else 1
+    if images < 2:
+        return ""
+    return f"; the body is symmetric, so only a part of it is touched, and a solve stands for up to {images} places"
 
 
 def load_data(study: Study, paths: Paths) -> tuple[Rows, Rows]:
@@ -325,9 +344,26 @@ def validate_study(study: Study, model: Any, test: Rows, history: Any = None) ->
     return validate(model, test, history=filter_record(history), limits=study.target.limits())
 
 
-def with_validation(model: Any, validation: Validation) -> Any:
-    """Return what was learnt with its errors on unseen solves written into it."""
-    return _with_meta(model, {"validation": validation.summary()})
+def with_validation(
+    model: Any, validation: Validation, curve: Sequence[Mapping[str, Any]] = (), solves: int = 0
+) -> Any:
+    """Return what was learnt with its errors on unseen solves written into it.
+
+    Parameters
+    ----------
+    model : Surrogate
+        What was learnt.
+    validation : Validation
+        Its figures.
+    curve : sequence of mapping
+        Learning curve of the surrogate that it replaces, if there was one.
+    solves : int
+        Solves that it was learnt from; 0 where the curve is not kept.
+    """
+    more: dict[str, Any] = {"validation": validation.summary()}
+    if solves:
+        more["learning_curve"] = learning_curve(curve, solves, validation)
+    return _with_meta(model, more)
 
 
 def save_model(paths: Paths, model: Any, history: Any) -> None:

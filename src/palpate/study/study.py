@@ -171,6 +171,31 @@ class Study(Record):
                 fix="Use letters, digits, dots, dashes and underscores, a letter or a digit first.",
             ) from error
 
+    def with_samples(self, samples: int | None) -> Study:
+        """Return the study with a number of solves to learn from; None: as the study says.
+
+        Raises
+        ------
+        UsageError
+            If the study has no such number, or it does not suit its design.
+        """
+        if samples is None:
+            return self
+        if self.sweep is None:
+            raise UsageError(
+                "The histories of this study are not counted by samples.",
+                fix="Change `histories` in [memory], or leave --samples out.",
+            )
+        content = self.model_dump()
+        content["sweep"]["samples"] = samples
+        try:
+            return Study.model_validate(content)
+        except ValidationError as error:
+            reason = str(error.errors(include_url=False)[0]["msg"]).removeprefix("Value error, ")
+            raise UsageError(
+                f"{samples} solves do not suit this study.", why=f"{reason}.", fix="Give another number."
+            ) from error
+
     def with_workers(self, workers: int | None) -> Study:
         """Return the study with a number of processes for its sweep and for learning; None: as the study says."""
         if workers is None:

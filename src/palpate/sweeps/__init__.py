@@ -10,9 +10,11 @@
     runner.py      the chains on Dask, through the loss of workers
     cluster.py     worker processes on this machine; worker.py is the process
     ledger.py      finished parts of an interrupted sweep, on disk
+    grow_sweep.py  a finished sweep that is asked for more samples
 """
 
 from palpate.sweeps.cluster import LocalCluster, Scheduler, local_cluster
+from palpate.sweeps.grow_sweep import grow
 from palpate.sweeps.problem import (
     Answer,
     Chained,
@@ -41,6 +43,7 @@ __all__ = [
     "Solver",
     "Space",
     "grid",
+    "grow",
     "local_cluster",
     "random",
     "sobol",

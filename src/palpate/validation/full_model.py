@@ -2,7 +2,7 @@
 
 The recorded stroke is thinned to moments that lie evenly along the way of the hand. They are solved in passes from its
 beginning to its end, each pass twice as fine as the one before: a comparison that runs out of time still covers the
-whole stroke. Each solve starts from the nearest equilibrium that is known.
+whole stroke, its deepest moment first of all. Each solve starts from the nearest equilibrium that is known.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ __all__ = ["compare_full_model", "stroke_moments"]
 
 Progress = Callable[[int, int, float], None]
 _EVERY = 5.0  # s between two words on the progress
+_SECANTS, _CLOSE = 12, 1e-8  # solves for a load at most, and share of the way to which it is found
 
 
 def stroke_moments(trace: Trace, most: int) -> np.ndarray:
@@ -63,7 +64,7 @@ def compare_full_model(
     Parameters
     ----------
     trace : Trace
-        Of a body pressed by a probe or held by a pad.
+        Of a body pressed by a probe, held by a pad, or, a beam, at the node of its single load.
     problem : Problem
         The body and its interaction, such as `palpate.study.Study.problem` returns.
     limit : float
@@ -82,23 +83,22 @@ def compare_full_model(
     SolverError
         If no moment has an equilibrium, or not two of them are solved in time.
     """
-    columns = _columns(trace, problem)
+    answer = (
+        _BeamUnderHand(trace, problem) if hasattr(problem, "load_nodes") else _BodyUnderHand(trace, problem)
+    )
     moments = stroke_moments(trace, most)
     if len(moments) < 2:
         raise UsageError(f"{trace.path.name} holds no touch.", fix="Record one in which the body is felt.")
-    places = np.hstack([trace.ticks["contact"].astype(float), trace.parameters])[moments][:, columns]
-    solver, began, told = problem.open(), clock(), clock()
+    began = told = clock()
     forces = np.full((len(moments), 3), np.nan)
     failed, done = 0, 0
-    for row in _passes(len(moments)):
+    deepest = int(np.argmax(trace.ticks["depth"][moments]))
+    for row in _passes(len(moments), deepest):
         if clock() - began > limit:
             break
-        answer = solver.solve(places[row])
+        forces[row] = answer(moments[row])
         done += 1
-        if answer.converged:
-            forces[row] = np.asarray(answer.response)[:3]
-        else:
-            failed += 1
+        failed += not np.isfinite(forces[row]).all()
         if clock() - told > _EVERY:
             told = clock()
             progress(done, len(moments), told - began)
@@ -125,24 +125,73 @@ def compare_full_model(
     )
 
 
-def _columns(trace: Trace, problem: Any) -> list[int]:
-    """Return, for each input of the problem, its column among the recorded contact and further inputs."""
-    known = [row[0] for row in trace.header["inputs"]]
-    felt = len(known) - len(trace.header["parameters"])
-    wanted = [r.name for r in problem.ranges]
-    if felt != 3 or sorted(wanted) != sorted(known):
-        raise UsageError(
-            "This full model can't be put under the recorded hand.",
-            why=f"Its inputs are {', '.join(wanted)}; those of the recorded body are {', '.join(known)}.",
-            fix="Give the study from which the recorded model was learnt, of a body that is pressed or held by a pad.",
+class _BodyUnderHand:
+    """Forces of a solid that is pressed by a probe or held by a pad, at ticks of a trace."""
+
+    def __init__(self, trace: Trace, problem: Any) -> None:
+        known = [row[0] for row in trace.header["inputs"]]
+        wanted = [r.name for r in problem.ranges]
+        if len(known) - len(trace.header["parameters"]) != 3 or sorted(wanted) != sorted(known):
+            raise _refusal(trace, problem, "Give the study from which the recorded model was learnt.")
+        self._columns = [known.index(name) for name in wanted]
+        self._trace, self._solver = trace, problem.open()
+
+    def __call__(self, tick: int) -> np.ndarray:
+        """Return the force (3,) on the hand, N; not-a-number without an equilibrium."""
+        place = np.concatenate([self._trace.ticks["contact"][tick], self._trace.parameters[tick]])
+        answer = self._solver.solve(place[self._columns])
+        return np.asarray(answer.response)[:3] if answer.converged else np.full(3, np.nan)
+
+
+class _BeamUnderHand:
+    """Forces of an elastic beam that is held at the node of its single load, at ticks of a trace."""
+
+    def __init__(self, trace: Trace, problem: Any) -> None:
+        felt = len(trace.header["inputs"]) - len(trace.header["parameters"])
+        if len(problem.ranges) != 1 or felt != 1 or problem.body.kind != "elastic":
+            raise _refusal(trace, problem, "Only an elastic beam under one load can be led by a hand.")
+        self._direction = np.append(np.asarray(problem.load_directions[0]), 0.0)
+        self._node, self._largest = problem.load_nodes[0], float(problem.ranges[0].high)
+        self._trace, self._solver = trace, problem.open()
+
+    def __call__(self, tick: int) -> np.ndarray:
+        """Return the force (3,) on the hand, N; not-a-number without an equilibrium."""
+        row = self._trace.ticks[tick]
+        # a spring in front of a stiff body: the hand is not where it holds the body
+        place = row["position"] if np.isinf(row["coupling"]) else row["contact"]
+        goal = float(place @ self._direction)
+        load = -float(row["wanted"] @ self._direction)
+        before, gap_before = 0.0, -goal
+        for _ in range(_SECANTS):
+            gap = self._along(load) - goal
+            if not np.isfinite(gap) or abs(gap) <= _CLOSE * abs(goal):
+                break
+            slope = (gap - gap_before) / (load - before) if load != before else np.inf
+            before, gap_before = load, gap
+            load -= gap / slope
+        return -load * self._direction if np.isfinite(gap) else np.full(3, np.nan)
+
+    def _along(self, load: float) -> float:
+        """Return how far the node goes along the load's direction, m."""
+        answer = self._solver.solve(np.array([load]))
+        return (
+            float(answer.displacement[self._node, :2] @ self._direction[:2]) if answer.converged else np.nan
         )
-    return [known.index(name) for name in wanted]
 
 
-def _passes(count: int) -> list[int]:
-    """Return 0 … count − 1 in passes along the stroke, each twice as fine as the one before."""
+def _refusal(trace: Trace, problem: Any, fix: str) -> UsageError:
+    known, wanted = [row[0] for row in trace.header["inputs"]], [r.name for r in problem.ranges]
+    return UsageError(
+        "This full model can't be put under the recorded hand.",
+        why=f"Its inputs are {', '.join(wanted)}; those of the recorded body are {', '.join(known)}.",
+        fix=fix,
+    )
+
+
+def _passes(count: int, first: int) -> list[int]:
+    """Return 0 … count − 1, `first` ahead, in passes along the stroke, each twice as fine as the one before."""
     step = 1 << max(0, (count - 1).bit_length() - 3)
-    order, seen = [], set()
+    order, seen = [first], {first}
     while step:
         for row in [*range(0, count, step), count - 1]:
             if row not in seen:

@@ -200,15 +200,17 @@ class Check:
         return "good" if good is not None and _within(self.measured, good) else "pass"
 
     def __str__(self) -> str:
-        """Return the measured value, the limit, the worst case, and after a miss the advice."""
+        """Return the measured value and the limit, and after a miss the worst case and the advice."""
         from palpate.format import criterion_figure
 
         kind = self.criterion.kind
         measured, limit = criterion_figure(self.measured, kind), criterion_figure(self.limit, kind)
         text = f"{self.criterion.label}: {measured} measured, {limit} asked."
+        if self.passed:
+            return text
         if self.where:
             text += f" The worst case is {self.where}."
-        return text if self.passed else f"{text} {self.criterion.fix}"
+        return f"{text} {self.criterion.fix}"
 
 
 _MORE = (

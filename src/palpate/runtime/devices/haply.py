@@ -120,6 +120,7 @@ class HaplyDevice:
         0.5,
         "radius: the vendor's tutorials; force: the Inverse3's peak; damping: none is published, 0.5 N·s/m is assumed",
         axes=AXES,
+        buttons=3,
     )
 
     def __init__(self, settings: HaplySettings) -> None:
@@ -271,12 +272,7 @@ class HaplyDevice:
                 "The address speaks the legacy format of version 3.0.",
                 fix="Use the simulation channel, ws://localhost:10001.",
             )
-        if name := self._settings.hold:
-            grips = [*(frame.get("verse_grip") or ()), *(frame.get("wireless_verse_grip") or ())]
-            buttons = [(grip.get("state") or {}).get("buttons") or {} for grip in grips]
-            self.sample.holding = any(bool(b.get(name)) for b in buttons)
-        else:
-            self.sample.holding = True
+        self._press(frame)
         for entry in entries or ():
             if entry.get("device_id") == self.device_id:
                 return entry  # type: ignore[no-any-return]
@@ -284,6 +280,19 @@ class HaplyDevice:
         raise DeviceLostError(
             f"Haply device {self.device_id} is no longer there.", fix="Connect it, then start again."
         )
+
+    def _press(self, frame: Mapping[str, Any]) -> None:
+        """Take the buttons of the grips, in the order of their names; the one that holds is the driver's own."""
+        sample, own = self.sample, self._settings.hold
+        sample.holding, sample.buttons = not own, 0
+        for family in ("verse_grip", "wireless_verse_grip"):
+            for grip in frame.get(family) or ():
+                buttons = (grip.get("state") or {}).get("buttons") or {}
+                for k, name in enumerate(sorted(buttons)):
+                    if buttons[name] and name == own:
+                        sample.holding = True
+                    elif buttons[name]:
+                        sample.buttons |= 1 << k
 
     def _watch_events(self) -> None:
         if self._settings.events:

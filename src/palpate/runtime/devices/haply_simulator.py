@@ -168,8 +168,10 @@ class HaplySimulator(ServiceDouble):
         self._kept: list[tuple[ServerConnection, str]] = []
 
     def force(self, device: int = 0) -> np.ndarray:
-        """Return the force (3,) on the hand, N, in the service's axes, after its scale."""
-        return self._devices[device].hand.force.copy()
+        """Return the force (3,) on the hand, N, in the service's axes, after its scale; zero once it has lapsed."""
+        hand = self._devices[device].hand
+        lapsed = self._clock() - hand.commanded > self.settings.silence
+        return np.zeros(3) if lapsed else hand.force.copy()
 
     def release(self) -> None:
         """Send the answers that were held, in their order."""

@@ -118,6 +118,8 @@ class SimulatedHand:
     ----------
     place, velocity : (3,)
         The true handle, m and m/s, without encoder and delay.
+    push : (3,)
+        The loop's force on the handle, N.
     work : float
         What the loop's force has done on the handle, J: positive where the loop gave energy.
     """
@@ -135,6 +137,8 @@ class SimulatedHand:
             s.damping,
             f"a simulation; radius and largest force are those of {limits.name}",
             mass=min(s.mass, known.mass),
+            max_stiffness=limits.max_stiffness,
+            name=f"simulated {limits.name}",
         )
         rng = np.random.default_rng(int(s.seed))
         self._along = np.array([s.x, s.y, s.z]) / math.hypot(s.x, s.y, s.z)
@@ -152,7 +156,7 @@ class SimulatedHand:
             ]
         )
         self._shape = _SHAPES.index(s.shape)
-        self.place, self.velocity, self._push = np.zeros(3), np.zeros(3), np.zeros(3)
+        self.place, self.velocity, self.push = np.zeros(3), np.zeros(3), np.zeros(3)
         self._clock = np.zeros(2)  # s since the first reading; J of work
         self._past, self._count = np.zeros((_PAST, 4)), 0
         self._began, self._last = math.nan, math.nan
@@ -190,7 +194,7 @@ class SimulatedHand:
         _integrate(
             self.place,
             self.velocity,
-            self._push,
+            self.push,
             self._clock,
             span,
             self._shape,
@@ -202,11 +206,11 @@ class SimulatedHand:
 
     def write(self, force: np.ndarray) -> None:
         """Push with a force (3,), N, until the next call."""
-        self._push[:] = force
+        self.push[:] = force
 
     def close(self) -> None:
         """Stop pushing and let go."""
-        self._push[:] = 0.0
+        self.push[:] = 0.0
         self.sample.holding = False
 
 

@@ -64,7 +64,7 @@ class Smoothness(Figure):
         """Return the ratio with its reference."""
         return [
             f"second differences of the force at 0.1 m/s and 1 kHz: at most {self.p95:.2f} times the "
-            f"reference's on 95 of 100 of {counted(self.strokes, 'stroke')}; reference: {self.reference}"
+            f"reference's on 95 % of {counted(self.strokes, 'stroke')}; reference: {self.reference}"
         ]
 
 

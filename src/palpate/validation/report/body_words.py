@@ -10,7 +10,7 @@ import numpy as np
 from palpate.dataset import Dataset
 from palpate.format import length, plain, pressure, share
 
-__all__ = ["LINEAR", "body_words", "strain_words"]
+__all__ = ["LINEAR", "body_words", "solid_words", "strain_words"]
 
 LINEAR = 0.05
 """Fibre strain above which hardly any material still follows a linear law."""
@@ -35,6 +35,48 @@ def body_words(provenance: Mapping[str, Any]) -> str:
     if "self_weight" in body:
         traits.append("bending under its own weight" if body["self_weight"] else "without self-weight")
     return ", ".join(traits) + ("," if len(traits) > 1 else "")
+
+
+def solid_words(data: Any) -> str:
+    """Return a solid body in one sentence: shape, size, mesh, materials, supports, and what acts on it.
+
+    Parameters
+    ----------
+    data : Dataset
+        Solves of it; empty where they do not tell.
+    """
+    if not isinstance(data, Dataset):
+        return ""
+    problem = data.provenance.get("problem", {})
+    body, acting = problem.get("body", {}), problem.get("interactions", [])
+    if "body" in body:  # a family
+        body = body["body"]
+    if not isinstance(body, Mapping) or "geometry" not in body:
+        return ""
+    rest = data.rest
+    sides = " × ".join(plain(1e3 * side, 3) for side in np.ptp(rest, axis=0))
+    name = str(data.provenance.get("words", "")).partition(" (")[0] or "solid"
+    size = "" if name.endswith("mm") else f"{sides} mm, "
+    parts = [f"{name[:1].upper()}{name[1:]}: {size}{len(rest):,} nodes"]
+    materials = body.get("material", {})
+    if isinstance(materials, Mapping):
+        told = [f"{region}{_material(law).replace(' of ', ' ', 1)}" for region, law in materials.items()]
+        parts.append(", ".join(told))
+    fixed = body.get("fixed", [])
+    parts.append(f"fixed at {', '.join(map(str, fixed))}" if fixed else "fixed nowhere")
+    parts += [words for item in acting if (words := _acting(item))]
+    return "; ".join(parts) + "."
+
+
+def _acting(item: Any) -> str:
+    """Return what acts on a body in words: a ball or a pad and where; empty for anything else."""
+    if not isinstance(item, Mapping) or not isinstance(item.get("radius"), (int, float)):
+        return ""
+    size = f"of radius {length(item['radius'])}"
+    if item.get("type") == "SphereProbe":
+        shallow, deep = (1e3 * depth for depth in item.get("depth") or (0.0, 0.0))
+        return f"pressed at {item.get('touches')} by a ball {size}, {shallow:.3g} to {deep:.3g} mm deep"
+    return f"held at {item.get('touches')} by a glued pad {size}" if item.get("type") == "GluedPad" else ""
 
 
 def strain_words(*datasets: Dataset) -> str:

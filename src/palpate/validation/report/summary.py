@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from palpate.format import count, interval, length, plain, scientific, share
 from palpate.validation.figures.by_load import worse_than_filter
 from palpate.validation.figures.history_following import HistoryErrors
-from palpate.validation.report.body_words import body_words, strain_words
+from palpate.validation.report.body_words import body_words, solid_words, strain_words
 from palpate.validation.report.chapter import Chapter
 from palpate.validation.subject import line_of
 from palpate.validation.validate import Validation
@@ -94,10 +94,11 @@ def _solved(chapter: Chapter) -> str:
         text = _solved_by_load(chapter)
     else:
         within = ", ".join(interval(r) for r in subject.ranges)
+        body = solid_words(chapter.test if chapter.train is None else chapter.train)
         text = (
-            f"{count(v.samples, 'solve')} by finite elements that the surrogate never saw, within {within}; "
+            f"{body} {count(v.samples, 'solve')} by finite elements that the surrogate never saw, within {within}; "
             f"{v.force.light_count} of them are light, up to f₀ = {plain(v.force.light)} N."
-        )
+        ).lstrip()
     return text
 
 

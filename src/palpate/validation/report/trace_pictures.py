@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 __all__ = ["comparison_pictures", "plot_comparison", "plot_trace", "save_figure"]
 
 _POINTS = 4000  # of a line: more can't be seen
-Solved = tuple[np.ndarray, np.ndarray, str]
+Solved = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Depths (k,) of solves, m, and the sizes of their forces and of the surrogate's at the same places, N."""
 
 
 def plot_trace(trace: Trace, solved: Solved | None = None) -> Figure:
@@ -35,8 +36,8 @@ def plot_trace(trace: Trace, solved: Solved | None = None) -> Figure:
     ----------
     trace : Trace
         With at least one tick.
-    solved : (k,) m, (k,) N and str, optional
-        Depths and sizes of the forces of solves beside the stroke, and the words for them.
+    solved : Solved, optional
+        Solves beside the stroke.
     """
     fig, axes = figure(1, 2, size=(9.2, 3.6), width_ratios=(1.7, 1.0))
     time, size = trace.time, np.linalg.norm(trace.ticks["force"], axis=1)
@@ -58,8 +59,13 @@ def plot_trace(trace: Trace, solved: Solved | None = None) -> Figure:
     some = slice(None, None, max(1, int(felt.sum()) // _POINTS))
     right.plot(depth[felt][some], size[felt][some], color=BLUE, linewidth=0.9, label="recorded")
     if solved is not None and len(solved[0]):
-        deep_at, force_at, words = solved
-        right.plot(1e3 * deep_at, force_at, "o", color=ORANGE, markersize=4, label=words)
+        deep_at, force_at, answer = solved
+        right.plot(
+            1e3 * deep_at, force_at, "o", color=ORANGE, markersize=4, label="finite elements beside it"
+        )
+        right.plot(
+            1e3 * deep_at, answer, "o", color=BLUE, markersize=7, fillstyle="none", label="surrogate there"
+        )
     right.set_xlabel("depth / mm")
     right.set_ylabel("‖F‖ / N")
     right.set_xlim(left=0)

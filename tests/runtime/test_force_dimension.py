@@ -330,12 +330,21 @@ def test_other_causes_wait_for_the_user(dhd, loop, cause):
     assert run(loop, dhd, 100)[-1][1] is Fault.NONE
 
 
-def test_power_that_is_lost_is_a_fault(dhd, loop):
+@pytest.mark.parametrize(
+    ("flag", "value", "fault", "words"),
+    [
+        ("powered", 0, Fault.DEVICE_STOPPED, "has no power"),
+        ("absent", 1, Fault.DEVICE_LOST, "is no longer there"),
+        ("broken", 1, Fault.DEVICE_STOPPED, "reports an error of its own"),
+    ],
+)
+def test_the_status_is_a_fault_while_it_lasts(dhd, loop, flag, value, fault, words):
     run(loop, dhd, 100)
-    dhd.powered = 0
-    seen = run(loop, dhd, 10)
-    assert seen[-1] == (0.0, Fault.DEVICE_STOPPED)
-    assert "has no power" in loop.device_error
+    setattr(dhd, flag, value)
+    assert run(loop, dhd, 10)[-1] == (0.0, fault)
+    assert words in loop.device_error
+    setattr(dhd, flag, 1 - value)
+    assert run(loop, dhd, 10)[-1][1] is Fault.NONE
 
 
 def test_a_position_that_is_no_number_is_a_fault(dhd, loop):

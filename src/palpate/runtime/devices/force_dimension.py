@@ -217,6 +217,12 @@ class ForceDimensionDevice:
             raise self._failure("tells no status", code)
         if not status.powered:
             raise DeviceStopError(f"{self.name} has no power.", fix="Plug in its supply and switch it on.")
+        if not status.connected:
+            raise DeviceLostError(f"{self.name} is no longer there.", fix="Connect it, then start again.")
+        if status.wrong:
+            raise DeviceStopError(
+                f"{self.name} reports an error of its own.", fix="Switch it off and on, then start again."
+            )
         if status.forces:
             self._on, self._cause = True, 0
         elif self._on or self._cause >= 0:

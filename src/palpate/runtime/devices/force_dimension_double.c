@@ -62,8 +62,9 @@ typedef struct {
   double buttons;
   /* the hand: kg, N s/m, N/m, m, Hz; scripted: its place is that of the script whatever the force */
   double mass, damping, stiffness, amplitude, frequency, scripted, x, y, z;
-  /* faults: commands until USB is lost; calls that fail or guard from now on; NaN as a position; garbage at first */
-  double lost_after, fail_position, fail_force, fail_error, fail_velocity, guard, nan, garbage;
+  /* faults: commands until USB is lost; calls that fail or guard from now on; NaN as a position; garbage at first; what the
+     status says */
+  double lost_after, fail_position, fail_force, fail_error, fail_velocity, guard, nan, garbage, absent, broken;
   /* the clock */
   double manual, time;
   /* what was done: forces set (N), limits, and counts */
@@ -85,7 +86,7 @@ static struct { const char *name; double *value; } const settings[] = {
     ENTRY(powered), ENTRY(device_max_force), ENTRY(plain), ENTRY(deaf), ENTRY(time_guard), ENTRY(brake_speed), ENTRY(motor_force), ENTRY(buttons),
     ENTRY(mass), ENTRY(damping), ENTRY(stiffness), ENTRY(amplitude), ENTRY(frequency), ENTRY(scripted), ENTRY(x),
     ENTRY(y), ENTRY(z), ENTRY(lost_after), ENTRY(fail_position), ENTRY(fail_force), ENTRY(fail_error),
-    ENTRY(fail_velocity), ENTRY(guard), ENTRY(nan), ENTRY(garbage), ENTRY(manual), ENTRY(time), ENTRY(force_x),
+    ENTRY(fail_velocity), ENTRY(guard), ENTRY(nan), ENTRY(garbage), ENTRY(absent), ENTRY(broken), ENTRY(manual), ENTRY(time), ENTRY(force_x),
     ENTRY(force_y), ENTRY(force_z), ENTRY(felt_x), ENTRY(felt_y), ENTRY(felt_z), ENTRY(max_force), ENTRY(watchdog),
     ENTRY(force_on), ENTRY(brakes), ENTRY(gravity), ENTRY(cause), ENTRY(commands), ENTRY(saturations), ENTRY(guards),
     ENTRY(foreign_calls), ENTRY(early_calls), ENTRY(late_calls), ENTRY(opened), ENTRY(closed), ENTRY(expert),
@@ -395,13 +396,13 @@ EXPORT int dhdGetStatus(int *status, char id) {
   int code = enter();
   memset(status, 0, 17 * sizeof *status);
   status[0] = s.powered != 0;
-  status[1] = code == 0;
+  status[1] = code == 0 && !s.absent;
   status[2] = is_open;
   status[3] = s.homed != 0;
   status[4] = !s.force_on && !s.brakes;
   status[5] = s.force_on != 0;
   status[6] = s.brakes != 0;
-  status[9] = code != 0;
+  status[9] = code != 0 || s.broken;
   status[10] = s.gravity != 0;
   status[11] = s.time_guard > 0;
   status[14] = (int)s.cause;

@@ -16,15 +16,14 @@ from typing import Any
 
 from palpate.errors import DeviceError
 
-__all__ = ["FORCES_OFF", "LOST", "OPTIONAL", "TIMED_OUT", "DhdLibrary", "Status"]
+__all__ = ["FORCES_OFF", "LOST", "OPTIONAL", "DhdLibrary", "Status"]
 
 _DOUBLES, _INTEGERS = POINTER(c_double), POINTER(c_int)
 _STATUS = 17  # entries of the status vector
 
-# error numbers: what is no longer there, what a device simply lacks, what comes again
+# error numbers: what is no longer there, and what a device simply lacks
 LOST = frozenset((2, 4, 5))
 OPTIONAL = frozenset((6, 10))
-TIMED_OUT = 7
 
 FORCES_OFF = {
     0: "it doesn't say why",
@@ -50,7 +49,6 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "dhdGetStatus": (c_int, (_INTEGERS, c_byte)),
     "dhdGetButtonMask": (c_uint, (c_byte,)),
     "dhdGetPosition": (c_int, (_DOUBLES, _DOUBLES, _DOUBLES, c_byte)),
-    "dhdGetLinearVelocity": (c_int, (_DOUBLES, _DOUBLES, _DOUBLES, c_byte)),
     "dhdSetForce": (c_int, (c_double, c_double, c_double, c_byte)),
     "dhdEnableForce": (c_int, (c_bool, c_byte)),
     "dhdSetBrakes": (c_int, (c_bool, c_byte)),
@@ -83,32 +81,32 @@ class Status:
 
     @property
     def powered(self) -> bool:
-        """Whether the device has power."""
+        """True while the device has power."""
         return bool(self.values[0])
 
     @property
     def connected(self) -> bool:
-        """Whether the device is there."""
+        """True while the device is there."""
         return bool(self.values[1])
 
     @property
     def homed(self) -> bool:
-        """Whether its encoders have been homed."""
+        """True once its encoders have been homed."""
         return bool(self.values[3])
 
     @property
     def forces(self) -> bool:
-        """Whether its motors push."""
+        """True while its motors push."""
         return bool(self.values[5])
 
     @property
     def wrong(self) -> bool:
-        """Whether the device reports an error."""
+        """True while the device reports an error."""
         return bool(self.values[9])
 
     @property
     def cause(self) -> int:
-        """Why its forces are off, a key of `FORCES_OFF`."""
+        """The cause of its forces being off, a key of `FORCES_OFF`."""
         return int(self.values[14])
 
 

@@ -1,4 +1,4 @@
-"""What the doubles of device services share: a thread that serves, and a hand that moves by itself.
+"""Parts of all doubles of device services: a thread that serves, and a hand that moves by itself.
 
 The hand is a mass on a spring whose other end moves up and down by a sine, with damping; its axes are the service's.
 """

@@ -27,10 +27,13 @@ ARGUMENTS = [
     "--no-first-run",
 ]
 
+DRAGS: dict[Page, tuple[float, float, int]] = {}  # the last one of each page
+
 READ = """() => ({
     data: {...document.documentElement.dataset},
     text: Object.fromEntries([...document.querySelectorAll("output[id]")].map(o => [o.id, o.textContent])),
     flags: [...document.querySelectorAll("#flags li")].map(li => li.dataset.flag),
+    withheld: document.getElementById("reason-words").textContent.includes("take hold again"),
 })"""
 
 
@@ -74,6 +77,10 @@ def settled(page: Page, flag: str = "") -> dict[str, Any]:
     for _ in range(400):
         page.wait_for_timeout(40)
         now = page.evaluate(READ)
+        if now["withheld"]:
+            hold_again(page)
+            was = page.evaluate(READ)
+            continue
         still = all(now["data"][k] == was["data"][k] for k in ("position", "contact", "force", "grabbed"))
         if not still or "stalled" in now["flags"] or (flag and flag not in now["flags"]):
             was = now
@@ -88,8 +95,20 @@ def let_go(page: Page) -> dict[str, Any]:
     return page.wait_for_function(free).json_value()
 
 
+def hold_again(page: Page) -> None:
+    """Let go and do the last drag, or press, again: the machine was so busy that the input stalled."""
+    page.mouse.up()
+    page.wait_for_function("() => document.documentElement.dataset.grabbed === 'false'")
+    page.wait_for_timeout(300)
+    if page in DRAGS:
+        drag(page, *DRAGS[page])
+    else:
+        page.mouse.down()
+
+
 def drag(page: Page, dx: float, dy: float, steps: int = 6) -> None:
     """Grab the tip with the mouse and pull it; the button stays down."""
+    DRAGS[page] = (dx, dy, steps)
     x, y = tip(page)
     page.mouse.move(x, y)
     page.mouse.down()

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from chromium_page import READ, assert_no, number, open_page, vector
+from chromium_page import READ, assert_no, hold_again, number, open_page, vector
 from playwright.sync_api import Browser, Page
 from slabs import DEVIATION, dents, touched_slab
 
@@ -56,6 +56,9 @@ def stand_still(page: Page, flag: str) -> dict:
     for _ in range(600):
         page.wait_for_timeout(40)
         now = page.evaluate(READ)
+        if now["withheld"]:
+            hold_again(page)
+            now, times = page.evaluate(READ), set()
         same = all(now["data"][k] == was["data"][k] for k in ("position", "force", "grabbed", "largest"))
         moving = now["data"].get("sinking") == "true" or "stalled" in now["flags"] or flag not in now["flags"]
         times = {*times, float(now["data"]["time"])} if same and not moving else set()

@@ -7,6 +7,7 @@ import type { Pad } from "./gamepad";
 import type { Hello, Vec3 } from "./messages";
 
 const BEAT = 50; // ms between heartbeats
+const PROMISE = 0.1; // s, the longest time between two: on a machine that is busy one may be late, and nobody is pushed
 const NEAR_MOUSE = 26; // px around what is held that count as on it
 const NEAR_FINGER = 44;
 const KEYS: Record<string, readonly [number, number]> = {
@@ -95,7 +96,7 @@ export abstract class Hand {
     const size = Math.hypot(...device);
     this.connection.send({
       sent: this.lastSent,
-      period: BEAT / 1000,
+      period: PROMISE,
       target: size > hello.workspace ? (device.map((v) => (v * hello.workspace) / size) as Vec3) : device,
       grabbed: this.grabbed,
       hidden: document.hidden,

@@ -14,6 +14,7 @@ import pytest
 
 from palpate import __version__
 from palpate.dataset import Dataset
+from palpate.errors import UsageError
 from palpate.learning.loading import load
 from palpate.physics.advice import advise
 from palpate.runtime import LoopReport
@@ -82,12 +83,22 @@ def test_a_finished_sweep_is_not_solved_again(palpate, carried_out):
     assert Dataset.open(carried_out / "small.zarr").provenance["created"] == before
 
 
-def test_validate_keeps_its_limits_and_writes_the_report(palpate, carried_out):
-    answer = palpate("validate", carried_out / "study.toml", "--json")
+def test_validate_keeps_its_limits_and_writes_the_report(palpate, carried_out, tmp_path):
+    """With the full model under a recorded hand: a beam, whose load is found for each place."""
+    trace, model = tmp_path / "beam.trace", carried_out / "small.palpate"
+    assert (
+        palpate("run", model, "--seconds", "0.4", "--device", "stroke:frequency=2", "--record", trace).code
+        == 0
+    )
+    answer = palpate("validate", carried_out / "study.toml", "--trace", trace, "--json")
     assert answer.code == 0
     content = json.loads(answer.out)
     assert content["passed"] is True
-    assert (carried_out / "small.html").read_text(encoding="utf-8").startswith("<!doctype html>")
+    assert content["traces"][0]["jnd_max"] < 0.5
+    page = (carried_out / "small.html").read_text(encoding="utf-8")
+    assert page.startswith("<!doctype html>")
+    assert "A recorded touch: small beside finite elements" in page
+    assert palpate("validate", model, "--trace", trace).code == UsageError.exit_code
 
 
 def test_a_model_file_is_judged_by_the_test_set_beside_it(palpate, carried_out):

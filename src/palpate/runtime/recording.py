@@ -181,7 +181,7 @@ class Ring:
 
     @property
     def facts(self) -> dict[str, Any]:
-        """What the loop says of itself; empty before it has."""
+        """Facts that the loop has left about itself; empty before it has."""
         return dict(json.loads(bytes(self._facts[: int(self._sizes[0])]) or b"{}"))
 
     def keep(self, state: Mapping[str, Any]) -> None:
@@ -194,7 +194,7 @@ class Ring:
 
     @property
     def state(self) -> dict[str, Any] | None:
-        """What the loop remembered as the recording began; None where it was too much to keep."""
+        """Memory of the loop as the recording began; None where it was too much to keep."""
         size = int(self._sizes[1])
         # the bytes come from the loop that this process has started itself
         return None if size < 0 else dict(pickle.loads(bytes(self._snapshot[:size])))

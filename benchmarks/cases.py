@@ -8,15 +8,28 @@ deflections of the five free nodes, full scale is the largest tip deflection (Na
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from palpate.network import Network, Scaling
 from palpate.physics.beam.beam_presets import preset
-from palpate.surrogates import Surrogate
+from palpate.surrogates import (
+    ContactBaseline,
+    ContactLaw,
+    Continuation,
+    LearntEnergy,
+    PadBaseline,
+    RestStiffness,
+    Stiffening,
+    Surrogate,
+    TouchedSurface,
+)
 from palpate.units import Quantity, Range
 
-__all__ = ["BEAMS", "FEW", "Case", "Errors", "case", "touch_model"]
+__all__ = ["BEAMS", "FEW", "Case", "Errors", "case", "formula_block", "formula_pad", "touch_model"]
 
 BEAMS = ("copper", "nylon")
 FEW = 26  # solves: 0 to 5 N by 0.2 N
@@ -135,3 +148,42 @@ def touch_model(beam: str, *, quick: bool = False) -> Surrogate:
             0
         ]
     return palpate.learn(data.every(2), name=beam)[0]
+
+
+def formula_block(memory: Any = None) -> Surrogate:
+    """A flat body of U = A s³, 1 N at 6 mm, by its formula: where it is no matter how it was learnt."""
+    radius, deepest = 0.010, 0.006  # m
+    inputs = [
+        Range("c_x", -0.02, 0.02, "m"),
+        Range("c_y", -0.02, 0.02, "m"),
+        Range("c_z", radius - deepest, radius, "m"),
+    ]
+    corners = 0.06 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    face = TouchedSurface.of(corners, np.array([[0, 1, 2], [0, 2, 3]]), radius=radius, spacing=0.003)
+    baseline = ContactBaseline(ContactLaw("pad"), face, radius)
+    going = Continuation.of(inputs, deepest=deepest)
+    energy = LearntEnergy(_constant(inputs, math.log(1e4)), baseline, continuation=going)
+    return Surrogate(energy, memory=memory, meta={"name": "block"})
+
+
+def formula_pad(stiffness: float = 200.0) -> Surrogate:
+    """A held body of U = ½ K |w|² up to 30 mm in each direction, by its formula."""
+    inputs = [Range(f"w_{axis}", -0.03, 0.03, "m") for axis in "xyz"]
+    rest = RestStiffness.even(stiffness * np.eye(3))
+    baseline = PadBaseline(rest, Stiffening.none(3), axes=np.eye(3))
+    return Surrogate(LearntEnergy(_constant(inputs, 0.0), baseline), meta={"name": "pad"})
+
+
+def _constant(inputs: list[Range], value: float) -> Network:
+    """A network that answers `value` everywhere."""
+    n = len(inputs)
+    low, high = np.array([r.low for r in inputs]), np.array([r.high for r in inputs])
+    return Network.axis_aligned(
+        inputs,
+        [Quantity("ℓ")],
+        centres=np.zeros((2, n)),
+        widths=np.ones((2, n)),
+        weights=np.zeros((1, 2)),
+        tail=np.array([[value] + n * [0.0]]),
+        scaling=Scaling((low + high) / 2, (high - low) / 2, np.zeros(1), np.ones(1)),
+    )

@@ -5,7 +5,6 @@ python -m benchmarks.faults [--quick] [--json | --markdown]
 
 from __future__ import annotations
 
-import contextlib
 import os
 import signal
 import sys
@@ -18,42 +17,37 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.cases import touch_model
+from benchmarks.cases import formula_block, formula_pad
 from benchmarks.runner import main
 from benchmarks.table import Claim, Column, Table
-from palpate.network import Network, Scaling
+from palpate.errors import DeviceError
 from palpate.runtime import LoopProcess
 from palpate.runtime.devices.haply_simulator import HaplySimulator, SimulatorSettings
 from palpate.runtime.fault_injection import FAULTS, FaultInjector, Outcome
 from palpate.runtime.touchable import touchable
-from palpate.surrogates import (
-    ContactBaseline,
-    ContactLaw,
-    Continuation,
-    LearntEnergy,
-    Surrogate,
-    TouchedSurface,
-)
 from palpate.surrogates.memories import Relaxation
-from palpate.units import Quantity, Range
 
 __all__ = ["tables"]
 
 COUNT, KILLS = 1000, 10
 SILENCE = 0.020  # s after which the double drops a force that isn't renewed, as Force Dimension's firmware is asked to
-RADIUS, DEEPEST = 0.010, 0.006  # m, of the probe, and its deepest press
 
 
 def tables(*, quick: bool = False) -> list[Table]:
     """The table; `quick` injects one fault of each kind and kills nothing."""
     count = len(FAULTS) if quick else COUNT
     outcomes: dict[str, list[Outcome]] = defaultdict(list)
-    injectors = {name: FaultInjector(touchable(body), seed=7) for name, body in _bodies(quick=quick).items()}
+    bodies = {
+        "pad": formula_pad(),
+        "block": formula_block(),
+        "relaxing block": formula_block(Relaxation(((0.4, 0.1),))),
+    }
+    injectors = {name: FaultInjector(touchable(body), seed=7) for name, body in bodies.items()}
     names = list(injectors)
     for k in range(count):
         kind = list(FAULTS)[k % len(FAULTS)]
         held = kind == "outside"  # a pressed body has let go by then
-        name = "beam" if held else names[(k // len(FAULTS)) % len(names)]
+        name = "pad" if held else names[(k // len(FAULTS)) % len(names)]
         outcomes[kind].append(injectors[name].inject(kind))
     if not quick:
         outcomes["process killed"] = list(_killed(KILLS))
@@ -82,54 +76,35 @@ def tables(*, quick: bool = False) -> list[Table]:
     return [Table("faults", title, columns, rows, claims, notes)]
 
 
-def _bodies(*, quick: bool) -> dict[str, Surrogate]:
-    beam = touch_model("nylon", quick=quick)
-    return {"beam": beam, "block": _block(), "relaxing block": _block(Relaxation(((0.4, 0.1),)))}
-
-
-def _block(memory: Any = None) -> Surrogate:
-    """A flat body of U = A s³, 1 N at 6 mm, by its formula: faults don't ask how it was learnt."""
-    inputs = [
-        Range("c_x", -0.02, 0.02, "m"),
-        Range("c_y", -0.02, 0.02, "m"),
-        Range("c_z", RADIUS - DEEPEST, RADIUS, "m"),
-    ]
-    low, high = np.array([r.low for r in inputs]), np.array([r.high for r in inputs])
-    network = Network.axis_aligned(
-        inputs,
-        [Quantity("ln U/U0")],
-        centres=np.zeros((2, 3)),
-        widths=np.ones((2, 3)),
-        weights=np.zeros((1, 2)),
-        tail=np.array([[np.log(1e4), 0.0, 0.0, 0.0]]),
-        scaling=Scaling((low + high) / 2, (high - low) / 2, np.zeros(1), np.ones(1)),
-    )
-    corners = 0.06 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
-    face = TouchedSurface.of(corners, np.array([[0, 1, 2], [0, 2, 3]]), radius=RADIUS, spacing=0.003)
-    baseline = ContactBaseline(ContactLaw("pad"), face, RADIUS)
-    energy = LearntEnergy(network, baseline, continuation=Continuation.of(inputs, deepest=DEEPEST))
-    return Surrogate(energy, memory=memory, meta={"name": "block"})
-
-
 def _killed(count: int) -> Iterator[Outcome]:
     """Kill the real-time process in the midst of a touch, and start it again."""
     settings = SimulatorSettings(port=0, events=0, silence=SILENCE, frequency=1.0)
     with tempfile.TemporaryDirectory() as folder, HaplySimulator(settings) as service:
-        path = _block().save(Path(folder) / "block.palpate")
+        path = formula_block().save(Path(folder) / "block.palpate")
         device = f"haply:ws://127.0.0.1:{service.port},events={service.events_port}"
         for _ in range(count):
-            with contextlib.suppress(Exception), LoopProcess(path, device=device) as loop:
+            with LoopProcess(path, device=device) as loop:
                 _until(lambda: service.force().any())
                 os.kill(loop.pid, signal.SIGKILL)
                 killed = time.monotonic()
-                _until(lambda: not service.force().any())
-                silence = time.monotonic() - killed
-                recorded = not loop.alive
+                _until(lambda: not loop.alive)
+                silence = service.lapses_at() - killed
+                recorded = _ended(loop)
             ended = time.monotonic()
             with LoopProcess(path, device=device):
                 _until(lambda: service.force().any())
                 back = time.monotonic() - ended
+            silence = max(0.0, silence)
             yield Outcome("process killed", silence, recorded, withheld=True, back=back, restarted=True)
+
+
+def _ended(loop: LoopProcess) -> bool:
+    """Whether the handle says that its process has ended."""
+    try:
+        loop.read()
+    except DeviceError:
+        return True
+    return False
 
 
 def _until(condition: Any) -> None:

@@ -147,7 +147,7 @@ class FaultyDevice:
 
 @dataclass
 class _Switch:
-    """What a body answers: itself where empty, or a fault of `FAULTS`."""
+    """A switch of what a body answers: itself where empty, or a fault of `FAULTS`."""
 
     fault: str = ""
 

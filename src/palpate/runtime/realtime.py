@@ -4,10 +4,10 @@ The metronome sleeps until shortly before a tick is due and then spins. A sleepi
 scheduler makes of it (50 µs of timer slack on a default Linux, more under load); the last 200 µs are therefore spent
 asking the clock. A missed tick is skipped, not made up for: two forces in a burst would be one stale force.
 
-Where nobody touches, no tick is urgent: `Rest` says so, and the metronome then beats every 5 ms and doesn't spin, which
+Where nobody touches, no tick is urgent: `Rest` says so, and the metronome then beats every 8 ms and doesn't spin, which
 takes a loop from a fifth of a core to a few per cent. A hand in the air is at rest only while it is at least 10 mm, and
 at its speed four such beats, from the body: the loop is back at its rate, and rehearsed, before there is a force. A
-page's grab is heard 5 ms later at most, a third of a frame.
+page's grab is heard 8 ms later at most, half a frame.
 
 `obtain` asks the operating system for real-time scheduling. Nothing of it is needed for the loop to run, and nothing
 fails it: on a machine that grants none of it the lateness histogram says so.
@@ -26,7 +26,7 @@ from palpate.runtime.shared_state import now
 
 __all__ = ["SLOW", "Metronome", "Rest", "obtain"]
 
-SLOW = 5e-3  # s between two beats where nobody touches
+SLOW = 8e-3  # s between two beats where nobody touches
 _CLEAR, _BEATS = 0.010, 4.0  # m from the body, and slow beats away from it at its speed: a hand at rest
 _SETTLED = 0.25  # s without a touch after which the loop rests: taps come faster
 
@@ -75,7 +75,7 @@ class Metronome:
     def wait(self, rehearse: Callable[[], None] = lambda: None, *, resting: bool = False) -> float:
         """Return at the next beat, with the time, s; `rehearse` is called once when the sleep is over.
 
-        Where the loop is `resting`, the next beat comes after 5 ms, and neither spin nor rehearsal before it.
+        Where the loop is `resting`, the next beat comes after 8 ms, and neither spin nor rehearsal before it.
         """
         if resting:
             return self._rest()

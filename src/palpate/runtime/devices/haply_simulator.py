@@ -169,9 +169,12 @@ class HaplySimulator(ServiceDouble):
 
     def force(self, device: int = 0) -> np.ndarray:
         """Return the force (3,) on the hand, N, in the service's axes, after its scale; zero once it has lapsed."""
-        hand = self._devices[device].hand
-        lapsed = self._clock() - hand.commanded > self.settings.silence
-        return np.zeros(3) if lapsed else hand.force.copy()
+        lapsed = self._clock() > self.lapses_at(device)
+        return np.zeros(3) if lapsed else self._devices[device].hand.force.copy()
+
+    def lapses_at(self, device: int = 0) -> float:
+        """Return when the force lapses unless another command comes, s of the clock."""
+        return self._devices[device].hand.commanded + self.settings.silence
 
     def release(self) -> None:
         """Send the answers that were held, in their order."""

@@ -58,9 +58,11 @@ def refused(shape: ImportedSolid, kind=UsageError) -> str:
 def repaired(shape: ImportedSolid, volume: float = VOLUME, rel: float = 1e-9) -> str:
     """The notes about a surface that encloses this volume after its repair."""
     with pytest.warns(ModelWarning, match="read with repairs"):
-        assert sum(face.area for face in shape.faces) > 0
-    assert read_stl(shape.path, "mm")[0].volume == pytest.approx(volume, rel=rel)
-    return " ".join(shape.notes)
+        topology, surface = read_stl(shape.path, "mm")
+    assert topology.volume == pytest.approx(volume, rel=rel)
+    with pytest.warns(ModelWarning, match="read with repairs"):
+        assert surface.notes == shape.notes
+    return " ".join(surface.notes)
 
 
 @pytest.fixture

@@ -3,7 +3,8 @@
 block       Block, LayeredBlock        cylinder    Cylinder, Tube
 dome        Dome, Inclusion            organ       Organ
 solid_file  a body from a STEP or STL file; stl_file reads and fills closed surfaces, stl_text knows its forms,
-            surface_repair mends small faults of exports, surface_checks refuses what bounds no body
+            surface_repair mends small faults of exports, surface_checks refuses what bounds no body,
+            surface_simplify makes large ones smaller
 mesh_file   a body from a volume mesh; mesh_source reads it, abaqus_file, gmsh_file two forms; mesh_groups has
             its cells and their names, mesh_cells splits them into tetrahedra
 body_file   files of bodies: unit, content, names for parts of their surface

@@ -213,6 +213,9 @@ class ImportedSolid(Shape):
         Names for parts of the surface; they go over those of the file. In a STEP file they name whole faces.
     feature_angle : float
         In degrees: from which angle between triangles an edge of an STL file is sharp.
+    simplify : float, optional
+        Distance in m by which the surface of an STL file of more than 20,000 triangles may be simplified; by default
+        1/2,000 of its length, 0 for not at all. `notes` tells how far it is from the file's.
     digest : str
         SHA-256 of the file, found when the value is made: the body is the file's content, not its name.
 
@@ -230,6 +233,7 @@ class ImportedSolid(Shape):
     element: float | None = None
     patches: tuple[SurfacePatch, ...] = ()
     feature_angle: float = FEATURE_ANGLE
+    simplify: float | None = None
     digest: str = field(default="", repr=False)
 
     def __post_init__(self) -> None:
@@ -238,6 +242,8 @@ class ImportedSolid(Shape):
         if self.element is not None:
             checks.positive("The element size", self.element, "m")
         checks.positive("The feature angle", self.feature_angle, "degrees")
+        if self.simplify is not None:
+            checks.fits("The distance by which a surface is simplified", self.simplify, "m", least=0)
         self._check_kind()
         if not self.digest:
             object.__setattr__(self, "digest", digest_of(self.path))
@@ -303,7 +309,7 @@ class ImportedSolid(Shape):
 
     def describe(self) -> dict[str, Any]:
         """Everything that decides the mesh, as plain data."""
-        return {
+        plain = {
             "type": "ImportedSolid",
             "unit": self.unit,
             "element": self.element,
@@ -311,6 +317,7 @@ class ImportedSolid(Shape):
             "feature_angle": self.feature_angle,
             "sha256": self.digest,
         }
+        return plain if self.simplify is None else plain | {"simplify": self.simplify}
 
     def __str__(self) -> str:
         return f"solid of {Path(self.path).name}"
@@ -355,7 +362,6 @@ def _read_names(shape: ImportedSolid) -> tuple[tuple[str, ...], tuple[str, ...],
 def _skin(shape: ImportedSolid) -> tuple[BodyMesh, float, tuple[str, ...]]:
     """Named surface of an STL file, the volume in it in m³, and notes about repairs."""
     require_same(shape.path, shape.digest)
-    topology, surface = read_stl(shape.path, shape.unit or "m")
+    topology, surface = read_stl(shape.path, shape.unit or "m", shape.simplify)
     skin = name_parts(topology, surface, shape.patches, shape.feature_angle)
-    tell_repairs(shape.path, surface.notes)
     return skin, float(topology.volume), (*surface.notes, *bodies_apart(topology))

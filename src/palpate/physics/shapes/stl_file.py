@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +13,7 @@ from palpate.errors import UsageError
 from palpate.files import TemporaryFolder
 from palpate.format import millimetres
 from palpate.physics.apart import read_apart
-from palpate.physics.shapes.body_file import UNITS, SurfacePatch, apply_patches, segments
+from palpate.physics.shapes.body_file import UNITS, SurfacePatch, apply_patches, segments, tell_repairs
 from palpate.physics.shapes.mesh import BodyMesh, body_mesh
 from palpate.physics.shapes.meshing import (
     GRADING,
@@ -25,7 +26,8 @@ from palpate.physics.shapes.meshing import (
 from palpate.physics.shapes.shape import require_size
 from palpate.physics.shapes.stl_text import parse_stl
 from palpate.physics.shapes.surface_checks import require_closed, shells_of, surface_gap
-from palpate.physics.shapes.surface_repair import Surface, open_edges, place, repair_surface
+from palpate.physics.shapes.surface_repair import Surface, is_manifold, open_edges, place, repair_surface
+from palpate.physics.shapes.surface_simplify import MANY, TOLERANCE, simplify_surface
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -38,8 +40,8 @@ SHARP = (
 )
 
 
-def read_stl(path: str, unit: str) -> tuple[Trimesh, Surface]:
-    """Read the surface of an STL file, repaired and searched for faults.
+def read_stl(path: str, unit: str, simplify: float | None = None) -> tuple[Trimesh, Surface]:
+    """Read the surface of an STL file, repaired, simplified if it is large, and searched for faults.
 
     Parameters
     ----------
@@ -47,6 +49,9 @@ def read_stl(path: str, unit: str) -> tuple[Trimesh, Surface]:
         An ASCII or binary STL file.
     unit : str
         Unit of its coordinates, a key of `UNITS`.
+    simplify : float, optional
+        Distance in m by which a surface of more than 20,000 triangles may be simplified; by default 1/2,000 of
+        its length, 0 for not at all.
 
     Returns
     -------
@@ -62,12 +67,27 @@ def read_stl(path: str, unit: str) -> tuple[Trimesh, Surface]:
     UsageError
         If the surface bounds no body, or its size tells of mistaken units.
     """
-    from trimesh import Trimesh
-
     surface = parse_stl(path, Path(path).read_bytes())
     surface = replace(surface, points=surface.points * UNITS[unit])
     require_size(path, surface.length, unit)
     surface = repair_surface(surface)
+    topology, whole = _simplify(path, surface, simplify)
+    tell_repairs(path, surface.notes)
+    return topology, whole
+
+
+def _simplify(path: str, surface: Surface, simplify: float | None) -> tuple[Trimesh, Surface]:
+    """Return a surface with its edges, of fewer triangles where there are many, and searched for faults."""
+    from trimesh import Trimesh
+
+    tolerance = TOLERANCE * surface.length if simplify is None else simplify
+    if tolerance and len(surface.triangles) > MANY and is_manifold(surface.triangles):
+        simple = simplify_surface(surface, tolerance)
+        topology = Trimesh(simple.points, simple.triangles, process=False)
+        # walls thinner than the tolerance may cross each other
+        with contextlib.suppress(UsageError):
+            require_closed(topology, path)
+            return topology, simple
     topology = Trimesh(surface.points, surface.triangles, process=False)
     require_closed(topology, path)
     return topology, surface

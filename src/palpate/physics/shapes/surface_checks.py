@@ -18,7 +18,7 @@ from palpate.physics.shapes.surface_repair import place
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
-__all__ = ["Shells", "require_closed", "shells_of", "surface_gap", "touching_shells"]
+__all__ = ["Shells", "closest_points", "require_closed", "shells_of", "surface_gap", "touching_shells"]
 
 FLUSH = 1e-6  # of the body's length, below which two faces lie on each other
 CLOSE = 64  # triangles whose distance to a point is measured
@@ -188,13 +188,23 @@ def _winding(point: np.ndarray, corners: np.ndarray) -> float:
     return float(2 * np.arctan2(above, below).sum() / (4 * np.pi))
 
 
+def closest_points(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return the point (n, 3) of each triangle (n, 3, 3) that is nearest to a point (n, 3)."""
+    from trimesh.triangles import closest_point
+
+    # trimesh compares fourth powers of lengths with fixed bounds, so that triangles of millimetres in m are nothing
+    origin = triangles[:, :1]
+    size = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)[:, None]
+    found = closest_point((triangles - origin) / size[:, :, None], (points - origin[:, 0]) / size)
+    return np.asarray(found * size + origin[:, 0])
+
+
 def surface_gap(corners: np.ndarray, others: np.ndarray) -> tuple[float, np.ndarray]:
     """Return the least distance in m from triangles (t, 3, 3) to others (u, 3, 3), and the place (3,) on the former.
 
     Distances are those of corners to triangles, of the `CLOSE` triangles whose centres are nearest.
     """
     from scipy.spatial import cKDTree
-    from trimesh.triangles import closest_point
 
     least, where = np.inf, corners[0, 0]
     for points, triangles, turned in ((corners, others, False), (others, corners, True)):
@@ -202,7 +212,7 @@ def surface_gap(corners: np.ndarray, others: np.ndarray) -> tuple[float, np.ndar
         count = min(CLOSE, len(triangles))
         near = cKDTree(triangles.mean(axis=1)).query(nodes, k=count)[1].reshape(len(nodes), count)
         start = np.repeat(nodes, count, axis=0)
-        end = closest_point(triangles[near.ravel()], start)
+        end = closest_points(triangles[near.ravel()], start)
         distance = np.linalg.norm(end - start, axis=1)
         best = int(distance.argmin())
         if distance[best] < least:

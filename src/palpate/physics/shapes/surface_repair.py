@@ -15,7 +15,15 @@ import numpy as np
 
 from palpate.format import number
 
-__all__ = ["Surface", "open_edges", "place", "repair_surface", "unite_points"]
+__all__ = [
+    "Surface",
+    "is_manifold",
+    "open_edges",
+    "place",
+    "repair_surface",
+    "unite_points",
+    "without_spare_nodes",
+]
 
 SAME = 1e-6  # of the body's length, below which two points are one, and a triangle is flat
 FURTHEST = 1e-4  # of the body's length: corners further apart are no noise of an export
@@ -77,6 +85,13 @@ def open_edges(triangles: np.ndarray) -> np.ndarray:
     return np.flatnonzero(count[inverse.ravel()] == 1)
 
 
+def is_manifold(triangles: np.ndarray) -> bool:
+    """Tell whether each edge belongs to two triangles, which run along it in opposite ways."""
+    edges = _edges(triangles)
+    ahead, back = np.unique(edges, axis=0), np.unique(edges[:, ::-1], axis=0)
+    return len(ahead) == len(edges) and np.array_equal(ahead, back)
+
+
 def unite_points(points: np.ndarray, tolerance: float) -> np.ndarray:
     """Return for each point the number of the node that stands for it: one for each chain of close points.
 
@@ -116,7 +131,8 @@ def _unite(surface: Surface, node: np.ndarray) -> Surface:
     return replace(surface, triangles=triangles).keep((a != b) & (b != c) & (c != a))
 
 
-def _without_spare_nodes(surface: Surface) -> Surface:
+def without_spare_nodes(surface: Surface) -> Surface:
+    """Return the surface with those nodes only that its triangles have."""
     used, renumbered = np.unique(surface.triangles, return_inverse=True)
     return replace(
         surface,
@@ -270,7 +286,7 @@ def repair_surface(surface: Surface) -> Surface:
         Triangles as a file holds them, each with corners of its own for example.
     """
     united = _unite(surface, unite_points(surface.points, SAME * surface.length))
-    united = _without_spare_nodes(united)
+    united = without_spare_nodes(united)
     united = _drop_flat(united)
     united = _drop_flat(_close_gaps(united))
-    return _without_spare_nodes(_unite_shells(united))
+    return without_spare_nodes(_unite_shells(united))

@@ -179,6 +179,21 @@ def test_stops_and_a_dead_man_button_are_replayed(tmp_path):
     assert_same(trace, body)
 
 
+def test_a_recording_that_begins_during_a_stop_is_replayed(tmp_path):
+    body, shared = touchable(spring_beam(200.0)), Shared.private()
+    for wish in ({"stop": True}, {"resume": True}, {"stop": True}):
+        shared.write_command(**wish)
+    device = StrokeDevice(StrokeSettings(frequency=2.0))
+    touch = Recorded(tmp_path / "a.trace", body, device, shared, before=200)
+    assert touch.loop.stop.stopped
+    touch.tick(50)
+    shared.write_command(resume=True)
+    touch.tick(500)
+    trace = touch.trace()
+    assert 0.0 < trace.flag("stopped").mean() < 0.2
+    assert_same(trace, body)
+
+
 def test_another_body_under_the_same_hand_differs_and_says_by_how_much(tmp_path):
     body = touchable(spring_beam(200.0))
     touch = Recorded(tmp_path / "a.trace", body, StrokeDevice(StrokeSettings(frequency=2.0)))

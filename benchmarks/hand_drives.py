@@ -140,10 +140,10 @@ def _table(
             Column("felt", "felt, N/m", ".0f"),
             Column("lowest", "lowest E, mJ", ".2g"),
             Column("below", "below its bound, mJ", ".1g"),
-            Column("given", "given to the handle, mJ", ".2g"),
+            Column("given", "given to the handle, mJ", ".0f"),
             Column("force", "largest force over the limit", ".3f"),
             Column("speed", "rms speed at rest, mm/s", ".2g"),
-            Column("bare_given", "without control: given, mJ", ".2g"),
+            Column("bare_given", "without control: given, mJ", ".0f"),
             Column("bare_speed", "rms speed at rest, mm/s", ".2g"),
         ),
         rows,
@@ -204,7 +204,7 @@ def _claims(rows: list[dict[str, Any]]) -> list[Claim]:
 
     return [
         Claim("energy below its bound, mJ", (worst("below"),), 1e-6),
-        Claim("energy given to the handle, mJ", (worst("given"),), 0.0, ".2g"),
+        Claim("energy given to the handle, mJ", (worst("given"),), 0.0, ".0f"),
         Claim("largest force over the profile's", (worst("force"),), 1.0 + 1e-12, ".3f"),
         Claim("rms speed at rest, mm/s", (worst("speed"),), 1e3 * CALM, ".2g"),
         Claim("ticks with a fault", (worst("faults"),), 0.0, ".0f"),

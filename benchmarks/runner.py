@@ -21,6 +21,7 @@ __all__ = ["BENCHMARKS", "Benchmark", "main"]
 
 BENCHMARKS = (
     "cantilever",
+    "device_round_trips",
     "faults",
     "filters",
     "hand_drives",
@@ -28,6 +29,7 @@ BENCHMARKS = (
     "literature",
     "online",
     "peers",
+    "punctuality",
     "refinement",
     "runtime",
     "scale",

@@ -3,16 +3,18 @@
     python -m benchmarks.hand_drives [--quick] [--json | --markdown]
 
 Each run is the loop as it is, from the encoder to the force sent, for a minute of its own time, computed as fast as it
-goes. The hand moves at random, or so as to shake; then it presses and stays. The rival is the same loop without
-the passivity controller, and without the limit of the felt stiffness.
+goes. The hand moves at random, or so as to shake, or goes after a recorded hand; then it presses and stays. The rival
+is the same loop without the passivity controller, and without the limit of the felt stiffness.
 """
 
 from __future__ import annotations
 
 import math
 import sys
+import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,16 +27,19 @@ from benchmarks.table import Claim, Column, Table
 from palpate.runtime.devices.profiles import PROFILES, DeviceProfile
 from palpate.runtime.devices.simulated import SimulatedHand, SimulatedSettings
 from palpate.runtime.loop import Loop
+from palpate.runtime.recording import Ring, TickRecorder
 from palpate.runtime.safety import Fault, Limits
 from palpate.runtime.shared_state import Shared
 from palpate.runtime.touchable import Touchable, touchable
+from palpate.runtime.trace_file import TraceWriter
 from palpate.surrogates import Surrogate
 
 __all__ = ["Drive", "tables"]
 
 SECONDS = 60.0
 PACES = ((1000.0, 0.0), (200.0, 0.005))  # Hz, s of delay
-SHAPES = ("random", "adversarial")
+SHAPES = ("random", "adversarial", "recorded")
+RECORDED = 20.0  # s of the recorded touch, which is gone through over and over
 PRESS = 2.0  # s: the second one counts
 STEP = 1e-5  # m, of the encoder
 CALM = 1e-3  # m/s, rms, of a hand at rest
@@ -80,6 +85,7 @@ class Drive:
         shape: str,
         seconds: float,
         *,
+        file: str = "",
         controlled: bool = True,
     ) -> Drive:
         """Run the loop for so many seconds of its own time."""
@@ -87,7 +93,15 @@ class Drive:
         space = body.workspace(device.radius)
         settings: dict[str, Any] = body.stroke(space.scale) or {"amplitude": 0.4 * device.radius}
         hand = SimulatedHand(
-            SimulatedSettings(**settings, shape=shape, delay=delay, step=STEP, seed=7, profile=device.name)
+            SimulatedSettings(
+                **settings,
+                shape="sine" if file else shape,
+                file=file,
+                delay=delay,
+                step=STEP,
+                seed=7,
+                profile=device.name,
+            )
         )
         loop = Loop(
             *(body, hand, Shared.private(), space, Limits(device.max_force)),
@@ -123,7 +137,11 @@ def tables(*, quick: bool = False) -> list[Table]:
     seconds = 1.0 if quick else SECONDS
     bodies = {name: touchable(make(quick)) for name, make in list(BODIES.items())[: 1 if quick else None]}
     devices = DEVICES[:2] if quick else DEVICES
-    rows = [_row(name, body, pace, devices, seconds) for name, body in bodies.items() for pace in PACES]
+    with tempfile.TemporaryDirectory() as folder:
+        file = _recording(next(iter(bodies.values())), Path(folder), 1.0 if quick else RECORDED)
+        rows = [
+            _row(name, body, pace, devices, seconds, file) for name, body in bodies.items() for pace in PACES
+        ]
     return [_table(rows, devices, seconds, quick=quick)]
 
 
@@ -150,7 +168,7 @@ def _table(
         _claims(rows),
         (
             "the worst of all devices and of the drives "
-            + " and ".join(SHAPES)
+            + ", ".join(SHAPES)
             + "; at rest: a press, last half",
             "given: work of the loop's force on the handle, less what the device's own damping took",
             "devices: " + ", ".join(d.name for d in devices) + f"; the encoder's step is {1e6 * STEP:.0f} µm",
@@ -159,16 +177,42 @@ def _table(
     )
 
 
+def _recording(body: Touchable, folder: Path, seconds: float) -> str:
+    """Record a hand that moves at random on the first body, at 1 kHz, and return the file."""
+    path = folder / "hand.trace"
+    hand = SimulatedHand(SimulatedSettings(shape="random", seed=11, step=STEP, amplitude=0.02))
+    recorder = TickRecorder(Ring.private())
+    space = body.workspace(hand.traits.radius)
+    loop = Loop(
+        *(body, hand, Shared.private(), space, Limits(hand.traits.max_force)),
+        stiffness=body.stiffness_max,
+        recorder=recorder,
+    )
+    recorder.ring.asked[()] = 1
+    writer = TraceWriter(path, {})
+    for k in range(round(seconds / loop.period)):
+        loop.tick(k * loop.period)
+        if k % 1000 == 999:
+            writer.add_ticks(recorder.ring.take())
+    writer.close({})
+    return str(path)
+
+
 def _row(
     name: str,
     body: Touchable,
     pace: tuple[float, float],
     devices: tuple[DeviceProfile, ...],
     seconds: float,
+    file: str,
 ) -> dict[str, Any]:
     runs = {
         controlled: [
-            Drive.of(body, device, pace, shape, seconds, controlled=controlled)
+            Drive.of(
+                *(body, device, pace, shape, seconds),
+                controlled=controlled,
+                file=file if shape == "recorded" else "",
+            )
             for device in devices
             for shape in SHAPES
         ]

@@ -10,6 +10,8 @@ import pytest
 from palpate.errors import UsageError
 from palpate.runtime.devices import device_named
 from palpate.runtime.devices.simulated import SimulatedHand, SimulatedSettings
+from palpate.runtime.recording import TICK
+from palpate.runtime.trace_file import TraceWriter
 
 T = 1e-3
 
@@ -97,3 +99,22 @@ def test_a_profile_sets_workspace_and_largest_force():
     assert np.linalg.norm(device.place) == pytest.approx(0.04)
     with pytest.raises(UsageError, match=r"no profile of a device 'fulcrum'"):
         hand(profile="fulcrum")
+
+
+def test_a_recorded_hand_is_followed_over_and_over(tmp_path):
+    ticks = np.zeros(400, TICK)
+    t = np.cumsum(np.random.default_rng(0).uniform(0.5, 1.5, 400)) * T
+    ticks["time"], ticks["hand"][:, 1] = 7.0 + t, 0.01 * np.sin(2.0 * math.pi * t / (t[-1] - t[0]))
+    writer = TraceWriter(tmp_path / "a.trace", {})
+    writer.add_ticks(ticks)
+    writer.close({})
+    device = SimulatedHand(SimulatedSettings(file=str(tmp_path / "a.trace"), grip=1e5, grip_damping=300.0))
+    span, places, wished = t[-1] - t[0], [], []
+    for k in range(1000):
+        device.read(k * T)
+        places.append(device.place[1])
+        wished.append(np.interp((k * T) % span, t - t[0], ticks["hand"][:, 1]))
+    lag = 300.5 / 1e5 / T  # ticks, of damper and spring
+    np.testing.assert_allclose(
+        places[20:], np.interp(np.arange(20, 1000) - lag, np.arange(1000), wished), atol=2e-4
+    )

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -26,6 +27,7 @@ from palpate.runtime.shared_state import Block
 __all__ = ["SimulatedHand", "SimulatedSettings"]
 
 _SHAPES = ("sine", "press", "random", "adversarial")
+_RECORDED = len(_SHAPES)
 _STEP = 1e-4  # s
 _PAST = 512  # samples kept for the delay
 _LONGEST_DELAY, _LONGEST_STRETCH = (
@@ -69,7 +71,9 @@ class SimulatedSettings:
     seed : float
         Of the random script; a whole number.
     profile : str
-        Device whose workspace and largest force it has, such as ``falcon``; see `profiles.PROFILES`.
+        Device whose workspace and limits it has, such as ``falcon``; see `profiles.PROFILES`.
+    file : str
+        Recorded touch whose hand it follows over and over, instead of `shape`; none by default.
     """
 
     mass: float = 0.3
@@ -87,6 +91,7 @@ class SimulatedSettings:
     z: float = 0.0
     seed: float = 0.0
     profile: str = "omega.3"
+    file: str = ""
 
     def __post_init__(self) -> None:
         if self.shape not in _SHAPES:
@@ -135,7 +140,7 @@ class SimulatedHand:
             limits.radius,
             limits.max_force,
             s.damping,
-            f"a simulation; radius and largest force are those of {limits.name}",
+            f"a simulation; radius and limits are those of {limits.name}",
             mass=min(s.mass, known.mass),
             max_stiffness=limits.max_stiffness,
             name=f"simulated {limits.name}",
@@ -155,7 +160,8 @@ class SimulatedHand:
                 self.traits.radius,
             ]
         )
-        self._shape = _SHAPES.index(s.shape)
+        self._shape = _RECORDED if s.file else _SHAPES.index(s.shape)
+        self._path = _recorded_path(s.file) if s.file else np.zeros((2, 4))
         self.place, self.velocity, self.push = np.zeros(3), np.zeros(3), np.zeros(3)
         self._clock = np.zeros(2)  # s since the first reading; J of work
         self._past, self._count = np.zeros((_PAST, 4)), 0
@@ -169,6 +175,11 @@ class SimulatedHand:
     def open(cls, commands: Block, options: Mapping[str, str]) -> SimulatedHand:
         """Open from texts such as ``{"mass": "0.2"}``."""
         return cls(settings_from(SimulatedSettings, options))
+
+    @classmethod
+    def traits_of(cls, options: Mapping[str, str]) -> Traits:
+        """Return the traits of the hand on the device that the options name."""
+        return cls(SimulatedSettings(profile=options.get("profile", SimulatedSettings.profile))).traits
 
     @property
     def work(self) -> float:
@@ -202,6 +213,7 @@ class SimulatedHand:
             self._figures,
             self._frequencies,
             self._phases,
+            self._path,
         )
 
     def write(self, force: np.ndarray) -> None:
@@ -214,8 +226,40 @@ class SimulatedHand:
         self.sample.holding = False
 
 
+def _recorded_path(file: str) -> np.ndarray:
+    """Return times, s from the first, and places, m, of a recorded hand (N, 4)."""
+    from palpate.runtime.trace_file import read_trace  # which needs the table of devices
+
+    trace = read_trace(Path(file))
+    if len(trace) < 2:
+        raise UsageError(f"{file} holds no stroke.", fix="Record a longer touch.")
+    return np.column_stack([trace.time - trace.time[0], trace.ticks["hand"]])
+
+
 @_jit
-def _integrate(place, velocity, push, clock, span, shape, along, figures, frequencies, phases):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def _scripted(shape, time, i, toward, along, amplitude, frequency, frequencies, phases):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    if shape == 0:
+        return amplitude * along[i] * math.sin(2.0 * math.pi * frequency * time)
+    if shape == 1:
+        return amplitude * along[i] * min(1.0, time / _RISE)
+    if shape == 2:
+        noise = 0.0
+        for j in range(len(frequencies)):
+            noise += math.sin(2.0 * math.pi * frequencies[j, i] * time + phases[j, i])
+        return amplitude * 0.4 / math.sqrt(len(frequencies) / 2.0) * noise + 0.6 * amplitude * along[i]
+    return amplitude * along[i] * (1.0 if toward >= 0.0 else 0.2)
+
+
+@_jit
+def _recorded(time, i, path):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    since = time % path[-1, 0]
+    row = min(np.searchsorted(path[:, 0], since, side="right") - 1, len(path) - 2)
+    share = (since - path[row, 0]) / (path[row + 1, 0] - path[row, 0])
+    return path[row, 1 + i] + share * (path[row + 1, 1 + i] - path[row, 1 + i])
+
+
+@_jit
+def _integrate(place, velocity, push, clock, span, shape, along, figures, frequencies, phases, path):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     mass, damper, friction, grip, amplitude, frequency, radius = figures
     count = max(1, math.ceil(span / _STEP))
     h = span / count
@@ -227,18 +271,10 @@ def _integrate(place, velocity, push, clock, span, shape, along, figures, freque
         for i in range(3):
             toward += velocity[i] * along[i]
         for i in range(3):
-            if shape == 0:
-                aim = amplitude * along[i] * math.sin(2.0 * math.pi * frequency * time)
-            elif shape == 1:
-                aim = amplitude * along[i] * min(1.0, time / _RISE)
-            elif shape == 2:
-                aim = 0.0
-                for j in range(len(frequencies)):
-                    aim += math.sin(2.0 * math.pi * frequencies[j, i] * time + phases[j, i])
-                aim *= amplitude * 0.4 / math.sqrt(len(frequencies) / 2.0)
-                aim += 0.6 * amplitude * along[i]
+            if shape == _RECORDED:
+                aim = _recorded(time, i, path)
             else:
-                aim = amplitude * along[i] * (1.0 if toward >= 0.0 else 0.2)
+                aim = _scripted(shape, time, i, toward, along, amplitude, frequency, frequencies, phases)
             velocity[i] += h / mass * (push[i] + grip * (aim - place[i]))
             velocity[i] /= 1.0 + h * damper / mass
             speed += velocity[i] * velocity[i]

@@ -133,6 +133,7 @@ def read_with_meshio(path: str) -> Any:
     Returns
     -------
     meshio.Mesh
+        With an attribute `said`: what meshio printed while it read.
 
     Raises
     ------
@@ -153,7 +154,8 @@ def read_with_meshio(path: str) -> Any:
             contextlib.redirect_stderr(silent),
             np.errstate(over="ignore"),
         ):
-            return meshio.read(path)
+            mesh = meshio.read(path)
+        mesh.said = silent.getvalue()
     except ImportError as error:
         package = error.name or "h5py"
         raise UsageError(
@@ -172,8 +174,10 @@ def read_with_meshio(path: str) -> Any:
         AttributeError,
         OSError,
         EOFError,
+        RuntimeError,
     ) as error:
         raise _unreadable(path, error) from error
+    return mesh
 
 
 def _unreadable(path: str, error: BaseException) -> FileFormatError:

@@ -7,6 +7,7 @@ read_source  reads any format: two of palpate's own readers, else meshio, else P
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
@@ -58,6 +59,7 @@ VTK_CELLS = {
     },
 }
 VOXEL, PIXEL = 11, 8  # VTK's boxes, whose corners run along x first
+SOLID_CARD = re.compile(rb"^(CTETRA|CHEXA|CPENTA|CPYRAM?)\*?[ ,\t]", re.MULTILINE | re.IGNORECASE)
 VTK_COUNT = re.compile(rb'\bNumberOfCells="(\d+)"|^CELL_TYPES (\d+)', re.MULTILINE)
 PROPERTY = re.compile(
     rb'^\$\s*(?:HMNAME\s+(?:PROP|COMP)\s+(\d+)\s*"([^"]+)"|Femap.*?Property\s+(\d+)\s*:\s*(\S.*?))\s*$',
@@ -89,10 +91,12 @@ def read_source(path: str, labels: str | None = None) -> MeshSource:
     if ending == ".msh" and is_gmsh_4(path):
         return read_gmsh(path)
     mesh = _read_vtk(path) if ending in VTK else _read_other(path)
-    if ending in {".bdf", ".nas", ".fem", ".dat"}:
+    if ending in {".bdf", ".nas", ".fem"}:
+        _require_all_cards(path, mesh)
         _require_basic_system(path, mesh)
         _name_properties(path, mesh)
     source = _collect(path, mesh, labels)
+    source.notes.extend(f"The reader says: {line}" for line in _skipped(mesh))
     if ending in {".node", ".ele"}:
         source.faces.extend(_tetgen_faces(path, mesh))
     return source
@@ -329,6 +333,28 @@ def _collect_sets(source: MeshSource, mesh: Any, solid_rows: list[int], face_row
                 source.faces.append(_face_group(plain_name(name), mesh, rows, chosen))
     for name, nodes in getattr(mesh, "point_sets", {}).items():
         source.node_sets.append(Group(plain_name(name), np.asarray(nodes, dtype=np.int64).ravel()))
+
+
+def _skipped(mesh: Any) -> list[str]:
+    """Return what meshio says about things that it passes over."""
+    lines = [" ".join(line.split()) for line in getattr(mesh, "said", "").splitlines()]
+    return list(
+        dict.fromkeys(line for line in lines if re.search(r"skip|ignor|unsupported|not support", line, re.I))
+    )
+
+
+def _require_all_cards(path: str, mesh: Any) -> None:
+    """Refuse a Nastran file of which meshio has passed over cells, as it does with those of sixteen columns."""
+    cards = Counter(word.decode().upper() for word in SOLID_CARD.findall(Path(path).read_bytes()))
+    there = sum(cards.values())
+    read = sum(len(block.data) for block in mesh.cells if _kind(block.type) in SOLIDS)
+    if read != there:
+        raise UsageError(
+            f"{there - read} of {there} cells of volume in {path} can't be read.",
+            why=f"It has {', '.join(f'{count} {word}' for word, count in cards.items())}; those in fields of sixteen "
+            "columns or in lower case are not known.",
+            fix="Export the mesh with fields of eight columns.",
+        )
 
 
 def _require_basic_system(path: str, mesh: Any) -> None:

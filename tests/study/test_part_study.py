@@ -17,7 +17,8 @@ from palpate.study import Study, read_study, to_toml
 from palpate.study.material_records import SolidMaterialRecord
 from palpate.study.part_records import PartRecord
 from palpate.study.part_study import part_study
-from palpate.study.run import Paths, carry_out, report_study
+from palpate.study.rounds import improve_in_rounds
+from palpate.study.run import Paths, report_study
 from palpate.surrogates import Surrogate
 
 SIZE = (0.04, 0.03, 0.02)
@@ -272,16 +273,24 @@ force_p95 = 0.3
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_a_part_goes_the_whole_way(folder, tmp_path):
-    """Sweep, learn, validate and report work on a part as on any body; what is learnt follows its solves."""
+    """A round of sweep, learning, validation and report works on a part as on any body, and is not repeated."""
     study = study_of(folder, HEAD + SMALL)
     paths = Paths(tmp_path, study.name)
-    outcome = carry_out(study, paths, progress=False)
+    wanted = {"until": 0.5, "limit": 600.0, "rounds": (6,), "progress": False}
+    (done,) = improve_in_rounds(study, paths, **wanted)
+    outcome = done.outcome
     assert (len(outcome.train), len(outcome.test)) == (6, 2), "every solve converged"
+    assert done.error == outcome.validation.force.p95
     body = Surrogate.load(paths.model)
     felt = np.linalg.norm(outcome.train.force, axis=1)
     off = np.linalg.norm(body.energy.force(outcome.train.X) - outcome.train.force, axis=1) / felt
     assert np.median(off) < 0.05
+    assert [point["solves"] for point in body.meta["learning_curve"]] == [6]
     page = report_study(tmp_path / "report.html", [outcome]).read_text(encoding="utf-8")
-    assert "pad" in page
+    assert "Solid of pad.stl" in page
+    assert "fixed at table" in page
+    (again,) = improve_in_rounds(study, paths, **wanted)
+    assert again.error == done.error
+    assert (tmp_path / "pad-6.palpate").read_bytes() == paths.model.read_bytes()
     with pytest.raises(StudyError, match="no such key"):
         study_of(folder, HEAD + SMALL.replace("samples = 6", "sample = 6"))

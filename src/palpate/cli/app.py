@@ -16,6 +16,7 @@ from palpate.cli.console import Console, advice_in_words
 from palpate.cli.device_commands import devices_app
 from palpate.cli.table_commands import correct, fit
 from palpate.cli.table_options import Json, with_table_options
+from palpate.cli.touch_command import touch
 from palpate.cli.touch_options import DeadMan, Device, Unsoftened
 from palpate.cli.trace_commands import replay, trace_app
 from palpate.errors import AccuracyError, PalpateError, UsageError
@@ -373,6 +374,7 @@ def run(
 
 
 app.command()(replay)
+app.command()(touch)
 app.command()(fit)
 app.command()(correct)
 

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import typer
 
 from palpate.errors import UsageError
 from palpate.files import write_file
-
-if TYPE_CHECKING:
-    from palpate.study import Study
 
 __all__ = ["init_study"]
 
@@ -45,6 +41,7 @@ def init_study(
     """
     from palpate.study import preset_study, to_toml
     from palpate.study.part_records import CAD_ENDINGS, MESH_ENDINGS
+    from palpate.study.part_study import part_study, part_text
 
     if path.is_dir():
         raise UsageError(f"{path} is a folder.", fix=f"Name a file, such as {path / 'study.toml'}.")
@@ -52,7 +49,8 @@ def init_study(
         _write_sample(path, force=force)
         return
     if path.suffix.lower() in (*CAD_ENDINGS, *MESH_ENDINGS):
-        record, text = _part_text(path, unit)
+        record, notes = part_study(path, unit=unit)
+        text = part_text(record, notes)
         target = path.with_name(f"{record.name}.toml")
     else:
         if unit is not None:
@@ -67,16 +65,6 @@ def init_study(
     _require_free(target, force=force)
     write_file(target, text)
     typer.echo(f"{target}: a study called {record.name}. Next: palpate sweep {target}")
-
-
-def _part_text(path: Path, unit: str | None) -> tuple[Study, str]:
-    """Return the study of a part, and its file, which names the part that lies beside it."""
-    from palpate.study import to_toml
-    from palpate.study.part_study import part_study
-
-    record, notes = part_study(path, unit=unit)
-    body = record.body.model_copy(update={"file": path.name})
-    return record, to_toml(record.model_copy(update={"body": body}), notes)
 
 
 def _write_sample(path: Path, *, force: bool) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +13,14 @@ import numpy as np
 
 from palpate.errors import PalpateError, UsageError
 from palpate.physics.shapes.mesh import Face
-from palpate.study.part_records import STEP_ENDINGS, part_shape
+from palpate.study.part_records import STEP_ENDINGS, PartRecord, part_shape
 from palpate.study.study import Study
+from palpate.study.toml import to_toml
 
-__all__ = ["part_study"]
+__all__ = ["part_study", "part_text"]
 
 HELD, TOUCHED = "held", "touched"
-YOUNG = 10e3  # Pa, of soft tissue, until the user says what it is
+YOUNG, POISSON = 10e3, 0.45  # Pa; of soft tissue, until the user says what it is
 SMALL = 5e-3  # m: a part that would be smaller in mm was probably drawn in m
 FLAT, LEVEL = (
     0.999,
@@ -34,7 +35,15 @@ LISTED = 20  # faces in the comments
 
 
 def part_study(
-    file: str | os.PathLike[str], *, unit: str | None = None, young: float = YOUNG, name: str | None = None
+    file: str | os.PathLike[str],
+    *,
+    unit: str | None = None,
+    young: float = YOUNG,
+    poisson: float = POISSON,
+    radius: float | None = None,
+    depth: float | None = None,
+    held: Sequence[str] = (),
+    touched: str | None = None,
 ) -> tuple[Study, tuple[str, ...]]:
     """Return a study of a part, and what its file holds as lines of text.
 
@@ -47,10 +56,14 @@ def part_study(
         STL, STEP or a volume mesh.
     unit : str, optional
         Unit of the file's numbers. By default mm, or m where the part would be smaller than 5 mm.
-    young : float
-        Young's modulus in Pa.
-    name : str, optional
-        Of the study; by default that of the file.
+    young, poisson : float
+        Young's modulus in Pa, and Poisson's ratio.
+    radius, depth : float, optional
+        Radius of the ball and its largest depth, m; by default from the part's least extent.
+    held : sequence of str
+        Surfaces of the file that are held; by default what the part stands on.
+    touched : str, optional
+        Surface of the file that is pressed; by default all that faces up.
 
     Raises
     ------
@@ -61,30 +74,40 @@ def part_study(
     unit, faces = _read(path, unit)
     low = np.min([face.lower for face in faces], axis=0)
     high = np.max([face.upper for face in faces], axis=0)
-    radius = _nice(RADIUS * float((high - low).min()))
-    deepest = _nice(DEPTH * radius)
-    fixed, held = _support(faces, float(low[2]), float(high[2] - low[2]))
+    radius = _nice(RADIUS * float((high - low).min())) if radius is None else radius
+    deepest = _nice(DEPTH * radius) if depth is None else depth
+    fixed, named = _support(faces, float(low[2]), float(high[2] - low[2]))
+    if held:
+        fixed, named = tuple(held), []
     content: dict[str, Any] = {
-        "name": name or _study_name(path.stem),
+        "name": _study_name(path.stem),
         "body": {
             "kind": "part",
             "file": str(path),
             "unit": unit,
-            "material": {"young": young, "poisson": 0.45, "name": "neo-Hookean"},
+            "material": {"young": young, "poisson": poisson, "name": "neo-Hookean"},
             "fixed": fixed,
+            "surfaces": named,
         },
         "interaction": {
             "kind": "probe",
-            "touches": TOUCHED,
+            "touches": touched or TOUCHED,
             "radius": radius,
             "depth": (_nice(LEAST_DEPTH * deepest), deepest),
         },
         "sweep": {"samples": 60, "depths": 3},
-        "test": {"samples": 40, "depths": 4},
+        "test": {"samples": 24, "depths": 2},  # many places: several depths of one tell less
     }
-    study = _with_touched(content, held)
+    study = Study.model_validate(content) if touched else _with_touched(content, named)
     regions = study.body.shape().regions  # type: ignore[union-attr]  # it is a part
     return study, tuple(_notes(path, unit, faces, regions, low, high))
+
+
+def part_text(study: Study, notes: Iterable[str]) -> str:
+    """Return the study of a part, and notes on its file, as a study file that lies beside the part."""
+    assert isinstance(study.body, PartRecord)
+    body = study.body.model_copy(update={"file": Path(study.body.file).name})
+    return to_toml(study.model_copy(update={"body": body}), notes)
 
 
 def _read(path: Path, unit: str | None) -> tuple[str | None, Sequence[Face]]:

@@ -1,0 +1,159 @@
+"""`palpate touch`: from a part to a surrogate of a wanted force error, in rounds of more and more solves."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from palpate.cli.table_options import Json
+from palpate.errors import AccuracyError, UsageError
+
+if TYPE_CHECKING:
+    from palpate.cli.console import Console
+    from palpate.study import Study
+    from palpate.study.rounds import Round
+    from palpate.study.run import Paths
+
+__all__ = ["touch"]
+
+
+def touch(
+    part: Annotated[Path, typer.Argument(help="Part: STL, STEP, VTU, MSH, INP and others.")],
+    unit: Annotated[
+        str | None, typer.Option(help="Unit of the file's numbers. Default: mm, or what fits.")
+    ] = None,
+    young: Annotated[str | None, typer.Option(help="Young's modulus. Default: 10 kPa.")] = None,
+    poisson: Annotated[float | None, typer.Option(help="Poisson's ratio. Default: 0.45.")] = None,
+    radius: Annotated[
+        str | None, typer.Option(help="Radius of the ball. Default: by the part's size.")
+    ] = None,
+    depth: Annotated[
+        str | None, typer.Option(help="Largest depth of the ball. Default: half its radius.")
+    ] = None,
+    held: Annotated[
+        list[str] | None,
+        typer.Option(help="Surface of the file that is held. Several times. Default: what it stands on."),
+    ] = None,
+    touched: Annotated[
+        str | None, typer.Option(help="Surface of the file that is touched. Default: what faces up.")
+    ] = None,
+    until: Annotated[str, typer.Option(help="Force error at the 95th percentile that ends it.")] = "2%",
+    minutes: Annotated[float, typer.Option(min=0, help="Minutes after which no further round begins.")] = 30,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Worker processes. Default: one per core.")
+    ] = None,
+    view: Annotated[
+        bool, typer.Option("--view/--no-view", help="Show the result on a page at the end.")
+    ] = True,
+    as_json: Json = False,
+) -> None:
+    """Solve, learn and check a part in rounds until its force error is reached. Called again, it goes on."""
+    from palpate.cli.console import Console
+    from palpate.study.run import Paths
+
+    console = Console(as_json)
+    asked = {"unit": unit, "young": young, "poisson": poisson, "radius": radius, "depth": depth}
+    choices = {"held": tuple(held or ()), "touched": touched}
+    study = _study_of(part, {k: v for k, v in (asked | choices).items() if v}, console).with_workers(workers)
+    paths = Paths(part.parent, study.name)
+    _carry_on(study, paths, _share(until), 60 * minutes, console)
+    if view and not as_json and sys.stdout.isatty():
+        from palpate.viewer import serve
+
+        serve(paths.model)
+
+
+def _study_of(part: Path, options: dict[str, Any], console: Console) -> Study:
+    """Return the study of a part that lies beside it, or write one with these options."""
+    from palpate.files import write_file
+    from palpate.study import read_study
+    from palpate.study.part_study import part_study, part_text
+    from palpate.units import to_si
+
+    file = part.with_suffix(".toml")
+    if file.exists():
+        if options:
+            raise UsageError(
+                f"{file} exists already, and says what is held, touched and of what material.",
+                why=f"Given besides: {', '.join('--' + name for name in options)}.",
+                fix="Change the file and leave the options out, or delete it with its solves.",
+            )
+        console.say(f"Going on with the study {file} …")
+        return read_study(file)
+    for name, si in (("young", "Pa"), ("radius", "m"), ("depth", "m")):
+        if name in options:
+            options[name] = to_si(options[name], si)
+    study, notes = part_study(part, **options)
+    write_file(file, part_text(study, notes))
+    console.say("\n".join(filter(None, notes)))
+    console.say(f"{_chosen(study)} {file} says all of it; change it there.")
+    return study
+
+
+def _chosen(study: Study) -> str:
+    """Return what was chosen for a part, in one sentence."""
+    from palpate.study.interaction_records import ProbeRecord
+
+    acting, held = study.interaction, ", ".join(study.body.fixed_names())
+    assert isinstance(acting, ProbeRecord)
+    surface = "the surface that faces up" if acting.touches == "touched" else acting.touches
+    ball = f"a ball of {1e3 * acting.radius:g} mm"
+    return f"Held at {held}; {ball} presses {surface}, up to {1e3 * acting.depth[1]:g} mm deep."
+
+
+def _carry_on(study: Study, paths: Paths, until: float, limit: float, console: Console) -> None:
+    """Carry out rounds, print each, and write the report of the last.
+
+    Raises
+    ------
+    AccuracyError
+        If the force error was not reached.
+    """
+    from palpate.format import duration, share
+    from palpate.study.rounds import improve_in_rounds
+    from palpate.study.run import report_study
+    from palpate.sweeps import local_cluster
+
+    rounds: list[Round] = []
+    with local_cluster(study.sweep.workers if study.sweep else None) as cluster:
+        for done in improve_in_rounds(
+            study,
+            paths,
+            until=until,
+            limit=limit,
+            cluster=cluster,
+            progress=not console.as_json,
+            log=lambda stage: console.say(f"{stage} …"),
+        ):
+            rounds.append(done)
+            console.say(
+                f"{done.solves} solves: force error {share(done.error)} at the 95th percentile of "
+                f"{done.outcome.validation.samples} unseen solves, after {duration(done.seconds)}"
+            )
+    last = rounds[-1]
+    report = report_study(paths.report, [last.outcome])
+    told = [{"solves": r.solves, "force_p95": r.error, "seconds": r.seconds} for r in rounds]
+    text = (
+        f"{last.outcome.validation}\nreport  {report}\nmodel   {paths.model}   (palpate view {paths.model})"
+    )
+    console.result(text, {"rounds": told, "model": str(paths.model), "report": str(report)})
+    if not last.error <= until:
+        raise AccuracyError(
+            f"The force error of {study.name} is {share(last.error)} after {last.solves} solves, not {share(until)}.",
+            why=f"The limit of {duration(limit)} or of the rounds was reached; everything is kept.",
+            fix="Run the same command again, which goes on, with more --minutes or a larger --until.",
+        )
+
+
+def _share(text: str) -> float:
+    """Return a share: of "2%" 0.02."""
+    try:
+        value = float(text.strip().removesuffix("%")) / (100 if "%" in text else 1)
+    except ValueError:
+        value = 0.0
+    if 0 < value < 1:
+        return value
+    raise UsageError(f"{text!r} is no force error.", fix="Give a share such as 2% or 0.02.")

@@ -33,6 +33,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert (len(outcome.train), len(outcome.test)) == (8, 4), "every solve converged"
     assert outcome.validation.force.median < 0.1
     assert outcome.validation.border_loops.max < 1e-9
+    (where / "validation.json").write_text(json.dumps(outcome.validation.as_dict()), encoding="utf-8")
     report_study(where / "page.html", [outcome])
     (where / "study.toml").write_text(to_toml(study), encoding="utf-8")
     return where
@@ -52,7 +53,7 @@ def test_the_report_draws_the_force_against_the_displacement(folder: Path) -> No
 
 
 def test_study_and_file_are_validated_alike(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    by_study = json.loads(answered(capsys, "validate", folder / "study.toml", "--no-report", "--json")[1])
+    by_study = json.loads((folder / "validation.json").read_text(encoding="utf-8"))
     by_file = json.loads(
         answered(capsys, "validate", folder / "grasp-quick.palpate", "--no-report", "--json")[1]
     )

@@ -1,4 +1,4 @@
-"""Bodies with a name are carried out, from finite elements to file and report; how well is the demos' to tell."""
+"""Bodies with a name are carried out, from finite elements to a file; how well is for the demos to tell."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from palpate.study import Study, preset_study
-from palpate.study.run import Paths, carry_out, report_study
+from palpate.study.run import Paths, carry_out
 from palpate.surrogates import Surrogate
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
@@ -33,7 +33,7 @@ def small(name: str) -> Study:
 
 # the block runs as a whole on the command line; dome, phantom and liver pass here too, and cost as much again each
 @pytest.mark.parametrize("name", ["layered"])
-def test_a_named_body_is_solved_learnt_judged_and_told(name: str, tmp_path: Path) -> None:
+def test_a_named_body_is_solved_learnt_and_judged(name: str, tmp_path: Path) -> None:
     study = small(name)
     paths = Paths(tmp_path, study.name)
     outcome = carry_out(study, paths, progress=False)
@@ -48,6 +48,4 @@ def test_a_named_body_is_solved_learnt_judged_and_told(name: str, tmp_path: Path
     most = np.abs(body.fields["displacement"].values(outcome.train.X)).max(axis=(1, 2))
     moved = np.abs(outcome.train.displacement).max(axis=(1, 2))
     assert np.median(np.abs(most - moved) / moved) < 0.1
-    page = report_study(tmp_path / "report.html", [outcome]).read_text(encoding="utf-8")
-    assert study.name in page
-    assert "Where to trust it" in page
+    assert outcome.validation.name == study.name

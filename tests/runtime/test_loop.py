@@ -11,6 +11,7 @@ from standins import STIFFNESS, PlainModel
 from palpate.errors import DeviceError, DeviceLostError, DeviceStopError, UsageError
 from palpate.runtime.devices.device import Sample, Traits
 from palpate.runtime.devices.page import PageDevice
+from palpate.runtime.devices.simulated import SimulatedHand, SimulatedSettings
 from palpate.runtime.loop import Loop
 from palpate.runtime.safety import Fault, Limits
 from palpate.runtime.shared_state import MAX_INPUTS
@@ -493,3 +494,12 @@ def test_every_fault_has_its_meaning():
     meanings = {fault.meaning for fault in Fault}
     assert len(meanings) == len(Fault)
     assert len(Fault) <= 16, "the shared memory counts 16 kinds"
+
+
+@pytest.mark.parametrize(("rate", "delay"), [(20.0, 0.0), (100.0, 0.010), (200.0, 0.015), (1000.0, 0.015)])
+def test_slow_loops_and_late_devices_are_no_faults(plain, shared, rate, delay):
+    """What a device is late by its nature is no stall, at any rate."""
+    hand = SimulatedHand(SimulatedSettings(delay=delay))
+    loop = Loop(plain, hand, shared, WORKSPACE, LIMITS, rate=rate)
+    loop.run_for(2.0)
+    assert shared.read_state().faults == 0

@@ -47,6 +47,9 @@ from palpate.units import Range
 __all__ = ["EDGE", "Loop", "Model", "rehearsal"]
 
 _PAUSE = 0.05  # s between two ticks of a page or script from which on the clock jumped; hardware bears less
+_AHEAD = (
+    2e-3  # s, at most, before the end of a sample's patience; a slow loop with a late device needs the rest
+)
 EDGE = 1.25  # radii of the workspace: no force beyond
 _AIR, _REST = 0.01, 0.05  # radii: as good as outside a pressed body, and as good as at rest of a held one
 _DELAY_TIME = 0.1  # s, over which the age of the samples is averaged
@@ -172,6 +175,8 @@ class Loop:
         self._check = PlaceCheck(traits.reach or 2.0 * traits.radius, traits.speed, self.period)
         self.longest = max(HARDWARE_PATIENCE if self.motors else _PAUSE, 2.5 * self.period)
         self._ticked, self._edge = math.nan, EDGE * radius
+        # of hardware the force is gone at the end of its patience, and not a tick later
+        self._ahead = min(self.period, _AHEAD) if self.motors else 0.0
         self.rest, self._was = Rest(self.period), (0.0, 0.0, 0.0)
         zone = _REST if self.evaluator.holds else _AIR
         self.evaluator.rest_zone = zone * radius * self.workspace.scale
@@ -316,9 +321,7 @@ class Loop:
         self._commands.fetch()  # an unfinished write leaves the last commands standing
         try:
             sample = self.device.read(self.now)
-            # of hardware the force is gone at the end of its patience, and not a tick later
-            due = self.now + self.period if self.motors else self.now
-            late = sample.asleep or stalled(due, sample.time, sample.patience)
+            late = sample.asleep or stalled(self.now + self._ahead, sample.time, sample.patience)
             x, y, z = sample.position.tolist()
             self.holding = bool(sample.holding) and not sample.clutched
             self._buttons, self._switch = int(sample.buttons), bool(sample.stop)

@@ -102,5 +102,5 @@ export function describe(frame: Frame, without: boolean): void {
   else if (frame.hold === Hold.ANOTHER) status("warn", "watching");
   else if (frame.stalled && frame.grabbed) status("warn", "no word from the hand");
   else if (without) status("warn", "no force");
-  else status("live", frame.grabbed ? "holding" : "live");
+  else status("live", frame.hold === Hold.YOURS ? "holding" : "live");
 }

@@ -133,7 +133,7 @@ export class Panel {
     put("depth", felt ? 1000 * Math.max(frame.depth, 0) : NaN, 2);
     put("stiffness", felt ? frame.stiffness : NaN, 0);
     element("trust").textContent = !felt ? "–" : frame.inside ? "inside" : "outside";
-    element("deviation").textContent = deviation(frame);
+    element("deviation").textContent = deviation(frame, this.hello!);
     record(frame); // one frame, whole
   }
 
@@ -223,8 +223,8 @@ function trained(range: RangeInfo): HTMLElement {
 }
 
 /** The deviation of the force, in words. */
-function deviation(frame: Frame): string {
-  if (!frame.grabbed) return "–";
+function deviation(frame: Frame, hello: Hello): string {
+  if (!frame.grabbed || (!hello.holds && frame.depth <= 0)) return "–"; // no force, no deviation
   return Number.isNaN(frame.deviation) ? "not known" : `± ${share(frame.deviation)}`;
 }
 

@@ -269,6 +269,7 @@ def test_late_doubled_and_lost_messages_are_no_fresh_samples(service, device):
     service.faults.swapped = 1
     drive(device, service, 4)
     assert device.repeated == 4
+    assert device.note.startswith("4 positions")
     service.faults.dropped = 3
     ages = [age for _, age in drive(device, service, 6)]
     assert max(ages) == pytest.approx(0.003, abs=1e-5)

@@ -10,7 +10,7 @@ import pytest
 from library_double import LibraryDouble
 
 from palpate.errors import DeviceError, UsageError
-from palpate.runtime import Fault, Workspace
+from palpate.runtime import Fault, LoopProcess, Workspace
 from palpate.runtime.device_search import HARDWARE, Surroundings
 from palpate.runtime.devices import device_named, device_traits
 from palpate.runtime.devices.force_dimension import (
@@ -256,6 +256,19 @@ def test_saturated_motors_are_counted_and_keep_the_direction(dhd, device):
     drive(device, dhd, 5, (3.0, 0.0, 4.0))
     assert device.saturations == dhd.saturations == 4
     np.testing.assert_allclose(asked(dhd), [1.2, 0.0, 1.6])
+    assert "saturated 4 times" in device.note
+
+
+def test_a_process_touches_through_the_library_and_reports_saturation(double, spring_file):
+    library = double("forcedimension", MOTOR_FORCE=0.001, FREQUENCY=1.5, AMPLITUDE=0.02)
+    with LoopProcess(spring_file, device=f"forcedimension:library={library}") as loop:
+        state = loop.read()
+        while np.linalg.norm(state.force) < 0.01 and state.tick < 10_000:
+            state = loop.read()
+    report = loop.report()
+    assert report.faults.keys() <= {"device_stopped", "clock_jump", "input_stalled"}, "a busy machine's"
+    assert "saturated" in report.device_note
+    assert report.device_note in str(report)
 
 
 def test_a_force_that_fails_is_noticed_by_the_loop(dhd, loop):

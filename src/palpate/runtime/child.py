@@ -109,7 +109,8 @@ def _run(options: argparse.Namespace) -> int:
     _say({"obtained": obtain()})
     loop.run(rehearsal(model, workspace, limits, options.rate))
     foreign = [name for name in FOREIGN if sys.modules.get(name)]
-    _say({"foreign": foreign, "device_error": loop.device_error})
+    note = str(getattr(device, "note", ""))
+    _say({"foreign": foreign, "device_error": loop.device_error, "device_note": note})
     return 0
 
 

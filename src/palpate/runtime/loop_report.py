@@ -104,6 +104,8 @@ class LoopReport:
         Packages in the loop's process that have no business there.
     device_error : str
         First error of the device's driver, once the loop has ended; empty without one.
+    device_note : str
+        Words of the driver on what was no fault, such as saturated motors; empty for none.
     energy_lowest : float
         The lowest energy that the hand had put in, less what it was given back, J.
     leak_bound : float
@@ -131,6 +133,7 @@ class LoopReport:
     obtained: Mapping[str, str]
     foreign: tuple[str, ...] = ()
     device_error: str = ""
+    device_note: str = ""
     energy_lowest: float = 0.0
     leak_bound: float = 0.0
     damping_energy: float = 0.0
@@ -146,6 +149,7 @@ class LoopReport:
         obtained: Mapping[str, str] | None = None,
         foreign: tuple[str, ...] = (),
         device_error: str = "",
+        device_note: str = "",
     ) -> LoopReport:
         """Sum up a published state.
 
@@ -159,6 +163,8 @@ class LoopReport:
             Packages that the loop's process should not have loaded.
         device_error : str
             First error of the device's driver, in words.
+        device_note : str
+            Words of the driver on what was no fault.
         """
         bounds = state.felt_stiffness
         return cls(
@@ -175,6 +181,7 @@ class LoopReport:
             obtained=dict(obtained or {}),
             foreign=foreign,
             device_error=device_error,
+            device_note=device_note,
             energy_lowest=state.energy_lowest,
             leak_bound=bounds.felt * state.leak,
             damping_energy=state.damping_energy,
@@ -213,6 +220,6 @@ class LoopReport:
                 f"faults    {faults or 'none'}",
                 f"system    {granted or 'not known'}",
                 *([f"stiffness {self.stiffness}", self._energy] if self.stiffness else []),
-                *([f"device    {self.device_error}"] if self.device_error else []),
+                *(f"device    {text}" for text in (self.device_error, self.device_note) if text),
             ]
         )

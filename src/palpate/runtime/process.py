@@ -295,8 +295,8 @@ class LoopProcess:
     def report(self) -> LoopReport:
         """Return the report of the loop, so far or in all; what the system granted is known once it has stopped."""
         foreign = tuple(self._said.get("foreign", ()))
-        said = self._said.get("device_error", "")
-        return LoopReport.of(self._state(), self._said.get("obtained"), foreign, said)
+        said, note = self._said.get("device_error", ""), self._said.get("device_note", "")
+        return LoopReport.of(self._state(), self._said.get("obtained"), foreign, said, note)
 
     def _failure(self, what: str) -> DeviceError | UsageError:
         code = self._running.poll()

@@ -36,11 +36,7 @@ from palpate.runtime.workspace import Axes
 
 __all__ = ["STATES", "CrtkDevice", "CrtkSettings", "axes_in_words"]
 
-STATES = {
-    "DISABLED": "its motors are off",
-    "PAUSED": "it is paused",
-    "FAULT": "it has a fault",
-}
+STATES = {"DISABLED": "its motors are off", "PAUSED": "it is paused", "FAULT": "it has a fault"}
 _WRENCHES = ("body/servo_cf", "servo_cf")
 _TYPES = {
     "measured_cp": "geometry_msgs/PoseStamped",
@@ -262,6 +258,11 @@ class CrtkDevice:
         if self._fresh or stops or self._now - self._sent_at >= _AGAIN:
             self._publish_force(x, y, z)
             self._fresh, self._sent, self._sent_at = False, norm, self._now
+
+    @property
+    def note(self) -> str:
+        """Words on positions that were passed over; empty for none."""
+        return f"{self.repeated} positions were late or doubled" if self.repeated else ""
 
     def close(self) -> None:
         """Publish zero force twice, since ROS may lose one, and let go."""

@@ -115,7 +115,8 @@ class Device(Protocol):
 
     `read` and `write` are called once a tick. They must not block for longer than a fraction of it and must
     not allocate. Whatever they raise, the loop turns into a fault and zero force: best a `DeviceStopError` where the
-    device's own safety acts, a `DeviceLostError` where it is gone, a `DeviceError` or an `OSError` for the rest.
+    device's own safety acts, a `DeviceLostError` where it is gone, a `DeviceError` or an `OSError` for the rest. A
+    driver that counts what is no fault, such as saturated motors, may have a text `note`, which the report shows.
     """
 
     @property

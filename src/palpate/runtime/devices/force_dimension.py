@@ -209,6 +209,16 @@ class ForceDimensionDevice:
             with contextlib.suppress(DeviceError):
                 self._dhd.call(last, self._id)
 
+    @property
+    def note(self) -> str:
+        """Words on saturated motors and on readings that came too soon; empty for neither."""
+        notes = []
+        if self.saturations:
+            notes.append(f"a motor was saturated {self.saturations} times: less force, in the same direction")
+        if self.guarded:
+            notes.append(f"{self.guarded} readings came too soon for the library's time guard")
+        return "; ".join(notes)
+
     def _look(self) -> None:
         """Read the status, and stop at what the device says of itself."""
         status = self._status
@@ -359,16 +369,18 @@ class ForceDimensionDevice:
     def _check_start(self) -> None:
         """Read positions for a tenth of a second, brakes on; of the later half each must look right."""
         before: tuple[float, ...] | None = None
+        then = -math.inf
         for k in range(_FIRST):
             self._dhd.dhdSleep(_STEP)
             code = self._position(*self._place, self._id)
             if code not in {0, 1}:
                 raise self._failure("tells no position", code)
+            now = self._dhd.dhdGetTime()
             place = self._x.value, self._y.value, self._z.value
             if code == 1 or k < _FIRST // 2:  # several devices deliver garbage at first
                 continue
-            speed = math.dist(place, before) / _STEP if before else 0.0
-            before = place
+            speed = math.dist(place, before) / max(_STEP, now - then) if before else 0.0
+            before, then = place, now
             if not (math.hypot(*place) <= 2.0 * self.traits.radius and speed <= _FASTEST):
                 raise DeviceError(
                     f"{self.name} starts at {', '.join(f'{x:.3g}' for x in place)} m with {speed:.3g} m/s.",

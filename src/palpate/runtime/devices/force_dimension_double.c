@@ -36,6 +36,9 @@
 #ifndef HOMED
 #define HOMED 1
 #endif
+#ifndef MOTOR_FORCE
+#define MOTOR_FORCE 1000
+#endif
 #ifndef LOST_AFTER
 #define LOST_AFTER 0
 #endif
@@ -75,7 +78,7 @@ typedef struct {
 
 static const State start = {
     .type = TYPE, .serial = 1234, .present = 1, .homed = HOMED, .powered = 1, .device_max_force = -1,
-    .time_guard = 0.0002, .brake_speed = 2.5, .motor_force = 1000, .mass = 0.3, .damping = 5, .stiffness = 300,
+    .time_guard = 0.0002, .brake_speed = 2.5, .motor_force = MOTOR_FORCE, .mass = 0.3, .damping = 5, .stiffness = 300,
     .amplitude = AMPLITUDE, .frequency = FREQUENCY, .lost_after = LOST_AFTER, .fail_error = COMMUNICATION, .max_force = -1,
     .brakes = 1};
 static State s;

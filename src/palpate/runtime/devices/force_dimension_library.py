@@ -61,6 +61,7 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "dhdErrorGetLast": (c_int, ()),
     "dhdErrorGetLastStr": (c_char_p, ()),
     "dhdSleep": (None, (c_double,)),
+    "dhdGetTime": (c_double, ()),
 }
 # those that not every library has: DRD comes in libdrd alone
 _EXTRA: dict[str, tuple[Any, tuple[Any, ...]]] = {

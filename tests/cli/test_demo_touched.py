@@ -67,7 +67,9 @@ def test_the_commands_take_what_the_demo_left(palpate, folder, tmp_path):
     assert judged.code == 0, judged.out + judged.err
     assert "every limit kept" in judged.out
     assert "Shape, mean distance of nodes" in judged.out
-    file.write_text(to_toml(study).replace("9000.0 Pa", "8000.0 Pa"), encoding="utf-8")
+    text = to_toml(study)
+    assert text.count('"9 kPa"') == 1
+    file.write_text(text.replace('"9 kPa"', '"8 kPa"'), encoding="utf-8")
     refused = palpate("validate", file)
     assert refused.code == 2
     assert "not of this study" in refused.err

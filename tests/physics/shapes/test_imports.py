@@ -336,6 +336,11 @@ def test_concentric_solids_keep_their_faces(tmp_path: Path):
     assert area("between regions") == pytest.approx(2 * np.pi * 6 * 40, rel=5e-3)
     assert area("cut top") == pytest.approx(np.pi * (20**2 - 6**2), rel=5e-3)
     assert not any(limb.rest().parts[0])
+    # a patch around the axis names the skin, whose centre is there, and not the wall
+    around = SurfacePatch("round", (-0.01, -0.01, 0.015), (0.01, 0.01, 0.025))
+    mesh = ImportedSolid(limb.path, element=0.02, patches=(around,)).mesh()
+    assert area("round") == pytest.approx(2 * np.pi * 20 * 40, rel=5e-3)
+    assert area("between regions") == pytest.approx(2 * np.pi * 6 * 40, rel=5e-3)
 
 
 def write_boxes(path: Path, *boxes: tuple[str, tuple, tuple]) -> None:

@@ -183,7 +183,8 @@ def _name_interfaces(body: Any) -> None:
 def _name_patches(patches: tuple[SurfacePatch, ...], body: Any) -> None:
     if not patches:
         return
-    faces = list(body.faces)
+    # a wall between solids may have its centre in a patch, too, and is no part of the surface
+    faces = [face for face in body.faces if face.name != INTERFACE]
     names, index = apply_patches(
         [face.name for face in faces],
         np.arange(len(faces)),

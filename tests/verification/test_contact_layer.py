@@ -15,6 +15,9 @@ from palpate.physics.materials import LinearElastic
 from palpate.physics.shapes import Block, FineMesh
 from palpate.physics.solid import Body
 
+# a ball much larger than the body is meant: it is Hertz's paraboloid
+pytestmark = pytest.mark.filterwarnings("ignore:The Corner has a radius:palpate.physics.advice.ModelWarning")
+
 YOUNG = 9e3
 RADIUS = 0.5  # m, a hundred times the contact's: what theory leaves out is of the order of their ratio
 CONTACT = 0.005  # m, √(Rδ)

@@ -40,7 +40,7 @@ class Client:
     def hand(self, x: float = 0.0, y: float = 0.0, *, grabbed: bool = True, hidden: bool = False) -> None:
         """Hold the tip at an offset of x, y body metres."""
         target = (x / self.hello.scale, y / self.hello.scale, 0.0)
-        self.socket.send(Hand(0.0, 0.05, target, grabbed, hidden, np.zeros(0, "f4")).pack())
+        self.socket.send(Hand(0.0, 0.1, target, grabbed, hidden, np.zeros(0, "f4")).pack())
 
 
 @contextlib.contextmanager

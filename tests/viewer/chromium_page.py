@@ -33,7 +33,8 @@ READ = """() => ({
     data: {...document.documentElement.dataset},
     text: Object.fromEntries([...document.querySelectorAll("output[id]")].map(o => [o.id, o.textContent])),
     flags: [...document.querySelectorAll("#flags li")].map(li => li.dataset.flag),
-    withheld: document.getElementById("reason-words").textContent.includes("take hold again"),
+    withheld: document.documentElement.dataset.hold === "1" &&
+        document.getElementById("reason-words").textContent.includes("take hold again"),
 })"""
 
 

@@ -128,7 +128,7 @@ def test_a_client_that_vanishes_lets_go(viewer: Viewer):
 def test_without_heartbeats_the_force_is_zero(viewer: Viewer):
     with client_of(viewer) as client:
         assert math.hypot(*held(client, -0.3).force) > 0.5
-        time.sleep(0.3)  # three silent periods of 50 ms, and some
+        time.sleep(0.4)  # three silent periods of 100 ms, and some
         client.grant(1)
         frame = client.frame()
         assert frame.stalled

@@ -65,7 +65,7 @@ class Surface:
         """Return the triangles that a mask or an index chooses, with all nodes."""
         return replace(self, triangles=self.triangles[chosen], label_of=self.label_of[chosen])
 
-    def told(self, note: str) -> Surface:
+    def with_note(self, note: str) -> Surface:
         """Return the surface with one more note."""
         return replace(self, notes=(*self.notes, note))
 
@@ -156,7 +156,7 @@ def _close_gaps(surface: Surface) -> Surface:
             continue
         moved = float(np.linalg.norm(surface.points - surface.points[node], axis=1).max())
         corners = int((node != np.arange(len(node))).sum())
-        return closed.told(
+        return closed.with_note(
             f"{corners} corners of triangles missed their neighbours by up to {_millimetres(moved)} and were united: "
             f"{least} edges were open."
         )
@@ -185,7 +185,7 @@ def _drop_flat(surface: Surface) -> Surface:
         parts.append(f"{dropped} flat {'triangle was' if dropped == 1 else 'triangles were'} dropped")
     if count:
         parts.append("1 edge was split at a node" if count == 1 else f"{count} edges were split at nodes")
-    return split.told(" and ".join(parts) + (" on it." if count == 1 else " on them." if count else "."))
+    return split.with_note(" and ".join(parts) + (" on it." if count == 1 else " on them." if count else "."))
 
 
 def _split_at_nodes(surface: Surface) -> tuple[Surface, int]:
@@ -261,12 +261,12 @@ def _unite_shells(surface: Surface) -> Surface:
     doubled = len(triangles) - int(keep.sum()) - 2 * int(pairs.sum())
     if pairs.any():
         middle = surface.points[key[pairs > 0]].mean(axis=(0, 1))
-        united = united.told(
+        united = united.with_note(
             f"{int(pairs.sum())} pairs of equal triangles that face each other were removed around "
             f"{place(middle)}: shells that touch there have become one."
         )
     if doubled:
-        united = united.told(f"{doubled} triangles were there more than once, and are kept once.")
+        united = united.with_note(f"{doubled} triangles were there more than once, and are kept once.")
     return united
 
 

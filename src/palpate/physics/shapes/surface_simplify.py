@@ -64,7 +64,7 @@ def simplify_surface(surface: Surface, tolerance: float, most: int = MANY) -> Su
         simple = replace(surface, points=points, triangles=triangles, label_of=label_of)
         deviation = _deviation(surface, simple, lead, tolerance / 4)
         if deviation <= tolerance:
-            return without_spare_nodes(simple).told(
+            return without_spare_nodes(simple).with_note(
                 f"{len(surface.triangles):,} triangles were simplified to {len(triangles):,}, at most "
                 f"{millimetres(float(f'{deviation:.2g}'))} from the surface of the file."
             )

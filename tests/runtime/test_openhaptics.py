@@ -230,7 +230,7 @@ def test_any_other_error_ends_the_callback_with_zero_force(device, drive, librar
 
 def test_a_user_can_try_its_faults(double, shared):
     """As `palpate devices simulate openhaptics` compiles it."""
-    simulated = LibraryDouble(double("openhaptics", MODEL=3.0, LOST_AFTER=200.0, WARM_EVERY=120.0), speed=50)
+    simulated = LibraryDouble(double("openhaptics", MODEL=3.0, LOST_AFTER=2000.0, WARM_EVERY=500.0), speed=5)
     device = device_named(f"openhaptics:library={simulated.path}", shared.command)
     assert device.profile.name == "omni"
     words, now = [], 0.0
@@ -316,13 +316,19 @@ def test_nonsense_at_the_start_is_thrown_away(connect, drive, library):
     assert np.abs(drive(connect(), 1)[0]).max() < 0.01
 
 
+def _kept_by_devices():
+    """Bytes that the files of devices hold; other threads of the process may do as they like."""
+    ours = tracemalloc.Filter(True, "*/palpate/runtime/*")
+    return sum(trace.size for trace in tracemalloc.take_snapshot().filter_traces([ours]).traces)
+
+
 def test_no_memory_is_kept_per_frame(device, drive):
     drive(device, 100)
     tracemalloc.start()
     drive(device, 100)
-    before = tracemalloc.get_traced_memory()[0]
+    before = _kept_by_devices()
     drive(device, 1000)
-    after = tracemalloc.get_traced_memory()[0]
+    after = _kept_by_devices()
     tracemalloc.stop()
     assert after - before < 1000, "bytes left after a thousand frames"
 

@@ -51,7 +51,11 @@ def go(page: Page, step: int) -> None:
 
 
 def canvas_pixels(page: Page) -> np.ndarray:
-    """Red, green and blue of the canvas without its rim, where the mark of the focus is."""
+    """Red, green and blue of the canvas at rest, in all its pixels, without its rim, where the mark of the focus is."""
+    for _ in range(100):
+        if page.locator("#view").evaluate("c => c.clientWidth * devicePixelRatio - c.width") <= 1.0:
+            break
+        page.wait_for_timeout(100)
     return matplotlib.image.imread(io.BytesIO(page.locator("#view").screenshot()))[4:-4, 4:-4, :3]
 
 

@@ -98,6 +98,9 @@ class CountedSession(Session):
         self.virtual.now += PICTURE
         return SimpleNamespace(pack=lambda: b"")
 
+    def _news(self, page):
+        return []
+
     def _take(self, page, data):
         self.virtual.now += MESSAGE
         self.taken[page.number] = self.taken.get(page.number, 0) + 1

@@ -20,6 +20,7 @@ from palpate.study.part_study import part_study
 from palpate.study.rounds import improve_in_rounds
 from palpate.study.run import Paths, report_study
 from palpate.surrogates import Surrogate
+from palpate.sweeps import grow
 
 SIZE = (0.04, 0.03, 0.02)
 HEAD = """
@@ -167,6 +168,18 @@ def test_every_law_can_be_written_with_its_constants(table, material):
     assert SolidMaterialRecord.model_validate(table).build() == material
 
 
+def test_a_study_with_a_bulk_modulus_reads_back_and_takes_other_numbers_of_solves(folder):
+    text = HEAD.replace(
+        '{ young = "9 kPa" }', '{ law = "mooney-rivlin", c10 = "1 kPa", c01 = 200, bulk = "1 MPa" }'
+    )
+    study = study_of(folder, text)
+    assert read_study_again(folder, text) == study
+    larger = study.with_samples(50)
+    assert larger.sweep.samples == 50
+    assert larger.body == study.body
+    assert study.renamed("other").body == study.body
+
+
 OWN = """
 from palpate.physics.materials.tensors import determinant, inner, log
 
@@ -202,7 +215,8 @@ def test_a_law_of_the_users_own_comes_from_a_module_beside_the_study(folder):
         ('facing = "up"', 'facing = "up", faces = "face 9"', "There is no surface 'face 9'"),
         ('{ name = "rim" }', '{ name = "a" }, { name = "b" }', "two surfaces have no bounds"),
         ("pad.stl", "pat.stl", "can't be read"),
-        ("young =", 'law = "user", module = "no.py", function = "f", poisson = 0.4 } #', "no.py does not exist"),
+        ("young =", 'law = "user", module = "no.py", function = "f" } #', "no.py does not exist"),
+        ("young =", 'law = "user", module = "no.py", function = "f", poisson = 0.4 } #', "leave out poisson"),
     ],
 )  # fmt: skip
 def test_mistakes_say_what_is_there(folder, old, new, words):
@@ -228,6 +242,21 @@ def test_a_study_for_a_part_says_what_its_file_holds(folder):
     assert part_study(folder / "pad.step")[0].body.unit is None
     with pytest.raises(UsageError):
         part_study(folder / "no.stl")
+
+
+@pytest.mark.parametrize(
+    ("choice", "words"),
+    [
+        ({"poisson": 0.7}, "body.material.poisson: Input should be less than 0.5"),
+        ({"touched": "front"}, "has no surface 'front'"),
+        ({"radius": -1e-3}, "The radius of the ball"),
+        ({"depth": 0.0}, "The depth of the ball"),
+    ],
+)
+def test_choices_that_do_not_suit_a_part_are_refused(folder, choice, words):
+    with pytest.raises(UsageError) as caught:
+        part_study(folder / "pad.mesh", **choice)
+    assert words in str(caught.value)
 
 
 def test_the_sample_part_is_closed_and_lies_on_its_side(tmp_path):
@@ -292,5 +321,11 @@ def test_a_part_goes_the_whole_way(folder, tmp_path):
     (again,) = improve_in_rounds(study, paths, **wanted)
     assert again.error == done.error
     assert (tmp_path / "pad-6.palpate").read_bytes() == paths.model.read_bytes()
+    # as if the round with 8 solves had been interrupted at once
+    problem = study.problem()
+    grow(paths.data, problem, study.with_samples(8).sweep.arguments(problem))
+    assert not paths.data.exists()
+    (third,) = improve_in_rounds(study, paths, **wanted | {"rounds": (6, 8)})
+    assert third.solves == len(third.outcome.train) == 8
     with pytest.raises(StudyError, match="no such key"):
         study_of(folder, HEAD + SMALL.replace("samples = 6", "sample = 6"))

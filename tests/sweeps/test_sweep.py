@@ -12,7 +12,7 @@ from sweep_problems import LoneSpring, Spring
 from palpate.dataset import Dataset
 from palpate.errors import FileFormatError, SolverError, UsageError
 from palpate.physics import Cantilever, Circle, LinearElastic, TipLoad, preset
-from palpate.sweeps import Scheduler, grow, sweep
+from palpate.sweeps import Scheduler, grow, is_begun, sweep
 from palpate.sweeps.sweep import reporter
 
 BODY = Cantilever(1.0, Circle(0.005), LinearElastic(2e9, 0.43), elements=5)
@@ -173,6 +173,8 @@ def test_a_finished_sweep_grows_by_what_is_missing(cluster, tmp_path):
     small = sweep(spring, samples=8, cluster=cluster, path=path)
     assert grow(path, spring, {"samples": 8}) is None
     assert grow(path, spring, {"samples": 16}) is None
+    begun = [samples for samples in (8, 16, 32) if is_begun(path, spring, {"samples": samples})]
+    assert begun == [16], "as after an interruption: nothing but the parts is there"
     grown = sweep(spring, samples=16, cluster=cluster, path=path)
     assert len(list((tmp_path / "log").iterdir())) == 16
     assert grown.hash == sweep(spring, samples=16, cluster=cluster).hash

@@ -49,6 +49,7 @@ def test_what_more_solves_do_not_help_is_not_advised() -> None:
     hopeless = advice_on_solves(judged(force_p95=8.0), 20, (), COMMAND)
     assert "more than 20 times as many solves" in hopeless
     assert COMMAND not in hopeless
+    assert not hopeless.endswith("."), "reports put the full stop"
 
 
 def test_a_point_of_as_many_solves_is_replaced() -> None:

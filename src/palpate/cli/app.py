@@ -486,8 +486,7 @@ def main(arguments: list[str] | None = None) -> None:
         sys.exit(known.exit_code)
     except SystemExit as end:
         if end.code == _INTERRUPTED:  # as which Typer ends by Ctrl-C, without a word
-            kept = (
-                " What is solved is kept: the same command goes on." if {"sweep", "demo"} & set(words) else ""
-            )
+            goes_on = {"sweep", "demo", "touch"} & set(words)
+            kept = " What is solved is kept: the same command goes on." if goes_on else ""
             Console().say(f"\nInterrupted.{kept}")
         raise

@@ -41,7 +41,7 @@ def init_study(
     """
     from palpate.study import preset_study, to_toml
     from palpate.study.part_records import CAD_ENDINGS, MESH_ENDINGS
-    from palpate.study.part_study import part_study, part_text
+    from palpate.study.part_study import part_study, part_text, study_file
 
     if path.is_dir():
         raise UsageError(f"{path} is a folder.", fix=f"Name a file, such as {path / 'study.toml'}.")
@@ -51,7 +51,7 @@ def init_study(
     if path.suffix.lower() in (*CAD_ENDINGS, *MESH_ENDINGS):
         record, notes = part_study(path, unit=unit)
         text = part_text(record, notes)
-        target = path.with_name(f"{record.name}.toml")
+        target = study_file(path)
     else:
         if unit is not None:
             raise UsageError("A unit belongs to a part.", fix="Name the part's file, or leave out --unit.")

@@ -191,7 +191,8 @@ def validate_study_file(study: Path, report: bool, console: Console, traces: Seq
     except AccuracyError as error:
         if not advice:
             raise
-        raise AccuracyError(error.what, why=error.why, fix=f"{advice}, then palpate learn {study}") from None
+        then = f", then palpate learn {study}" if "--samples" in advice else "."
+        raise AccuracyError(error.what, why=error.why, fix=advice + then) from None
 
 
 def _beside_full_model(record: Study, traces: Sequence[Path], console: Console) -> list[TouchComparison]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -57,7 +58,8 @@ def touch(
     console = Console(as_json)
     asked = {"unit": unit, "young": young, "poisson": poisson, "radius": radius, "depth": depth}
     choices = {"held": tuple(held or ()), "touched": touched}
-    study = _study_of(part, {k: v for k, v in (asked | choices).items() if v}, console).with_workers(workers)
+    given = {name: value for name, value in (asked | choices).items() if value not in (None, ())}
+    study = _study_of(part, given, console).with_workers(workers)
     paths = Paths(part.parent, study.name)
     _carry_on(study, paths, _share(until), 60 * minutes, console)
     if view and not as_json and sys.stdout.isatty():
@@ -70,27 +72,52 @@ def _study_of(part: Path, options: dict[str, Any], console: Console) -> Study:
     """Return the study of a part that lies beside it, or write one with these options."""
     from palpate.files import write_file
     from palpate.study import read_study
-    from palpate.study.part_study import part_study, part_text
+    from palpate.study.part_study import part_study, part_text, study_file
     from palpate.units import to_si
 
-    file = part.with_suffix(".toml")
-    if file.exists():
-        if options:
-            raise UsageError(
-                f"{file} exists already, and says what is held, touched and of what material.",
-                why=f"Given besides: {', '.join('--' + name for name in options)}.",
-                fix="Change the file and leave the options out, or delete it with its solves.",
-            )
-        console.say(f"Going on with the study {file} …")
-        return read_study(file)
     for name, si in (("young", "Pa"), ("radius", "m"), ("depth", "m")):
         if name in options:
             options[name] = to_si(options[name], si)
+    file = study_file(part)
+    if file.exists():
+        study = read_study(file)
+        said = _choices_of(study)
+        if others := [name for name, value in options.items() if not _are_equal(said.get(name), value)]:
+            raise UsageError(
+                f"{file} exists already, and says what is held, touched and of what material.",
+                why=f"It says otherwise of {', '.join('--' + name for name in others)}.",
+                fix="Change the file and leave the options out, or delete it with its solves.",
+            )
+        console.say(f"Going on with the study {file} …")
+        return study
     study, notes = part_study(part, **options)
     write_file(file, part_text(study, notes))
     console.say("\n".join(filter(None, notes)))
     console.say(f"{_chosen(study)} {file} says all of it; change it there.")
     return study
+
+
+def _choices_of(study: Study) -> dict[str, Any]:
+    """Return what the study of a part says of the options of this command."""
+    from palpate.study.interaction_records import ProbeRecord
+    from palpate.study.material_records import SolidMaterialRecord
+    from palpate.study.part_records import PartRecord
+
+    body, acting = study.body, study.interaction
+    if not isinstance(body, PartRecord) or not isinstance(acting, ProbeRecord):
+        return {}
+    said: dict[str, Any] = {"radius": acting.radius, "depth": acting.depth[1], "touched": acting.touches}
+    said |= {"unit": body.unit, "held": body.fixed_names()}
+    if isinstance(body.material, SolidMaterialRecord):
+        said |= {"young": body.material.young, "poisson": body.material.poisson}
+    return said
+
+
+def _are_equal(one: Any, other: Any) -> bool:
+    """Return whether two choices are the same; numbers may differ by the rounding of a unit."""
+    if isinstance(one, float) and isinstance(other, float):
+        return math.isclose(one, other, rel_tol=1e-9)
+    return bool(one == other)
 
 
 def _chosen(study: Study) -> str:

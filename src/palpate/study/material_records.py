@@ -54,6 +54,7 @@ _NEEDED = {
     "user": {"module", "function"},
 }
 _ALSO = {"user": {"constants", "bulk"}} | {law: {"bulk"} for law in ("mooney-rivlin", "yeoh", "ogden")}
+_POISSON = 0.45  # where neither Poisson's ratio nor a bulk modulus is given
 _CONSTANTS = set().union(*_NEEDED.values(), *_ALSO.values())
 _LARGE = {
     "mooney-rivlin": MooneyRivlin,
@@ -136,7 +137,7 @@ class SolidMaterialRecord(Record):
         description="Young's modulus at small strains",
         examples=["9 kPa"],
     )
-    poisson: float = Field(0.45, ge=0, lt=0.5, description="Poisson's ratio at small strains")
+    poisson: float = Field(_POISSON, ge=0, lt=0.5, description="Poisson's ratio at small strains")
     bulk: Pascals | None = Field(
         None,
         gt=0,
@@ -176,8 +177,9 @@ class SolidMaterialRecord(Record):
 
     @property
     def unused_keys(self) -> frozenset[str]:
-        """Keys that a file of this material need not show: constants of other laws."""
-        return frozenset(_CONSTANTS - _NEEDED[self.law] - _ALSO.get(self.law, set()))
+        """Keys that a file of this material need not show: constants of other laws, and a Poisson's ratio of no use."""
+        unused = _CONSTANTS - _NEEDED[self.law] - _ALSO.get(self.law, set())
+        return frozenset(unused | {"poisson"} if self.bulk is not None or self.law == "user" else unused)
 
     @field_validator("constants")
     @classmethod
@@ -196,8 +198,10 @@ class SolidMaterialRecord(Record):
             raise ValueError(
                 f"the law {self.law} has no constant {foreign[0]}; it belongs to {', '.join(laws)}"
             )
-        if self.bulk is not None and "poisson" in self.model_fields_set:
+        if self.bulk is not None and self.poisson != _POISSON:
             raise ValueError("bulk and poisson say the same: give one of them")
+        if self.law == "user" and self.poisson != _POISSON:
+            raise ValueError("the law user has its Poisson's ratio in its function: leave out poisson")
         if self.hardening is not None and self.law != "linear-elastic":
             raise ValueError("hardening is for the law linear-elastic: plastic flow is a law of small strain")
         if self.hardening is not None and self.prony:

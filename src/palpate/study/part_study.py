@@ -10,14 +10,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
+from palpate import checks
 from palpate.errors import PalpateError, UsageError
 from palpate.physics.shapes.mesh import Face
 from palpate.study.part_records import STEP_ENDINGS, PartRecord, part_shape
 from palpate.study.study import Study
-from palpate.study.toml import to_toml
+from palpate.study.toml import complaints, to_toml
 
-__all__ = ["part_study", "part_text"]
+__all__ = ["part_study", "part_text", "study_file"]
 
 HELD, TOUCHED = "held", "touched"
 YOUNG, POISSON = 10e3, 0.45  # Pa; of soft tissue, until the user says what it is
@@ -68,9 +70,12 @@ def part_study(
     Raises
     ------
     UsageError, FileFormatError
-        If the file is missing, or no body.
+        If the file is missing, or no body, or a choice does not suit it.
     """
     path = Path(file)
+    for what, length in (("The radius of the ball", radius), ("The depth of the ball", depth)):
+        if length is not None:
+            checks.positive(what, length, "m")
     unit, faces = _read(path, unit)
     low = np.min([face.lower for face in faces], axis=0)
     high = np.max([face.upper for face in faces], axis=0)
@@ -98,7 +103,7 @@ def part_study(
         "sweep": {"samples": 60, "depths": 3},
         "test": {"samples": 24, "depths": 2},  # many places: several depths of one tell less
     }
-    study = Study.model_validate(content) if touched else _with_touched(content, named)
+    study = _study_of(content) if touched else _with_touched(content, named)
     regions = study.body.shape().regions  # type: ignore[union-attr]  # it is a part
     return study, tuple(_notes(path, unit, faces, regions, low, high))
 
@@ -149,11 +154,27 @@ def _with_touched(content: dict[str, Any], held: list[Any]) -> Study:
         # what is held goes over what is touched
         body = content["body"] | {"surfaces": (touched, *held)}
         try:
-            return Study.model_validate(content | {"body": body})
+            return _study_of(content | {"body": body})
         except UsageError as error:
             failure = failure or error
     assert failure is not None
     raise failure
+
+
+def _study_of(content: dict[str, Any]) -> Study:
+    try:
+        return Study.model_validate(content)
+    except ValidationError as error:
+        raise UsageError(
+            f"No study of {content['body']['file']} can be made with these choices.",
+            why="\n".join(f"  {line}" for line in complaints(error)),
+            fix="Change them; `palpate init` of the part lists its surfaces.",
+        ) from error
+
+
+def study_file(part: str | os.PathLike[str]) -> Path:
+    """Return the path of the study of a part: beside it, under a name that its files can have."""
+    return Path(part).with_name(f"{_study_name(Path(part).stem)}.toml")
 
 
 def _study_name(stem: str) -> str:

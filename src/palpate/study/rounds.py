@@ -25,6 +25,7 @@ from palpate.study.run import (
 )
 from palpate.study.study import Study
 from palpate.study.study_advice import earlier_curve
+from palpate.sweeps import is_begun
 
 __all__ = ["ROUNDS", "Round", "improve_in_rounds"]
 
@@ -90,7 +91,7 @@ def improve_in_rounds(
         Gets one line when a part of the work begins.
     """
     began = time.monotonic()
-    known = len(Dataset.open(paths.data)) if paths.data.exists() else 0
+    known = _solves_so_far(study, paths, rounds)
     for solves in [n for n in rounds if n >= known] or [known]:
         record = study.with_samples(solves)
         log(f"round with {solves} solves")
@@ -108,6 +109,17 @@ def improve_in_rounds(
         yield Round(solves, outcome, math.nan if error is None else float(error), seconds)
         if (error is not None and error <= until) or seconds > limit:
             return
+
+
+def _solves_so_far(study: Study, paths: Paths, rounds: Sequence[int]) -> int:
+    """Return the number of solves of the round that was interrupted, else of the sweep that is finished."""
+    if paths.data.with_name(f"{paths.data.name}.parts").exists():
+        problem = study.problem()
+        for solves in rounds:
+            wanted = study.with_samples(solves).sweep
+            if wanted is not None and is_begun(paths.data, problem, wanted.arguments(problem)):
+                return solves
+    return len(Dataset.open(paths.data)) if paths.data.exists() else 0
 
 
 def _learnt(record: Study, paths: Paths, train: Any, test: Any, log: Log) -> tuple[Any, Any]:

@@ -22,7 +22,7 @@ from palpate.study.quantities import Unit
 from palpate.study.study import Study
 from palpate.units import to_si
 
-__all__ = ["read_study", "study_schema", "to_toml"]
+__all__ = ["complaints", "read_study", "study_schema", "to_toml"]
 
 _EXAMPLES = {"cantilever": "beam-nylon", "layered": "layered", "dome": "breast-dome", "organ": "liver"}
 """Presets that show every key of a kind of body; the block shows those of the others."""
@@ -68,7 +68,7 @@ def read_study(path: str | os.PathLike[str]) -> Study:
     except ValidationError as error:
         raise StudyError(
             f"{path} does not describe a study:",
-            why="\n".join(f"  {line}" for line in _complaints(error)),
+            why="\n".join(f"  {line}" for line in complaints(error)),
             fix=f"`palpate init {_example_of(content)} --print` shows every key with its meaning; "
             "`palpate schema` is for editors.",
         ) from error
@@ -285,7 +285,7 @@ def _unit(parts: Iterable[Any]) -> str | None:
     return None
 
 
-def _complaints(error: ValidationError) -> Iterator[str]:
+def complaints(error: ValidationError) -> Iterator[str]:
     """Yield one line per mistake: where, what, and the nearest key that exists."""
     items = [(_place(item["loc"]), item) for item in error.errors(include_url=False)]
     for place, item in items:

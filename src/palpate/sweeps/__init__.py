@@ -14,7 +14,7 @@
 """
 
 from palpate.sweeps.cluster import LocalCluster, Scheduler, local_cluster
-from palpate.sweeps.grow_sweep import grow
+from palpate.sweeps.grow_sweep import grow, is_begun
 from palpate.sweeps.problem import (
     Answer,
     Chained,
@@ -44,6 +44,7 @@ __all__ = [
     "Space",
     "grid",
     "grow",
+    "is_begun",
     "local_cluster",
     "random",
     "sobol",

@@ -17,7 +17,7 @@ from palpate.files import system_errors
 from palpate.sweeps.ledger import Ledger
 from palpate.sweeps.plan import Plan, make_plan
 
-__all__ = ["grow"]
+__all__ = ["grow", "is_begun"]
 
 
 def grow(path: str | os.PathLike[str], problem: Any, arguments: Mapping[str, Any]) -> Dataset | None:
@@ -44,14 +44,7 @@ def grow(path: str | os.PathLike[str], problem: Any, arguments: Mapping[str, Any
     path = Path(path)
     if not path.exists():
         return None
-    plan = make_plan(
-        problem,
-        None,
-        arguments.get("samples"),
-        arguments.get("seed", 0),
-        arguments.get("design"),
-        arguments.get("points"),
-    )
+    plan = _plan(problem, arguments)
     try:
         finished = Dataset.open(path)
     except FileFormatError:
@@ -66,6 +59,32 @@ def grow(path: str | os.PathLike[str], problem: Any, arguments: Mapping[str, Any
     with system_errors(f"The folder {path} could not be removed, to make room for the larger sweep."):
         shutil.rmtree(path)
     return None
+
+
+def is_begun(path: str | os.PathLike[str], problem: Any, arguments: Mapping[str, Any]) -> bool:
+    """Return whether a run of this very sweep was interrupted, so that `sweep` goes on with it.
+
+    Parameters
+    ----------
+    path : path
+        Dataset that the sweep writes.
+    problem : Problem
+        Problem of the sweep.
+    arguments : mapping
+        Arguments of `sweep` that say where to solve.
+    """
+    return Ledger(Path(path), _plan(problem, arguments).config).is_begun
+
+
+def _plan(problem: Any, arguments: Mapping[str, Any]) -> Plan:
+    return make_plan(
+        problem,
+        None,
+        arguments.get("samples"),
+        arguments.get("seed", 0),
+        arguments.get("design"),
+        arguments.get("points"),
+    )
 
 
 def _begins_alike(finished: Dataset, plan: Plan) -> bool:

@@ -40,6 +40,11 @@ class Ledger:
         """Folder of the parts."""
         return self.path.with_name(self.path.name + ".parts")
 
+    @property
+    def is_begun(self) -> bool:
+        """True where an interrupted run of this very sweep has left its parts."""
+        return _config_in(self.parts / "plan.json") == self.config
+
     def complete(self) -> Dataset | None:
         """Read the finished dataset, if there is one.
 

@@ -44,6 +44,8 @@ def learning_curve(earlier: Curve, solves: int, validation: Validation) -> list[
 def advice_on_solves(validation: Validation, solves: int, curve: Curve, command: str) -> str:
     """Return a sentence on the number of solves that would keep all limits; empty where more solves help nothing.
 
+    It has no full stop, since it may go on with what follows the command.
+
     Parameters
     ----------
     validation : Validation
@@ -68,7 +70,7 @@ def advice_on_solves(validation: Validation, solves: int, curve: Curve, command:
     if number > MOST * solves:
         return (
             f"{text}: by the curve so far more than {MOST} times as many solves would be needed. Touch a smaller part "
-            "(`over`), press less deep (`depth`), or ask for less (`[target]`)."
+            "(`over`), press less deep (`depth`), or ask for less (`[target]`)"
         )
     number = _rounded_up(number)
     then = criterion_figure(worst.measured * (solves / number) ** exponent, kind)

@@ -134,6 +134,18 @@ def test_surfaces_of_element_faces(tmp_path: Path):
     assert shape.notes == (f"{len(HEXES)} hexahedra were split into tetrahedra.",)
 
 
+def test_a_surface_of_an_assembly_has_all_of_its_sides(tmp_path: Path):
+    part = "*PART, NAME=BLOCK\n" + nodes() + "*ELEMENT, TYPE=C3D8R\n" + rows(HEXES + 1) + "*END PART\n"
+    placed = "*ASSEMBLY, NAME=A\n*INSTANCE, NAME=one, PART=BLOCK\n*END INSTANCE\n"
+    for side, level in (("S1", 2.5), ("S2", 17.5)):
+        chosen = np.flatnonzero(POINTS[HEXES].mean(axis=1)[:, 2] == level) + 1
+        placed += f"*ELSET, ELSET=_ends_{side}, INTERNAL, INSTANCE=one\n" + "".join(
+            f"{n}\n" for n in chosen.tolist()
+        )
+    placed += "*SURFACE, NAME=ends, TYPE=ELEMENT\n_ends_S1, S1\n_ends_S2, S2\n*END ASSEMBLY\n"
+    assert areas(mesh_of(write(tmp_path / "a.inp", part + placed)))["ends"] == 2 * 1600
+
+
 def test_instances_stand_where_the_assembly_says(tmp_path: Path):
     """Two of one part, the second turned by 180° about an axis through the end of the first's top."""
     part = "*PART, NAME=BLOCK\n" + nodes() + elements(UPPER | ~UPPER, 1, "") + "*END PART\n"

@@ -398,12 +398,11 @@ def _of_instance(assembly: _Part, name: str) -> _Part:
         mine.update({key: value for key, value in theirs.items() if key.startswith(start)})
     part.internal = {key for key in part.element_sets if key in assembly.internal}
     part.internal |= {key for key in part.element_sets if key.removeprefix(start) in assembly.internal}
-    part.surfaces = {
-        key: [(f"{start}{first}" if f"{start}{first.upper()}" in part.element_sets else first, side)]
-        for key, entries in assembly.surfaces.items()
-        for first, side in entries
-        if f"{start}{first.upper()}" in part.element_sets or first.upper().startswith(start)
-    }
+    for key, entries in assembly.surfaces.items():
+        for first, side in entries:
+            in_set = f"{start}{first.upper()}" in part.element_sets
+            if in_set or first.upper().startswith(start):
+                part.surfaces.setdefault(key, []).append((f"{start}{first}" if in_set else first, side))
     return part
 
 

@@ -20,7 +20,8 @@ from palpate.study.part_study import part_study
 from palpate.study.rounds import improve_in_rounds
 from palpate.study.run import Paths, report_study
 from palpate.surrogates import Surrogate
-from palpate.sweeps import grow
+from palpate.sweeps.ledger import Ledger
+from palpate.sweeps.plan import make_plan
 
 SIZE = (0.04, 0.03, 0.02)
 HEAD = """
@@ -299,6 +300,20 @@ force_p95 = 0.3
 """
 
 
+def test_rounds_go_on_with_the_one_that_was_interrupted(folder, tmp_path):
+    """Of a round that grows a sweep there are only parts left: the finished sweep before it has gone into them."""
+    study, paths = study_of(folder, HEAD + SMALL), Paths(tmp_path, "pad")
+    problem = study.problem()
+    points = study.with_samples(8).sweep.arguments(problem)["points"]
+    Ledger(paths.data, make_plan(problem, None, None, 0, None, points).config).begin()
+
+    def stop(line: str) -> None:
+        raise InterruptedError(line)
+
+    with pytest.raises(InterruptedError, match="round with 8 solves"):
+        next(improve_in_rounds(study, paths, until=0.5, limit=1.0, rounds=(6, 8, 10), log=stop))
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_a_part_goes_the_whole_way(folder, tmp_path):
@@ -321,11 +336,5 @@ def test_a_part_goes_the_whole_way(folder, tmp_path):
     (again,) = improve_in_rounds(study, paths, **wanted)
     assert again.error == done.error
     assert (tmp_path / "pad-6.palpate").read_bytes() == paths.model.read_bytes()
-    # as if the round with 8 solves had been interrupted at once
-    problem = study.problem()
-    grow(paths.data, problem, study.with_samples(8).sweep.arguments(problem))
-    assert not paths.data.exists()
-    (third,) = improve_in_rounds(study, paths, **wanted | {"rounds": (6, 8)})
-    assert third.solves == len(third.outcome.train) == 8
     with pytest.raises(StudyError, match="no such key"):
         study_of(folder, HEAD + SMALL.replace("samples = 6", "sample = 6"))

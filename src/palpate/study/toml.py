@@ -194,7 +194,8 @@ def _fill_by_name(table: Any, records: dict[str, Any]) -> None:
 
 def _can_vary(record: BaseModel) -> bool:
     """Return whether numbers of a study's body can be inputs."""
-    return isinstance(record, Study) and bool(record.body.surface_names())
+    # the names of its surfaces would tell, too, but those of a part are in its file, which may be elsewhere
+    return isinstance(record, Study) and "probe" in record.body.INTERACTIONS
 
 
 def _add_tables(table: Any, name: str, item: type[BaseModel], values: Iterable[BaseModel] | None) -> None:

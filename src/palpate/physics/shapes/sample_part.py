@@ -22,7 +22,7 @@ SUBDIVISIONS = 4  # of an icosahedron: 5,120 triangles with edges of about 4 mm
 
 
 def kidney_surface(subdivisions: int = SUBDIVISIONS) -> tuple[np.ndarray, np.ndarray]:
-    """Return the closed surface of a kidney-like organ that lies on its flattened side, about 110 × 70 × 40 mm.
+    """Return the closed surface of a kidney-like organ that lies on its flattened side, about 110 × 60 × 40 mm.
 
     An ellipsoid with one pole thicker than the other, bent, dented in its hollow and flattened below. Each step moves
     points along one axis by a function that grows along it, so the surface never cuts itself. It is a smooth stand-in,

@@ -241,3 +241,10 @@ def test_advice_is_told_once_and_without_the_line_of_code(palpate, carried_out, 
     )
     assert "ModelWarning" not in answer.err
     assert ".py" not in answer.err
+
+
+def test_a_poisson_ratio_of_zero_is_an_option_too(palpate, tmp_path):
+    (tmp_path / "part.toml").write_text("", encoding="utf-8")
+    answer = palpate("touch", tmp_path / "part.stl", "--poisson", "0")
+    assert answer.code == 2
+    assert "--poisson" in answer.err

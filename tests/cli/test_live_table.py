@@ -68,6 +68,16 @@ def test_keys_stop_and_resume_without_a_line(request):
             assert keys.wish() == wish
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="a pseudo-terminal is POSIX")
+def test_in_the_background_no_keys_are_heard(request, monkeypatch):
+    """The system would stop a program that changes a terminal which another one uses."""
+    leader, follower = os.openpty()
+    request.addfinalizer(lambda: (os.close(leader), os.close(follower)))
+    monkeypatch.setattr(os, "tcgetpgrp", lambda _: os.getpgrp() + 1)
+    with terminal_keys(follower) as keys:
+        assert not keys.heard
+
+
 def test_without_a_terminal_no_keys_are_heard(tmp_path):
     with (tmp_path / "no terminal").open("w+") as file, terminal_keys(file.fileno()) as keys:
         assert not keys.heard

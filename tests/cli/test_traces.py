@@ -13,7 +13,7 @@ import pressed as slab
 from palpate.errors import SolverError, UsageError
 from palpate.runtime.touchable import touchable
 from palpate.runtime.trace_export import trace_table
-from palpate.runtime.trace_file import read_trace
+from palpate.runtime.trace_file import TraceWriter, read_trace
 from palpate.units import Range
 from palpate.validation.full_model import compare_full_model, stroke_moments
 from palpate.validation.limits import FAINT_JND
@@ -76,6 +76,15 @@ def test_a_replay_says_that_it_is_the_same_or_by_how_much_it_is_not(palpate, tra
     by_model = json.loads(palpate("trace", "compare", trace, "--model", harder, "--json").out)
     assert by_model["jnd_max"] == told["jnd_max"]
     assert palpate("trace", "compare", trace).code == UsageError.exit_code
+
+
+def test_a_recording_that_never_began_is_told_and_no_option_is_passed_over(palpate, trace, tmp_path):
+    path = tmp_path / "a.trace"
+    TraceWriter(path, {"device": "page"}).abandon()
+    answer = palpate("trace", "info", path)
+    assert answer.code == 0
+    assert "page: its loop had not begun" in answer.out
+    assert palpate("replay", trace, "--view", "--out", tmp_path / "b.trace").code == UsageError.exit_code
 
 
 def test_a_model_that_is_gone_is_asked_for(palpate, trace, tmp_path):

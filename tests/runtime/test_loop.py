@@ -503,3 +503,22 @@ def test_slow_loops_and_late_devices_are_no_faults(plain, shared, rate, delay):
     loop = Loop(plain, hand, shared, WORKSPACE, LIMITS, rate=rate)
     loop.run_for(2.0)
     assert shared.read_state().faults == 0
+
+
+def test_whatever_a_driver_says_and_a_body_raises_stays_in_the_loop(bench, plain):
+    bench.settle()
+    bench.device.read_error = DeviceError(
+        "the bridge complains: \ud800"
+    )  # as JSON may spell it, and no encoding
+    states = bench.ticks(3)
+    assert zero(states)
+    assert states[-1].fault == Fault.DEVICE_ERROR
+    assert "the bridge complains: ?" in states[-1].reason
+    assert "complains: ?" in bench.loop.device_error
+    bench.device.read_error = None
+    bench.grab()
+    bench.settle()
+    plain.answer.error = KeyError("a body of foreign code")
+    states = bench.ticks(3)
+    assert zero(states)
+    assert states[-1].fault == Fault.EVALUATOR_ERROR

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import signal
 import subprocess
@@ -15,7 +16,9 @@ import pytest
 from standins import STIFFNESS
 
 from palpate.errors import DeviceError, UsageError
+from palpate.network import shared_memory
 from palpate.runtime import Fault, LoopProcess, now
+from palpate.runtime.recording import Ring
 
 POSIX = pytest.mark.skipif(os.name != "posix", reason="signals and process ids are POSIX's")
 TICK = 1e-3
@@ -222,6 +225,34 @@ def test_bad_beginnings_are_explained(spring_file, tmp_path):
         assert not Path(loop.shared.name).exists()
     with pytest.raises(UsageError, match="not started"):
         LoopProcess(spring_file).read()
+
+
+def test_a_start_that_fails_leaves_no_shared_memory(spring_file, monkeypatch):
+    names, most, create = [], [1], shared_memory.create
+
+    def created(head, size):
+        if len(names) == most[0]:
+            raise OSError("no room")
+        names.append(create(head, size))
+        return names[-1]
+
+    monkeypatch.setattr(shared_memory, "create", created)
+    for room, options, error in (
+        (1, {}, DeviceError),
+        (2, {"parameters": [0.0] * 99}, UsageError),
+        (2, {"rate": 1e9}, UsageError),
+    ):
+        names.clear()
+        most[0] = room
+        with pytest.raises(error):
+            LoopProcess(spring_file, **options).start()
+        assert names
+        assert not any(Path(name).exists() for name in names)
+
+
+def test_no_rate_makes_a_ring_that_fills_the_memory():
+    for rate in (math.inf, math.nan, -1.0, 1e9):
+        assert Ring.private(rate).length <= 40_100
 
 
 def test_parameters_reach_the_loop(spring_file):

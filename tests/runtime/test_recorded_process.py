@@ -193,6 +193,11 @@ def test_a_damaged_or_forged_file_is_no_more_than_an_error(tmp_path):
             archive.writestr("ticks-000001.npz", chunk.getvalue())
         with pytest.raises(FileFormatError, match="damaged"):
             read_trace(path)
+    for header in ("[]", '{"format": "palpate trace", "version": Infinity}', "[" * 100_000):
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("header.json", header)
+        with pytest.raises(FileFormatError):
+            read_trace(path)
     path.write_bytes(data)
     with pytest.raises(FileFormatError, match="can't be replayed"):
         Replay(read_trace(path), None)

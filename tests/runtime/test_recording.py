@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -15,9 +18,10 @@ from palpate.runtime.devices.page import PageDevice
 from palpate.runtime.devices.simulated import SimulatedHand, SimulatedSettings
 from palpate.runtime.devices.stroke import StrokeDevice, StrokeSettings
 from palpate.runtime.loop import Loop
+from palpate.runtime.publisher import Publisher
 from palpate.runtime.recorder import TraceRecorder
 from palpate.runtime.recording import Ring, TickRecorder
-from palpate.runtime.replay import Replay, loop_facts
+from palpate.runtime.replay import Replay, loop_facts, play
 from palpate.runtime.safety import Fault, Limits
 from palpate.runtime.shared_state import Shared
 from palpate.runtime.touchable import touchable
@@ -269,3 +273,19 @@ def test_a_torn_tick_waits_for_its_rest():
     ring.slots[7] = whole
     assert ring.take()["tick"].tolist() == [8, 9, 10]
     assert ring.lost == 0
+
+
+def test_a_replay_that_is_looked_at_has_faults_at_its_own_time_and_ends_within_a_gap(tmp_path):
+    shared = Shared.private()
+    out = Publisher(shared, 0)
+    out.offset = 100.0
+    out.tick(5.0, 0.0, Fault.DEVICE_ERROR)
+    assert shared.read_state().onsets == ((105.0, Fault.DEVICE_ERROR),)
+    touch = Recorded(tmp_path / "a.trace", body := touchable(spring_beam(200.0)), hand())
+    touch.tick(20)
+    trace = touch.trace()
+    ticks = trace.ticks.copy()
+    ticks["time"][1:] += 1e6  # the machine slept
+    asked, shared = itertools.count(), Shared.private()
+    play(replace(trace, ticks=ticks), body, shared, lambda: next(asked) > 20)
+    assert shared.read_state().tick == 1

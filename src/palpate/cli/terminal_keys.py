@@ -53,7 +53,7 @@ def terminal_keys(descriptor: int | None = None) -> Iterator[Keys]:
             descriptor = sys.stdin.fileno()
         except (AttributeError, OSError, ValueError):  # no standard input, or one that is no file
             descriptor = -1
-    if sys.platform == "win32" or descriptor < 0 or not os.isatty(descriptor):
+    if sys.platform == "win32" or descriptor < 0 or not os.isatty(descriptor) or _in_background(descriptor):
         yield Keys()
         return
     import termios
@@ -65,3 +65,11 @@ def terminal_keys(descriptor: int | None = None) -> Iterator[Keys]:
         yield Keys(descriptor)
     finally:
         termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+
+
+def _in_background(descriptor: int) -> bool:
+    """Return whether a shell runs this program in the background: the system stops one that touches its terminal."""
+    try:
+        return os.tcgetpgrp(descriptor) != os.getpgrp()
+    except OSError:  # a terminal of another session, which nobody guards
+        return False

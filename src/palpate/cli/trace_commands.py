@@ -53,12 +53,18 @@ def replay(
     from palpate.runtime.replay import Replay, is_recorded_model
     from palpate.runtime.touchable import load_touchable
 
+    if view and (own_workspace or out is not None):
+        raise UsageError(
+            "A page shows the touch in its own workspace, and writes no trace.",
+            fix="Leave out --view, or --own-workspace and --out.",
+        )
     console = Console(as_json)
     trace = _read(file, console)
     path: Path = _model_of(trace) if model is None else model
     same = is_recorded_model(trace, path)
     if not same:
-        console.say(f"{path} is not the model that was recorded ({trace.header['model']['file']}).")
+        known = trace.header.get("model", {}).get("file", "unknown")
+        console.say(f"{path} is not the model that was recorded ({known}).")
     if view:
         _show(path, file, console)
         return
@@ -164,11 +170,14 @@ def _in_words(trace: Trace, facts: dict[str, Any]) -> str:
 
     faults = ", ".join(f"{n} × {name.replace('_', ' ')}" for name, n in facts["faults"].items())
     model = facts["model"] or {}
+    loop = "its loop had not begun"
+    if facts["limits"] is not None:
+        loop = f"{facts['rate']:g} Hz, at most {facts['limits']['max_force']:g} N"
     lines = [
         f"{trace.path}: {count(len(trace), 'tick')} in {trace.seconds:.3f} s, "
         f"recorded {(facts['recorded'] or '')[:19]} UTC",
         f"  body       {facts['body']}, {model.get('file')} ({model.get('sha256', '')[:12]}…)",
-        f"  device     {facts['device']} at {facts['rate']:g} Hz, at most {facts['limits']['max_force']:g} N",
+        f"  device     {facts['device']}: {loop}",
         f"  force      up to {facts['largest_force']:.3g} N",
         f"  lateness   {1e6 * facts['lateness_p99']:.0f} µs (p99)",
         f"  faults     {faults or 'none'}",

@@ -306,10 +306,13 @@ class Loop:
 
     def device_failed(self, error: Exception) -> None:
         """Record an error of the device's driver; of several ticks in a row, the first one's words are published."""
+        said = (
+            str(error).encode(errors="replace").decode()
+        )  # a service's words may hold what can't be written
         if not self._driver_fails:
             self._driver_fails = True
-            self.out.words(str(error) or type(error).__name__)
-        self.device_error = self.device_error or f"{type(error).__name__}: {error}"
+            self.out.words(said or type(error).__name__)
+        self.device_error = self.device_error or f"{type(error).__name__}: {said}"
         if isinstance(error, DeviceStopError):
             self.fail(Fault.DEVICE_STOPPED)
         else:
@@ -400,7 +403,7 @@ class Loop:
             else:
                 answer(self.out.position, self.parameters)
                 self.wanted = answer.force
-        except (ArithmeticError, ValueError, TypeError, IndexError):
+        except Exception:  # noqa: BLE001 - a kind of body may be foreign code, too
             self.coupling.reset()
             self.fail(Fault.EVALUATOR_ERROR)
             return

@@ -127,17 +127,19 @@ class LoopProcess:
         DeviceError
             If it doesn't start, with what it said.
         """
-        self._shared, self._ring = Shared.create(), Ring.create(self.rate)
-        if len(self._parameters):
-            self.shared.write_command(parameters=self._parameters)
         self._stderr = tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace")  # noqa: SIM115
         try:
+            self._shared = Shared.create()
+            self._ring = Ring.create(self.rate)
+            if len(self._parameters):
+                self.shared.write_command(parameters=self._parameters)
             if self._record is not None:
                 self.recording = self._recorder(self._record)
             self._process = self._popen()
             self._await_first_tick()
         except BaseException:
             self.stop()
+            self._stderr.close()
             if self.recording is not None:
                 self.recording.discard()
             raise
@@ -259,8 +261,9 @@ class LoopProcess:
         if self._shared is not None and self._last is None:
             self._last = self._state()
             self._errors = self._complaint()
-            _started(self._ring).unlink()
-            _started(self._ring).close()
+            if self._ring is not None:
+                self._ring.unlink()
+                self._ring.close()
             self._stderr.close()
             self._shared.close()
             self._shared.unlink()

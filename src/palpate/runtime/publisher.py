@@ -58,11 +58,11 @@ class Publisher:
 
     def device(self, name: str) -> None:
         """Take over what the device calls itself."""
-        self.record["device"] = name.encode()[:48]
+        self.record["device"] = name.encode(errors="replace")[:48]
 
     def words(self, text: str) -> None:
         """Take over the words of a driver's error."""
-        self.record["words"] = text.encode()[:160]
+        self.record["words"] = text.encode(errors="replace")[:160]
 
     def hold_back(self, withheld: Fault, *, waiting: bool, stopped: bool, released: bool) -> None:
         """Take over why there is no force, besides a fault: see `STATE`."""
@@ -121,7 +121,7 @@ class Publisher:
         if self._count == 1:
             self._since = now
         if fault is not self._before:
-            self._changed(fault, now)
+            self._changed(fault, now + self.offset)
         if self._count % _EVERY == 0:
             self._pace(now)
         self._block.publish()

@@ -167,9 +167,9 @@ class TraceRecorder:
             self._writer.add_ticks(rows)
             self.ticks += len(rows)
             self._rows.clear()
-        if self._events:
-            self._writer.add_events(self._events)
-            self._events.clear()
+        if count := len(self._events):  # another thread may add one meanwhile
+            self._writer.add_events(self._events[:count])
+            del self._events[:count]
 
     def _try(self, step: Callable[[], None]) -> None:
         """Take a step of writing; one that fails ends the recording."""

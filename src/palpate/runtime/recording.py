@@ -85,6 +85,7 @@ TICK = np.dtype(
 )
 
 _SECONDS, _LEAST = 4.0, 4096  # of ticks that the ring holds
+_FASTEST = 10_000.0  # Hz; a loop at a higher rate is refused, and needs no room before that
 _HEAD = 4096  # bytes before the slots: counters
 _FACTS = 64 * 1024  # bytes for what the loop says of itself, JSON
 _SNAPSHOT = 2 * 1024 * 1024  # bytes for what the loop remembers at the start of a recording
@@ -222,7 +223,8 @@ class Ring:
 
 
 def _size(rate: float) -> int:
-    return _HEAD + _FACTS + _SNAPSHOT + max(_LEAST, round(_SECONDS * rate)) * TICK.itemsize
+    ticks = round(_SECONDS * min(max(0.0, rate), _FASTEST))
+    return _HEAD + _FACTS + _SNAPSHOT + max(_LEAST, ticks) * TICK.itemsize
 
 
 def _intact(rows: np.ndarray) -> int:

@@ -386,8 +386,9 @@ def play(
         return not (shared.command.record["quit"] or orphaned())
 
     for k in range(len(trace)):
-        if (rest := start + float(times[k]) - now()) > 0.0:
-            time.sleep(rest)
+        # in short sleeps: a recording may have a gap of hours, and the wish to quit is heard within it
+        while (rest := start + float(times[k]) - now()) > 0.0 and wanted():
+            time.sleep(min(rest, _IDLE))
         if not wanted():
             break
         replay.tick(k)

@@ -45,7 +45,8 @@ _CENTRAL = struct.Struct("<4s6H3I5H2I")
 _END = struct.Struct("<4s4H2IH")
 _DATE = 0x21  # 1 January 1980, as early as a ZIP can say
 _LARGEST_CHUNK = 256 * 1024 * 1024  # bytes of what is decoded at once: more is no half second
-_DAMAGE = (ValueError, KeyError, TypeError, EOFError, OSError, zlib.error, zipfile.BadZipFile)
+_DAMAGE = (ValueError, KeyError, TypeError, ArithmeticError, RuntimeError, MemoryError, EOFError, OSError,
+           zlib.error, zipfile.BadZipFile)  # fmt: skip
 _MOST_ENTRIES, _LARGEST = 0xFFFF, 0xFFFFFFFF  # for which an archive can have a plain directory
 
 
@@ -255,7 +256,7 @@ def read_trace(path: str | os.PathLike[str]) -> Trace:
             elif name == "end.json":
                 end = json.loads(content)
             elif name.startswith("events-"):
-                events += json.loads(content)
+                events += [event for event in json.loads(content) if isinstance(event, dict)]
             elif name.startswith("ticks-"):
                 chunks.append(_unfold(_arrays(content)))
     except _DAMAGE as error:
@@ -282,8 +283,8 @@ def _missing(data: bytes, used: int, end: Mapping[str, Any] | None) -> tuple[str
     return (f"The recording has no end: its program was killed, or still records{cut}.",)
 
 
-def _accepted(path: Path, header: Mapping[str, Any]) -> dict[str, Any]:
-    if header.get("format") != FORMAT:
+def _accepted(path: Path, header: Any) -> dict[str, Any]:
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
         return {}
     if int(header["version"]) > VERSION:
         raise FileFormatError(

@@ -115,7 +115,7 @@ class CrtkSettings:
         )
         if not words:
             raise UsageError(
-                "An option of crtk is none of its words.",
+                "An option of crtk has a word that is not known.",
                 fix=f"types is auto, ros1 or ros2; origin is here or base; wrench is {' or '.join(_WRENCHES)}.",
             )
         switches = all(value in {0.0, 1.0} for value in (self.state, self.enable, self.home))
@@ -459,7 +459,7 @@ class CrtkDevice:
         if self.round_trip > _LONGEST_DELAY:
             raise DeviceError(
                 f"The way through the ROS bridge and back takes {1e3 * self.round_trip:.0f} ms.",
-                why=f"A hand is not pushed on over more than {1e3 * _LONGEST_DELAY:g} ms.",
+                why=f"With a delay of more than {1e3 * _LONGEST_DELAY:g} ms no force is sent to a hand.",
                 fix="Run the bridge on this machine or by cable, with nothing else on it.",
             )
         self._one_way = 0.5 * self.round_trip

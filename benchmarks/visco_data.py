@@ -51,7 +51,7 @@ def _slide() -> Drive:
     return Drive("slide", times, np.array(TOUCH) + np.c_[x, 0 * x, np.full(len(x), -0.004)])
 
 
-def _solved(drive: Drive) -> dict[str, np.ndarray]:
+def _solve(drive: Drive) -> dict[str, np.ndarray]:
     elastic = NeoHookean(9e3, 0.45)
     probe = SphereProbe(RADIUS, depth=(0.0, 0.006))
 
@@ -85,7 +85,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if f"{name}_t" in known or (options.only and name not in options.only):
             continue
         begun = time.process_time()
-        known |= {f"{name}_{key}": value for key, value in _solved(drive).items()}
+        known |= {f"{name}_{key}": value for key, value in _solve(drive).items()}
         known |= {"height": HEIGHT, "provenance": __doc__}
         np.savez_compressed(options.out, **known)
         print(f"{name}: {len(drive)} samples, {time.process_time() - begun:.0f} s", flush=True)

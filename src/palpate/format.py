@@ -10,6 +10,7 @@ from palpate.units import Range
 
 __all__ = [
     "bind_units",
+    "by_number",
     "count",
     "criterion_figure",
     "duration",
@@ -17,7 +18,6 @@ __all__ = [
     "length",
     "millimetres",
     "number",
-    "numbered",
     "plain",
     "power_of_ten",
     "pressure",
@@ -74,7 +74,7 @@ def count(number: int, singular: str, plural: str = "") -> str:
     return f"{number:,} {singular if number == 1 else plural or singular + 's'}"
 
 
-def numbered(singular: str, numbers: Sequence[int], shown: int = 5) -> str:
+def by_number(singular: str, numbers: Sequence[int], shown: int = 5) -> str:
     """Write things of one kind by their numbers: line 3, or lines 3, 7, 19; … stands for those beyond `shown`."""
     listed = ", ".join(str(number) for number in numbers[:shown])
     return f"{singular}{'s' * (len(numbers) > 1)} {listed}{', …' * (len(numbers) > shown)}"

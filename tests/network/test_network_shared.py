@@ -146,7 +146,7 @@ def test_names_that_are_nobodys_are_refused(tmp_path):
     with pytest.raises(UsageError, match="No network is published"):
         Subscriber.attach(str(tmp_path / "none"))
     (tmp_path / "other").write_bytes(b"\0" * 4096)
-    with pytest.raises(UsageError, match="no network published by this version"):
+    with pytest.raises(UsageError, match="another version of palpate"):
         Subscriber.attach(str(tmp_path / "other"))
 
 

@@ -240,12 +240,15 @@ def test_the_round_trip_is_measured(clock, monkeypatch):
 
 
 def test_the_loop_pushes_on_the_hand_against_its_way(rig):
-    seen = rig.run(60)
-    assert all(fault is Fault.NONE for _, fault in seen)
-    place, force = rig.device.sample.position, rig.service.force()
-    assert force[2] * place[2] < 0.0
-    assert abs(force[2]) > 0.3
-    np.testing.assert_allclose(force[:2], 0.0, atol=1e-9)
+    places, forces = [], []
+    for _ in range(250):  # a whole stroke: on the way back from the first press, damping may turn the force
+        assert rig.run(1)[0][1] is Fault.NONE
+        places.append(rig.device.sample.position.copy())
+        forces.append(rig.service.force())
+    k = np.argmax(np.abs(np.array(forces)[:, 2]))
+    assert forces[k][2] * places[k][2] < 0.0
+    assert abs(forces[k][2]) > 0.3
+    np.testing.assert_allclose(np.array(forces)[:, :2], 0.0, atol=1e-9)
 
 
 def test_a_silent_arm_is_zero_force_within_20_ms_and_a_reason(rig):

@@ -14,6 +14,7 @@ import sys
 import time
 import zipfile
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -161,6 +162,20 @@ def test_a_folder_that_nobody_may_write_to_is_an_error_before_the_loop(spring_fi
     monkeypatch.setattr(Path, "open", refuse)
     with pytest.raises(ResourceError, match="could not be begun"):
         TraceWriter(tmp_path / "a.trace", {})
+
+
+def test_a_recording_larger_than_memory_is_refused_before_it_is_unfolded(tmp_path, monkeypatch):
+    path = tmp_path / "a.trace"
+    writer = TraceWriter(path, {"name": "nobody"})
+    for _ in range(3):
+        writer.add_ticks(np.zeros(1000, TICK))
+    writer.close({})
+    needed = 3 * 1000 * TICK.itemsize
+    assert path.stat().st_size < needed / 20
+    for free, fits in ((2 * needed, True), (2 * needed - 2, False)):
+        monkeypatch.setattr("psutil.virtual_memory", lambda free=free: SimpleNamespace(available=free))
+        with contextlib.nullcontext() if fits else pytest.raises(ResourceError, match="does not fit"):
+            assert len(read_trace(path)) == 3000
 
 
 def test_a_damaged_or_forged_file_is_no_more_than_an_error(tmp_path):

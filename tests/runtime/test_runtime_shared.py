@@ -125,5 +125,5 @@ def test_names_end_with_their_owner(tmp_path):
         Shared.attach(blocks.name)
     foreign = tmp_path / "foreign"
     foreign.write_bytes(b"x" * module._SIZE)
-    with pytest.raises(DeviceError, match="not this version"):
+    with pytest.raises(DeviceError, match="another version of palpate"):
         Shared.attach(str(foreign))

@@ -43,7 +43,7 @@ def test_compressed_or_not_the_bytes_are_the_same(keep: bool, times: int):
         return NUMBERS
 
     async def field(request: Request) -> Response:
-        return await answers.answer(request, make)
+        return await answers.answer(request, request.url.path, make)
 
     async def ask(coding: str) -> tuple[httpx.Headers, bytes]:
         transport = httpx.ASGITransport(Starlette(routes=[Route("/field", field)]))

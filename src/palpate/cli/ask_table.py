@@ -15,7 +15,7 @@ from palpate.cli.ask_command import answers_at, inputs_of
 from palpate.cli.console import Console
 from palpate.errors import UsageError
 from palpate.files import write_file
-from palpate.format import count, numbered
+from palpate.format import by_number, count
 from palpate.learning import Fitted
 from palpate.learning.loading import load
 from palpate.network import Network
@@ -107,7 +107,7 @@ def _notes(table: Table, inputs: Sequence[Range], whole: np.ndarray, model: Path
         lines = table.lines[~whole].tolist()
         verb = "has" if len(lines) == 1 else "have"
         notes.append(
-            f"{len(lines)} of {len(whole)} rows {verb} no answer, a value is missing: {numbered('line', lines)}."
+            f"{len(lines)} of {len(whole)} rows {verb} no answer, a value is missing: {by_number('line', lines)}."
         )
     return notes
 

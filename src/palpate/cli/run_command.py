@@ -24,7 +24,7 @@ __all__ = ["aim_device", "run_loop"]
 
 LOOK = 0.02  # s between two looks at the loop
 _REFRESH = 10.0  # Hz, of the live table
-_TOLD = 0.2  # change of the spring in front of a stiff body from which on it is said again: a tenth is hardly felt
+_HEEDED = 0.2  # change of the spring in front of a stiff body from which on it is said again: a tenth is hardly felt
 
 
 @dataclass
@@ -213,7 +213,7 @@ def _wait(
         state = loop.read()
         peak.see(state)
         with_motors = state.felt_stiffness.damping is not None
-        if with_motors and not math.isclose(state.coupling, coupling, rel_tol=_TOLD):
+        if with_motors and not math.isclose(state.coupling, coupling, rel_tol=_HEEDED):
             coupling = state.coupling
             console.say(state.felt_stiffness.warning or f"{state.felt_stiffness}.")
         if end - left - shown > 1.0 / _REFRESH:

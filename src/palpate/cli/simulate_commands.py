@@ -61,12 +61,9 @@ def haply(
         amplitude=amplitude,
         frequency=frequency,
     )
-    console = Console(as_json)
     with HaplySimulator(settings) as service:
         device = f"haply:ws://localhost:{service.port},events={service.events_port}"
-        console.say(f"A simulated Haply Inverse3 listens. Next: palpate run MODEL --device {device}")
-        with contextlib.suppress(KeyboardInterrupt):
-            time.sleep(seconds)
+        console = _listen("A simulated Haply Inverse3 listens.", device, seconds, as_json)
     console.result(
         f"{service.received} commands were answered.", {"device": device, "commands": service.received}
     )
@@ -89,12 +86,9 @@ def crtk(
     settings = CrtkSimulatorSettings(
         port=port, arm=arm, rate=rate, ros=ros, amplitude=amplitude, frequency=frequency
     )
-    console = Console(as_json)
     with CrtkSimulator(settings) as service:
         device = f"crtk:ws://localhost:{service.port},arm={arm}"
-        console.say(f"A simulated CRTK arm moves. Next: palpate run MODEL --device {device}")
-        with contextlib.suppress(KeyboardInterrupt):
-            time.sleep(seconds)
+        console = _listen("A simulated CRTK arm moves.", device, seconds, as_json)
     console.result(
         f"{service.wrenches} wrenches were taken.", {"device": device, "wrenches": service.wrenches}
     )
@@ -153,6 +147,15 @@ def openhaptics(
     _compile(
         "openhaptics", folder, definitions | {"LOST_AFTER": lost_after, "WARM_EVERY": warm_every}, as_json
     )
+
+
+def _listen(words: str, device: str, seconds: float, as_json: bool) -> Console:
+    """Say how a service's double is used, and wait for Ctrl-C or `seconds`, s; return where its result is told."""
+    console = Console(as_json)
+    console.say(f"{words} Next: palpate run MODEL --device {device}")
+    with contextlib.suppress(KeyboardInterrupt):
+        time.sleep(seconds)
+    return console
 
 
 def _compile(device: str, folder: Path, definitions: dict[str, float], as_json: bool) -> None:

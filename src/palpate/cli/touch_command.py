@@ -162,11 +162,11 @@ def _carry_on(study: Study, paths: Paths, until: float, limit: float, console: C
             )
     last = rounds[-1]
     report = report_study(paths.report, [last.outcome])
-    told = [{"solves": r.solves, "force_p95": r.error, "seconds": r.seconds} for r in rounds]
+    figures = [{"solves": r.solves, "force_p95": r.error, "seconds": r.seconds} for r in rounds]
     text = (
         f"{last.outcome.validation}\nreport  {report}\nmodel   {paths.model}   (palpate view {paths.model})"
     )
-    console.result(text, {"rounds": told, "model": str(paths.model), "report": str(report)})
+    console.result(text, {"rounds": figures, "model": str(paths.model), "report": str(report)})
     if not last.error <= until:
         raise AccuracyError(
             f"The force error of {study.name} is {share(last.error)} after {last.solves} solves, not {share(until)}.",

@@ -71,8 +71,8 @@ def replay(
     replayed = Replay(trace, load_touchable(path), same=same, own_workspace=own_workspace).run()
     if out is not None:
         replayed.save(out, path)
-    told = "" if out is None else f"\n{out}"
-    console.result(f"{replayed}{told}", replayed.as_dict() | {"model": str(path), "same_model": same})
+    where = "" if out is None else f"\n{out}"
+    console.result(f"{replayed}{where}", replayed.as_dict() | {"model": str(path), "same_model": same})
 
 
 def _show(model: Path, file: Path, console: Console) -> None:
@@ -128,12 +128,12 @@ def _facts(trace: Trace) -> dict[str, Any]:
     import numpy as np
 
     header, ticks = trace.header, trace.ticks
-    told = ("palpate", "recorded", "model", "device", "rate", "limits", "workspace")
+    names = ("palpate", "recorded", "model", "device", "rate", "limits", "workspace")
     return {
         "file": str(trace.path),
         "format": header["version"],
         "body": header.get("name"),
-        **{name: header.get(name) for name in told},
+        **{name: header.get(name) for name in names},
         "ticks": len(ticks),
         "seconds": trace.seconds,
         "lost": trace.lost,
@@ -228,7 +228,7 @@ def plot(
     trace = _read(file, console)
     if not len(trace):
         raise UsageError(f"{file.name} holds no tick.", why=" ".join(trace.notes))
-    solved, apart = (None, 0.0) if data is None else _solved(trace, data, model)
+    solved, apart = (None, 0.0) if data is None else _beside_solves(trace, data, model)
     path = save_figure(out or file.with_suffix(".svg"), lambda: plot_trace(trace, solved))
     words = (
         ""
@@ -239,7 +239,7 @@ def plot(
     console.result(f"{path}{words}", {"file": str(path)} | facts)
 
 
-def _solved(trace: Trace, data: Path, model: Path | None) -> tuple[Solved, float]:
+def _beside_solves(trace: Trace, data: Path, model: Path | None) -> tuple[Solved, float]:
     """Return the solves beside a stroke, and how far from it the farthest is, in half ranges of the inputs."""
     import numpy as np
 
@@ -292,13 +292,13 @@ def compare(
     else:
         comparison = _beside_trace(trace, other, model, console)
     content = comparison.as_dict()
-    told = ""
+    where = ""
     if out is not None:
         from palpate.validation.report.trace_pictures import plot_comparison, save_figure
 
         content["file"] = str(save_figure(out, lambda: plot_comparison(comparison)))
-        told = f"\n{out}"
-    console.result(f"{comparison}{told}", content)
+        where = f"\n{out}"
+    console.result(f"{comparison}{where}", content)
 
 
 def _beside_trace(trace: Trace, other: Path | None, model: Path | None, console: Console) -> TouchComparison:

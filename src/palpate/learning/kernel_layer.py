@@ -77,13 +77,16 @@ class KernelLayer:
         if len(X) <= most:
             C = metric.kernel(X, X)
             C[np.diag_indices(len(C))] += metric.ridge
-            return cls(metric, X, _solved(C, residual), tail)
+            return cls(metric, X, _solve_weights(C, residual), tail)
         chosen = np.random.default_rng(seed).choice(len(X), most, replace=False)
         Z = X[np.sort(chosen)]
         cross, own = metric.kernel(X, Z), metric.kernel(Z, Z)
         # the subset-of-regressors equations (Rasmussen & Williams 2006, eq. 8.14)
         return cls(
-            metric, Z, _solved(cross.T @ cross + max(metric.ridge, 1e-9) * own, cross.T @ residual), tail
+            metric,
+            Z,
+            _solve_weights(cross.T @ cross + max(metric.ridge, 1e-9) * own, cross.T @ residual),
+            tail,
         )
 
     def predict(self, X: np.ndarray) -> np.ndarray:
@@ -167,7 +170,7 @@ def _tail(X: np.ndarray) -> np.ndarray:
     return np.hstack([np.ones((len(X), 1)), X])
 
 
-def _solved(C: np.ndarray, Y: np.ndarray) -> np.ndarray:
+def _solve_weights(C: np.ndarray, Y: np.ndarray) -> np.ndarray:
     """Return C⁻¹ Y of a symmetric positive definite C, helped by jitter where rounding spoilt it."""
     jitter, size = 0.0, float(np.trace(C)) / len(C)
     while True:

@@ -169,15 +169,19 @@ class _Search:
         columns = self._columns(samples)
         if not rounds:
             rest = self._rest(theta)
-            return _Fit(rest, theta, _solved(columns, samples.rows(_baseline(rest, len(samples.inputs))))[0])
+            return _Fit(
+                rest, theta, _solve_weights(columns, samples.rows(_baseline(rest, len(samples.inputs))))[0]
+            )
 
         def missed(unknowns: np.ndarray) -> np.ndarray:
             rows = samples.rows(_baseline(self._rest(unknowns), len(samples.inputs)))
-            return np.concatenate([_solved(columns, rows)[1], _FIRST * (unknowns - theta) / size])
+            return np.concatenate([_solve_weights(columns, rows)[1], _FIRST * (unknowns - theta) / size])
 
         solution = least_squares(missed, theta, x_scale=size, max_nfev=rounds, ftol=1e-6, xtol=1e-8).x
         rest = self._rest(solution)
-        return _Fit(rest, solution, _solved(columns, samples.rows(_baseline(rest, len(samples.inputs))))[0])
+        return _Fit(
+            rest, solution, _solve_weights(columns, samples.rows(_baseline(rest, len(samples.inputs))))[0]
+        )
 
     def left_out(self, samples: EnergySamples, start: np.ndarray, rounds: int = 4) -> float:
         """Root of the mean over solves of the weighted squares that they miss when left out, a fifth at a time."""
@@ -239,7 +243,7 @@ def _stacked(
     return A, y, np.concatenate(weights)
 
 
-def _solved(columns: tuple[np.ndarray, ...], rows: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+def _solve_weights(columns: tuple[np.ndarray, ...], rows: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     """Coefficients of the polynomial, and the weighted residual of all rows and of the ridge."""
     A, y, w = _stacked(columns, rows)
     root = np.sqrt(w)

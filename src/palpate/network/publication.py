@@ -62,19 +62,14 @@ class _Memory:
 
     def __init__(self, name: str) -> None:
         try:
-            self.map = shared_memory.attach(name)
+            self.map = shared_memory.attach(name, _MAGIC)
         except (OSError, ValueError) as error:
             raise UsageError(
                 f"No network is published as {name!r}.",
                 why=str(error),
-                fix="Its publisher has ended, or the name is another process's: pass Publisher.name.",
+                fix="Its publisher has ended, or the name is another process's: pass Publisher.name, and run both "
+                "sides from one installation.",
             ) from error
-        if self.map[: len(_MAGIC)] != _MAGIC:
-            self.map.close()
-            raise UsageError(
-                f"{name!r} is no network published by this version of palpate.",
-                fix="Run both sides from one installation.",
-            )
         self.name = name
         length = int(np.frombuffer(self.map, np.int64, 1, _LENGTH)[0])
         self.text: dict[str, Any] = json.loads(self.map[_TEXT : _TEXT + length])

@@ -55,16 +55,20 @@ def create(head: bytes, size: int) -> str:
     return name
 
 
-def attach(name: str) -> mmap.mmap:
-    """Map the file of that name.
+def attach(name: str, head: bytes, size: int = 0) -> mmap.mmap:
+    """Map the file of that name, which begins with `head` and, unless 0, is `size` bytes long.
 
     Raises
     ------
     OSError, ValueError
-        If there is none, or nothing in it.
+        If there is none, nothing in it, or something else.
     """
     with Path(name).open("r+b") as file:
-        return mmap.mmap(file.fileno(), 0)
+        memory = mmap.mmap(file.fileno(), 0)
+    if memory[: len(head)] != head or (size and len(memory) != size):
+        memory.close()
+        raise ValueError("Another program or another version of palpate made it.")
+    return memory
 
 
 def remove(name: str) -> None:

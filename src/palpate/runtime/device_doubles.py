@@ -81,11 +81,15 @@ def compile_double(device: str, folder: Path, definitions: Mapping[str, float] |
         *(c_compiler(), "-O2", "-std=gnu11", "-Wall", "-Wextra", "-shared", "-fPIC", *numbers),
         *(str(Path(__file__).parent / "devices" / source), "-o", str(library), "-lm", "-lpthread"),
     ]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=_LIMIT, check=False)
-    if done.returncode != 0:
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=_LIMIT, check=False)
+        failed = f"It ended with {done.returncode}: {done.stderr.strip()[-500:]}" if done.returncode else ""
+    except subprocess.TimeoutExpired:
+        failed = f"The compiler was not ready after {_LIMIT:g} s."
+    if failed:
         raise ResourceError(
             f"The double of {device} could not be compiled.",
-            why=done.stderr.strip()[-500:],
+            why=failed,
             fix="Run the command by hand, or name another compiler in the variable CC: " + " ".join(command),
         )
     return library

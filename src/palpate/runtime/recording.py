@@ -154,14 +154,13 @@ class Ring:
             If there is none of that name, or another version of palpate made it.
         """
         try:
-            memory = shared_memory.attach(name)
+            memory = shared_memory.attach(name, _MAGIC)
         except (OSError, ValueError) as error:
-            raise DeviceError(f"There is no ring named {name!r}.", why=str(error)) from error
-        if memory[: len(_MAGIC)] != _MAGIC:
-            memory.close()
             raise DeviceError(
-                f"{name!r} is not this version's ring.", fix="Run both sides from one installation."
-            )
+                f"There is no ring named {name!r}.",
+                why=str(error),
+                fix="Its owner has ended, or is of another installation.",
+            ) from error
         return cls(name, memory)
 
     @classmethod

@@ -130,8 +130,8 @@ def _write_parquet(trace: Trace, path: Path) -> None:
             fix="Give pip install 'palpate[results]', or export to .npz or .csv.",
         ) from error
     table = pa.table(trace_table(trace))
-    told = {"palpate": json.dumps(dict(trace.header)), "units": json.dumps(UNITS)}
-    pq.write_table(table.replace_schema_metadata(told), path)
+    metadata = {"palpate": json.dumps(dict(trace.header)), "units": json.dumps(UNITS)}
+    pq.write_table(table.replace_schema_metadata(metadata), path)
 
 
 FORMATS: dict[str, Callable[[Trace, Path], None]] = {

@@ -32,7 +32,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from palpate.errors import FileFormatError, UsageError
+from palpate.errors import FileFormatError, ResourceError, UsageError
 from palpate.files import system_errors
 from palpate.runtime.recording import FLAGS, TICK
 
@@ -232,7 +232,11 @@ def read_trace(path: str | os.PathLike[str]) -> Trace:
     ------
     FileFormatError
         If the file is missing, is no recording, is of a later version, or is damaged before its first tick.
+    ResourceError
+        If its ticks take more than half of the memory that is free.
     """
+    import psutil
+
     path = Path(path)
     try:
         data = path.read_bytes()
@@ -244,7 +248,7 @@ def read_trace(path: str | os.PathLike[str]) -> Trace:
     state, end = None, None
     chunks: list[np.ndarray] = []
     events: list[Mapping[str, Any]] = []
-    used = 0
+    used, room = 0, psutil.virtual_memory().available // 2  # once in chunks, and once in one piece
     try:
         for name, content, used in _entries(data):  # noqa: B007 used after the loop
             if name == "header.json":
@@ -258,7 +262,8 @@ def read_trace(path: str | os.PathLike[str]) -> Trace:
             elif name.startswith("events-"):
                 events += [event for event in json.loads(content) if isinstance(event, dict)]
             elif name.startswith("ticks-"):
-                chunks.append(_unfold(_arrays(content)))
+                chunks.append(_unfold(path, _arrays(content), room))
+                room -= chunks[-1].nbytes
     except _DAMAGE as error:
         raise FileFormatError(
             f"{path} is damaged.", why=str(error), fix="Copy the file again, or record it anew."
@@ -335,9 +340,9 @@ def _fold(ticks: np.ndarray) -> dict[str, np.ndarray]:
         column = np.ascontiguousarray(ticks[name])
         bits = column.tobytes()
         likely = (known for known, other in columns.items() if other.dtype == column.dtype)
-        twin = next((known for known in likely if columns[known].tobytes() == bits), "")
-        if twin:
-            same.append((name, twin))
+        double = next((known for known in likely if columns[known].tobytes() == bits), "")
+        if double:
+            same.append((name, double))
         else:
             columns[name] = column
     for name, column in columns.items():
@@ -346,14 +351,21 @@ def _fold(ticks: np.ndarray) -> dict[str, np.ndarray]:
     return columns | {"same": np.array(same, dtype="U16").reshape(-1, 2), "count": np.array(len(ticks))}
 
 
-def _unfold(columns: Mapping[str, np.ndarray]) -> np.ndarray:
+def _unfold(path: Path, columns: Mapping[str, np.ndarray], room: int) -> np.ndarray:
+    """Return the ticks (N,) of a chunk, where they take no more than `room`, bytes."""
     count = int(columns["count"])
     if not 0 <= count <= _LARGEST_CHUNK // TICK.itemsize:
         raise ValueError(f"A chunk claims to hold {count} ticks.")
+    if count * TICK.itemsize > room:
+        raise ResourceError(
+            f"The recording {path} does not fit into memory.",
+            why="Its ticks take more than half of what is free.",
+            fix="End other programs or take a machine with more memory; if it should be small, it is damaged.",
+        )
     ticks = np.zeros(count, TICK)
     for name in COLUMNS:
         if name in columns:
             ticks[name] = columns[name]
-    for name, twin in np.asarray(columns["same"], dtype=str).tolist():
-        ticks[name] = ticks[twin]
+    for name, double in np.asarray(columns["same"], dtype=str).tolist():
+        ticks[name] = ticks[double]
     return ticks

@@ -24,7 +24,7 @@ import numpy as np
 
 from palpate import checks
 from palpate.errors import FileFormatError, UsageError
-from palpate.format import numbered
+from palpate.format import by_number
 from palpate.tables.numerals import Numerals
 from palpate.tables.table_layout import (
     Head,
@@ -229,7 +229,7 @@ class Table:
                 why="Rows with a gap were to be refused.",
                 fix="Correct them, or have them left out: missing='leave-out' (--missing leave-out).",
             )
-        lines = numbered("line", self.lines[rows].tolist())
+        lines = by_number("line", self.lines[rows].tolist())
         note = f"{len(rows)} of {len(whole)} rows left out, in which a value is missing: {lines}."
         return whole, [note]
 
@@ -376,8 +376,8 @@ def _table(
         notes.append(f"Left out of the head: line {', '.join(map(str, head.skipped))}.")
     lines = np.array([row.line for row in data])
     if decimal is None:
-        numbered = [list(zip(lines.tolist(), cells[j], strict=True)) for j in numeric if j < width]
-        numerals = Numerals.of(numbered, separator)
+        by_number = [list(zip(lines.tolist(), cells[j], strict=True)) for j in numeric if j < width]
+        numerals = Numerals.of(by_number, separator)
     else:
         numerals = Numerals(decimal)
     return Table(path, columns, cells, lines, numerals, tuple(notes))

@@ -89,7 +89,7 @@ def compare_full_model(
     moments = stroke_moments(trace, most)
     if len(moments) < 2:
         raise UsageError(f"{trace.path.name} holds no touch.", fix="Record one in which the body is felt.")
-    began = told = clock()
+    began = shown = clock()
     forces = np.full((len(moments), 3), np.nan)
     failed, done = 0, 0
     deepest = int(np.argmax(trace.ticks["depth"][moments]))
@@ -99,9 +99,9 @@ def compare_full_model(
         forces[row] = answer(moments[row])
         done += 1
         failed += not np.isfinite(forces[row]).all()
-        if clock() - told > _EVERY:
-            told = clock()
-            progress(done, len(moments), told - began)
+        if clock() - shown > _EVERY:
+            shown = clock()
+            progress(done, len(moments), shown - began)
     spent = clock() - began
     good = np.isfinite(forces).all(axis=1)
     if good.sum() < 2:
@@ -164,12 +164,12 @@ class _BeamUnderHand:
         before, gap_before = 0.0, -goal
         for _ in range(_SECANTS):
             gap = self._along(load) - goal
-            if not np.isfinite(gap) or abs(gap) <= _CLOSE * abs(goal):
+            if abs(gap) <= _CLOSE * abs(goal):
+                return -load * self._direction
+            if not np.isfinite(gap) or load == before or gap == gap_before:
                 break
-            slope = (gap - gap_before) / (load - before) if load != before else np.inf
-            before, gap_before = load, gap
-            load -= gap / slope
-        return -load * self._direction if np.isfinite(gap) else np.full(3, np.nan)
+            load, before, gap_before = load - gap * (load - before) / (gap - gap_before), load, gap
+        return np.full(3, np.nan)
 
     def _along(self, load: float) -> float:
         """Return how far the node goes along the load's direction, m."""

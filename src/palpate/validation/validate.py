@@ -239,8 +239,8 @@ def checks(figures: Any, limits: Limits, fixes: Mapping[str, str]) -> tuple[Chec
         limit = getattr(limits, criterion.key)
         value, worst = measured.get(criterion.key, (None, None))
         if limit is not None and value is not None:
-            told = replace(criterion, fix=fixes.get(criterion.key, criterion.fix))
-            found.append(Check(told, value, limit, str(worst) if worst else ""))
+            advised = replace(criterion, fix=fixes.get(criterion.key, criterion.fix))
+            found.append(Check(advised, value, limit, str(worst) if worst else ""))
     return tuple(found)
 
 

@@ -36,13 +36,13 @@ def body_application(body: ShownBody) -> Starlette:
         return Response(facts, media_type="application/json")
 
     async def surface(request: Request) -> Response:
-        return await once.answer(request, lambda: mesh)
+        return await once.answer(request, "surface", lambda: mesh)
 
     async def step(request: Request) -> Response:
         index = request.path_params["index"]
         if index >= len(body.steps):
             raise HTTPException(404)
-        return await each.answer(request, lambda: body.step(index, parts).pack())
+        return await each.answer(request, f"step {index}", lambda: body.step(index, parts).pack())
 
     return local_application(
         [

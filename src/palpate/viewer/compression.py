@@ -16,7 +16,7 @@ _BINARY = "application/octet-stream"
 
 
 class BinaryAnswers:
-    """Answers of bytes by their path, made and compressed beside the server's thread, where the hand is heard.
+    """Answers of bytes by their name, made and compressed beside the server's thread, where the hand is heard.
 
     Parameters
     ----------
@@ -28,10 +28,10 @@ class BinaryAnswers:
         self._keep = keep
         self._made: dict[tuple[str, bool], bytes] = {}
 
-    async def answer(self, request: Request, make: Callable[[], bytes]) -> Response:
-        """Return the bytes that `make` returns, compressed where the request accepts gzip."""
+    async def answer(self, request: Request, name: str, make: Callable[[], bytes]) -> Response:
+        """Return the bytes of that name, which `make` returns, compressed where the request accepts gzip."""
         zipped = accepts_gzip(request.headers.get("accept-encoding", ""))
-        key = request.url.path, zipped
+        key = name, zipped
         content = self._made.get(key)
         if content is None:
             content = await run_in_threadpool(_made, make, zipped)

@@ -19,7 +19,7 @@ from palpate.viewer.messages import Recording
 __all__ = ["LONGEST", "PageRecording", "Recordable"]
 
 LONGEST = 3600.0  # s of a recording: one that was forgotten must not fill the disk
-_TOLD = 1.0  # s between two words on a recording that runs
+_NEWS = 1.0  # s between two words on a recording that runs
 
 
 class Recordable(Protocol):
@@ -88,7 +88,7 @@ class PageRecording:
     async def _watch(self, recorder: TraceRecorder) -> None:
         """Tell once a second how the recording goes, and end one that was forgotten."""
         while recorder.active and self._seconds() < LONGEST:
-            await asyncio.sleep(_TOLD)
+            await asyncio.sleep(_NEWS)
             await self._say(self._of(recorder))
         if recorder.active:
             await asyncio.to_thread(self._loop.stop_recording)

@@ -48,13 +48,13 @@ def application(session: Session) -> Starlette:
     async def surface(request: Request) -> Response:
         if model.surface is None:
             raise HTTPException(404)
-        return await answers.answer(request, model.surface.pack)
+        return await answers.answer(request, "surface", model.surface.pack)
 
     async def modes(request: Request) -> Response:
         index = request.path_params["index"]
         if index >= model.field_count:
             raise HTTPException(404)
-        return await answers.answer(request, lambda: model.modes(index).pack())
+        return await answers.answer(request, f"field {index}", lambda: model.modes(index).pack())
 
     routes = [
         WebSocketRoute("/touch", session.talk),

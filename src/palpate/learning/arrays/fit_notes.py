@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from palpate.format import numbered, share
+from palpate.format import by_number, share
 
 if TYPE_CHECKING:
     from palpate.learning.arrays.array_samples import ArrayProblem, Samples
@@ -69,9 +69,9 @@ def notes_on(
 def wild_note(rows: Sequence[int], count: int, lines: Sequence[int] | None = None) -> str:
     """Return the note on wild rows of `count` samples, by the lines of their table or by their rows."""
     verb, them = ("is", "it") if len(rows) == 1 else ("are", "them")
-    where = f"{numbered('row', rows)}, counted from 0"
+    where = f"{by_number('row', rows)}, counted from 0"
     if lines is not None:
-        where = numbered("line", [lines[row] for row in rows])
+        where = by_number("line", [lines[row] for row in rows])
     return (
         f"{len(rows)} of {count} samples {verb} far from what the others say: {where}. A wrong number there spoils "
         f"the network and widens its intervals: check {them}, or leave {them} out."

@@ -155,15 +155,15 @@ def correct(
     measured = probe_positions(
         measured, surface, baseline.radius if own is None else float(parameters[own - 3])
     )
-    with _doubted(corrector, measured):
+    with _doubt_first(corrector, measured):
         measured, cell = _without_faults(corrector, measured)
-        _observed(corrector, measured, np.arange(len(measured)))
+        _observe(corrector, measured, np.arange(len(measured)))
         if not cell.readings and _sound(corrector, measured):
             rest = corrector.load_cell(float(np.nanmax(np.linalg.norm(measured.force, axis=1))))
             if rest.offset.any():
                 corrector = Corrector(surrogate, **options)
-                measured = rest.corrected(measured)
-                _observed(corrector, measured, np.arange(len(measured)))
+                measured = rest.without_offset(measured)
+                _observe(corrector, measured, np.arange(len(measured)))
             cell = replace(rest, faults=cell.faults)
         left_out = _left_out(surrogate, measured, options)
     return summarise_correction(corrector, measured, left_out=left_out, cell=cell)
@@ -191,7 +191,7 @@ def _without_faults(corrector: Corrector, measured: Measurements) -> tuple[Measu
     cell = cell_from_air(usable, depth < -corrector.clearance, noise)
     if cell is None:
         return usable, LoadCell(faults=faults)
-    return cell.corrected(usable), replace(cell, faults=faults)
+    return cell.without_offset(usable), replace(cell, faults=faults)
 
 
 def summarise_correction(
@@ -218,7 +218,7 @@ def summarise_correction(
     UsageError
         If it has learnt nothing.
     """
-    with _doubted(corrector, measured):
+    with _doubt_first(corrector, measured):
         return _summary(corrector, measured, left_out, cell)
 
 
@@ -260,7 +260,7 @@ def _usable(corrector: Corrector, measured: Measurements) -> tuple[np.ndarray, n
 
 
 @contextlib.contextmanager
-def _doubted(corrector: Corrector, measured: Measurements) -> Iterator[None]:
+def _doubt_first(corrector: Corrector, measured: Measurements) -> Iterator[None]:
     """Where nothing can be learnt, and sign or unit of the forces look wrong, say that first."""
     try:
         yield
@@ -312,13 +312,13 @@ def _left_out(surrogate: Surrogate, measured: Measurements, options: Mapping[str
     depth = np.empty(len(force))
     for fold in range(_FOLDS):
         corrector = Corrector(surrogate, **options)
-        _observed(corrector, measured, np.flatnonzero(turn != fold))
+        _observe(corrector, measured, np.flatnonzero(turn != fold))
         energy, out = corrector.surrogate.energy, turn == fold
         predicted[out], depth[out] = energy.force(X[out]), energy.depth(X[out])
     return force_error((predicted, depth), X, force, measured.along)
 
 
-def _observed(corrector: Corrector, measured: Measurements, which: np.ndarray) -> None:
+def _observe(corrector: Corrector, measured: Measurements, which: np.ndarray) -> None:
     for i in which:
         corrector.observe(measured.position[i], measured.force[i], along=measured.along[i])
 

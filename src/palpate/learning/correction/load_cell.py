@@ -70,7 +70,7 @@ class LoadCell:
         later = np.where(np.isfinite(time), time - self.middle, 0.0)
         return np.asarray(self.offset[None] + np.asarray(later)[:, None] * self.drift)
 
-    def corrected(self, measured: Measurements) -> Measurements:
+    def without_offset(self, measured: Measurements) -> Measurements:
         """Return the record without offset and drift."""
         zero = self.without_load(measured.time)
         single = (measured.along != 0.0).any(axis=1)

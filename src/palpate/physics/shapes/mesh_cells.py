@@ -71,7 +71,7 @@ def split_cells(
     for kind, cells in solids:
         number = np.arange(start, start + len(cells))
         start += len(cells)
-        cells = _right_handed(points, kind, cells)
+        cells = _turn_right_handed(points, kind, cells)
         if kind == "tetra":
             tetrahedra.append(cells)
             origins.append(number)
@@ -161,7 +161,7 @@ def _pull(cells: np.ndarray, kind: str) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(tetrahedra), np.concatenate(origins)
 
 
-def _right_handed(points: np.ndarray, kind: str, cells: np.ndarray) -> np.ndarray:
+def _turn_right_handed(points: np.ndarray, kind: str, cells: np.ndarray) -> np.ndarray:
     """Turn cells of a kind whose corners run the other way round, as those of VTK's wedges do."""
     centre = points[cells].mean(axis=1)
     volume = np.zeros(len(cells))

@@ -96,7 +96,7 @@ def read_source(path: str, labels: str | None = None) -> MeshSource:
         _require_basic_system(path, mesh)
         _name_properties(path, mesh)
     source = _collect(path, mesh, labels)
-    source.notes.extend(f"The reader says: {line}" for line in _skipped(mesh))
+    source.notes.extend(f"The reader says: {line}" for line in _skip_messages(mesh))
     if ending in {".node", ".ele"}:
         source.faces.extend(_tetgen_faces(path, mesh))
     return source
@@ -335,7 +335,7 @@ def _collect_sets(source: MeshSource, mesh: Any, solid_rows: list[int], face_row
         source.node_sets.append(Group(plain_name(name), np.asarray(nodes, dtype=np.int64).ravel()))
 
 
-def _skipped(mesh: Any) -> list[str]:
+def _skip_messages(mesh: Any) -> list[str]:
     """Return what meshio says about things that it passes over."""
     lines = [" ".join(line.split()) for line in getattr(mesh, "said", "").splitlines()]
     return list(

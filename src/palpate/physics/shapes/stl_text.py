@@ -54,7 +54,7 @@ def parse_stl(path: str, content: bytes) -> Surface:
     return surface
 
 
-def _damaged(path: str, why: str) -> FileFormatError:
+def _damage(path: str, why: str) -> FileFormatError:
     return FileFormatError(
         f"The file {path} holds no whole surface of triangles.",
         why=why,
@@ -64,7 +64,7 @@ def _damaged(path: str, why: str) -> FileFormatError:
 
 def _parse_binary(path: str, content: bytes) -> Surface:
     if len(content) < HEAD:
-        raise _damaged(path, "It is too short for an STL file, or of another format.")
+        raise _damage(path, "It is too short for an STL file, or of another format.")
     stated = int.from_bytes(content[80:HEAD], "little")
     there, spare = divmod(len(content) - HEAD, RECORD)
     notes = []
@@ -73,12 +73,12 @@ def _parse_binary(path: str, content: bytes) -> Surface:
         count = there
         notes.append(f"The file's head counts no triangles; {there} are there, and were read.")
     elif stated > there:
-        raise _damaged(
+        raise _damage(
             path,
             f"Its head counts {stated} triangles, and there is room for {there}: it is cut short, or no STL file.",
         )
     elif not stated:
-        raise _damaged(path, "It counts no triangles: it is empty, or no STL file.")
+        raise _damage(path, "It counts no triangles: it is empty, or no STL file.")
     elif left := len(content) - HEAD - RECORD * stated:
         notes.append(f"{left} bytes behind the last of {stated} triangles were passed over.")
     corners = np.frombuffer(content, dtype=TRIANGLE, count=count, offset=HEAD)["corners"]
@@ -103,13 +103,13 @@ def _parse_text(path: str, content: bytes) -> Surface:
         for loop in LOOP.finditer(content, start.end(), end):
             corners = VERTEX.findall(loop[1])
             if len(corners) != 3:
-                raise _damaged(
+                raise _damage(
                     path, f"Facet {len(label_of) + 1} has {len(corners)} corners, and a triangle has three."
                 )
             numbers += corners
             label_of.append(label)
     if not label_of or len(label_of) != facets:
-        raise _damaged(
+        raise _damage(
             path, f"It has {facets} facets, of which {len(label_of)} are whole: it is cut short or damaged."
         )
     notes = []
@@ -120,5 +120,5 @@ def _parse_text(path: str, content: bytes) -> Surface:
     try:
         points = digits.astype(float)
     except ValueError as error:
-        raise _damaged(path, f"A coordinate is no number ({error}).") from error
+        raise _damage(path, f"A coordinate is no number ({error}).") from error
     return _surface(points, np.array(label_of, dtype=np.int64), tuple(labels), notes)

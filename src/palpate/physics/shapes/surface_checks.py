@@ -61,7 +61,7 @@ def require_closed(surface: Trimesh, source: str) -> None:
             why="Some of them are inverted: their corners run the other way than their neighbours'.",
             fix="Make the normals consistent (recalculate outside) and export again.",
         )
-    if len(pinched := _pinched(surface)):
+    if len(pinched := _pinch_points(surface)):
         raise UsageError(
             f"The surface of {source} is not a manifold: at {len(pinched)} nodes sheets meet in a point only.",
             why=f"The first is at {place(surface.vertices[pinched[0]])}, where the body would hang by a point.",
@@ -245,7 +245,7 @@ def _require_outside(surface: Trimesh, shells: Shells, source: str) -> None:
         )
 
 
-def _pinched(surface: Trimesh) -> np.ndarray:
+def _pinch_points(surface: Trimesh) -> np.ndarray:
     """Nodes at which sheets meet in a point only: their triangles are more than one fan."""
     from trimesh.graph import connected_component_labels
 

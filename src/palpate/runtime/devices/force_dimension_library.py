@@ -10,11 +10,11 @@ Names, codes and units are those of the *Force Dimension SDK* 3.16: m, m/s, N, k
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
 from ctypes import POINTER, c_bool, c_byte, c_char_p, c_double, c_int, c_ubyte, c_uint, c_ushort
 from typing import Any
 
 from palpate.errors import DeviceError
+from palpate.runtime.devices.vendor_library import VendorLibrary
 
 __all__ = ["FORCES_OFF", "LOST", "OPTIONAL", "DhdLibrary", "Status"]
 
@@ -111,7 +111,7 @@ class Status:
         return int(self.values[14])
 
 
-class DhdLibrary:
+class DhdLibrary(VendorLibrary):
     """The library's functions, with their types, as attributes.
 
     Parameters
@@ -126,32 +126,9 @@ class DhdLibrary:
     """
 
     def __init__(self, library: ctypes.CDLL) -> None:
-        self._functions: dict[str, Callable[..., Any]] = {}
-        missing = []
-        for name, (result, arguments) in (_SIGNATURES | _EXTRA).items():
-            try:
-                function = getattr(library, name)
-            except AttributeError:
-                if name in _SIGNATURES:
-                    missing.append(name)
-                continue
-            function.restype, function.argtypes = result, arguments
-            self._functions[name] = function
-        if missing:
-            raise DeviceError(
-                f"The library {library._name} lacks {', '.join(missing)}.",
-                fix="Install the Force Dimension SDK, 3.16 or later.",
-            )
-
-    def __getattr__(self, name: str) -> Callable[..., Any]:
-        try:
-            return self._functions[name]
-        except KeyError as error:
-            raise AttributeError(name) from error
-
-    def has(self, name: str) -> bool:
-        """Return whether the library has a function."""
-        return name in self._functions
+        super().__init__(
+            library, _SIGNATURES, extra=_EXTRA, install="Install the Force Dimension SDK, 3.16 or later."
+        )
 
     def last_error(self) -> tuple[int, str]:
         """Return the number and the words of the library's last error."""

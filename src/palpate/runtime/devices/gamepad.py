@@ -149,7 +149,11 @@ class GamepadDevice:
         self._pressed: set[int] = set()
         self._dropped, self._closed, self._last = False, False, math.nan
         self._target, self._step = np.zeros(3), np.zeros(3)
-        self._lay_out()
+        try:
+            self._lay_out()
+        except BaseException:
+            self._pad.close()
+            raise
         self._resume()
         self._shaken, self._force, self._norm = -math.inf, 0.0, 0.0
         self._effect, self.rumbles = -1, False
@@ -330,7 +334,7 @@ def _opened(path: str) -> Any:
         devices = [InputDevice(file) for file in list_devices()]
     except OSError as error:
         raise DeviceError(
-            f"The gamepad {path} can't be opened.",
+            f"{f'The gamepad {path}' if path else 'A gamepad'} can't be opened.",
             why=str(error),
             fix="See `palpate devices`; for the right to read it add yourself to the group input and log in again.",
         ) from error

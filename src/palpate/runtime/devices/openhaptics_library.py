@@ -10,7 +10,7 @@ import ctypes
 from ctypes import POINTER, c_char_p, c_double, c_int, c_ubyte, c_uint, c_ulong, c_ushort, c_void_p
 from typing import Any
 
-from palpate.errors import DeviceError
+from palpate.runtime.devices.vendor_library import VendorLibrary
 
 __all__ = ["DONE", "GOING_ON", "LOST", "NO_DEVICE", "Code", "HdError", "HdLibrary"]
 
@@ -93,7 +93,7 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
 _MOST_ERRORS = 64  # a list that is longer doesn't end
 
 
-class HdLibrary:
+class HdLibrary(VendorLibrary):
     """The library's functions, with their types, as attributes.
 
     Parameters
@@ -108,33 +108,9 @@ class HdLibrary:
     """
 
     def __init__(self, library: ctypes.CDLL) -> None:
-        self._functions: dict[str, Any] = {}
-        missing = []
-        for name, (result, arguments) in _SIGNATURES.items():
-            try:
-                function = getattr(library, name)
-            except AttributeError:
-                missing.append(name)
-                continue
-            function.restype, function.argtypes = result, arguments
-            self._functions[name] = function
-        if missing:
-            raise DeviceError(
-                f"The library {library._name} lacks {', '.join(missing)}.",
-                fix="Install OpenHaptics for Developers 3.4 or later, of 3D Systems.",
-            )
-
-    def __getattr__(self, name: str) -> Any:
-        try:
-            return self._functions[name]
-        except KeyError as error:
-            raise AttributeError(name) from error
-
-    def addresses(self) -> dict[str, int]:
-        """Return the address of each function."""
-        return {
-            name: ctypes.cast(function, c_void_p).value or 0 for name, function in self._functions.items()
-        }
+        super().__init__(
+            library, _SIGNATURES, install="Install OpenHaptics for Developers 3.4 or later, of 3D Systems."
+        )
 
     def errors(self) -> list[HdError]:
         """Return the errors since the last call, the newest first; the library has none left afterwards."""

@@ -18,6 +18,7 @@ __all__ = ["WebsocketChannel"]
 
 _OPENING = 2.0  # s
 _CHUNK = 65536  # bytes
+_MOST_CHUNKS = 16  # at a time: a service that sends without end is not waited for
 _REMEDY = "Check that it runs, and start again."
 
 
@@ -116,7 +117,7 @@ class WebsocketChannel:
         if wait > 0.0 and not messages:
             select.select(self._poll, (), (), wait)
         ended = False
-        while not ended:
+        for _ in range(_MOST_CHUNKS):
             try:
                 data = self._socket.recv(_CHUNK)
             except BlockingIOError:
@@ -130,6 +131,8 @@ class WebsocketChannel:
                 self._protocol.receive_eof()
             messages += self._messages(self._protocol.events_received())
             self._answer_pings()
+            if ended:
+                break
         closing = self._protocol.close_rcvd is not None or self._protocol.parser_exc is not None
         if (ended or closing) and not messages:
             raise self._lost("closed the connection")

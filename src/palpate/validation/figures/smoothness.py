@@ -101,7 +101,11 @@ def smoothness(
     UsageError
         If a stroke given has fewer than eight solves.
     """
-    found = [_solved(model, stroke) for stroke in strokes] if strokes else _random(model, test, count, seed)
+    found = (
+        [_roughness_of_stroke(model, stroke) for stroke in strokes]
+        if strokes
+        else _random(model, test, count, seed)
+    )
     if not found:
         return "Smoothness is not judged: no straight line between two touches is long enough and stays in touch."
     own, other = np.array([f[:2] for f in found]).T
@@ -143,7 +147,7 @@ def _random(
     return found
 
 
-def _solved(model: TouchFunction, stroke: TouchSolves) -> tuple[float, float, np.ndarray]:
+def _roughness_of_stroke(model: TouchFunction, stroke: TouchSolves) -> tuple[float, float, np.ndarray]:
     from scipy.interpolate import CubicSpline
 
     if len(stroke) < LEAST:

@@ -60,8 +60,8 @@ def solid_words(data: Any) -> str:
     parts = [f"{name[:1].upper()}{name[1:]}: {size}{len(rest):,} nodes"]
     materials = body.get("material", {})
     if isinstance(materials, Mapping):
-        told = [f"{region}{_material(law).replace(' of ', ' ', 1)}" for region, law in materials.items()]
-        parts.append(", ".join(told))
+        laws = [f"{region}{_material(law).replace(' of ', ' ', 1)}" for region, law in materials.items()]
+        parts.append(", ".join(laws))
     fixed = body.get("fixed", [])
     parts.append(f"fixed at {', '.join(map(str, fixed))}" if fixed else "fixed nowhere")
     parts += [words for item in acting if (words := _acting(item))]

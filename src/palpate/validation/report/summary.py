@@ -53,7 +53,9 @@ def story(chapter: Chapter) -> Story:
     """Tell a chapter's results to a person."""
     v = chapter.validation
     verdict = "Every limit kept" if v.passed else f"{len(v.failures)} of {len(v.checks)} limits missed"
-    return Story(verdict, v.passed, tuple(_facts(chapter)), _solved(chapter), _learnt(chapter), _good(v))
+    return Story(
+        verdict, v.passed, tuple(_facts(chapter)), _solves_in_words(chapter), _learnt(chapter), _good(v)
+    )
 
 
 def _facts(chapter: Chapter) -> Iterator[Fact]:
@@ -86,7 +88,7 @@ def _facts(chapter: Chapter) -> Iterator[Fact]:
         yield Fact(f"{plain(more, 3)} ×", "as much error without a memory")
 
 
-def _solved(chapter: Chapter) -> str:
+def _solves_in_words(chapter: Chapter) -> str:
     v, subject = chapter.validation, chapter.subject
     if v.histories is not None:
         text = f"{v.histories.count} histories by finite elements that the body never saw, {v.samples} samples in all."

@@ -154,6 +154,28 @@ def test_a_crowd_shares_alike_and_leaves_half_of_the_thread():
     run(scene)
 
 
+class Deaf(FakeSocket):
+    """A websocket that takes no more text after the first, as one whose page doesn't read."""
+
+    async def send_text(self, text: str) -> None:
+        if self.texts:
+            await asyncio.Event().wait()
+        self.texts.append(text)
+
+
+def test_a_page_that_does_not_read_keeps_news_from_nobody_else():
+    async def scene(loop: VirtualTime) -> None:
+        session, sockets = CountedSession(loop), [Deaf(), FakeSocket()]
+        looking(session, sockets)
+        await asyncio.sleep(0.5)
+        session.loop.alive = False
+        await asyncio.wait_for(session.watch(), 10.0)
+        assert [len(s.texts) for s in sockets] == [1, 2]
+        assert "has ended" in sockets[1].texts[1]
+
+    run(scene)
+
+
 def test_a_hand_waits_for_one_picture_at_most():
     async def scene(loop: VirtualTime) -> None:
         session, hand = CountedSession(loop), FakeSocket()

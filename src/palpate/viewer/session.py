@@ -53,6 +53,7 @@ SHORTEST = 1.0 / 125.0  # s between frames to one page: no display that matters 
 STALE = 0.25  # s without a tick until the loop counts as frozen
 RATE_KNOWN = 0.5  # s after the loop has rested until its rate is that of a touched body again
 WATCH = 0.1  # s between looks at the real-time process
+PATIENCE = 1.0  # s that a page has to take news of all pages
 GRACE = 0.5  # s; a signal that ends the whole program may reach the real-time process first
 MOST_PAGES = 32
 MESSAGES, MESSAGES_AT_ONCE = 1000.0, 250.0  # of a page, per second and at once; a display at 360 Hz needs 485
@@ -190,9 +191,14 @@ class Session:
         await self._tell_all(ENDED)
 
     async def _tell_all(self, news: Notice | Recording) -> None:
-        for page in list(self._pages.values()):
-            with contextlib.suppress(WebSocketDisconnect, RuntimeError):  # RuntimeError: just closed
-                await page.socket.send_text(news.to_json())
+        text = news.to_json()
+
+        async def tell(page: Page) -> None:
+            # RuntimeError: just closed; TimeoutError: a page that doesn't read keeps it from nobody else
+            with contextlib.suppress(WebSocketDisconnect, RuntimeError, TimeoutError):
+                await asyncio.wait_for(page.socket.send_text(text), PATIENCE)
+
+        await asyncio.gather(*map(tell, list(self._pages.values())))
 
     def hello(self) -> Hello:
         """Return the first message to every page."""

@@ -8,6 +8,7 @@ from .dataset import Layout as Layout
 from .dataset.readers import import_results as import_results
 from .dataset.readers import read_results as read_results
 from .errors import PalpateError as PalpateError
+from .improvement import improve as improve
 from .learning import Fitted as Fitted
 from .learning import Learner as Learner
 from .learning import Refinement as Refinement

@@ -1,8 +1,7 @@
-"""`palpate touch`: its options and the study that it writes; the rounds themselves are tested with parts."""
+"""`palpate touch`: its options and the study that it writes; the improvement itself is tested with parts."""
 
 from __future__ import annotations
 
-import contextlib
 from pathlib import Path
 
 import pytest
@@ -14,15 +13,14 @@ from palpate.study import Study
 
 @pytest.fixture
 def asked(monkeypatch) -> list[Study]:
-    """The studies whose rounds were asked for; none is solved, as if the time was over."""
+    """The studies whose improvement was asked for; none is solved, as if the time was over."""
     studies: list[Study] = []
 
-    def rounds(study: Study, *_: object, **__: object):
+    def improve(study: Study, *_: object, **__: object):
         studies.append(study)
         raise AccuracyError("The force error is not reached.")
 
-    monkeypatch.setattr("palpate.study.rounds.improve_in_rounds", rounds)
-    monkeypatch.setattr("palpate.sweeps.local_cluster", lambda _: contextlib.nullcontext())
+    monkeypatch.setattr("palpate.study.improve_study.improve_study", improve)
     return studies
 
 

@@ -14,14 +14,12 @@ from palpate.errors import StudyError, UsageError
 from palpate.physics.shapes import Block
 from palpate.physics.shapes.sample_part import kidney_surface, write_sample_part
 from palpate.study import Study, read_study, to_toml
+from palpate.study.improve_study import conclude, improve_study
 from palpate.study.material_records import SolidMaterialRecord
 from palpate.study.part_records import PartRecord
 from palpate.study.part_study import part_study
-from palpate.study.rounds import improve_in_rounds
 from palpate.study.run import Paths, report_study
 from palpate.surrogates import Surrogate
-from palpate.sweeps.ledger import Ledger
-from palpate.sweeps.plan import make_plan
 
 SIZE = (0.04, 0.03, 0.02)
 HEAD = """
@@ -300,41 +298,30 @@ force_p95 = 0.3
 """
 
 
-def test_rounds_go_on_with_the_one_that_was_interrupted(folder, tmp_path):
-    """Of a round that grows a sweep there are only parts left: the finished sweep before it has gone into them."""
-    study, paths = study_of(folder, HEAD + SMALL), Paths(tmp_path, "pad")
-    problem = study.problem()
-    points = study.with_samples(8).sweep.arguments(problem)["points"]
-    Ledger(paths.data, make_plan(problem, None, None, 0, None, points).config).begin()
-
-    def stop(line: str) -> None:
-        raise InterruptedError(line)
-
-    with pytest.raises(InterruptedError, match="round with 8 solves"):
-        next(improve_in_rounds(study, paths, until=0.5, limit=1.0, rounds=(6, 8, 10), log=stop))
-
-
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_a_part_goes_the_whole_way(folder, tmp_path):
-    """A round of sweep, learning, validation and report works on a part as on any body, and is not repeated."""
+    """Solves, learning, validation and report work on a part as on any body, and are not repeated."""
     study = study_of(folder, HEAD + SMALL)
     paths = Paths(tmp_path, study.name)
-    wanted = {"until": 0.5, "limit": 600.0, "rounds": (6,), "progress": False}
-    (done,) = improve_in_rounds(study, paths, **wanted)
-    outcome = done.outcome
-    assert (len(outcome.train), len(outcome.test)) == (6, 2), "every solve converged"
-    assert done.error == outcome.validation.force.p95
+    wanted = {"until": 0.5, "progress": False}
+    *_, last = improve_study(study, paths, **wanted)
+    assert last.reached
+    assert last.model_path == paths.model
+    assert (last.solves, last.unseen) == (12, 2), "every solve converged"
+    outcome = conclude(study, paths, last)
+    assert last.error == outcome.validation.force.p95
     body = Surrogate.load(paths.model)
     felt = np.linalg.norm(outcome.train.force, axis=1)
     off = np.linalg.norm(body.energy.force(outcome.train.X) - outcome.train.force, axis=1) / felt
     assert np.median(off) < 0.05
-    assert [point["solves"] for point in body.meta["learning_curve"]] == [6]
+    assert [point["solves"] for point in body.meta["learning_curve"]] == [12]
     page = report_study(tmp_path / "report.html", [outcome]).read_text(encoding="utf-8")
     assert "Solid of pad.stl" in page
     assert "fixed at table" in page
-    (again,) = improve_in_rounds(study, paths, **wanted)
-    assert again.error == done.error
-    assert (tmp_path / "pad-6.palpate").read_bytes() == paths.model.read_bytes()
+    again = list(improve_study(study, paths, **wanted))
+    assert [step.phase for step in again] == ["learnt", "ended"], "nothing is solved or learnt again"
+    assert again[-1].error == last.error
+    assert (tmp_path / "pad-12.palpate").is_file()
     with pytest.raises(StudyError, match="no such key"):
         study_of(folder, HEAD + SMALL.replace("samples = 6", "sample = 6"))

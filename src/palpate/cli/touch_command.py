@@ -1,4 +1,4 @@
-"""`palpate touch`: from a part to a surrogate of a wanted force error, in rounds of more and more solves."""
+"""`palpate touch`: from a part to a surrogate of a wanted force error, by solves that are chosen batch by batch."""
 
 from __future__ import annotations
 
@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from palpate.cli.table_options import Json
-from palpate.errors import AccuracyError, UsageError
+from palpate.errors import UsageError
 
 if TYPE_CHECKING:
     from palpate.cli.console import Console
     from palpate.study import Study
-    from palpate.study.rounds import Round
     from palpate.study.run import Paths
 
 __all__ = ["touch"]
@@ -42,7 +41,9 @@ def touch(
         str | None, typer.Option(help="Surface of the file that is touched. Default: what faces up.")
     ] = None,
     until: Annotated[str, typer.Option(help="Force error at the 95th percentile that ends it.")] = "2%",
-    minutes: Annotated[float, typer.Option(min=0, help="Minutes after which no further round begins.")] = 30,
+    minutes: Annotated[
+        float, typer.Option(min=0, help="Minutes after which no further batch of solves begins.")
+    ] = 30,
     workers: Annotated[
         int | None, typer.Option(min=1, help="Worker processes. Default: one per core.")
     ] = None,
@@ -51,8 +52,9 @@ def touch(
     ] = True,
     as_json: Json = False,
 ) -> None:
-    """Solve, learn and check a part in rounds until its force error is reached. Called again, it goes on."""
+    """Solve, learn and check a part until its force error is reached. Called again, it goes on."""
     from palpate.cli.console import Console
+    from palpate.cli.improvement_lines import share_of
     from palpate.study.run import Paths
 
     console = Console(as_json)
@@ -61,7 +63,7 @@ def touch(
     given = {name: value for name, value in (asked | choices).items() if value not in (None, ())}
     study = _study_of(part, given, console).with_workers(workers)
     paths = Paths(part.parent, study.name)
-    _carry_on(study, paths, _share(until), 60 * minutes, console)
+    _carry_on(study, paths, share_of(until), 60 * minutes, console)
     if view and not as_json and sys.stdout.isatty():
         from palpate.viewer import serve
 
@@ -132,55 +134,19 @@ def _chosen(study: Study) -> str:
 
 
 def _carry_on(study: Study, paths: Paths, until: float, limit: float, console: Console) -> None:
-    """Carry out rounds, print each, and write the report of the last.
+    """Improve the study, print each surrogate, and write the report of the last.
 
     Raises
     ------
     AccuracyError
         If the force error was not reached.
     """
-    from palpate.format import duration, share
-    from palpate.study.rounds import improve_in_rounds
+    from palpate.cli.improvement_lines import improve_and_print
     from palpate.study.run import report_study
-    from palpate.sweeps import local_cluster
 
-    rounds: list[Round] = []
-    with local_cluster(study.sweep.workers if study.sweep else None) as cluster:
-        for done in improve_in_rounds(
-            study,
-            paths,
-            until=until,
-            limit=limit,
-            cluster=cluster,
-            progress=not console.as_json,
-            log=lambda stage: console.say(f"{stage} …"),
-        ):
-            rounds.append(done)
-            console.say(
-                f"{done.solves} solves: force error {share(done.error)} at the 95th percentile of "
-                f"{done.outcome.validation.samples} unseen solves, after {duration(done.seconds)}"
-            )
-    last = rounds[-1]
-    report = report_study(paths.report, [last.outcome])
-    figures = [{"solves": r.solves, "force_p95": r.error, "seconds": r.seconds} for r in rounds]
-    text = (
-        f"{last.outcome.validation}\nreport  {report}\nmodel   {paths.model}   (palpate view {paths.model})"
-    )
-    console.result(text, {"rounds": figures, "model": str(paths.model), "report": str(report)})
-    if not last.error <= until:
-        raise AccuracyError(
-            f"The force error of {study.name} is {share(last.error)} after {last.solves} solves, not {share(until)}.",
-            why=f"The limit of {duration(limit)} or of the rounds was reached; everything is kept.",
-            fix="Run the same command again, which goes on, with more --minutes or a larger --until.",
-        )
-
-
-def _share(text: str) -> float:
-    """Return a share: of "2%" 0.02."""
-    try:
-        value = float(text.strip().removesuffix("%")) / (100 if "%" in text else 1)
-    except ValueError:
-        value = 0.0
-    if 0 < value < 1:
-        return value
-    raise UsageError(f"{text!r} is no force error.", fix="Give a share such as 2% or 0.02.")
+    outcome, content, failure = improve_and_print(study, paths, until, limit, console)
+    report = report_study(paths.report, [outcome])
+    text = f"{outcome.validation}\nreport  {report}\nmodel   {paths.model}   (palpate view {paths.model})"
+    console.result(text, content | {"report": str(report)})
+    if failure is not None:
+        raise failure

@@ -9,7 +9,7 @@ toml                 the record as a TOML file with comments, and back
 named_studies        studies that have a name
 part_study           study of a part that the user has
 run                  the stages: sweep, load the data, learn, validate, report
-rounds               a study in rounds of more and more solves
+improve_study        a study whose solves are chosen batch by batch, until a force error is reached
 study_advice         number of solves that would keep the limits
 """
 

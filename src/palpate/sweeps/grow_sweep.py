@@ -17,7 +17,10 @@ from palpate.files import system_errors
 from palpate.sweeps.ledger import Ledger
 from palpate.sweeps.plan import Plan, make_plan
 
-__all__ = ["grow", "is_begun"]
+__all__ = ["CHOSEN", "grow", "is_begun"]
+
+CHOSEN = "chosen"
+"""Name of the design of solves that were chosen batch by batch, each by what was known then."""
 
 
 def grow(path: str | os.PathLike[str], problem: Any, arguments: Mapping[str, Any]) -> Dataset | None:

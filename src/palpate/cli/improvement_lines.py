@@ -1,0 +1,106 @@
+"""Lines that `palpate touch` and `palpate sweep --until` print of an improvement, and the error at its end."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from palpate.errors import AccuracyError, UsageError
+from palpate.format import count, duration, share
+
+if TYPE_CHECKING:
+    from palpate.cli.console import Console
+    from palpate.improvement import ImprovementStep
+    from palpate.study import Study
+    from palpate.study.run import Outcome, Paths
+
+__all__ = ["improve_and_print", "share_of"]
+
+
+def improve_and_print(
+    study: Study, paths: Paths, until: float, limit: float, console: Console, **options: Any
+) -> tuple[Outcome, dict[str, Any], AccuracyError | None]:
+    """Improve a study and print a line for each surrogate.
+
+    Parameters
+    ----------
+    study : Study
+        A study of a body under a probe.
+    paths : Paths
+        Its files.
+    until : float
+        Wanted relative force error.
+    limit : float
+        Time in s after which no further batch begins.
+    console : Console
+        Printer of the lines.
+    **options
+        Further ones of `palpate.study.improve_study.improve_study`.
+
+    Returns
+    -------
+    outcome : Outcome
+        The study with its last surrogate.
+    content : dict
+        The steps and the files, for JSON.
+    failure : AccuracyError or None
+        What to raise where the wanted error was not reached.
+    """
+    from palpate.study.improve_study import conclude, improve_study
+
+    steps: list[dict[str, Any]] = []
+    last: ImprovementStep | None = None
+    console.say("Starting …")
+    for step in improve_study(
+        study,
+        paths,
+        until=until,
+        limit=limit,
+        progress=not console.as_json,
+        log=lambda stage: console.say(f"{stage} …"),
+        **options,
+    ):
+        last = step
+        if step.phase == "learnt":
+            console.say(_line(step))
+            if step.unseen:
+                steps.append({"solves": step.solves, "force_p95": step.error, "seconds": step.seconds})
+    assert last is not None
+    outcome = conclude(study, paths, last)
+    content = {"steps": steps, "reached": last.reached, "reason": last.reason, "model": str(paths.model)}
+    return outcome, content, None if last.reached else _failure(study, until, last)
+
+
+def _line(step: ImprovementStep) -> str:
+    if not step.unseen or math.isnan(step.error):
+        return f"{count(step.solves, 'solve')}: a first surrogate, not judged yet, after {duration(step.seconds)}"
+    kept = "" if step.is_new else "; the surrogate before is better and stays"
+    return (
+        f"{step.solves} solves: force error {share(step.median)} at the median, {share(step.error)} at the 95th "
+        f"percentile of {count(step.unseen, 'unseen solve')}, after {duration(step.seconds)}{kept}"
+    )
+
+
+def _failure(study: Study, until: float, last: ImprovementStep) -> AccuracyError:
+    return AccuracyError(
+        f"The force error of {study.name} is {share(last.error)} after {last.solves} solves, not {share(until)}.",
+        why=f"{last.reason} Everything is kept.",
+        fix="Run the same command again, which goes on, with more --minutes or a larger --until.",
+    )
+
+
+def share_of(text: str) -> float:
+    """Return a share: of "2%" 0.02.
+
+    Raises
+    ------
+    UsageError
+        If the text is no share between 0 and 1.
+    """
+    try:
+        value = float(text.strip().removesuffix("%")) / (100 if "%" in text else 1)
+    except ValueError:
+        value = 0.0
+    if 0 < value < 1:
+        return value
+    raise UsageError(f"{text!r} is no force error.", fix="Give a share such as 2% or 0.02.")

@@ -1,0 +1,245 @@
+"""A Gaussian process of a scalar that is observed with its gradient, symmetric under a group of maps of the inputs.
+
+The covariance of two values is
+
+    k(x, x') = 1/c Σ_g [ (1 + ‖(x − G x' − t)/l‖²)^(−1/2) + a + b (x − p)·(G x' + t − p) ]
+
+the inverse multiquadric of Hardy (1971) with a length l for each input, and a wide prior on an affine part about the
+point p that the group leaves where it is. The sum goes over the c maps x' ↦ G x' + t of the group; it makes every
+function of the process symmetric (Ginsbourger, Roustant & Durrande 2016). Values and slopes are jointly Gaussian, since
+differentiation is linear; the covariances of slopes are derivatives of k (Solak, Murray-Smith, Leithead, Leith &
+Rasmussen 2003). An observation of weight w has the noise σ²τ²/w. The process's own scale σ² has its most likely value
+in closed form; lengths and τ are searched by the marginal likelihood (Rasmussen & Williams 2006, chapter 5).
+
+References: R. L. Hardy (1971), J. Geophys. Res. 76, 1905–1915. D. Ginsbourger, O. Roustant, N. Durrande (2016), J.
+Stat. Plan. Inference 170, 117–128. E. Solak et al. (2003), NIPS 15, 1057–1064. C. E. Rasmussen, C. K. I. Williams
+(2006), Gaussian Processes for Machine Learning, MIT Press.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import cho_solve, cholesky
+from scipy.optimize import minimize
+from scipy.sparse.csgraph import connected_components
+
+from palpate.rbf.symmetric_units import Images
+
+__all__ = ["GradientProcess", "Observations", "covariance", "fit_process", "no_symmetry", "tied_inputs"]
+
+LEVEL, SLOPE = 25.0, 4.0
+"""Prior variances a and b of the affine part, in units of the process's own variance."""
+
+SHORTEST, LONGEST = 0.15, 6.0  # lengths, in scaled inputs: half of a range is 1
+QUIETEST, NOISIEST = 3e-4, 0.3  # τ
+BEGIN_LENGTH, BEGIN_NOISE = 1.0, 0.01
+SEARCHED = 60  # observations from which lengths are searched: more cost time and move them little
+FIRST_STEPS, FURTHER_STEPS = (
+    60,
+    16,
+)  # evaluations of the likelihood, of a new process and from the last lengths
+_SPREAD = 0.4  # of the search's simplex, in logarithms
+_MIXED = 1e-9  # entry of a map that mixes two inputs
+
+
+@dataclass(frozen=True, eq=False)
+class Observations:
+    """Values and slopes of the scalar at N places.
+
+    Attributes
+    ----------
+    X : (N, n) array
+        Scaled inputs.
+    targets : (N, 1 + n) array
+        Value and slopes by the scaled inputs.
+    weights : (N, 1 + n) array
+        Weight of each; zero where it is not known.
+    """
+
+    X: np.ndarray
+    targets: np.ndarray
+    weights: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.X)
+
+    def take(self, rows: np.ndarray) -> Observations:
+        """Return some of the places, by indices or a mask."""
+        return Observations(self.X[rows], self.targets[rows], self.weights[rows])
+
+
+def no_symmetry(inputs: int) -> Images:
+    """Return the group of the identity alone."""
+    return Images(np.eye(inputs)[None], np.zeros((1, inputs)))
+
+
+def covariance(A: np.ndarray, B: np.ndarray, lengths: np.ndarray, images: Images) -> np.ndarray:
+    """Return the prior covariance (N, 1 + n, P, 1 + n) of values and slopes at A (N, n) with those at B (P, n).
+
+    Parameters
+    ----------
+    A, B : (N, n), (P, n) arrays
+        Scaled inputs.
+    lengths : (n,) array
+        l. Inputs that the group mixes need one length, else the function is not symmetric.
+    images : Images
+        The group, on scaled inputs.
+    """
+    n, inverse = A.shape[1], 1.0 / lengths**2
+    out = np.zeros((len(A), 1 + n, len(B), 1 + n))
+    own = np.arange(n)
+    fixed = images.shifts.mean(axis=0)  # the middle of the origin's images
+    centred = A - fixed
+    for G, image in zip(images.turns, images.of(B), strict=True):
+        D = A[:, None] - image[None]
+        E = D * inverse
+        q = (D * E).sum(axis=2)
+        k = 1.0 / np.sqrt(1.0 + q)
+        first, second = -0.5 * k / (1.0 + q), 0.75 * k / (1.0 + q) ** 2
+        by_a = 2.0 * first[..., None] * E
+        out[:, 0, :, 0] += k + LEVEL + SLOPE * centred @ (image - fixed).T
+        out[:, 0, :, 1:] += -by_a @ G + SLOPE * (centred @ G)[:, None]
+        out[:, 1:, :, 0] += (by_a + SLOPE * (image - fixed)[None]).transpose(0, 2, 1)
+        both = (-4.0 * second)[..., None, None] * E[..., :, None] * E[..., None, :]
+        both[..., own, own] -= 2.0 * first[..., None] * inverse
+        out[:, 1:, :, 1:] += (both @ G + SLOPE * G).transpose(0, 2, 1, 3)
+    return out / len(images.turns)
+
+
+@dataclass(frozen=True, eq=False)
+class GradientProcess:
+    """The process, given observations.
+
+    Attributes
+    ----------
+    seen : Observations
+        What it is conditioned on.
+    images : Images
+        The group.
+    lengths : (n,) array
+        l, in scaled inputs.
+    noise : float
+        τ.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        From the properties, where rounding makes the covariance indefinite: the noise is too small then.
+    """
+
+    seen: Observations
+    images: Images
+    lengths: np.ndarray
+    noise: float
+
+    @cached_property
+    def _known(self) -> np.ndarray:
+        return np.flatnonzero(self.seen.weights.ravel() > 0)
+
+    @cached_property
+    def _factor(self) -> np.ndarray:
+        X, size = self.seen.X, self.seen.targets.size
+        K = covariance(X, X, self.lengths, self.images).reshape(size, size)[np.ix_(self._known, self._known)]
+        K[np.diag_indices(len(K))] += self.noise**2 / self.seen.weights.ravel()[self._known]
+        return np.asarray(cholesky(K, lower=True, check_finite=False))
+
+    @cached_property
+    def _solution(self) -> np.ndarray:
+        return np.asarray(cho_solve((self._factor, True), self.seen.targets.ravel()[self._known]))
+
+    @cached_property
+    def variance(self) -> float:
+        """σ²: the scale of the covariance that makes the observations most likely."""
+        return float(self.seen.targets.ravel()[self._known] @ self._solution) / len(self._known)
+
+    @cached_property
+    def misfit(self) -> float:
+        """Negative logarithm of the marginal likelihood at that scale, less a constant."""
+        return float(0.5 * len(self._known) * np.log(self.variance) + np.log(np.diagonal(self._factor)).sum())
+
+    def predict(self, X: np.ndarray) -> np.ndarray:
+        """Return the expected value and slopes (P, 1 + n) at scaled inputs X (P, n)."""
+        shape = (len(X), 1 + X.shape[1])
+        prior = covariance(X, self.seen.X, self.lengths, self.images).reshape(X.size + len(X), -1)
+        return np.asarray(prior[:, self._known] @ self._solution).reshape(shape)
+
+    def posterior(self, X: np.ndarray) -> np.ndarray:
+        """Return the covariance (P(1 + n), P(1 + n)) of value and slopes at X (P, n), place by place."""
+        size = X.size + len(X)
+        prior = covariance(X, X, self.lengths, self.images).reshape(size, size)
+        with_seen = covariance(self.seen.X, X, self.lengths, self.images).reshape(-1, size)[self._known]
+        half = np.linalg.solve(self._factor, with_seen)
+        return np.asarray(self.variance * (prior - half.T @ half))
+
+    def noise_variance(self, weights: np.ndarray) -> np.ndarray:
+        """Return the noise σ²τ²/w of observations of these weights; infinite where the weight is zero."""
+        with np.errstate(divide="ignore"):
+            return np.asarray(self.variance * self.noise**2 / weights)
+
+
+def tied_inputs(images: Images) -> np.ndarray:
+    """Return the number (n,) of the length of each input: inputs that the group mixes share one."""
+    mixed = (np.abs(images.turns) > _MIXED).any(axis=0)
+    return np.asarray(connected_components(mixed | mixed.T, directed=False)[1])
+
+
+def fit_process(
+    seen: Observations, images: Images, begin: GradientProcess | None = None, *, seed: int = 0
+) -> GradientProcess:
+    """Return the process whose lengths and noise make the observations most likely, by a coarse search.
+
+    Parameters
+    ----------
+    seen : Observations
+        At least one place with a weight.
+    images : Images
+        The group.
+    begin : GradientProcess, optional
+        A process of fewer observations, from whose lengths and noise the search begins.
+    seed : int
+        Decides which observations the search looks at, where there are many.
+    """
+    tied = tied_inputs(images)
+    count = int(tied.max()) + 1
+    some = seen
+    if len(seen) > SEARCHED:
+        rng = np.random.default_rng([seed, len(seen)])
+        some = seen.take(np.sort(rng.choice(len(seen), SEARCHED, replace=False)))
+    low = np.log([*[SHORTEST] * count, QUIETEST])
+    high = np.log([*[LONGEST] * count, NOISIEST])
+    start = np.log([*[BEGIN_LENGTH] * count, BEGIN_NOISE])
+    if begin is not None:
+        first = [int(np.flatnonzero(tied == i)[0]) for i in range(count)]
+        start = np.log([*begin.lengths[first], begin.noise])
+
+    def process(p: np.ndarray, of: Observations) -> GradientProcess:
+        values = np.exp(np.clip(p, low, high))
+        return GradientProcess(of, images, values[:-1][tied], float(values[-1]))
+
+    def misfit(p: np.ndarray) -> float:
+        outside = 10.0 * float(np.square(p - np.clip(p, low, high)).sum())
+        try:
+            return process(p, some).misfit + outside
+        except np.linalg.LinAlgError:
+            return 1e10
+
+    steps = FIRST_STEPS if begin is None else FURTHER_STEPS
+    simplex = np.vstack([start, start + _SPREAD * np.eye(len(start))])
+    result = minimize(
+        misfit, start, method="Nelder-Mead", options={"maxfev": steps, "initial_simplex": simplex}
+    )
+    return _definite(process(result.x, seen))
+
+
+def _definite(process: GradientProcess) -> GradientProcess:
+    """Return the process with as much more noise as makes its covariance definite in floating point."""
+    while True:
+        try:
+            _ = process.variance
+        except np.linalg.LinAlgError:
+            process = replace(process, noise=3.0 * process.noise)
+            continue
+        return process

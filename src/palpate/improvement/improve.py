@@ -1,0 +1,434 @@
+"""`palpate.improve`: solve, learn and judge in turn, each batch of solves where the force is least certain.
+
+A few Sobol places of one depth each begin. A Gaussian process of ℓ, which is fitted anew for each batch, chooses the
+next, whatever network is learnt. Unseen solves, which nothing is learnt from and which choose nothing, say when to
+stop.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from palpate import checks
+from palpate.dataset import Dataset
+from palpate.errors import UsageError
+from palpate.format import count
+from palpate.improvement.choice_rules import choose_by_disagreement, choose_by_variance, choose_farthest
+from palpate.improvement.force_model import ForceModel
+from palpate.improvement.kept_solves import KeptSolves
+from palpate.improvement.stop_rule import StopRule, relative_errors
+from palpate.learning import learn_dataset
+from palpate.learning.pressed_solves import PROBES, PressedSolves
+from palpate.processes import available_cores
+from palpate.surrogates import Surrogate
+from palpate.sweeps import Problem, local_cluster
+
+__all__ = ["RULES", "ImprovementStep", "improve"]
+
+RULES = ("variance", "disagreement", "farthest", "sobol")
+"""Rules that choose the next solves; the last three are there to compare with."""
+
+FIRST = 12  # Sobol places to begin with, of one depth each
+CANDIDATES = 384  # places of one depth each among which a batch is chosen
+SERIES, DEPTHS = 48, 3  # depth series among which as well, towards the end, and depths of each
+FOLLOWS = 0.6  # cost of a further depth of a series over that of a solve of its own: it starts from the last
+SMALLEST_BATCH, LARGEST_BATCH = 4, 8  # solves
+NEAR = 2.0  # times the wanted error: from there on networks are searched properly, and depth series offered
+QUICK, PROPER = 0.1, 0.5  # effort of learning far from the wanted error, and near it
+BETTER = 1.0  # a new surrogate is kept if its error is no more than so many times the last one's
+UNSEEN_FIRST, UNSEEN_EACH = 8, 2  # unseen solves at the first judgement, and with each batch
+
+Learner = Callable[[Dataset, float], tuple[Surrogate, Any]]
+"""From solves and an effort to a surrogate and the record of its learning."""
+
+Log = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class ImprovementStep:
+    """State of an improvement after a part of the work.
+
+    Attributes
+    ----------
+    phase : {"solved", "learnt", "ended"}
+        A batch was solved; a surrogate was learnt and judged; or nothing more will come.
+    solves, unseen : int
+        Converged solves to learn from, and those to judge by.
+    error, median : float
+        Relative force error of the surrogate on the unseen solves, at the 95th percentile and the median;
+        not-a-number while there is no surrogate, or nothing to judge it by.
+    places : (k, 3) array
+        Contact points of the solves on the surface at rest, m, in the order in which they were solved.
+    values : (k,) array
+        Relative force error of each of these solves when it is left out of learning; not-a-number where it is not
+        known, as of solves that the surrogate has not learnt from.
+    seconds : float
+        Time since the improvement began.
+    surrogate : Surrogate or None
+        The best so far on the unseen solves.
+    train, test : Dataset or None
+        The solves to learn from, and those to judge by.
+    history : optional
+        Record of the learning of the surrogate.
+    is_new : bool
+        Whether this step has brought a surrogate that is better than the last one.
+    reached : bool
+        Whether the wanted error is kept.
+    reason : str
+        Why the improvement has ended; empty before.
+    model_path : Path or None
+        File of the surrogate, where there is one.
+    """
+
+    phase: str
+    solves: int
+    unseen: int
+    error: float
+    median: float
+    places: np.ndarray
+    values: np.ndarray
+    seconds: float
+    surrogate: Surrogate | None
+    train: Dataset | None
+    test: Dataset | None
+    history: Any = None
+    is_new: bool = False
+    reached: bool = False
+    reason: str = ""
+    model_path: Path | None = None
+
+
+def improve(
+    problem: Problem,
+    *,
+    until: float = 0.02,
+    limit: float = math.inf,
+    most: int = 400,
+    unseen: int | np.ndarray = 40,
+    rule: str = "variance",
+    seed: int = 0,
+    batch: int | None = None,
+    path: Path | str | None = None,
+    unseen_path: Path | str | None = None,
+    learner: Learner | None = None,
+    known: tuple[Surrogate, Any] | None = None,
+    workers: int | None = None,
+    cluster: Any = None,
+    progress: Any = True,
+    case_limit: float | None = None,
+    log: Log = lambda _: None,
+) -> Iterator[ImprovementStep]:
+    """Solve a body under a probe where the force is least certain, learn, and yield each step, until an error is kept.
+
+    Parameters
+    ----------
+    problem : Problem
+        A body under a probe, ``body.problem(SphereProbe(…))``, or a family of bodies.
+    until : float
+        Wanted relative force error at the 95th percentile of unseen solves.
+    limit : float
+        Time in s after which no further batch begins; by default none.
+    most : int
+        Number of solves to learn from after which no further batch begins.
+    unseen : int or (U, n) array
+        Number of solves to judge by, in depth series of two at places of their own; or their inputs, in the order in
+        which they are solved.
+    rule : {"variance", "disagreement", "farthest", "sobol"}
+        How the next solves are chosen.
+    seed : int
+        Decides the first places and the candidates.
+    batch : int, optional
+        Solves of a batch; by default a multiple of the workers between 4 and 8.
+    path, unseen_path : path, optional
+        Datasets (``NAME.zarr``) that keep the solves to learn from and to judge by. A later call goes on with them.
+    learner : callable, optional
+        From solves and an effort to a surrogate and its record; by default `palpate.learn`.
+    known : (surrogate, record), optional
+        A surrogate of just these solves, to go on from.
+    workers : int, optional
+        Processes that solve and search; by default one for each core.
+    cluster : optional
+        A running `local_cluster`, or what else `palpate.sweep` takes.
+    progress : bool or callable
+        Of each batch: a bar on standard error, or a function (done, total).
+    case_limit : float, optional
+        Time in s after which a single solve has failed.
+    log : callable
+        Gets one line when a part of the work begins.
+
+    Yields
+    ------
+    ImprovementStep
+        After each batch, after each surrogate, and at the end.
+
+    Raises
+    ------
+    UsageError
+        For a wrong argument, a problem that no probe presses, or paths that hold another problem's solves.
+    SolverError
+        If more than half of the first solves fail.
+    """
+    _check_problem(problem, rule)
+    stop = StopRule(until, limit, most)
+    if isinstance(unseen, int | np.integer):
+        checks.fits("The number of unseen solves", unseen, least=1, whole=True)
+        unseen = problem.design(int(unseen), seed + 7, depths=2)  # type: ignore[attr-defined]
+    count_of_workers = workers or available_cores()
+    size = batch or int(
+        np.clip(count_of_workers * -(-SMALLEST_BATCH // count_of_workers), SMALLEST_BATCH, LARGEST_BATCH)
+    )
+    began = time.monotonic()
+    with contextlib.ExitStack() as stack:
+        if cluster is None:
+            cluster = stack.enter_context(local_cluster(workers))
+        options = {"cluster": cluster, "progress": progress}
+        if case_limit is not None:
+            options["case_limit"] = case_limit
+        work = _Improvement(
+            problem,
+            KeptSolves.open(problem, None if path is None else Path(path), **options),
+            KeptSolves.open(problem, None if unseen_path is None else Path(unseen_path), **options),
+            np.asarray(unseen, dtype=float),
+            stop,
+            rule,
+            seed,
+            size,
+            learner or partial(_learn, workers=workers, log=log),
+            log,
+            began,
+        )
+        yield from work.run(known)
+
+
+def _learn(data: Dataset, effort: float, *, workers: int | None, log: Log) -> tuple[Surrogate, Any]:
+    return learn_dataset(data, effort=effort, workers=workers, log=log)
+
+
+def _check_problem(problem: Any, rule: str) -> None:
+    checks.one_of("The rule", rule, RULES)
+    acting = problem.describe().get("interactions", ()) if hasattr(problem, "describe") else ()
+    kinds = [entry.get("type") for entry in acting if isinstance(entry, dict)]
+    if len(kinds) != 1 or kinds[0] not in PROBES or not hasattr(problem, "design"):
+        raise UsageError(
+            "Solves can be chosen for a body under one probe only.",
+            why=f"On this body act: {', '.join(map(str, kinds)) or 'nothing that its description tells'}.",
+            fix="Use body.problem(SphereProbe(…)); `palpate.sweep` takes any other problem.",
+        )
+
+
+@dataclass(eq=False)
+class _Improvement:
+    """One improvement and its state."""
+
+    problem: Any
+    kept: KeptSolves
+    judging: KeptSolves
+    unseen: np.ndarray
+    stop: StopRule
+    rule: str
+    seed: int
+    size: int
+    learner: Learner
+    log: Log
+    began: float
+    model: ForceModel | None = None
+    pressed: PressedSolves | None = None
+    best: tuple[Surrogate, Any] | None = None
+    learnt_from: int = 0
+    values: np.ndarray = field(default_factory=lambda: np.empty(0))
+    errors: list[float] = field(default_factory=list)
+
+    def run(self, known: tuple[Surrogate, Any] | None) -> Iterator[ImprovementStep]:
+        if len(self.kept) < FIRST:
+            self.log(f"{FIRST} solves to begin with")
+            points = self.problem.design(FIRST, self.seed, depths=1)
+            self.kept.add([point[None] for point in points[len(self.kept) :]])
+            yield self._step("solved")
+        if known is not None:
+            self._take(known)
+        else:
+            self._learn(QUICK)
+            yield self._step("learnt", is_new=True)  # a hand can feel it before it is judged
+        self._judge_by(max(UNSEEN_FIRST, len(self.judging)))
+        error = self._error(self.best)
+        self.errors.append(error)
+        yield self._step("learnt", is_new=known is not None)
+        while not (reason := self._reason()):
+            below = self.errors[-1] <= self.stop.until
+            self._solve_batch()
+            more = len(self.unseen) if below else min(len(self.judging) + UNSEEN_EACH, len(self.unseen))
+            self._judge_by(more)
+            yield self._step("solved")
+            is_new = self._learn_and_judge()
+            yield self._step("learnt", is_new=is_new)
+        reached = self.stop.is_reached(self.errors, complete=self._is_complete)
+        yield replace(self._step("ended"), reached=reached, reason=reason)
+
+    @property
+    def _is_complete(self) -> bool:
+        return len(self.judging) >= len(self.unseen)
+
+    def _reason(self) -> str:
+        if self._is_complete or self.errors[-1] > self.stop.until:
+            pass
+        elif (
+            len(self.errors) == 1
+        ):  # a surrogate of an earlier run: all unseen solves judge it before anything else
+            self._judge_by(len(self.unseen))
+            self.errors[-1] = self._error(self.best)
+        return self.stop.reason(
+            self.errors,
+            complete=self._is_complete,
+            solves=len(self.kept),
+            seconds=time.monotonic() - self.began,
+        )
+
+    def _judge_by(self, number: int) -> None:
+        """Solve unseen places until there are so many."""
+        have, number = len(self.judging), min(number, len(self.unseen))
+        if have < number:
+            self.log(f"{count(number - have, 'unseen solve')} to judge by")
+            self.judging.add(_series_of(self.unseen[have:number]))
+
+    def _solve_batch(self) -> None:
+        groups = self._choose()
+        self.log(f"{count(sum(map(len, groups)), 'solve')} chosen by {self.rule}")
+        self.kept.add(groups)
+
+    def _choose(self) -> list[np.ndarray]:
+        """Return the points of the next batch, in groups that are solved in order."""
+        solved = len(self.kept)
+        if self.rule == "sobol":  # the sequence that began, taken further
+            return [x[None] for x in self.problem.design(solved + self.size, self.seed, depths=1)[solved:]]
+        model = self._fit()
+        near = bool(self.errors) and self.errors[-1] <= NEAR * self.stop.until
+        singles = self.problem.design(CANDIDATES, self.seed + 7919 * (1 + solved), depths=1)
+        parts = [singles]
+        if near and self.rule == "variance":
+            parts.append(
+                self.problem.design(SERIES * DEPTHS, self.seed + 7919 * (1 + solved) + 1, depths=DEPTHS)
+            )
+        X = np.concatenate(parts)
+        groups = [np.array([i]) for i in range(len(singles))]
+        groups += list(np.arange(len(singles), len(X)).reshape(-1, DEPTHS))
+        touching = model.baseline.coordinate(X) > 0
+        groups = [g for g in groups if touching[g].all()]
+        rows = np.concatenate(groups)
+        place = np.full(len(X), -1)
+        place[rows] = np.arange(len(rows))
+        X, groups = X[rows], [place[g] for g in groups]
+        with threadpool_limits(1):
+            picks = self._picks(model, X, groups)
+        return [X[groups[i]] for i in picks]
+
+    def _picks(self, model: ForceModel, X: np.ndarray, groups: list[np.ndarray]) -> list[int]:
+        taken = self.kept.X
+        if self.rule == "farthest":
+            return choose_farthest(model.scaled(X), model.scaled(taken), model.half, model.images, self.size)
+        if self.rule == "disagreement":
+            return choose_by_disagreement(model, X, self.size)
+        costs = np.array([1.0 + FOLLOWS * (len(g) - 1) for g in groups])
+        return choose_by_variance(model, X, groups, costs, self.size, taken=taken, failed=self._failed(model))
+
+    def _failed(self, model: ForceModel) -> np.ndarray:
+        """Return the inputs of solves that failed: nothing is to be chosen beside them."""
+        assert self.kept.data is not None
+        X = self.kept.X[~self.kept.data.converged]
+        return np.asarray(X[model.baseline.coordinate(X) > 0]) if len(X) else X
+
+    def _fit(self) -> ForceModel:
+        train = self.kept.good
+        assert train is not None
+        self.pressed = self._pressed(train)
+        with threadpool_limits(1):
+            self.model = ForceModel.fit(
+                self.pressed.solves, self.pressed.baseline, self.model, seed=self.seed
+            )
+        return self.model
+
+    def _pressed(self, train: Dataset) -> PressedSolves:
+        # the touched surface is the same for all batches, and takes seconds
+        return PressedSolves.of(train) if self.pressed is None else replace(self.pressed, data=train)
+
+    def _learn(self, effort: float) -> tuple[Surrogate, Any]:
+        train = self.kept.good
+        assert train is not None
+        result = self.learner(train, effort)
+        if self.best is None:
+            self._take(result)
+        return result
+
+    def _take(self, result: tuple[Surrogate, Any]) -> None:
+        train = self.kept.good
+        assert train is not None
+        self.best, self.learnt_from = result, len(train)
+        self.pressed = self._pressed(train)
+        self.values = np.full(len(train), np.nan)
+        errors = getattr(getattr(result[1], "energy", None), "errors", None)
+        touching = np.flatnonzero(result[0].energy.baseline.coordinate(train.X) > 0)
+        if errors is not None and len(errors) == len(touching):
+            self.values[touching] = errors
+
+    def _learn_and_judge(self) -> bool:
+        """Learn from all solves, keep the better of the new and the last surrogate, and return whether it's new."""
+        near = self.errors[-1] <= NEAR * self.stop.until
+        result = self._learn(PROPER if near else QUICK)
+        error, before = self._error(result), self._error(self.best)
+        if not near and error <= NEAR * self.stop.until:
+            proper = self._learn(PROPER)
+            if (other := self._error(proper)) <= error:
+                result, error = proper, other
+        is_new = not error > BETTER * before
+        if is_new:
+            self._take(result)
+        self.errors.append(error if is_new else before)
+        return is_new
+
+    def _error(self, result: tuple[Surrogate, Any] | None) -> float:
+        assert result is not None
+        errors = relative_errors(result[0], self.judging.data)
+        return float(np.quantile(errors, 0.95)) if errors.size else math.nan
+
+    def _step(self, phase: str, *, is_new: bool = False) -> ImprovementStep:
+        train, test = self.kept.good, self.judging.good
+        surrogate, history = self.best or (None, None)
+        errors = relative_errors(surrogate, test) if surrogate is not None else np.empty(0)
+        places = np.empty((0, 3))
+        if train is not None and len(train):
+            self.pressed = self._pressed(train)
+            C = np.ascontiguousarray(train.X[:, :3])
+            distance, normal, _ = self.pressed.surface.at(C)
+            places = C - distance[:, None] * normal
+        values = np.full(len(places), np.nan)
+        values[: len(self.values)] = self.values
+        median, p95 = np.quantile(errors, (0.5, 0.95)) if errors.size else (math.nan, math.nan)
+        return ImprovementStep(
+            phase,
+            0 if train is None else len(train),
+            0 if test is None else len(test),
+            float(p95),
+            float(median),
+            places,
+            values,
+            time.monotonic() - self.began,
+            surrogate,
+            train,
+            test,
+            history,
+            is_new,
+        )
+
+
+def _series_of(points: np.ndarray) -> list[np.ndarray]:
+    """Split unseen points (U, n) into pairs that are solved in order: each is a depth series or a part of one."""
+    return [points[i : i + 2] for i in range(0, len(points), 2)]

@@ -1,0 +1,101 @@
+"""When to stop: a force error on unseen solves that holds twice, a limit on time, or on the number of solves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.dataset import Dataset
+from palpate.errors import UsageError
+from palpate.format import duration, share
+from palpate.surrogates import Surrogate
+from palpate.validation.unseen_solves import ForceSamples, TouchSolves
+
+__all__ = ["StopRule", "relative_errors"]
+
+
+def relative_errors(surrogate: Surrogate, unseen: Dataset | None) -> np.ndarray:
+    """Return the relative force errors (N,) of a surrogate on unseen solves that are stronger than a light touch.
+
+    Parameters
+    ----------
+    surrogate : Surrogate
+        What was learnt.
+    unseen : Dataset or None
+        Solves that it was not learnt from.
+    """
+    if unseen is None or not len(unseen.ok):
+        return np.empty(0)
+    energy = surrogate.energy
+    solves = TouchSolves.of(unseen, energy.inputs)
+    answer, inside = energy.force(solves.X), np.ones(len(solves), dtype=bool)
+    samples = ForceSamples(solves.X[:, :3], solves.force, answer, inside)
+    return np.asarray(samples.relative[samples.heavy])
+
+
+@dataclass(frozen=True)
+class StopRule:
+    """The rule that ends an improvement.
+
+    A single error below the wanted one may be luck: many surrogates are judged by the same solves, and the search for
+    each scatters. So the error must hold for two surrogates in a row, and the second is judged by all unseen solves.
+
+    Attributes
+    ----------
+    until : float
+        Wanted force error at the 95th percentile, relative.
+    limit : float
+        Time in s after which nothing more is begun.
+    most : int
+        Number of solves to learn from after which nothing more is begun.
+
+    Raises
+    ------
+    UsageError
+        For an error that is not between 0 and 1, or limits that are not positive.
+    """
+
+    until: float
+    limit: float = math.inf
+    most: int = 400
+
+    def __post_init__(self) -> None:
+        if not 0 < self.until < 1:
+            raise UsageError(
+                f"The wanted force error is {self.until}.",
+                why="It is a share of the force.",
+                fix="Give a number between 0 and 1, such as 0.02.",
+            )
+        if not self.limit >= 0 or self.most < 1:
+            raise UsageError(
+                f"The limits are {self.limit} s and {self.most} solves.", fix="Give positive numbers."
+            )
+
+    def reason(self, errors: Sequence[float], *, complete: bool, solves: int, seconds: float) -> str:
+        """Return why to stop, as a sentence; empty to go on.
+
+        Parameters
+        ----------
+        errors : sequence of float
+            Force errors of the surrogates so far, at the 95th percentile; not-a-number where none was judged.
+        complete : bool
+            Whether all unseen solves have judged the last one.
+        solves : int
+            Solves to learn from.
+        seconds : float
+            Time since the beginning.
+        """
+        if self.is_reached(errors, complete=complete):
+            return f"The force error is {share(errors[-1])} on unseen solves, {share(self.until)} were asked for."
+        if seconds >= self.limit:
+            return f"The limit of {duration(self.limit)} is over."
+        if solves >= self.most:
+            return f"The limit of {self.most} solves is reached."
+        return ""
+
+    def is_reached(self, errors: Sequence[float], *, complete: bool) -> bool:
+        """Return whether the last two surrogates keep the error, or the only one; see `reason`."""
+        return complete and bool(errors) and all(e <= self.until for e in errors[-2:])

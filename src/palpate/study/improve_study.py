@@ -1,0 +1,148 @@
+"""A study whose solves are chosen batch by batch, until a force error is reached; everything is kept in its files."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+from palpate.dataset import Dataset
+from palpate.errors import FileFormatError, UsageError
+from palpate.improvement import ImprovementStep, improve
+from palpate.processes import CASE_LIMIT
+from palpate.study.run import (
+    Log,
+    Outcome,
+    Paths,
+    learn_study,
+    load_model,
+    save_model,
+    split_rows,
+    validate_study,
+    with_validation,
+)
+from palpate.study.stage_records import ProbeSweepRecord
+from palpate.study.study import Study
+from palpate.study.study_advice import earlier_curve
+
+__all__ = ["conclude", "improve_study"]
+
+MOST = 400
+"""Solves to learn from after which no further batch begins."""
+
+
+def improve_study(
+    study: Study,
+    paths: Paths,
+    *,
+    until: float = 0.02,
+    limit: float = float("inf"),
+    most: int = MOST,
+    cluster: Any = None,
+    progress: Any = True,
+    case_limit: float = CASE_LIMIT,
+    log: Log = lambda _: None,
+) -> Iterator[ImprovementStep]:
+    """Yield each step of `palpate.improve` for a study; its solves and surrogates are kept as the study's files.
+
+    A later call goes on where this one stopped, from whatever solves the study has. The surrogate of each step stays as
+    ``NAME-SOLVES.palpate``, and the newest as ``NAME.palpate``; a step tells its file as `model_path`. All solves that
+    ``[test]`` asks for have judged the surrogate by the time its error counts as reached.
+
+    Parameters
+    ----------
+    study : Study
+        A study of a solid body under a probe.
+    paths : Paths
+        Where the files are.
+    until : float
+        Wanted relative force error at the 95th percentile of unseen solves.
+    limit : float
+        Time in s after which no further batch begins; by default none.
+    most : int
+        Solves to learn from after which no further batch begins.
+    cluster : optional
+        A running `local_cluster`, or what else `palpate.sweep` takes.
+    progress : bool or callable
+        Of each batch: a bar on standard error, or a function (done, total).
+    case_limit : float
+        Time in s after which a single solve has failed.
+    log : callable
+        Gets one line when a part of the work begins.
+
+    Raises
+    ------
+    UsageError
+        If the study's body is not pressed by a probe, or its files are of another body.
+    """
+    if not isinstance(study.sweep, ProbeSweepRecord) or study.test is None:
+        raise UsageError(
+            f"The solves of {study.name!r} can't be chosen one by one.",
+            why="That takes a solid body under a probe, whose force is learnt from each place.",
+            fix="Leave --until out; --samples asks for a number of solves.",
+        )
+    problem = study.problem()
+    wanted = study.test.arguments(problem)
+    assert wanted is not None  # a probe's test is never empty
+    finished = Dataset.open(paths.data).ok if paths.data.exists() else None
+    steps = improve(
+        problem,
+        until=until,
+        limit=limit,
+        most=most,
+        unseen=wanted["points"],
+        seed=study.sweep.seed,
+        path=paths.data,
+        unseen_path=paths.random,
+        learner=lambda data, effort: learn_study(_with_effort(study, effort), data, log=log),
+        known=_known(paths, finished),
+        workers=study.sweep.workers,
+        cluster=cluster if cluster is not None else study.sweep.scheduler,
+        progress=progress,
+        case_limit=case_limit,
+        log=log,
+    )
+    for step in steps:
+        yield replace(step, model_path=_keep(study, paths, step))
+
+
+def conclude(study: Study, paths: Paths, step: ImprovementStep) -> Outcome:
+    """Judge the surrogate of the last step by all of the study's targets, write that into its file, and return it."""
+    if step.train is None or step.test is None:
+        raise UsageError("This step has no solves yet.", fix="Conclude with the last step.")
+    train, test = split_rows(study, step.train, step.test)
+    validation = validate_study(study, step.surrogate, test, step.history)
+    model = with_validation(step.surrogate, validation, earlier_curve(paths, study.name), step.solves)
+    save_model(paths, model, step.history)
+    return Outcome(study, model, train, test, validation, step.history)
+
+
+def _with_effort(study: Study, effort: float) -> Study:
+    """Return the study with its own effort multiplied."""
+    assert study.learning is not None
+    own: float = getattr(study.learning, "effort", 1.0)
+    return study.model_copy(update={"learning": study.learning.model_copy(update={"effort": effort * own})})
+
+
+def _known(paths: Paths, train: Dataset | None) -> tuple[Any, Any] | None:
+    """Return the surrogate that was learnt from just these solves, if there is one."""
+    if train is None or not paths.model.exists():
+        return None
+    try:
+        return load_model(paths, train)
+    except (UsageError, FileFormatError):
+        return None
+
+
+def _keep(study: Study, paths: Paths, step: ImprovementStep) -> Any:
+    """Write a new surrogate with its learning curve, and return the file of the newest one."""
+    if step.is_new and step.surrogate is not None:
+        point = {"solves": step.solves, "force_median": step.median, "force_p95": step.error}
+        curve = [p for p in earlier_curve(paths, study.name) if p["solves"] != step.solves]
+        if step.unseen:
+            curve = sorted([*curve, point], key=lambda p: int(p["solves"]))
+        model = replace(step.surrogate, meta={**step.surrogate.meta, "learning_curve": curve})
+        save_model(paths, model, step.history)
+        shutil.copyfile(paths.model, paths.model.with_name(f"{study.name}-{step.solves}.palpate"))
+    return paths.model if paths.model.exists() else None

@@ -1,0 +1,96 @@
+"""A problem whose answers are a formula: a slab under a probe, harder towards one side, as a sweep asks for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from palpate.dataset import Layout, solid_fields
+from palpate.sweeps import Space, sobol
+from palpate.units import Range
+
+RADIUS, DEEPEST, SIDE = 0.010, 0.006, 0.02
+HEIGHT = 1.0e4  # J/m³
+
+
+def truth(X: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """U (N,), F (N, 3) and ∂F/∂c (N, 3, 3) of U = A s³ exp(b + 0.3 x), b a bump beside the middle of the slab."""
+    x, y, s = X[:, 0] / SIDE - 0.4, X[:, 1] / SIDE, RADIUS - X[:, 2]
+    b = 0.8 * np.exp(-3.0 * (x**2 + y**2))
+    U = HEIGHT * s**3 * np.exp(b + 0.3 * (x + 0.4))
+    g = np.stack([(0.3 - 6.0 * x * b) / SIDE, -6.0 * y * b / SIDE, -3.0 / s], axis=1)
+    H = np.zeros((len(X), 3, 3))
+    H[:, 0, 0], H[:, 1, 1] = b * (36.0 * x**2 - 6.0) / SIDE**2, b * (36.0 * y**2 - 6.0) / SIDE**2
+    H[:, 0, 1] = H[:, 1, 0] = 36.0 * x * y * b / SIDE**2
+    H[:, 2, 2] = -3.0 / s**2
+    return U, -U[:, None] * g, -U[:, None, None] * (g[:, :, None] * g[:, None] + H)
+
+
+@dataclass(frozen=True)
+class PressedSlab:
+    """The slab and its probe; `failing` solves nothing beyond x = failing."""
+
+    failing: float = np.inf
+
+    @property
+    def ranges(self) -> tuple[Range, ...]:
+        return (
+            Range("c_x", -SIDE, SIDE, "m"),
+            Range("c_y", -SIDE, SIDE, "m"),
+            Range("c_z", RADIUS - DEEPEST, RADIUS, "m"),
+        )
+
+    @property
+    def layout(self) -> Layout:
+        corners = 0.06 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+        return Layout(
+            corners,
+            triangles=np.array([[0, 1, 2], [0, 2, 3]]),
+            surfaces=("top",),
+            surface_of=np.zeros(2, dtype=int),
+        )
+
+    @property
+    def schema(self) -> Any:
+        return solid_fields(4, self.ranges)
+
+    def describe(self) -> dict[str, Any]:
+        probe = {"type": "SphereProbe", "radius": RADIUS, "touches": "top", "depth": [0.0, DEEPEST]}
+        return {"body": {"material": {}}, "interactions": [probe], "failing": str(self.failing)}
+
+    def open(self) -> _Solver:
+        return _Solver(self)
+
+    def design(self, samples: int, seed: int = 0, *, depths: int = 1) -> np.ndarray:
+        number = -(-samples // depths)
+        points = sobol(Space(self.ranges), number, seed)
+        shift = (RADIUS - points[:, 2]) / DEEPEST
+        depth = DEEPEST * (np.arange(depths) + np.clip(shift, 0.02, 1.0)[:, None]) / depths
+        series = np.repeat(points[:, None], depths, axis=1)
+        series[:, :, 2] = RADIUS - depth
+        return series.reshape(-1, 3)[:samples]
+
+
+@dataclass(frozen=True)
+class _Solver:
+    problem: PressedSlab
+
+    def solve(self, x: np.ndarray) -> Any:
+        U, F, K = truth(x[None])
+        converged = bool(x[0] <= self.problem.failing)
+        return SimpleNamespace(
+            converged=converged,
+            message="converged" if converged else "beyond",
+            iterations=1,
+            residual=0.0,
+            displacement=np.zeros((4, 3)),
+            potential_energy=float(U[0]),
+            strain_energy=float(U[0]),
+            response=F[0],
+            response_gradient=K[0],
+            penetration=0.0,
+            least_volume_ratio=1.0,
+        )

@@ -1,8 +1,9 @@
 """The real-time process: ``python -m palpate.runtime MODEL --state NAME --device page``.
 
 Started by `LoopProcess`, which holds this process's standard input: its end of file means that the parent is
-gone, whatever the operating system and however it went. Standard output carries two lines of JSON, one when
-the loop is about to run and one when it has.
+gone, whatever the operating system and however it went. On it come the surrogates that shall take the place of the one
+in the hand (`swap_desk`), a line of JSON each. Standard output carries lines of JSON: one when the loop is about to
+run, one for each such wish, and one when the loop has run.
 """
 
 from __future__ import annotations
@@ -18,12 +19,14 @@ from collections.abc import Callable, Sequence
 from palpate.errors import PalpateError
 from palpate.network.kinds import import_when_needed
 from palpate.runtime.devices import device_named
-from palpate.runtime.loop import Loop, rehearsal
+from palpate.runtime.loop import Loop
 from palpate.runtime.realtime import obtain
 from palpate.runtime.recording import Ring, TickRecorder
+from palpate.runtime.rehearsal import Rehearsal
 from palpate.runtime.replay import is_recorded_model, loop_facts, play
 from palpate.runtime.safety import Limits
 from palpate.runtime.shared_state import Shared
+from palpate.runtime.swap_desk import SwapDesk
 from palpate.runtime.touchable import load_touchable
 from palpate.runtime.trace_file import read_trace
 
@@ -71,7 +74,8 @@ def _parser() -> argparse.ArgumentParser:
 def _run(options: argparse.Namespace) -> int:
     shared = Shared.attach(options.state)
     shared.unlink()  # both sides have it: from here on no kind of death can leave it behind
-    orphaned = _watch_parent()
+    desk = SwapDesk(_say)
+    orphaned = _watch_parent(desk.ask)
     import_when_needed(options.module)
     model = load_touchable(options.model)
     if options.replay:
@@ -107,20 +111,26 @@ def _run(options: argparse.Namespace) -> int:
         recorder.ring.describe(loop_facts(model, loop, limits))
         recorder.begin(loop)
     _say({"obtained": obtain()})
-    loop.run(rehearsal(model, workspace, limits, options.rate))
+    rehearsal = Rehearsal(model, workspace, limits, options.rate)
+    desk.serve(model, loop, limits, rehearsal)
+    loop.run(rehearsal)
     foreign = [name for name in FOREIGN if sys.modules.get(name)]
     note = str(getattr(device, "note", ""))
     _say({"foreign": foreign, "device_error": loop.device_error, "device_note": note})
     return 0
 
 
-def _watch_parent() -> Callable[[], bool]:
+def _watch_parent(hear: Callable[[str], None]) -> Callable[[], bool]:
+    """Hear each line of the standard input, until it ends; return whether it has."""
     gone = threading.Event()
 
     def wait() -> None:
+        rest = b""
         try:
-            while os.read(0, 4096):
-                pass
+            while data := os.read(0, 4096):
+                *lines, rest = (rest + data).split(b"\n")
+                for line in lines:
+                    hear(line.decode())
         except OSError:
             pass
         gone.set()

@@ -112,6 +112,20 @@ class Coupling:
         self._rested = True
         self.force[:] = 0.0
 
+    def take_up(self, hand: np.ndarray, force: np.ndarray) -> None:
+        """Put a spring in front of a body that was touched without one: it pulls as the body did.
+
+        Parameters
+        ----------
+        hand : (3,)
+            x, m.
+        force : (3,)
+            Of the body on the hand there, N.
+        """
+        self._rested = not force.any()
+        self.force[:] = force
+        self.proxy[:] = hand + force / self.stiffness
+
     def follow(self, hand: np.ndarray, force: np.ndarray, tangent: np.ndarray) -> None:
         """Move the proxy by one Newton step; the first after `reset` leads to the hand.
 

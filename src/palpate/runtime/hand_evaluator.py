@@ -24,9 +24,10 @@ from typing import Any, Protocol
 import numpy as np
 from numba import njit
 
+from palpate.surrogates.memories import Carry
 from palpate.surrogates.moving_rest import MovingRest
 
-__all__ = ["Elastic", "HandEvaluator"]
+__all__ = ["Elastic", "HandEvaluator", "stiffness_along"]
 
 # slope of d: 1 for a distance, measured 1.0004 at most where five bodies are pressed; behind flat ones it is 6 at s = 0
 _STEEP = 1.2
@@ -54,6 +55,11 @@ class Elastic(Protocol):
     inside: bool
 
     slope: np.ndarray
+
+    @property
+    def energy(self) -> float:
+        """Energy, J."""
+        ...
 
     @property
     def amplitude(self) -> float:
@@ -162,7 +168,7 @@ class HandEvaluator:
         self.inside, self.let_go = True, False
         self.waiting, self.rest_zone = False, 0.0
         self.depth, self.stiffness, self.elapsed = -math.inf, 0.0, 0.0
-        _along(elastic.force, elastic.stiffness)  # compile now, not in the loop
+        stiffness_along(elastic.force, elastic.stiffness)  # compile now, not in the loop
         _behind(self._normal, self._normal)
         _project(self._place, self._onto, self._place.copy())
 
@@ -215,9 +221,34 @@ class HandEvaluator:
         return self._elastic.stiffness  # type: ignore[no-any-return]
 
     @property
+    def stored(self) -> float:
+        """Energy, J, that the body holds at the last call: the most that it can give back."""
+        if self._memory is not None:
+            return float(self._memory.stored)
+        return 0.0 if self.let_go or self.waiting else float(self._elastic.energy)
+
+    @property
     def grew(self) -> bool:
         """True where the last call made an indentation grow."""
         return self._indentation is not None and self._indentation.lost_in_step > 0.0
+
+    def take_over(self, other: HandEvaluator, carry: Carry | None = None) -> None:
+        """Go on where the evaluator of another surrogate of the same body is: in the same hand, and with its memory.
+
+        Parameters
+        ----------
+        other : HandEvaluator
+            Which answered until now.
+        carry : callable, optional
+            Hands its memory on, see `palpate.surrogates.memories.Memory.carry_from`.
+        """
+        self.let_go, self.waiting, self.rest_zone = other.let_go, other.waiting, other.rest_zone
+        self._held, self._taken = other._held, other._taken.copy()
+        self._grip[:] = other._grip
+        if carry is not None:
+            carry(other._memory, self._memory)
+        if self._stays is not None:
+            self._stays.lies[:] = other._stays.lies
 
     def __call__(self, position: np.ndarray, parameters: np.ndarray) -> None:
         """Renew the attributes for a probe or a held place at `position` (3,), m, and the further inputs (p,)."""
@@ -247,7 +278,7 @@ class HandEvaluator:
         self.inside = elastic.inside and not self.let_go
         untouched = self.let_go or (self.waiting and not self._holds)
         self.depth = 0.0 if untouched else elastic.depth
-        self.stiffness = _along(elastic.force, elastic.stiffness)
+        self.stiffness = stiffness_along(elastic.force, elastic.stiffness)
         if not good:
             self.force[:] = math.nan  # the loop makes a fault of it
 
@@ -288,7 +319,8 @@ def _project(position, onto, place) -> None:  # type: ignore[no-untyped-def]  # 
 
 
 @_jit
-def _along(force, stiffness) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def stiffness_along(force, stiffness) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """−F·(∂F/∂x)F/‖F‖², N/m, of a force (3,), N, and ∂F/∂x (3, 3), N/m; 0 without a force."""
     size, total = 0.0, 0.0
     for i in range(3):
         size += force[i] * force[i]

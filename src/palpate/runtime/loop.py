@@ -30,21 +30,22 @@ from typing import Protocol
 import numpy as np
 
 from palpate.errors import DeviceLostError, DeviceStopError, UsageError
+from palpate.runtime.blending import Blend
 from palpate.runtime.coupling import STEPS, Coupling
 from palpate.runtime.devices import Device
-from palpate.runtime.devices.page import PageDevice
 from palpate.runtime.hand_evaluator import HandEvaluator
 from palpate.runtime.passivity import PassivityController, largest_damping
 from palpate.runtime.publisher import Publisher
 from palpate.runtime.realtime import Metronome, Rest
 from palpate.runtime.recording import TickRecorder
 from palpate.runtime.safety import HARDWARE_PATIENCE, Fault, Limits, PlaceCheck, Safety, Stop, stalled
-from palpate.runtime.shared_state import MAX_INPUTS, MAX_PLACES, Shared, now
+from palpate.runtime.shared_state import MAX_INPUTS, MAX_PLACES, Shared
 from palpate.runtime.stability import FeltStiffness
+from palpate.runtime.swap import Swap
 from palpate.runtime.workspace import HandFrame, Workspace
 from palpate.units import Range
 
-__all__ = ["EDGE", "Loop", "Model", "rehearsal"]
+__all__ = ["EDGE", "Loop", "Model"]
 
 _PAUSE = 0.05  # s between two ticks of a page or script from which on the clock jumped; hardware bears less
 _AHEAD = (
@@ -99,6 +100,11 @@ class Loop:
     recorder : TickRecorder, optional
         Takes down each tick while a recording is wanted.
 
+    Attributes
+    ----------
+    swap : Swap, optional
+        To be set where another surrogate shall take the place of the one in the hand; None again at its end.
+
     Raises
     ------
     UsageError
@@ -126,7 +132,8 @@ class Loop:
             raise UsageError(
                 f"The loop can't run at {rate:g} Hz.", fix="Choose 10 … 10000 Hz; 1000 is usual."
             )
-        self.evaluator, self.workspace, self.recorder = model.evaluator(), workspace, recorder
+        self.evaluator: HandEvaluator | Blend = model.evaluator()
+        self.workspace, self.recorder = workspace, recorder
         self.device = device if recorder is None else recorder.watch(device)
         if max(len(self.evaluator.loads), len(model.parameters)) > MAX_INPUTS:
             raise UsageError(
@@ -144,6 +151,7 @@ class Loop:
         self.safety = Safety(limits, self.period, self.out.force)
         self.out.describe(workspace, limits)
         self.motors = device.traits.damping is not None
+        self.swap: Swap | None = None
         self._prepare_safety(dead_man)
         self._prepare(limits, rate, stiffness, override, control)
         self.parameters = np.array([(r.low + r.high) / 2.0 for r in model.parameters])
@@ -209,6 +217,17 @@ class Loop:
         self.passivity.delay = delay
         if self.controlled:
             self.passivity.max_damping = largest_damping(traits.mass, self.bounds.rate, delay=delay)
+        self._take_spring()
+
+    def take_stiffness(self, stiffness: float) -> None:
+        """Take over the largest stiffness of a body whose surrogate is being replaced, N/m in its own metres."""
+        touched = not self.coupling.active
+        self.bounds = replace(self.bounds, body=self.workspace.felt(stiffness))
+        self._take_spring()
+        if touched and self.coupling.active:
+            self.coupling.take_up(self.out.position, self.wanted)
+
+    def _take_spring(self) -> None:
         self._spring = self.bounds.coupling / self.workspace.scale
         self.coupling.change(self._spring)
         self.out.stiffness(self.bounds)
@@ -219,7 +238,7 @@ class Loop:
         Parameters
         ----------
         rehearse : callable
-            Called before each tick while there is time; see `palpate.runtime.loop`.
+            Called before each tick while there is time; see `palpate.runtime.rehearsal`.
         """
         metronome = Metronome(self.period, jump=self.longest)
         gc.collect()
@@ -266,6 +285,8 @@ class Loop:
             self.fail(Fault.CLOCK_JUMP)
         elif self._orphaned():
             self.fail(Fault.PARENT_GONE)
+        if self.swap is not None:
+            self.swap.step(self)
         for stage in self.stages:
             stage()
         stopped = self.fault is Fault.NONE and self.stop.stopped
@@ -474,17 +495,3 @@ class Loop:
                 last()
             except Exception as error:  # noqa: BLE001 - as for `read`
                 self.device_failed(error)
-
-
-def rehearsal(model: Model, workspace: Workspace, limits: Limits, rate: float) -> Callable[[], None]:
-    """Return a function that performs one dry tick, without any effect outside itself.
-
-    Called just before the real tick, it brings code and data into the caches. Between two ticks the processor sleeps
-    or does other people's work, and a tick that takes 15 µs when repeated takes 70 µs after a millisecond of that. The
-    metronome spins for the last 200 µs anyway; one tick of a second loop, on a page device that nobody drags and in
-    memory that nobody reads, spends part of that time and halves the delay between the hand and the force.
-    """
-    stage = Shared.private()
-    stage.write_command(beat=math.inf, grabbed=True, target=(0.0, -0.1 * workspace.radius, 0.0))
-    double = Loop(model, PageDevice(stage.command), stage, workspace, limits, rate=rate)
-    return lambda: double.tick(now())

@@ -22,6 +22,9 @@ leaks at most ½ K |Δx|², one that is also d late at most K (½ + d/T) |Δx|²
 the bound of `stability.passive_stiffness`, device and loop together never give energy. The controller is for all that
 this sum doesn't know of: limits, faults, an outdated stiffness, an override.
 
+**A body that gains energy by itself**, because another surrogate of it takes its place (`swap`), lowers the bound by
+that energy, and no further: `PassivityController.added` counts the gains.
+
 **Credit ends with the contact.** Energy that a body has swallowed is no licence to give it back later: outside a body,
 and when the force is let go, E > 0 becomes 0. A debt stays.
 
@@ -104,6 +107,8 @@ class PassivityController:
         The latest forces, N, and the energy that the damping in each will take, J; a ring.
     delay : float
         From the device's sample to its force, s; may change at any tick.
+    added : float
+        Energy that the body has gained by no work of the hand, in all, J; see `book`.
     """
 
     def __init__(self, period: float, *, max_force: float, max_damping: float) -> None:
@@ -113,11 +118,19 @@ class PassivityController:
                 fix="Give a positive tick and force and no negative damping.",
             )
         self.period, self.max_force, self.max_damping = period, max_force, max_damping
-        self.delay = 0.0
+        self.delay, self.added = 0.0, 0.0
         self.state, self.sent = np.zeros(_SIZE), np.zeros((_RING, 4))
         self.ledger = self.state[:LEDGER]
         self.apply(np.zeros(3), np.zeros(3), period)  # compile now, not in the loop
         self.state[:] = 0.0
+
+    def book(self, gain: float) -> None:
+        """Count energy (J) that the body has gained by no work of the hand, as while two surrogates are blended.
+
+        The ledger itself stays what went through the hand: a gain shows there as the debt of a hand that gets it, and
+        is damped. What the body has lost licenses no gain.
+        """
+        self.added += max(gain, 0.0)
 
     @property
     def energy(self) -> float:

@@ -8,14 +8,18 @@ from __future__ import annotations
 
 import json
 import os
+import queue
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Sequence
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, TypeVar
 
+from palpate import errors
 from palpate.errors import DeviceError, UsageError
 from palpate.network.kinds import outside_modules
 from palpate.processes import helper_environment
@@ -24,6 +28,7 @@ from palpate.runtime.loop_report import LoopReport
 from palpate.runtime.recorder import TraceRecorder, model_facts
 from palpate.runtime.recording import Ring
 from palpate.runtime.shared_state import Shared, State, now
+from palpate.runtime.swap import SECONDS, SHORTEST
 
 __all__ = ["LoopProcess"]
 
@@ -31,6 +36,7 @@ T = TypeVar("T")
 
 _START = 60.0  # s: the first start on a machine compiles the kernels
 _STOP = 2.0  # s
+_SWAP = 60.0  # s until a surrogate is in the hand: its reading, and a blend before it
 
 
 class LoopProcess:
@@ -107,7 +113,7 @@ class LoopProcess:
             self._arguments.append("--dead-man")
         if replay is not None:
             self._arguments.append(f"--replay={os.fspath(replay)}")
-        self._model, self._record = model, record
+        self._model, self._record, self._replayed = model, record, replay is not None
         self._ring: Ring | None = None
         self.recording: TraceRecorder | None = None
         self._parameters = parameters
@@ -116,6 +122,9 @@ class LoopProcess:
         self._errors = ""
         self._last: State | None = None
         self._said: dict[str, Any] = {}
+        self._listener: threading.Thread | None = None
+        self._swapping, self._wishes = threading.Lock(), 0
+        self._answers: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
 
     def start(self) -> Self:
         """Start the process and wait for its first ticks.
@@ -136,6 +145,8 @@ class LoopProcess:
             if self._record is not None:
                 self.recording = self._recorder(self._record)
             self._process = self._popen()
+            self._listener = threading.Thread(target=self._listen, args=(self._process,), daemon=True)
+            self._listener.start()
             self._await_first_tick()
         except BaseException:
             self.stop()
@@ -146,6 +157,81 @@ class LoopProcess:
         if self.recording is not None:
             self.recording.start()
         return self
+
+    def swap(self, model: str | os.PathLike[str], *, seconds: float = SECONDS) -> int:
+        """Put another surrogate of the touched body in the place of the one in the hand, while the loop ticks.
+
+        It is read and made ready beside the loop. Then the two are blended, so that the force has no jump; what the
+        body remembers of its touch is handed on, and what the blend adds to its energy is booked. The workspace stays.
+        Returns as the blend begins; another call waits until it has ended.
+
+        Parameters
+        ----------
+        model : path
+            File of the new surrogate.
+        seconds : float
+            Time of the blend, s, at least 0.1.
+
+        Returns
+        -------
+        int
+            Number of the tick with which the blend began.
+
+        Raises
+        ------
+        UsageError, FileFormatError
+            If the file is missing or damaged, or of a body that can't take the place: the old one stays in the hand.
+        DeviceError
+            If the process ends, or the blend has not begun within a minute.
+        """
+        if not SHORTEST <= seconds < float("inf"):
+            raise UsageError(
+                f"Two surrogates can't be blended in {seconds:g} s.",
+                why="A faster change would be felt as a jump.",
+                fix=f"Give at least {SHORTEST:g} s.",
+            )
+        if self._replayed:
+            raise UsageError(
+                "A recorded touch is replayed: its surrogates are those that were recorded.",
+                fix="Start the loop without a replay.",
+            )
+        with self._swapping:
+            self._wishes += 1
+            wish = {"swap": self._wishes, "model": str(Path(model).absolute()), "seconds": seconds}
+            self._write(json.dumps(wish) + "\n")
+            answer = self._answer_to(self._wishes)
+        if refused := answer.get("refused"):
+            kind = getattr(errors, refused["kind"], UsageError)
+            raise kind(refused["what"], why=refused["why"], fix=refused["fix"])
+        return int(answer["begun"])
+
+    def _write(self, line: str) -> None:
+        pipe = self._running.stdin
+        try:
+            assert pipe is not None
+            pipe.write(line)
+            pipe.flush()
+        except (OSError, ValueError) as error:
+            raise self._failure("The real-time process has ended.") from error
+
+    def _answer_to(self, number: int) -> dict[str, Any]:
+        until = now() + _SWAP
+        while now() < until:
+            try:
+                answer = self._answers.get(timeout=0.1)
+            except queue.Empty:
+                if not self.alive:
+                    raise self._failure(
+                        "The real-time process ended while it read another surrogate."
+                    ) from None
+                continue
+            if answer["swap"] == number:
+                return answer
+        raise DeviceError(
+            f"The new surrogate was not in the hand within {_SWAP:.0f} s.",
+            why="A blend before it is slow, as the hand presses where it would add energy, or the machine is busy.",
+            fix="Take the hand out of the body; the new surrogate follows then.",
+        )
 
     def start_recording(self, path: str | os.PathLike[str]) -> TraceRecorder:
         """Record every tick from now on into a new file, until `stop_recording` or `stop`.
@@ -255,9 +341,11 @@ class LoopProcess:
         if process is not None and process.stdin is not None and not process.stdin.closed:
             self.shared.write_command(quit=True)
             self._end(process)
-            self._listen(process)
+            if self._listener is not None:
+                self._listener.join()
+            process.stdin.close()
         if self.recording is not None:
-            self.recording.stop(lambda: {"report": self.report().as_dict()})
+            self.recording.stop(lambda: {"report": self.report().as_dict()} if self._state().tick else {})
         if self._shared is not None and self._last is None:
             self._last = self._state()
             self._errors = self._complaint()
@@ -277,15 +365,27 @@ class LoopProcess:
         process.wait()
 
     def _listen(self, process: subprocess.Popen[str]) -> None:
+        """Take what the process says, until it ends."""
         assert process.stdout is not None
-        assert process.stdin is not None
         for line in process.stdout:
             try:
-                self._said |= json.loads(line)
+                said = json.loads(line)
             except ValueError:
                 continue  # cut off by a kill
+            if "swap" not in said:
+                self._said |= said
+                continue
+            if "begun" in said:
+                self._swapped(said)
+            self._answers.put(said)
         process.stdout.close()
-        process.stdin.close()
+
+    def _swapped(self, said: dict[str, Any]) -> None:
+        """Note that another surrogate has begun to take the place of the one in the hand."""
+        self._model = said["model"]["path"]
+        if self.recording is not None and self.recording.active:
+            facts = {key: said[key] for key in ("model", "seconds")}
+            self.recording.add_event("swap", loop_tick=said["begun"], **facts)
 
     def _state(self) -> State:
         if self._last is not None:

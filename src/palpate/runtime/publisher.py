@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from palpate.runtime.blending import Blend
 from palpate.runtime.hand_evaluator import HandEvaluator
 from palpate.runtime.loop_report import Histogram
 from palpate.runtime.passivity import PassivityController
@@ -73,7 +74,7 @@ class Publisher:
         """Take over whether a hand holds the body, and whether its input is too old."""
         self._grabbed[()], self._stalled[()] = holding, late
 
-    def answer(self, answer: HandEvaluator) -> None:
+    def answer(self, answer: HandEvaluator | Blend) -> None:
         """Take over the learnt body's answer, and publish its indentations where one has grown."""
         self._contact[:] = answer.contact
         self._loads[:] = answer.loads
@@ -106,6 +107,21 @@ class Publisher:
     def passivity(self, controller: PassivityController) -> None:
         """Take over the energy ledger and the damping that it asked for."""
         self._ledger[:] = controller.ledger
+
+    def begin_blend(self) -> int:
+        """Say that another surrogate takes over with the tick that begins now; return its number."""
+        self.record["blending"] = True
+        return self._count + 1
+
+    def blended(self, added: float) -> None:
+        """Take over the energy that blending has given the body, in all, J."""
+        self.record["added"] = added
+
+    def end_blend(self) -> int:
+        """Say that it alone answers from the tick that begins now; return its number."""
+        self.record["blending"] = False
+        self.record["swaps"] += 1
+        return self._count + 1
 
     def tick(self, now: float, lateness: float, fault: Fault, *, resting: bool = False) -> None:
         """Close the tick that began at `now` (s), `lateness` (s) behind its schedule, and publish it.

@@ -15,6 +15,7 @@ fails it: on a machine that grants none of it the lateness histogram says so.
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import math
 import os
@@ -24,7 +25,7 @@ from collections.abc import Callable
 
 from palpate.runtime.shared_state import now
 
-__all__ = ["SLOW", "Metronome", "Rest", "obtain"]
+__all__ = ["SLOW", "Metronome", "Rest", "obtain", "obtain_beside"]
 
 SLOW = 8e-3  # s between two beats where nobody touches
 _CLEAR, _BEATS = 0.010, 4.0  # m from the body, and slow beats away from it at its speed: a hand at rest
@@ -154,6 +155,16 @@ def obtain() -> dict[str, str]:
         Under ``scheduler``, ``timer slack`` and ``memory`` what was granted, in words.
     """
     return {"scheduler": _scheduler(), "timer slack": _timer_slack(), "memory": _memory()}
+
+
+def obtain_beside() -> None:
+    """Ask for real-time scheduling one step below the loop's for the calling thread, which shares its interpreter.
+
+    A thread that holds the interpreter while other programs keep it from running would keep the loop from running, too.
+    """
+    if sys.platform == "linux" and (os.cpu_count() or 1) > 1:
+        with contextlib.suppress(OSError):
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_FIFO_PRIORITY - 1))
 
 
 def _scheduler() -> str:

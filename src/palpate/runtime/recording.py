@@ -52,6 +52,7 @@ FLAGS = (
     "waiting",  # no force until the hand is where the body holds no energy
     "stopped",  # no force until a person resumes
     "released",  # no force until the dead-man button is held
+    "blending",  # another surrogate takes the place of the one in the hand
 )
 """Bits of a tick's flags, the lowest first: append, never reorder."""
 
@@ -175,7 +176,11 @@ class Ring:
 
     def describe(self, facts: Mapping[str, Any]) -> None:
         """Leave for the reader what the loop says of itself, as JSON."""
-        text = json.dumps(facts, allow_nan=False).encode()[:_FACTS]
+        self.describe_encoded(json.dumps(facts, allow_nan=False).encode())
+
+    def describe_encoded(self, text: bytes) -> None:
+        """Leave the same, already as JSON: it takes next to no time."""
+        text = text[:_FACTS]
         self._facts[: len(text)] = text
         self._sizes[0] = len(text)
 
@@ -315,9 +320,14 @@ class TickRecorder:
         return self._device  # type: ignore[no-any-return]
 
     def begin(self, loop: Loop) -> None:
-        """Begin or end a recording with the next tick, where the reader has asked for it."""
+        """Begin or end a recording with the next tick, where the reader has asked for it.
+
+        None begins while two surrogates are blended: a replay finds one in the hand.
+        """
         ring = self.ring
         asked = int(ring.asked)
+        if asked and loop.swap is not None:
+            return
         if asked != int(ring.begun):
             if asked:
                 ring.keep(snapshot(loop))

@@ -11,8 +11,9 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -26,7 +27,8 @@ from palpate.runtime.recording import FLAGS, Ring, TickRecorder
 from palpate.runtime.safety import Fault, Limits
 from palpate.runtime.shared_state import Shared, now
 from palpate.runtime.snapshot import restore
-from palpate.runtime.touchable import Touchable
+from palpate.runtime.swap import Swap, swap_between
+from palpate.runtime.touchable import Touchable, load_touchable
 from palpate.runtime.trace_file import Trace, TraceWriter
 from palpate.runtime.workspace import Workspace
 
@@ -148,10 +150,14 @@ class Replay:
     shared : Shared, optional
         Where the ticks are published; by default nobody sees them. Commands of others are not heard.
     same : bool
-        Whether it is the recorded body: its state is put back then.
+        Whether it is the recorded body: its state is put back then, and the surrogates that took its place in the
+        recording do so again.
     own_workspace : bool
         Whether another body lies in the hand as it would by itself; by default it lies as the recorded one did, so
         that the same motion reaches the same places.
+    successor : callable, optional
+        Returns the surrogate that took over, of an event of the trace, or None where there is none; by default it is
+        read from its recorded file, where that was or beside the trace.
 
     Attributes
     ----------
@@ -176,6 +182,7 @@ class Replay:
         *,
         same: bool = True,
         own_workspace: bool = False,
+        successor: Callable[[Mapping[str, Any]], Touchable | None] | None = None,
     ) -> None:
         if not len(trace):
             raise UsageError(f"{trace.path.name} holds no tick.", why=" ".join(trace.notes))
@@ -214,12 +221,36 @@ class Replay:
         )
         if same and trace.state is not None:
             restore(self.loop, trace.state)
+        self._swaps: list[tuple[int, Swap]] = []
+        self._missing: list[str] = []
+        if same:
+            self._prepare_swaps(successor or (lambda event: _recorded_successor(trace, event)))
         self._columns = _columns(header["parameters"], model)
         self._set = np.full(len(model.parameters), np.nan)
+
+    def _prepare_swaps(self, successor: Callable[[Mapping[str, Any]], Touchable | None]) -> None:
+        """Make the swaps that were recorded; where a surrogate is missing, it and those after it are left out."""
+        body, first = self.model, int(self.trace.ticks["tick"][0])
+        for event in self.trace.events:
+            if event.get("kind") != "swap" or int(event.get("loop_tick", 0)) < first:
+                continue
+            new = None if self._missing else successor(event)
+            if new is None:
+                name = event.get("model", {}).get("file", "another surrogate")
+                self._missing.append(
+                    f"{name} answers from tick {event.get('loop_tick')} on, and is not there"
+                )
+                continue
+            stiffness = new.stiffness_max if self.loop.motors else 0.0
+            swap = swap_between(body, new, seconds=float(event["seconds"]), stiffness=stiffness)
+            self._swaps.append((int(event["loop_tick"]), swap))
+            body = new
 
     def tick(self, k: int) -> None:
         """Pass through tick `k` of the trace."""
         row = self.device.row = self.trace.ticks[k]
+        if self._swaps and self.loop.swap is None and int(row["tick"]) >= self._swaps[0][0]:
+            self.loop.swap = self._swaps.pop(0)[1]
         for i, j in self._columns:
             self._set[i] = row["parameters"][j]
         known = self._commands.command.record["parameters"][: self._set.size]
@@ -239,7 +270,7 @@ class Replay:
             self.tick(k)
             ticks[k] = self._recorder.record
         ticks["tick"] = self.trace.ticks["tick"]  # the replay counts its own
-        return Replayed(self.trace, ticks, self.model.name, self.same)
+        return Replayed(self.trace, ticks, self.model.name, self.same, tuple(self._missing))
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,12 +287,15 @@ class Replayed:
         Of the body that answered in the replay.
     same : bool
         Whether it is the recorded one.
+    missing : tuple of str
+        Surrogates, in words, that took over in the recording and did not in the replay.
     """
 
     trace: Trace
     ticks: np.ndarray
     name: str
     same: bool = True
+    missing: tuple[str, ...] = ()
 
     @property
     def differing(self) -> np.ndarray:
@@ -294,8 +328,7 @@ class Replayed:
             for name in here
             if header.get(name) not in {None, here[name]}
         ]
-        swaps = [event for event in self.trace.events if event.get("kind") == "swap"]
-        causes += [f"another surrogate answers from tick {event.get('tick')} on" for event in swaps]
+        causes += self.missing
         if self.trace.lost:
             causes.append(f"the recording is without {self.trace.lost} ticks")
         if self.trace.state is None:
@@ -414,6 +447,15 @@ def _require_loop(trace: Trace, model: Touchable) -> None:
             why=f"The recorded body was {how}, this one is {'held' if model.holds else 'pressed'}.",
             fix="Take a model of the same kind.",
         )
+
+
+def _recorded_successor(trace: Trace, event: Mapping[str, Any]) -> Touchable | None:
+    """Return the surrogate that took over, from its file, by its checksum; None where that is not there."""
+    known = event.get("model", {})
+    for place in (Path(known.get("path", "")), trace.path.parent / known.get("file", "")):
+        if place.is_file() and model_facts(place)["sha256"] == known.get("sha256"):
+            return load_touchable(place)
+    return None
 
 
 def _axes(rows: Any) -> Any:

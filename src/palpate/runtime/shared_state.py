@@ -93,6 +93,9 @@ STATE = np.dtype(
             "f8",
         ),  # N/m in hand metres, of the spring in front of a body that is too stiff; inf: none
         ("unsoftened", "u1"),  # the body shall feel as stiff as it is
+        ("blending", "u1"),  # another surrogate takes the place of the one in the hand
+        ("swaps", "i8"),  # surrogates that have taken another one's place
+        ("added", "f8"),  # J, that blending has given the body, in all
         ("histogram", "i8", BINS),  # lateness, `Histogram` bins
         ("work_histogram", "i8", BINS),
     ],
@@ -174,6 +177,9 @@ class State:
     nominal_rate: float
     coupling: float
     unsoftened: bool
+    blending: bool
+    swaps: int
+    added: float
     histogram: np.ndarray
     work_histogram: np.ndarray
     indentation: np.ndarray  # (n,) √J, of the indentation at each place; empty where nothing has yielded

@@ -28,6 +28,7 @@ _OUTSIDE = {
     "device",  # its samples are recorded
     "recorder",
     "stages",
+    "swap",  # no recording begins while one is under way
     "_wished",  # views of the command block
     "_quit",
     "_stops",
@@ -36,6 +37,7 @@ _OUTSIDE = {
     "_constants",
     "_posterior",
 }
+_LATER = {"passivity.added"}  # what older recordings do not have: it begins as in a new loop
 _NUMBERS = (bool, int, float, np.number, type(None))
 
 _Entry = tuple[str, Any, Callable[[Any], None]]
@@ -64,7 +66,7 @@ def restore(loop: Loop, values: Mapping[str, Any]) -> None:
     if "bounds.delay" in values:
         loop.take_delay(float(values["bounds.delay"]))
     for path, now, put in list(_entries(loop)):
-        if path != "bounds.delay":
+        if path != "bounds.delay" and not (path in _LATER and path not in values):
             _put(path, now, put, values.get(path))
 
 

@@ -31,10 +31,11 @@ from palpate.errors import DeviceError
 from palpate.processes import helper_environment
 from palpate.runtime.devices import device_named, device_traits
 from palpate.runtime.hand_evaluator import HandEvaluator
-from palpate.runtime.loop import Loop, rehearsal
+from palpate.runtime.loop import Loop
 from palpate.runtime.loop_report import LoopReport
 from palpate.runtime.machine import Check
 from palpate.runtime.realtime import Metronome, obtain
+from palpate.runtime.rehearsal import Rehearsal
 from palpate.runtime.safety import HARDWARE_PATIENCE, Limits
 from palpate.runtime.shared_state import Shared, now
 from palpate.runtime.workspace import Workspace
@@ -92,7 +93,7 @@ def measure_timing(
     traits = device_traits(device)
     limits, workspace = Limits(traits.max_force, 0.0), Workspace(traits.radius, 1.0)
     loop = Loop(model, device_named(device, shared.command), shared, workspace, limits, rate=rate)
-    rehearse = rehearsal(model, workspace, limits, rate)
+    rehearse = Rehearsal(model, workspace, limits, rate)
     rehearse()  # the first use of everything is no tick of the test
     metronome = Metronome(1.0 / rate, clock=clock, sleep=sleep)
     gc.collect()

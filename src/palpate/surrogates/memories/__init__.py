@@ -9,12 +9,20 @@ patches         places of the touched surface
 
 from palpate.surrogates.memories.indentation import Indentation, IndentationState
 from palpate.surrogates.memories.iwan_elements import IwanElements, IwanMemento, IwanState
-from palpate.surrogates.memories.memory import Amplitude, Memory, MemoryState, amplitudes, register_memory
+from palpate.surrogates.memories.memory import (
+    Amplitude,
+    Carry,
+    Memory,
+    MemoryState,
+    amplitudes,
+    register_memory,
+)
 from palpate.surrogates.memories.patches import Patches
 from palpate.surrogates.memories.relaxation import Course, Relaxation, RelaxationState, course
 
 __all__ = [
     "Amplitude",
+    "Carry",
     "Course",
     "Indentation",
     "IndentationState",

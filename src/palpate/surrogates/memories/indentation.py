@@ -27,7 +27,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numba import njit
@@ -35,8 +35,8 @@ from numba import njit
 from palpate.checks import own_arrays
 from palpate.errors import UsageError
 from palpate.format import share
-from palpate.surrogates.memories.memory import Memory, MemoryState, register_memory
-from palpate.surrogates.memories.patches import Patches
+from palpate.surrogates.memories.memory import Carry, Memory, MemoryState, register_memory
+from palpate.surrogates.memories.patches import Patches, nearest_points
 
 __all__ = ["Indentation", "IndentationState"]
 
@@ -237,6 +237,23 @@ class Indentation(Memory):
     def start(self) -> IndentationState:
         """Return the state of a virgin body."""
         return IndentationState(self)
+
+    def carry_from(self, other: Memory) -> Carry:
+        """Return how residual amplitudes are taken over, each place from the nearest one of the other's.
+
+        Raises
+        ------
+        UsageError
+            If the other memory is no indentation.
+        """
+        if not isinstance(other, Indentation):
+            return super().carry_from(other)
+        nearest = nearest_points(self.points, other.points)
+
+        def carry(old: Any, new: Any) -> None:
+            new.depths = old.now[nearest]
+
+        return carry
 
     def spread(self, patches: Patches, spacing: float) -> Indentation:
         """Return the law with indentations at places of the surface.

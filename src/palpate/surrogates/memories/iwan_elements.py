@@ -28,14 +28,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numba import njit
 
 from palpate.checks import own_arrays
 from palpate.errors import UsageError
-from palpate.surrogates.memories.memory import Amplitude, Memory, MemoryState, register_memory
+from palpate.surrogates.memories.memory import Amplitude, Carry, Memory, MemoryState, register_memory
 
 __all__ = ["IwanElements", "IwanMemento", "IwanState", "advance", "free_step"]
 
@@ -250,6 +250,27 @@ class IwanElements(Memory):
                 fix="Give one time in s for each sample, ascending from 0.",
             )
         return np.asarray(_follow(stretch, steps, *self.compiled()))
+
+    def carry_from(self, other: Memory) -> Carry:
+        """Return how elongations and slips are taken over, element by element.
+
+        Raises
+        ------
+        UsageError
+            If the other memory has no such elements, or another number of them.
+        """
+        if not isinstance(other, IwanElements):
+            return super().carry_from(other)
+        if len(other) != len(self):
+            raise UsageError(
+                f"What {len(other)} elements remember can't be handed on to {len(self)}.",
+                fix="Learn the new body with as many elements.",
+            )
+
+        def carry(old: Any, new: Any) -> None:
+            new.memento = old.memento
+
+        return carry
 
     def start(self) -> IwanState:
         """Return the state of a virgin body."""

@@ -11,6 +11,7 @@ memory gives back no more than was put in:
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from typing import ClassVar, Literal, TypeAlias
 
 import numpy as np
@@ -19,7 +20,7 @@ from palpate.errors import UsageError
 from palpate.network.kinds import register_kind
 from palpate.surrogates.memories.patches import Patches
 
-__all__ = ["Amplitude", "Memory", "MemoryState", "amplitudes", "register_memory"]
+__all__ = ["Amplitude", "Carry", "Memory", "MemoryState", "amplitudes", "register_memory"]
 
 Amplitude: TypeAlias = Literal["none", "positive", "signed"]
 
@@ -107,6 +108,10 @@ class MemoryState(ABC):
         """
 
 
+Carry: TypeAlias = Callable[[MemoryState, MemoryState], None]
+"""Hands what the first state remembers on to the second, which nothing was done to."""
+
+
 class Memory(ABC):
     """The law of a memory, as a value: a frozen dataclass.
 
@@ -131,6 +136,22 @@ class Memory(ABC):
     @abstractmethod
     def start(self) -> MemoryState:
         """Return the state of a body that nothing has been done to."""
+
+    def carry_from(self, other: Memory) -> Carry:
+        """Return how a state of this memory takes over what a state of `other` remembers, as amplitudes in √J.
+
+        So a body that was pressed goes on from where it was while another surrogate of it takes its place. All that
+        takes long is done here; the function that is returned runs within a tick of the loop.
+
+        Raises
+        ------
+        UsageError
+            If the two have nothing in common: by default always.
+        """
+        raise UsageError(
+            f"What a memory called {other.name!r} remembers can't be handed on to one called {self.name!r}.",
+            fix="Let go of the body, and load the new one from the start.",
+        )
 
     def spread(self, patches: Patches, spacing: float) -> Memory:
         """Return the same memory, kept at places of the surface that are `spacing` (m) apart.

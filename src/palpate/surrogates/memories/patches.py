@@ -23,11 +23,12 @@ import numpy as np
 
 from palpate.errors import UsageError
 
-__all__ = ["Patches"]
+__all__ = ["Patches", "nearest_points"]
 
 FINE = 0.5  # distance of the points that a patch is the mean of, over the patches' spacing
 LEAST = 0.7  # w₀ over the spacing: narrower patterns jump from patch to patch
 SHARE = 0.45  # w over the radius of a Hertzian contact
+_AT_ONCE = 64  # points whose distances to all others are taken at once
 MOST = 20_000  # patches: 1 ms of work and more, far beyond what a loop at 1 kHz can spend
 
 
@@ -120,6 +121,12 @@ class Patches:
                 fix="Give a larger spacing, or only the part of the surface that will be touched.",
             )
         return cls(_means(_sprinkled(corners, FINE * spacing), spacing), width, energy, LEAST * spacing)
+
+
+def nearest_points(points: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Return for each point (M, 3) the index (M,) of the nearest of others (K, 3), both in m."""
+    rows = (points[start : start + _AT_ONCE] for start in range(0, len(points), _AT_ONCE))
+    return np.concatenate([((part[:, None] - others) ** 2).sum(axis=2).argmin(axis=1) for part in rows])
 
 
 def _require_sizes(width: float, energy: float, least: float) -> None:

@@ -56,8 +56,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.surrogates.memories.memory import Memory, MemoryState, amplitudes, register_memory
-from palpate.surrogates.memories.patches import Patches
+from palpate.surrogates.memories.memory import Carry, Memory, MemoryState, amplitudes, register_memory
+from palpate.surrogates.memories.patches import Patches, nearest_points
 from palpate.surrogates.memories.relaxation_kernels import step_into
 
 __all__ = ["Course", "Relaxation", "RelaxationState", "course"]
@@ -111,6 +111,39 @@ class Relaxation(Memory):
         """Return the same memory, kept on patches of the surface."""
         del spacing
         return replace(self, patches=patches)
+
+    def carry_from(self, other: Memory) -> Carry:
+        """Return how remembered amplitudes are taken over: from the branch of nearest time, at the nearest place.
+
+        Where several places take over from one they share its energy; no place has more than it was given.
+
+        Raises
+        ------
+        UsageError
+            If the other memory is no relaxation, or one travels with the probe and the other doesn't.
+        """
+        if not isinstance(other, Relaxation):
+            return super().carry_from(other)
+        if (self.patches is None) != (other.patches is None):
+            raise UsageError(
+                "What a relaxing body remembers at places of its surface can't be handed on to one memory that "
+                "travels with the probe, nor the other way round.",
+                fix="Give both bodies places that remember, or neither.",
+            )
+        if self.patches is None or other.patches is None:
+            place, part = np.zeros(1, dtype=np.int64), np.ones(1)
+        else:
+            place = nearest_points(self.patches.points, other.patches.points)
+            part = 1.0 / np.sqrt(np.bincount(place, minlength=len(other.patches))[place])
+        times = np.log(other.times)
+        branch = np.array(
+            [int(np.argmin(np.abs(times - math.log(t)))) for t in self.times if len(times)], int
+        )
+
+        def carry(old: Any, new: Any) -> None:
+            new.take_over(old, place, part, branch)
+
+        return carry
 
     def __str__(self) -> str:
         if not self.terms:
@@ -220,6 +253,29 @@ class RelaxationState(MemoryState):
         super().reset()
         for array in self._state:
             array[...] = 0
+
+    def take_over(
+        self, other: RelaxationState, place: np.ndarray, part: np.ndarray, branch: np.ndarray
+    ) -> None:
+        """Go on with what another body remembers.
+
+        Parameters
+        ----------
+        other : RelaxationState
+            Of that body.
+        place : (M,) int
+            Which of its places each place takes over from.
+        part : (M,)
+            By what its amplitudes there are multiplied, at most 1.
+        branch : (n,) int
+            Which of its branches each branch takes over from; (0,) where it has none.
+        """
+        asked, remembered, awake, last = other._state
+        self._state[0][:] = part * asked[place]
+        if len(branch):
+            self._state[1][:] = part[:, None] * remembered[place][:, branch]
+        self._state[2][:] = awake[place]
+        self._state[3][:] = last
 
     def step(self, position: np.ndarray, amplitude: float, slope: np.ndarray, dt: float) -> bool:
         """Move the probe to a place within dt seconds and renew `force`; see `MemoryState.step`.

@@ -12,7 +12,7 @@ import pytest
 
 import palpate.viewer
 from palpate.errors import UsageError
-from palpate.viewer import messages, typescript
+from palpate.viewer import messages, part_messages, typescript
 from palpate.viewer.messages import (
     PROTOCOL,
     Feel,
@@ -29,6 +29,15 @@ from palpate.viewer.messages import (
     Shown,
     StepInfo,
 )
+from palpate.viewer.part_messages import (
+    Answer,
+    FaceInfo,
+    LearningProgress,
+    MaterialInfo,
+    PartFacts,
+    PartNews,
+    StartWish,
+)
 from palpate.viewer.wire import Binary, Json, Layout
 
 VIEWER = Path(palpate.viewer.__file__).parent
@@ -44,6 +53,7 @@ LINE = Line(
 FIELD = FieldInfo("displacement", "m", 0.0, 0.01, 3, 12)
 HELLO = Hello(
     protocol=PROTOCOL,
+    version=1,
     name="rod",
     inputs=(RangeInfo("tip force", 0.0, 5.0, "N"),),
     parameters=(),
@@ -70,7 +80,21 @@ SHOWN = Shown(PROTOCOL, "block", (FIELD,), (StepInfo("sample 3", {"energy": "1 m
 NEWS = Recording(active=True, file="rod.trace", seconds=3.5, size=4e5, lost=0, problem="")
 REASON = Reason(now="no force", stopped=True, dropped="a bad number", ago=0.25)
 FEEL = Feel(body=900.0, limit=333.0, felt=333.0, override=False, words="softened")
-WRITTEN = (HELLO, PRESSED, SHOWN, Notice("what", "why", "fix"), NEWS, REASON, FEEL)
+WISH = StartWish("", "neo-hookean", "10 kPa", "0.45", "6 mm", "3 mm")
+FACTS = PartFacts(
+    file="kidney.stl",
+    unit="mm",
+    size=(0.11, 0.06, 0.04),
+    faces=(FaceInfo("face 1", 1e-3, (0.0, 0.5, 1.0)),),
+    whole=False,
+    materials=(MaterialInfo("fat", "soft"),),
+    laws=("neo-hookean",),
+    choices=dataclasses.asdict(WISH),
+    notes=("repaired",),
+)
+LEARNING = LearningProgress("solving", 12, 0.02, None, 0.03, ((0.0, 1.0, 2.0),), 60.0, report=True)
+PART = (PartNews(PROTOCOL, "kidney", "working", "words", 2), FACTS, WISH, Answer("no"), LEARNING)
+WRITTEN = (HELLO, PRESSED, SHOWN, Notice("what", "why", "fix"), NEWS, REASON, FEEL, *PART)
 
 
 def sample(message: type[Binary]) -> Binary:
@@ -144,7 +168,10 @@ def test_json_messages_come_back_the_same(message: Json):
 def test_every_message_class_is_among_those_that_come_back():
     known = {*typescript.BINARY, *typescript.JSON}
     declared = {
-        c for c in vars(messages).values() if isinstance(c, type) and issubclass(c, Binary | Json)
+        c
+        for module in (messages, part_messages)
+        for c in vars(module).values()
+        if isinstance(c, type) and issubclass(c, Binary | Json)
     } - {Binary, Json}
     assert declared == known
     assert {type(m) for m in WRITTEN} == set(typescript.JSON)

@@ -14,6 +14,7 @@ from palpate.physics import Body, ImportedMesh, ImportedSolid, SurfacePatch
 from palpate.physics.shapes.body_file import FEATURE_ANGLE, WITHIN
 from palpate.physics.shapes.mesh import Face
 from palpate.physics.shapes.naming import require_known, require_name
+from palpate.physics.shapes.triangle_list import read_triangles
 from palpate.study.material_records import SolidMaterial, build_material
 from palpate.study.quantities import Metres, Record
 
@@ -59,6 +60,11 @@ class PartSurfaceRecord(Record):
         None, description="up, down, +x, -x, +y, -y, or (x, y, z): what faces that way", examples=["up"]
     )
     within: float = Field(WITHIN, gt=0, le=180, description="largest angle from that direction, degrees")
+    triangles: str = Field(
+        "",
+        description="triangles of the surface as it is read, as `palpate touch` writes them; not for STEP",
+        examples=["0-17 25 40-80 of 5120"],
+    )
 
     @field_validator("name")
     @classmethod
@@ -78,6 +84,16 @@ class PartSurfaceRecord(Record):
             raise ValueError("its direction (0, 0, 0) points nowhere")
         return facing
 
+    @field_validator("triangles")
+    @classmethod
+    def _a_list(cls, triangles: str) -> str:
+        if triangles:
+            try:
+                read_triangles(triangles)
+            except UsageError as error:
+                raise ValueError(" ".join(str(error).split("\n"))) from error
+        return triangles
+
     @model_validator(mode="after")
     def _not_empty(self) -> PartSurfaceRecord:
         low, high = self._corners()
@@ -90,7 +106,9 @@ class PartSurfaceRecord(Record):
     def is_rest(self) -> bool:
         """True for a surface without bounds: what the others leave."""
         low, high = self._corners()
-        return not (self.faces or self.facing) and not any(value is not None for value in (*low, *high))
+        return not (self.faces or self.facing or self.triangles) and not any(
+            value is not None for value in (*low, *high)
+        )
 
     def _corners(self) -> tuple[list[float | None], list[float | None]]:
         """Return the bounds along x, y and z in m, None where there is none."""
@@ -125,7 +143,14 @@ class PartSurfaceRecord(Record):
                     fix="Enlarge `within`, or name the faces.",
                 )
         return SurfacePatch(
-            self.name, (low[0], low[1], low[2]), (high[0], high[1], high[2]), None, facing, self.within, faces
+            self.name,
+            (low[0], low[1], low[2]),
+            (high[0], high[1], high[2]),
+            None,
+            facing,
+            self.within,
+            faces,
+            self.triangles,
         )
 
 
@@ -212,11 +237,18 @@ class PartRecord(Record):
         PalpateError
             If the file is missing or no body, or a surface's bounds hold nothing.
         """
-        bare = part_shape(self.file, self.unit, self.element, self.feature_angle)
-        # what the others leave comes first, since later patches go over earlier ones
-        ordered = sorted(self.surfaces, key=lambda surface: not surface.is_rest)
-        patches = tuple(surface.patch(bare) for surface in ordered)
+        patches = self.patches(self.bare())
         return part_shape(self.file, self.unit, self.element, self.feature_angle, patches)
+
+    def bare(self) -> ImportedSolid | ImportedMesh:
+        """Return the shape with the names of its file alone."""
+        return part_shape(self.file, self.unit, self.element, self.feature_angle)
+
+    def patches(self, bare: ImportedSolid | ImportedMesh) -> tuple[SurfacePatch, ...]:
+        """Return the names for parts of the surface, in the order in which they are given: later ones go over."""
+        # what the others leave comes first
+        ordered = sorted(self.surfaces, key=lambda surface: not surface.is_rest)
+        return tuple(surface.patch(bare) for surface in ordered)
 
     def build(self) -> Body:
         """Return the body."""

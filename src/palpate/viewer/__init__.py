@@ -6,6 +6,9 @@
 `hand_lock`        which of several pages holds the hand
 `page_model`       a touchable body as its pages see it; drawn as a line
 `surface_drawing`  drawn as a surface; `surfaces`: its mesh; `indentation_drawing`: what stays on it
+`part_page`        `serve_part` and `PartPage`: a part is set up, solved, learnt and touched on one page
+`shown_part`       that part, and a person's choices; `part_messages`: its messages; `solve_dots`: places of solves
+`trust_map`        how well the force is known over the touched surface
 `messages`         every message between server and page, as dataclasses that generate the TypeScript
 `wire`             how those dataclasses become bytes; `typescript`: how they become TypeScript
 `body_viewer`      `show` and `BodyViewer`: the page of a solved body

@@ -30,8 +30,9 @@ __all__ = ["LOOPBACK", "Guard", "Token", "refusal"]
 logger = logging.getLogger("palpate.viewer")
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
+POLICY = "content-security-policy"
 HEADERS = {
-    "content-security-policy": "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
+    POLICY: "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
     "img-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
     "x-content-type-options": "nosniff",
     "referrer-policy": "no-referrer",
@@ -145,7 +146,9 @@ class Guard:
 
         async def with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
-                MutableHeaders(scope=message).update(HEADERS)
+                headers = MutableHeaders(scope=message)
+                own = {POLICY: headers[POLICY]} if POLICY in headers else {}  # a report has one of its own
+                headers.update(HEADERS | own)
             await send(message)
 
         if (answer := self._answer_at_the_door(scope)) is None:

@@ -20,6 +20,8 @@ A body drawn as a line (`Line`) is sent node by node in each frame. Of any other
 `Surface` at ``/surface``, and for the modes of each field as `Modes` at ``/fields/N``; a frame carries the coefficients
 of the modes, and the page sums them itself.
 
+A part that is set up and learnt while it is touched has a conversation of its own beside this one (`part_messages`).
+
 A body that is only looked at needs no conversation: its page asks for `Shown` (JSON) at ``/shown``, for `Surface` at
 ``/surface`` and for each `Step` when it is wanted at ``/steps/N``.
 
@@ -65,7 +67,7 @@ __all__ = [
     "Vec3",
 ]
 
-PROTOCOL = 5  # a page of another protocol reloads itself
+PROTOCOL = 6  # a page of another protocol reloads itself
 
 Vec3 = tuple[float, float, float]
 
@@ -92,6 +94,7 @@ class Frame(Binary):
 
     KIND: ClassVar[int] = 1
 
+    version: Annotated[int, Wire("u16", "of the body that this picture is drawn with, as in Hello")]
     tick: Annotated[float, Wire("f64", "counts the loop's ticks")]
     time: Annotated[float, Wire("f64", "s, when the frame was composed, on the loop's clock")]
     echo: Annotated[float, Wire("f64", "ms, page clock: `sent` of the last Hand that this page sent")]
@@ -285,6 +288,8 @@ class Hello(Json):
     ----------
     protocol : int
         `PROTOCOL`: a page of another one reloads itself.
+    version : int
+        Counts the surrogates of one body: a later one takes the place of the one before while it is touched.
     name : str
         Of the body.
     inputs, parameters : ranges
@@ -326,6 +331,7 @@ class Hello(Json):
     """
 
     protocol: int
+    version: int
     name: str
     inputs: tuple[RangeInfo, ...]
     parameters: tuple[RangeInfo, ...]

@@ -20,7 +20,9 @@ from palpate.surrogates import NodeField
 from palpate.units import Range, bounds
 from palpate.viewer.indentation_drawing import yielding_in_words
 from palpate.viewer.messages import PROTOCOL, Frame, Hello, Line, Modes, RangeInfo, Surface, Vec3
+from palpate.viewer.part_messages import TrustMap
 from palpate.viewer.surface_drawing import SurfaceDrawing
+from palpate.viewer.trust_map import trust_map
 
 __all__ = ["LineDrawing", "PageModel", "swing", "vector"]
 
@@ -42,16 +44,23 @@ _NO_TOUCH: dict[str, Any] = {
 class PageModel:
     """A touchable body with all that its pages are told and sent.
 
-    Attributes
+    Parameters
     ----------
     body : Touchable
         The learnt body as a hand finds it.
+    version : int
+        Counts the surrogates of one body, where a later one takes the place of the one before.
+
+    Attributes
+    ----------
+    body, version
+        As given.
     surface : Surface, optional
         At rest; None for a body drawn as a line.
     """
 
-    def __init__(self, body: Touchable) -> None:
-        self.body = body
+    def __init__(self, body: Touchable, version: int = 1) -> None:
+        self.body, self.version = body, version
         self._drawing: LineDrawing | SurfaceDrawing = (
             SurfaceDrawing(body) if body.line is None else LineDrawing(body, body.line)
         )
@@ -66,6 +75,11 @@ class PageModel:
         """Return what the page needs to sum up field `index` of the surface."""
         assert isinstance(self._drawing, SurfaceDrawing)
         return self._drawing.modes(index)
+
+    def trust_map(self) -> TrustMap:
+        """Return how well the force is known over the touched surface."""
+        assert isinstance(self._drawing, SurfaceDrawing)
+        return trust_map(self._drawing)
 
     def hello(self, state: State, rate: float, device: str = "") -> Hello:
         """Return what every page is told first.
@@ -82,6 +96,7 @@ class PageModel:
         body = self.body
         return Hello(
             protocol=PROTOCOL,
+            version=self.version,
             name=body.name,
             inputs=_ranges(body.inputs),
             parameters=_ranges(body.parameters),
@@ -120,7 +135,7 @@ class PageModel:
         """
         drawn = self._drawing.frame(state, held, parameters)
         felt = {"depth": state.depth, "stiffness": state.stiffness if held else 0.0}
-        return Frame(**{**_NO_TOUCH, **felt, **loop, **drawn})
+        return Frame(**{"version": self.version, **_NO_TOUCH, **felt, **loop, **drawn})
 
 
 class LineDrawing:

@@ -19,7 +19,8 @@ from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import Response
-from starlette.routing import Route, WebSocketRoute
+from starlette.routing import BaseRoute, Route, WebSocketRoute
+from starlette.websockets import WebSocket
 
 from palpate.files import TemporaryFolder
 from palpate.runtime import LoopProcess
@@ -29,8 +30,9 @@ from palpate.viewer.compression import BinaryAnswers
 from palpate.viewer.page_model import PageModel
 from palpate.viewer.session import Session
 from palpate.viewer.web_server import LocalServer, local_application, wait_until_interrupted
+from palpate.viewer.wire import Binary
 
-__all__ = ["Viewer", "application", "serve"]
+__all__ = ["Viewer", "application", "body_routes", "serve"]
 
 
 def application(session: Session) -> Starlette:
@@ -43,25 +45,59 @@ def application(session: Session) -> Starlette:
         watcher.cancel()
         await asyncio.gather(watcher, return_exceptions=True)
 
-    model, answers = session.model, BinaryAnswers(keep=True)
+    return local_application(body_routes(lambda: session), lifespan=lifespan)
+
+
+def body_routes(session: Callable[[], Session | None]) -> list[BaseRoute]:
+    """Return the routes of a touchable body: its websocket, surface, fields, and the map of trust.
+
+    Parameters
+    ----------
+    session : callable
+        Returns the session of the body, or None as long as there is none.
+    """
+    answers = BinaryAnswers(keep=True)
+
+    async def answer(request: Request, name: str, make: Callable[[PageModel], Binary | None]) -> Response:
+        current = session()
+        number = request.query_params.get("version", "")
+        model = current and current.version(int(number) if number.isdecimal() else None)
+        if not model:
+            raise HTTPException(404)
+
+        def made() -> bytes:
+            if (content := make(model)) is None:
+                raise HTTPException(404)
+            return content.pack()
+
+        return await answers.answer(request, f"{name} {model.version}", made)
+
+    async def talk(socket: WebSocket) -> None:
+        if (current := session()) is not None:
+            await current.talk(socket)
+        else:
+            await socket.close(1013)
 
     async def surface(request: Request) -> Response:
-        if model.surface is None:
-            raise HTTPException(404)
-        return await answers.answer(request, "surface", model.surface.pack)
+        return await answer(request, "surface", lambda model: model.surface)
+
+    async def trust(request: Request) -> Response:
+        return await answer(request, "trust", lambda model: model.surface and model.trust_map())
 
     async def modes(request: Request) -> Response:
         index = request.path_params["index"]
-        if index >= model.field_count:
-            raise HTTPException(404)
-        return await answers.answer(request, f"field {index}", lambda: model.modes(index).pack())
 
-    routes = [
-        WebSocketRoute("/touch", session.talk),
+        def make(model: PageModel) -> Binary | None:
+            return model.modes(index) if index < model.field_count else None
+
+        return await answer(request, f"field {index}", make)
+
+    return [
+        WebSocketRoute("/touch", talk),
         Route("/surface", surface),
+        Route("/trust", trust),
         Route("/fields/{index:int}", modes),
     ]
-    return local_application(routes, lifespan=lifespan)
 
 
 def _driver(device: str) -> str:

@@ -42,6 +42,7 @@ from palpate.viewer.messages import (
 )
 from palpate.viewer.page_model import PageModel, vector
 from palpate.viewer.page_recording import PageRecording
+from palpate.viewer.part_messages import Ready
 from palpate.viewer.traffic import Bucket, Turns
 
 __all__ = ["NOT_SOFTENED", "LoopLike", "Page", "Session", "softening"]
@@ -97,6 +98,7 @@ class Page:
     number: int
     socket: WebSocket
     heard: Bucket
+    model: PageModel  # with which its pictures are drawn
     credits: int = 0
     echo: float = 0.0  # ms, the page's clock
     histogram: np.ndarray | None = None  # of lateness, as of the frame before
@@ -153,6 +155,7 @@ class Session:
         if recordings is not None:
             recordable: Any = loop
             self._recording = PageRecording(recordable, recordings, model.body.name, self._tell_all)
+        self._models = {model.version: model}
         self._device = device
         self._wishes: set[asyncio.Task[None]] = set()
         self._state = loop.shared.read_state()
@@ -165,7 +168,7 @@ class Session:
             await socket.close(1013)
             return
         heard = Bucket(MESSAGES, MESSAGES_AT_ONCE, self._clock)
-        page = Page(next(self._numbers), socket, heard)
+        page = Page(next(self._numbers), socket, heard, self.model)
         self._pages[page.number] = page
         with contextlib.suppress(WebSocketDisconnect):
             await socket.send_text(self.hello().to_json())
@@ -190,7 +193,7 @@ class Session:
         logger.error("%s %s", ENDED.what, ENDED.fix)
         await self._tell_all(ENDED)
 
-    async def _tell_all(self, news: Notice | Recording) -> None:
+    async def _tell_all(self, news: Notice | Recording | Hello) -> None:
         text = news.to_json()
 
         async def tell(page: Page) -> None:
@@ -209,7 +212,18 @@ class Session:
         """Return the newest state as one page sees it."""
         state, loop = self._read()
         held = state.grabbed and not state.stalled and loop is Loop.RUNNING
-        return self.model.frame(self._facts(page, state, loop, held), state, held, self._lock.parameters)
+        return page.model.frame(self._facts(page, state, loop, held), state, held, self._lock.parameters)
+
+    async def replace(self, model: PageModel) -> None:
+        """Show another surrogate of the same body: each page is told, and is drawn the old one until it has the new."""
+        self.model = model
+        in_use = {page.model.version for page in self._pages.values()} | {model.version}
+        self._models = {v: m for v, m in self._models.items() if v in in_use} | {model.version: model}
+        await self._tell_all(self.hello())
+
+    def version(self, number: int | None) -> PageModel | None:
+        """Return a version of the body that a page may ask for; the newest for None."""
+        return self.model if number is None else self._models.get(number)
 
     def _facts(self, page: Page, state: State, loop: Loop, held: bool) -> dict[str, Any]:
         """Return the fields of `Frame` that tell of the loop and the page."""
@@ -304,6 +318,9 @@ class Session:
         if data[:1] == bytes([StopWish.KIND]):
             stop = StopWish.unpack(data).stop
             self.loop.shared.write_command(stop=stop, resume=not stop)
+            return
+        if data[:1] == bytes([Ready.KIND]):
+            page.model = self.version(Ready.unpack(data).version) or page.model
             return
         hand = Hand.unpack(data)
         if self._device and hand.grabbed:  # the hand is not the page's

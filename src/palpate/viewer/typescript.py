@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from enum import IntEnum
 from typing import Any
 
-from palpate.viewer import messages
+from palpate.viewer import messages, part_messages
 from palpate.viewer.wire import CODES, Binary, Json, Wire
 
 __all__ = ["generate"]
@@ -23,6 +23,11 @@ BINARY: tuple[type[Binary], ...] = (
     messages.Modes,
     messages.RecordWish,
     messages.StopWish,
+    part_messages.Picks,
+    part_messages.EndWish,
+    part_messages.Ready,
+    part_messages.PartFaces,
+    part_messages.TrustMap,
 )
 JSON: tuple[type[Json], ...] = (
     messages.Hello,
@@ -31,9 +36,21 @@ JSON: tuple[type[Json], ...] = (
     messages.Reason,
     messages.Feel,
     messages.Shown,
+    part_messages.PartNews,
+    part_messages.PartFacts,
+    part_messages.StartWish,
+    part_messages.Answer,
+    part_messages.LearningProgress,
 )
-RECORDS: tuple[type, ...] = (messages.RangeInfo, messages.FieldInfo, messages.Line, messages.StepInfo)
-ENUMS: tuple[type[IntEnum], ...] = (messages.Loop, messages.Hold)
+RECORDS: tuple[type, ...] = (
+    messages.RangeInfo,
+    messages.FieldInfo,
+    messages.Line,
+    messages.StepInfo,
+    part_messages.FaceInfo,
+    part_messages.MaterialInfo,
+)
+ENUMS: tuple[type[IntEnum], ...] = (messages.Loop, messages.Hold, part_messages.Role)
 
 # wire type → TypeScript type
 TYPES = dict.fromkeys(CODES, "number") | {
@@ -44,7 +61,7 @@ TYPES = dict.fromkeys(CODES, "number") | {
 }
 
 HEAD = """\
-// Generated from palpate/viewer/messages.py; change it there, then
+// Generated from palpate/viewer/messages.py and part_messages.py; change it there, then
 //   python -m palpate.viewer.messages > src/palpate/viewer/client/src/messages.ts
 
 import { decode, encode } from "./wire";

@@ -153,6 +153,7 @@ class LocalServer(ABC):
         self._token = Token() if token else None
         self._wanted = (port, host, strict_port)
         self._closing = contextlib.ExitStack()
+        self._thread: threading.Thread | None = None
 
     @property
     def address(self) -> str:
@@ -179,7 +180,7 @@ class LocalServer(ABC):
         """Return the web application; what it needs until the end enters `_closing`."""
 
     def start(self) -> Self:
-        """Start the server and all that it needs; the page can be opened when this returns.
+        """Start the server and all that it needs; the page can be opened when this returns. Harmless when repeated.
 
         Raises
         ------
@@ -190,6 +191,8 @@ class LocalServer(ABC):
         DeviceError
             If the server, or the real-time process behind it, doesn't start.
         """
+        if self._thread is not None:
+            return self
         try:
             port, host, strict = self._wanted
             listener = self._closing.enter_context(listen(port, host, strict=strict))
@@ -219,15 +222,14 @@ class LocalServer(ABC):
                 server_header=False,
             )
         )
-        self._thread = threading.Thread(
-            target=server.run, args=([listener],), name="palpate viewer", daemon=True
-        )
-        self._thread.start()
-        self._closing.callback(self._thread.join)
+        thread = threading.Thread(target=server.run, args=([listener],), name="palpate viewer", daemon=True)
+        thread.start()
+        self._thread = thread
+        self._closing.callback(thread.join)
         self._closing.callback(setattr, server, "should_exit", True)
         until = time.monotonic() + START
         while not server.started:
-            if not self._thread.is_alive() or time.monotonic() > until:
+            if not thread.is_alive() or time.monotonic() > until:
                 raise DeviceError(
                     "The viewer's server did not start.",
                     why="Its thread ended or hangs; the log of 'uvicorn.error' says more.",
@@ -238,10 +240,11 @@ class LocalServer(ABC):
     def stop(self) -> None:
         """End the server and what it started. Harmless when repeated."""
         self._closing.close()
+        self._thread = None
 
     def wait(self) -> None:
         """Return when the server has ended."""
-        while self._thread.is_alive():
+        while self._thread is not None and self._thread.is_alive():
             self._thread.join(0.5)  # in steps: a join without end can't be interrupted on every system
 
     def __enter__(self) -> Self:

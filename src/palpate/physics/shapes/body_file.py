@@ -14,7 +14,7 @@ import io
 import math
 import re
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +24,7 @@ from palpate import checks
 from palpate.errors import FileFormatError, UsageError
 from palpate.physics.advice import advise
 from palpate.physics.shapes.naming import require_known, require_name
+from palpate.physics.shapes.triangle_list import read_triangles
 from palpate.processes import is_supervised
 
 if TYPE_CHECKING:
@@ -211,6 +212,9 @@ class SurfacePatch:
         Largest angle in degrees between normal and `facing`; by default 60.
     faces : tuple of str
         Names that the file gives, or that sharp edges give: the patch is in these surfaces only.
+    triangles : str
+        Triangles of the surface as it is read, such as ``"0-17 25 40-80 of 5120"``: what was picked on a page. Not for
+        STEP files.
 
     Raises
     ------
@@ -225,13 +229,16 @@ class SurfacePatch:
     facing: Point | None = None
     within: float = WITHIN
     faces: tuple[str, ...] = ()
+    triangles: str = field(default="", repr=False)
 
     def __post_init__(self) -> None:
         require_name("The name of a patch", self.name)
         object.__setattr__(self, "faces", tuple(self.faces))
+        if self.triangles:
+            read_triangles(self.triangles)
         boxed = self.lower is not None or self.upper is not None
         places = boxed + (self.where is not None)
-        if places > 1 or not (places or self.faces or self.facing is not None):
+        if places > 1 or not (places or self.faces or self.facing is not None or self.triangles):
             raise UsageError(
                 f"The patch {self.name!r} has no clear place.",
                 why="It is a box, a function, a direction that it faces, or surfaces of the file; a box and a function "
@@ -291,7 +298,22 @@ class SurfacePatch:
             for face in self.faces:
                 require_known("surface", face, known)
             inside = inside & np.array([name in self.faces for name in given.tolist()], dtype=bool)
+        if self.triangles:
+            inside = inside & self._listed(len(centres))
         return inside
+
+    def _listed(self, present: int) -> np.ndarray:
+        """Return which of the triangles that are present (present,) stand in the list."""
+        listed, count = read_triangles(self.triangles)
+        if count != present:
+            raise UsageError(
+                f"The patch {self.name!r} was picked on a surface of {count} triangles; there are {present}.",
+                why="The file has changed, or is a STEP file, whose faces are named whole.",
+                fix="Pick it anew, or name it by a box, a direction or faces of the file.",
+            )
+        mask = np.zeros(present, dtype=bool)
+        mask[listed] = True
+        return mask
 
     def describe(self) -> dict[str, Any]:
         """Return the patch as plain data."""
@@ -304,7 +326,8 @@ class SurfacePatch:
         }
         if self.facing is not None:
             plain |= {"facing": self.facing, "within": self.within}
-        return plain | ({"faces": self.faces} if self.faces else {})
+        plain |= {"faces": self.faces} if self.faces else {}
+        return plain | ({"triangles": self.triangles} if self.triangles else {})
 
 
 def _corner(what: str, value: Any) -> Corner:

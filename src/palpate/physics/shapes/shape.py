@@ -175,9 +175,14 @@ class Shape:
         return _plain(cast("Hashable", self), self._checked(refinements))
 
     @property
+    def skin(self) -> BodyMesh:
+        """Triangles of the outer surface, with the names of the surfaces."""
+        return self.rest()
+
+    @property
     def faces(self) -> tuple[Face, ...]:
         """Place, size and direction of each surface: what to print to tell which is which."""
-        return faces_of(self.rest())
+        return faces_of(self.skin)
 
     def describe(self) -> dict[str, Any]:
         """Everything that decides the mesh, as plain data for a JSON file."""

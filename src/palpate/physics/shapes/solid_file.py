@@ -24,7 +24,7 @@ from palpate.physics.shapes.body_file import (
     require_unit,
     tell_repairs,
 )
-from palpate.physics.shapes.mesh import BodyMesh, Face, faces_of, to_ngsolve
+from palpate.physics.shapes.mesh import BodyMesh, to_ngsolve
 from palpate.physics.shapes.meshing import FineMesh, mesh_solid
 from palpate.physics.shapes.naming import INTERFACE, plain_name
 from palpate.physics.shapes.shape import Shape, require_size
@@ -292,9 +292,9 @@ class ImportedSolid(Shape):
         return _names(self)[0]
 
     @property
-    def faces(self) -> tuple[Face, ...]:
-        """Place, size and direction of each surface; those of an STL file are found without meshing."""
-        return super().faces if self.is_step else faces_of(_skin(self)[0])
+    def skin(self) -> BodyMesh:
+        """Triangles of the surface with their names; those of an STL file are found without meshing."""
+        return super().skin if self.is_step else _skin(self)[0]
 
     @property
     def regions(self) -> tuple[str, ...]:

@@ -5,10 +5,10 @@ import type { Connection } from "./connection";
 import { Field, Indentation } from "./field";
 import { PullHand } from "./hand";
 import type { Hand } from "./hand";
-import { choices, largest, legend, nothing, shares } from "./legend";
+import { choices, largest, legend, nothing, shares, trusted } from "./legend";
 import { LineView } from "./line_view";
-import { decodeModes, decodeSurface } from "./messages";
-import type { FieldInfo, Frame, Hello, Surface } from "./messages";
+import { decodeModes, decodeSurface, decodeTrustMap } from "./messages";
+import type { FieldInfo, Frame, Hello, Surface, TrustMap, Vec3 } from "./messages";
 import { Panel } from "./panel";
 import { PressHand } from "./press";
 import { PadView, PressView } from "./touch_view";
@@ -17,6 +17,7 @@ import type { View } from "./view";
 import type { Vector3 } from "three";
 
 const WORDS = ["title", "tools", "scale-notes", "legend"];
+const TRUST_NOTE = "One standard deviation, with the ball half as deep as it may go. Darkest also where nothing was trained.";
 
 /** A body on the page, with the hand that touches it. */
 export interface Body {
@@ -29,6 +30,10 @@ export interface Body {
   notes(): string[];
   /** Publish where the hand's place is, for programs that drive the page. */
   place(): void;
+  /** Get ready to show another surrogate of the same body; returns what shows it from then on. */
+  renew?(hello: Hello): Promise<() => void>;
+  /** Draw dots where solves are done, m. */
+  mark?(places: readonly Vec3[]): void;
 }
 
 export function bodyOf(hello: Hello, canvas: HTMLCanvasElement, connection: Connection, panel: Panel): Body {
@@ -71,14 +76,18 @@ class LineBody implements Body {
 class PressedBody implements Body {
   readonly hand: PressHand;
   view: PressView | null = null;
+  private surface: Surface | null = null;
   private fields: Field[] = [];
+  private trust: TrustMap | null = null;
+  private infos: FieldInfo[] = [];
   private indentation: Indentation | null = null;
   private still = new Float32Array();
+  private places: readonly Vec3[] = [];
   private chosen = 0;
   private latest: Frame | null = null;
 
   constructor(
-    private readonly hello: Hello,
+    private hello: Hello,
     private readonly canvas: HTMLCanvasElement,
     connection: Connection,
     panel: Panel,
@@ -90,23 +99,63 @@ class PressedBody implements Body {
   }
 
   async open(): Promise<void> {
-    const infos = this.hello.fields;
-    const surface = decodeSurface(await get("surface"));
-    const modes = await Promise.all(infos.map(async (_, i) => decodeModes(await get(`fields/${i}`))));
-    this.fields = infos.map((info, i) => new Field(info, modes[i]!, surface.rest));
-    this.still = new Float32Array(surface.rest.length);
-    this.indentation = new Indentation(surface);
-    choices(infos, (index) => {
-      this.chosen = index;
-      legend(this.info);
-      this.view?.neutral(nothing(this.info!));
-      this.draw();
-    });
-    legend(this.info);
+    const [surface, fields, trust] = await this.load(this.hello);
     this.view = new PressView(this.canvas, surface, this.hello, WORDS.map(element));
-    if (this.info) this.view.neutral(nothing(this.info));
+    this.take(surface, fields, trust);
     this.hand.attach(this.view);
     for (const id of ["show-ghost", "show-mesh"]) input(id).addEventListener("input", () => this.draw());
+    input("show-solves").addEventListener("input", () => this.mark(this.places));
+  }
+
+  async renew(hello: Hello): Promise<() => void> {
+    const [surface, fields, trust] = await this.load(hello);
+    return () => {
+      if (!same(surface.rest, this.surface!.rest) || !same(surface.triangles, this.surface!.triangles)) {
+        location.reload(); // of another mesh: a fresh page is simpler than a changed one
+        return;
+      }
+      this.hello = hello;
+      this.take(surface, fields, trust);
+      this.draw();
+    };
+  }
+
+  mark(places: readonly Vec3[]): void {
+    this.places = places;
+    this.view?.mark(input("show-solves").checked ? places : []);
+  }
+
+  /** Fetch a version of the body. */
+  private async load(hello: Hello): Promise<[Surface, Field[], TrustMap | null]> {
+    const version = `?version=${hello.version}`;
+    const learnt = "learning" in document.documentElement.dataset;
+    const [surface, trust, ...modes] = await Promise.all([
+      get(`surface${version}`).then(decodeSurface),
+      learnt ? get(`trust${version}`).then(decodeTrustMap) : null,
+      ...hello.fields.map(async (_, i) => decodeModes(await get(`fields/${i}${version}`))),
+    ]);
+    return [surface, hello.fields.map((info, i) => new Field(info, modes[i]!, surface.rest)), trust];
+  }
+
+  /** Draw from now on with this surface, these fields and this map. */
+  private take(surface: Surface, fields: Field[], trust: TrustMap | null): void {
+    [this.surface, this.fields] = [surface, fields];
+    this.still = new Float32Array(surface.rest.length);
+    this.indentation = new Indentation(surface);
+    // one scale for all versions, so that it is seen how they get better
+    if (trust) trust.high = Math.max(trust.high, this.trust?.high ?? 0);
+    this.trust = trust;
+    this.infos = [...fields.map((field) => field.info), ...(trust ? [trusted(trust)] : [])];
+    this.chosen = Math.min(this.chosen, Math.max(this.infos.length - 1, 0));
+    choices(this.infos, (index) => this.choose(index), this.chosen);
+    this.choose(this.chosen);
+  }
+
+  private choose(index: number): void {
+    this.chosen = index;
+    legend(this.info);
+    if (this.info) this.view!.neutral(nothing(this.info));
+    this.draw();
   }
 
   show(frame: Frame): void {
@@ -128,8 +177,13 @@ class PressedBody implements Body {
     mark("middle", this.view!.middle(this.hello.centre), this.canvas);
   }
 
+  /** True where the colours show how well the force is known. */
+  private get trusting(): boolean {
+    return this.trust !== null && this.chosen === this.fields.length;
+  }
+
   private get info(): FieldInfo | null {
-    return this.hello.fields[this.chosen] ?? null;
+    return this.infos[this.chosen] ?? null;
   }
 
   private draw(): void {
@@ -146,13 +200,13 @@ class PressedBody implements Body {
     if (first?.info.components !== 3) this.still.fill(0);
     const moved = first?.info.components === 3 ? first.values : this.still;
     this.indentation?.into(moved, latest.indentation);
-    const values = fields[this.chosen]?.sizes() ?? this.still;
-    const colours = info ? shares(info, values) : plain(this.still.length);
+    const values = fields[this.chosen]?.sizes() ?? (this.trust ? deviations(this.trust) : this.still);
+    const colours = this.trusting ? certainty(this.trust!) : info ? shares(info, values) : plain(this.still.length);
     document.documentElement.dataset["summed"] = String(performance.now() - began); // ms
     const layers = { ghost: input("show-ghost").checked, mesh: input("show-mesh").checked };
     view.touch(latest, this.hand.radius, moved, colours, layers);
     const most = largest(info, values);
-    element("largest-note").textContent = this.chosen === 0 && latest.grabbed ? remainder(latest.depth, most) : "";
+    element("largest-note").textContent = this.trusting ? TRUST_NOTE : this.chosen === 0 && latest.grabbed ? remainder(latest.depth, most) : "";
   }
 }
 
@@ -194,6 +248,20 @@ function remainder(depth: number, most: number): string {
   if (rest < 0.005) return "";
   const deep = fixed(1000 * depth, 2);
   return `The probe is ${deep} mm deep: the soft pad around it takes the other ${fixed(rest, 2)} mm.`;
+}
+
+/** Deviations of a map in per cent; 0 where there is none. */
+function deviations({ values }: TrustMap): Float32Array {
+  return values.map((v) => 100 * Math.max(v, 0));
+}
+
+/** Shares of the colour scale of a map: all of it where nothing was trained. */
+function certainty({ values, high }: TrustMap): Float32Array {
+  return values.map((v) => (v >= 0 ? v / high : v < -1.5 ? 1 : 0));
+}
+
+function same(a: Float32Array, b: Float32Array): boolean {
+  return a.length === b.length && a.every((x, i) => x === b[i]);
 }
 
 async function get(path: string): Promise<ArrayBuffer> {

@@ -4,6 +4,7 @@ import {
   decodeFrame,
   encodeCredit,
   encodeHand,
+  encodeReady,
   encodeRecordWish,
   encodeStopWish,
   isFeel,
@@ -33,6 +34,7 @@ export class Connection {
   private readonly worker = new Worker(new URL("./socket_worker.ts", import.meta.url), { type: "module" });
   private newest: Frame | null = null;
   private owed = 0;
+  private greeted = false; // since the connection stands
 
   constructor(private readonly listener: Listener) {
     this.worker.onmessage = ({ data }: MessageEvent<Report>) => {
@@ -55,6 +57,11 @@ export class Connection {
   /** End all force, or the stop. */
   stop(stop: boolean): void {
     if (this.connected) this.order({ message: encodeStopWish({ stop }) });
+  }
+
+  /** Say that this version of the body can be drawn. */
+  ready(version: number): void {
+    if (this.connected) this.order({ message: encodeReady({ version }) });
   }
 
   /** The newest frame not drawn yet; taking it grants the server as many more as have come. */
@@ -88,13 +95,16 @@ export class Connection {
       location.reload(); // the server is of another version than this page
       return;
     }
-    this.owed = 0;
     this.listener.hello(message);
+    if (this.greeted) return; // another version of the same body: the credits go on
+    this.greeted = true;
+    this.owed = 0;
     this.order({ message: encodeCredit({ frames: CREDITS_AT_START }) });
   }
 
   private closed(): void {
     this.newest = null;
+    this.greeted = false;
     this.listener.lost();
   }
 }

@@ -1,7 +1,7 @@
 // The colour scale: which quantity colours the body, between which values, and how large it is now.
 
 import { gradient } from "./colour";
-import type { FieldInfo } from "./messages";
+import type { FieldInfo, TrustMap } from "./messages";
 import { capital, element, multiple, tidy, worded } from "./units";
 
 /** Show the scale of a quantity; null hides it. */
@@ -16,13 +16,19 @@ export function legend(info: FieldInfo | null): void {
   );
 }
 
-/** A button for each quantity; `choose` hears of the one taken. */
-export function choices(infos: FieldInfo[], choose: (index: number) => void): void {
+/** What the colours of a map of trust show, in per cent. */
+export function trusted({ high, known }: TrustMap): FieldInfo {
+  const name = known ? "uncertainty of the force" : "not trained";
+  return { name, unit: "%", low: 0, high: 100 * high, components: 1, modes: 0 };
+}
+
+/** A button for each quantity; `choose` hears of the one taken, `chosen` is the one at first. */
+export function choices(infos: FieldInfo[], choose: (index: number) => void, chosen = 0): void {
   element("colours").hidden = infos.length < 2;
   const buttons = infos.map((info, i) => {
     const button = worded("button", info.name) as HTMLButtonElement;
     button.type = "button";
-    button.setAttribute("aria-pressed", String(i === 0));
+    button.setAttribute("aria-pressed", String(i === chosen));
     button.addEventListener("click", () => {
       buttons.forEach((other, j) => other.setAttribute("aria-pressed", String(j === i)));
       choose(i);

@@ -1,4 +1,4 @@
-// Generated from palpate/viewer/messages.py; change it there, then
+// Generated from palpate/viewer/messages.py and part_messages.py; change it there, then
 //   python -m palpate.viewer.messages > src/palpate/viewer/client/src/messages.ts
 
 import { decode, encode } from "./wire";
@@ -6,7 +6,7 @@ import type { Layout } from "./wire";
 
 export type Vec3 = [number, number, number];
 
-export const PROTOCOL = 5;
+export const PROTOCOL = 6;
 
 /** The real-time process as the server sees it. */
 export const Loop = {
@@ -20,6 +20,13 @@ export const Hold = {
   FREE: 0,
   YOURS: 1,
   ANOTHER: 2,
+} as const;
+
+/** The role of a triangle of a part's surface. */
+export const Role = {
+  FREE: 0,
+  HELD: 1,
+  TOUCHED: 2,
 } as const;
 
 /** A named interval. */
@@ -54,9 +61,23 @@ export interface StepInfo {
   figures: Record<string, unknown>;
 }
 
+/** A face of a part: its name, its area in m², and the middle of it in m. */
+export interface FaceInfo {
+  name: string;
+  area: number;
+  centre: Vec3;
+}
+
+/** A material that can be asked for by name, with what there is to say of it in a few words. */
+export interface MaterialInfo {
+  name: string;
+  about: string;
+}
+
 /** A touchable body and its loop, once per connection, server to page. */
 export interface Hello {
   protocol: number;
+  version: number;
   name: string;
   inputs: RangeInfo[];
   parameters: RangeInfo[];
@@ -122,6 +143,55 @@ export interface Shown {
   reach: number;
 }
 
+/** The stage of the work on a part, server to page. */
+export interface PartNews {
+  protocol: number;
+  name: string;
+  stage: string;
+  words: string;
+  version: number;
+}
+
+/** A part and the choices that were made for it, server to page. */
+export interface PartFacts {
+  file: string;
+  unit: string;
+  size: Vec3;
+  faces: FaceInfo[];
+  whole: boolean;
+  materials: MaterialInfo[];
+  laws: string[];
+  choices: Record<string, unknown>;
+  notes: string[];
+}
+
+/** The choices with which the solves shall begin, page to server. Quantities are texts with units. */
+export interface StartWish {
+  material: string;
+  law: string;
+  young: string;
+  poisson: string;
+  radius: string;
+  depth: string;
+}
+
+/** The answer to `StartWish`, server to page: a problem in a sentence or two, or nothing where the work begins. */
+export interface Answer {
+  problem: string;
+}
+
+/** The state of solving and learning, server to page. */
+export interface LearningProgress {
+  phase: string;
+  solves: number;
+  target: number;
+  error_median: number | null;
+  error_p95: number | null;
+  places: Vec3[];
+  seconds: number;
+  report: boolean;
+}
+
 export function isHello(message: { kind: string }): message is Hello & { kind: string } {
   return message.kind === "Hello";
 }
@@ -146,10 +216,32 @@ export function isShown(message: { kind: string }): message is Shown & { kind: s
   return message.kind === "Shown";
 }
 
+export function isPartNews(message: { kind: string }): message is PartNews & { kind: string } {
+  return message.kind === "PartNews";
+}
+
+export function isPartFacts(message: { kind: string }): message is PartFacts & { kind: string } {
+  return message.kind === "PartFacts";
+}
+
+export function isStartWish(message: { kind: string }): message is StartWish & { kind: string } {
+  return message.kind === "StartWish";
+}
+
+export function isAnswer(message: { kind: string }): message is Answer & { kind: string } {
+  return message.kind === "Answer";
+}
+
+export function isLearningProgress(message: { kind: string }): message is LearningProgress & { kind: string } {
+  return message.kind === "LearningProgress";
+}
+
 export const FRAME = 1;
 
 /** One picture of the loop and of a touched body, server to page. */
 export interface Frame {
+  /** of the body that this picture is drawn with, as in Hello */
+  version: number;
   /** counts the loop's ticks */
   tick: number;
   /** s, when the frame was composed, on the loop's clock */
@@ -215,6 +307,7 @@ export interface Frame {
 }
 
 const FRAME_LAYOUT: Layout = [
+  ["version", "u16"],
   ["tick", "f64"],
   ["time", "f64"],
   ["echo", "f64"],
@@ -415,3 +508,96 @@ const STOPWISH_LAYOUT: Layout = [
 
 export const encodeStopWish = (m: StopWish): ArrayBuffer => encode(STOPWISH, STOPWISH_LAYOUT, m);
 export const decodeStopWish = (buffer: ArrayBuffer): StopWish => decode<StopWish>(STOPWISH_LAYOUT, buffer);
+
+export const PICKS = 9;
+
+/** Triangles that were picked on a part's surface, page to server. */
+export interface Picks {
+  /** a Role, held or touched */
+  role: number;
+  /** the first piece of this role; others are added to it */
+  first: boolean;
+  /** indices into the part's triangles */
+  triangles: Float32Array;
+}
+
+const PICKS_LAYOUT: Layout = [
+  ["role", "u8"],
+  ["first", "flag"],
+  ["triangles", "floats"],
+];
+
+export const encodePicks = (m: Picks): ArrayBuffer => encode(PICKS, PICKS_LAYOUT, m);
+export const decodePicks = (buffer: ArrayBuffer): Picks => decode<Picks>(PICKS_LAYOUT, buffer);
+
+export const ENDWISH = 10;
+
+/** The wish that no more solves begin, because the surrogate is good enough; page to server. */
+export interface EndWish {
+  /** always true */
+  sure: boolean;
+}
+
+const ENDWISH_LAYOUT: Layout = [
+  ["sure", "flag"],
+];
+
+export const encodeEndWish = (m: EndWish): ArrayBuffer => encode(ENDWISH, ENDWISH_LAYOUT, m);
+export const decodeEndWish = (buffer: ArrayBuffer): EndWish => decode<EndWish>(ENDWISH_LAYOUT, buffer);
+
+export const READY = 11;
+
+/** The news that the page has the surface and fields of a version of the body, page to server. */
+export interface Ready {
+  /** of the body, as in Hello */
+  version: number;
+}
+
+const READY_LAYOUT: Layout = [
+  ["version", "u16"],
+];
+
+export const encodeReady = (m: Ready): ArrayBuffer => encode(READY, READY_LAYOUT, m);
+export const decodeReady = (buffer: ArrayBuffer): Ready => decode<Ready>(READY_LAYOUT, buffer);
+
+export const PARTFACES = 12;
+
+/** The faces that a part's triangles belong to, and what each is there for at first; server to page. */
+export interface PartFaces {
+  /** index into PartFacts.faces for each triangle */
+  faces: Float32Array;
+  /** a Role for each triangle */
+  roles: Float32Array;
+}
+
+const PARTFACES_LAYOUT: Layout = [
+  ["faces", "floats"],
+  ["roles", "floats"],
+];
+
+export const encodePartFaces = (m: PartFaces): ArrayBuffer => encode(PARTFACES, PARTFACES_LAYOUT, m);
+export const decodePartFaces = (buffer: ArrayBuffer): PartFaces => decode<PartFaces>(PARTFACES_LAYOUT, buffer);
+
+export const TRUSTMAP = 13;
+
+/** The map of how well the force is known over the touched surface, server to page. */
+export interface TrustMap {
+  /** m, of the ball at each point */
+  depth: number;
+  /** upper end of the colour scale */
+  high: number;
+  /** values are deviations; otherwise only the trained region is known */
+  known: boolean;
+  /** deviation of the force over the force at each point; -1 not touched, -2 not trained */
+  values: Float32Array;
+}
+
+const TRUSTMAP_LAYOUT: Layout = [
+  ["depth", "f32"],
+  ["high", "f32"],
+  ["known", "flag"],
+  ["values", "floats"],
+];
+
+export const encodeTrustMap = (m: TrustMap): ArrayBuffer => encode(TRUSTMAP, TRUSTMAP_LAYOUT, m);
+export const decodeTrustMap = (buffer: ArrayBuffer): TrustMap => decode<TrustMap>(TRUSTMAP_LAYOUT, buffer);

@@ -1,7 +1,11 @@
-// The entry of every page. The server says which one it is: of a touched body, or of a solved one that is looked at.
+// The entry of every page. The server says which one it is: of a touched body, of a solved one that is looked at, or of a part
+// that is set up and learnt.
 
+import { part } from "./part";
 import { shown } from "./shown";
 import { touch } from "./touch";
 
-if (document.documentElement.dataset["mode"] === "shown") shown();
+const mode = document.documentElement.dataset["mode"];
+if (mode === "shown") shown();
+else if (mode === "part") part();
 else touch();

@@ -70,6 +70,16 @@ export class Panel {
       this.depth(slider.valueAsNumber);
     };
     this.depth(first);
+    this.describe(hello);
+  }
+
+  /** Another surrogate of the same body: sliders stay where they are. */
+  renew(hello: Hello): void {
+    this.hello = hello;
+    this.describe(hello);
+  }
+
+  private describe(hello: Hello): void {
     about(hello, [
       [hello.holds ? "largest trained displacement" : "deepest trained press", measured(hello.deepest, "m")],
       ["largest trained force", `${tidy(hello.force_max)} N`],

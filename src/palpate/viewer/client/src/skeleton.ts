@@ -4,17 +4,23 @@
 // press   one that is pressed by a probe
 // pad     one that is held by a pad
 // shown   a solved body that is looked at
+// setup   a part that is set up
+// work    a part that is solved and can't be touched yet
+//
+// What belongs to solving and learning is marked by data-learn, and seen beside any of them.
 
 import { element } from "./units";
 import type { View } from "./view";
 
-export type Mode = "line" | "press" | "pad" | "shown";
+export type Mode = "line" | "press" | "pad" | "shown" | "setup" | "work";
 
 const LABELS: Record<Mode, string> = {
   line: "The body. Arrow keys pull the held end, Escape lets it go.",
   press: "The body. Hold the space bar to press, arrow keys move the probe, Page Up and Page Down change the depth.",
   pad: "The body. Arrow keys pull the pad, Escape lets it go.",
   shown: "The body. Arrow keys left and right change the state, the mouse turns it.",
+  setup: "The body, which can be touched later.",
+  work: "The body, which can be touched later.",
 };
 
 /** Show the parts that belong to a mode; at first none of them are seen. */
@@ -26,8 +32,11 @@ export function mode(name: Mode): void {
 }
 
 /** Keep a view fitting its canvas and the theme; `recolour` hears of a new theme as well. */
-export function watch(view: () => View | null, recolour: () => void = () => {}): void {
-  const canvas = element("view");
+export function watch(
+  view: () => View | null,
+  recolour: () => void = () => {},
+  canvas: HTMLElement = element("view"),
+): void {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
     view()?.recolour();
     recolour();

@@ -6,9 +6,11 @@ import {
   BufferGeometry,
   DoubleSide,
   Float32BufferAttribute,
+  InstancedMesh,
   LessDepth,
   LineBasicMaterial,
   LineSegments,
+  Matrix4,
   Mesh,
   MeshBasicMaterial,
   MeshLambertMaterial,
@@ -31,6 +33,8 @@ const STANCE = {
   sunFrom: new Vector3(-1.1, -0.55, 1.0), // low, so that a shallow dent has a bright and a dark side
 };
 
+const DOT = 0.006; // of the body's size, radius of a dot
+
 export interface Layers {
   ghost: boolean;
   mesh: boolean;
@@ -45,7 +49,7 @@ export interface Probe {
 export class SurfaceView extends View {
   readonly cell: number; // m, spacing of the floor's grid
 
-  private readonly geometry = new BufferGeometry();
+  protected readonly geometry = new BufferGeometry();
   private readonly position: BufferAttribute;
   private readonly colour: BufferAttribute;
   protected readonly body: Mesh<BufferGeometry, MeshPhongMaterial>;
@@ -59,6 +63,7 @@ export class SurfaceView extends View {
   private colours = palette();
   private readonly low = new Vector3().setScalar(Infinity);
   private readonly high = new Vector3().setScalar(-Infinity);
+  private dots: InstancedMesh<SphereGeometry, MeshBasicMaterial> | null = null;
   protected roof: number; // m, room that a view leaves above the body
 
   constructor(
@@ -139,6 +144,21 @@ export class SurfaceView extends View {
     this.dirty = true;
   }
 
+  /** Draw dots at places (m) of the surface at rest. */
+  mark(places: readonly Vec3[]): void {
+    if (this.dots) {
+      this.scene.remove(this.dots);
+      this.dots.dispose();
+    }
+    const size = DOT * this.across();
+    this.dots = new InstancedMesh(new SphereGeometry(size, 12, 8), new MeshBasicMaterial(), places.length);
+    this.dots.material.color.set(css("--ink"));
+    places.forEach((place, i) => this.dots!.setMatrixAt(i, new Matrix4().makeTranslation(...place)));
+    this.dots.frustumCulled = false;
+    this.scene.add(this.dots);
+    this.dirty = true;
+  }
+
   /** Set the share of the colour scale at which there is nothing to show. */
   neutral(none: number): void {
     this.colours = palette(none);
@@ -151,6 +171,7 @@ export class SurfaceView extends View {
     this.still.material.color.set(css("--soft"));
     this.fixed.material.color.set(css("--accent-2"));
     this.floor.material.color.set(css("--grid"));
+    this.dots?.material.color.set(css("--ink"));
     this.probe.material.color.set(css("--accent"));
     this.probe.material.emissive.set(css("--accent")).multiplyScalar(0.25);
     this.dirty = true;

@@ -6,7 +6,7 @@ import { Connection } from "./connection";
 import { describe, say, status, warn } from "./flags";
 import { Pads } from "./gamepad";
 import { LineView } from "./line_view";
-import type { Frame, Hello } from "./messages";
+import type { Frame, Hello, Vec3 } from "./messages";
 import { Panel } from "./panel";
 import { Drops, feel } from "./reason";
 import { Recorder } from "./recorder";
@@ -18,7 +18,16 @@ const SAME = 1e-9; // what differs by less is drawn alike
 
 const canvas = element<HTMLCanvasElement>("view");
 
-export function touch(): void {
+/** A touched body, for the page of a part that is learnt meanwhile. */
+export interface Touched {
+  /** Draw dots where solves are done, m. */
+  mark(places: readonly Vec3[]): void;
+  /** Version of the body that is drawn; 0 before the first picture. */
+  readonly version: number;
+}
+
+/** Show a touched body; `changed` hears of each version of it once it is drawn. */
+export function touch(renewed: (version: number) => void = () => {}): Touched {
   const panel = new Panel();
   let hello: Hello | null = null;
   let body: Body | null = null;
@@ -27,6 +36,9 @@ export function touch(): void {
   let pads: Pads | null = null; // of the page's own hand
   let lastFrame = 0;
   let ticked = 0;
+  let places: readonly Vec3[] = [];
+  let drawable = 0; // version of the body
+  let next: { version: number; take: () => void; hello: Hello } | null = null; // comes with the first picture of it
 
   const connection = new Connection({
     hello: start,
@@ -40,6 +52,10 @@ export function touch(): void {
   const recorder = new Recorder((wanted) => connection.record(wanted));
 
   function start(news: Hello): void {
+    if (hello && body?.renew && news.version > hello.version && news.name === hello.name) {
+      renew(news).catch((error: unknown) => say(`The body can't be shown: ${String(error)}.`, "calm"));
+      return;
+    }
     if (hello && JSON.stringify(hello) !== JSON.stringify(news)) {
       location.reload(); // the server is back with another body: a fresh page is simpler than a changed one
       return;
@@ -66,7 +82,28 @@ export function touch(): void {
     await body.open(); // without WebGL this fails, and the numbers are still shown
     notes();
     body.view!.look(); // now that the words stand where they will
+    body.mark?.(places);
     if (latest) show(latest);
+    drawable = news.version;
+    renewed(drawable);
+  }
+
+  /** A later surrogate: fetch what draws it, while the one before is still drawn. */
+  async function renew(news: Hello): Promise<void> {
+    const take = await body!.renew!(news);
+    next = { version: news.version, take, hello: news };
+    connection.ready(news.version);
+  }
+
+  /** Change to the surrogate that a frame is drawn with, where it is the next one. */
+  function follow(frame: Frame): void {
+    if (!next || frame.version !== next.version) return;
+    hello = next.hello;
+    next.take();
+    panel.renew(hello);
+    drawable = next.version;
+    next = null;
+    renewed(drawable);
   }
 
   function notes(): void {
@@ -106,6 +143,7 @@ export function touch(): void {
     drops.show();
     const now = performance.now();
     if (frame) {
+      follow(frame);
       [latest, lastFrame] = [frame, now];
       describe(frame, drops.without);
       if (changed(frame, drawn)) show(frame);
@@ -142,6 +180,15 @@ export function touch(): void {
     notes();
   });
   requestAnimationFrame(picture);
+  return {
+    mark: (news) => {
+      places = news;
+      body?.mark?.(places);
+    },
+    get version() {
+      return drawable;
+    },
+  };
 }
 
 /** The force in words beside the arrow's end, where it hides neither the arrow nor what is held. */

@@ -99,6 +99,13 @@ export abstract class View {
     this.dirty = true;
   }
 
+  /** Free what the browser holds for this view, which is not used any more. */
+  dispose(): void {
+    this.controls.dispose();
+    this.renderer.dispose();
+    this.renderer.forceContextLoss();
+  }
+
   /** True while the mouse and fingers turn the view. */
   set turnable(on: boolean) {
     this.controls.enabled = on;

@@ -1,0 +1,249 @@
+"""A part on the page of `palpate touch`: what its study shows there, and the study of what a person chooses there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from palpate.errors import UsageError
+from palpate.format import millimetres, pressure
+from palpate.physics import ImportedMesh, named_material
+from palpate.physics.materials.library import MATERIALS
+from palpate.physics.shapes.body_file import apply_patches
+from palpate.physics.shapes.mesh import BodyMesh
+from palpate.physics.shapes.naming import members
+from palpate.physics.shapes.triangle_list import triangle_text
+from palpate.study.interaction_records import ProbeRecord
+from palpate.study.material_records import SolidMaterialRecord
+from palpate.study.part_records import PartRecord
+from palpate.study.part_study import HELD, TOUCHED
+from palpate.study.study import Study
+from palpate.study.toml import complaints
+
+if TYPE_CHECKING:
+    from palpate.viewer.shown_part import PartChoices, ShownPart
+
+__all__ = ["LAWS", "chosen_study", "shown_part"]
+
+LAWS = ("neo-hookean", "st-venant-kirchhoff", "linear-elastic")
+"""Laws that take Young's modulus and Poisson's ratio alone."""
+
+
+def shown_part(study: Study) -> ShownPart:
+    """Return the part of a study as the page shows it, with the study's choices as those made at first.
+
+    Parameters
+    ----------
+    study : Study
+        A study of a part under a ball, as `part_study` makes it.
+    """
+    from palpate.viewer.shown_part import PartChoices, ShownPart
+
+    body, acting = _parts(study)
+    bare = body.bare()
+    skin, names = bare.skin, _names(body)
+    own = body.material if isinstance(body.material, SolidMaterialRecord) else None
+    plain = own if own is not None and own.law in LAWS and own.young is not None else None
+    return ShownPart(
+        name=study.name,
+        file=Path(body.file).name,
+        unit=body.unit or "",
+        points=skin.points,
+        triangles=skin.triangles,
+        face_of=skin.surface_of,
+        faces=skin.surfaces,
+        held=_marked(names, body.fixed_names()),
+        touched=_marked(names, (acting.touches,)),
+        choices=PartChoices(
+            material=body.material if isinstance(body.material, str) else "",
+            law=plain.law if plain else LAWS[0],
+            young=plain.young if plain and plain.young else 10e3,
+            poisson=plain.poisson if plain else 0.45,
+            radius=acting.radius,
+            depth=acting.depth[1],
+        ),
+        whole=bool(getattr(bare, "is_step", False)),
+        materials={name: _about(name) for name in MATERIALS if _is_for_solids(name)},
+        laws=LAWS,
+        notes=tuple(bare.notes),
+    )
+
+
+def chosen_study(study: Study, choices: PartChoices) -> Study:
+    """Return the study of a part with the choices of a person in place of its own.
+
+    Parameters
+    ----------
+    study : Study
+        The study that `shown_part` has shown.
+    choices : PartChoices
+        Choices of the page.
+
+    Raises
+    ------
+    UsageError
+        If they don't fit: nothing is held or touched, the ball or its depth is too large, elements are larger than
+        the ball, or the material can't be.
+    """
+    body, acting = _parts(study)
+    skin = body.bare().skin
+    held, touched, surfaces, fixed, touches = _picked(body, acting, skin, choices)
+    _require_surfaces(held, touched)
+    _require_room(body, skin, touched, choices)
+    least = float(f"{acting.depth[0] * choices.depth / acting.depth[1]:.6g}")
+    content = study.model_dump()
+    content["body"] |= {
+        "surfaces": surfaces,
+        "fixed": fixed,
+        "material": _material(body, choices),
+    }
+    content["interaction"] |= {"touches": touches, "radius": choices.radius, "depth": (least, choices.depth)}
+    try:
+        return Study.model_validate(content)
+    except ValidationError as error:
+        raise UsageError(" ".join(complaints(error)), fix="Change it on the page.") from error
+
+
+def _parts(study: Study) -> tuple[PartRecord, ProbeRecord]:
+    """Return body and interaction of a study of a part under a ball."""
+    body, acting = study.body, study.interaction
+    if not isinstance(body, PartRecord) or not isinstance(acting, ProbeRecord):
+        raise UsageError(
+            f"The study {study.name} is not of a part under a ball.",
+            why="Only such a study is set up on the page.",
+            fix="Carry it out with `palpate study`, and look at it with `palpate view`.",
+        )
+    return body, acting
+
+
+def _names(body: PartRecord) -> np.ndarray:
+    """Return the name of the surface that each triangle (t,) belongs to, by file and study."""
+    bare = body.bare()
+    skin, patches = bare.skin, body.patches(bare)
+    if getattr(bare, "is_step", False):  # whole faces are named, by their centres
+        centres = np.array([face.centre for face in bare.faces])
+        names, index = apply_patches(skin.surfaces, np.arange(len(skin.surfaces)), centres, patches)
+        index = index[skin.surface_of]
+    else:
+        centres = skin.points[skin.triangles].mean(axis=1)
+        names, index = apply_patches(skin.surfaces, skin.surface_of, centres, patches, skin.normals)
+    return np.asarray(np.array(names, dtype=object)[index])
+
+
+def _marked(names: np.ndarray, wanted: Sequence[str]) -> np.ndarray:
+    """Return which triangles (t,) belong to surfaces, of which one may be a group."""
+    known = tuple(dict.fromkeys(names.tolist()))
+    chosen = {name for group in wanted for name in members(group, known)}
+    return np.array([name in chosen for name in names.tolist()], dtype=bool)
+
+
+def _picked(
+    body: PartRecord, acting: ProbeRecord, skin: BodyMesh, choices: PartChoices
+) -> tuple[np.ndarray, np.ndarray, list[dict[str, Any]], Any, str]:
+    """Return what is held and touched as masks (t,), the named surfaces, the names that are held, and that touched."""
+    names = _names(body)
+    held, touched = _marked(names, body.fixed_names()), _marked(names, (acting.touches,))
+    surfaces = [surface.model_dump() for surface in body.surfaces]
+    fixed, touches = body.fixed, acting.touches
+    if choices.held is None and choices.touched is None:
+        return held, touched, surfaces, fixed, touches
+    for role, picked in ((TOUCHED, choices.touched), (HELD, choices.held)):
+        if picked is None:
+            continue
+        mask = np.zeros(len(skin.triangles), dtype=bool)
+        mask[picked] = True
+        if role == HELD:
+            held = mask
+        else:
+            touched = mask
+        faces = _whole_faces(skin, mask)
+        name = _free_name(role, skin)
+        surfaces = [surface for surface in surfaces if surface["name"] != name]
+        if mask.any():
+            surfaces.append(
+                {"name": name, "faces": faces}
+                if faces
+                else {"name": name, "triangles": triangle_text(np.flatnonzero(mask), len(mask))}
+            )
+        if role == HELD:
+            fixed = name
+        else:
+            touches = name
+    return held, touched & ~held, surfaces, fixed, touches
+
+
+def _whole_faces(skin: BodyMesh, mask: np.ndarray) -> tuple[str, ...]:
+    """Return the names of the faces that make up a mask (t,) of triangles; nothing where one is only in part in it."""
+    numbers = np.unique(skin.surface_of[mask])
+    if not np.array_equal(np.isin(skin.surface_of, numbers), mask):
+        return ()
+    return tuple(skin.surfaces[number] for number in numbers)
+
+
+def _free_name(role: str, skin: BodyMesh) -> str:
+    """Return the name for what was picked; one that no face of the file has."""
+    return role if role not in skin.surfaces else f"{role} by hand"
+
+
+def _require_surfaces(held: np.ndarray, touched: np.ndarray) -> None:
+    if not held.any():
+        raise UsageError(
+            "Nothing is held.", fix="Pick the faces that the part rests on, or where it is clamped, as held."
+        )
+    if not touched.any():
+        raise UsageError("Nothing is touched.", fix="Pick the faces that the ball shall press as touched.")
+
+
+def _require_room(body: PartRecord, skin: BodyMesh, touched: np.ndarray, choices: PartChoices) -> None:
+    """Refuse a ball or a depth that the part leaves no room for, and elements that are larger than the ball."""
+    low, high = skin.corners
+    least, longest = float((high - low).min()), float((high - low).max())
+    if 2 * choices.radius > longest:
+        raise UsageError(
+            f"The ball, {millimetres(2 * choices.radius)} across, is larger than the part, {millimetres(longest)}.",
+            fix="Choose a smaller radius.",
+        )
+    if choices.depth >= least:
+        raise UsageError(
+            f"The depth of {millimetres(choices.depth)} is more than the part is thick, {millimetres(least)}.",
+            fix="Choose a smaller depth.",
+        )
+    if isinstance(body.bare(), ImportedMesh):
+        corners = skin.points[skin.triangles[touched]]
+        size = float(np.median(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)))
+        if size > 2 * choices.radius:
+            raise UsageError(
+                f"The elements of the mesh, {millimetres(size)}, are larger than the ball, "
+                f"{millimetres(2 * choices.radius)}.",
+                fix="Choose a larger ball, or a finer mesh.",
+            )
+
+
+def _material(body: PartRecord, choices: PartChoices) -> Any:
+    """Return the material of the choices; that of the study where it is the one shown."""
+    if choices.material:
+        return choices.material
+    own = body.material
+    if isinstance(own, SolidMaterialRecord) and own.law not in LAWS:
+        return own.model_dump(exclude_none=True)
+    return {
+        "law": choices.law,
+        "young": choices.young,
+        "poisson": choices.poisson,
+        "name": "neo-Hookean" if choices.law == LAWS[0] else choices.law,
+    }
+
+
+def _is_for_solids(name: str) -> bool:
+    """Return whether a material of the library can be that of a solid that is learnt from rest."""
+    return not hasattr(named_material(name), "hardening")
+
+
+def _about(name: str) -> str:
+    material = named_material(name)
+    young = 2 * material.shear_modulus * (1 + material.poisson)
+    return f"{type(material).__name__}, Young's modulus {pressure(young)} at small strains"

@@ -1,0 +1,73 @@
+// How far solves and learning are: phase, error against unseen solves, target, time; and the wish that they end.
+
+import type { LearningProgress } from "./messages";
+import { element, share, tidy } from "./units";
+
+const TOAST = 6000; // ms that an improvement is shown on the picture
+
+export class Learning {
+  private latest: LearningProgress | null = null;
+  private since = 0; // ms, when it came
+  private shown = NaN; // force error of the body that is drawn
+  private ended = false;
+
+  constructor(enough: () => void) {
+    element("enough").addEventListener("click", () => {
+      element<HTMLButtonElement>("enough").disabled = true;
+      enough();
+    });
+    setInterval(() => this.clock(), 500);
+  }
+
+  hear(news: LearningProgress): void {
+    [this.latest, this.since] = [news, performance.now()];
+    document.documentElement.dataset["learning"] = "";
+    element("phase").textContent = news.phase;
+    element("solves").textContent = String(news.solves);
+    element("error-target").textContent = share(news.target);
+    element("report-link").hidden = !news.report;
+    this.errors();
+    this.clock();
+  }
+
+  /** No more solves come. */
+  end(words: string): void {
+    this.ended = true;
+    element("enough").hidden = true;
+    if (words) element("phase").textContent = words;
+    this.clock();
+  }
+
+  private errors(): void {
+    const { latest } = this;
+    if (!latest || latest.error_p95 === null) return;
+    const error = latest.error_p95;
+    element("error-p95").textContent = tidy(100 * error, 2);
+    element("error-median").textContent = latest.error_median === null ? "–" : share(latest.error_median);
+    if (error !== this.shown && !Number.isNaN(this.shown)) {
+      const words = `${error < this.shown ? "improved" : "changed"}: ${share(this.shown)} → ${share(error)}`;
+      element("improved").textContent = words;
+      document.documentElement.dataset["improved"] = words; // for programs that read the page
+      toast(words);
+    }
+    this.shown = error;
+  }
+
+  private clock(): void {
+    if (!this.latest) return;
+    const passed = this.latest.seconds + (this.ended ? 0 : (performance.now() - this.since) / 1000);
+    const [minutes, seconds] = [Math.floor(passed / 60), Math.floor(passed % 60)];
+    element("elapsed").textContent = `${minutes ? `${minutes} min ` : ""}${seconds} s since the start`;
+  }
+}
+
+let fading = 0;
+
+/** Say something on the picture for some seconds. */
+function toast(words: string): void {
+  const box = element("toast");
+  box.textContent = words;
+  box.hidden = false;
+  clearTimeout(fading);
+  fading = window.setTimeout(() => (box.hidden = true), TOAST);
+}

@@ -1,0 +1,169 @@
+// The page of a part: it is set up, then solved and learnt, and touched as soon as there is something to touch.
+
+import { say, status } from "./flags";
+import { Learning } from "./learning";
+import {
+  decodePartFaces,
+  decodeSurface,
+  encodeEndWish,
+  encodePicks,
+  isAnswer,
+  isLearningProgress,
+  isPartFacts,
+  isPartNews,
+  PROTOCOL,
+  Role,
+} from "./messages";
+import type { LearningProgress, PartFacts, PartNews, StartWish } from "./messages";
+import { PartView } from "./part_view";
+import { Setup } from "./setup";
+import { mode, watch } from "./skeleton";
+import { touch } from "./touch";
+import type { Touched } from "./touch";
+import { element, tidy } from "./units";
+
+const PIECE = 900; // triangles in a message: the server takes 4 kB
+const AGAIN = 1000; // ms until a lost connection is tried again
+
+const canvas = element<HTMLCanvasElement>("part-view");
+const root = document.documentElement;
+
+let socket: WebSocket;
+let view: PartView | null = null;
+let setup: Setup | null = null;
+let loading: Promise<PartFacts> | null = null;
+let touched: Touched | null = null;
+let news: PartNews | null = null;
+let progress: LearningProgress | null = null;
+const learning = new Learning(() => send(encodeEndWish({ sure: true })));
+
+export function part(): void {
+  mode("work");
+  status("connecting", "reading the part");
+  connect();
+  watch(() => view, undefined, canvas);
+  requestAnimationFrame(picture);
+}
+
+function connect(): void {
+  socket = new WebSocket(`ws://${location.host}/part`);
+  socket.onmessage = (event: MessageEvent<string>) => hear(JSON.parse(event.data) as { kind: string });
+  socket.onclose = () => {
+    if (!touched) status("lost", "disconnected, trying again");
+    setTimeout(connect, AGAIN);
+  };
+}
+
+function send(message: string | ArrayBuffer): void {
+  if (socket.readyState === WebSocket.OPEN) socket.send(message);
+}
+
+function hear(message: { kind: string }): void {
+  if (isPartNews(message)) turn(message);
+  if (isAnswer(message)) setup?.answer(message.problem);
+  if (!isLearningProgress(message)) return;
+  progress = message;
+  learning.hear(message);
+  element("model-line").textContent ||= message.phase;
+  if (touched) touched.mark(message.places);
+  else view?.mark(message.places);
+}
+
+function turn(message: PartNews): void {
+  if (message.protocol !== PROTOCOL || (news && (news.name !== message.name || news.version > message.version))) {
+    location.reload(); // another version of palpate, or another part
+    return;
+  }
+  news = message;
+  root.dataset["stage"] = message.stage;
+  document.title = `${message.name} · palpate`;
+  if (!touched) element("model-name").textContent = message.name;
+  if (message.stage === "choosing") choose();
+  if (message.stage === "working" || message.stage === "ended") work(message);
+}
+
+/** Show the part with all that can be chosen. */
+function choose(): void {
+  status("live", "set it up");
+  loading ??= open();
+  loading
+    .then((facts) => {
+      if (news?.stage !== "choosing") return;
+      mode("setup");
+      setup ??= new Setup(canvas, view!, facts, begin);
+      view!.look();
+    })
+    .catch(fail);
+}
+
+async function open(): Promise<PartFacts> {
+  const [facts, surface, faces] = await Promise.all([
+    get("part/facts").then((answer) => answer.json() as Promise<{ kind: string }>),
+    get("part/surface").then(async (answer) => decodeSurface(await answer.arrayBuffer())),
+    get("part/faces").then(async (answer) => decodePartFaces(await answer.arrayBuffer())),
+  ]);
+  if (!isPartFacts(facts)) throw new Error("the server speaks of something else");
+  view = new PartView(canvas, surface, faces, ["title", "tools", "scale-notes"].map(element));
+  element("model-line").textContent = `${facts.file}, ${facts.size.map((side) => tidy(1000 * side)).join(" × ")} mm`;
+  if (progress) view.mark(progress.places);
+  return facts;
+}
+
+function begin(wish: StartWish, held: number[] | null, chosen: number[] | null): void {
+  for (const [role, triangles] of [
+    [Role.HELD, held],
+    [Role.TOUCHED, chosen],
+  ] as const) {
+    if (!triangles) continue;
+    for (let at = 0; at === 0 || at < triangles.length; at += PIECE) {
+      const piece = Float32Array.from(triangles.slice(at, at + PIECE));
+      send(encodePicks({ role, first: at === 0, triangles: piece }));
+    }
+  }
+  send(JSON.stringify({ kind: "StartWish", ...wish }));
+}
+
+/** Solves run, or have ended; the body is touched once there is one. */
+function work(message: PartNews): void {
+  root.dataset["learning"] = "";
+  if (message.stage === "ended") learning.end(message.words);
+  else if (message.words) element("phase").textContent = message.words;
+  if (message.version > 0) {
+    touched ??= joinTouch();
+    return;
+  }
+  mode("work");
+  status("connecting", "solving");
+  loading ??= open();
+  loading.then(() => view?.look()).catch(fail);
+}
+
+function joinTouch(): Touched {
+  const joined = touch((version) => {
+    if (view) {
+      view.dispose();
+      view = null;
+    }
+    root.dataset["touching"] = String(version);
+  });
+  if (progress) joined.mark(progress.places);
+  return joined;
+}
+
+async function get(path: string): Promise<Response> {
+  const answer = await fetch(`./${path}`);
+  if (!answer.ok) throw new Error(`${path}: ${answer.status}`);
+  return answer;
+}
+
+function picture(): void {
+  if (root.dataset["touching"]) return; // the body is drawn by its own page
+  requestAnimationFrame(picture);
+  if (document.hidden || !view?.render()) return;
+  // for programs that drive the page: where some triangles are, in pixels of the window
+  root.dataset["partdrawn"] = "true";
+}
+
+function fail(error: unknown): void {
+  say(`The part can't be shown: ${String(error)}.`, "bad");
+}

@@ -1,0 +1,242 @@
+"""Every message of the page on which a part is set up and learnt, beside those of `messages`.
+
+The conversation, over a websocket of its own at ``/part``:
+
+1. The server says `PartNews` (JSON) at once and whenever the stage changes: reading the part, choosing, working,
+   ended. While it is chosen, the page asks for `PartFacts` (JSON) at ``/part/facts``, for the surface as `Surface` at
+   ``/part/surface`` and for `PartFaces` at ``/part/faces``.
+2. What was picked on the surface is sent as `Picks`, in pieces that are small enough for one message each; then
+   `StartWish` (JSON) says all other choices. The server answers each with an `Answer` (JSON).
+3. While solves run, `LearningProgress` (JSON) says how far they are. A page ends the work with `EndWish`.
+4. Where `PartNews.version` is not zero, the body can be touched: the page joins the conversation at ``/touch``. Each
+   later surrogate is announced there by a new `Hello` with a larger version; the page fetches that version's surface,
+   fields and `TrustMap` (at ``/trust``), and says `Ready`. From then on its frames are drawn with that version.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Annotated, ClassVar
+
+import numpy as np
+
+from palpate.viewer.messages import Vec3
+from palpate.viewer.wire import Binary, Json, Wire
+
+__all__ = [
+    "Answer",
+    "EndWish",
+    "FaceInfo",
+    "LearningProgress",
+    "MaterialInfo",
+    "PartFaces",
+    "PartFacts",
+    "PartNews",
+    "Picks",
+    "Ready",
+    "Role",
+    "StartWish",
+    "TrustMap",
+]
+
+
+class Role(IntEnum):
+    """The role of a triangle of a part's surface."""
+
+    FREE = 0
+    HELD = 1
+    TOUCHED = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Picks(Binary):
+    """Triangles that were picked on a part's surface, page to server."""
+
+    KIND: ClassVar[int] = 9
+
+    role: Annotated[int, Wire("u8", "a Role, held or touched")]
+    first: Annotated[bool, Wire("flag", "the first piece of this role; others are added to it")]
+    triangles: Annotated[np.ndarray, Wire("floats", "indices into the part's triangles")]
+
+
+@dataclass(frozen=True, eq=False)
+class EndWish(Binary):
+    """The wish that no more solves begin, because the surrogate is good enough; page to server."""
+
+    KIND: ClassVar[int] = 10
+
+    sure: Annotated[bool, Wire("flag", "always true")]
+
+
+@dataclass(frozen=True, eq=False)
+class Ready(Binary):
+    """The news that the page has the surface and fields of a version of the body, page to server."""
+
+    KIND: ClassVar[int] = 11
+
+    version: Annotated[int, Wire("u16", "of the body, as in Hello")]
+
+
+@dataclass(frozen=True, eq=False)
+class PartFaces(Binary):
+    """The faces that a part's triangles belong to, and what each is there for at first; server to page."""
+
+    KIND: ClassVar[int] = 12
+
+    faces: Annotated[np.ndarray, Wire("floats", "index into PartFacts.faces for each triangle")]
+    roles: Annotated[np.ndarray, Wire("floats", "a Role for each triangle")]
+
+
+@dataclass(frozen=True, eq=False)
+class TrustMap(Binary):
+    """The map of how well the force is known over the touched surface, server to page."""
+
+    KIND: ClassVar[int] = 13
+
+    depth: Annotated[float, Wire("f32", "m, of the ball at each point")]
+    high: Annotated[float, Wire("f32", "upper end of the colour scale")]
+    known: Annotated[bool, Wire("flag", "values are deviations; otherwise only the trained region is known")]
+    values: Annotated[
+        np.ndarray,
+        Wire("floats", "deviation of the force over the force at each point; -1 not touched, -2 not trained"),
+    ]
+
+
+@dataclass(frozen=True)
+class FaceInfo:
+    """A face of a part: its name, its area in m², and the middle of it in m."""
+
+    name: str
+    area: float
+    centre: Vec3
+
+
+@dataclass(frozen=True)
+class MaterialInfo:
+    """A material that can be asked for by name, with what there is to say of it in a few words."""
+
+    name: str
+    about: str
+
+
+@dataclass(frozen=True)
+class PartNews(Json):
+    """The stage of the work on a part, server to page.
+
+    Attributes
+    ----------
+    protocol : int
+        `PROTOCOL`: a page of another one reloads itself.
+    name : str
+        Of the part.
+    stage : str
+        ``reading`` the part, ``choosing``, ``working`` or ``ended``.
+    words : str
+        What goes on, in a sentence.
+    version : int
+        Version of the body that can be touched; 0 where there is none yet.
+    """
+
+    protocol: int
+    name: str
+    stage: str
+    words: str
+    version: int
+
+
+@dataclass(frozen=True)
+class PartFacts(Json):
+    """A part and the choices that were made for it, server to page.
+
+    Attributes
+    ----------
+    file, unit : str
+        Name of the file, and unit of its numbers; empty where the file states it.
+    size : (3,)
+        Lengths of the box around it, m.
+    faces : tuple of FaceInfo
+        Faces of the file, or parts of its surface between sharp edges.
+    whole : bool
+        Whether faces can be picked as a whole only.
+    materials : tuple of MaterialInfo
+        Materials that can be asked for by name.
+    laws : tuple of str
+        Laws that take Young's modulus and Poisson's ratio.
+    choices : StartWish
+        The choices made so far, as texts with units.
+    notes : tuple of str
+        What else there is to say, in sentences.
+    """
+
+    file: str
+    unit: str
+    size: Vec3
+    faces: tuple[FaceInfo, ...]
+    whole: bool
+    materials: tuple[MaterialInfo, ...]
+    laws: tuple[str, ...]
+    choices: Mapping[str, str]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class StartWish(Json):
+    """The choices with which the solves shall begin, page to server. Quantities are texts with units.
+
+    Attributes
+    ----------
+    material : str
+        Name of a material; empty where law and constants are given.
+    law, young, poisson : str
+        Law, Young's modulus and Poisson's ratio of an own material.
+    radius, depth : str
+        Of the ball, and how deep it presses at most.
+    """
+
+    material: str
+    law: str
+    young: str
+    poisson: str
+    radius: str
+    depth: str
+
+
+@dataclass(frozen=True)
+class Answer(Json):
+    """The answer to `StartWish`, server to page: a problem in a sentence or two, or nothing where the work begins."""
+
+    problem: str
+
+
+@dataclass(frozen=True)
+class LearningProgress(Json):
+    """The state of solving and learning, server to page.
+
+    Attributes
+    ----------
+    phase : str
+        What goes on, in words.
+    solves : int
+        Solves that are done.
+    target : float
+        Relative force error at the 95th percentile that ends the work.
+    error_median, error_p95 : float or null
+        Relative force error against solves that were kept apart, of the body that is touched; null before the first.
+    places : tuple of (3,)
+        Places on the surface where solves are done, m.
+    seconds : float
+        Time since the start, s.
+    report : bool
+        Whether there is a report at ``/report``.
+    """
+
+    phase: str
+    solves: int
+    target: float
+    error_median: float | None
+    error_p95: float | None
+    places: tuple[Vec3, ...]
+    seconds: float
+    report: bool

@@ -1,0 +1,424 @@
+"""The page of `palpate touch`: a part is set up on it, and touched while it is learnt better and better.
+
+The server starts at once; whoever carries out the solves tells the page what there is to show::
+
+    page = serve_part("kidney", on_start=begin)       # the page can be opened
+    page.show_part(part)                              # a person chooses, and presses "start": begin(choices)
+    page.show_progress(Progress("solving", ...))      # as often as there is news
+    page.show_body("kidney-12.palpate")               # the first starts the loop, each later one takes its place
+    page.stopped.is_set()                             # a person finds it good enough
+
+All of these may be called in any thread. What page and server say to each other stands in `part_messages`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import os
+import threading
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import FileResponse, HTMLResponse, Response
+from starlette.routing import BaseRoute, Route, WebSocketRoute
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from palpate.errors import PalpateError, UsageError
+from palpate.runtime import LoopProcess
+from palpate.runtime.touchable import load_touchable
+from palpate.viewer.compression import BinaryAnswers
+from palpate.viewer.messages import PROTOCOL
+from palpate.viewer.page_model import PageModel
+from palpate.viewer.part_messages import Answer, EndWish, LearningProgress, PartNews, Picks, Role, StartWish
+from palpate.viewer.server import body_routes
+from palpate.viewer.session import Session
+from palpate.viewer.shown_part import PartChoices, ShownPart, choices_of
+from palpate.viewer.solve_dots import on_surface
+from palpate.viewer.traffic import Bucket
+from palpate.viewer.web_server import STATIC, LocalServer, local_application
+from palpate.viewer.wire import Json
+
+__all__ = ["PartPage", "Progress", "serve_part"]
+
+logger = logging.getLogger("palpate.viewer")
+
+MOST_PAGES = 32
+PATIENCE = 1.0  # s that a page has to take news
+MESSAGES, MESSAGES_AT_ONCE = (
+    20.0,
+    200.0,
+)  # of a page, per second and at once; a start after long brushing takes fifty
+REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'"
+
+
+@dataclass(frozen=True, eq=False)
+class Progress:
+    """The state of solving and learning.
+
+    Attributes
+    ----------
+    phase : str
+        What goes on, in words: ``"meshing"``, ``"solve 7 of 12"``, ``"learning from 12 solves"``.
+    solves : int
+        Solves that are done.
+    target : float
+        Relative force error at the 95th percentile that ends the work.
+    error_median, error_p95 : float
+        Relative force error against solves kept apart, of the body shown; not-a-number before the first.
+    places : (k, 3) array
+        Centres of the ball in the solves that are done, m.
+    seconds : float
+        Time since the start, s.
+    report : path, optional
+        The report, once there is one.
+    """
+
+    phase: str
+    solves: int = 0
+    target: float = 0.02
+    error_median: float = float("nan")
+    error_p95: float = float("nan")
+    places: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    seconds: float = 0.0
+    report: str | os.PathLike[str] | None = None
+
+
+@dataclass(eq=False)
+class _Visitor:
+    """One page that is open, and what it has picked so far."""
+
+    socket: WebSocket
+    picks: dict[Role, list[np.ndarray]] = field(default_factory=dict)
+
+    def take(self, picks: Picks) -> None:
+        """Add a piece of what was picked."""
+        role = Role(picks.role)
+        if picks.first:
+            self.picks[role] = []
+        self.picks.setdefault(role, []).append(np.asarray(picks.triangles, dtype=np.int64))
+
+    def picked(self, role: Role, count: int) -> np.ndarray | None:
+        """Return the triangles of a role, of `count` that there are; None where nothing was changed."""
+        if role not in self.picks:
+            return None
+        chosen = np.unique(np.concatenate([*self.picks[role], np.zeros(0, dtype=np.int64)]))
+        return chosen[(chosen >= 0) & (chosen < count)]
+
+
+class PartPage(LocalServer):
+    """The page of a part that is set up, solved, learnt and touched, at `url` while the context lasts.
+
+    Parameters
+    ----------
+    name : str
+        Title of the page.
+    on_start : callable
+        Gets the `PartChoices` when a person presses *start*, in a thread of its own. Where they don't fit it raises a
+        `PalpateError`, which the page answers with; otherwise it returns at once, and the work goes on elsewhere.
+    port, host, strict_port, token
+        As for `Viewer`.
+    device : str
+        The real-time process's device: ``page`` is the page's own hand.
+    recordings : path
+        Folder for what is recorded by the page's button.
+
+    Attributes
+    ----------
+    stopped : threading.Event
+        Set when a person finds the body good enough: no more solves shall begin.
+    visited : threading.Event
+        Set when the first page has been opened.
+    loop : LoopProcess or None
+        The real-time process, once there is a body to touch.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        *,
+        on_start: Callable[[PartChoices], object],
+        port: int = 8080,
+        host: str = "127.0.0.1",
+        strict_port: bool = False,
+        token: bool = True,
+        device: str = "page",
+        recordings: str | os.PathLike[str] = ".",
+    ) -> None:
+        super().__init__(port, host, strict_port=strict_port, token=token)
+        self.name, self._on_start = name, on_start
+        self._device, self._recordings = device, Path(recordings)
+        self.stopped, self.visited = threading.Event(), threading.Event()
+        self.loop: LoopProcess | None = None
+        self._part: ShownPart | None = None
+        self._stage, self._words = "reading", "The part is being read."
+        self._progress: Progress | None = None
+        self._session: Session | None = None
+        self._version = 0
+        self._changing, self._starting = threading.Lock(), threading.Lock()
+        self._visitors: list[_Visitor] = []
+        self._events: asyncio.AbstractEventLoop | None = None
+        self._watcher: asyncio.Task[None] | None = None
+        self._parts = BinaryAnswers(keep=True)
+
+    @property
+    def caption(self) -> str:
+        """The part's name."""
+        return f"{self.name}. Set it up there, and touch it;"
+
+    def show_part(self, part: ShownPart) -> None:
+        """Show a part, on which a person now chooses what is held and touched."""
+        self._part = part
+        self._parts = BinaryAnswers(keep=True)
+        self._turn("choosing", "")
+
+    def show_progress(self, progress: Progress) -> None:
+        """Show how far solves and learning are; where nobody has pressed *start*, the work begins without."""
+        self._progress = progress
+        if self._stage not in {"working", "ended"}:
+            self._turn("working", "")
+        self._tell(self._learning(progress))
+
+    def show_body(self, path: str | os.PathLike[str]) -> None:
+        """Let the surrogate of a file be touched, in place of the one before if there was one.
+
+        Raises
+        ------
+        FileFormatError
+            If the file holds nothing that can be touched.
+        DeviceError
+            If the real-time process does not start.
+        """
+        with self._changing:
+            model = PageModel(load_touchable(path), self._version + 1)
+            if self.loop is None:
+                self._open(model, path)
+            else:
+                swapping: Any = self.loop
+                swapping.swap(path)
+                self._do(self._replace(model))
+            self._version = model.version
+        self._turn(self._stage if self._stage in {"working", "ended"} else "working", self._words)
+
+    def end(self, words: str) -> None:
+        """Say that no more solves come, and why; what is there can be touched on."""
+        self._turn("ended", words)
+
+    def _open(self, model: PageModel, path: str | os.PathLike[str]) -> None:
+        """Start the real-time process, and a session for its pages."""
+        self.loop = self._closing.enter_context(LoopProcess(path, device=self._device))
+        name = self._device.partition(":")[0]
+        driver = "" if name == "page" else f"the device {name}"
+        self._session = Session(model, self.loop, recordings=self._recordings, device=driver)
+        self._do(self._watch(self._session))
+
+    async def _watch(self, session: Session) -> None:
+        self._watcher = asyncio.create_task(session.watch())
+
+    async def _replace(self, model: PageModel) -> None:
+        if self._session is not None:
+            await self._session.replace(model)
+
+    def _application(self) -> Starlette:
+        @contextlib.asynccontextmanager
+        async def lifespan(_: Starlette) -> AsyncIterator[None]:
+            self._events = asyncio.get_running_loop()
+            yield
+            if self._watcher is not None:
+                self._watcher.cancel()
+                await asyncio.gather(self._watcher, return_exceptions=True)
+
+        return local_application([*self._routes(), *body_routes(lambda: self._session)], lifespan=lifespan)
+
+    def _routes(self) -> list[BaseRoute]:
+        skeleton = (STATIC / "index.html").read_text(encoding="utf-8")
+        html = skeleton.replace('data-mode="touch"', 'data-mode="part"')
+
+        def part() -> ShownPart:
+            if self._part is None:
+                raise HTTPException(404)
+            return self._part
+
+        async def page(_: Request) -> Response:
+            return HTMLResponse(html)
+
+        async def facts(_: Request) -> Response:
+            text = await run_in_threadpool(lambda: part().facts().to_json())
+            return Response(text, media_type="application/json")
+
+        async def surface(request: Request) -> Response:
+            return await self._parts.answer(request, "surface", part().surface.pack)
+
+        async def faces(request: Request) -> Response:
+            return await self._parts.answer(request, "faces", lambda: part().picks().pack())
+
+        async def report(_: Request) -> Response:
+            path = self._progress.report if self._progress is not None else None
+            if path is None or not Path(path).is_file():
+                raise HTTPException(404)
+            headers = {"content-security-policy": REPORT_POLICY}
+            return FileResponse(path, media_type="text/html", headers=headers)
+
+        return [
+            Route("/", page),
+            Route("/part/facts", facts),
+            Route("/part/surface", surface),
+            Route("/part/faces", faces),
+            Route("/report", report),
+            WebSocketRoute("/part", self._talk),
+        ]
+
+    async def _talk(self, socket: WebSocket) -> None:
+        """Hold the conversation with one page."""
+        await socket.accept()
+        if len(self._visitors) >= MOST_PAGES:
+            await socket.close(1013)
+            return
+        visitor, heard = _Visitor(socket), Bucket(MESSAGES, MESSAGES_AT_ONCE)
+        self._visitors.append(visitor)
+        self.visited.set()
+        try:
+            await socket.send_text(self._news().to_json())
+            if self._progress is not None:
+                await socket.send_text(self._learning(self._progress).to_json())
+            while True:
+                message = await socket.receive()
+                if message["type"] == "websocket.disconnect":
+                    return
+                await self._take(visitor, message)
+                await asyncio.sleep(heard.take())
+        except WebSocketDisconnect:
+            pass
+        except UsageError as error:
+            logger.warning("a page was sent away: %s", error)
+            await socket.close(1003, error.what)
+        finally:
+            self._visitors.remove(visitor)
+
+    async def _take(self, visitor: _Visitor, message: Any) -> None:
+        """Take one message of a page."""
+        data = message.get("bytes")
+        if data is None:
+            wish = StartWish.from_json(message.get("text") or "")
+            answer = await run_in_threadpool(self._start_by, visitor, wish)
+            await visitor.socket.send_text(answer.to_json())
+        elif data[:1] == bytes([EndWish.KIND]):
+            EndWish.unpack(data)
+            self.stopped.set()
+            self._turn(self._stage, "No more solves begin; what is done is kept.")
+        else:
+            picks = Picks.unpack(data)
+            if picks.role not in {Role.HELD, Role.TOUCHED}:
+                raise UsageError(f"A page picked triangles for the role {picks.role}.")
+            visitor.take(picks)
+
+    def _start_by(self, visitor: _Visitor, wish: StartWish) -> Answer:
+        """Begin with what a page has chosen; return what does not fit."""
+        with self._starting:
+            if self._part is None or self._stage != "choosing":
+                return Answer("The work has begun already, by another page." if self._part else "")
+            count = len(self._part.triangles)
+            held, touched = visitor.picked(Role.HELD, count), visitor.picked(Role.TOUCHED, count)
+            try:
+                self._on_start(choices_of(wish, held, touched))
+            except PalpateError as error:
+                return Answer(" ".join(filter(None, (error.what, error.why, error.fix))))
+            if self._stage == "choosing":
+                self._turn("working", "")
+            return Answer("")
+
+    def _news(self) -> PartNews:
+        return PartNews(PROTOCOL, self.name, self._stage, self._words, self._version)
+
+    def _learning(self, progress: Progress) -> LearningProgress:
+        places = np.asarray(progress.places, dtype=float).reshape(-1, 3)
+        if self._part is not None:
+            places = on_surface(self._part, places)
+        median, p95 = (
+            float(e) if np.isfinite(e) else None for e in (progress.error_median, progress.error_p95)
+        )
+        return LearningProgress(
+            phase=progress.phase,
+            solves=progress.solves,
+            target=progress.target,
+            error_median=median,
+            error_p95=p95,
+            places=tuple((x, y, z) for x, y, z in places.tolist()),
+            seconds=progress.seconds,
+            report=progress.report is not None,
+        )
+
+    def _turn(self, stage: str, words: str) -> None:
+        """Go on to a stage, and tell all pages."""
+        self._stage, self._words = stage, words
+        self._tell(self._news())
+
+    def _tell(self, news: Json) -> None:
+        """Send a message to all pages, from any thread."""
+        self._do(self._tell_all(news.to_json()))
+
+    async def _tell_all(self, text: str) -> None:
+        async def tell(visitor: _Visitor) -> None:
+            with contextlib.suppress(WebSocketDisconnect, RuntimeError, TimeoutError):
+                await asyncio.wait_for(visitor.socket.send_text(text), PATIENCE)
+
+        await asyncio.gather(*map(tell, list(self._visitors)))
+
+    def _do(self, work: Any) -> None:
+        """Let the server's thread carry out a coroutine; nothing happens where the server has ended."""
+        events = self._events
+        if events is None or events.is_closed():
+            work.close()
+            return
+        asyncio.run_coroutine_threadsafe(work, events)
+
+
+def serve_part(
+    name: str,
+    *,
+    on_start: Callable[[PartChoices], object],
+    part: ShownPart | None = None,
+    port: int = 8080,
+    host: str = "127.0.0.1",
+    strict_port: bool = False,
+    token: bool = True,
+    device: str = "page",
+    recordings: str | os.PathLike[str] = ".",
+) -> PartPage:
+    """Start the page of a part; it can be opened when this returns.
+
+    Parameters
+    ----------
+    part : ShownPart, optional
+        What is shown at first; by default the page says that the part is being read, until `PartPage.show_part`.
+
+    Returns
+    -------
+    PartPage
+        Running; its `stop` ends it.
+
+    Notes
+    -----
+    The other parameters and the errors are those of `PartPage`, which is a context manager.
+    """
+    page = PartPage(
+        name,
+        on_start=on_start,
+        port=port,
+        host=host,
+        strict_port=strict_port,
+        token=token,
+        device=device,
+        recordings=recordings,
+    ).start()
+    if part is not None:
+        page.show_part(part)
+    return page

@@ -1,0 +1,233 @@
+"""A part on the page on which it is set up: its surface, and the choices that a person makes there.
+
+ShownPart    surface, faces, and what is chosen at first
+PartChoices  what a person has chosen
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.units import to_si
+from palpate.viewer.messages import Surface
+from palpate.viewer.part_messages import (
+    FaceInfo,
+    MaterialInfo,
+    PartFaces,
+    PartFacts,
+    Role,
+    StartWish,
+)
+from palpate.viewer.surfaces import split
+
+__all__ = ["PartChoices", "ShownPart", "as_wish", "choices_of"]
+
+_BARE = re.compile(r"[-+]?[\d.]+([eE][-+]?\d+)?")
+
+
+@dataclass(frozen=True, eq=False)
+class PartChoices:
+    """The choices of a person for a part.
+
+    Attributes
+    ----------
+    material : str
+        Name of a material of the library; empty where law and constants are given.
+    law : str
+        Law of an own material.
+    young : float
+        Its Young's modulus, Pa.
+    poisson : float
+        Its Poisson's ratio.
+    radius : float
+        Radius of the ball, m.
+    depth : float
+        Largest depth of the ball, m.
+    held, touched : (k,) int array or None
+        Triangles of the part that are held, and that are touched; None where nobody has changed what was chosen
+        at first.
+    """
+
+    material: str
+    law: str
+    young: float
+    poisson: float
+    radius: float
+    depth: float
+    held: np.ndarray | None = None
+    touched: np.ndarray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class ShownPart:
+    """A part to set up: its surface as triangles, its faces, and the choices made for it at first.
+
+    Attributes
+    ----------
+    name : str
+        Title of the page.
+    file, unit : str
+        Name of the file, and unit of its numbers; empty where the file states it.
+    points : (n, 3) array
+        Corners of the triangles, m, z up.
+    triangles : (t, 3) int array
+        Outer surface, counter-clockwise as seen from outside.
+    face_of : (t,) int array
+        Index into `faces` for each triangle.
+    faces : tuple of str
+        Names of the faces.
+    held, touched : (t,) bool arrays
+        Triangles that are held, and touched, unless a person chooses others.
+    choices : PartChoices
+        All other choices at first.
+    whole : bool
+        Whether faces can be picked as a whole only, as those of a STEP file.
+    materials : mapping of name to words
+        Materials that can be asked for by name, and what there is to say of each.
+    laws : tuple of str
+        Laws that take Young's modulus and Poisson's ratio.
+    notes : tuple of str
+        What else there is to say of the file, in sentences.
+    """
+
+    name: str
+    file: str
+    unit: str
+    points: np.ndarray
+    triangles: np.ndarray
+    face_of: np.ndarray
+    faces: tuple[str, ...]
+    held: np.ndarray
+    touched: np.ndarray
+    choices: PartChoices
+    whole: bool = False
+    materials: Mapping[str, str] = field(default_factory=dict)
+    laws: tuple[str, ...] = ("neo-hookean",)
+    notes: tuple[str, ...] = ()
+
+    @cached_property
+    def surface(self) -> Surface:
+        """Its surface as a message, split along sharp edges; triangles keep their order."""
+        triangles = np.asarray(self.triangles, dtype=np.int64)
+        points = np.asarray(self.points, dtype=float)
+        parts = split(points, triangles, np.zeros(len(triangles), bool))
+        return Surface(
+            rest=points[parts.nodes].ravel(),
+            triangles=parts.triangles.ravel(),
+            creases=parts.creases.ravel(),
+            fixed=np.zeros(0),
+            touchable=np.zeros(0),
+            yielding=np.zeros(0),
+            normals=np.zeros(0),
+        )
+
+    def picks(self) -> PartFaces:
+        """Return the faces and the first roles of its triangles as a message; what is held goes over the rest."""
+        roles = np.where(self.touched, float(Role.TOUCHED), float(Role.FREE))
+        roles[np.asarray(self.held, dtype=bool)] = float(Role.HELD)
+        return PartFaces(faces=np.asarray(self.face_of), roles=roles)
+
+    def facts(self) -> PartFacts:
+        """Return what the page asks for first."""
+        corners = np.asarray(self.points, dtype=float)[np.asarray(self.triangles)]
+        area = (
+            np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+        )
+        size = np.ptp(corners.reshape(-1, 3), axis=0)
+        middle, faces = corners.mean(axis=1), []
+        for index, name in enumerate(self.faces):
+            mine = np.asarray(self.face_of) == index
+            x, y, z = (area[mine] @ middle[mine] / max(area[mine].sum(), 1e-300)).tolist()
+            faces.append(FaceInfo(name, float(area[mine].sum()), (x, y, z)))
+        wish = as_wish(self.choices)
+        return PartFacts(
+            file=self.file,
+            unit=self.unit,
+            size=(float(size[0]), float(size[1]), float(size[2])),
+            faces=tuple(faces),
+            whole=self.whole,
+            materials=tuple(MaterialInfo(name, about) for name, about in self.materials.items()),
+            laws=self.laws,
+            choices={
+                name: getattr(wish, name)
+                for name in ("material", "law", "young", "poisson", "radius", "depth")
+            },
+            notes=self.notes,
+        )
+
+
+def as_wish(choices: PartChoices) -> StartWish:
+    """Return choices as the texts that the page shows."""
+    return StartWish(
+        material=choices.material,
+        law=choices.law,
+        young=f"{choices.young / 1e3:.6g} kPa",
+        poisson=f"{choices.poisson:.6g}",
+        radius=f"{choices.radius * 1e3:.6g} mm",
+        depth=f"{choices.depth * 1e3:.6g} mm",
+    )
+
+
+def choices_of(wish: StartWish, held: np.ndarray | None, touched: np.ndarray | None) -> PartChoices:
+    """Return the choices that a page has sent.
+
+    Parameters
+    ----------
+    wish : StartWish
+        All that stands in the page's form.
+    held, touched : (k,) int array or None
+        Triangles that were picked; None where nothing was changed.
+
+    Raises
+    ------
+    UsageError
+        If a quantity is no number with a unit of its kind, or is not above zero.
+    """
+    own = not wish.material
+    return PartChoices(
+        material=wish.material,
+        law=wish.law,
+        young=_quantity("Young's modulus", wish.young, "Pa", "10 kPa") if own else 0.0,
+        poisson=_pure_number("Poisson's ratio", wish.poisson) if own else 0.0,
+        radius=_quantity("The radius of the ball", wish.radius, "m", "6 mm"),
+        depth=_quantity("The depth", wish.depth, "m", "3 mm"),
+        held=held,
+        touched=touched,
+    )
+
+
+def _quantity(what: str, text: str, unit: str, example: str) -> float:
+    """Return a quantity above zero in an SI unit; its text must say a unit."""
+    fix, plain = f"Write for example {example}.", _plain_text(text)
+    if _BARE.fullmatch(plain):
+        raise UsageError(f"{what} is {text.strip()} without a unit.", fix=fix)
+    try:
+        number = to_si(plain, unit)
+    except UsageError as error:
+        raise UsageError(
+            f"{what} is {text.strip() or 'missing'}, which is no such quantity.", fix=fix
+        ) from error
+    if not (number > 0 and math.isfinite(number)):
+        raise UsageError(f"{what} is {text.strip()}, which is not above zero.", fix=fix)
+    return number
+
+
+def _pure_number(what: str, text: str) -> float:
+    try:
+        return float(_plain_text(text))
+    except ValueError as error:
+        raise UsageError(
+            f"{what} is {text.strip() or 'missing'}, which is no number.", fix="Write for example 0.45."
+        ) from error
+
+
+def _plain_text(text: str) -> str:
+    """Return a text as programs write numbers: with a point, and a plain minus."""
+    return text.strip().replace("−", "-").replace("\N{NO-BREAK SPACE}", " ").replace(",", ".")

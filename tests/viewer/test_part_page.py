@@ -1,0 +1,209 @@
+"""The page of `palpate touch` in a real browser: a part is set up on it, watched while it is learnt, and touched."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from chromium_page import READ, assert_no, hold_again, vector
+from playwright.sync_api import Browser, Page
+from slabs import DEVIATION, touched_slab
+
+from palpate.runtime import LoopProcess
+from palpate.study import Study
+from palpate.study.part_choices import chosen_study, shown_part
+from palpate.study.part_study import part_study
+from palpate.surrogates import Surrogate
+from palpate.viewer.part_page import PartPage, Progress, serve_part
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(180)]
+
+LENGTH, WIDTH, HEIGHT = 40.0, 30.0, 20.0  # mm, of a box with 12 triangles
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    path = tmp_path_factory.mktemp("part") / "pad.stl"
+    trimesh.creation.box((LENGTH, WIDTH, HEIGHT)).export(path)
+    return part_study(path)[0]
+
+
+@pytest.fixture
+def chosen() -> list[Study]:
+    """The studies with which the solves would begin."""
+    return []
+
+
+@pytest.fixture
+def server(study: Study, chosen: list[Study]) -> Iterator[PartPage]:
+    page = serve_part("pad", on_start=lambda choices: chosen.append(chosen_study(study, choices)), port=0)
+    with page:
+        yield page
+
+
+@pytest.fixture
+def page(browser: Browser, server: PartPage, complaints: list[str]) -> Iterator[Page]:
+    page = browser.new_context(viewport={"width": 1000, "height": 640}).new_page()
+    page.on("console", lambda m: complaints.append(m.text) if m.type in {"error", "warning"} else None)
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    local = (server.address, "data:", "blob:")
+    page.on("request", lambda r: None if r.url.startswith(local) else complaints.append(f"asks {r.url}"))
+    page.goto(server.url)
+    yield page
+    page.context.close()
+    assert_no(complaints)
+
+
+def begin(page: Page, **texts: str) -> None:
+    for name, text in texts.items():
+        page.fill(f"#{name.replace('_', '-')}", text)
+    page.click("#start")
+
+
+def problem(page: Page) -> str:
+    page.wait_for_selector("#problem:not([hidden])")
+    return page.inner_text("#problem")
+
+
+def picked(page: Page) -> tuple[int, int]:
+    held, touched = page.evaluate("document.documentElement.dataset.picked").split()
+    return int(held), int(touched)
+
+
+def test_a_part_is_set_up_by_picks_and_texts(server, page, study, chosen, keep):
+    page.wait_for_selector("html[data-stage=reading]")
+    server.show_part(shown_part(study))
+    page.wait_for_selector("html[data-partdrawn][data-picked]")
+    assert picked(page) == (2, 2), "at first it stands on its underside, and is touched above"
+    assert "40 × 30 × 20 mm" in page.inner_text("#part-facts")
+
+    begin(page, young="4")
+    assert "without a unit" in problem(page)
+    begin(page, young="4 kPa", ball_depth="25 mm")
+    assert "The depth of 25 mm is more than the part is thick, 20 mm." in problem(page)
+    begin(page, ball_depth="2 mm", poisson="0.6")
+    assert "poisson" in problem(page).lower()
+    page.fill("#poisson", "0.4")
+
+    box = page.locator("#part-view").bounding_box()
+    middle = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    page.click("[data-role='2']")
+    page.mouse.click(*middle)  # the upper face is given back
+    assert picked(page) == (2, 0)
+    begin(page)
+    assert problem(page).startswith("Nothing is touched.")
+    page.click("[data-tool=brush]")
+    page.mouse.move(*middle)
+    page.mouse.down()
+    page.mouse.move(middle[0] + 4, middle[1], steps=2)
+    page.mouse.up()
+    assert picked(page) in {(2, 1), (2, 2)}
+    keep(page, "part-setup")
+    page.locator("#face-list select").first.evaluate("s => s.closest('details').open = true")
+    page.click("[data-take=rest]")
+    held, touched = picked(page)
+    assert (held, touched) == (2, 10)
+    assert not chosen
+    begin(page)
+    page.wait_for_selector("html[data-stage=working]")
+    (made,) = chosen
+    assert made.body.material.young == pytest.approx(4e3)
+    assert made.interaction.depth[1] == pytest.approx(2e-3)
+    areas = {face.name: 1e6 * face.area for face in made.body.shape().faces}
+    assert areas["touched"] == pytest.approx(LENGTH * WIDTH + 2 * HEIGHT * (LENGTH + WIDTH))
+    assert areas["held"] == pytest.approx(LENGTH * WIDTH)
+
+
+@pytest.fixture
+def versions(tmp_path: Path) -> list[Path]:
+    """Two surrogates of one slab: the second one moves twice as far, and is surer of its force."""
+    first = touched_slab()
+    field = first.fields["displacement"]
+    fields = {
+        **first.fields,
+        "displacement": dataclasses.replace(field, modes=2 * field.modes, local_mode=None),
+    }
+    second = dataclasses.replace(first, fields=fields)
+    return [first.save(tmp_path / "slab-12.palpate"), second.save(tmp_path / "slab-24.palpate")]
+
+
+@pytest.fixture
+def swaps(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
+    """The files that the loop was told to change to."""
+    paths: list[Path] = []
+    monkeypatch.setattr(LoopProcess, "swap", lambda self, path: paths.append(path), raising=False)
+    return paths
+
+
+def test_a_part_is_touched_while_it_gets_better(server, page, study, versions, swaps, tmp_path, keep):
+    places = np.array([[0.0, 0.0, 0.02], [0.005, 0.005, 0.02]])
+    server.show_part(shown_part(study))
+    server.show_progress(Progress("solve 2 of 12", solves=2, places=places))
+    page.wait_for_selector("html[data-learning][data-partdrawn]")
+    assert page.inner_text("#phase") == "solve 2 of 12"
+    keep(page, "part-solving")
+    report = tmp_path / "slab.html"
+    report.write_text("<p>A report.</p>", encoding="utf-8")
+    first = Progress("learning", 12, 0.02, 0.008, 0.031, places, 41.0, report)
+    server.show_body(versions[0])
+    server.show_progress(first)
+    page.wait_for_selector("html[data-touching='1'][data-tick][data-middle]")
+    assert page.inner_text("#error-p95") == "3.1"
+    assert 41 <= int(page.inner_text("#elapsed").split()[0]) < 60
+
+    page.click("#fields button:has-text('uncertainty')")
+    assert page.inner_text("#legend-title") == "uncertainty of the force (%)"
+    assert float(page.evaluate("document.documentElement.dataset.largest")) == pytest.approx(
+        100 * DEVIATION, rel=1e-3
+    )
+    keep(page, "part-trust")
+    page.click("#fields button:has-text('displacement')")
+    page.evaluate("window.mark = 'not reloaded'")
+    x, y = page.evaluate("document.documentElement.dataset.middle").split()
+    page.mouse.move(float(x), float(y) + 10)
+    page.mouse.down()
+    assert largest(page) == pytest.approx(largest_of(versions[0], page), rel=1e-4)
+
+    server.show_body(versions[1])
+    server.show_progress(dataclasses.replace(first, error_p95=0.022, solves=24))
+    page.wait_for_selector("html[data-touching='2'][data-improved]")
+    assert swaps == [versions[1]]
+    assert "improved: 3.1 % → 2.2 %" in page.inner_text("#improved").replace("\N{NO-BREAK SPACE}", " ")
+    assert largest(page) == pytest.approx(largest_of(versions[1], page), rel=1e-4)
+    keep(page, "part-improved")
+    assert page.evaluate("window.mark") == "not reloaded"
+    page.mouse.up()
+
+    response = page.request.get(server.address + "report")
+    assert "A report." in response.text()
+    assert "script-src" not in response.headers["content-security-policy"]
+    page.click("#enough")
+    assert server.stopped.wait(5)
+    server.end("Done: 2 % were reached.")
+    page.wait_for_selector("#enough[hidden]", state="attached")
+    assert page.inner_text("#phase") == "Done: 2 % were reached."
+
+
+def largest(page: Page) -> float:
+    """The largest displacement that is drawn, m, once the probe has arrived and stands still."""
+    was = page.evaluate(READ)
+    for _ in range(400):
+        page.wait_for_timeout(100)
+        now = page.evaluate(READ)
+        if now["withheld"] or "stalled" in now["flags"]:  # a busy machine
+            hold_again(page)
+        still = all(now["data"][k] == was["data"][k] for k in ("position", "largest", "force"))
+        if still and now["data"]["sinking"] == "false" and "inside" in now["flags"]:
+            return float(now["data"]["largest"])
+        was = now
+    pytest.fail(f"the page did not settle: {was}")
+
+
+def largest_of(file: Path, page: Page) -> float:
+    """The largest displacement of a surrogate under the probe that the page shows, m."""
+    at = vector(page.evaluate(READ)["data"], "position")[None]
+    return float(np.linalg.norm(Surrogate.load(file).fields["displacement"].values(at)[0], axis=1).max())

@@ -37,6 +37,7 @@ from palpate.viewer.part_messages import (
     PartFacts,
     PartNews,
     StartWish,
+    UnitWish,
 )
 from palpate.viewer.wire import Binary, Json, Layout
 
@@ -84,6 +85,7 @@ WISH = StartWish("", "neo-hookean", "10 kPa", "0.45", "6 mm", "3 mm")
 FACTS = PartFacts(
     file="kidney.stl",
     unit="mm",
+    units=("mm", "m"),
     size=(0.11, 0.06, 0.04),
     faces=(FaceInfo("face 1", 1e-3, (0.0, 0.5, 1.0)),),
     whole=False,
@@ -93,7 +95,14 @@ FACTS = PartFacts(
     notes=("repaired",),
 )
 LEARNING = LearningProgress("solving", 12, 0.02, None, 0.03, ((0.0, 1.0, 2.0),), 60.0, report=True)
-PART = (PartNews(PROTOCOL, "kidney", "working", "words", 2), FACTS, WISH, Answer("no"), LEARNING)
+PART = (
+    PartNews(PROTOCOL, "kidney", "working", "words", 2, 1),
+    FACTS,
+    WISH,
+    UnitWish("m"),
+    Answer("no"),
+    LEARNING,
+)
 WRITTEN = (HELLO, PRESSED, SHOWN, Notice("what", "why", "fix"), NEWS, REASON, FEEL, *PART)
 
 

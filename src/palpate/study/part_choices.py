@@ -13,7 +13,7 @@ from palpate.errors import UsageError
 from palpate.format import millimetres, pressure
 from palpate.physics import ImportedMesh, named_material
 from palpate.physics.materials.library import MATERIALS
-from palpate.physics.shapes.body_file import apply_patches
+from palpate.physics.shapes.body_file import UNITS, apply_patches
 from palpate.physics.shapes.mesh import BodyMesh
 from palpate.physics.shapes.naming import members
 from palpate.physics.shapes.triangle_list import triangle_text
@@ -66,6 +66,7 @@ def shown_part(study: Study) -> ShownPart:
             radius=acting.radius,
             depth=acting.depth[1],
         ),
+        units=tuple(UNITS) if body.unit else (),
         whole=bool(getattr(bare, "is_step", False)),
         materials={name: _about(name) for name in MATERIALS if _is_for_solids(name)},
         laws=LAWS,

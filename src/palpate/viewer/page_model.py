@@ -50,17 +50,21 @@ class PageModel:
         The learnt body as a hand finds it.
     version : int
         Counts the surrogates of one body, where a later one takes the place of the one before.
+    centre : (3,) array, optional
+        The device's centre in the body's coordinates, m; by default the body's own. A later surrogate has that of the
+        first, because the loop keeps its workspace.
 
     Attributes
     ----------
-    body, version
+    body, version, centre
         As given.
     surface : Surface, optional
         At rest; None for a body drawn as a line.
     """
 
-    def __init__(self, body: Touchable, version: int = 1) -> None:
+    def __init__(self, body: Touchable, version: int = 1, centre: np.ndarray | None = None) -> None:
         self.body, self.version = body, version
+        self.centre = body.home if centre is None else centre
         self._drawing: LineDrawing | SurfaceDrawing = (
             SurfaceDrawing(body) if body.line is None else LineDrawing(body, body.line)
         )
@@ -106,7 +110,7 @@ class PageModel:
             deepest=body.deepest,
             force_max=body.force_max,
             stiffness_max=body.stiffness_max,
-            centre=vector(body.home),
+            centre=vector(self.centre),
             line=self._drawing.line if isinstance(self._drawing, LineDrawing) else None,
             fields=self._drawing.infos,
             remembers="" if body.line is not None else yielding_in_words(body) or str(body.memory or ""),

@@ -5,8 +5,9 @@ The conversation, over a websocket of its own at ``/part``:
 1. The server says `PartNews` (JSON) at once and whenever the stage changes: reading the part, choosing, working,
    ended. While it is chosen, the page asks for `PartFacts` (JSON) at ``/part/facts``, for the surface as `Surface` at
    ``/part/surface`` and for `PartFaces` at ``/part/faces``.
-2. What was picked on the surface is sent as `Picks`, in pieces that are small enough for one message each; then
-   `StartWish` (JSON) says all other choices. The server answers each with an `Answer` (JSON).
+2. A page may ask for another unit of the file's numbers with `UnitWish` (JSON). What was picked on the surface is sent
+   as `Picks`, in pieces that are small enough for one message each; then `StartWish` (JSON) says all other
+   choices. The server answers each wish with an `Answer` (JSON).
 3. While solves run, `LearningProgress` (JSON) says how far they are. A page ends the work with `EndWish`.
 4. Where `PartNews.version` is not zero, the body can be touched: the page joins the conversation at ``/touch``. Each
    later surrogate is announced there by a new `Hello` with a larger version; the page fetches that version's surface,
@@ -39,6 +40,7 @@ __all__ = [
     "Role",
     "StartWish",
     "TrustMap",
+    "UnitWish",
 ]
 
 
@@ -137,6 +139,8 @@ class PartNews(Json):
         What goes on, in a sentence.
     version : int
         Version of the body that can be touched; 0 where there is none yet.
+    part : int
+        Counts the parts that are shown: another unit makes another part of a file. 0 where there is none yet.
     """
 
     protocol: int
@@ -144,6 +148,7 @@ class PartNews(Json):
     stage: str
     words: str
     version: int
+    part: int
 
 
 @dataclass(frozen=True)
@@ -154,6 +159,8 @@ class PartFacts(Json):
     ----------
     file, unit : str
         Name of the file, and unit of its numbers; empty where the file states it.
+    units : tuple of str
+        Units in which the numbers could be taken instead; none where the file states its own.
     size : (3,)
         Lengths of the box around it, m.
     faces : tuple of FaceInfo
@@ -172,6 +179,7 @@ class PartFacts(Json):
 
     file: str
     unit: str
+    units: tuple[str, ...]
     size: Vec3
     faces: tuple[FaceInfo, ...]
     whole: bool
@@ -201,6 +209,13 @@ class StartWish(Json):
     poisson: str
     radius: str
     depth: str
+
+
+@dataclass(frozen=True)
+class UnitWish(Json):
+    """The wish that the numbers of the file are taken in another unit, page to server."""
+
+    unit: str
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ import logging
 import os
 import threading
 from collections.abc import AsyncIterator, Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +38,16 @@ from palpate.runtime.touchable import load_touchable
 from palpate.viewer.compression import BinaryAnswers
 from palpate.viewer.messages import PROTOCOL
 from palpate.viewer.page_model import PageModel
-from palpate.viewer.part_messages import Answer, EndWish, LearningProgress, PartNews, Picks, Role, StartWish
+from palpate.viewer.part_messages import (
+    Answer,
+    EndWish,
+    LearningProgress,
+    PartNews,
+    Picks,
+    Role,
+    StartWish,
+    UnitWish,
+)
 from palpate.viewer.server import body_routes
 from palpate.viewer.session import Session
 from palpate.viewer.shown_part import PartChoices, ShownPart, choices_of
@@ -124,6 +133,8 @@ class PartPage(LocalServer):
     on_start : callable
         Gets the `PartChoices` when a person presses *start*, in a thread of its own. Where they don't fit it raises a
         `PalpateError`, which the page answers with; otherwise it returns at once, and the work goes on elsewhere.
+    on_unit : callable, optional
+        Gets another unit of the file's numbers, and returns the part as it is then; by default the unit stays.
     port, host, strict_port, token
         As for `Viewer`.
     device : str
@@ -146,6 +157,7 @@ class PartPage(LocalServer):
         name: str,
         *,
         on_start: Callable[[PartChoices], object],
+        on_unit: Callable[[str], ShownPart] | None = None,
         port: int = 8080,
         host: str = "127.0.0.1",
         strict_port: bool = False,
@@ -154,11 +166,12 @@ class PartPage(LocalServer):
         recordings: str | os.PathLike[str] = ".",
     ) -> None:
         super().__init__(port, host, strict_port=strict_port, token=token)
-        self.name, self._on_start = name, on_start
+        self.name, self._on_start, self._on_unit = name, on_start, on_unit
         self._device, self._recordings = device, Path(recordings)
         self.stopped, self.visited = threading.Event(), threading.Event()
         self.loop: LoopProcess | None = None
         self._part: ShownPart | None = None
+        self._parts_shown = 0
         self._stage, self._words = "reading", "The part is being read."
         self._progress: Progress | None = None
         self._session: Session | None = None
@@ -176,8 +189,9 @@ class PartPage(LocalServer):
 
     def show_part(self, part: ShownPart) -> None:
         """Show a part, on which a person now chooses what is held and touched."""
-        self._part = part
+        self._part = part if self._on_unit is not None else replace(part, units=())
         self._parts = BinaryAnswers(keep=True)
+        self._parts_shown += 1
         self._turn("choosing", "")
 
     def show_progress(self, progress: Progress) -> None:
@@ -194,16 +208,18 @@ class PartPage(LocalServer):
         ------
         FileFormatError
             If the file holds nothing that can be touched.
+        UsageError
+            If it is no surrogate of the body that is touched: the one before stays.
         DeviceError
-            If the real-time process does not start.
+            If the real-time process does not start, or has ended.
         """
         with self._changing:
-            model = PageModel(load_touchable(path), self._version + 1)
+            centre = None if self._session is None else self._session.model.centre
+            model = PageModel(load_touchable(path), self._version + 1, centre)
             if self.loop is None:
                 self._open(model, path)
             else:
-                swapping: Any = self.loop
-                swapping.swap(path)
+                self.loop.swap(path)
                 self._do(self._replace(model))
             self._version = model.version
         self._turn(self._stage if self._stage in {"working", "ended"} else "working", self._words)
@@ -307,8 +323,7 @@ class PartPage(LocalServer):
         """Take one message of a page."""
         data = message.get("bytes")
         if data is None:
-            wish = StartWish.from_json(message.get("text") or "")
-            answer = await run_in_threadpool(self._start_by, visitor, wish)
+            answer = await run_in_threadpool(self._answer, visitor, message.get("text") or "")
             await visitor.socket.send_text(answer.to_json())
         elif data[:1] == bytes([EndWish.KIND]):
             EndWish.unpack(data)
@@ -320,23 +335,36 @@ class PartPage(LocalServer):
                 raise UsageError(f"A page picked triangles for the role {picks.role}.")
             visitor.take(picks)
 
-    def _start_by(self, visitor: _Visitor, wish: StartWish) -> Answer:
-        """Begin with what a page has chosen; return what does not fit."""
+    def _answer(self, visitor: _Visitor, text: str) -> Answer:
+        """Carry out a wish of a page that chooses; return what does not fit."""
+        unit = '"UnitWish"' in text
+        wish = UnitWish.from_json(text) if unit else StartWish.from_json(text)
         with self._starting:
             if self._part is None or self._stage != "choosing":
                 return Answer("The work has begun already, by another page." if self._part else "")
-            count = len(self._part.triangles)
-            held, touched = visitor.picked(Role.HELD, count), visitor.picked(Role.TOUCHED, count)
             try:
-                self._on_start(choices_of(wish, held, touched))
+                if isinstance(wish, UnitWish):
+                    self._take_unit(self._part, wish.unit)
+                else:
+                    self._start_by(self._part, visitor, wish)
             except PalpateError as error:
                 return Answer(" ".join(filter(None, (error.what, error.why, error.fix))))
-            if self._stage == "choosing":
-                self._turn("working", "")
             return Answer("")
 
+    def _take_unit(self, part: ShownPart, unit: str) -> None:
+        if self._on_unit is not None and unit in part.units:
+            self.show_part(self._on_unit(unit))
+
+    def _start_by(self, part: ShownPart, visitor: _Visitor, wish: StartWish) -> None:
+        """Begin with what a page has chosen."""
+        count = len(part.triangles)
+        held, touched = visitor.picked(Role.HELD, count), visitor.picked(Role.TOUCHED, count)
+        self._on_start(choices_of(wish, held, touched))
+        if self._stage == "choosing":
+            self._turn("working", "")
+
     def _news(self) -> PartNews:
-        return PartNews(PROTOCOL, self.name, self._stage, self._words, self._version)
+        return PartNews(PROTOCOL, self.name, self._stage, self._words, self._version, self._parts_shown)
 
     def _learning(self, progress: Progress) -> LearningProgress:
         places = np.asarray(progress.places, dtype=float).reshape(-1, 3)
@@ -385,6 +413,7 @@ def serve_part(
     name: str,
     *,
     on_start: Callable[[PartChoices], object],
+    on_unit: Callable[[str], ShownPart] | None = None,
     part: ShownPart | None = None,
     port: int = 8080,
     host: str = "127.0.0.1",
@@ -412,6 +441,7 @@ def serve_part(
     page = PartPage(
         name,
         on_start=on_start,
+        on_unit=on_unit,
         port=port,
         host=host,
         strict_port=strict_port,

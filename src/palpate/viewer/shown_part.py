@@ -87,6 +87,8 @@ class ShownPart:
         Triangles that are held, and touched, unless a person chooses others.
     choices : PartChoices
         All other choices at first.
+    units : tuple of str
+        Units in which the file's numbers could be taken instead.
     whole : bool
         Whether faces can be picked as a whole only, as those of a STEP file.
     materials : mapping of name to words
@@ -107,6 +109,7 @@ class ShownPart:
     held: np.ndarray
     touched: np.ndarray
     choices: PartChoices
+    units: tuple[str, ...] = ()
     whole: bool = False
     materials: Mapping[str, str] = field(default_factory=dict)
     laws: tuple[str, ...] = ("neo-hookean",)
@@ -150,6 +153,7 @@ class ShownPart:
         return PartFacts(
             file=self.file,
             unit=self.unit,
+            units=self.units,
             size=(float(size[0]), float(size[1]), float(size[2])),
             faces=tuple(faces),
             whole=self.whole,

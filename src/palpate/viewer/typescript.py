@@ -39,6 +39,7 @@ JSON: tuple[type[Json], ...] = (
     part_messages.PartNews,
     part_messages.PartFacts,
     part_messages.StartWish,
+    part_messages.UnitWish,
     part_messages.Answer,
     part_messages.LearningProgress,
 )

@@ -25,6 +25,7 @@ export class Learning {
     element("phase").textContent = news.phase;
     element("solves").textContent = String(news.solves);
     element("error-target").textContent = share(news.target);
+    element("error").classList.toggle("unknown", news.error_p95 === null);
     element("report-link").hidden = !news.report;
     this.errors();
     this.clock();

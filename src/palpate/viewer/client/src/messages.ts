@@ -150,12 +150,14 @@ export interface PartNews {
   stage: string;
   words: string;
   version: number;
+  part: number;
 }
 
 /** A part and the choices that were made for it, server to page. */
 export interface PartFacts {
   file: string;
   unit: string;
+  units: string[];
   size: Vec3;
   faces: FaceInfo[];
   whole: boolean;
@@ -173,6 +175,11 @@ export interface StartWish {
   poisson: string;
   radius: string;
   depth: string;
+}
+
+/** The wish that the numbers of the file are taken in another unit, page to server. */
+export interface UnitWish {
+  unit: string;
 }
 
 /** The answer to `StartWish`, server to page: a problem in a sentence or two, or nothing where the work begins. */
@@ -226,6 +233,10 @@ export function isPartFacts(message: { kind: string }): message is PartFacts & {
 
 export function isStartWish(message: { kind: string }): message is StartWish & { kind: string } {
   return message.kind === "StartWish";
+}
+
+export function isUnitWish(message: { kind: string }): message is UnitWish & { kind: string } {
+  return message.kind === "UnitWish";
 }
 
 export function isAnswer(message: { kind: string }): message is Answer & { kind: string } {

@@ -70,8 +70,8 @@ function hear(message: { kind: string }): void {
 }
 
 function turn(message: PartNews): void {
-  if (message.protocol !== PROTOCOL || (news && (news.name !== message.name || news.version > message.version))) {
-    location.reload(); // another version of palpate, or another part
+  if (message.protocol !== PROTOCOL || (news && isOther(message, news))) {
+    location.reload(); // another version of palpate, another part, or another unit of its numbers
     return;
   }
   news = message;
@@ -82,6 +82,11 @@ function turn(message: PartNews): void {
   if (message.stage === "working" || message.stage === "ended") work(message);
 }
 
+function isOther(message: PartNews, before: PartNews): boolean {
+  const other = before.name !== message.name || before.version > message.version;
+  return other || (before.part > 0 && before.part !== message.part);
+}
+
 /** Show the part with all that can be chosen. */
 function choose(): void {
   status("live", "set it up");
@@ -90,7 +95,7 @@ function choose(): void {
     .then((facts) => {
       if (news?.stage !== "choosing") return;
       mode("setup");
-      setup ??= new Setup(canvas, view!, facts, begin);
+      setup ??= new Setup(canvas, view!, facts, begin, (unit) => send(JSON.stringify({ kind: "UnitWish", unit })));
       view!.look();
     })
     .catch(fail);

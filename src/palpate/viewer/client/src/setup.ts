@@ -27,6 +27,7 @@ export class Setup {
     private readonly view: PartView,
     private readonly facts: PartFacts,
     private readonly start: (wish: StartWish, held: number[] | null, touched: number[] | null) => void,
+    private readonly another: (unit: string) => void,
   ) {
     this.first = view.roles.slice();
     this.spreads.brush = 0.06 * view.extent;
@@ -52,13 +53,25 @@ export class Setup {
     const rows: [string, string][] = [
       ["file", facts.file],
       ["size", `${size} mm`],
-      ["unit", facts.unit ? `numbers taken as ${facts.unit}` : "stated by the file"],
+      ["unit", facts.unit || "stated by the file"],
       ["faces", String(facts.faces.length)],
       ["triangles", String(this.view.roles.length)],
     ];
     element("part-facts").replaceChildren(...rows.flatMap(([name, words]) => [worded("dt", name), worded("dd", words)]));
+    if (facts.units.length > 1) element("part-facts").querySelectorAll("dd")[2]!.replaceChildren(this.units());
     element("part-notes").replaceChildren(...facts.notes.map((note) => worded("li", note)));
     element("face-list").replaceChildren(...this.faces());
+  }
+
+  /** The unit in which the file's numbers are taken, to choose from. */
+  private units(): HTMLElement {
+    const select = document.createElement("select");
+    select.id = "unit";
+    select.setAttribute("aria-label", "Unit of the file's numbers");
+    select.append(...this.facts.units.map((unit) => new Option(`numbers are ${unit}`, unit)));
+    select.value = this.facts.unit;
+    select.addEventListener("input", () => this.another(select.value));
+    return select;
   }
 
   /** A row for each of the largest faces, by which it is given a role. */

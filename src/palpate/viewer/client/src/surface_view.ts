@@ -64,6 +64,7 @@ export class SurfaceView extends View {
   private readonly low = new Vector3().setScalar(Infinity);
   private readonly high = new Vector3().setScalar(-Infinity);
   private dots: InstancedMesh<SphereGeometry, MeshBasicMaterial> | null = null;
+  private marks: { place: Vec3; nearest: number }[] = [];
   protected roof: number; // m, room that a view leaves above the body
 
   constructor(
@@ -134,6 +135,7 @@ export class SurfaceView extends View {
     this.position.needsUpdate = this.colour.needsUpdate = true;
     this.geometry.computeVertexNormals();
     this.geometry.computeBoundingSphere();
+    this.moveDots();
     this.probe.visible = probe !== null;
     if (probe) {
       this.probe.position.set(...probe.centre);
@@ -144,19 +146,41 @@ export class SurfaceView extends View {
     this.dirty = true;
   }
 
-  /** Draw dots at places (m) of the surface at rest. */
+  /** Draw dots at places (m) of the surface at rest; they move with it. */
   mark(places: readonly Vec3[]): void {
     if (this.dots) {
       this.scene.remove(this.dots);
       this.dots.dispose();
     }
-    const size = DOT * this.across();
-    this.dots = new InstancedMesh(new SphereGeometry(size, 12, 8), new MeshBasicMaterial(), places.length);
-    this.dots.material.color.set(css("--ink"));
-    places.forEach((place, i) => this.dots!.setMatrixAt(i, new Matrix4().makeTranslation(...place)));
+    const material = new MeshBasicMaterial({ color: css("--ink") });
+    this.dots = new InstancedMesh(new SphereGeometry(DOT * this.across(), 12, 8), material, places.length);
     this.dots.frustumCulled = false;
+    this.marks = places.map((place) => ({ place, nearest: this.nearest(place) }));
+    this.moveDots();
     this.scene.add(this.dots);
     this.dirty = true;
+  }
+
+  /** Put the dots where their places have moved to. */
+  private moveDots(): void {
+    const { rest } = this.surface;
+    const at = this.position.array;
+    this.marks.forEach(({ place, nearest }, i) => {
+      const [x, y, z] = place.map((v, k) => v + at[3 * nearest + k]! - rest[3 * nearest + k]!) as Vec3;
+      this.dots!.setMatrixAt(i, new Matrix4().makeTranslation(x, y, z));
+    });
+    if (this.dots) this.dots.instanceMatrix.needsUpdate = true;
+  }
+
+  /** The point of the surface at rest that is nearest to a place. */
+  private nearest(place: Vec3): number {
+    const { rest } = this.surface;
+    let [best, least] = [0, Infinity];
+    for (let i = 0; i < rest.length; i += 3) {
+      const far = (rest[i]! - place[0]) ** 2 + (rest[i + 1]! - place[1]) ** 2 + (rest[i + 2]! - place[2]) ** 2;
+      if (far < least) [best, least] = [i / 3, far];
+    }
+    return best;
   }
 
   /** Set the share of the colour scale at which there is nothing to show. */

@@ -14,6 +14,7 @@ import typer
 
 from palpate.cli.console import Console, advice_in_words
 from palpate.cli.device_commands import devices_app
+from palpate.cli.material_commands import material_app
 from palpate.cli.table_commands import correct, fit
 from palpate.cli.table_options import Json, with_table_options
 from palpate.cli.touch_command import touch
@@ -37,6 +38,7 @@ app = typer.Typer(
 dataset_app = typer.Typer(help="Datasets of solves.", no_args_is_help=True)
 app.add_typer(dataset_app, name="dataset")
 app.add_typer(devices_app, name="devices")
+app.add_typer(material_app, name="material")
 app.add_typer(trace_app, name="trace")
 
 StudyFile = Annotated[Path, typer.Argument(help="Study file, as [bold]palpate init[/] writes it.")]

@@ -13,15 +13,20 @@
     homogeneous    uniaxial, equibiaxial, planar, shear and volumetric tests
     material_stability  Drucker's criterion over a range of strains
     library        materials by name, with sources
+    specimen_tests, law_forms, fit_law, material_fit   constants from tests, and what they tell
+    fit_relaxation a Prony series from a response that fades
 
 A law is one expression, a function of the deformation gradient, that NumPy and NGSolve both read.
 """
 
 from palpate.physics.materials.fibres import FibreFamily, FibreReinforced
+from palpate.physics.materials.fit_law import fit
+from palpate.physics.materials.fit_relaxation import RelaxationFit, fit_relaxation
 from palpate.physics.materials.hardening import LinearHardening, VoceHardening
 from palpate.physics.materials.library import MATERIALS, named_material
 from palpate.physics.materials.linear import LinearElastic
 from palpate.physics.materials.material import Elastic, Material, StateVariable, Volumetric
+from palpate.physics.materials.material_fit import MaterialFit
 from palpate.physics.materials.material_stability import ModeStability, Stability
 from palpate.physics.materials.mooney_rivlin import MooneyRivlin
 from palpate.physics.materials.neo_hooke import NeoHookean
@@ -29,6 +34,7 @@ from palpate.physics.materials.ogden import Ogden
 from palpate.physics.materials.plastic import Plastic
 from palpate.physics.materials.pre_stretched import PreStretched
 from palpate.physics.materials.prony import PronySeries
+from palpate.physics.materials.specimen_tests import IndentationTest, StretchTest
 from palpate.physics.materials.st_venant import StVenantKirchhoff
 from palpate.physics.materials.user import UserMaterial
 from palpate.physics.materials.viscous import Viscoelastic
@@ -39,9 +45,11 @@ __all__ = [
     "Elastic",
     "FibreFamily",
     "FibreReinforced",
+    "IndentationTest",
     "LinearElastic",
     "LinearHardening",
     "Material",
+    "MaterialFit",
     "ModeStability",
     "MooneyRivlin",
     "NeoHookean",
@@ -49,13 +57,17 @@ __all__ = [
     "Plastic",
     "PreStretched",
     "PronySeries",
+    "RelaxationFit",
     "StVenantKirchhoff",
     "Stability",
     "StateVariable",
+    "StretchTest",
     "UserMaterial",
     "Viscoelastic",
     "VoceHardening",
     "Volumetric",
     "Yeoh",
+    "fit",
+    "fit_relaxation",
     "named_material",
 ]

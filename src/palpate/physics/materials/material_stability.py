@@ -9,7 +9,7 @@ An incompressible material is asked for the rates that keep its volume.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -131,7 +131,7 @@ class Stability:
 
 def stability(
     material: Material,
-    strain: tuple[float, float] = (-0.5, 1.0),
+    strain: tuple[float, float] | Mapping[str, tuple[float, float]] = (-0.5, 1.0),
     volume: tuple[float, float] = (-0.2, 0.2),
     *,
     dt: Any = None,
@@ -142,8 +142,9 @@ def stability(
     ----------
     material : Material
         Any.
-    strain : tuple of float
-        Range of λ − 1 in uniaxial, equibiaxial and planar tests, and of γ in simple shear; from above −1.
+    strain : tuple of float, or mapping of mode to it
+        Range of λ − 1 in uniaxial, equibiaxial and planar tests, and of γ in simple shear; from above −1. A mapping
+        gives each of these four modes a range of its own.
     volume : tuple of float
         Range of J − 1.
 
@@ -152,13 +153,15 @@ def stability(
     UsageError
         If a range is empty, does not hold 0, or begins at −1 or below.
     """
-    _check(strain)
-    _check(volume)
+    ranges = strain if isinstance(strain, Mapping) else {mode: strain for mode, _, _ in _MODES}
+    ranges = {**ranges, "volumetric": volume}
+    for limits in ranges.values():
+        _check(limits)
     verdicts = []
     for mode, test, undeformed in _MODES:
         if mode == "volumetric" and is_incompressible(material):
             continue
-        strains = _spaced(volume if mode == "volumetric" else strain)
+        strains = _spaced(ranges[mode])
         state = initial_state(material, _unit(strains)) if material.states else NO_STATE
         moduli = _least_moduli(material, test(material, undeformed + strains, state=state, dt=dt), state, dt)
         verdicts.append(_verdict(mode, strains, moduli))

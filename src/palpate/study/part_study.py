@@ -150,9 +150,15 @@ def _support(faces: Sequence[Face], low: float, height: float) -> tuple[str | tu
 def _with_touched(content: dict[str, Any], held: list[Any]) -> Study:
     """Return the study whose touched surface faces up, or is all that is not held where nothing does."""
     failure: UsageError | None = None
-    for touched in ({"name": TOUCHED, "facing": "up"}, {"name": TOUCHED}):
+    fixed = content["body"]["fixed"]
+    kept = held or [{"name": HELD, "faces": fixed}]  # else all that is left would take the faces of the file, too
+    ways: tuple[tuple[dict[str, Any], list[Any], Any], ...] = (
+        ({"name": TOUCHED, "facing": "up"}, held, fixed),
+        ({"name": TOUCHED}, kept, fixed if held else HELD),
+    )
+    for touched, named, holding in ways:
         # what is held goes over what is touched
-        body = content["body"] | {"surfaces": (touched, *held)}
+        body = content["body"] | {"surfaces": (touched, *named), "fixed": holding}
         try:
             return _study_of(content | {"body": body})
         except UsageError as error:

@@ -362,7 +362,13 @@ def _read_names(shape: ImportedSolid) -> tuple[tuple[str, ...], tuple[str, ...],
 @lru_cache(maxsize=8)
 def _skin(shape: ImportedSolid) -> tuple[BodyMesh, float, tuple[str, ...]]:
     """Named surface of an STL file, the volume in it in m³, and notes about repairs."""
-    require_same(shape.path, shape.digest)
-    topology, surface = read_stl(shape.path, shape.unit or "m", shape.simplify)
+    topology, surface = _stl_surface(shape.path, shape.digest, shape.unit or "m", shape.simplify)
     skin = name_parts(topology, surface, shape.patches, shape.feature_angle)
     return skin, float(topology.volume), (*surface.notes, *bodies_apart(topology))
+
+
+@lru_cache(maxsize=2)
+def _stl_surface(path: str, digest: str, unit: str, simplify: float | None) -> tuple[Any, Any]:
+    """Surface of an STL file, which all patches of it share: large ones take seconds to simplify."""
+    require_same(path, digest)
+    return read_stl(path, unit, simplify)

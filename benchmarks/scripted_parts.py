@@ -91,7 +91,9 @@ def fine_organ(folder: Path) -> Path:
     sphere = icosphere(subdivisions=6)
     x, y, z = np.array(sphere.vertices).T
     lobes = 1 + 0.12 * np.sin(3 * x + 1) * np.cos(2 * y) + 0.06 * np.cos(4 * z + x)
-    points = np.stack([45 * x * lobes, 30 * y * lobes + 8 * x * x, 20 * z * lobes * (1 - 0.2 * (z < 0) * z * z)], axis=1)
+    points = np.stack(
+        [45 * x * lobes, 30 * y * lobes + 8 * x * x, 20 * z * lobes * (1 - 0.2 * (z < 0) * z * z)], axis=1
+    )
     return _stl(points, np.array(sphere.faces), folder / "fine-organ.stl")
 
 
@@ -170,7 +172,9 @@ def zero_surface(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     corner = np.array([[i >> 2 & 1, i >> 1 & 1, i & 1] for i in range(8)])
     ways = [(4, 2, 1), (4, 1, 2), (2, 4, 1), (2, 1, 4), (1, 4, 2), (1, 2, 4)]
     tetrahedra = np.array([[0, a, a | b, 7] for a, b, _ in ways])
-    cube = np.stack(np.meshgrid(*[np.arange(n - 1) for n in shape], indexing="ij"), axis=-1).reshape(-1, 1, 1, 3)
+    cube = np.stack(np.meshgrid(*[np.arange(n - 1) for n in shape], indexing="ij"), axis=-1).reshape(
+        -1, 1, 1, 3
+    )
     places = cube + corner[tetrahedra][None]
     number = (places @ np.array([shape[1] * shape[2], shape[2], 1])).reshape(-1, 4)
     inside = flat[number] < 0

@@ -16,6 +16,7 @@ from palpate.physics.materials.library import MATERIALS
 from palpate.physics.shapes.body_file import UNITS, apply_patches
 from palpate.physics.shapes.mesh import BodyMesh
 from palpate.physics.shapes.naming import members
+from palpate.physics.shapes.step_patches import FacePatches
 from palpate.physics.shapes.triangle_list import triangle_text
 from palpate.study.interaction_records import ProbeRecord
 from palpate.study.material_records import SolidMaterialRecord
@@ -123,15 +124,13 @@ def _parts(study: Study) -> tuple[PartRecord, ProbeRecord]:
 
 def _names(body: PartRecord) -> np.ndarray:
     """Return the name of the surface that each triangle (t,) belongs to, by file and study."""
-    bare = body.bare()
-    skin, patches = bare.skin, body.patches(bare)
-    if getattr(bare, "is_step", False):  # whole faces are named, by their centres
-        centres = np.array([face.centre for face in bare.faces])
-        names, index = apply_patches(skin.surfaces, np.arange(len(skin.surfaces)), centres, patches)
-        index = index[skin.surface_of]
-    else:
-        centres = skin.points[skin.triangles].mean(axis=1)
-        names, index = apply_patches(skin.surfaces, skin.surface_of, centres, patches, skin.normals)
+    bare, patches = body.bare(), body.patches()
+    skin = bare.skin
+    middles = skin.points[skin.triangles].mean(axis=1)
+    if getattr(bare, "is_step", False):  # whole faces are named by their centres
+        faces = FacePatches(skin.surfaces, np.array([face.centre for face in bare.faces]), patches)
+        return np.array(faces.labels(skin.surface_of, middles, skin.normals), dtype=object)
+    names, index = apply_patches(skin.surfaces, skin.surface_of, middles, patches, skin.normals)
     return np.asarray(np.array(names, dtype=object)[index])
 
 

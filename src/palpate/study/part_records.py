@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
-import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from palpate.errors import UsageError
 from palpate.physics import Body, ImportedMesh, ImportedSolid, SurfacePatch
 from palpate.physics.shapes.body_file import FEATURE_ANGLE, WITHIN
-from palpate.physics.shapes.mesh import Face
-from palpate.physics.shapes.naming import require_known, require_name
+from palpate.physics.shapes.naming import require_name
 from palpate.physics.shapes.triangle_list import read_triangles
 from palpate.study.material_records import SolidMaterial, build_material
 from palpate.study.quantities import Metres, Record
@@ -121,27 +118,11 @@ class PartSurfaceRecord(Record):
             high[i] = self.below if high[i] is None else min(high[i] or 0.0, self.below)
         return low, high
 
-    def patch(self, bare: ImportedSolid | ImportedMesh) -> SurfacePatch:
-        """Return the patch of the surface of a part without patches."""
+    def patch(self) -> SurfacePatch:
+        """Return the patch of the surface of a part."""
         low, high = self._corners()
         facing = _DIRECTIONS[self.facing] if isinstance(self.facing, str) else self.facing
         faces = (self.faces,) if isinstance(self.faces, str) else self.faces
-        if facing is not None and getattr(bare, "is_step", False):
-            # faces of a STEP file are named whole, by the mean of their normals
-            known = {face.name: face for face in bare.faces}
-            for name in faces:
-                require_known("surface", name, tuple(known))
-            faces = tuple(
-                name for name in faces or known if _faces_that_way(known[name], facing, self.within)
-            )
-            facing = None
-            if not faces:
-                normals = ", ".join(f"{face.name}: {_rounded(face.normal)}" for face in known.values())
-                raise UsageError(
-                    f"No face of {bare.path} faces the way of the surface {self.name!r}.",
-                    why=f"Their mean normals are {normals}.",
-                    fix="Enlarge `within`, or name the faces.",
-                )
         return SurfacePatch(
             self.name,
             (low[0], low[1], low[2]),
@@ -152,15 +133,6 @@ class PartSurfaceRecord(Record):
             faces,
             self.triangles,
         )
-
-
-def _faces_that_way(face: Face, facing: tuple[float, float, float], within: float) -> bool:
-    length = float(np.linalg.norm(face.normal)) * math.hypot(*facing)
-    return length > 0 and float(np.dot(face.normal, facing)) >= length * math.cos(math.radians(within)) - 1e-7
-
-
-def _rounded(values: tuple[float, float, float]) -> str:
-    return f"({', '.join(f'{value + 0.0:.2g}' for value in values)})"
 
 
 class PartRecord(Record):
@@ -237,18 +209,18 @@ class PartRecord(Record):
         PalpateError
             If the file is missing or no body, or a surface's bounds hold nothing.
         """
-        patches = self.patches(self.bare())
+        patches = self.patches()
         return part_shape(self.file, self.unit, self.element, self.feature_angle, patches)
 
     def bare(self) -> ImportedSolid | ImportedMesh:
         """Return the shape with the names of its file alone."""
         return part_shape(self.file, self.unit, self.element, self.feature_angle)
 
-    def patches(self, bare: ImportedSolid | ImportedMesh) -> tuple[SurfacePatch, ...]:
+    def patches(self) -> tuple[SurfacePatch, ...]:
         """Return the names for parts of the surface, in the order in which they are given: later ones go over."""
         # what the others leave comes first
         ordered = sorted(self.surfaces, key=lambda surface: not surface.is_rest)
-        return tuple(surface.patch(bare) for surface in ordered)
+        return tuple(surface.patch() for surface in ordered)
 
     def build(self) -> Body:
         """Return the body."""

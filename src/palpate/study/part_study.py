@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from palpate import checks
 from palpate.errors import PalpateError, UsageError
 from palpate.physics.shapes.mesh import Face
-from palpate.study.part_records import STEP_ENDINGS, PartRecord, part_shape
+from palpate.study.part_records import CAD_ENDINGS, STEP_ENDINGS, PartRecord, part_shape
 from palpate.study.study import Study
 from palpate.study.toml import complaints, to_toml
 
@@ -31,6 +31,9 @@ FLAT, LEVEL = (
 FOOT = 0.05  # share of the box's footprint that a face has at least to stand on
 HOLD = 0.12  # share of the height that is held where no flat face is below
 RADIUS, DEPTH = 0.18, 0.5  # radius of the probe over the least extent, and its depth over the radius
+LARGEST = 0.3  # radius over the least extent, that a large surface may ask for
+CELLS = 300  # squares of an element's length on the footprint: about 15,000 unknowns, seconds a solve
+COARSE = 0.5  # element over the radius: coarser ones do not feel the ball
 LEAST_DEPTH = 1 / 25  # of the depth
 NICE = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 LISTED = 20  # faces in the comments
@@ -79,7 +82,11 @@ def part_study(
     unit, faces = _read(path, unit)
     low = np.min([face.lower for face in faces], axis=0)
     high = np.max([face.upper for face in faces], axis=0)
-    radius = _nice(RADIUS * float((high - low).min())) if radius is None else radius
+    footprint = float(np.prod((high - low)[:2]))
+    if radius is None:
+        least = float((high - low).min())
+        radius = _nice(min(max(RADIUS * least, math.sqrt(footprint / CELLS) / COARSE), LARGEST * least))
+    element = _nice(min(math.sqrt(footprint / CELLS), COARSE * radius))
     deepest = _nice(DEPTH * radius) if depth is None else depth
     fixed, named = _support(faces, float(low[2]), float(high[2] - low[2]))
     if held:
@@ -100,7 +107,8 @@ def part_study(
             "radius": radius,
             "depth": (_nice(LEAST_DEPTH * deepest), deepest),
         },
-        "sweep": {"samples": 60, "depths": 3},
+        "sweep": {"samples": 60, "depths": 3}
+        | ({"element": element} if path.suffix.lower() in CAD_ENDINGS else {}),
         "test": {"samples": 24, "depths": 2},  # many places: several depths of one tell less
     }
     study = _study_of(content) if touched else _with_touched(content, named)
@@ -151,7 +159,9 @@ def _with_touched(content: dict[str, Any], held: list[Any]) -> Study:
     """Return the study whose touched surface faces up, or is all that is not held where nothing does."""
     failure: UsageError | None = None
     fixed = content["body"]["fixed"]
-    kept = held or [{"name": HELD, "faces": fixed}]  # else all that is left would take the faces of the file, too
+    kept = held or [
+        {"name": HELD, "faces": fixed}
+    ]  # else all that is left would take the faces of the file, too
     ways: tuple[tuple[dict[str, Any], list[Any], Any], ...] = (
         ({"name": TOUCHED, "facing": "up"}, held, fixed),
         ({"name": TOUCHED}, kept, fixed if held else HELD),

@@ -22,6 +22,7 @@ from palpate.physics.shapes import (
     LayeredBlock,
     SurfacePatch,
 )
+from palpate.physics.shapes.mesh import body_mesh
 from palpate.physics.shapes.naming import UPRIGHT
 
 PLATE = 0.1 * 0.06 * 0.04 - np.pi * 0.015**2 * 0.04  # m³, a block with a round hole
@@ -289,6 +290,35 @@ def test_patches_are_chosen_by_plane_by_direction_and_by_name(tmp_path: Path):
     names = write_stl(tmp_path / "cube.stl", CUBE, SIDES).surfaces
     assert area(faces=names[:2]) == pytest.approx(2)
     assert "Did you mean" in failure(lambda: area(faces=("face1",)))
+
+
+def test_a_curved_face_of_a_step_file_is_cut_by_the_way_that_it_faces(tmp_path: Path):
+    """Of a lying cylinder's side what faces up within 60° gets the name; the rest keeps its own."""
+    from netgen.occ import Cylinder, Pnt, X
+
+    path, radius, length = tmp_path / "bar.step", 10.0, 30.0
+    Cylinder(Pnt(0, 0, 0), X, r=radius, h=length).WriteStep(str(path))
+    bare, top = ImportedSolid(path, element=4e-3), SurfacePatch("top", facing=(0, 0, 1), within=60)
+    side = next(face.name for face in bare.faces if face.area > 1e-3)
+    solid = ImportedSolid(path, element=4e-3, patches=(top,))
+    assert set(solid.surfaces) == {"top", *bare.surfaces}
+
+    curved = solid.mesh((FineMesh("top", 2e-3),))
+    mesh, coarse = body_mesh(curved.ngmesh), solid.rest()
+    areas = {}
+    for name in ("top", side):
+        corners = mesh.points[mesh.triangles_of(name)]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        areas[name] = np.linalg.norm(normals, axis=1).sum() / 2
+        upright = normals[:, 2] / np.linalg.norm(normals, axis=1)
+        assert ((upright >= 0.5) == (name == "top")).all()
+    assert areas["top"] + areas[side] == pytest.approx(2e-6 * np.pi * radius * length, rel=0.02)
+    assert len(mesh.triangles_of("top")) > 2 * len(coarse.triangles_of("top"))
+    curved.Curve(3)
+    volume = ngsolve.Integrate(1.0, curved)
+    assert volume == pytest.approx(
+        1e-9 * np.pi * radius**2 * length, rel=1e-4
+    )  # straight triangles miss a hundredth
 
 
 def test_faces_say_where_they_are(tmp_path: Path):

@@ -206,8 +206,8 @@ class SurfacePatch:
         In place of a box: a function of centres (n, 3) in m to bool (n,). Define it in a module, so that other
         processes find it.
     facing : tuple of three floats, optional
-        Direction of the outward normal: ``(0, 0, 1)`` is all that faces up. Not for STEP files, whose faces are
-        named whole.
+        Direction of the outward normal: ``(0, 0, 1)`` is all that faces up. Faces of a STEP file are cut along the
+        elements of the mesh.
     within : float
         Largest angle in degrees between normal and `facing`; by default 60.
     faces : tuple of str
@@ -287,8 +287,8 @@ class SurfacePatch:
             if normals is None:
                 raise UsageError(
                     f"The patch {self.name!r} is chosen by the direction that it faces.",
-                    why="Faces of a STEP file are named whole, and a curved one faces many ways.",
-                    fix="Name them: faces=('face 1',); `faces` of the solid without patches tells which is where.",
+                    why="No normals were given.",
+                    fix="Pass the outward unit normals (n, 3).",
                 )
             # a hundred-thousandth of a degree: a plane that faces just so is meant to belong
             inside = inside & (normals @ np.array(self.facing) >= np.cos(np.radians(self.within)) - 1e-7)

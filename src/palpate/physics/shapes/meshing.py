@@ -8,7 +8,7 @@ mesh_solid      the mesh
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -206,7 +206,12 @@ def _halve(corners: np.ndarray) -> np.ndarray:
     return np.concatenate([np.stack([a, b, middle], axis=1), np.stack([a, middle, c], axis=1)])
 
 
-def mesh_solid(solid: Any, coarse: float, refinements: tuple[FineMesh, ...]) -> Any:
+def mesh_solid(
+    solid: Any,
+    coarse: float,
+    refinements: tuple[FineMesh, ...],
+    rename: Callable[[Any], None] | None = None,
+) -> Any:
     """Mesh a solid whose faces and solids carry names.
 
     The fine part of an upright plane rectangle is cut out of it as a face of its own, so that the size of its
@@ -220,6 +225,8 @@ def mesh_solid(solid: Any, coarse: float, refinements: tuple[FineMesh, ...]) -> 
         Largest element size in m.
     refinements : tuple of FineMesh
         Parts of surfaces that shall have smaller elements.
+    rename : function, optional
+        Of the mesh: gives its faces names, where those of the solid are not the ones that refinements speak of.
 
     Returns
     -------
@@ -233,13 +240,16 @@ def mesh_solid(solid: Any, coarse: float, refinements: tuple[FineMesh, ...]) -> 
     from netgen.meshing import Pnt
     from netgen.occ import OCCGeometry
 
-    flat = [r for r in refinements if all(_is_rectangle(f) for f in solid.faces if r.is_on(f.name))]
+    flat = [] if rename else [r for r in refinements if _is_on_rectangles(r, solid)]
     solid = _imprint(solid, flat)
     fine = _restricted_faces(solid, flat)
     points = []
     for refinement in refinements:
         if refinement not in flat:
-            places, area = points_on(body_mesh(_generate(OCCGeometry(solid), solid, coarse)), refinement)
+            rough = _generate(OCCGeometry(solid), solid, coarse)
+            if rename is not None:
+                rename(rough)
+            places, area = points_on(body_mesh(rough), refinement)
             points.append((places, refinement.element))
             fine.append((area, refinement.element))
     require_budget([(s.mass, min(coarse, s.maxh)) for s in solid.solids], fine)
@@ -247,7 +257,15 @@ def mesh_solid(solid: Any, coarse: float, refinements: tuple[FineMesh, ...]) -> 
     for places, element in points:
         for place in places.tolist():
             geometry.RestrictH(Pnt(*place), element)
-    return _generate(geometry, solid, coarse)
+    mesh = _generate(geometry, solid, coarse)
+    if rename is not None:
+        rename(mesh)
+    return mesh
+
+
+def _is_on_rectangles(refinement: FineMesh, solid: Any) -> bool:
+    """Return True where all refined faces of a solid are upright plane rectangles."""
+    return all(_is_rectangle(face) for face in solid.faces if refinement.is_on(face.name))
 
 
 def _generate(geometry: Any, solid: Any, coarse: float, **options: Any) -> Any:

@@ -24,10 +24,11 @@ from palpate.physics.shapes.body_file import (
     require_unit,
     tell_repairs,
 )
-from palpate.physics.shapes.mesh import BodyMesh, to_ngsolve
+from palpate.physics.shapes.mesh import BodyMesh, body_mesh, to_ngsolve
 from palpate.physics.shapes.meshing import FineMesh, mesh_solid
 from palpate.physics.shapes.naming import INTERFACE, plain_name
 from palpate.physics.shapes.shape import Shape, require_size
+from palpate.physics.shapes.step_patches import FacePatches, number_faces
 from palpate.physics.shapes.stl_file import bodies_apart, fill_surface, name_parts, read_stl
 
 __all__ = [
@@ -40,7 +41,9 @@ MILLIMETRE = 1e-3  # the CAD kernel turns every unit that a STEP file states int
 STEP, STL = (".step", ".stp"), (".stl",)
 
 
-def read_step(path: str, patches: tuple[SurfacePatch, ...]) -> tuple[Any, tuple[str, ...]]:
+def read_step(
+    path: str, patches: tuple[SurfacePatch, ...]
+) -> tuple[Any, tuple[str, ...], FacePatches | None]:
     """Read the solids of a STEP file, glued where they touch.
 
     A face is called by its name, else by its colour (``colour ff0000``), else ``face 1``, ``face 2``, … in the
@@ -60,6 +63,9 @@ def read_step(path: str, patches: tuple[SurfacePatch, ...]) -> tuple[Any, tuple[
         In m.
     notes : tuple of str
         A sentence about each solid that was left out.
+    naming : FacePatches, optional
+        What names the faces of a mesh of the solid, where a patch is chosen by its direction; until then the faces are
+        called by numbers.
 
     Raises
     ------
@@ -81,8 +87,10 @@ def read_step(path: str, patches: tuple[SurfacePatch, ...]) -> tuple[Any, tuple[
     low, high = body.bounding_box
     require_size(path, max(high[i] - low[i] for i in range(3)), "stated in the file")
     _name_interfaces(body)
+    if any(patch.facing is not None for patch in patches):
+        return body, notes, number_faces(patches, body)
     _name_patches(patches, body)
-    return body, notes
+    return body, notes, None
 
 
 def _without_overlap(path: str, solids: list[Any]) -> tuple[list[Any], tuple[str, ...]]:
@@ -211,7 +219,8 @@ class ImportedSolid(Shape):
     element : float, optional
         Largest element size in m, by default a third of the least extent.
     patches : tuple of SurfacePatch
-        Names for parts of the surface; they go over those of the file. In a STEP file they name whole faces.
+        Names for parts of the surface; they go over those of the file. In a STEP file they name whole faces, unless
+        they are chosen by the way that they face.
     feature_angle : float
         In degrees: from which angle between triangles an edge of an STL file is sharp.
     simplify : float, optional
@@ -336,11 +345,12 @@ class ImportedSolid(Shape):
 
 
 def _mesh_step(shape: ImportedSolid, refinements: tuple[FineMesh, ...]) -> Any:
-    solid, _ = _read_solid(shape)
-    return mesh_solid(solid, shape.coarse(*solid.bounding_box), refinements)
+    solid, _, naming = _read_solid(shape)
+    rename = None if naming is None else naming.name_mesh
+    return mesh_solid(solid, shape.coarse(*solid.bounding_box), refinements, rename)
 
 
-def _read_solid(shape: ImportedSolid) -> tuple[Any, tuple[str, ...]]:
+def _read_solid(shape: ImportedSolid) -> tuple[Any, tuple[str, ...], FacePatches | None]:
     require_same(shape.path, shape.digest)
     return read_step(shape.path, shape.patches)
 
@@ -354,8 +364,12 @@ def _names(shape: ImportedSolid) -> tuple[tuple[str, ...], tuple[str, ...], tupl
 
 
 def _read_names(shape: ImportedSolid) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
-    solid, notes = _read_solid(shape)
-    surfaces = dict.fromkeys(face.name for face in solid.faces if face.name != INTERFACE)
+    solid, notes, naming = _read_solid(shape)
+    if naming is None:
+        surfaces = dict.fromkeys(face.name for face in solid.faces if face.name != INTERFACE)
+    else:  # which parts there are is known of a mesh
+        mesh = mesh_solid(solid, shape.coarse(*solid.bounding_box), (), naming.name_mesh)
+        surfaces = dict.fromkeys(name for name in body_mesh(mesh).surfaces if name != INTERFACE)
     return tuple(surfaces), tuple(dict.fromkeys(part.name for part in solid.solids)), notes
 
 

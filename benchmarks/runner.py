@@ -20,6 +20,7 @@ from benchmarks.table import Table
 __all__ = ["BENCHMARKS", "Benchmark", "main"]
 
 BENCHMARKS = (
+    "active_choice",
     "cantilever",
     "device_round_trips",
     "faults",

@@ -15,6 +15,7 @@ import typer
 from palpate.cli.console import Console, advice_in_words
 from palpate.cli.device_commands import devices_app
 from palpate.cli.material_commands import material_app
+from palpate.cli.sweep_command import sweep
 from palpate.cli.table_commands import correct, fit
 from palpate.cli.table_options import Json, with_table_options
 from palpate.cli.touch_command import touch
@@ -158,48 +159,7 @@ def schema() -> None:
     typer.echo(study_schema())
 
 
-@app.command()
-def sweep(
-    study: StudyFile = STUDY,
-    samples: Annotated[
-        int | None,
-        typer.Option(
-            min=1,
-            help="Solves to learn from. Default: those of the study. A finished sweep is continued, not repeated.",
-        ),
-    ] = None,
-    workers: Workers = None,
-    case_limit: CaseLimit = CASE_LIMIT,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS",
-            help="Solve on a running Dask scheduler, such as tls://HOST:8786. Default: processes of this machine.",
-        ),
-    ] = None,
-    tls_ca: Annotated[
-        Path | None, typer.Option(help="For --scheduler: certificate of the authority, as a PEM file.")
-    ] = None,
-    tls_cert: Annotated[
-        Path | None, typer.Option(help="For --scheduler: your own certificate, as a PEM file.")
-    ] = None,
-    tls_key: Annotated[
-        Path | None,
-        typer.Option(help="For --scheduler: the key of your certificate, if it has a PEM file of its own."),
-    ] = None,
-    as_json: Json = False,
-) -> None:
-    """Solve the finite-element model of a study over its ranges. An interrupted sweep continues where it stopped."""
-    from palpate.cli.study_commands import sweep_file
-    from palpate.sweeps import Scheduler
-
-    if scheduler is not None:
-        own = Scheduler(scheduler, tls_ca, tls_cert, tls_key)
-    elif tls_ca or tls_cert or tls_key:
-        raise UsageError("Certificates belong to a scheduler.", fix="Give its address with --scheduler.")
-    else:
-        own = None
-    sweep_file(study, workers, Console(as_json), own, case_limit=case_limit, samples=samples)
+app.command()(sweep)
 
 
 @app.command()

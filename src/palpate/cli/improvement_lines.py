@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from palpate.errors import AccuracyError, UsageError
@@ -13,8 +14,69 @@ if TYPE_CHECKING:
     from palpate.improvement import ImprovementStep
     from palpate.study import Study
     from palpate.study.run import Outcome, Paths
+    from palpate.sweeps import Scheduler
 
-__all__ = ["improve_and_print", "share_of"]
+__all__ = ["improve_and_print", "improve_file", "share_of"]
+
+
+def improve_file(
+    file: Path,
+    until: str,
+    minutes: float | None,
+    samples: int | None,
+    workers: int | None,
+    scheduler: Scheduler | None,
+    console: Console,
+    *,
+    case_limit: float,
+) -> None:
+    """Choose the solves of a study file until a force error is kept, and print where everything is.
+
+    Parameters
+    ----------
+    file : Path
+        Study file.
+    until : str
+        Wanted force error, such as "2%".
+    minutes : float, optional
+        Limit on time; by default none.
+    samples : int, optional
+        Most solves to learn from.
+    workers : int, optional
+        Processes of this machine; by default those of the study.
+    scheduler : Scheduler, optional
+        Running scheduler to solve on instead.
+    console : Console
+        Printer of the lines.
+    case_limit : float
+        Time in s after which a single solve has failed.
+
+    Raises
+    ------
+    AccuracyError
+        If the force error was not reached; everything has been kept and printed then.
+    """
+    from palpate.study import read_study
+    from palpate.study.run import Paths
+
+    record = read_study(file).with_workers(workers)
+    paths = Paths(file.parent, record.name)
+    options: dict[str, Any] = {"cluster": scheduler, "case_limit": case_limit}
+    if samples is not None:
+        options["most"] = samples
+    limit = math.inf if minutes is None else 60.0 * minutes
+    outcome, content, failure = improve_and_print(record, paths, share_of(until), limit, console, **options)
+    lines = [
+        content["reason"],
+        f"{paths.data}: {count(len(outcome.train), 'solve')} to learn from",
+        f"{paths.random}: {count(len(outcome.test), 'unseen solve')}",
+        f"{paths.model}",
+    ]
+    files = {"data": str(paths.data), "random": str(paths.random)}
+    console.result("\n".join(lines), content | files | {"passed": outcome.validation.passed})
+    console.say(f"Next: palpate validate {file}, palpate view {paths.model}")
+    if failure is not None:
+        raise failure
 
 
 def improve_and_print(

@@ -197,7 +197,9 @@ def improve(
         work = _Improvement(
             problem,
             KeptSolves.open(problem, None if path is None else Path(path), **options),
-            KeptSolves.open(problem, None if unseen_path is None else Path(unseen_path), **options),
+            KeptSolves.open(
+                problem, None if unseen_path is None else Path(unseen_path), design="points", **options
+            ),
             np.asarray(unseen, dtype=float),
             stop,
             rule,

@@ -89,6 +89,8 @@ class KeptSolves:
         What is solved.
     path : Path or None
         Dataset that holds them, a folder ``NAME.zarr``; None keeps them in memory.
+    design : str
+        Name of the design, for the provenance: solves that were chosen, or points that were given.
     options : mapping
         Options of `palpate.sweep`, such as `cluster` and `progress`.
     data : Dataset or None
@@ -97,11 +99,12 @@ class KeptSolves:
 
     problem: Problem
     path: Path | None = None
+    design: str = CHOSEN
     options: dict[str, Any] = field(default_factory=dict)
     data: Dataset | None = None
 
     @classmethod
-    def open(cls, problem: Problem, path: Path | None, **options: Any) -> KeptSolves:
+    def open(cls, problem: Problem, path: Path | None, *, design: str = CHOSEN, **options: Any) -> KeptSolves:
         """Return what earlier runs have kept, and the whole of a batch that one of them began.
 
         Raises
@@ -109,7 +112,7 @@ class KeptSolves:
         UsageError
             If the dataset at the path is of another problem.
         """
-        kept = cls(problem, path, options)
+        kept = cls(problem, path, design, options)
         if path is None:
             return kept
         if path.exists():
@@ -162,7 +165,7 @@ class KeptSolves:
         )
         batch = Dataset(batch.data.load())  # its folder is about to go
         joined = batch if self.data is None else Dataset.concat([self.data, batch])
-        origin = provenance(self.problem, joined.X, CHOSEN, 0)
+        origin = provenance(self.problem, joined.X, self.design, 0)
         self.data = Dataset(joined.data.assign_attrs(provenance=json.dumps(origin, sort_keys=True)).load())
         if self.path is not None and folder is not None:
             self.data.save(self.path, overwrite=True)

@@ -108,12 +108,23 @@ def improve_study(
 
 
 def conclude(study: Study, paths: Paths, step: ImprovementStep) -> Outcome:
-    """Judge the surrogate of the last step by all of the study's targets, write that into its file, and return it."""
-    if step.train is None or step.test is None:
+    """Judge the surrogate of the last step by all of the study's targets, and write that into its file.
+
+    Raises
+    ------
+    UsageError
+        If the step has no surrogate yet.
+    """
+    if step.surrogate is None or step.train is None or step.test is None:
         raise UsageError("This step has no solves yet.", fix="Conclude with the last step.")
     train, test = split_rows(study, step.train, step.test)
     validation = validate_study(study, step.surrogate, test, step.history)
-    model = with_validation(step.surrogate, validation, earlier_curve(paths, study.name), step.solves)
+    # the last batch may have brought nothing: the surrogate of fewer solves has still not seen the unseen ones
+    origin = (
+        {**step.surrogate.meta.get("dataset", {}), "hash": train.hash} if isinstance(train, Dataset) else {}
+    )
+    surrogate = replace(step.surrogate, meta={**step.surrogate.meta, "dataset": origin})
+    model = with_validation(surrogate, validation, earlier_curve(paths, study.name), step.solves)
     save_model(paths, model, step.history)
     return Outcome(study, model, train, test, validation, step.history)
 

@@ -30,6 +30,7 @@ from palpate.study.memory_stages import learn_histories, sweep_histories
 from palpate.study.study import Study
 from palpate.surrogates import Surrogate
 from palpate.sweeps import grow, sweep
+from palpate.sweeps.grow_sweep import CHOSEN
 from palpate.validation import Chapter, Validation, validate, write_report
 from palpate.validation.more_solves import learning_curve
 from palpate.validation.touch_comparison import TouchComparison
@@ -203,11 +204,16 @@ def sweep_study(
     data = grow(paths.data, problem, wanted) if paths else None
     if data is None:
         data = sweep(problem, path=paths.data if paths else None, **wanted, **common)
+    elif paths and data.provenance.get("design") == CHOSEN:
+        log(f"{paths.data} holds {count(len(data), 'solve')} that were chosen; they stay as they are")
     further = study.test.arguments(problem)
     if further is None:
         return data, None
     log("further solves for testing only, which learning never sees")
-    return data, sweep(problem, path=paths.random if paths else None, **further, **common)
+    unseen = grow(paths.random, problem, further) if paths else None
+    if unseen is None:
+        unseen = sweep(problem, path=paths.random if paths else None, **further, **common)
+    return data, unseen
 
 
 def _solved_part(study: Study, problem: Any) -> str:

@@ -41,21 +41,24 @@ def grow(path: str | os.PathLike[str], problem: Any, arguments: Mapping[str, Any
     Returns
     -------
     Dataset or None
-        The finished dataset where it holds all of the points and more; None where `sweep` has to look: nothing is
+        The finished dataset where it holds all of the points and more, or solves of this problem that were chosen one
+        by one, which no design continues; None where `sweep` has to look: nothing is
         there, exactly this sweep, another one, or one that it can now continue.
     """
-    path = Path(path)
-    if not path.exists():
-        return None
-    plan = _plan(problem, arguments)
+    path, plan = Path(path), _plan(problem, arguments)
     try:
-        finished = Dataset.open(path)
+        finished = Dataset.open(path) if path.exists() else None
     except FileFormatError:
-        return None  # `sweep` says what is wrong with it
-    if finished.provenance.get("config_hash") == plan.config or not _begins_alike(finished, plan):
+        finished = None  # `sweep` says what is wrong with it
+    if finished is None:
         return None
-    if len(finished) > len(plan.points):
+    if finished.provenance.get("config_hash") == plan.config or not _is_same_problem(finished, plan):
+        return None
+    begins_alike = _begins_alike(finished, plan)
+    if finished.provenance.get("design") == CHOSEN or (begins_alike and len(finished) > len(plan.points)):
         return finished
+    if not begins_alike:
+        return None
     ledger = Ledger(path, plan.config)
     ledger.begin()
     ledger.add(finished)
@@ -90,11 +93,13 @@ def _plan(problem: Any, arguments: Mapping[str, Any]) -> Plan:
     )
 
 
+def _is_same_problem(finished: Dataset, plan: Plan) -> bool:
+    # compared as the file has it: tuples are lists there
+    return bool(finished.provenance.get("problem") == json.loads(json.dumps(plan.problem.describe())))
+
+
 def _begins_alike(finished: Dataset, plan: Plan) -> bool:
     """Return whether the points of the smaller of two sweeps of one problem are the first of the larger."""
-    # compared as the file has it: tuples are lists there
-    if finished.provenance.get("problem") != json.loads(json.dumps(plan.problem.describe())):
-        return False
     known = finished.X
     n = min(len(known), len(plan.points))
     return len(known) != len(plan.points) and bool(np.array_equal(known[:n], plan.points[:n]))

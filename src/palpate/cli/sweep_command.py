@@ -1,0 +1,88 @@
+"""`palpate sweep`: the solves of a study, by its design or chosen until a force error is kept."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from palpate.cli.console import Console
+from palpate.cli.table_options import Json
+from palpate.errors import UsageError
+from palpate.processes import CASE_LIMIT
+
+__all__ = ["sweep"]
+
+
+def sweep(
+    study: Annotated[Path, typer.Argument(help="Study file, as [bold]palpate init[/] writes it.")] = Path(
+        "study.toml"
+    ),
+    samples: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help="Solves to learn from. Default: those of the study. A finished sweep is continued, not repeated. "
+            "With --until: the most solves.",
+        ),
+    ] = None,
+    until: Annotated[
+        str | None,
+        typer.Option(
+            help="For a body under a probe: choose solves where the force is least certain, and learn, until this "
+            "force error is kept at the 95th percentile of unseen solves, such as 2%."
+        ),
+    ] = None,
+    minutes: Annotated[
+        float | None, typer.Option(min=0, help="With --until: minutes after which no further batch begins.")
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Number of worker processes. Default: one per core.")
+    ] = None,
+    case_limit: Annotated[
+        float,
+        typer.Option(
+            min=0.1,
+            help="Seconds after which a single solve has failed. It costs that solve; the sweep goes on.",
+        ),
+    ] = CASE_LIMIT,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Solve on a running Dask scheduler, such as tls://HOST:8786. Default: processes of this machine.",
+        ),
+    ] = None,
+    tls_ca: Annotated[
+        Path | None, typer.Option(help="For --scheduler: certificate of the authority, as a PEM file.")
+    ] = None,
+    tls_cert: Annotated[
+        Path | None, typer.Option(help="For --scheduler: your own certificate, as a PEM file.")
+    ] = None,
+    tls_key: Annotated[
+        Path | None,
+        typer.Option(help="For --scheduler: the key of your certificate, if it has a PEM file of its own."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Solve the finite-element model of a study over its ranges. An interrupted sweep continues where it stopped."""
+    from palpate.cli.study_commands import sweep_file
+    from palpate.sweeps import Scheduler
+
+    if scheduler is not None:
+        own = Scheduler(scheduler, tls_ca, tls_cert, tls_key)
+    elif tls_ca or tls_cert or tls_key:
+        raise UsageError("Certificates belong to a scheduler.", fix="Give its address with --scheduler.")
+    else:
+        own = None
+    if until is not None:
+        from palpate.cli.improvement_lines import improve_file
+
+        improve_file(study, until, minutes, samples, workers, own, Console(as_json), case_limit=case_limit)
+        return
+    if minutes is not None:
+        raise UsageError(
+            "A sweep of a design has no limit on time.", fix="Give --until, or leave --minutes out."
+        )
+    sweep_file(study, workers, Console(as_json), own, case_limit=case_limit, samples=samples)

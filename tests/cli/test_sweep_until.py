@@ -1,0 +1,90 @@
+"""`palpate sweep --until`: a body of few elements on the whole way, and what its options refuse."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from palpate.dataset import Dataset
+
+TINY = """\
+name = "tiny"
+[body]
+kind = "block"
+size = ["40 mm", "40 mm", "20 mm"]
+material = { young = "9 kPa" }
+[interaction]
+radius = "8 mm"
+pad = 5e6
+depth = ["0.3 mm", "2 mm"]
+over = [["16 mm", "16 mm"], ["24 mm", "24 mm"]]
+[sweep]
+samples = 6
+depths = 2
+element = "12 mm"
+workers = 1
+[test]
+samples = 2
+depths = 2
+[learning]
+effort = 0.1
+workers = 1
+shape = false
+"""
+
+
+@pytest.fixture
+def study(tmp_path):
+    path = tmp_path / "tiny.toml"
+    path.write_text(TINY, encoding="utf-8")
+    return path
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_solves_are_chosen_until_the_error_is_kept(palpate, study, tmp_path):
+    first = palpate("sweep", study, "--until", "60%", "--json")
+    assert first.code == 0, first.err
+    content = json.loads(first.out)
+    assert content["reached"] is True
+    assert [step["solves"] for step in content["steps"]] == [12]
+    data, unseen = (Dataset.open(tmp_path / f"tiny{end}.zarr") for end in ("", "-random"))
+    assert (len(data), len(unseen)) == (12, 2)
+    assert (tmp_path / "tiny-12.palpate").is_file()
+    again = palpate("sweep", study, "--until", "60%")
+    assert again.code == 0, again.err
+    assert "12 solves to learn from" in again.out
+    assert "chosen by variance" not in again.err, "nothing is solved twice"
+    usual = palpate("sweep", study)
+    assert usual.code == 0, usual.err
+    assert "12 solves that were chosen; they stay as they are" in usual.err
+    judged = palpate("validate", study, "--no-report")
+    assert "tiny on 2 unseen solves" in judged.out
+    missed = palpate("sweep", study, "--until", "0.001%", "--samples", "16")
+    assert missed.code == 1
+    assert "The limit of 16 solves is reached. Everything is kept." in missed.err
+    assert len(Dataset.open(tmp_path / "tiny.zarr")) == 16
+    assert palpate("validate", study, "--no-report").code in {0, 1}, "the surrogate is of this study's solves"
+
+
+@pytest.mark.parametrize(
+    ("options", "answer"),
+    [
+        (("--until", "two"), "no force error"),
+        (("--until", "200%"), "no force error"),
+        (("--minutes", "3"), "Give --until"),
+    ],
+)
+def test_options_that_say_nothing_are_refused(palpate, study, options, answer):
+    refused = palpate("sweep", study, *options)
+    assert refused.code == 2
+    assert answer in refused.err
+
+
+def test_loads_are_not_chosen_one_by_one(palpate, tmp_path):
+    path = tmp_path / "beam.toml"
+    assert palpate("init", path).code == 0
+    refused = palpate("sweep", path, "--until", "2%")
+    assert refused.code == 2
+    assert "under a probe" in refused.err

@@ -1,0 +1,124 @@
+"""`palpate.improve` on a body whose answers are a formula: its steps, its files, and what an interruption leaves."""
+
+from __future__ import annotations
+
+import itertools
+from functools import partial
+
+import numpy as np
+import pytest
+from pressed_problem import PressedSlab, learn_affine, truth
+
+import palpate as pp
+from palpate.dataset import Dataset
+from palpate.errors import UsageError
+from palpate.improvement.improve import FIRST, RULES
+from palpate.sweeps import ExternalProblem, local_cluster
+from palpate.sweeps.plan import config_hash
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    with local_cluster(1) as running:
+        yield running
+
+
+@pytest.fixture
+def improve(cluster):
+    common = {"cluster": cluster, "progress": False, "learner": learn_affine, "unseen": 10, "batch": 4}
+    return partial(pp.improve, PressedSlab(), **common)
+
+
+def test_steps_solve_learn_and_judge_in_turn(improve):
+    steps = list(improve(until=1e-4, most=FIRST + 8))
+    assert [step.phase for step in steps] == ["solved", *["learnt"] * 2, *["solved", "learnt"] * 2, "ended"]
+    assert [step.solves for step in steps if step.phase == "solved"] == [12, 16, 20]
+    assert [step.unseen for step in steps if step.phase == "solved"] == [0, 10, 10]
+    last = steps[-1]
+    assert not last.reached
+    assert "limit of 20 solves" in last.reason
+    answered = last.surrogate.energy.force(last.test.X)
+    relative = np.linalg.norm(answered - last.test.response, axis=1) / np.linalg.norm(
+        last.test.response, axis=1
+    )
+    strong = (
+        np.linalg.norm(last.test.response, axis=1) > 0.05 * np.linalg.norm(last.test.response, axis=1).max()
+    )
+    assert last.error == pytest.approx(np.quantile(relative[strong], 0.95))
+    assert last.median == pytest.approx(np.median(relative[strong]))
+    assert last.places == pytest.approx(last.train.X * [1, 1, 0], abs=1e-9), "on the slab's surface z = 0"
+    missed = np.linalg.norm(last.surrogate.energy.force(last.train.X) - last.train.response, axis=1)
+    known = ~np.isnan(last.values)
+    assert known.sum() in {12, 16, 20}, "solves that the surrogate has not learnt from have none"
+    assert last.values[known] == pytest.approx((missed / np.linalg.norm(last.train.response, axis=1))[known])
+    errors = [step.error for step in steps if step.phase == "learnt"][2:]
+    assert all(after <= before for before, after in itertools.pairwise(errors)), "the better one stays"
+    seen, unseen = (set(map(tuple, data.X)) for data in (last.train, last.test))
+    assert not seen & unseen
+
+
+def test_it_ends_when_the_error_is_kept_on_all_unseen_solves(improve):
+    *_, last = improve(until=0.9)
+    assert last.reached
+    assert (last.solves, last.unseen) == (FIRST, 10)
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_every_rule_chooses_new_places(improve, rule):
+    *_, last = improve(until=1e-4, most=FIRST + 4, rule=rule)
+    X = last.train.X
+    assert len(np.unique(X, axis=0)) == FIRST + 4
+    low, high = np.array([[r.low, r.high] for r in last.train.ranges]).T
+    assert ((low <= X) & (high >= X)).all()
+    assert last.train.response == pytest.approx(truth(X)[1])
+
+
+def test_an_interrupted_batch_is_finished_first(improve, tmp_path):
+    files = {"path": tmp_path / "slab.zarr", "unseen_path": tmp_path / "slab-random.zarr"}
+
+    def stop(done: int, total: int) -> None:
+        if total == 4 and done == 2:
+            raise KeyboardInterrupt
+
+    whole = list(improve(until=1e-4, most=FIRST + 4))[-1]
+    with pytest.raises(KeyboardInterrupt):
+        list(improve(until=1e-4, most=FIRST + 4, progress=stop, **files))
+    assert len(Dataset.open(files["path"])) == FIRST
+    assert (tmp_path / "slab.zarr.batch" / "solves.zarr.parts").is_dir()
+    steps = list(improve(until=1e-4, most=FIRST + 4, **files))
+    assert steps[0].phase == "learnt", "the batch is whole before anything is learnt"
+    assert pytest.approx(whole.train.X) == steps[-1].train.X
+    assert not list(tmp_path.glob("*.batch"))
+    kept = Dataset.open(files["path"])
+    assert pytest.approx(whole.train.X) == kept.X
+    assert kept.provenance["design"] == "chosen"
+    assert kept.provenance["samples"] == FIRST + 4
+    unseen = Dataset.open(files["unseen_path"])
+    assert unseen.provenance["config_hash"] == config_hash(PressedSlab(), unseen.X)
+
+
+def test_solves_that_fail_stay_out(cluster):
+    problem = PressedSlab(failing=0.012)
+    *_, last = pp.improve(
+        problem, cluster=cluster, progress=False, learner=learn_affine, unseen=6, batch=4, until=1e-4, most=24
+    )
+    assert last.train.converged.all()
+    assert (last.train.X[:, 0] <= 0.012).all()
+    assert last.solves < 24
+
+
+def test_another_bodys_solves_are_refused(improve, tmp_path):
+    path = tmp_path / "slab.zarr"
+    next(iter(improve(path=path)))
+    with pytest.raises(UsageError, match="not of this body"):
+        next(iter(pp.improve(PressedSlab(failing=0.1), path=path, progress=False)))
+
+
+def test_wrong_arguments_are_refused():
+    spring = ExternalProblem(PressedSlab().ranges, PressedSlab().layout, (), dict, {})
+    with pytest.raises(UsageError, match="one probe"):
+        next(iter(pp.improve(spring)))
+    with pytest.raises(UsageError, match="rule"):
+        next(iter(pp.improve(PressedSlab(), rule="guess")))
+    with pytest.raises(UsageError, match="between 0 and 1"):
+        next(iter(pp.improve(PressedSlab(), until=2.0)))

@@ -2,6 +2,9 @@
 
     python -m benchmarks.punctuality [--quick] [--json | --markdown]
 
+The second table is of one loop while a page drags: at rest, while a part is solved and learnt as `palpate touch` does,
+and while, besides, another surrogate takes the place of the one in the hand, two times a second.
+
 Rounds alternate: `cyclictest` beside a learner that adapts in a process of its own, then the loop beside the same
 learner and with a page that drags and asks for pictures. Both are asked for a tick each millisecond. Without
 `cyclictest` on this machine its columns stay empty.
@@ -10,6 +13,8 @@ learner and with a page that drags and asks for pictures. Both are asked for a t
 from __future__ import annotations
 
 import contextlib
+import itertools
+import json
 import math
 import multiprocessing
 import shutil
@@ -17,19 +22,24 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from websockets.sync.client import connect
 
-from benchmarks.cases import touch_model
+from benchmarks.cases import formula_block, touch_model
 from benchmarks.runner import main
 from benchmarks.surrogate_cases import Case
 from benchmarks.surrogate_measure import learnt
 from benchmarks.table import Claim, Column, Table
+from palpate.files import TemporaryFolder
 from palpate.learning import Learner
+from palpate.physics.shapes.sample_part import write_sample_part
+from palpate.processes import available_cores, helper_environment
 from palpate.runtime.loop_report import percentile
+from palpate.study.part_study import part_study, part_text
 from palpate.surrogates import Surrogate
 from palpate.units import Range
 from palpate.viewer import Viewer
@@ -93,8 +103,142 @@ def tables(*, quick: bool = False) -> list[Table]:
                 "the loop sleeps until shortly before a tick and then asks the clock; cyclictest sleeps all the way",
                 f"cyclictest -p {PRIORITY} -m -i 1000, with the learner alone; the loop also has a page beside it",
             ),
-        )
+        ),
+        _while_working(quick=quick),
     ]
+
+
+def _while_working(*, quick: bool) -> Table:
+    """The table of one loop at rest, beside solves and learning, and with swaps."""
+    seconds, rounds = (1.0, 1) if quick else (SECONDS, ROUNDS)
+    with TemporaryFolder() as folder:
+        rows = _phases(folder, seconds, rounds, quick=quick)
+    rest = rows[0]["late_p99"]
+    return Table(
+        "punctuality_working",
+        f"One loop under a page's hand, {rounds} × {seconds:g} s{' (quick)' if quick else ''}, µs",
+        (
+            Column("phase", "meanwhile"),
+            Column("late_p50", "late, median", ".1f"),
+            Column("late_p99", "p99", ".1f"),
+            Column("late_p999", "p99.9", ".0f"),
+            Column("late_max", "largest", ".0f"),
+            Column("work_p50", "CPU of a tick, median", ".0f"),
+            Column("work_p99", "p99", ".0f"),
+            Column("swaps", "swaps", "d"),
+            Column("faults", "faults", "d"),
+        ),
+        rows,
+        [
+            Claim(
+                "p99 of lateness beside solves and learning, over that at rest",
+                (rows[1]["late_p99"] / rest,),
+                1.5,
+                ".2f",
+            ),
+            Claim(
+                "p99 of lateness with swaps besides, over that at rest",
+                (rows[2]["late_p99"] / rest,),
+                1.5,
+                ".2f",
+            ),
+        ],
+        (
+            "solves and learning: the process behind the page of `palpate touch`, with a worker for each core but one",
+            "a lateness below the histogram's 1 µs counts as 1 µs",
+        ),
+    )
+
+
+def _phases(folder: Path, seconds: float, rounds: int, *, quick: bool) -> list[dict[str, Any]]:
+    bodies = [formula_block(), formula_block()] if quick else [_liver(), _liver(40)]
+    files = [body.save(folder / f"{k}.palpate") for k, body in enumerate(bodies)]
+    measured: dict[str, list[dict[str, Any]]] = {
+        "nothing else": [],
+        "solves and learning": [],
+        "swaps too": [],
+    }
+    with _dragged(bodies[0]) as viewer:
+        for _ in range(rounds):
+            measured["nothing else"].append(_window(viewer, seconds, []))
+            with _solving(folder) as ready:
+                ready(1.0 if quick else 30.0)
+                measured["solves and learning"].append(_window(viewer, seconds, []))
+                measured["swaps too"].append(_window(viewer, seconds, files[::-1]))
+    return [
+        {
+            "phase": name,
+            "swaps": sum(r["swaps"] for r in windows),
+            "faults": sum(r["faults"] for r in windows),
+        }
+        | {
+            key: statistics.median(r[key] for r in windows)
+            for key in windows[0]
+            if key.startswith(("late", "work"))
+        }
+        for name, windows in measured.items()
+    ]
+
+
+def _window(viewer: Viewer, seconds: float, files: list[Path]) -> dict[str, Any]:
+    """Lateness and work of the loop in a time, µs, while the surrogates of files take turns in the hand."""
+    first, until, turn = viewer.loop.read(), time.monotonic() + seconds, itertools.cycle(files)
+    while (rest := until - time.monotonic()) > 0:
+        if files:
+            viewer.loop.swap(next(turn))
+        time.sleep(min(rest, 0.5))
+    last = viewer.loop.read()
+    late, work = last.histogram - first.histogram, last.work_histogram - first.work_histogram
+    shares = {"p50": 0.5, "p99": 0.99, "p999": 0.999, "max": 1.0 - 1e-9}
+    return (
+        {f"late_{name}": max(1.0, 1e6 * percentile(late, share)) for name, share in shares.items()}
+        | {f"work_{name}": 1e6 * percentile(work, share) for name, share in shares.items()}
+        | {"swaps": last.swaps - first.swaps, "faults": last.faults - first.faults}
+    )
+
+
+@contextlib.contextmanager
+def _solving(folder: Path) -> Iterator[Callable[[float], None]]:
+    """The process behind `palpate touch` on the sample part; what is yielded waits until it solves, at most a time."""
+    part, file = folder / "kidney.stl", folder / "kidney.toml"
+    if not file.exists():
+        write_sample_part(part)
+        file.write_text(part_text(*part_study(part, unit="mm")), encoding="utf-8")
+    for old in folder.glob("kidney*.zarr*"):
+        shutil.rmtree(old, ignore_errors=True)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "palpate.study.part_work"],
+        stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, env=helper_environment(), start_new_session=True,
+    )  # fmt: skip
+    assert process.stdin is not None
+    workers = max(1, available_cores() - 1)
+    wish = {"study": str(file), "until": 0.001, "limit": 600.0, "workers": workers}
+    process.stdin.write(json.dumps(wish) + "\n")
+    process.stdin.flush()
+    try:
+        yield time.sleep
+    finally:
+        process.stdin.close()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(10.0)
+        process.kill()
+
+
+@contextlib.contextmanager
+def _dragged(body: Surrogate) -> Iterator[Viewer]:
+    """A page that drags a body about."""
+    context = multiprocessing.get_context("spawn")
+    with Viewer(body, port=0) as viewer:
+        over = context.Event()
+        cookie = "; ".join(f"{name}={value}" for name, value in viewer.cookies.items())
+        reach = float(viewer.model.workspace(0.075).radius)
+        page = context.Process(target=drag, args=(viewer.address, cookie, reach, over), daemon=True)
+        page.start()
+        await_grab(viewer)
+        time.sleep(WARM)
+        yield viewer
+        over.set()
+        page.join(10)
 
 
 def _row(name: str, pairs: list[tuple[dict[str, Any], dict[str, Any]]]) -> dict[str, Any]:
@@ -138,20 +282,10 @@ def _cyclictest(seconds: float) -> dict[str, float]:
 
 def _loop(body: Surrogate, seconds: float) -> dict[str, Any]:
     """Lateness and work of the loop, µs, while a page drags."""
-    context = multiprocessing.get_context("spawn")
-    with Viewer(body, port=0) as viewer:
-        over = context.Event()
-        cookie = "; ".join(f"{name}={value}" for name, value in viewer.cookies.items())
-        reach = float(viewer.model.workspace(0.075).radius)
-        page = context.Process(target=drag, args=(viewer.address, cookie, reach, over), daemon=True)
-        page.start()
-        await_grab(viewer)
-        time.sleep(WARM)
+    with _dragged(body) as viewer:
         first = viewer.loop.read()
         time.sleep(seconds)
         last = viewer.loop.read()
-        over.set()
-        page.join(10)
         loop = viewer.loop
     report = loop.report()
     late, work = last.histogram - first.histogram, last.work_histogram - first.work_histogram
@@ -213,10 +347,10 @@ def _adapt(over: Any) -> None:
         learner.observe(x, np.array([math.sin(3.0 * x[0]) * x[1] + 0.05 * rng.normal()]))
 
 
-def _liver() -> Surrogate:
+def _liver(solves: int = 80) -> Surrogate:
     case = Case.load("liver")
     assert case is not None
-    return learnt(case, 80, 1.0)
+    return learnt(case, solves, 1.0)
 
 
 if __name__ == "__main__":

@@ -39,7 +39,7 @@ def test_the_same_command_goes_on(palpate, asked, tmp_path):
     assert asked[0].body.material.young == pytest.approx(4e3)
     assert asked[0].body.material.poisson == 0.0
     assert asked[0].interaction == asked[1].interaction
-    other = palpate(*words, "--radius", "4 mm", "--until", "5%")
+    other = palpate(*words, "--radius", "7 mm", "--until", "5%")
     assert other.code == 2
     assert "It says otherwise of --radius." in other.err
     assert len(asked) == 2

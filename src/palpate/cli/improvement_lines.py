@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from palpate.study.run import Outcome, Paths
     from palpate.sweeps import Scheduler
 
-__all__ = ["improve_and_print", "improve_file", "share_of"]
+__all__ = ["improve_and_print", "improve_file", "share_of", "step_line"]
 
 
 def improve_file(
@@ -124,7 +124,7 @@ def improve_and_print(
     ):
         last = step
         if step.phase == "learnt":
-            console.say(_line(step))
+            console.say(step_line(step))
             if step.unseen:
                 steps.append({"solves": step.solves, "force_p95": step.error, "seconds": step.seconds})
     assert last is not None
@@ -133,7 +133,8 @@ def improve_and_print(
     return outcome, content, None if last.reached else _failure(study, until, last)
 
 
-def _line(step: ImprovementStep) -> str:
+def step_line(step: Any) -> str:
+    """Return the figures of an `ImprovementStep` as a line."""
     if not step.unseen or math.isnan(step.error):
         return f"{count(step.solves, 'solve')}: a first surrogate, not judged yet, after {duration(step.seconds)}"
     kept = "" if step.is_new else "; the surrogate before is better and stays"

@@ -48,11 +48,19 @@ def touch(
         int | None, typer.Option(min=1, help="Worker processes. Default: one per core.")
     ] = None,
     view: Annotated[
-        bool, typer.Option("--view/--no-view", help="Show the result on a page at the end.")
-    ] = True,
+        bool | None,
+        typer.Option(
+            "--view/--no-view", help="Choose, watch and touch on a page. Default: where there is a terminal."
+        ),
+    ] = None,
+    start: Annotated[
+        bool, typer.Option("--start", help="Begin at once with what is chosen, without a click on the page.")
+    ] = False,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Of the page.")] = 8080,
+    device: Annotated[str, typer.Option(help="Device that presses; see [bold]palpate devices[/].")] = "page",
     as_json: Json = False,
 ) -> None:
-    """Solve, learn and check a part until its force error is reached. Called again, it goes on."""
+    """Open a part on a page, to be touched while solves and learning improve it. Called again, it goes on."""
     from palpate.cli.console import Console
     from palpate.cli.improvement_lines import share_of
     from palpate.study.run import Paths
@@ -61,13 +69,63 @@ def touch(
     asked = {"unit": unit, "young": young, "poisson": poisson, "radius": radius, "depth": depth}
     choices = {"held": tuple(held or ()), "touched": touched}
     given = {name: value for name, value in (asked | choices).items() if value not in (None, ())}
-    study = _study_of(part, given, console).with_workers(workers)
-    paths = Paths(part.parent, study.name)
-    _carry_on(study, paths, share_of(until), 60 * minutes, console)
-    if view and not as_json and sys.stdout.isatty():
-        from palpate.viewer import serve
+    wanted, limit = share_of(until), 60 * minutes
+    if sys.stdout.isatty() and not as_json if view is None else view:
+        from palpate.cli.touch_page import TouchedPart, touch_on_page
 
-        serve(paths.model)
+        if not part.is_file():
+            raise UsageError(f"There is no file {part}.", fix="Name the part: STL, STEP, or a volume mesh.")
+        notes: list[str] = []
+        touch_on_page(
+            part.stem,
+            lambda: _study_on_page(part, given, notes, console),
+            lambda study: _write(part, study, notes),
+            TouchedPart(wanted, limit, workers, console),
+            at_once=start,
+            port=port,
+            device=device,
+            recordings=part.parent,
+        )
+        return
+    study = _study_of(part, given, console).with_workers(workers)
+    _carry_on(study, Paths(part.parent, study.name), wanted, limit, console)
+
+
+def _study_on_page(
+    part: Path, options: dict[str, Any], notes: list[str], console: Console
+) -> tuple[Study, Path, bool]:
+    """Return the study of a part, its file, and whether that was there; a new one is written at the start.
+
+    What the part's file holds is added to `notes`.
+    """
+    from palpate.study.part_study import part_study, study_file
+
+    file = study_file(part)
+    if file.exists():
+        return _study_of(part, options, console), file, True
+    study, held = part_study(part, **_in_si(options))
+    notes += held
+    console.say("\n".join(filter(None, notes)))
+    console.say(f"{_chosen(study)} Change it on the page, and press start there.")
+    return study, file, False
+
+
+def _write(part: Path, study: Study, notes: list[str]) -> Path:
+    """Write the study of a part beside it, and return the file."""
+    from palpate.files import write_file
+    from palpate.study.part_study import part_text, study_file
+
+    file = study_file(part)
+    write_file(file, part_text(study, notes))
+    return file
+
+
+def _in_si(options: dict[str, Any]) -> dict[str, Any]:
+    """Return options with their quantities in SI units."""
+    from palpate.units import to_si
+
+    units = {"young": "Pa", "radius": "m", "depth": "m"}
+    return {name: to_si(value, units[name]) if name in units else value for name, value in options.items()}
 
 
 def _study_of(part: Path, options: dict[str, Any], console: Console) -> Study:
@@ -75,11 +133,8 @@ def _study_of(part: Path, options: dict[str, Any], console: Console) -> Study:
     from palpate.files import write_file
     from palpate.study import read_study
     from palpate.study.part_study import part_study, part_text, study_file
-    from palpate.units import to_si
 
-    for name, si in (("young", "Pa"), ("radius", "m"), ("depth", "m")):
-        if name in options:
-            options[name] = to_si(options[name], si)
+    options = _in_si(options)
     file = study_file(part)
     if file.exists():
         study = read_study(file)

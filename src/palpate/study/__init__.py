@@ -10,6 +10,7 @@ named_studies        studies that have a name
 part_study           study of a part that the user has
 run                  the stages: sweep, load the data, learn, validate, report
 improve_study        a study whose solves are chosen batch by batch, until a force error is reached
+part_work            the work behind the page of `palpate touch`, in a process of its own
 study_advice         number of solves that would keep the limits
 """
 

@@ -1,0 +1,288 @@
+"""The page of `palpate touch`: opened at once, fed by a process that solves, and touched while it gets better."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import queue
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from palpate.cli.console import Console
+from palpate.cli.improvement_lines import step_line
+from palpate.errors import PalpateError
+from palpate.format import duration
+from palpate.processes import helper_environment, kill_group
+from palpate.study import Study
+from palpate.viewer.part_page import PartPage, Progress
+from palpate.viewer.shown_part import PartChoices
+from palpate.viewer.web_server import wait_until_interrupted
+
+__all__ = ["TouchedPart", "touch_on_page"]
+
+_GRACE = 8.0  # s that the work has to end in good order
+
+
+class _Work:
+    """The process that solves and learns; it starts at once, so that its imports are done when it is asked."""
+
+    def __init__(self) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "palpate.study.part_work"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            encoding="utf-8",
+            env=helper_environment(),
+            start_new_session=True,  # Ctrl-C in the terminal is for this process, which then ends the work
+        )
+
+    def ask(self, line: str) -> None:
+        """Send a line; nothing happens where the process has ended."""
+        with contextlib.suppress(OSError, ValueError):
+            assert self._process.stdin is not None
+            self._process.stdin.write(line + "\n")
+            self._process.stdin.flush()
+
+    def __iter__(self) -> Any:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            with contextlib.suppress(ValueError):  # cut off by a kill
+                yield dict(json.loads(line))
+
+    def close(self) -> int:
+        """End the process and all that it started; return its exit code."""
+        process = self._process
+        with contextlib.suppress(OSError, ValueError):
+            assert process.stdin is not None
+            process.stdin.close()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(_GRACE)
+        kill_group(process)  # type: ignore[arg-type]
+        return int(process.returncode)
+
+
+class TouchedPart:
+    """One part on its page: what a person chooses, the work, and the surrogates that come of it.
+
+    Parameters
+    ----------
+    until : float
+        Wanted relative force error.
+    limit : float
+        Time in s after which no further batch of solves begins.
+    workers : int, optional
+        Processes that solve.
+    console : Console
+        Printer of the lines.
+
+    Attributes
+    ----------
+    page : PartPage
+        To be set before `begin`.
+    times : dict of str to float
+        Time in s from the making of this object to ``page``, ``start``, ``touch`` and ``end``.
+    """
+
+    page: PartPage
+
+    def __init__(self, until: float, limit: float, workers: int | None, console: Console) -> None:
+        self.until, self.limit, self.workers, self.console = until, limit, workers, console
+        self.times: dict[str, float] = {}
+        self._made = time.monotonic()
+        self._progress = Progress("starting", target=until)
+        self._work = _Work()
+        self._stopped = False
+        self._bodies: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+        self._threads: list[threading.Thread] = []
+
+    def mark(self, name: str) -> None:
+        """Note that something has happened now, and print how long it took."""
+        if name not in self.times:
+            self.times[name] = time.monotonic() - self._made
+
+    def begin(self, file: Path) -> None:
+        """Let the work on a study file begin, and return at once."""
+        self.mark("start")
+        wish = {"study": str(file), "until": self.until, "limit": self.limit, "workers": self.workers}
+        self._work.ask(json.dumps(wish))
+        for target in (self._listen, self._show_bodies, self._heed_stop):
+            thread = threading.Thread(target=target, daemon=True)
+            thread.start()
+            self._threads.append(thread)
+
+    def close(self) -> None:
+        """End the work; everything that it has done is kept."""
+        self._stopped = True
+        self._bodies.put(None)
+        self._work.close()
+
+    def _heed_stop(self) -> None:
+        while not self._stopped:
+            if self.page.stopped.wait(0.5):
+                self._work.ask("stop")
+                return
+
+    def _listen(self) -> None:
+        """Show and print what the work says, until it ends."""
+        handlers: dict[str, Callable[[Any], None]] = {
+            "log": self._log,
+            "progress": self._count,
+            "step": self._step,
+            "body": self._bodies.put,
+            "ended": self._end,
+            "failed": self._fail,
+        }
+        done = False
+        for said in self._work:
+            for name, content in said.items():
+                handlers[name](content)
+                done = done or name in {"ended", "failed"}
+        if not done and not self._stopped:
+            self._fail(
+                {"what": "The process that solves has ended.", "why": "", "fix": "Give the command again."}
+            )
+
+    def _show(self, **changes: Any) -> None:
+        known = vars(self._progress) | {"seconds": time.monotonic() - self._made} | changes
+        self._progress = Progress(**known)
+        self.page.show_progress(self._progress)
+
+    def _log(self, words: str) -> None:
+        self._phase = words
+        self._show(phase=words)
+        self.console.say(f"{words} …")
+
+    _phase = "starting"
+
+    def _count(self, progress: list[int]) -> None:
+        done, total = progress
+        self._show(phase=f"{self._phase}: {done} of {total}")
+
+    def _step(self, figures: dict[str, Any]) -> None:
+        step = SimpleNamespace(**figures)
+        if step.phase == "learnt":
+            self.console.say(step_line(step))
+        places = np.array(step.places, dtype=float).reshape(-1, 3)
+        self._show(solves=step.solves, error_median=step.median, error_p95=step.error, places=places)
+
+    def _end(self, outcome: dict[str, Any]) -> None:
+        self.mark("end")
+        report = outcome["report"] or None
+        self._show(phase="done", report=report)
+        reached = "The wanted force error is kept." if outcome["reached"] else outcome["reason"]
+        self.page.end(f"{reached} Everything is kept beside the part; the same command goes on.")
+        self.console.say(outcome.get("validation") or outcome["reason"])
+        if report:
+            self.console.say(f"report  {report}")
+        self.console.say(reached)
+
+    def _fail(self, error: dict[str, str]) -> None:
+        words = " ".join(filter(None, (error["what"], error["why"], error["fix"])))
+        self.page.end(words)
+        self.console.say(words)
+
+    def _show_bodies(self) -> None:
+        """Put each surrogate into the hand: the newest, where several came while one was blended."""
+        while (path := self._bodies.get()) is not None:
+            while not self._bodies.empty():
+                path = self._bodies.get()
+                if path is None:
+                    return
+            try:
+                self.page.show_body(path)
+            except PalpateError as error:
+                self.console.say(f"{path} is not in the hand: {error}")
+                continue
+            if "touch" not in self.times:
+                self.mark("touch")
+                self.console.say(
+                    f"It can be touched, {duration(self.times['touch'] - self.times['start'])} after the start."
+                )
+
+
+def touch_on_page(
+    name: str,
+    study_of: Callable[[], tuple[Study, Path, bool]],
+    write: Callable[[Study], Path],
+    touched: TouchedPart,
+    *,
+    at_once: bool = False,
+    on_ready: Callable[[PartPage], object] | None = None,
+    **options: Any,
+) -> None:
+    """Open the page of a part, let a person choose, and work until Ctrl-C.
+
+    Parameters
+    ----------
+    name : str
+        Title of the page.
+    study_of : callable
+        Returns the study of the part, its file, and whether that was there before: then the work goes on at once.
+    write : callable
+        Writes a chosen study, and returns its file.
+    touched : TouchedPart
+        The part and its work.
+    at_once : bool
+        Whether to begin with the first choices.
+    on_ready : callable, optional
+        Called once with the running page; by default its address is printed, and opened in the user's browser where
+        there is a terminal.
+    **options
+        Those of `palpate.viewer.part_page.PartPage`.
+
+    Raises
+    ------
+    PalpateError
+        If the part can't be read.
+    """
+    from palpate.study.part_choices import chosen_study, shown_part
+
+    known: list[Study] = []
+    failures: list[BaseException] = []
+
+    def begin(choices: PartChoices) -> None:
+        study = chosen_study(known[0], choices)
+        touched.begin(write(study))
+
+    def read(page: PartPage) -> None:
+        try:
+            study, file, there = study_of()
+            known.append(study)
+            part = shown_part(study)
+            page.show_part(part)
+            if there:
+                touched.begin(file)
+            elif at_once:
+                begin(part.choices)
+        except PalpateError as error:
+            failures.append(error)
+            page.end(str(error).replace("\n", " "))
+            if not page.visited.is_set():
+                threading.Thread(target=page.stop, daemon=True).start()
+
+    def ready(page: PartPage) -> None:
+        touched.mark("page")
+        if on_ready is not None:
+            on_ready(page)
+        else:
+            touched.console.say(f"{page.url} shows {page.caption} Ctrl-C ends it.")
+        threading.Thread(target=read, args=(page,), daemon=True).start()
+
+    touched.page = PartPage(name, on_start=begin, **options)
+    try:
+        wait_until_interrupted(
+            touched.page, open_browser=on_ready is None and sys.stdout.isatty(), on_ready=ready
+        )
+    finally:
+        touched.close()
+    if failures:
+        raise failures[0]

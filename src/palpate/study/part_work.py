@@ -1,0 +1,263 @@
+"""The work behind the page of `palpate touch`, in a process of its own: ``python -m palpate.study.part_work``.
+
+A study is improved here beside the page and the real-time loop, at a lower priority, and one core is left to the loop
+once there is something to touch. First comes a *rough* surrogate, of twelve solves on elements as large as the ball,
+which takes a fraction of the time; then the study itself, whose surrogates take the rough one's place.
+
+Standard input brings one line of JSON with what to do, then perhaps the line ``stop``: no further batch of solves
+begins, and what there is is concluded. Its end ends this process and all that it started. Standard output carries lines
+of JSON, each with one of
+
+    log        a part of the work begins, in words
+    progress   solves of this batch that are done, and their number
+    step       `palpate.improvement.ImprovementStep`, without what can't be written
+    body       file of a surrogate to touch
+    ended      whether the wanted error was reached, why it ended, report and figures in words
+    failed     what, why and fix of an error
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from palpate.errors import PalpateError
+from palpate.processes import available_cores, end_by_sigterm, end_group
+from palpate.study.part_records import CAD_ENDINGS, PartRecord
+from palpate.study.run import Paths
+from palpate.study.stage_records import ProbeSweepRecord
+from palpate.study.study import Study
+
+__all__ = ["main", "rough_study", "work_on"]
+
+Say = Callable[[dict[str, Any]], None]
+
+_NICE = 5  # below the page and everything else that somebody waits for
+_GRACE = 5.0  # s to end in good order
+
+
+def rough_study(study: Study) -> Study | None:
+    """Return the study on elements as large as the ball, ``NAME-rough``; None where its file's mesh can't be coarser.
+
+    On a kidney of 110 mm a solve takes a fifteenth of the time, and forces are off by 2 to 9 %.
+    """
+    body, acting = study.body, study.interaction
+    if not (isinstance(body, PartRecord) and isinstance(study.sweep, ProbeSweepRecord)):
+        return None
+    if Path(body.file).suffix.lower() not in CAD_ENDINGS:
+        return None
+    sweep = study.sweep.model_copy(update={"element": getattr(acting, "radius", None)})
+    return study.model_copy(update={"name": f"{study.name}-rough", "sweep": sweep})
+
+
+def work_on(
+    study: Study,
+    paths: Paths,
+    say: Say,
+    *,
+    until: float,
+    limit: float,
+    workers: int | None = None,
+    stopped: Callable[[], bool] = lambda: False,
+) -> None:
+    """Improve a study until a force error is kept, and say all that a page shows of it.
+
+    Parameters
+    ----------
+    study : Study
+        A study of a part under a ball.
+    paths : Paths
+        Where its files are; a later call goes on from them.
+    say : callable
+        Takes what the module's text lists.
+    until : float
+        Wanted relative force error at the 95th percentile of unseen solves.
+    limit : float
+        Time in s after which no further batch of solves begins.
+    workers : int, optional
+        Processes that solve; by default one for each core, one fewer once there is something to touch.
+    stopped : callable
+        Returns whether no further batch shall begin.
+    """
+    from palpate.study.improve_study import improve_study
+    from palpate.sweeps import local_cluster
+
+    began = time.monotonic()
+    rough = rough_study(study)
+    kept = [paths.model] if rough is None else [paths.model, Paths(paths.folder, rough.name).model]
+    known = next((path for path in kept if path.exists()), None)
+    if known is not None:
+        say({"body": str(known)})
+    elif rough is not None:
+        with local_cluster(workers) as cluster:
+            _first_touch(rough.with_workers(workers), Paths(paths.folder, rough.name), cluster, say)
+    if stopped():
+        say(
+            {
+                "ended": {
+                    "reached": False,
+                    "reason": "It was stopped before the study's own solves.",
+                    "report": "",
+                }
+            }
+        )
+        return
+    fewer = workers or max(1, available_cores() - 1)
+    with local_cluster(fewer) as cluster:
+        steps = improve_study(
+            study.with_workers(fewer),
+            paths,
+            until=until,
+            limit=limit - (time.monotonic() - began),
+            cluster=cluster,
+            **_callbacks(say),
+        )
+        _carry_out(study, paths, steps, say, stopped)
+
+
+def _first_touch(rough: Study, paths: Paths, cluster: Any, say: Say) -> None:
+    """Learn a first surrogate on large elements; what fails here is left to the study itself."""
+    from palpate.study.improve_study import improve_study
+
+    say({"log": "a rough surrogate first, on elements as large as the ball"})
+    try:
+        for step in improve_study(rough, paths, cluster=cluster, **_callbacks(say)):
+            if step.phase == "learnt":
+                say({"body": str(step.model_path)})
+                return
+    except PalpateError as error:
+        say({"log": f"no rough surrogate: {error.what}"})
+
+
+def _carry_out(
+    study: Study, paths: Paths, steps: Iterator[Any], say: Say, stopped: Callable[[], bool]
+) -> None:
+    """Go through the steps, and conclude with the last."""
+    from palpate.study.improve_study import conclude
+    from palpate.study.run import report_study
+
+    last: Any = None
+    for step in steps:
+        last = step
+        say({"step": _figures(step)})
+        if step.is_new and step.model_path is not None:
+            own = step.model_path.with_name(f"{study.name}-{step.solves}.palpate")
+            say({"body": str(own if own.exists() else step.model_path)})
+        if stopped() and step.phase != "ended":
+            break
+    reason = last.reason or "It was stopped."
+    if last.train is None or not last.unseen or last.surrogate is None:
+        say({"ended": {"reached": False, "reason": reason, "report": ""}})
+        return
+    outcome = conclude(study, paths, last)
+    report = report_study(paths.report, [outcome])
+    words = str(outcome.validation)
+    say({"ended": {"reached": last.reached, "reason": reason, "report": str(report), "validation": words}})
+
+
+def _figures(step: Any) -> dict[str, Any]:
+    names = ("phase", "solves", "unseen", "error", "median", "seconds", "is_new", "reached", "reason")
+    return {name: getattr(step, name) for name in names} | {"places": step.places.tolist()}
+
+
+def _callbacks(say: Say) -> dict[str, Any]:
+    return {
+        "progress": lambda done, total: say({"progress": [int(done), int(total)]}),
+        "log": lambda words: say({"log": words}),
+    }
+
+
+def main() -> int:
+    """Carry out what the standard input asks for; the exit code is that of the error, 0 without one."""
+    with contextlib.suppress(OSError, AttributeError):
+        os.nice(_NICE)
+    signal.signal(
+        signal.SIGINT, signal.SIG_IGN
+    )  # Ctrl-C reaches the whole terminal: the page's process decides
+    signal.signal(signal.SIGTERM, end_by_sigterm)
+    say, stopping = _speaker(), threading.Event()
+    asked = _wishes(stopping)
+    _import_all()
+    wish = asked()
+    from palpate.study.toml import read_study
+
+    try:
+        file = Path(wish["study"])
+        study = read_study(file)
+        work_on(
+            study,
+            Paths(file.parent, study.name),
+            say,
+            until=wish["until"],
+            limit=wish["limit"],
+            workers=wish["workers"],
+            stopped=stopping.is_set,
+        )
+    except PalpateError as error:
+        say({"failed": {"what": error.what, "why": error.why, "fix": error.fix}})
+        return error.exit_code
+    return 0
+
+
+def _speaker() -> Say:
+    """Return what writes lines of JSON to the standard output, which libraries find closed to them from now on."""
+    out = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)
+    lock = threading.Lock()
+
+    def say(words: dict[str, Any]) -> None:
+        with lock, contextlib.suppress(OSError, ValueError):
+            out.write(json.dumps(words) + "\n")
+            out.flush()
+
+    return say
+
+
+def _wishes(stopping: threading.Event) -> Callable[[], dict[str, Any]]:
+    """Listen to the standard input; return what waits for the line that says what to do."""
+    lines: list[str] = []
+    come = threading.Event()
+
+    def listen() -> None:
+        rest = b""
+        while data := os.read(0, 65536):
+            *whole, rest = (rest + data).split(b"\n")
+            for line in whole:
+                if line == b"stop":
+                    stopping.set()
+                else:
+                    lines.append(line.decode())
+                    come.set()
+        os.kill(os.getpid(), signal.SIGTERM)  # who asked for the work is gone
+        time.sleep(_GRACE)
+        end_group()
+
+    threading.Thread(target=listen, daemon=True).start()
+
+    def first() -> dict[str, Any]:
+        while not come.wait(0.5):  # in steps: signals are heard between them
+            pass
+        return dict(json.loads(lines[0]))
+
+    return first
+
+
+def _import_all() -> None:
+    """Import what takes seconds, while a person still chooses."""
+    import distributed  # noqa: F401
+    import ngsolve  # noqa: F401
+
+    import palpate.learning
+    import palpate.study.improve_study  # noqa: F401
+
+
+if __name__ == "__main__":
+    sys.exit(main())

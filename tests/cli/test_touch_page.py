@@ -1,0 +1,162 @@
+"""`palpate touch` on its page: a rough surrogate first, then better ones, and everything kept beside the part."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+import urllib.request
+from http.cookiejar import CookieJar
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import trimesh
+
+from palpate.study import Study
+from palpate.study.part_study import part_study
+from palpate.study.part_work import rough_study, work_on
+from palpate.study.run import Paths
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Study:
+    trimesh.creation.box((40.0, 30.0, 20.0)).export(tmp_path / "pad.stl")
+    return part_study(tmp_path / "pad.stl")[0]
+
+
+class Improvement:
+    """Steps as an improvement makes them, of files that need no solves."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.studies: list[tuple[str, object, object]] = []
+        self.ended: list[str] = []
+        monkeypatch.setattr("palpate.study.improve_study.improve_study", self)
+        monkeypatch.setattr("palpate.sweeps.local_cluster", contextlib.nullcontext)
+
+    def __call__(self, study: Study, paths: Paths, *, cluster: object, **options: object):
+        self.studies.append((study.name, cluster, study.sweep.element))
+        try:
+            for phase, solves in (
+                ("solved", 12),
+                ("learnt", 12),
+                ("solved", 16),
+                ("learnt", 16),
+                ("ended", 16),
+            ):
+                yield self.step(paths, phase, solves)
+        finally:
+            self.ended.append(study.name)
+
+    def step(self, paths: Paths, phase: str, solves: int) -> SimpleNamespace:
+        is_new = phase == "learnt"
+        if is_new:
+            paths.model.write_text("surrogate")
+        return SimpleNamespace(
+            phase=phase, solves=solves, unseen=0, error=float("nan"), median=float("nan"), seconds=1.0, is_new=is_new,
+            reached=False, reason="The time is over." * (phase == "ended"), places=np.zeros((solves, 3)),
+            train=None, surrogate=None, model_path=paths.model if paths.model.exists() else None,
+        )  # fmt: skip
+
+
+def carried_out(study: Study, folder: Path, **options: object) -> list[dict]:
+    said: list[dict] = []
+    work_on(study, Paths(folder, study.name), said.append, until=0.02, limit=600.0, **options)
+    json.dumps(said)
+    return said
+
+
+def bodies(said: list[dict]) -> list[str]:
+    return [Path(line["body"]).name for line in said if "body" in line]
+
+
+def test_a_rough_surrogate_comes_first_and_is_replaced(study, tmp_path, monkeypatch):
+    work = Improvement(monkeypatch)
+    said = carried_out(study, tmp_path, workers=2)
+    assert work.studies == [("pad-rough", 2, study.interaction.radius), ("pad", 2, study.sweep.element)]
+    assert bodies(said) == ["pad-rough.palpate", "pad.palpate", "pad.palpate"]
+    assert work.ended == ["pad-rough", "pad"], "the rough study ends with its first surrogate"
+    assert [line["step"]["solves"] for line in said if "step" in line] == [12, 12, 16, 16, 16]
+    assert said[-1]["ended"]["reason"] == "The time is over."
+
+
+def test_the_same_command_goes_on_with_what_there_is(study, tmp_path, monkeypatch):
+    work = Improvement(monkeypatch)
+    carried_out(study, tmp_path)
+    said = carried_out(study, tmp_path)
+    assert bodies(said[:1]) == ["pad.palpate"], "what was learnt before can be touched at once"
+    assert [name for name, _, _ in work.studies] == ["pad-rough", "pad", "pad"]
+
+
+def test_it_stops_after_the_batch_that_is_solved(study, tmp_path, monkeypatch):
+    Improvement(monkeypatch)
+    said = carried_out(study, tmp_path, stopped=(tmp_path / "pad.palpate").exists)
+    assert [line["step"]["solves"] for line in said if "step" in line] == [12, 12]
+    assert said[-1]["ended"]["reason"] == "It was stopped."
+
+
+def test_a_mesh_keeps_its_elements_and_has_no_rough_study(study):
+    rough = rough_study(study)
+    assert rough is not None
+    assert rough.sweep.element == study.interaction.radius
+    assert rough.body == study.body
+    body = study.body.model_copy(update={"file": "pad.vtu"})
+    assert rough_study(study.model_copy(update={"body": body})) is None
+
+
+def lines_until(process: subprocess.Popen, words: str, seconds: float = 240.0) -> list[str]:
+    """Lines that a command prints, up to the one with these words."""
+    lines, until = [], time.monotonic() + seconds
+    for line in process.stderr:
+        lines.append(line)
+        if words in line:
+            return lines
+        assert time.monotonic() < until, "".join(lines)
+    raise AssertionError("".join(lines))
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_a_part_is_touched_while_it_is_solved(tmp_path):
+    """The real command on a small block: page, work, first touch, Ctrl-C, and nothing is left behind."""
+    part = tmp_path / "pad.stl"
+    trimesh.creation.box((30.0, 30.0, 12.0)).export(part)
+    options = ("--radius", "8 mm", "--depth", "2 mm", "--view", "--start", "--port", "0", "--minutes", "1")
+    process = subprocess.Popen(
+        [sys.executable, "-m", "palpate", "touch", str(part), *options],
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, cwd=tmp_path,
+    )  # fmt: skip
+    try:
+        address = re.search(r"http://\S+", lines_until(process, "Ctrl-C ends it")[-1])[0]
+        opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor(CookieJar()))
+        origin = address.split("?")[0]
+        opener.open(address, timeout=10).close()  # the token becomes a cookie
+        with opener.open(origin, timeout=10) as page:
+            assert b'data-mode="part"' in page.read()
+        lines_until(process, "It can be touched")
+        with opener.open(f"{origin}surface", timeout=10) as surface:
+            assert len(surface.read()) > 1000
+        process.send_signal(signal.SIGINT)
+        process.wait(30)
+        assert process.returncode == 0, process.stderr.read()
+    finally:
+        process.kill()
+        process.wait()
+        process.stderr.close()
+    assert (tmp_path / "pad.toml").is_file()
+    assert (tmp_path / "pad-rough.palpate").is_file()
+    assert not [line for line in _processes() if str(os.fspath(tmp_path)) in line]
+
+
+def _processes() -> list[str]:
+    names = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            names.append((folder / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace"))
+    return names

@@ -23,6 +23,7 @@ BENCHMARKS = (
     "active_choice",
     "cantilever",
     "device_round_trips",
+    "export_speed",
     "faults",
     "filters",
     "hand_drives",

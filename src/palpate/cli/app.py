@@ -14,6 +14,7 @@ import typer
 
 from palpate.cli.console import Console, advice_in_words
 from palpate.cli.device_commands import devices_app
+from palpate.cli.export_commands import export_app
 from palpate.cli.material_commands import material_app
 from palpate.cli.sweep_command import sweep
 from palpate.cli.table_commands import correct, fit
@@ -41,6 +42,7 @@ app.add_typer(dataset_app, name="dataset")
 app.add_typer(devices_app, name="devices")
 app.add_typer(material_app, name="material")
 app.add_typer(trace_app, name="trace")
+app.add_typer(export_app, name="export")
 
 StudyFile = Annotated[Path, typer.Argument(help="Study file, as [bold]palpate init[/] writes it.")]
 ModelFile = Annotated[

@@ -238,11 +238,11 @@ class LearntEnergy:
 
     def _compiled_posterior(self) -> tuple[np.ndarray, tuple[Any, ...]]:
         """Return the root and the network that the kernels of trust take, with scratch for one thread."""
-        root, network = self._posterior
+        root, network = self.posterior
         return root, network.compiled()
 
     @cached_property
-    def _posterior(self) -> tuple[np.ndarray, Network]:
+    def posterior(self) -> tuple[np.ndarray, Network]:
         """The posterior's root (1 + n + k, z) in units of ℓ, (0, 0) without one, and the network of its k units.
 
         Of a mean of networks only the first one's units have a covariance.

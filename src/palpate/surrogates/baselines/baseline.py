@@ -200,7 +200,11 @@ class Baseline(ABC):
         return [self]
 
     def c_source(self) -> str | None:
-        """Return the kernel in C99 for exporters; None where there is none."""
+        """Return the kernels in C99 for exporters, which refuse a baseline without them by name.
+
+        The text defines four functions, called as the name with ``_enter``, ``_rest``, ``_log`` and ``_leave``; the
+        arrays of `compiled` are theirs in the same order (docs/guide/export.md, "A baseline of your own").
+        """
         return None
 
     @classmethod

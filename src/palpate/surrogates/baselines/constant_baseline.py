@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -90,6 +91,10 @@ class ConstantBaseline(Baseline):
     def compiled(self) -> Compiled:
         """Return the kernels and their arguments."""
         return Compiled(None, (self.level,), enter=_enter)
+
+    def c_source(self) -> str:
+        """Return the kernels in C99."""
+        return Path(__file__).with_suffix(".c").read_text("utf-8")
 
     def coordinate(self, X: np.ndarray) -> np.ndarray:
         """Return how far (N,) the hand is from where it was at rest, m."""

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -129,6 +130,10 @@ class ContactBaseline(Baseline):
         usual = self.probe_radius if math.isfinite(self.probe_radius) else self.touched.reach
         numbers = np.array([*self.law.numbers(), self.probe_radius, own, _STEP * usual])
         return Compiled(None, (numbers, self.touched.compiled()), enter=_enter, leave=_leave)
+
+    def c_source(self) -> str:
+        """Return the kernels in C99."""
+        return Path(__file__).with_suffix(".c").read_text("utf-8")
 
     def coordinate(self, X: np.ndarray) -> np.ndarray:
         """Return the depth s (N,) of the rigid probe in the surface at rest, m."""

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -92,6 +93,10 @@ class PadBaseline(Baseline):
         """Return the kernels and their arguments, with scratch for one thread."""
         args = (self.axes, *self.rest.compiled(), *self.stiffening.compiled())
         return Compiled(None, args, enter=_enter, rest=_rest, log=_log)
+
+    def c_source(self) -> str:
+        """Return the kernels in C99."""
+        return Path(__file__).with_suffix(".c").read_text("utf-8")
 
     def coordinate(self, X: np.ndarray) -> np.ndarray:
         """Return how far (N,) the pad is displaced, m."""

@@ -27,6 +27,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -233,6 +234,18 @@ class Indentation(Memory):
     def single(cls, residual: np.ndarray, reach: np.ndarray, stiffening: np.ndarray) -> Indentation:
         """Return one indentation that moves with the probe: for a body pressed at one place."""
         return cls(residual, reach, stiffening, np.zeros((1, 3)), 1.0)
+
+    def c_source(self) -> str:
+        """Return the step in C99."""
+        return Path(__file__).with_suffix(".c").read_text("utf-8")
+
+    def c_arguments(self) -> tuple[np.ndarray, ...]:
+        """Return the arrays of that step."""
+        return self.compiled()
+
+    def c_size(self) -> int:
+        """Return how many numbers the state of that step has, after the four of the ledger."""
+        return 2 * len(self.points)
 
     def start(self) -> IndentationState:
         """Return the state of a virgin body."""

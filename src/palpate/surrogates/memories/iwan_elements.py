@@ -28,6 +28,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -271,6 +272,18 @@ class IwanElements(Memory):
             new.memento = old.memento
 
         return carry
+
+    def c_source(self) -> str:
+        """Return the step in C99."""
+        return Path(__file__).with_suffix(".c").read_text("utf-8")
+
+    def c_arguments(self) -> tuple[np.ndarray, ...]:
+        """Return the arrays of that step."""
+        return self.compiled()
+
+    def c_size(self) -> int:
+        """Return how many numbers the state of that step has, after the four of the ledger."""
+        return 1 + 2 * len(self)
 
     def start(self) -> IwanState:
         """Return the state of a virgin body."""

@@ -153,6 +153,22 @@ class Memory(ABC):
             fix="Let go of the body, and load the new one from the start.",
         )
 
+    def c_source(self) -> str | None:
+        """Return the step in C99 for exporters, which refuse a memory without it by name.
+
+        The text defines ``NAME_step`` (docs/guide/export.md); `c_arguments` are its arrays, `c_size` says how large
+        its state is.
+        """
+        return None
+
+    def c_arguments(self) -> tuple[np.ndarray, ...]:
+        """Return the arrays that the functions of `c_source` take, in their order."""
+        return ()
+
+    def c_size(self) -> int:
+        """Return how many numbers the state of `c_source` has, after the four of the ledger."""
+        return 0
+
     def spread(self, patches: Patches, spacing: float) -> Memory:
         """Return the same memory, kept at places of the surface that are `spacing` (m) apart.
 

@@ -51,6 +51,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -102,6 +103,22 @@ class Relaxation(Memory):
             raise UsageError(
                 f"A pad's energy can't be {self.pad} J.", fix="Give 0, or a positive energy in J."
             )
+
+    def c_source(self) -> str:
+        """Return the step in C99."""
+        return Path(__file__).with_suffix(".c").read_text("utf-8")
+
+    def c_arguments(self) -> tuple[np.ndarray, ...]:
+        """Return the arrays of that step."""
+        patches = self.patches or Patches.single()
+        shares, times, pad = self.compiled()
+        law = np.array([patches.width, math.sqrt(2 * patches.energy), patches.least])
+        return patches.points, law, shares, times, np.array([pad])
+
+    def c_size(self) -> int:
+        """Return how many numbers the state of that step has, after the four of the ledger."""
+        patches, terms = len(self.patches or Patches.single()), len(self.terms)
+        return 1 + patches * (3 + terms) + 3 * terms
 
     def start(self) -> RelaxationState:
         """Return the state of a body at rest."""

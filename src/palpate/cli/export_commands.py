@@ -1,0 +1,102 @@
+"""`palpate export`: learnt bodies and networks in other people's tools."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from palpate.cli.console import Console
+from palpate.cli.table_options import Json
+from palpate.errors import UsageError
+
+if TYPE_CHECKING:
+    from palpate.network import Network
+    from palpate.surrogates import Surrogate
+
+__all__ = ["export_app"]
+
+export_app = typer.Typer(help="Take a learnt body or a network into other tools: C99.", no_args_is_help=True)
+
+LearntFile = Annotated[
+    Path, typer.Argument(help="Model file (.palpate), of [bold]palpate learn[/] or [bold]palpate fit[/].")
+]
+Name = Annotated[str | None, typer.Option(help="Beginning of all names in C. Default: the body's name.")]
+FieldName = Annotated[str | None, typer.Option(help="The field that goes out. Default: the displacement.")]
+NoField = Annotated[bool, typer.Option("--no-field", help="Leave the field out.")]
+NoDeviation = Annotated[
+    bool, typer.Option("--no-deviation", help="Leave out how far the force may be off; files become smaller.")
+]
+NoCheck = Annotated[bool, typer.Option("--no-check", help="Don't compile and compare with palpate.")]
+Compiler = Annotated[
+    str | None,
+    typer.Option(
+        help="C compiler for the comparison. Default: that of the variable CC, or the first one found."
+    ),
+]
+
+
+def _read(file: Path) -> Surrogate | Network:
+    """Return the body or the network of a file.
+
+    Raises
+    ------
+    UsageError
+        If it holds neither.
+    """
+    from palpate.learning.loading import load
+    from palpate.network import Network
+    from palpate.surrogates import Surrogate
+
+    thing = load(file)
+    thing = getattr(thing, "network", thing)
+    if not isinstance(thing, Surrogate | Network):
+        raise UsageError(
+            f"{file} holds no learnt body and no network.",
+            why="These are what other tools can evaluate.",
+            fix="Give a file of `palpate learn` or `palpate fit`.",
+        )
+    return thing
+
+
+@export_app.command("c")
+def to_c(
+    file: LearntFile,
+    out: Annotated[Path | None, typer.Option(help="Folder for the files. Default: the body's name.")] = None,
+    name: Name = None,
+    single: Annotated[bool, typer.Option("--float", help="Numbers of single precision.")] = False,
+    field: FieldName = None,
+    no_field: NoField = False,
+    no_deviation: NoDeviation = False,
+    no_check: NoCheck = False,
+    compiler: Compiler = None,
+    as_json: Json = False,
+) -> None:
+    """Write C99: a header, a source with the weights as tables, an example and a CMake file.
+
+    The files allocate nothing and need only math.h. If there is a C compiler they are compiled, and compared with
+    palpate at 1,000 places; files that differ are refused.
+    """
+    from palpate.export import export_c
+
+    thing = _read(file)
+    console = Console(as_json)
+    done = export_c(
+        thing,
+        Path(name or file.stem) if out is None else out,
+        name=name,
+        single=single,
+        field=field,
+        with_field=not no_field,
+        deviation=not no_deviation,
+        check=not no_check,
+        compiler=compiler,
+    )
+    if done.comparison is None:
+        console.say(
+            "not compared with palpate: " + ("not asked for" if no_check else "no C compiler was found")
+        )
+    lines = [f"{f}  {f.stat().st_size / 1e3:.0f} kB" for f in done.files]
+    lines += [] if done.comparison is None else [str(done.comparison)]
+    console.result("\n".join(lines), done.as_dict())

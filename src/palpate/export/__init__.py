@@ -1,0 +1,17 @@
+"""The way out: learnt bodies and networks in other people's tools, from one evaluator core in C99.
+
+weights_block   what goes out: arrays in fixed places, as a binary block and as tables of C
+field_tables    a field's modes as whole numbers of two bytes
+core_source     the core's sources as one text, with the baseline and the memory of a body
+c_files         header, source, example and CMake file of a body or a network
+compilers       the C compilers of this machine, and how a program is compiled with them
+check_points    places at which every export is compared with palpate, and how
+check_program   a compiled export that answers them
+c_export        `palpate export c`: write, compile and compare
+core            the C sources
+"""
+
+from palpate.export.c_export import ExportedC, export_c
+from palpate.export.weights_block import WeightsBlock
+
+__all__ = ["ExportedC", "WeightsBlock", "export_c"]

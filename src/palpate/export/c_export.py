@@ -1,0 +1,188 @@
+"""Export to C99: a header, a source with the weights as tables, an example and a CMake file, compared with palpate."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from palpate.errors import AccuracyError
+from palpate.export.c_files import c_files, require_name
+from palpate.export.check_points import Comparison, Precision, compare_body, compare_network
+from palpate.export.check_program import CheckProgram
+from palpate.export.compilers import find_compiler
+from palpate.export.field_tables import chosen_field
+from palpate.export.weights_block import ROOT, WeightsBlock, identifier
+from palpate.files import write_file
+from palpate.network import Network
+from palpate.surrogates import Surrogate
+
+__all__ = ["ExportedC", "block_of", "compare_c", "export_c"]
+
+
+@dataclass(frozen=True)
+class ExportedC:
+    """Files that an export wrote, and how far they are from palpate.
+
+    Attributes
+    ----------
+    files : tuple of Path
+        The header first.
+    name : str
+        Beginning of all names in C.
+    hash : str
+        SHA-256 of the weights.
+    field : str
+        The field that went out with it; "" for none.
+    comparison : Comparison, optional
+        How far it is from palpate; None where there was no compiler, or nothing was to be compared.
+    """
+
+    files: tuple[Path, ...]
+    name: str
+    hash: str
+    field: str
+    comparison: Comparison | None
+
+    @property
+    def sources(self) -> tuple[Path, ...]:
+        """The .c files that belong into a program."""
+        return tuple(f for f in self.files if f.suffix == ".c" and f.name != "example.c")
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what was written and compared, for JSON."""
+        parts = {} if self.comparison is None else self.comparison.parts
+        compared = {
+            k: {"relative": v.relative, "allowed": v.allowed, "count": v.count} for k, v in parts.items()
+        }
+        files = [{"file": str(f), "bytes": f.stat().st_size} for f in self.files]
+        return {
+            "files": files,
+            "name": self.name,
+            "hash": self.hash,
+            "field": self.field,
+            "compared": compared or None,
+        }
+
+
+def export_c(
+    thing: Surrogate | Network,
+    out: str | os.PathLike[str],
+    *,
+    name: str | None = None,
+    single: bool = False,
+    field: str | None = None,
+    with_field: bool = True,
+    deviation: bool = True,
+    check: bool = True,
+    compiler: str | None = None,
+) -> ExportedC:
+    """Write a body or a network as C99, and compare it with palpate at 1,000 places if there is a C compiler.
+
+    Parameters
+    ----------
+    thing : Surrogate or Network
+        What goes out.
+    out : path
+        Folder for the files; it is made if need be.
+    name : str, optional
+        Beginning of all names in C; by default the body's name.
+    single : bool
+        Whether numbers are of single precision.
+    field : str, optional
+        The field that goes out, as a second source; by default the displacement.
+    with_field, deviation : bool
+        Whether the field and the deviation of the force go out.
+    check : bool
+        Whether it is compiled and compared.
+    compiler : str, optional
+        Name of the compiler to compare with; by default that of the variable CC, or the first one found.
+
+    Raises
+    ------
+    UsageError
+        If the name is no identifier, or a part of the body has no C source.
+    AccuracyError
+        If the compiled files differ from palpate by more than they may.
+    """
+    name = require_name(identifier(_default_name(thing)) if name is None else name)
+    block = block_of(thing, field=field, with_field=with_field, deviation=deviation)
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    texts = c_files(thing, block, name, single=single)
+    files = tuple(write_file(folder / file, text) for file, text in texts.items())
+    done = ExportedC(files, name, block.hash, block.field, None)
+    path = find_compiler(compiler) if check else None
+    if path is None:
+        return done
+    comparison = compare_c(thing, block, done, path, single=single)
+    if not comparison.passed:
+        raise AccuracyError(
+            f"The exported files do not answer as palpate does: {comparison}.",
+            why="Single precision is too coarse for this body."
+            if single
+            else "The compiler may bend the arithmetic.",
+            fix="Export in double precision." if single else "Try another compiler, and report this.",
+        )
+    return ExportedC(files, name, block.hash, block.field, comparison)
+
+
+def block_of(
+    thing: Surrogate | Network, *, field: str | None, with_field: bool, deviation: bool
+) -> WeightsBlock:
+    """Return the weights of a body or of a network.
+
+    Raises
+    ------
+    UsageError
+        If a part of it has no C source.
+    """
+    if isinstance(thing, Network):
+        return WeightsBlock.of_network(thing)
+    chosen = chosen_field(thing, field) if with_field else None
+    return WeightsBlock.of(thing, field=chosen, deviation=deviation)
+
+
+def compare_c(
+    thing: Surrogate | Network,
+    block: WeightsBlock,
+    done: ExportedC,
+    compiler: str,
+    *,
+    single: bool,
+    options: tuple[str, ...] = (),
+) -> Comparison:
+    """Compile exported files and compare them with palpate.
+
+    Raises
+    ------
+    ResourceError
+        If the compiler refuses them.
+    AccuracyError
+        If the program does not answer.
+    """
+    precision = Precision(single)
+    with tempfile.TemporaryDirectory() as folder:
+        if isinstance(thing, Network):
+            program = CheckProgram.compile(
+                compiler, done.sources, done.name, Path(folder), network=True, options=options
+            )
+            return compare_network(thing, lambda X: program.evaluate(X, len(thing.outputs)), precision)
+        nodes = thing.fields[block.field].rest.shape if block.field else (0, 0)  # type: ignore[union-attr]
+        program = CheckProgram.compile(
+            compiler,
+            done.sources,
+            done.name,
+            Path(folder),
+            memory=bool(block.memory),
+            field=nodes,
+            options=options,
+        )
+        known = ROOT in block.tables
+        return compare_body(thing, program, precision, field=block.field, deviation=known)
+
+
+def _default_name(thing: Surrogate | Network) -> str:
+    return thing.name if isinstance(thing, Surrogate) else "network"

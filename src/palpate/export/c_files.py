@@ -1,0 +1,321 @@
+"""The files of an exported body or network: header, source with its weights as tables, example and CMake file."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.export.c_templates import (
+    BODY,
+    BODY_API,
+    CMAKE,
+    EXAMPLE,
+    FIELD_API,
+    FIELD_CODE,
+    HEADER,
+    HEADER_END,
+    LIMITS,
+    MEMORY_API,
+    MEMORY_CODE,
+    NETWORK,
+    NETWORK_API,
+    NETWORK_EXAMPLE,
+)
+from palpate.export.core_source import core_source
+from palpate.export.weights_block import ARRAYS, FIELD, NET, ROOT, Table, WeightsBlock
+from palpate.network import Network
+from palpate.surrogates import Surrogate
+from palpate.units import Quantity, Range
+
+__all__ = ["c_files", "require_name"]
+
+_WIDTH = 118
+_KEYWORDS = frozenset(
+    "auto break case char const continue default do double else enum extern float for goto if inline int long "  # noqa: SIM905
+    "register restrict return short signed sizeof static struct switch typedef union unsigned void volatile "
+    "while main".split()
+)
+
+
+def require_name(name: str) -> str:
+    """Return a name that can begin the names of C functions.
+
+    Raises
+    ------
+    UsageError
+        If it is no identifier.
+    """
+    if (
+        not (name.isascii() and name.isidentifier())
+        or name in _KEYWORDS
+        or name.startswith(("pp_", "PP_", "_"))
+    ):
+        raise UsageError(
+            f"{name!r} can't begin the names of C functions.",
+            why="They have letters, digits and underscores, begin with a letter, and are no word of C.",
+            fix="Give another one: --name liver.",
+        )
+    return name
+
+
+@dataclass(frozen=True)
+class _Facts:
+    """Words for the files of a body or a network, besides its numbers."""
+
+    name: str
+    single: bool
+    block: WeightsBlock
+    title: str
+    inputs: tuple[Range, ...]
+    outputs: tuple[Quantity, ...]
+    felt: int
+    along: np.ndarray | None = None
+
+    @property
+    def real(self) -> str:
+        return "float" if self.single else "double"
+
+
+def c_files(thing: Surrogate | Network, block: WeightsBlock, name: str, *, single: bool) -> dict[str, str]:
+    """Return the texts of all files by their names.
+
+    Parameters
+    ----------
+    thing : Surrogate or Network
+        What the block is of.
+    block : WeightsBlock
+        Its weights.
+    name : str
+        Beginning of all names in C.
+    single : bool
+        Whether numbers are of single precision.
+    """
+    if isinstance(thing, Network):
+        facts = _Facts(name, single, block, str(thing), thing.inputs, thing.outputs, 0)
+        header, public, example = _network_header(facts), NETWORK, NETWORK_EXAMPLE
+    else:
+        felt = len(thing.energy.baseline.directions)
+        facts = _Facts(
+            name,
+            single,
+            block,
+            str(thing).splitlines()[0],
+            thing.inputs,
+            (),
+            felt,
+            thing.energy.baseline.directions,
+        )
+        header, public, example = (
+            _body_header(facts, thing),
+            BODY + _memory_part(block) + _field_part(block),
+            EXAMPLE,
+        )
+    files = {f"{name}.h": header, f"{name}.c": _source(facts, public)}
+    if block.field:
+        files[f"{name}_field.c"] = _field_source(facts)
+    files["example.c"] = _filled(example, facts)
+    sources = " ".join(file for file in files if file.endswith(".c") and file != "example.c")
+    files["CMakeLists.txt"] = _filled(CMAKE, facts).replace("@SOURCES@", sources)
+    return files
+
+
+def _filled(text: str, facts: _Facts) -> str:
+    along = "" if facts.along is None else ", ".join(_braced(row, facts) for row in facts.along)
+    middle = (
+        ", ".join(_number((r.low + r.high) / 2, single=facts.single) for r in facts.inputs[facts.felt :])
+        or "0"
+    )
+    for word, value in (
+        ("NAME", facts.name),
+        ("@REAL@", facts.real),
+        ("@MIDDLE@", middle),
+        ("@ALONG@", along),
+    ):
+        text = text.replace(word, value)
+    return text
+
+
+def _braced(row: np.ndarray, facts: _Facts) -> str:
+    return "{" + ", ".join(_number(a, single=facts.single) for a in row.tolist()) + "}"
+
+
+def _comment(lines: list[str]) -> str:
+    wrapped = [part for line in lines for part in (textwrap.wrap(line, 110, subsequent_indent="  ") or [""])]
+    return "/* " + "\n * ".join(line.replace("*/", "* /") for line in wrapped) + "\n */\n"
+
+
+def _head(facts: _Facts, further: list[str]) -> str:
+    from palpate import __version__
+
+    rows = [f"{r.name} from {r.low:g} to {r.high:g} {r.unit}".rstrip() for r in facts.inputs]
+    lines = [
+        f"{facts.name}: a model learnt by palpate {__version__}.",
+        "",
+        facts.title,
+        "",
+        *(f"input {i}: {row}" for i, row in enumerate(rows)),
+        *further,
+        "",
+        "All quantities are in SI units. No function allocates memory, writes to a variable of its own, or reads or",
+        "prints anything: any number of threads may call them. Do not compile with options such as -ffast-math.",
+        f"SHA-256 of the weights: {facts.block.hash}",
+    ]
+    return _comment(lines)
+
+
+def _body_header(facts: _Facts, surrogate: Surrogate) -> str:
+    baseline = surrogate.energy.baseline
+    x = "displacement of what the hand holds from its rest" if baseline.holds else "centre of the probe"
+    lines = ["", f"x (3) is the {x}, m; p are the inputs after the first {facts.felt}, in their units."]
+    text = _head(facts, lines) + _filled(HEADER, facts)
+    sizes = {
+        "INPUTS": len(facts.inputs),
+        "FELT": facts.felt,
+        "PARAMETERS": len(facts.inputs) - facts.felt,
+        "DEVIATION_WORK": _work_size(facts.block),
+    }
+    text += "".join(f"#define {facts.name}_{k} {v}\n" for k, v in sizes.items()) + _filled(BODY_API, facts)
+    if facts.block.memory:
+        assert surrogate.memory is not None
+        size = 4 + _state_size(surrogate)
+        text += _filled(MEMORY_API, facts).replace("@STATE@", str(size))
+    if facts.block.field:
+        nodes, components, size = _shape_sizes(facts.block)
+        text += (
+            _filled(FIELD_API, facts).replace("@NODES@", str(nodes)).replace("@COMPONENTS@", str(components))
+        )
+        text = text.replace("@SHAPE@", str(size))
+    return text + HEADER_END
+
+
+def _network_header(facts: _Facts) -> str:
+    named = ["", *(f"output {i}: {q.name} {q.unit}".rstrip() for i, q in enumerate(facts.outputs[:50]))]
+    text = _head(facts, named) + _filled(HEADER, facts)
+    text += f"#define {facts.name}_INPUTS {len(facts.inputs)}\n#define {facts.name}_OUTPUTS {len(facts.outputs)}\n"
+    return text + _filled(NETWORK_API, facts) + HEADER_END
+
+
+def _work_size(block: WeightsBlock) -> int:
+    return 4 * block.tables[ROOT].shape[2] if ROOT in block.tables else 1
+
+
+def _state_size(surrogate: Surrogate) -> int:
+    """Return how many numbers the state of a memory has, after the four of its ledger."""
+    memory = surrogate.memory
+    assert memory is not None
+    return memory.c_size()
+
+
+def _shape_sizes(block: WeightsBlock) -> tuple[int, int, int]:
+    nodes, components, modes, _, knots = block.tables[FIELD].values.tolist()
+    return nodes, components, 8 + 16 + 1 + modes + knots * 4 * components
+
+
+def _source(facts: _Facts, public: str) -> str:
+    first = f'#include "{facts.name}.h"\n' + ("#define PP_SINGLE\n" if facts.single else "")
+    tables, external = [], []
+    for place, table in _stored(facts.block):
+        if place >= FIELD:
+            external += [f"extern const {kind} {word}[];" for kind, word, _ in _parts(facts, place, table)]
+        else:
+            tables += [
+                _table_text(f"static const {kind} {word}[]", array, facts)
+                for kind, word, array in _parts(facts, place, table)
+            ]
+    body = _comment(["the evaluator core of palpate"]) + core_source(facts.block)
+    weights = "\n".join(["\n/* the weights */", *external, *tables, _model(facts)])
+    latent = str(int(facts.block.tables[NET].values[4]))
+    last = _filled(public + LIMITS, facts).replace("@HASH@", facts.block.hash).replace("@LATENT@", latent)
+    return first + body + weights + last
+
+
+def _field_source(facts: _Facts) -> str:
+    lines = [
+        f"/* {facts.name}: the field's tables, of the weights {facts.block.hash} */",
+        "#include <stdint.h>",
+    ]
+    for place, table in _stored(facts.block):
+        if place >= FIELD:
+            for kind, word, array in _parts(facts, place, table):
+                kind = kind.replace("pp_real", facts.real)
+                lines += [
+                    f"extern const {kind} {word}[];",
+                    _table_text(f"const {kind} {word}[]", array, facts),
+                ]
+    return "\n".join(lines) + "\n"
+
+
+def _stored(block: WeightsBlock) -> list[tuple[int, Table]]:
+    """Return the tables that are not empty, each once, with its first place."""
+    first: dict[int, tuple[int, Table]] = {}
+    for place, table in sorted(block.tables.items()):
+        if table.values.size:
+            first.setdefault(id(table), (place, table))
+    return list(first.values())
+
+
+_C_KINDS = {"float64": "pp_real", "int32": "int32_t", "float32": "float", "int16": "int16_t"}
+
+
+def _parts(facts: _Facts, place: int, table: Table) -> Iterator[tuple[str, str, np.ndarray]]:
+    """Return kind, name and numbers of a table, and of its tiles."""
+    yield _C_KINDS[table.values.dtype.name], f"{facts.name}_{place}", table.values
+    if table.tiles is not None:
+        yield "int32_t", f"{facts.name}_{place}_tiles", table.tiles
+
+
+def _model(facts: _Facts) -> str:
+    rows = []
+    first = {id(table): place for place, table in _stored(facts.block)}
+    places = {"float64": 0, "int32": 1, "float32": 2, "int16": 3}
+    for place in range(ARRAYS):
+        table, pointers = facts.block.tables.get(place), ["0"] * 4
+        if table is None or not table.values.size:
+            rows.append("  {0, 0, 0, 0, {0, 1, 1, 1}},")
+            continue
+        word = f"{facts.name}_{first[id(table)]}"
+        pointers[places[table.values.dtype.name]] = word
+        if table.tiles is not None:
+            pointers[1] = f"{word}_tiles"
+        rows.append(f"  {{{', '.join(pointers)}, {{{', '.join(map(str, table.four))}}}}},")
+    text = f"static const pp_array {facts.name}_arrays[PP_ARRAYS] = {{\n" + "\n".join(rows) + "\n};\n"
+    return text + f"static const pp_model {facts.name}_model = {{{facts.name}_arrays}};\n"
+
+
+def _table_text(declared: str, array: np.ndarray, facts: _Facts) -> str:
+    if array.dtype == np.float64:
+        words = [_number(v, single=facts.single) for v in array.ravel().tolist()]
+    elif array.dtype == np.float32:
+        words = [_number(v, single=True) for v in array.ravel().tolist()]
+    else:
+        words = [str(v) for v in array.ravel().tolist()]
+    lines, line = [], ""
+    for word in words:
+        if len(line) + len(word) + 1 > _WIDTH:
+            lines.append(line)
+            line = ""
+        line += word + ","
+    return f"{declared} = {{\n" + "\n".join([*lines, line]) + "};"
+
+
+def _number(value: float, *, single: bool) -> str:
+    """Return a number so that nothing of it is lost: in hexadecimal digits, unless it is a small whole one."""
+    if single:
+        value = float(np.float32(value))
+    if value == int(value) and abs(value) < 1e6:
+        return str(int(value))
+    mantissa, _, exponent = value.hex().partition("p")
+    text = f"{mantissa.rstrip('0').rstrip('.')}p{int(exponent)}"
+    return text + "F" if single else text
+
+
+def _memory_part(block: WeightsBlock) -> str:
+    return MEMORY_CODE.replace("@LAW@", block.memory) if block.memory else ""
+
+
+def _field_part(block: WeightsBlock) -> str:
+    return FIELD_CODE if block.field else ""

@@ -1,0 +1,369 @@
+r"""The weights block: all that the evaluator core reads of a body or a network, as arrays in fixed places.
+
+The same arrays become tables of an exported C file and, through `WeightsBlock.to_bytes`, one binary block that a
+generic program reads: little-endian, all arrays at multiples of eight bytes,
+
+    64 bytes    "PALPATE\0", version (uint32), number of arrays (uint32), bytes in all (uint64), FNV-1a checksum of
+                all that follows the head (uint64), SHA-256 of the same (32 bytes)
+    40 bytes    for each array: kind (int32: 0 none, 1 float64, 2 int32, 3 float32, 4 int16, 5 float64 in tiles), shape
+                (4 int32), zero (int32), offset of its numbers and of its tiles' places in the block (2 uint64)
+    the rest    the arrays
+
+`core/palpate_core.h` tells the places. See docs/method/weights-block.md.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import struct
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.network import Network
+from palpate.network.network_kernels import gram, packed
+from palpate.network.radial import RADIAL_FUNCTIONS
+from palpate.surrogates import LearntEnergy, Surrogate, TouchedSurface
+from palpate.units import bounds
+
+__all__ = [
+    "ARRAYS",
+    "BASELINE",
+    "FIELD",
+    "FIELD_NET",
+    "LANES",
+    "NET",
+    "ROOT",
+    "VERSION",
+    "Table",
+    "WeightsBlock",
+    "fnv",
+    "identifier",
+    "net_tables",
+]
+
+VERSION = 1
+ARRAYS, LANES, MOST = 64, 8, 16
+HEAD, NUMBERS, LIMITS, POINTS, AXES, NET, ROOT, BASELINE, MEMORY, FIELD, FIELD_NET = (
+    0,
+    1,
+    2,
+    3,
+    4,
+    5,
+    10,
+    12,
+    24,
+    36,
+    44,
+)
+ROOM = 12  # arrays of a baseline, and of a memory
+ENDLESS = 1e30  # stands for infinity
+FAR = 1e15  # where points are that fill a row up
+_KINDS = {"float64": 1, "int32": 2, "float32": 3, "int16": 4}
+_TILES = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """One array of a block.
+
+    Attributes
+    ----------
+    values : array
+        Of float64, int32, float32 or int16; of a table in tiles its numbers (m,).
+    shape : tuple of int
+        Up to four; of a table in tiles that of the whole table.
+    tiles : (t,) int32, optional
+        Where each tile's numbers begin; see `pp_gather` in core/surface.c.
+    """
+
+    values: np.ndarray
+    shape: tuple[int, ...]
+    tiles: np.ndarray | None = None
+
+    @classmethod
+    def of(cls, values: Any) -> Table:
+        """Return an array, or a number, as the core takes it: whole numbers in 32 bits, all others in double."""
+        array = np.atleast_1d(np.asarray(values))
+        if array.dtype in (np.float32, np.int16):
+            return cls(np.ascontiguousarray(array), array.shape)
+        kind = np.int32 if array.dtype.kind in "iub" else np.float64
+        array = np.ascontiguousarray(array, dtype=kind)
+        if kind is np.float64:
+            array = np.nan_to_num(array, nan=0.0, posinf=ENDLESS, neginf=-ENDLESS)
+        return cls(array, array.shape)
+
+    @property
+    def four(self) -> tuple[int, ...]:
+        """The shape, filled up with ones to four numbers."""
+        return (*self.shape, *([1] * (4 - len(self.shape))))
+
+
+@dataclass(frozen=True, eq=False)
+class WeightsBlock:
+    """Arrays in their places, and what belongs to them.
+
+    Attributes
+    ----------
+    tables : mapping of int to Table
+        The arrays by their places.
+    baseline, memory : str
+        Names, as identifiers of C; "" for none. A network has neither.
+    sources : mapping of str to str
+        C99 of the baseline and of the memory, by these names.
+    field : str
+        Name of the field whose modes are in; "" for none.
+    """
+
+    tables: Mapping[int, Table]
+    baseline: str = ""
+    memory: str = ""
+    sources: Mapping[str, str] = field(default_factory=dict)
+    field: str = ""
+
+    @classmethod
+    def of(cls, surrogate: Surrogate, *, field: str | None = None, deviation: bool = True) -> WeightsBlock:
+        """Return the block of a learnt body.
+
+        Parameters
+        ----------
+        surrogate : Surrogate
+            Baseline and memory must have C sources.
+        field : str, optional
+            Name of the field that goes out with it; none by default.
+        deviation : bool
+            Whether the posterior goes out, from which the deviation of the force comes.
+
+        Raises
+        ------
+        UsageError
+            If a part of the body has no C source, or is larger than the core's workspace.
+        """
+        from palpate.export.field_tables import field_tables
+
+        energy, memory = surrogate.energy, surrogate.memory
+        baseline, source = energy.baseline, energy.baseline.c_source()
+        if source is None:
+            raise _refused("baseline", baseline.name)
+        if len(energy.inputs) > MOST:
+            raise UsageError(
+                f"{len(energy.inputs)} inputs are more than the {MOST} of the evaluator core.",
+                fix="Learn the body with fewer parameters.",
+            )
+        sources = {identifier(baseline.name): source}
+        tables = _energy_tables(energy, deviation=deviation)
+        arrays = [Table.of(a) for a in _flat(baseline.compiled().args)]
+        if baseline.surface is not None:
+            arrays = _with_tiles(arrays, baseline.surface)
+        tables |= _numbered(BASELINE, arrays, f"baseline {baseline.name!r}")
+        code, size = 0, 0
+        if memory is not None:
+            step = memory.c_source()
+            if step is None:
+                raise _refused("memory", memory.name)
+            sources[identifier(memory.name)] = step
+            code, size = _code(memory.name, _MEMORIES), memory.c_size()
+            tables |= _numbered(
+                MEMORY, [Table.of(a) for a in memory.c_arguments()], f"memory {memory.name!r}"
+            )
+        own = baseline.radius_input
+        head = [len(energy.inputs), len(baseline.directions), _code(baseline.name, _BASELINES), code, 1]
+        tables[HEAD] = Table.of(np.array([*head, -1 if own is None else own, size]))
+        if field is not None:
+            tables |= field_tables(surrogate, field, tables)
+        names = identifier(baseline.name), "" if memory is None else identifier(memory.name)
+        return cls(tables, *names, sources, field or "")
+
+    @classmethod
+    def of_network(cls, network: Network) -> WeightsBlock:
+        """Return the block of a network alone.
+
+        Raises
+        ------
+        UsageError
+            If it is larger than the core's workspace.
+        """
+        tables = net_tables(network, NET, 0)
+        tables[HEAD] = Table.of(np.array([len(network.inputs), 0, 0, 0, len(network.outputs), -1, 0]))
+        low, high = bounds(network.inputs)
+        tables[LIMITS] = Table.of(np.array([low, high, high - low]))
+        return cls(tables)
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 of the arrays, in hexadecimal digits."""
+        return hashlib.sha256(self._body()).hexdigest()
+
+    def _body(self) -> bytes:
+        """Return everything that follows the head."""
+        offset, rows, parts = 64 + 40 * ARRAYS, [], []
+        written: dict[int, bytes] = {}
+        for place in range(ARRAYS):
+            table = self.tables.get(place)
+            if id(table) in written:  # one table in two places is stored once
+                rows.append(written[id(table)])
+                continue
+            if table is None or not table.values.size:
+                rows.append(struct.pack("<6i2Q", 0, 0, 1, 1, 1, 0, 0, 0))
+                continue
+            starts = []
+            for array in (table.values, table.tiles):
+                starts.append(offset if array is not None else 0)
+                data = (
+                    b""
+                    if array is None
+                    else np.ascontiguousarray(array).astype(array.dtype.newbyteorder("<")).tobytes()
+                )
+                data += bytes(-len(data) % 8)
+                parts.append(data)
+                offset += len(data)
+            kind = _TILES if table.tiles is not None else _KINDS[table.values.dtype.name]
+            rows.append(struct.pack("<6i2Q", kind, *table.four, 0, *starts))
+            written[id(table)] = rows[-1]
+        return b"".join(rows + parts)
+
+    def to_bytes(self) -> bytes:
+        """Return the binary block."""
+        body = self._body()
+        head = struct.pack("<8sIIQQ", b"PALPATE\0", VERSION, ARRAYS, 64 + len(body), fnv(body))
+        return head + hashlib.sha256(body).digest() + body
+
+
+def fnv(data: bytes) -> int:
+    """Return the checksum of a block: FNV-1a over little-endian words of eight bytes."""
+    total, prime, mask = 0xCBF29CE484222325, 0x100000001B3, (1 << 64) - 1
+    for (word,) in struct.iter_unpack("<Q", data):
+        total = ((total ^ word) * prime) & mask
+    return total
+
+
+def identifier(name: str) -> str:
+    """Return a name as C takes it: "iwan-elements" becomes iwan_elements."""
+    word = "".join(c if c.isascii() and (c.isalnum() or c == "_") else "_" for c in name)
+    return f"_{word}" if word[:1].isdigit() else word
+
+
+_BASELINES = ("contact", "pad", "constant")
+_MEMORIES = ("relaxation", "indentation", "iwan-elements")
+
+
+def _code(name: str, known: tuple[str, ...]) -> int:
+    """Return the number by which the generic core finds a kind; 0 for one that it does not hold."""
+    return known.index(name) + 1 if name in known else 0
+
+
+def _refused(what: str, name: str) -> UsageError:
+    return UsageError(
+        f"The {what} {name!r} has no C source, so a body with it can't leave palpate.",
+        why="Every export runs the evaluator core in C99, and knows no other way to compute it.",
+        fix=f"Give it a method c_source() (docs/guide/export.md), or take a {what} of palpate's.",
+    )
+
+
+def _flat(args: Any) -> Iterator[Any]:
+    """Return the arrays and numbers of nested tuples, one after the other."""
+    for part in args:
+        if isinstance(part, tuple):
+            yield from _flat(part)
+        else:
+            yield part
+
+
+def _with_tiles(arrays: list[Table], surface: TouchedSurface) -> list[Table]:
+    """Return a baseline's arrays with the tables of its surface, where they are among them, in tiles."""
+    from palpate.export.surface_tiles import surface_tables
+
+    dense = [Table.of(a) for a in surface.compiled()]
+    for first in range(len(arrays) - 2):
+        some = arrays[first : first + 3]
+        if all(np.array_equal(a.values, b.values) for a, b in zip(some, dense, strict=True)):
+            return [*arrays[:first], *surface_tables(surface), *arrays[first + 3 :]]
+    return arrays
+
+
+def _numbered(first: int, arrays: list[Table], what: str) -> dict[int, Table]:
+    if len(arrays) > ROOM:
+        raise UsageError(
+            f"The {what} has {len(arrays)} arrays.", fix=f"The evaluator core has room for {ROOM}."
+        )
+    return dict(enumerate(arrays, first))
+
+
+def _energy_tables(energy: LearntEnergy, *, deviation: bool) -> dict[int, Table]:
+    """Return what every learnt energy has: numbers, limits, trained points, axes, network and posterior."""
+    baseline, region, going = energy.baseline, energy.region, energy.going
+    low, high = bounds(energy.inputs)
+    radius = np.inf if region is None else region.radius
+    tables = net_tables(energy.network, NET, len(baseline.directions))
+    tables[NUMBERS] = Table.of(
+        np.array([radius, going.deepest, going.depth_width, baseline.inner, baseline.radius])
+    )
+    tables[LIMITS] = Table.of(np.array([low, high, going.widths]))
+    tables[AXES] = Table.of(baseline.directions)
+    if region is not None:
+        points = region.points.T
+        filled = np.full((len(points), -(-points.shape[1] // LANES) * LANES), FAR)
+        filled[:, : points.shape[1]] = points
+        tables[POINTS] = Table.of(filled)
+    if deviation and energy.root is not None:
+        tables[ROOT] = _root_table(*energy.posterior)
+    return tables
+
+
+def _root_table(root: np.ndarray, network: Network) -> Table:
+    """Return the lower triangular root of the same covariance, column by column, see `pp_deviation`."""
+    lower = np.asarray(np.linalg.qr(root.T, mode="r")).T
+    rows, columns = lower.shape
+    whole = -(-rows // LANES) * LANES
+    parts = []
+    for c in range(columns):
+        column = np.zeros(whole)
+        column[c:rows] = lower[c:, c]
+        parts.append(column[c - c % LANES :])
+    return Table(np.concatenate(parts).astype(np.float32), (columns, network.units, whole))
+
+
+def net_tables(network: Network, first: int, felt: int) -> dict[int, Table]:
+    """Return a network's arrays in the places from `first` on.
+
+    Parameters
+    ----------
+    network : Network
+        Any; of one output where curvature is asked.
+    first : int
+        The place of its sizes.
+    felt : int
+        Inputs by which curvature is asked; 0 for none.
+
+    Raises
+    ------
+    UsageError
+        If it has more inputs, or its factors more rows, than the core's workspace.
+    """
+    layout, scales, units, rows, modes, _ = packed(network, "double")
+    n, e, latent = scales.shape[1], len(layout) - 1, rows.shape[1]
+    r, h = len(units) - e, units.shape[1]
+    if max(n, r) > MOST:
+        raise UsageError(
+            f"A network of {n} inputs and {r} rows is larger than the evaluator core's workspace of {MOST}.",
+            fix="Learn it with fewer inputs.",
+        )
+    grams = gram(network, felt) if felt else np.zeros((0, h))
+    lines = np.vstack([units, grams, rows[1 + n :].T])
+    groups = -(-h // LANES)
+    filled = np.zeros((len(lines), groups * LANES))
+    filled[:, :h] = lines
+    filled = filled.reshape(len(lines), groups, LANES).transpose(1, 0, 2)
+    sizes = [n, e, r, h, latent, RADIAL_FUNCTIONS.index(network.radial), len(grams)]
+    tail = np.concatenate([rows[: 1 + n].ravel(), modes.ravel()])
+    return {
+        first: Table.of(np.array(sizes)),
+        first + 1: Table.of(scales),
+        first + 2: Table.of(layout[1:].reshape(e, 2)),
+        first + 3: Table.of(filled),
+        first + 4: Table.of(tail),
+    }

@@ -248,3 +248,16 @@ def test_a_poisson_ratio_of_zero_is_an_option_too(palpate, tmp_path):
     answer = palpate("touch", tmp_path / "part.stl", "--poisson", "0")
     assert answer.code == 2
     assert "--poisson" in answer.err
+
+
+def test_learning_is_watched(palpate, carried_out, tmp_path):
+    folder = tmp_path / "watched"
+    shutil.copytree(carried_out, folder)
+    answer = palpate("learn", folder / "study.toml", "--watch", "--json")
+    assert answer.code == 0, answer.err
+    page = Path(json.loads(answer.out)["growth"])
+    assert page.name == "small.growth.html"
+    assert "How the network of small grew" in page.read_text(encoding="utf-8")
+    refused = palpate("learn", folder / "small.zarr", "--watch")
+    assert refused.code == 2
+    assert "watched of a study" in refused.err

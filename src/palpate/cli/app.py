@@ -170,17 +170,20 @@ def learn(
     effort: Annotated[
         float | None, typer.Option(min=0.01, help="Of a dataset: how much is tried; 0.1 is a quick look.")
     ] = None,
+    watch: Annotated[
+        bool,
+        typer.Option(
+            "--watch",
+            help="Show the units as they appear, move and vanish, and write a page that plays it, NAME.growth.html. "
+            "For beams under loads.",
+        ),
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Learn a surrogate from the solves of a study, check it, and write it to a model file."""
-    from palpate.cli.study_commands import learn_dataset_file, learn_file
+    from palpate.cli.study_commands import learn_path
 
-    if study.is_dir():
-        learn_dataset_file(study, 1.0 if effort is None else effort, Console(as_json))
-        return
-    if effort is not None:
-        raise UsageError("A study file states its own effort.", fix="Leave out --effort.")
-    learn_file(study, Console(as_json))
+    learn_path(study, effort, Console(as_json), watch=watch)
 
 
 @app.command()

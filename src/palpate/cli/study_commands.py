@@ -24,6 +24,7 @@ __all__ = [
     "is_archive",
     "learn_dataset_file",
     "learn_file",
+    "learn_path",
     "sweep_file",
     "validate_model",
     "validate_study_file",
@@ -109,8 +110,48 @@ def sweep_file(
     console.result(text, content | {"rows": sum(map(len, parts)), "failed": failed})
 
 
-def learn_file(study: Path, console: Console) -> None:
-    """Learn the dataset of a study file, judge the result, write it and print how good it is."""
+def learn_path(study: Path, effort: float | None, console: Console, *, watch: bool) -> None:
+    """Learn a study file, or a dataset.
+
+    Parameters
+    ----------
+    study : Path
+        Study file, or a folder ``NAME.zarr``.
+    effort : float or None
+        Work of the search, of a dataset.
+    console : Console
+        Printer of the result.
+    watch : bool
+        Whether to show the growth of a study's sequential filter.
+
+    Raises
+    ------
+    UsageError
+        If an option is of the other kind.
+    """
+    if not study.is_dir():
+        if effort is not None:
+            raise UsageError("A study file states its own effort.", fix="Leave out --effort.")
+        learn_file(study, console, watch=watch)
+        return
+    if watch:
+        raise UsageError("The growth is watched of a study.", fix="Name the study file, or omit --watch.")
+    learn_dataset_file(study, 1.0 if effort is None else effort, console)
+
+
+def learn_file(study: Path, console: Console, *, watch: bool = False) -> None:
+    """Learn the dataset of a study file, judge the result, write it and print how good it is.
+
+    Parameters
+    ----------
+    study : Path
+        Study file.
+    console : Console
+        Printer of the result.
+    watch : bool
+        Whether to show the growth of the sequential filter, and to write the page that plays it.
+    """
+    from palpate.cli.growth_view import watched
     from palpate.study import read_study
     from palpate.study.run import (
         Paths,
@@ -126,7 +167,11 @@ def learn_file(study: Path, console: Console) -> None:
     paths = Paths(study.parent, record.name)
     train, test = load_data(record, paths)
     console.say(f"Learning from {len(train)} {'solves' if record.memory is None else 'histories'} …")
-    model, history = learn_study(record, train, test, log=lambda stage: console.say(f"{stage} …"))
+    page = paths.folder / f"{record.name}.growth.html" if watch else None
+    with watched(page, record.name, console) as recorder:
+        model, history = learn_study(
+            record, train, test, log=lambda stage: console.say(f"{stage} …"), watch=recorder
+        )
     validation = validate_study(record, model, test, history)
     curve = earlier_curve(paths, record.name)
     model = with_validation(model, validation, curve, len(train) if record.memory is None else 0)
@@ -134,8 +179,9 @@ def learn_file(study: Path, console: Console) -> None:
     lines = [f"  {check}" for check in validation.checks if check.criterion.key in _HEADLINES]
     values = {check.criterion.key: check.measured for check in validation.checks}
     console.result(
-        "\n".join([str(model), str(history), *lines, str(paths.model)]),
-        {"model": str(paths.model), "passed": validation.passed, "measured": values},
+        "\n".join([str(model), str(history), *lines, *([str(page)] if page else []), str(paths.model)]),
+        {"model": str(paths.model), "passed": validation.passed, "measured": values}
+        | ({"growth": str(page)} if page else {}),
     )
     console.say(f"Next: palpate validate {study}, palpate view {paths.model}")
 

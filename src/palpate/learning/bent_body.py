@@ -33,6 +33,7 @@ from threadpoolctl import threadpool_limits
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.learning.energy import EnergyHistory, learn_energy
+from palpate.learning.growth_frames import GrowthRecorder
 from palpate.learning.learn import Learned, learn
 from palpate.learning.structure import refined_network
 from palpate.network import Network
@@ -114,6 +115,7 @@ def learn_bent(
     seconds: float | None = None,
     workers: int | None = None,
     progress: Callable[[int, int], None] | None = None,
+    watch: GrowthRecorder | None = None,
 ) -> LearntBent:
     """Learn a body that a hand holds at one node.
 
@@ -144,6 +146,8 @@ def learn_bent(
         Processes that search at a time; the result is the same with any number.
     progress : callable, optional
         Called with (done, total) observations of the filter.
+    watch : GrowthRecorder, optional
+        Keeps frames of the filter's growth.
 
     Raises
     ------
@@ -171,6 +175,7 @@ def learn_bent(
             seed=seed,
             heldout=None if heldout is None else (heldout.ok.X, _columns(heldout.ok, columns)),
             progress=progress,
+            watch=watch,
         )
         fields = _fields(few, outputs, columns, sequential, settings, refinement, seed)
         baseline, solves = _energy_of(few, fields["displacement"], coupling)

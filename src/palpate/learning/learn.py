@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 from palpate import checks
 from palpate.errors import UsageError
 from palpate.learning.automatic import automatic, check_target
+from palpate.learning.growth_frames import GrowthRecorder
 from palpate.learning.learning_history import History
 from palpate.network import Network, Scaling
 from palpate.rbf.filter.observation import Observation
@@ -97,6 +98,7 @@ def learn(
     slope_weight: float = 1.0,
     heldout: tuple[np.ndarray, np.ndarray] | None = None,
     progress: Callable[[int, int], None] | None = None,
+    watch: GrowthRecorder | None = None,
 ) -> Learned:
     """Learn a network sample by sample.
 
@@ -129,6 +131,8 @@ def learn(
         Unseen samples on which the error is recorded after every observation.
     progress : callable, optional
         Called with (done, total) observations.
+    watch : GrowthRecorder, optional
+        Keeps frames of the growth, and changes nothing of it.
 
     Returns
     -------
@@ -161,6 +165,9 @@ def learn(
     shown = _observations(xs, ys, scaling, w, slopes, s)
     modes = output_modes(ys, settings.modes) if settings.update == "shared" else None
     state = initial(len(inputs), len(outputs), settings, modes)
+    if watch is not None:
+        total = passes * len(xs)
+        watch.begin((X, Y), (inputs, outputs), scaling, settings, total, heldout=judge is not None)
     rng = np.random.default_rng(seed)
     events: list[Event] = []
     innovation: list[float] = []
@@ -173,6 +180,8 @@ def learn(
                 innovation.append(state.innovation)
                 if judge:
                     errors.append(judge(state))
+                if watch is not None:
+                    watch.observe(state, event, xs[i], errors[-1] if judge else np.sqrt(state.innovation))
             if progress:
                 progress(len(events), passes * len(xs))
     network = freeze(state, settings, inputs, outputs, scaling, meta=training_record(X, Y, inputs))

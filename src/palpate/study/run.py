@@ -28,6 +28,7 @@ from palpate.learning.plastic import LoadHistories
 from palpate.processes import CASE_LIMIT
 from palpate.study.memory_stages import learn_histories, sweep_histories
 from palpate.study.study import Study
+from palpate.study.study_paths import Paths
 from palpate.surrogates import Surrogate
 from palpate.sweeps import grow, sweep
 from palpate.sweeps.grow_sweep import CHOSEN
@@ -53,49 +54,6 @@ __all__ = [
 Log = Callable[[str], None]
 Rows: TypeAlias = Dataset | LoadHistories
 """What was solved: a dataset, or the histories of a body with memory."""
-
-
-@dataclass(frozen=True)
-class Paths:
-    """Files of a study: all named after the study, in one folder."""
-
-    folder: Path
-    name: str
-
-    @property
-    def data(self) -> Path:
-        """Dataset of the sweep."""
-        return self.folder / f"{self.name}.zarr"
-
-    @property
-    def random(self) -> Path:
-        """Dataset of further solves, for testing only."""
-        return self.folder / f"{self.name}-random.zarr"
-
-    @property
-    def histories(self) -> Path:
-        """Histories from which a body with memory is learnt."""
-        return self.folder / f"{self.name}-histories.palpate"
-
-    @property
-    def unseen_histories(self) -> Path:
-        """Histories of a body with memory for testing only."""
-        return self.folder / f"{self.name}-unseen.palpate"
-
-    @property
-    def model(self) -> Path:
-        """File of the surrogate."""
-        return self.folder / f"{self.name}.palpate"
-
-    @property
-    def history(self) -> Path:
-        """Record of the sequential filter, where one ran."""
-        return self.folder / f"{self.name}.history.npz"
-
-    @property
-    def report(self) -> Path:
-        """Page of the report."""
-        return self.folder / f"{self.name}.html"
 
 
 @dataclass(frozen=True, eq=False)
@@ -298,6 +256,7 @@ def learn_study(
     *,
     progress: Callable[[int, int], None] | None = None,
     log: Log = lambda _: None,
+    watch: Any = None,
 ) -> tuple[Any, Any]:
     """Learn the study's surrogate, which keeps the study's runtime settings.
 
@@ -313,14 +272,28 @@ def learn_study(
         A function (done, total) of the filter's observations.
     log : callable
         Gets one line when a part of the work begins.
+    watch : GrowthRecorder, optional
+        Keeps frames of the growth of the study's sequential filter.
 
     Returns
     -------
     surrogate, history
         What `palpate.learn` returns, and for a body with memory how well it fits.
+
+    Raises
+    ------
+    UsageError
+        If the growth is to be watched of a study that has no sequential filter.
     """
+    if watch is not None and (study.filter is None or not isinstance(train, Dataset)):
+        raise UsageError(
+            f"No network of the study {study.name!r} grows sample by sample.",
+            why="Its energy is found by a search among many networks at once.",
+            fix="Watch a study of a beam under loads, such as that of palpate init --preset beam-nylon.",
+        )
     if isinstance(train, Dataset):
-        model, history = learn_dataset(train, **_options(study, train, test, progress, log))
+        options = _options(study, train, test, progress, log) | ({} if watch is None else {"watch": watch})
+        model, history = learn_dataset(train, **options)
     else:
         model, history = learn_histories(study, train)
     return _with_meta(model, {"runtime": study.runtime.model_dump()}), history

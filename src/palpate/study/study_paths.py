@@ -1,0 +1,51 @@
+"""Files of a study, by what they hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+__all__ = ["Paths"]
+
+
+@dataclass(frozen=True)
+class Paths:
+    """Files of a study: all named after the study, in one folder."""
+
+    folder: Path
+    name: str
+
+    @property
+    def data(self) -> Path:
+        """Dataset of the sweep."""
+        return self.folder / f"{self.name}.zarr"
+
+    @property
+    def random(self) -> Path:
+        """Dataset of further solves, for testing only."""
+        return self.folder / f"{self.name}-random.zarr"
+
+    @property
+    def histories(self) -> Path:
+        """Histories from which a body with memory is learnt."""
+        return self.folder / f"{self.name}-histories.palpate"
+
+    @property
+    def unseen_histories(self) -> Path:
+        """Histories of a body with memory for testing only."""
+        return self.folder / f"{self.name}-unseen.palpate"
+
+    @property
+    def model(self) -> Path:
+        """File of the surrogate."""
+        return self.folder / f"{self.name}.palpate"
+
+    @property
+    def history(self) -> Path:
+        """Record of the sequential filter, where one ran."""
+        return self.folder / f"{self.name}.history.npz"
+
+    @property
+    def report(self) -> Path:
+        """Page of the report."""
+        return self.folder / f"{self.name}.html"

@@ -1,0 +1,51 @@
+"""The page that plays how a network grew: one self-contained HTML file that needs no server and no network."""
+
+from __future__ import annotations
+
+import html
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from palpate.errors import UsageError
+from palpate.files import write_file
+
+if TYPE_CHECKING:
+    from palpate.learning.growth_frames import GrowthRecorder
+
+__all__ = ["growth_html", "write_growth_page"]
+
+TEMPLATE = Path(__file__).parent / "templates" / "growth.html"
+
+
+def growth_html(growth: GrowthRecorder, name: str) -> str:
+    """Return the page as text.
+
+    Parameters
+    ----------
+    growth : GrowthRecorder
+        Frames of a run that is done.
+    name : str
+        Name of the body, for the heading.
+
+    Raises
+    ------
+    UsageError
+        If nothing was recorded.
+    """
+    if not growth.frames:
+        raise UsageError(
+            "There is no growth to be shown.",
+            why="No network was learnt with this recorder.",
+            fix="Pass it to a learner first: learn(…, watch=recorder).",
+        )
+    # a name that holds "</script" must not end the script
+    data = json.dumps(growth.describe(), separators=(",", ":")).replace("</", "<\\/")
+    page = TEMPLATE.read_text(encoding="utf-8")
+    return page.replace("{{name}}", html.escape(name)).replace("{{data}}", data)
+
+
+def write_growth_page(path: str | os.PathLike[str], growth: GrowthRecorder, name: str) -> Path:
+    """Write the page and return its path; the parameters are those of `growth_html`."""
+    return write_file(path, growth_html(growth, name))

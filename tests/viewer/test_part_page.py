@@ -156,13 +156,14 @@ def test_a_part_is_touched_while_it_gets_better(server, page, study, versions, t
     assert page.inner_text("#error-p95") == "3.1"
     assert 41 <= int(page.inner_text("#elapsed").split()[0]) < 60
 
-    page.click("#fields button:has-text('uncertainty')")
+    assert page.get_attribute("#trust-toggle", "aria-pressed") == "true"
     assert page.inner_text("#legend-title") == "uncertainty of the force (%)"
     assert float(page.evaluate("document.documentElement.dataset.largest")) == pytest.approx(
         100 * DEVIATION, rel=1e-3
     )
     keep(page, "part-trust")
-    page.click("#fields button:has-text('displacement')")
+    page.click("#trust-toggle")
+    assert page.inner_text("#legend-title") == "displacement (mm)"
     page.evaluate("window.mark = 'not reloaded'")
     x, y = page.evaluate("document.documentElement.dataset.middle").split()
     page.mouse.move(float(x), float(y) + 10)

@@ -17,7 +17,7 @@ import type { View } from "./view";
 import type { Vector3 } from "three";
 
 const WORDS = ["title", "tools", "scale-notes", "legend"];
-const TRUST_NOTE = "One standard deviation, with the ball half as deep as it may go. Darkest also where nothing was trained.";
+const TRUST_NOTE = "One standard deviation, with the ball half as deep as it may go.";
 
 /** A body on the page, with the hand that touches it. */
 export interface Body {
@@ -142,17 +142,22 @@ class PressedBody implements Body {
     [this.surface, this.fields] = [surface, fields];
     this.still = new Float32Array(surface.rest.length);
     this.indentation = new Indentation(surface);
+    const first = this.infos.length === 0;
     // one scale for all versions, so that it is seen how they get better
     if (trust) trust.high = Math.max(trust.high, this.trust?.high ?? 0);
     this.trust = trust;
     this.infos = [...fields.map((field) => field.info), ...(trust ? [trusted(trust)] : [])];
-    this.chosen = Math.min(this.chosen, Math.max(this.infos.length - 1, 0));
-    choices(this.infos, (index) => this.choose(index), this.chosen);
-    this.choose(this.chosen);
+    const last = Math.max(this.infos.length - 1, 0);
+    this.choose(first && trust ? last : Math.min(this.chosen, last));
+    // between the map of trust and the displacement
+    element("trust-toggle").onclick = () => this.choose(this.trusting ? 0 : last);
   }
 
   private choose(index: number): void {
     this.chosen = index;
+    choices(this.infos, (other) => this.choose(other), index);
+    element("trust-toggle").setAttribute("aria-pressed", String(this.trusting));
+    element("legend-note").hidden = !this.trusting;
     legend(this.info);
     if (this.info) this.view!.neutral(nothing(this.info));
     this.draw();
@@ -255,9 +260,9 @@ function deviations({ values }: TrustMap): Float32Array {
   return values.map((v) => 100 * Math.max(v, 0));
 }
 
-/** Shares of the colour scale of a map: all of it where nothing was trained. */
+/** Shares of the colour scale of a map: -1 where nothing was trained. */
 function certainty({ values, high }: TrustMap): Float32Array {
-  return values.map((v) => (v >= 0 ? v / high : v < -1.5 ? 1 : 0));
+  return values.map((v) => (v >= 0 ? v / high : v < -1.5 ? -1 : 0));
 }
 
 function same(a: Float32Array, b: Float32Array): boolean {

@@ -4,6 +4,7 @@ import {
   BoxGeometry,
   BufferAttribute,
   BufferGeometry,
+  Color,
   DoubleSide,
   Float32BufferAttribute,
   InstancedMesh,
@@ -33,6 +34,7 @@ const STANCE = {
   sunFrom: new Vector3(-1.1, -0.55, 1.0), // low, so that a shallow dent has a bright and a dark side
 };
 
+const UNKNOWN = -0.5; // a share below it means that nothing is known there
 const DOT = 0.006; // of the body's size, radius of a dot
 
 export interface Layers {
@@ -61,6 +63,7 @@ export class SurfaceView extends View {
   private readonly floor: LineSegments<BufferGeometry, LineBasicMaterial>;
   protected readonly probe: Mesh<SphereGeometry, MeshLambertMaterial>;
   private colours = palette();
+  private readonly unknown = new Color();
   private readonly low = new Vector3().setScalar(Infinity);
   private readonly high = new Vector3().setScalar(-Infinity);
   private dots: InstancedMesh<SphereGeometry, MeshBasicMaterial> | null = null;
@@ -117,7 +120,7 @@ export class SurfaceView extends View {
     this.look();
   }
 
-  /** Take over one state: displacements at `factor` times their size, colours by each point's share of the scale. */
+  /** Take over one state: displacements at `factor` times their size, colours by each point's share of the scale, -1: unknown. */
   deform(
     displacement: Float32Array,
     factor: number,
@@ -129,7 +132,8 @@ export class SurfaceView extends View {
     const at = this.position.array as Float32Array;
     for (let i = 0; i < at.length; i++) at[i] = rest[i]! + factor * displacement[i]!;
     for (let i = 0; i < shares.length; i++) {
-      const tint = this.colours[Math.round(255 * Math.min(Math.max(shares[i]!, 0), 1))]!;
+      const share = shares[i]!;
+      const tint = share < UNKNOWN ? this.unknown : this.colours[Math.round(255 * Math.min(Math.max(share, 0), 1))]!;
       this.colour.setXYZ(i, tint.r, tint.g, tint.b);
     }
     this.position.needsUpdate = this.colour.needsUpdate = true;
@@ -195,6 +199,7 @@ export class SurfaceView extends View {
     this.still.material.color.set(css("--soft"));
     this.fixed.material.color.set(css("--accent-2"));
     this.floor.material.color.set(css("--grid"));
+    this.unknown.set(css("--unknown"));
     this.dots?.material.color.set(css("--ink"));
     this.probe.material.color.set(css("--accent"));
     this.probe.material.emissive.set(css("--accent")).multiplyScalar(0.25);

@@ -21,7 +21,7 @@ from palpate.physics.shapes.triangle_list import triangle_text
 from palpate.study.interaction_records import ProbeRecord
 from palpate.study.material_records import SolidMaterialRecord
 from palpate.study.part_records import PartRecord
-from palpate.study.part_study import HELD, TOUCHED
+from palpate.study.part_study import COARSE, HELD, TOUCHED
 from palpate.study.study import Study
 from palpate.study.toml import complaints
 
@@ -103,6 +103,8 @@ def chosen_study(study: Study, choices: PartChoices) -> Study:
         "fixed": fixed,
         "material": _material(body, choices),
     }
+    if content["sweep"].get("element") is not None:  # coarser ones would not feel a smaller ball
+        content["sweep"]["element"] = min(content["sweep"]["element"], COARSE * choices.radius)
     content["interaction"] |= {"touches": touches, "radius": choices.radius, "depth": (least, choices.depth)}
     try:
         return Study.model_validate(content)
@@ -149,30 +151,27 @@ def _picked(
     held, touched = _marked(names, body.fixed_names()), _marked(names, (acting.touches,))
     surfaces = [surface.model_dump() for surface in body.surfaces]
     fixed, touches = body.fixed, acting.touches
-    if choices.held is None and choices.touched is None:
-        return held, touched, surfaces, fixed, touches
-    for role, picked in ((TOUCHED, choices.touched), (HELD, choices.held)):
+    for role, picked, other in ((TOUCHED, choices.touched, choices.held), (HELD, choices.held, None)):
         if picked is None:
             continue
-        mask = np.zeros(len(skin.triangles), dtype=bool)
+        before = touched if role == TOUCHED else held
+        mask, covered = np.zeros(len(before), dtype=bool), np.zeros(len(before), dtype=bool)
         mask[picked] = True
-        if role == HELD:
-            held = mask
-        else:
-            touched = mask
-        faces = _whole_faces(skin, mask)
-        name = _free_name(role, skin)
+        if other is not None:
+            covered[other] = True
+        if np.array_equal(mask, before & ~covered):
+            continue  # as the study says it, less what is held now, which goes over it
+        name, faces = _free_name(role, skin), _whole_faces(skin, mask)
         surfaces = [surface for surface in surfaces if surface["name"] != name]
         if mask.any():
-            surfaces.append(
-                {"name": name, "faces": faces}
-                if faces
-                else {"name": name, "triangles": triangle_text(np.flatnonzero(mask), len(mask))}
+            listed = (
+                {"faces": faces} if faces else {"triangles": triangle_text(np.flatnonzero(mask), len(mask))}
             )
+            surfaces.append({"name": name, **listed})
         if role == HELD:
-            fixed = name
+            held, fixed = mask, name
         else:
-            touches = name
+            touched, touches = mask, name
     return held, touched & ~held, surfaces, fixed, touches
 
 

@@ -18,7 +18,7 @@ import palpate as pp
 from conftest import require_program
 from exported_bodies import BODIES, body, networks
 from palpate.errors import AccuracyError, UsageError
-from palpate.export import export_c
+from palpate.export import export_c, export_lib
 from palpate.export.c_export import block_of, compare_c
 from palpate.export.check_points import Comparison, Precision, compare_body, places, true_answers
 from palpate.export.check_program import CheckProgram
@@ -42,18 +42,28 @@ def c_with(compiler: str, *options: str, single: bool = False) -> Callable[[pp.S
     return export
 
 
+def library(thing: pp.Surrogate, folder: Path) -> Comparison:
+    """Export to a shared library, asked through its Python wrapper."""
+    require_program("gcc")
+    done = export_lib(thing, folder, compiler="gcc")
+    assert done.comparison is not None
+    return done.comparison
+
+
 EXPORTERS = {
     "gcc": c_with("gcc", *STRICT, *SANITIZED),
     "clang": c_with("clang", *STRICT),
     "tcc": c_with("tcc", "-Wall", "-Werror"),
+    "lib": library,
     "float": c_with("gcc", *STRICT, *SANITIZED, single=True),
 }
 ON_ALL = ("gcc", "float")  # the others on two bodies: the sources are the same
+ON_SOME = ("relaxation", "pad")
 
 
 @pytest.mark.parametrize(
     ("exporter", "name"),
-    [(e, b) for e in EXPORTERS for b in BODIES if e in ON_ALL or b in ("relaxation", "pad")],
+    [(e, b) for e in EXPORTERS for b in BODIES if e in ON_ALL or b in ON_SOME],
 )
 def test_an_export_answers_as_palpate_does(exporter, name, tmp_path):
     thing = body(name)

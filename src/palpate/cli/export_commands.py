@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,7 +18,10 @@ if TYPE_CHECKING:
 
 __all__ = ["export_app"]
 
-export_app = typer.Typer(help="Take a learnt body or a network into other tools: C99.", no_args_is_help=True)
+export_app = typer.Typer(
+    help="Take a learnt body or a network into other tools: C99, a shared library.",
+    no_args_is_help=True,
+)
 
 LearntFile = Annotated[
     Path, typer.Argument(help="Model file (.palpate), of [bold]palpate learn[/] or [bold]palpate fit[/].")
@@ -100,3 +104,54 @@ def to_c(
     lines = [f"{f}  {f.stat().st_size / 1e3:.0f} kB" for f in done.files]
     lines += [] if done.comparison is None else [str(done.comparison)]
     console.result("\n".join(lines), done.as_dict())
+
+
+@export_app.command("lib")
+def to_library(
+    file: LearntFile,
+    out: Annotated[Path | None, typer.Option(help="Folder for the files. Default: the body's name.")] = None,
+    name: Name = None,
+    field: FieldName = None,
+    no_field: NoField = False,
+    no_deviation: NoDeviation = False,
+    no_check: NoCheck = False,
+    compiler: Compiler = None,
+    as_json: Json = False,
+) -> None:
+    """Compile a shared library with a plain C ABI, with wrappers for Python, Unity, Unreal and MATLAB.
+
+    Without a C compiler the sources and their CMake file are written, to be built elsewhere.
+    """
+    from palpate.export import export_lib
+
+    console = Console(as_json)
+    done = export_lib(
+        _body(file),
+        Path(name or file.stem) if out is None else out,
+        name=name,
+        field=field,
+        with_field=not no_field,
+        deviation=not no_deviation,
+        check=not no_check,
+        compiler=compiler,
+    )
+    if done.library is None:
+        console.say("no C compiler was found: build the library with CMake, -DBUILD_SHARED_LIBS=ON")
+    lines = [f"{f}  {f.stat().st_size / 1e3:.0f} kB" for f in done.files]
+    lines += [] if done.comparison is None else [str(done.comparison)]
+    content = replace(done.sources, comparison=done.comparison).as_dict()
+    content["files"] = [{"file": str(f), "bytes": f.stat().st_size} for f in done.files]
+    console.result("\n".join(lines), content)
+
+
+def _body(file: Path) -> Surrogate:
+    from palpate.surrogates import Surrogate
+
+    thing = _read(file)
+    if not isinstance(thing, Surrogate):
+        raise UsageError(
+            f"{file} holds a network alone.",
+            why="This way out is for learnt bodies, which answer a hand.",
+            fix="Take the network out as C99: palpate export c.",
+        )
+    return thing

@@ -8,10 +8,13 @@ compilers       the C compilers of this machine, and how a program is compiled w
 check_points    places at which every export is compared with palpate, and how
 check_program   a compiled export that answers them
 c_export        `palpate export c`: write, compile and compare
+lib_export      `palpate export lib`: a shared library, with wrappers whose texts are lib_templates
+check_library   a library that answers through its Python wrapper
 core            the C sources
 """
 
 from palpate.export.c_export import ExportedC, export_c
+from palpate.export.lib_export import ExportedLibrary, export_lib
 from palpate.export.weights_block import WeightsBlock
 
-__all__ = ["ExportedC", "WeightsBlock", "export_c"]
+__all__ = ["ExportedC", "ExportedLibrary", "WeightsBlock", "export_c", "export_lib"]

@@ -31,7 +31,7 @@ from palpate.network import Network
 from palpate.surrogates import Surrogate
 from palpate.units import Quantity, Range
 
-__all__ = ["c_files", "require_name"]
+__all__ = ["body_sizes", "c_files", "require_name"]
 
 _WIDTH = 118
 _KEYWORDS = frozenset(
@@ -99,6 +99,7 @@ def c_files(thing: Surrogate | Network, block: WeightsBlock, name: str, *, singl
         header, public, example = _network_header(facts), NETWORK, NETWORK_EXAMPLE
     else:
         felt = len(thing.energy.baseline.directions)
+        body = BODY.replace("@SIZES@", ", ".join(map(str, body_sizes(thing, block))))
         facts = _Facts(
             name,
             single,
@@ -111,7 +112,7 @@ def c_files(thing: Surrogate | Network, block: WeightsBlock, name: str, *, singl
         )
         header, public, example = (
             _body_header(facts, thing),
-            BODY + _memory_part(block) + _field_part(block),
+            body + _memory_part(block) + _field_part(block),
             EXAMPLE,
         )
     files = {f"{name}.h": header, f"{name}.c": _source(facts, public)}
@@ -201,6 +202,14 @@ def _network_header(facts: _Facts) -> str:
 
 def _work_size(block: WeightsBlock) -> int:
     return 4 * block.tables[ROOT].shape[2] if ROOT in block.tables else 1
+
+
+def body_sizes(surrogate: Surrogate, block: WeightsBlock) -> tuple[int, ...]:
+    """Return the eight sizes that `NAME_sizes` gives."""
+    inputs, felt = len(surrogate.inputs), len(surrogate.energy.baseline.directions)
+    state = 4 + _state_size(surrogate) if block.memory else 0
+    nodes, components, shape = _shape_sizes(block) if block.field else (0, 0, 0)
+    return inputs, felt, inputs - felt, _work_size(block), state, shape, nodes, components
 
 
 def _state_size(surrogate: Surrogate) -> int:

@@ -59,6 +59,10 @@ int32_t NAME_answer(const NAME_real *x, const NAME_real *p, NAME_real *answer);
 /* standard deviation of the force relative to its size; not-a-number for a body that has none. work: workspace */
 int32_t NAME_deviation(const NAME_real *x, const NAME_real *p, NAME_real *work, NAME_real *deviation);
 
+/* Sizes, as numbers that the caller must provide (8): inputs, felt coordinates, parameters, workspace of the deviation,
+ * state of the memory, shape of a touch, nodes and components of the field; 0 for what the body has not. */
+void NAME_sizes(int32_t *sizes);
+
 /* trained ranges of all inputs: the felt coordinates (m), then the parameters */
 void NAME_limits(NAME_real *low, NAME_real *high);
 
@@ -108,6 +112,11 @@ void NAME_limits(NAME_real *low, NAME_real *high);
 const char *NAME_hash(void);
 """
 BODY = """
+void NAME_sizes(int32_t *sizes) {
+  static const int32_t own[8] = {@SIZES@};
+  memcpy(sizes, own, sizeof own);
+}
+
 int32_t NAME_answer(const NAME_real *x, const NAME_real *p, NAME_real *answer) {
   return pp_answer(&NAME_model, x, p, answer);
 }

@@ -1,0 +1,154 @@
+"""Export as a shared library with a plain C ABI, with wrappers for Python, Unity, Unreal and MATLAB.
+
+Functions take pointers to doubles and whole numbers of 32 bits, no structures by value and no callbacks. The library
+is compiled by this machine's compiler; without one the sources and their CMake file are what is written.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from palpate.errors import AccuracyError
+from palpate.export.c_export import ExportedC, block_of, export_c
+from palpate.export.check_library import CheckLibrary
+from palpate.export.check_points import Comparison, compare_body
+from palpate.export.compilers import compile_c, find_compiler
+from palpate.export.lib_templates import CSHARP, MATLAB_EXAMPLE, MATLAB_HEADER, PYTHON, UNREAL
+from palpate.export.weights_block import ROOT
+from palpate.files import write_file
+from palpate.surrogates import Surrogate
+
+__all__ = ["ExportedLibrary", "export_lib", "library_name"]
+
+
+@dataclass(frozen=True)
+class ExportedLibrary:
+    """Sources, wrappers and library of one body.
+
+    Attributes
+    ----------
+    sources : ExportedC
+        The C files.
+    wrappers : tuple of Path
+        For Python, Unity, Unreal and MATLAB.
+    library : Path, optional
+        The shared library; None where there was no compiler.
+    comparison : Comparison, optional
+        How far the library is from palpate, asked by the Python wrapper.
+    """
+
+    sources: ExportedC
+    wrappers: tuple[Path, ...]
+    library: Path | None
+    comparison: Comparison | None
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All files, the library first."""
+        own = () if self.library is None else (self.library,)
+        return (*own, *self.wrappers, *self.sources.files)
+
+
+def library_name(name: str) -> str:
+    """Return the file name of a shared library on this system."""
+    return {"win32": f"{name}.dll", "darwin": f"lib{name}.dylib"}.get(sys.platform, f"lib{name}.so")
+
+
+def export_lib(
+    surrogate: Surrogate,
+    out: str | os.PathLike[str],
+    *,
+    name: str | None = None,
+    field: str | None = None,
+    with_field: bool = True,
+    deviation: bool = True,
+    check: bool = True,
+    compiler: str | None = None,
+) -> ExportedLibrary:
+    """Write a body as a shared library with its sources and wrappers.
+
+    Parameters
+    ----------
+    surrogate : Surrogate
+        The body.
+    out : path
+        Folder for the files.
+    name, field, with_field, deviation : optional
+        As `palpate.export.export_c` takes them.
+    check : bool
+        Whether the library is compared with palpate.
+    compiler : str, optional
+        Name of the compiler; by default that of the variable CC, or the first one found.
+
+    Raises
+    ------
+    UsageError
+        If the name is no identifier, or a part of the body has no C source.
+    ResourceError
+        If the compiler refuses the sources.
+    AccuracyError
+        If the library differs from palpate by more than it may.
+    """
+    folder = Path(out)
+    parts = {"field": field, "with_field": with_field, "deviation": deviation}
+    done = export_c(surrogate, folder, name=name, check=False, **parts)  # type: ignore[arg-type]
+    wrappers = tuple(write_file(folder / file, text) for file, text in _wrappers(surrogate, done).items())
+    path = find_compiler(compiler)
+    if path is None:
+        return ExportedLibrary(done, wrappers, None, None)
+    library = folder / library_name(done.name)
+    compile_c(path, list(done.sources), library, options=("-shared", "-fPIC"))
+    whole = ExportedLibrary(done, wrappers, library, None)
+    if not check:
+        return whole
+    block = block_of(surrogate, **parts)  # type: ignore[arg-type]
+    asked = CheckLibrary(folder / f"{done.name}.py")
+    comparison = compare_body(surrogate, asked, field=block.field, deviation=ROOT in block.tables)
+    if not comparison.passed:
+        raise AccuracyError(
+            f"The library does not answer as palpate does: {comparison}.",
+            fix="Try another compiler, and report this.",
+        )
+    return replace(whole, comparison=comparison)
+
+
+def _wrappers(surrogate: Surrogate, done: ExportedC) -> dict[str, str]:
+    """Return the texts of the wrappers by their file names."""
+    name, baseline = done.name, surrogate.energy.baseline
+    middle = [(r.low + r.high) / 2 for r in surrogate.inputs]
+    k = len(baseline.directions)
+    place = sum(m * d for m, d in zip(middle[:k], baseline.directions, strict=True))
+    words = {
+        "@HASH@": done.hash,
+        "@PLACE@": "[" + "; ".join(f"{v:.6g}" for v in place) + "]",
+        "@PARAMETERS@": "["
+        + "; ".join(f"{v:.6g}" for v in [*middle[k:], 0.0][: max(1, len(middle) - k)])
+        + "]",
+        "CLASS": name[0].upper() + name[1:] + "Body",
+        "NAME": name,
+    }
+    has = {"@MEMORY@": surrogate.memory is not None, "@FIELD@": bool(done.field)}
+    texts = {
+        f"{name}.py": PYTHON,
+        f"{words['CLASS']}.cs": CSHARP,
+        f"{name}_unreal.h": UNREAL,
+        f"{name}_matlab.h": MATLAB_HEADER,
+        f"{name}_example.m": MATLAB_EXAMPLE,
+    }
+    return {file: _written(text, words, has) for file, text in texts.items()}
+
+
+def _written(text: str, words: dict[str, str], has: dict[str, bool]) -> str:
+    """Fill in words, and keep or drop the lines of what a body may have."""
+    lines = []
+    for line in text.splitlines():
+        mark = next((m for m in has if line.startswith(m)), None)
+        if mark is None or has[mark]:
+            lines.append(line.removeprefix(mark or ""))
+    whole = "\n".join(lines) + "\n"
+    for word, value in words.items():
+        whole = whole.replace(word, value)
+    return whole

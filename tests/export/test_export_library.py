@@ -1,0 +1,84 @@
+"""Wrappers of exported libraries: every function that they name is in the library, and frames turn as documented."""
+
+from __future__ import annotations
+
+import ctypes
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from conftest import require_program
+from exported_bodies import body
+from palpate.export import export_lib
+
+
+@pytest.fixture(scope="module")
+def exported(tmp_path_factory):
+    require_program("gcc")
+    folder = tmp_path_factory.mktemp("organ")
+    return export_lib(body("relaxation"), folder, compiler="gcc", check=False)
+
+
+def test_every_function_of_every_wrapper_is_in_the_library(exported):
+    library = ctypes.CDLL(str(exported.library))
+    for file in exported.wrappers:
+        names = set(re.findall(r"\borgan_[a-z_]+(?=\()", file.read_text("utf-8")))
+        assert names or file.suffix in (".py", ".m")
+        for name in names:
+            assert getattr(library, name) is not None, (file, name)
+
+
+def test_the_python_wrapper_needs_no_other_package(exported):
+    code = f"import sys; sys.path.append({str(exported.library.parent)!r}); import organ; b = organ.Body()"
+    code += "; print(b.force([0.0, 0.0, 0.005])[0], b.limits(), b.remembers)"
+    command = [sys.executable, "-I", "-S", "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "True" in done.stdout
+
+
+def test_the_wrapper_refuses_other_weights(exported, tmp_path):
+    wrapper = (exported.library.parent / "organ.py").read_text("utf-8")
+    (tmp_path / "organ.py").write_text(wrapper.replace(exported.sources.hash, "0" * 64), "utf-8")
+    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import organ; organ.Body({str(exported.library)!r})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "holds other weights" in done.stderr
+
+
+def test_the_frame_of_unreal_is_left_handed_and_in_centimetres(exported, tmp_path):
+    compiler = require_program("g++", "clang++")
+    folder = exported.library.parent
+    main = tmp_path / "main.cpp"
+    main.write_text(
+        """#include "organ_unreal.h"
+        #include <cstdio>
+        int main() {
+          OrganBody body; int32_t flags;
+          OrganBodyVector f = body.Force({0.3, 0.4, 0.5}, flags);
+          OrganBodyVector g = body.Step({0.3, 0.4, 0.5}, 0.0, flags);
+          std::printf("%.17g %.17g %.17g %.17g", f.X, f.Y, f.Z, g.Z);
+        }""",
+        "utf-8",
+    )
+    program = tmp_path / "unreal"
+    command = [
+        compiler,
+        "-Wall",
+        "-Werror",
+        f"-I{folder}",
+        str(main),
+        str(exported.library),
+        "-o",
+        str(program),
+    ]
+    subprocess.run(command, check=True, capture_output=True)
+    done = subprocess.run(
+        [program], capture_output=True, text=True, check=True, env={"LD_LIBRARY_PATH": str(folder)}
+    )
+    x, y, z, stepped = map(float, done.stdout.split())
+    force = body("relaxation").energy.force(np.array([[0.003, -0.004, 0.005]]))[0]
+    np.testing.assert_allclose([x, -y, z], force, rtol=1e-12)
+    assert stepped == pytest.approx(z, rel=1e-9)

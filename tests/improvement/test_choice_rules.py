@@ -125,6 +125,17 @@ def test_nothing_is_chosen_beside_a_solve_that_failed(model):
     assert again == [first[1]]
 
 
+def test_errors_count_where_a_hand_goes(model):
+    """With weight at one place alone, its own solve and those beside it are worth most."""
+    X = candidates(10)
+    groups = [np.array([i]) for i in range(10)]
+    for place in (2, 7):
+        picks = choose_by_variance(
+            model, X, groups, np.ones(10), 1, taken=X[:0], interest=np.eye(10)[place], farthest_every=0
+        )
+        assert picks == [place]
+
+
 def test_one_pick_in_four_is_the_farthest(model):
     X = candidates(12)
     groups = [np.array([i]) for i in range(12)]

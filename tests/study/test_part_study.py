@@ -320,7 +320,9 @@ def test_a_part_goes_the_whole_way(folder, tmp_path):
     assert "Solid of pad.stl" in page
     assert "fixed at table" in page
     again = list(improve_study(study, paths, **wanted))
-    assert [step.phase for step in again] == ["learnt", "ended"], "nothing is solved or learnt again"
+    assert [step.phase for step in again] == ["learnt", "judged", "ended"], (
+        "nothing is solved or learnt again"
+    )
     assert again[-1].error == last.error
     assert (tmp_path / "pad-12.palpate").is_file()
     with pytest.raises(StudyError, match="no such key"):

@@ -123,7 +123,7 @@ def improve_and_print(
         **options,
     ):
         last = step
-        if step.phase == "learnt":
+        if step.phase in {"learnt", "judged"}:
             console.say(step_line(step))
             if step.unseen:
                 steps.append({"solves": step.solves, "force_p95": step.error, "seconds": step.seconds})
@@ -137,7 +137,7 @@ def step_line(step: Any) -> str:
     """Return the figures of an `ImprovementStep` as a line."""
     if not step.unseen or math.isnan(step.error):
         return f"{count(step.solves, 'solve')}: a first surrogate, not judged yet, after {duration(step.seconds)}"
-    kept = "" if step.is_new else "; the surrogate before is better and stays"
+    kept = "" if step.is_new or step.phase == "judged" else "; the surrogate before is better and stays"
     return (
         f"{step.solves} solves: force error {share(step.median)} at the median, {share(step.error)} at the 95th "
         f"percentile of {count(step.unseen, 'unseen solve')}, after {duration(step.seconds)}{kept}"

@@ -169,7 +169,7 @@ class TouchedPart:
 
     def _step(self, figures: dict[str, Any]) -> None:
         step = SimpleNamespace(**figures)
-        if step.phase == "learnt":
+        if step.phase in {"learnt", "judged"}:
             self.console.say(step_line(step))
         places = np.array(step.places, dtype=float).reshape(-1, 3)
         self._show(solves=step.solves, error_median=step.median, error_p95=step.error, places=places)

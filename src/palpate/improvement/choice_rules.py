@@ -119,6 +119,7 @@ def choose_by_variance(
     *,
     taken: np.ndarray,
     failed: np.ndarray | None = None,
+    interest: np.ndarray | None = None,
     farthest_every: int = FARTHEST_EVERY,
     largest: bool = False,
 ) -> list[int]:
@@ -141,6 +142,8 @@ def choose_by_variance(
     failed : (F, n) array, optional
         Inputs in contact whose solves failed. They count as if they had answered, so that no others are chosen beside
         them.
+    interest : (C,) array, optional
+        Weight of the squared error at each candidate; by default all count the same.
     farthest_every : int
         One pick in so many is the farthest; 0 for none.
     largest : bool
@@ -150,6 +153,8 @@ def choose_by_variance(
     places = X if failed is None else np.concatenate([X, failed])
     maps = model.error_maps(places)
     maps[len(X) :] = 0.0
+    if interest is not None:
+        maps[: len(X)] *= np.sqrt(np.maximum(interest, 0.0))[:, None, None]
     state = VarianceChoice.of(model.process, model.scaled(places), maps, model.weights(places))
     if len(places) > len(X):
         state.condition(np.arange(len(X), len(places)))

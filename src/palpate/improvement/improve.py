@@ -51,6 +51,9 @@ UNSEEN_FIRST, UNSEEN_EACH = 8, 2  # unseen solves at the first judgement, and wi
 Learner = Callable[[Dataset, float], tuple[Surrogate, Any]]
 """From solves and an effort to a surrogate and the record of its learning."""
 
+Interest = Callable[[np.ndarray], np.ndarray]
+"""From inputs (C, n) of places to how much an error at each of them counts, (C,)."""
+
 Log = Callable[[str], None]
 
 
@@ -60,8 +63,9 @@ class ImprovementStep:
 
     Attributes
     ----------
-    phase : {"solved", "learnt", "ended"}
-        A batch was solved; a surrogate was learnt and judged; or nothing more will come.
+    phase : {"solved", "learnt", "judged", "ended"}
+        A batch was solved; a surrogate was learnt, the first one (or that of an earlier run) before it is judged; the
+        first one was judged; or nothing more will come.
     solves, unseen : int
         Converged solves to learn from, and those to judge by.
     error, median : float
@@ -116,6 +120,7 @@ def improve(
     most: int = 400,
     unseen: int | np.ndarray = 40,
     rule: str = "variance",
+    interest: Interest | None = None,
     seed: int = 0,
     batch: int | None = None,
     path: Path | str | None = None,
@@ -145,6 +150,9 @@ def improve(
         which they are solved.
     rule : {"variance", "disagreement", "farthest", "sobol"}
         How the next solves are chosen.
+    interest : callable, optional
+        From inputs (C, n) of places to weights (C,) of at least zero: how much an error at each of them counts, such as
+        where a hand goes. It is asked anew for each batch; by default all places count the same.
     seed : int
         Decides the first places and the candidates.
     batch : int, optional
@@ -203,6 +211,7 @@ def improve(
             np.asarray(unseen, dtype=float),
             stop,
             rule,
+            interest,
             seed,
             size,
             learner or partial(_learn, workers=workers, log=log),
@@ -238,6 +247,7 @@ class _Improvement:
     unseen: np.ndarray
     stop: StopRule
     rule: str
+    interest: Interest | None
     seed: int
     size: int
     learner: Learner
@@ -260,11 +270,11 @@ class _Improvement:
             self._take(known)
         else:
             self._learn(QUICK)
-            yield self._step("learnt", is_new=True)  # a hand can feel it before it is judged
+        yield self._step("learnt", is_new=True)  # a hand can feel it before it is judged
         self._judge_by(max(UNSEEN_FIRST, len(self.judging)))
         error = self._error(self.best)
         self.errors.append(error)
-        yield self._step("learnt", is_new=known is not None)
+        yield self._step("judged")
         while not (reason := self._reason()):
             below = self.errors[-1] <= self.stop.until
             self._solve_batch()
@@ -340,7 +350,16 @@ class _Improvement:
         if self.rule == "disagreement":
             return choose_by_disagreement(model, X, self.size)
         costs = np.array([1.0 + FOLLOWS * (len(g) - 1) for g in groups])
-        return choose_by_variance(model, X, groups, costs, self.size, taken=taken, failed=self._failed(model))
+        return choose_by_variance(
+            model,
+            X,
+            groups,
+            costs,
+            self.size,
+            taken=taken,
+            failed=self._failed(model),
+            interest=None if self.interest is None else self.interest(X),
+        )
 
     def _failed(self, model: ForceModel) -> np.ndarray:
         """Return the inputs of solves that failed: nothing is to be chosen beside them."""

@@ -10,6 +10,7 @@ from typing import Any
 from palpate.dataset import Dataset
 from palpate.errors import FileFormatError, UsageError
 from palpate.improvement import ImprovementStep, improve
+from palpate.improvement.improve import Interest
 from palpate.processes import CASE_LIMIT
 from palpate.study.run import (
     Log,
@@ -40,6 +41,7 @@ def improve_study(
     limit: float = float("inf"),
     most: int = MOST,
     cluster: Any = None,
+    interest: Interest | None = None,
     progress: Any = True,
     case_limit: float = CASE_LIMIT,
     log: Log = lambda _: None,
@@ -64,6 +66,8 @@ def improve_study(
         Solves to learn from after which no further batch begins.
     cluster : optional
         A running `local_cluster`, or what else `palpate.sweep` takes.
+    interest : callable, optional
+        From inputs (C, n) of places to how much an error there counts, (C,), such as where a hand goes.
     progress : bool or callable
         Of each batch: a bar on standard error, or a function (done, total).
     case_limit : float
@@ -99,6 +103,7 @@ def improve_study(
         known=_known(paths, finished),
         workers=study.sweep.workers,
         cluster=cluster if cluster is not None else study.sweep.scheduler,
+        interest=interest,
         progress=progress,
         case_limit=case_limit,
         log=log,

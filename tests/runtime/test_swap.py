@@ -14,6 +14,7 @@ from models import spring_beam
 from palpate.errors import UsageError
 from palpate.runtime.devices.device import Sample, Traits
 from palpate.runtime.devices.simulated import SimulatedHand, SimulatedSettings
+from palpate.runtime.handover import hand_over, prepared, take
 from palpate.runtime.loop import Loop
 from palpate.runtime.recorder import TraceRecorder
 from palpate.runtime.recording import Ring, TickRecorder
@@ -401,3 +402,21 @@ def test_a_recording_that_is_wanted_during_a_blend_begins_after_it(tmp_path):
     assert trace.ticks["tick"][0] > swap.ended - 1
     assert not trace.flag("blending").any()
     assert Replay(trace, touch.body).run().identical
+
+
+@pytest.mark.parametrize("name", [*BODIES, "pad", "rod"])
+def test_a_body_that_is_handed_over_in_memory_answers_with_the_same_bits(name):
+    body = touchable(
+        {"pad": held.pad, "rod": held.yielding_rod}[name]() if name not in BODIES else BODIES[name](1.0)
+    )
+    other = take(hand_over(prepared(body)))
+    felt = len(body.energy.baseline.directions)
+    answers = [one.evaluator() for one in (body, other)]
+    for x in body.trained_inputs[:20]:
+        place, parameters = x[:felt] @ body.energy.baseline.directions, np.ascontiguousarray(x[felt:])
+        for answer in answers:
+            answer.elapsed = 1e-3
+            answer(place.copy(), parameters)
+        np.testing.assert_array_equal(answers[0].force, answers[1].force)
+    assert (other.stiffness_max, other.name) == (body.stiffness_max, body.name)
+    np.testing.assert_array_equal(other.away, body.away)

@@ -21,14 +21,17 @@ from typing import Any, Self, TypeVar
 
 from palpate import errors
 from palpate.errors import DeviceError, UsageError
+from palpate.network import shared_memory
 from palpate.network.kinds import outside_modules
 from palpate.processes import helper_environment
 from palpate.runtime.devices import device_traits
+from palpate.runtime.handover import hand_over, prepared
 from palpate.runtime.loop_report import LoopReport
 from palpate.runtime.recorder import TraceRecorder, model_facts
 from palpate.runtime.recording import Ring
 from palpate.runtime.shared_state import Shared, State, now
 from palpate.runtime.swap import SECONDS, SHORTEST
+from palpate.runtime.touchable import load_touchable
 
 __all__ = ["LoopProcess"]
 
@@ -161,9 +164,9 @@ class LoopProcess:
     def swap(self, model: str | os.PathLike[str], *, seconds: float = SECONDS) -> int:
         """Put another surrogate of the touched body in the place of the one in the hand, while the loop ticks.
 
-        It is read and made ready beside the loop. Then the two are blended, so that the force has no jump; what the
-        body remembers of its touch is handed on, and what the blend adds to its energy is booked. The workspace stays.
-        Returns as the blend begins; another call waits until it has ended.
+        It is read here, and handed to the loop ready to answer. Then the two are blended, so that the force has no
+        jump; what the body remembers of its touch is handed on, and what the blend adds to its energy is booked. The
+        workspace stays. Returns as the blend begins; another call waits until it has ended.
 
         Parameters
         ----------
@@ -196,10 +199,16 @@ class LoopProcess:
                 fix="Start the loop without a replay.",
             )
         with self._swapping:
+            body = prepared(load_touchable(model))
+            facts = model_facts(Path(model).absolute())
             self._wishes += 1
-            wish = {"swap": self._wishes, "model": str(Path(model).absolute()), "seconds": seconds}
-            self._write(json.dumps(wish) + "\n")
-            answer = self._answer_to(self._wishes)
+            shared = hand_over(body)
+            wish = {"swap": self._wishes, "shared": shared, "model": facts, "seconds": seconds}
+            try:
+                self._write(json.dumps(wish) + "\n")
+                answer = self._answer_to(self._wishes)
+            finally:
+                shared_memory.remove(shared)  # where the loop has not taken it
         if refused := answer.get("refused"):
             kind = getattr(errors, refused["kind"], UsageError)
             raise kind(refused["what"], why=refused["why"], fix=refused["fix"])

@@ -1,8 +1,8 @@
-"""The loop's side of a swap: a thread that reads the new surrogate and makes all ready, beside the ticking loop.
+"""The loop's side of a swap: a thread that takes the new surrogate and makes all ready, beside the ticking loop.
 
-What takes long (the file, the checks, the largest stiffness, where memories take over from) is done in this thread. The
-loop only finds the finished swap and begins it with its next tick. The kernels are those that it has compiled already,
-because another kind of body is refused.
+Whoever asks has read and prepared it (`handover`); what is left (the checks, the evaluators, where memories take over
+from) is done in this thread. The loop only finds the finished swap and begins it with its next tick. The kernels are
+those that it has compiled already, because another kind of body is refused.
 
 The interpreter's lock is what the two share. While the thread works it is asked for every 0.1 ms and not every 5 ms;
 and where the loop has real-time scheduling the thread has it too, one step below, since a thread that holds the lock
@@ -17,19 +17,18 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from palpate.errors import FileFormatError, PalpateError
 from palpate.runtime.blending import compile_blend
+from palpate.runtime.handover import take
 from palpate.runtime.loop import Loop
 from palpate.runtime.realtime import obtain_beside
-from palpate.runtime.recorder import model_facts
 from palpate.runtime.rehearsal import Rehearsal
 from palpate.runtime.replay import loop_facts
 from palpate.runtime.safety import Limits
 from palpate.runtime.swap import Swap, swap_between
-from palpate.runtime.touchable import Touchable, load_touchable
+from palpate.runtime.touchable import Touchable
 
 __all__ = ["SwapDesk"]
 
@@ -51,7 +50,7 @@ class SwapDesk:
         self._wishes: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
 
     def ask(self, line: str) -> None:
-        """Take a wish: JSON with ``swap``, its number, ``model``, a path, and ``seconds``."""
+        """Take a wish: JSON with ``swap``, its number, ``shared``, ``seconds``, and the ``model`` as files know it."""
         self._wishes.put(json.loads(line))
 
     def serve(self, model: Touchable, loop: Loop, limits: Limits, rehearsal: Rehearsal) -> None:
@@ -79,7 +78,7 @@ class SwapDesk:
             usual = sys.getswitchinterval()
             sys.setswitchinterval(_SWITCH)
             try:
-                swap, new, facts = _prepare(wish, model, loop, limits, rehearsal)
+                swap, new = _prepare(wish, model, loop, limits, rehearsal)
             except PalpateError as error:
                 self._refuse(wish, error)
                 continue
@@ -91,7 +90,7 @@ class SwapDesk:
             loop.swap = swap
             while not swap.begun:
                 time.sleep(_LOOK)
-            said = {"begun": swap.begun, "model": facts, "seconds": swap.seconds}
+            said = {"begun": swap.begun, "model": wish["model"], "seconds": swap.seconds}
             self._say({"swap": wish["swap"]} | said)
             while not swap.ended:  # the next wish waits
                 time.sleep(_LOOK)
@@ -105,23 +104,21 @@ class SwapDesk:
 
 def _prepare(
     wish: dict[str, Any], model: Touchable, loop: Loop, limits: Limits, rehearsal: Rehearsal
-) -> tuple[Swap, Touchable, dict[str, str]]:
-    """Return the swap that is wished, the new body, and what identifies its file."""
-    path = Path(wish["model"])
-    new = load_touchable(path)
+) -> tuple[Swap, Touchable]:
+    """Return the swap that is wished, and the new body."""
+    new = take(wish["shared"])
     stiffness = new.stiffness_max if loop.motors else 0.0
     swap = swap_between(model, new, seconds=float(wish["seconds"]), stiffness=stiffness)
-    facts = model_facts(path)
-    said = loop_facts(new, loop, limits) | {"body_stiffness": stiffness, "model": facts}
+    said = loop_facts(new, loop, limits) | {"body_stiffness": stiffness, "model": wish["model"]}
     swap.facts = json.dumps(said, allow_nan=False).encode()
     spare = new.evaluator()
     swap.rehearse = lambda: rehearsal.take(spare)
-    return swap, new, facts
+    return swap, new
 
 
 def _foreign_fault(wish: dict[str, Any], error: Exception) -> FileFormatError:
     return FileFormatError(
-        f"{wish['model']} could not be made ready: {type(error).__name__}: {error}.",
+        f"{wish['model']['file']} could not be made ready: {type(error).__name__}: {error}.",
         why="The body in the hand stays.",
         fix="Learn it again, or take another file.",
     )

@@ -129,15 +129,17 @@ def test_a_part_is_set_up_by_picks_and_texts(server, page, study, chosen, keep):
 
 @pytest.fixture
 def versions(tmp_path: Path) -> list[Path]:
-    """Two surrogates of one slab: the second one moves twice as far, and is surer of its force."""
+    """Surrogates of one slab: the second one moves twice as far, the third one is of another mesh."""
     first = touched_slab()
     field = first.fields["displacement"]
-    fields = {
-        **first.fields,
-        "displacement": dataclasses.replace(field, modes=2 * field.modes, local_mode=None),
-    }
-    second = dataclasses.replace(first, fields=fields)
-    return [first.save(tmp_path / "slab-12.palpate"), second.save(tmp_path / "slab-24.palpate")]
+    twice = dataclasses.replace(field, modes=2 * field.modes, local_mode=None)
+    low = field.points[field.triangles][:, :, 2].max(axis=1) < -0.005
+    other = dataclasses.replace(twice, triangles=field.triangles[~low])
+    bodies = [
+        first,
+        *(dataclasses.replace(first, fields={"displacement": shown}) for shown in (twice, other)),
+    ]
+    return [body.save(tmp_path / f"slab-{i}.palpate") for i, body in enumerate(bodies)]
 
 
 def test_a_part_is_touched_while_it_gets_better(server, page, study, versions, tmp_path, keep):
@@ -176,7 +178,12 @@ def test_a_part_is_touched_while_it_gets_better(server, page, study, versions, t
     assert "improved: 3.1 % → 2.2 %" in page.inner_text("#improved").replace("\N{NO-BREAK SPACE}", " ")
     check_displacement(versions[1], page)
     keep(page, "part-improved")
+    server.show_body(versions[2])
+    page.wait_for_selector("html[data-touching='3']")
+    check_displacement(versions[2], page)
+    keep(page, "part-other-mesh")
     assert page.evaluate("window.mark") == "not reloaded"
+    assert page.inner_text("#model-name") == "pad", "the part's name, whatever the files are called"
     page.mouse.up()
 
     response = page.request.get(server.address + "report")

@@ -84,7 +84,7 @@ class Progress:
     error_median, error_p95 : float
         Relative force error against solves kept apart, of the body shown; not-a-number before the first.
     places : (k, 3) array
-        Centres of the ball in the solves that are done, m.
+        Places of the solves that are done, m: contact points on the surface, or centres of the ball.
     seconds : float
         Time since the start, s.
     report : path, optional
@@ -215,7 +215,8 @@ class PartPage(LocalServer):
         """
         with self._changing:
             centre = None if self._session is None else self._session.model.centre
-            model = PageModel(load_touchable(path), self._version + 1, centre)
+            body = replace(load_touchable(path), name=self.name)
+            model = PageModel(body, self._version + 1, centre)
             if self.loop is None:
                 self._open(model, path)
             else:

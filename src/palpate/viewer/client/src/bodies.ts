@@ -110,11 +110,14 @@ class PressedBody implements Body {
   async renew(hello: Hello): Promise<() => void> {
     const [surface, fields, trust] = await this.load(hello);
     return () => {
-      if (!same(surface.rest, this.surface!.rest) || !same(surface.triangles, this.surface!.triangles)) {
-        location.reload(); // of another mesh: a fresh page is simpler than a changed one
-        return;
-      }
       this.hello = hello;
+      if (!same(surface.rest, this.surface!.rest) || !same(surface.triangles, this.surface!.triangles)) {
+        const before = this.view!; // of another mesh
+        this.view = new PressView(this.canvas, surface, hello, WORDS.map(element), before);
+        before.clear();
+        this.hand.change(this.view);
+        this.mark(this.places);
+      }
       this.take(surface, fields, trust);
       this.draw();
     };

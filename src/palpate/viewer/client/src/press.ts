@@ -49,6 +49,12 @@ export class PressHand extends Hand {
     this.view = view;
   }
 
+  /** Go on in another view of the same body; what is pressed stays pressed. */
+  change(view: PressView): void {
+    this.view = view;
+    view.turnable = !this.grabbed;
+  }
+
   /** The probe sinks to its depth, picture by picture. */
   override tick(): void {
     const now = performance.now();

@@ -74,8 +74,9 @@ export class SurfaceView extends View {
     canvas: HTMLCanvasElement,
     protected readonly surface: Surface,
     words: readonly Element[],
+    before: View | null = null,
   ) {
-    super(canvas, words, STANCE);
+    super(canvas, words, STANCE, before);
     const { rest, triangles } = surface;
     this.position = new BufferAttribute(Float32Array.from(rest), 3);
     this.colour = new BufferAttribute(new Float32Array(rest.length), 3);
@@ -116,6 +117,7 @@ export class SurfaceView extends View {
     this.scene.add(this.plate());
     for (const moving of [this.body, this.wires, this.creases, this.fixed]) moving.frustumCulled = false;
     this.recolour();
+    if (before) return;
     this.resize();
     this.look();
   }

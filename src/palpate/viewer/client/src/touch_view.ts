@@ -28,8 +28,9 @@ export class PressView extends SurfaceView {
     surface: Surface,
     private readonly hello: Hello,
     words: readonly Element[],
+    before: PressView | null = null,
   ) {
-    super(canvas, surface, words);
+    super(canvas, surface, words, before);
     this.arrow = new Arrow(LONG * this.across(), Math.max(hello.force_max, 1e-9), hello.radius);
     this.hover = new Mesh(
       new SphereGeometry(1, 48, 32),

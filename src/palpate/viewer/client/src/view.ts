@@ -4,6 +4,8 @@ import {
   Color,
   DirectionalLight,
   HemisphereLight,
+  LineSegments,
+  Mesh,
   PerspectiveCamera,
   Raycaster,
   Scene,
@@ -27,26 +29,29 @@ export interface Stance {
 
 export abstract class View {
   protected readonly scene = new Scene();
-  protected readonly camera = new PerspectiveCamera(30, 1, 0.01, 100);
+  protected readonly camera: PerspectiveCamera;
   protected readonly controls: OrbitControls;
   protected dirty = true;
   private readonly renderer: WebGLRenderer;
-  private readonly resolution = new Resolution();
+  private readonly resolution: Resolution;
   private readonly caster = new Raycaster();
 
   constructor(
     readonly canvas: HTMLCanvasElement,
     private readonly words: readonly Element[], // that stand in front of the canvas
     private readonly stance: Stance,
+    before: View | null = null, // whose place it takes, on the same canvas and with the same camera
   ) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, stencil: true });
+    this.renderer = before?.renderer ?? new WebGLRenderer({ canvas, antialias: true, alpha: true, stencil: true });
+    this.camera = before?.camera ?? new PerspectiveCamera(30, 1, 0.01, 100);
+    this.resolution = before?.resolution ?? new Resolution();
     const sky = new HemisphereLight(new Color(0xffffff), new Color(0xb9c4cc), stance.sky);
     sky.position.copy(stance.up);
     const sun = new DirectionalLight(0xffffff, stance.sun);
     sun.position.copy(stance.sunFrom);
     this.scene.add(sky, sun);
     this.camera.up.copy(stance.up);
-    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls = before?.controls ?? new OrbitControls(this.camera, canvas);
     canvas.style.cursor = ""; // the controls set one, which would hide the style sheet's
     this.controls.addEventListener("change", () => (this.dirty = true));
   }
@@ -99,8 +104,17 @@ export abstract class View {
     this.dirty = true;
   }
 
-  /** Free what the browser holds for this view, which is not used any more. */
+  /** Free what is drawn; another view has taken the place. */
+  clear(): void {
+    this.scene.traverse((part) => {
+      if (part instanceof Mesh || part instanceof LineSegments) part.geometry.dispose();
+    });
+    this.scene.clear();
+  }
+
+  /** Free all that the browser holds for this view, which is not used any more. */
   dispose(): void {
+    this.clear();
     this.controls.dispose();
     this.renderer.dispose();
     this.renderer.forceContextLoss();

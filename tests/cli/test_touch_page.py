@@ -82,7 +82,7 @@ def test_a_rough_surrogate_comes_first_and_is_replaced(study, tmp_path, monkeypa
     assert work.studies == [("pad-rough", 2, study.interaction.radius), ("pad", 2, study.sweep.element)]
     assert bodies(said) == ["pad-rough.palpate", "pad.palpate", "pad.palpate"]
     assert work.ended == ["pad-rough", "pad"], "the rough study ends with its first surrogate"
-    assert [line["step"]["solves"] for line in said if "step" in line] == [12, 12, 16, 16, 16]
+    assert [line["step"]["solves"] for line in said if "step" in line] == [12, 12, 12, 16, 16, 16]
     assert said[-1]["ended"]["reason"] == "The time is over."
 
 
@@ -97,7 +97,7 @@ def test_the_same_command_goes_on_with_what_there_is(study, tmp_path, monkeypatc
 def test_it_stops_after_the_batch_that_is_solved(study, tmp_path, monkeypatch):
     Improvement(monkeypatch)
     said = carried_out(study, tmp_path, stopped=(tmp_path / "pad.palpate").exists)
-    assert [line["step"]["solves"] for line in said if "step" in line] == [12, 12]
+    assert [line["step"]["solves"] for line in said if "step" in line] == [12, 12, 12]
     assert said[-1]["ended"]["reason"] == "It was stopped."
 
 

@@ -112,10 +112,10 @@ def test_holding_the_button_presses_and_the_numbers_are_the_surrogates(page: Pag
 
 def test_moving_slides_the_probe_at_its_depth(page: Page, slab: Surrogate):
     x, y = middle(page)
-    page.mouse.move(x, y + 10)
+    page.mouse.move(x - 30, y - 5)
     page.mouse.down()
     before = check(slab, stand_still(page, "inside"))
-    page.mouse.move(x + 60, y + 20, steps=5)
+    page.mouse.move(x + 30, y + 5, steps=5)
     after = check(slab, stand_still(page, "inside"))
     assert np.linalg.norm(after[0, :2] - before[0, :2]) > 0.005
     assert after[0, 2] == pytest.approx(before[0, 2], abs=1e-5)

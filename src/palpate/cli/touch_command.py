@@ -78,7 +78,7 @@ def touch(
         notes: list[str] = []
         touch_on_page(
             part.stem,
-            lambda: _study_on_page(part, given, notes, console),
+            lambda other: _study_on_page(part, given | ({"unit": other} if other else {}), notes, console),
             lambda study: _write(part, study, notes),
             TouchedPart(wanted, limit, workers, console),
             at_once=start,
@@ -96,7 +96,7 @@ def _study_on_page(
 ) -> tuple[Study, Path, bool]:
     """Return the study of a part, its file, and whether that was there; a new one is written at the start.
 
-    What the part's file holds is added to `notes`.
+    `notes` becomes what the part's file holds.
     """
     from palpate.study.part_study import part_study, study_file
 
@@ -104,7 +104,7 @@ def _study_on_page(
     if file.exists():
         return _study_of(part, options, console), file, True
     study, held = part_study(part, **_in_si(options))
-    notes += held
+    notes[:] = held
     console.say("\n".join(filter(None, notes)))
     console.say(f"{_chosen(study)} Change it on the page, and press start there.")
     return study, file, False

@@ -23,7 +23,7 @@ from palpate.format import duration
 from palpate.processes import helper_environment, kill_group
 from palpate.study import Study
 from palpate.viewer.part_page import PartPage, Progress
-from palpate.viewer.shown_part import PartChoices
+from palpate.viewer.shown_part import PartChoices, ShownPart
 from palpate.viewer.web_server import wait_until_interrupted
 
 __all__ = ["TouchedPart", "touch_on_page"]
@@ -152,7 +152,8 @@ class TouchedPart:
             )
 
     def _show(self, **changes: Any) -> None:
-        known = vars(self._progress) | {"seconds": time.monotonic() - self._made} | changes
+        began = self._made + self.times.get("start", 0.0)
+        known = vars(self._progress) | {"seconds": time.monotonic() - began} | changes
         self._progress = Progress(**known)
         self.page.show_progress(self._progress)
 
@@ -211,7 +212,7 @@ class TouchedPart:
 
 def touch_on_page(
     name: str,
-    study_of: Callable[[], tuple[Study, Path, bool]],
+    study_of: Callable[[str | None], tuple[Study, Path, bool]],
     write: Callable[[Study], Path],
     touched: TouchedPart,
     *,
@@ -226,7 +227,8 @@ def touch_on_page(
     name : str
         Title of the page.
     study_of : callable
-        Returns the study of the part, its file, and whether that was there before: then the work goes on at once.
+        Gets a unit of the file's numbers, or None at first; returns the study of the part, its file, and whether that
+        was there before: then the work goes on at once.
     write : callable
         Writes a chosen study, and returns its file.
     touched : TouchedPart
@@ -253,9 +255,13 @@ def touch_on_page(
         study = chosen_study(known[0], choices)
         touched.begin(write(study))
 
+    def take_unit(unit: str) -> ShownPart:
+        known[:] = [study_of(unit)[0]]
+        return shown_part(known[0])
+
     def read(page: PartPage) -> None:
         try:
-            study, file, there = study_of()
+            study, file, there = study_of(None)
             known.append(study)
             part = shown_part(study)
             page.show_part(part)
@@ -277,7 +283,7 @@ def touch_on_page(
             touched.console.say(f"{page.url} shows {page.caption} Ctrl-C ends it.")
         threading.Thread(target=read, args=(page,), daemon=True).start()
 
-    touched.page = PartPage(name, on_start=begin, **options)
+    touched.page = PartPage(name, on_start=begin, on_unit=take_unit, **options)
     try:
         wait_until_interrupted(
             touched.page, open_browser=on_ready is None and sys.stdout.isatty(), on_ready=ready

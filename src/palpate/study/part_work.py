@@ -133,6 +133,7 @@ def _first_touch(rough: Study, paths: Paths, cluster: Any, say: Say) -> None:
             if step.phase == "learnt":
                 say({"body": str(step.model_path)})
                 return
+            say({"step": _figures(step)})
     except PalpateError as error:
         say({"log": f"no rough surrogate: {error.what}"})
 

@@ -146,8 +146,6 @@ class PressedBody implements Body {
     this.still = new Float32Array(surface.rest.length);
     this.indentation = new Indentation(surface);
     const first = this.infos.length === 0;
-    // one scale for all versions, so that it is seen how they get better
-    if (trust) trust.high = Math.max(trust.high, this.trust?.high ?? 0);
     this.trust = trust;
     this.infos = [...fields.map((field) => field.info), ...(trust ? [trusted(trust)] : [])];
     const last = Math.max(this.infos.length - 1, 0);

@@ -22,6 +22,7 @@ export class PressView extends SurfaceView {
   readonly grip = new Vector3(); // the probe's centre
 
   private readonly hover: Mesh<SphereGeometry, MeshLambertMaterial>;
+  private nearby: Vector3 | null = null; // m, of the device's centre
 
   constructor(
     canvas: HTMLCanvasElement,
@@ -76,9 +77,22 @@ export class PressView extends SurfaceView {
     return { point: hit.point.toArray() as Vec3, normal: normal.toArray() as Vec3, touchable };
   }
 
-  /** Where a point in body coordinates (m) is on the canvas, CSS pixels. */
-  middle(point: Vec3): Vector2 {
-    return this.project(new Vector3(...point));
+  /** Where the touchable point at rest that is nearest to a ball's centre (m) is on the canvas, CSS pixels. */
+  middle(centre: Vec3): Vector2 {
+    return this.project((this.nearby ??= this.touchableNear(new Vector3(...centre))));
+  }
+
+  private touchableNear(centre: Vector3): Vector3 {
+    const { rest, triangles, touchable } = this.surface;
+    let [best, least] = [centre, Infinity];
+    touchable.forEach((yes, t) => {
+      if (!yes) return;
+      const middle = new Vector3();
+      for (let k = 0; k < 3; k++) middle.add(new Vector3().fromArray(rest, 3 * triangles[3 * t + k]!));
+      const far = middle.divideScalar(3).distanceTo(centre);
+      if (far < least) [best, least] = [middle, far];
+    });
+    return best;
   }
 
   override recolour(): void {

@@ -14,6 +14,7 @@ import typer
 
 from palpate.cli.console import Console, advice_in_words
 from palpate.cli.device_commands import devices_app
+from palpate.cli.exchange_commands import card, export_dataset
 from palpate.cli.export_commands import export_app
 from palpate.cli.material_commands import material_app
 from palpate.cli.sweep_command import sweep
@@ -344,6 +345,8 @@ app.command()(replay)
 app.command()(touch)
 app.command()(fit)
 app.command()(correct)
+app.command()(card)
+dataset_app.command("export")(export_dataset)
 
 
 @dataset_app.command("import")

@@ -6,6 +6,7 @@
     schema.py    Field, Layout: the quantities that a solver answers, and the nodes that they belong to
     assemble.py  inputs and answers, labelled and joined into a dataset
     store.py     a dataset on disk, with a checksum
+    dataset_tables.py  the same as CSV, Parquet and netCDF, for other tools
     measured/    forces measured on a specimen: text tables, and lines from a sensor
 """
 

@@ -11,6 +11,8 @@ c_export        `palpate export c`: write, compile and compare
 lib_export      `palpate export lib`: a shared library, with wrappers whose texts are lib_templates
 check_library   a library that answers through its Python wrapper
 core            the C sources
+gltf            a deforming surface as glTF with morph targets
+shape_files     shapes of datasets and of learnt bodies, as VTU series and glTF
 """
 
 from palpate.export.c_export import ExportedC, export_c

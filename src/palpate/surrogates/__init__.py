@@ -3,6 +3,7 @@
 ::
 
     surrogate            the learnt body as one value, with its file
+    model_card           what a file was made from, by whom, how good it is, where it ends
     energy               the energy that a hand feels: force, stiffness, trust
     baselines            what of the energy is known beforehand, one file for each kind of interaction
     contact_law          how a contact begins

@@ -22,6 +22,7 @@ from palpate.network.codec import load_value, save_value
 from palpate.surrogates.energy import LearntEnergy
 from palpate.surrogates.fields import FieldSurrogate, NodeField
 from palpate.surrogates.memories import Memory, Patches
+from palpate.surrogates.model_card import ModelCard, card_of
 from palpate.surrogates.moving_rest import Followed, follow
 from palpate.units import Range, bounds
 
@@ -199,6 +200,21 @@ class Surrogate:
         depth = (deepest if np.isfinite(deepest) else float(s.max())) / 2.0
         near = int(np.argmin(np.abs(s - depth)))
         return depth, float(self.energy.energy(X[near : near + 1])[0])
+
+    def card(self, file: str | os.PathLike[str] | None = None) -> ModelCard:
+        """Return the model card: what it was made from, by whom, its errors, limits and hashes.
+
+        Parameters
+        ----------
+        file : path, optional
+            Its file, whose hash goes into the card.
+        """
+        return card_of(self, file)
+
+    def signed(self, author: str = "", licence: str = "") -> Surrogate:
+        """Return the same body whose card names an author and a licence, such as ``CC-BY-4.0``; "" changes nothing."""
+        stated = {k: v for k, v in (("author", author), ("licence", licence)) if v}
+        return replace(self, meta={**self.meta, "card": {**self.meta.get("card", {}), **stated}})
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write all of it to one file.

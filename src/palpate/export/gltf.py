@@ -1,0 +1,255 @@
+"""glTF 2.0: a deforming surface as one binary file (GLB) that every viewer, browser and office program shows.
+
+Each step of a stroke is a *morph target*: what it adds to the positions and to the normals at rest. An animation of the
+targets' weights plays the stroke, evenly between the steps. Lengths are in m, and y is up, as the format asks:
+(x, y, z) of palpate becomes (x, z, −y). The specification is Khronos Group (2021), glTF 2.0, ISO/IEC 12113:2022.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.files import write_file
+
+__all__ = ["MOST_TARGETS", "ShapeSeries", "glb_bytes", "write_glb"]
+
+MOST_TARGETS = 8  # as many as the weakest viewers show
+_FLOAT, _UNSIGNED = 5126, 5125
+_VERTICES, _INDICES = 34962, 34963
+_MAGIC, _JSON, _BINARY = 0x46546C67, 0x4E4F534A, 0x004E4942
+_COLOUR = (0.80, 0.45, 0.40, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeSeries:
+    """A surface, or a line of nodes, in several states.
+
+    Attributes
+    ----------
+    points : (P, 3) array
+        Nodes at rest in m, z up.
+    cells : (T, 3) or (T, 2) int array
+        Triangles, counter-clockwise seen from outside, or the pieces of a line.
+    displacement : (k, P, 3) array
+        Displacement of the nodes in each state, m.
+    values : (k,) array
+        Time in s, or load, of each state, ascending.
+    fields : mapping of name to (k, P) array
+        Further fields in each state, for VTU files.
+    name : str
+        Name of the body.
+    """
+
+    points: np.ndarray
+    cells: np.ndarray
+    displacement: np.ndarray
+    values: np.ndarray
+    name: str = "body"
+    fields: dict[str, np.ndarray] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        points, states = np.asarray(self.points, dtype=float), np.asarray(self.displacement, dtype=float)
+        cells = np.asarray(self.cells, dtype=np.int64)
+        good = (
+            points.ndim == 2
+            and points.shape[1] == 3
+            and states.ndim == 3
+            and states.shape[1:] == points.shape
+        )
+        if not good or len(states) != len(self.values) or not len(states) or not np.isfinite(states).all():
+            raise UsageError(
+                f"Points {points.shape} and displacements {states.shape} with {len(self.values)} values are no series.",
+                why="There are points (P, 3), finite displacements (k, P, 3) and k values.",
+                fix="Leave out states that did not converge.",
+            )
+        if cells.ndim != 2 or cells.shape[1] not in {2, 3} or (cells.size and cells.max() >= len(points)):
+            raise UsageError("The cells are no triangles or pieces of a line of these points.")
+        for name, value in (("points", points), ("displacement", states), ("cells", cells)):
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "values", np.asarray(self.values, dtype=float))
+
+    def thinned(self, most: int) -> ShapeSeries:
+        """Return the series with at most so many states, the first and the last among them."""
+        kept = np.unique(
+            np.linspace(0, len(self.values) - 1, min(most, len(self.values))).round().astype(int)
+        )
+        fields = {name: values[kept] for name, values in self.fields.items()}
+        return ShapeSeries(
+            self.points, self.cells, self.displacement[kept], self.values[kept], self.name, fields
+        )
+
+
+def write_glb(
+    series: ShapeSeries,
+    path: str | os.PathLike[str],
+    *,
+    targets: int = MOST_TARGETS,
+    seconds: float = 2.0,
+    card: dict[str, Any] | None = None,
+) -> Path:
+    """Write a series of shapes as GLB and return its path.
+
+    Parameters
+    ----------
+    series : ShapeSeries
+        Rest and states.
+    path : path
+        File, ending in ``.glb``.
+    targets : int
+        Most states that become morph targets; a longer series is thinned, since some viewers show no more than eight.
+    seconds : float
+        Duration of the stroke; it goes on to the last state and back.
+    card : mapping, optional
+        Model card for the file's `extras`.
+
+    Raises
+    ------
+    UsageError
+        For another ending.
+    """
+    target = Path(path)
+    if target.suffix.lower() != ".glb":
+        raise UsageError(
+            f"The file {target} doesn't end in .glb.",
+            why="Viewers tell the format by the name.",
+            fix=f"Write to {target.with_suffix('.glb').name}.",
+        )
+    return write_file(target, glb_bytes(series, targets=targets, seconds=seconds, card=card))
+
+
+def glb_bytes(
+    series: ShapeSeries,
+    *,
+    targets: int = MOST_TARGETS,
+    seconds: float = 2.0,
+    card: dict[str, Any] | None = None,
+) -> bytes:
+    """Return the bytes of a GLB file; the parameters are those of `write_glb`."""
+    if targets < 1 or not seconds > 0:
+        raise UsageError(
+            f"{targets} targets over {seconds:g} s make no stroke.", fix="Give 1 or more, over 2 s."
+        )
+    series = series.thinned(targets)
+    buffer = _Buffer()
+    rest, moved = _turned(series.points), _turned(series.displacement)
+    surface = series.cells.shape[1] == 3
+    attributes = {"POSITION": buffer.add(rest, "VEC3", _VERTICES, ends=True)}
+    shapes = [{"POSITION": buffer.add(move, "VEC3", _VERTICES, ends=True)} for move in moved]
+    if surface:
+        normals = _normals(rest, series.cells)
+        attributes["NORMAL"] = buffer.add(normals, "VEC3", _VERTICES)
+        for shape, move in zip(shapes, moved, strict=True):
+            shape["NORMAL"] = buffer.add(_normals(rest + move, series.cells) - normals, "VEC3", _VERTICES)
+    primitive = {
+        "attributes": attributes,
+        "indices": buffer.add(series.cells.ravel(), "SCALAR", _INDICES),
+        "mode": 4 if surface else 1,
+        "material": 0,
+        "targets": shapes,
+    }
+    times, weights = _keyframes(len(moved), seconds)
+    sampler = {
+        "input": buffer.add(times, "SCALAR", None, ends=True),
+        "output": buffer.add(weights.ravel(), "SCALAR", None),
+        "interpolation": "LINEAR",
+    }
+    scene = _scene(series, primitive, sampler)
+    scene |= {
+        "accessors": buffer.accessors,
+        "bufferViews": buffer.views,
+        "buffers": [{"byteLength": len(buffer.data)}],
+    }
+    if card:
+        scene["extras"] = {"model card": card}
+    return _packed(scene, bytes(buffer.data))
+
+
+def _scene(series: ShapeSeries, primitive: dict[str, Any], sampler: dict[str, Any]) -> dict[str, Any]:
+    """Return the scene: one node with one mesh, whose weights one animation moves."""
+    mesh = {
+        "name": series.name,
+        "primitives": [primitive],
+        "weights": [0.0] * len(series.values),
+        "extras": {"targetNames": [f"{value:.6g}" for value in series.values]},
+    }
+    look = {"baseColorFactor": _COLOUR, "metallicFactor": 0.0, "roughnessFactor": 0.7}
+    channel = {"sampler": 0, "target": {"node": 0, "path": "weights"}}
+    return {
+        "asset": {"version": "2.0", "generator": "palpate"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0, "name": series.name}],
+        "meshes": [mesh],
+        "materials": [{"pbrMetallicRoughness": look, "doubleSided": True}],
+        "animations": [{"name": "stroke", "samplers": [sampler], "channels": [channel]}],
+    }
+
+
+def _turned(vectors: np.ndarray) -> np.ndarray:
+    """Return vectors (..., 3) with y up: (x, z, −y)."""
+    return np.stack([vectors[..., 0], vectors[..., 2], -vectors[..., 1]], axis=-1)
+
+
+def _normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Return unit normals (P, 3) at the nodes, weighted by area; up where no triangle is."""
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    faces = np.cross(b - a, c - a)
+    sums = np.zeros_like(points)
+    for k in range(3):
+        np.add.at(sums, triangles[:, k], faces)
+    length = np.linalg.norm(sums, axis=1, keepdims=True)
+    return np.where(length > 0, sums / np.where(length > 0, length, 1.0), [0.0, 1.0, 0.0])
+
+
+def _keyframes(count: int, seconds: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return times (2k + 1,) and weights (2k + 1, k): from rest over the states to the last one, and back."""
+    there = np.vstack([np.zeros(count), np.eye(count)])
+    weights = np.vstack([there, there[-2::-1]])
+    return np.linspace(0.0, seconds, len(weights)), weights
+
+
+class _Buffer:
+    """The binary part, and how the scene finds its way in it."""
+
+    def __init__(self) -> None:
+        self.data = bytearray()
+        self.views: list[dict[str, Any]] = []
+        self.accessors: list[dict[str, Any]] = []
+
+    def add(self, values: np.ndarray, kind: str, purpose: int | None, *, ends: bool = False) -> int:
+        """Append an array and return the number of its accessor; `ends` states least and largest values."""
+        whole = values.dtype.kind in "iu"
+        stored = np.ascontiguousarray(values, dtype="<u4" if whole else "<f4")
+        view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": stored.nbytes}
+        self.views.append(view if purpose is None else {**view, "target": purpose})
+        accessor: dict[str, Any] = {
+            "bufferView": len(self.views) - 1,
+            "componentType": _UNSIGNED if whole else _FLOAT,
+            "count": len(stored),
+            "type": kind,
+        }
+        if ends:
+            rows = stored.reshape(len(stored), -1)
+            accessor |= {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
+        self.accessors.append(accessor)
+        self.data += stored.tobytes()
+        return len(self.accessors) - 1
+
+
+def _packed(scene: dict[str, Any], binary: bytes) -> bytes:
+    """Return the file: its head, the scene as JSON, the binary part; each in multiples of four bytes."""
+    text = json.dumps(scene, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    binary += b"\0" * (-len(binary) % 4)
+    parts: Sequence[tuple[int, bytes]] = ((_JSON, text), (_BINARY, binary))
+    body = b"".join(struct.pack("<II", len(part), kind) + part for kind, part in parts)
+    return struct.pack("<III", _MAGIC, 2, 12 + len(body)) + body

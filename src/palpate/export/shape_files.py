@@ -1,0 +1,176 @@
+"""Shapes for pictures: the states of a dataset or of a learnt body's stroke, as VTU series and as glTF."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+from palpate.dataset import Dataset
+from palpate.errors import UsageError
+from palpate.export.gltf import MOST_TARGETS, ShapeSeries, write_glb
+from palpate.files import writing, writing_folder
+
+__all__ = ["SHAPES", "series_of_dataset", "series_of_surrogate", "write_shapes", "write_vtu_series"]
+
+SHAPES = (".pvd", ".vtu", ".glb")
+"""Ends of the names of files that hold shapes."""
+
+
+def write_shapes(
+    series: ShapeSeries,
+    path: str | os.PathLike[str],
+    *,
+    targets: int = MOST_TARGETS,
+    card: dict[str, Any] | None = None,
+) -> Path:
+    """Write shapes; the ending decides: .pvd (VTU files for ParaView), .vtu (the last state alone), or .glb.
+
+    Parameters
+    ----------
+    series : ShapeSeries
+        Rest and states.
+    path : path
+        File to write.
+    targets : int
+        Most morph targets of a GLB file.
+    card : mapping, optional
+        Model card, for a GLB file.
+
+    Raises
+    ------
+    UsageError
+        For another ending.
+    """
+    ending = Path(path).suffix.lower()
+    if ending == ".glb":
+        return write_glb(series, path, targets=targets, card=card)
+    if ending == ".pvd":
+        return write_vtu_series(series, path)
+    if ending == ".vtu":
+        _write_state(series, len(series.values) - 1, Path(path))
+        return Path(path)
+    raise UsageError(
+        f"{path} names no file of shapes.",
+        why=f"The ending {ending or 'none'!r} is none of {', '.join(SHAPES)}.",
+        fix="End the name in .pvd, .vtu or .glb.",
+    )
+
+
+def write_vtu_series(series: ShapeSeries, path: str | os.PathLike[str]) -> Path:
+    """Write a PVD file, which ParaView plays, and a folder of VTU files beside it; rest comes first.
+
+    Points are those at rest in m, z up; point data are ``displacement`` (m) and the series' other fields, in SI units.
+    """
+    target = Path(path)
+    folder = target.with_suffix("")
+    collection = ElementTree.Element("VTKFile", type="Collection", version="0.1")
+    entries = ElementTree.SubElement(collection, "Collection")
+    with writing_folder(folder) as part:
+        part.mkdir(parents=True, exist_ok=True)
+        for step, value in enumerate(series.values.tolist()):
+            name = f"{step:04d}.vtu"
+            _write_state(series, step, part / name)
+            entry = {"timestep": f"{value:.17g}", "group": "", "part": "0", "file": f"{folder.name}/{name}"}
+            ElementTree.SubElement(entries, "DataSet", entry)
+    with writing(target) as part:
+        ElementTree.ElementTree(collection).write(part, encoding="utf-8", xml_declaration=True)
+    return target
+
+
+def _write_state(series: ShapeSeries, step: int, path: Path) -> None:
+    import meshio
+
+    kind = "triangle" if series.cells.shape[1] == 3 else "line"
+    data = {"displacement": series.displacement[step]}
+    data |= {name: values[step] for name, values in series.fields.items()}
+    grid = meshio.Mesh(series.points, [(kind, series.cells)], point_data=data)
+    with writing(path) as part:
+        meshio.vtu.write(part, grid, header_type="UInt64")
+
+
+def series_of_dataset(data: Dataset, rows: Sequence[int] | None = None, name: str = "body") -> ShapeSeries:
+    """Return the shapes of a dataset's solves, numbered by their rows.
+
+    Parameters
+    ----------
+    data : Dataset
+        Solves with a displacement; those that did not converge are left out.
+    rows : sequence of int, optional
+        Rows, in their order; by default all.
+    name : str
+        Name of the body.
+
+    Raises
+    ------
+    UsageError
+        If the dataset has no displacement, or nothing of the rows converged.
+    """
+    if "displacement" not in data:
+        raise UsageError(
+            "The dataset has no displacement.", fix="Export it as a table: .csv, .parquet or .nc."
+        )
+    count = len(data)
+    wanted = np.arange(count) if rows is None else np.asarray(rows, dtype=np.int64)
+    if wanted.size and not (wanted.min() >= 0 and wanted.max() < count):
+        raise UsageError(f"The dataset has {count} rows, counted from 0.", fix="Choose among these.")
+    kept = wanted[data.converged[wanted]] if wanted.size else wanted
+    if not kept.size:
+        raise UsageError("None of these solves converged.", fix="Choose other rows.")
+    flat = data.rest.shape[1] == 2  # a beam: its third component is a rotation
+    u = data.displacement[kept]
+    points, u = (_upright(data.rest), _upright(u[..., :2])) if flat else (data.rest, u)
+    cells = _pieces(data.rest[:, 0]) if "triangles" not in data else data.triangles
+    fields = {"von Mises stress": data["von_mises"][kept]} if "von_mises" in data else {}
+    order = np.arange(len(kept), dtype=float) if rows is not None else kept.astype(float)
+    return ShapeSeries(points, cells, u, order, name, fields)
+
+
+def series_of_surrogate(surrogate: Any, X: np.ndarray) -> ShapeSeries:
+    """Return the shapes of a learnt body at inputs X (k, n), numbered from 1.
+
+    Parameters
+    ----------
+    surrogate : Surrogate
+        A body that was learnt with its displacement.
+    X : (k, n) array
+        Inputs of the states, such as those of a stroke.
+
+    Raises
+    ------
+    UsageError
+        If it has no displacement.
+    """
+    shown = surrogate.fields.get("displacement")
+    if shown is None:
+        raise UsageError(
+            f"The body {surrogate.name!r} has no shape.",
+            why="It was learnt without its displacement.",
+            fix="Learn it with shape=True.",
+        )
+    u, points = np.asarray(shown.values(X)), np.asarray(shown.points)
+    triangles = getattr(shown, "triangles", None)
+    if triangles is None:
+        cells = _pieces(points[:, 0])
+        points, u = _upright(points[:, :2]), _upright(u[..., :2])
+    else:
+        cells = np.asarray(triangles)
+    fields = {}
+    if (stress := surrogate.fields.get("von_mises")) is not None:
+        fields["von Mises stress"] = np.asarray(stress.values(X))[..., 0]
+    return ShapeSeries(points, cells, u, np.arange(1.0, len(u) + 1), surrogate.name, fields)
+
+
+def _upright(flat: np.ndarray) -> np.ndarray:
+    """Return plane vectors (..., 2), y up, in space with z up."""
+    return np.stack([flat[..., 0], np.zeros_like(flat[..., 0]), flat[..., 1]], axis=-1)
+
+
+def _pieces(along: np.ndarray) -> np.ndarray:
+    """Return the pieces (T, 2) of a line between neighbouring nodes."""
+    order = np.argsort(along, kind="stable")
+    return np.stack([order[:-1], order[1:]], axis=1)

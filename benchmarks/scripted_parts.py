@@ -1,13 +1,15 @@
-"""Ten parts made by scripts, as people have them: STL, STEP and volume meshes, smooth, noisy, thin, hollow, of two regions.
+"""Ten parts made by scripts, as people have them: STL, STEP, volume meshes; smooth, noisy, thin, hollow, two regions.
 
-Each function writes one file and returns its path. None of them was made to suit palpate: each stands for a kind of part
-that people press (a lattice, a cup, a sponge, a limb, a scan, a bracket), with the triangles that its tool would give it.
+Each function writes one file and returns its path. None of them was made to suit palpate: each stands for a kind of
+part that people press (a lattice, a cup, a sponge, a limb, a scan, a bracket), with the triangles that its tool would
+give it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import meshio
 import numpy as np
@@ -19,7 +21,7 @@ def lattice_ring(folder: Path) -> Path:
     """Write a ring of two hoops and twelve struts as STL, 60 mm across: a lattice as it is printed of silicone."""
     from netgen.occ import Axis, Cylinder, Pnt, Z
 
-    def hoop(height: float):
+    def hoop(height: float) -> Any:
         outer = Cylinder(Pnt(0, 0, height), Z, r=30, h=5)
         return outer - Cylinder(Pnt(0, 0, height - 1), Z, r=21, h=7)
 
@@ -39,7 +41,7 @@ def thin_cup(folder: Path) -> Path:
 
 
 def gyroid_sponge(folder: Path) -> Path:
-    """Write a block of 40 mm of a gyroid, about half of it solid, as STL: a surface with handles and sharp cut edges."""
+    """Write a block of 40 mm of a gyroid, half of it solid, as STL: a surface with handles and sharp cut edges."""
     side, cells, points_a_side = 40.0, 1.5, 33
     axis = np.linspace(-0.02, 1.02, points_a_side)
     x, y, z = np.meshgrid(axis, axis, axis, indexing="ij")
@@ -187,7 +189,7 @@ def zero_surface(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         if len(pairs) == 4:
             pairs = [pairs[0], pairs[1], pairs[3], pairs[2]]
         for pick in [(0, 1, 2)] if len(pairs) == 3 else [(0, 1, 2), (0, 2, 3)]:
-            edges.append(np.stack([rows[:, list(pairs[k])] for k in pick], axis=1))
+            edges.append(np.stack([rows[:, list(pairs[k])] for k in pick], axis=1))  # noqa: PERF401
     found = np.concatenate(edges)
     ends = np.sort(found.reshape(-1, 2), axis=1)
     unique, index = np.unique(ends, axis=0, return_inverse=True)
@@ -213,7 +215,7 @@ def _stl(points: np.ndarray, triangles: np.ndarray, path: Path) -> Path:
     return path
 
 
-def _stl_of(solid, path: Path, size: float) -> Path:
+def _stl_of(solid: Any, path: Path, size: float) -> Path:
     """Write the surface of a solid of OpenCASCADE as STL, its triangles of at most this size."""
     from netgen.occ import OCCGeometry
 
@@ -223,6 +225,6 @@ def _stl_of(solid, path: Path, size: float) -> Path:
     return _stl(points, triangles, path)
 
 
-def _step_of(solid, path: Path) -> Path:
+def _step_of(solid: Any, path: Path) -> Path:
     solid.WriteStep(str(path))
     return path

@@ -17,6 +17,7 @@ import pytest
 import palpate as pp
 from conftest import require_program
 from exported_bodies import BODIES, body, networks
+from models import linear_network
 from palpate.errors import AccuracyError, UsageError
 from palpate.export import export_c, export_lib
 from palpate.export.c_export import block_of, compare_c
@@ -131,6 +132,23 @@ def test_what_has_no_c_source_is_refused_by_name(tmp_path):
     with pytest.raises(UsageError, match="no field 'stress'"):
         export_c(thing, tmp_path, field="stress")
     assert not any(tmp_path.iterdir())
+
+
+def test_a_baseline_of_ones_own_goes_out_as_the_guide_says(tmp_path):
+    from test_new_kind import MEETS, RANGES, SpringBed
+
+    guide = (Path(__file__).parents[2] / "docs" / "guide" / "export.md").read_text("utf-8")
+    source = guide.split("```c\n")[1].split("```")[0]
+
+    class Bed(SpringBed):
+        def c_source(self):
+            return source
+
+    network = linear_network(list(RANGES), [pp.Quantity("ln U/U0")], np.array([[0.1, 0.3, -0.2, 0.4]]))
+    thing = pp.Surrogate(LearntEnergy(network, Bed(120.0, MEETS)), meta={"name": "bed"})
+    compared = c_with("gcc", *STRICT, *SANITIZED)(thing, tmp_path)
+    assert compared.passed, str(compared)
+    assert compared.parts["force"].count > 2000
 
 
 class _Off:

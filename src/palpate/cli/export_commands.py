@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["export_app"]
 
 export_app = typer.Typer(
-    help="Take a learnt body or a network into other tools: C99, a shared library.",
+    help="Take a learnt body or a network into other tools: C99, a shared library, an FMU.",
     no_args_is_help=True,
 )
 
@@ -142,6 +142,42 @@ def to_library(
     content = replace(done.sources, comparison=done.comparison).as_dict()
     content["files"] = [{"file": str(f), "bytes": f.stat().st_size} for f in done.files]
     console.result("\n".join(lines), content)
+
+
+@export_app.command("fmu")
+def to_fmu(
+    file: LearntFile,
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="File. Default: NAME.fmu.")] = None,
+    name: Name = None,
+    no_deviation: NoDeviation = False,
+    no_check: NoCheck = False,
+    as_json: Json = False,
+) -> None:
+    """Write an FMU (FMI 2.0) for Simulink and others; nothing is compiled.
+
+    Where FMPy is installed the FMU is loaded, and compared with palpate at 1,000 places.
+    """
+    from palpate.export import export_fmu
+
+    thing, console = _body(file), Console(as_json)
+    path = out if out is not None else Path(f"{name or file.stem}.fmu")
+    done = export_fmu(thing, path, name=name, deviation=not no_deviation)
+    comparison = None if no_check else done.compare(thing)
+    if comparison is None:
+        console.say(
+            "not compared with palpate: " + ("not asked for" if no_check else "FMPy is not installed")
+        )
+    kinds = "co-simulation and model exchange" if done.exchange else "co-simulation"
+    lines = [f"{path}  {path.stat().st_size / 1e3:.0f} kB, {kinds}, {', '.join(done.platforms)}"]
+    lines += [] if comparison is None else [str(comparison)]
+    content = {
+        "file": str(path),
+        "hash": done.hash,
+        "platforms": list(done.platforms),
+        "exchange": done.exchange,
+    }
+    compared = {} if comparison is None else {k: v.relative for k, v in comparison.parts.items()}
+    console.result("\n".join(lines), content | {"compared": compared or None})
 
 
 def _body(file: Path) -> Surrogate:

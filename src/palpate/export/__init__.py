@@ -10,13 +10,24 @@ check_program   a compiled export that answers them
 c_export        `palpate export c`: write, compile and compare
 lib_export      `palpate export lib`: a shared library, with wrappers whose texts are lib_templates
 check_library   a library that answers through its Python wrapper
+fmu_export      `palpate export fmu`: description, weights and the binaries of fmu_binaries, which read them
+check_fmu       an FMU that answers through FMPy
 core            the C sources
 gltf            a deforming surface as glTF with morph targets
 shape_files     shapes of datasets and of learnt bodies, as VTU series and glTF
 """
 
 from palpate.export.c_export import ExportedC, export_c
+from palpate.export.fmu_export import ExportedFmu, export_fmu
 from palpate.export.lib_export import ExportedLibrary, export_lib
 from palpate.export.weights_block import WeightsBlock
 
-__all__ = ["ExportedC", "ExportedLibrary", "WeightsBlock", "export_c", "export_lib"]
+__all__ = [
+    "ExportedC",
+    "ExportedFmu",
+    "ExportedLibrary",
+    "WeightsBlock",
+    "export_c",
+    "export_fmu",
+    "export_lib",
+]

@@ -174,6 +174,7 @@ def compare_body(
     *,
     field: str = "",
     deviation: bool = True,
+    partial: bool = False,
 ) -> Comparison:
     """Return how far an export is from palpate at 1,000 places, along a stroke of its memory, and in its field.
 
@@ -189,6 +190,8 @@ def compare_body(
         Name of the field that went out; "" for none.
     deviation : bool
         Whether the posterior went out.
+    partial : bool
+        Whether columns that the export answers by not-a-number throughout are left out.
     """
     precision = precision or Precision()
     energy, X = surrogate.energy, places(surrogate)
@@ -203,10 +206,14 @@ def compare_body(
     if surface is not None:  # far away in the air the export's depth is only a level
         far = wanted[:, 1] < -0.0 - (surface.reach - _radii(energy, X)) * 0.999
         got[:, 1] = np.where(far & (got[:, 1] < 0), wanted[:, 1], got[:, 1])
+    there = ~np.isnan(got).all(axis=0) | (not partial)
     parts = {
-        name: _difference(wanted[~deep][:, c], got[~deep][:, c], limit[~deep]) for name, c in _PARTS.items()
+        name: _difference(wanted[~deep][:, c], got[~deep][:, c], limit[~deep])
+        for name, c in _PARTS.items()
+        if there[c].all()
     }
-    parts["slope"] = _slope(energy, X, wanted, got, limit, deep)
+    if there[16:19].all():
+        parts["slope"] = _slope(energy, X, wanted, got, limit, deep)
     size = np.linalg.norm(np.nan_to_num(wanted[:, 2:5]), axis=1)
     if deviation and energy.root is not None:
         # relative to the force: nothing can be said where that is nearly none

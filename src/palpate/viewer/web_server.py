@@ -154,6 +154,7 @@ class LocalServer(ABC):
         self._wanted = (port, host, strict_port)
         self._closing = contextlib.ExitStack()
         self._thread: threading.Thread | None = None
+        self._ended = threading.Event()
 
     @property
     def address(self) -> str:
@@ -222,7 +223,15 @@ class LocalServer(ABC):
                 server_header=False,
             )
         )
-        thread = threading.Thread(target=server.run, args=([listener],), name="palpate viewer", daemon=True)
+        self._ended.clear()
+
+        def run() -> None:
+            try:
+                server.run([listener])
+            finally:
+                self._ended.set()
+
+        thread = threading.Thread(target=run, name="palpate viewer", daemon=True)
         thread.start()
         self._thread = thread
         self._closing.callback(thread.join)
@@ -244,8 +253,10 @@ class LocalServer(ABC):
 
     def wait(self) -> None:
         """Return when the server has ended."""
-        while self._thread is not None and self._thread.is_alive():
-            self._thread.join(0.5)  # in steps: a join without end can't be interrupted on every system
+        # in steps: a wait without end can't be interrupted on every system. Not by `join`: where Ctrl-C interrupts it,
+        # Python takes the thread for ended, and the listener would be closed under it
+        while not self._ended.wait(0.5):
+            pass
 
     def __enter__(self) -> Self:
         return self.start()

@@ -138,7 +138,12 @@ function work(message: PartNews): void {
     return;
   }
   mode("work");
-  status("connecting", "solving");
+  if (message.part === 0 && message.stage === "ended") {
+    status("ended", "not begun"); // the part could not be read
+    say(message.words, "bad");
+    return;
+  }
+  status("connecting", message.stage === "ended" ? "ended" : "solving");
   loading ??= open();
   loading.then(() => view?.look()).catch(fail);
 }

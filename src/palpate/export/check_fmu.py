@@ -33,7 +33,7 @@ class CheckFmu:
     def __init__(self, path: Path) -> None:
         try:
             import fmpy
-            from fmpy.fmi2 import FMU2Slave
+            from fmpy.fmi2 import FMU2Slave, defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
         except ImportError as error:
             raise ResourceError(
                 "An FMU is compared with palpate through FMPy.", fix="pip install fmpy"
@@ -50,7 +50,12 @@ class CheckFmu:
             modelIdentifier=self._description.coSimulation.modelIdentifier,
             instanceName="checked",
         )
-        self._fmu.instantiate(loggingOn=False)
+        # warnings of places outside are what is asked for here: nothing is printed
+        self._calls = fmi2CallbackFunctions()
+        self._calls.logger = fmi2CallbackLoggerTYPE(lambda *_: None)
+        self._calls.allocateMemory = defaultCallbacks.allocateMemory
+        self._calls.freeMemory = defaultCallbacks.freeMemory
+        self._fmu.instantiate(callbacks=self._calls)
 
     def __enter__(self) -> CheckFmu:
         return self

@@ -1,0 +1,58 @@
+"""`palpate export c|lib|fmu` on files: what is written, what is compared, and what is refused."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from conftest import require_program
+from exported_bodies import body, networks
+
+
+@pytest.fixture(scope="module")
+def pad(tmp_path_factory):
+    return body("pad").save(tmp_path_factory.mktemp("pad") / "pad.palpate")
+
+
+@pytest.mark.parametrize("kind", ["c", "lib", "fmu"])
+def test_a_body_goes_out_and_is_compared(kind, palpate, pad, tmp_path):
+    require_program("gcc")
+    out = tmp_path / ("pad.fmu" if kind == "fmu" else "out")
+    answer = palpate("export", kind, pad, "--out", out, "--json")
+    assert answer.code == 0, answer.err
+    said = json.loads(answer.out)
+    assert out.exists()
+    assert set(said["compared"]) >= {"energy", "force", "stiffness", "flags"}
+    assert len(said["hash"]) == 64
+
+
+def test_a_network_goes_out_as_c_alone(palpate, tmp_path):
+    require_program("gcc")
+    file = networks()[1].save(tmp_path / "map.palpate")
+    answer = palpate("export", "c", file, "--out", tmp_path / "map", "--name", "map", "--compiler", "gcc")
+    assert answer.code == 0, answer.err
+    assert "derivatives" in answer.out
+    for kind in ("lib", "fmu"):
+        answer = palpate("export", kind, file, "--out", tmp_path / kind)
+        assert answer.code == 2
+        assert "holds a network alone" in answer.err
+        assert not (tmp_path / kind).exists()
+
+
+def test_bad_names_and_fields_are_refused(palpate, pad, tmp_path):
+    for words, said in (
+        (("--name", "7pads"), "begin the names"),
+        (("--field", "stress"), "no field 'stress'"),
+    ):
+        answer = palpate("export", "c", pad, "--out", tmp_path / "out", *words)
+        assert answer.code == 2
+        assert said in answer.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_nothing_is_compared_where_that_is_not_asked(palpate, pad, tmp_path):
+    answer = palpate("export", "c", pad, "--out", tmp_path / "out", "--no-check", "--float", "--no-deviation")
+    assert answer.code == 0, answer.err
+    assert "not compared with palpate: not asked for" in answer.err
+    assert "typedef float pad_real;" in (tmp_path / "out" / "pad.h").read_text("utf-8")

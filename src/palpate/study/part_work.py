@@ -116,7 +116,7 @@ def work_on(
             study.with_workers(fewer),
             paths,
             until=until,
-            limit=limit - (time.monotonic() - began),
+            limit=max(1e-3, limit - (time.monotonic() - began)),
             cluster=cluster,
             **_callbacks(say),
         )

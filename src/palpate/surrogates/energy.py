@@ -137,7 +137,8 @@ class LearntEnergy:
         low, high = bounds(self.inputs)
         numbers = np.array([math.inf if region is None else region.radius, going.deepest, going.depth_width])
         points = np.zeros((0, len(self.inputs))) if region is None else region.points
-        points.flags.writeable = False  # as a region's own are: another kind of array would be compiled for anew
+        # as a region's own are: another kind of array would be compiled for anew
+        points.flags.writeable = False
         axes = np.ascontiguousarray(self.baseline.directions, dtype=np.float64)
         return numbers, np.array([low, high, going.widths]), points, axes, gram(self.network, len(axes))
 

@@ -3,7 +3,7 @@
 chapter        content on one body                write           the page
 summary        plain words on top                 tables          rows of the tables
 style          look of the pictures               body_words      a body in words
-load_pictures, network_pictures, touch_pictures, history_pictures, hand_pictures, trace_pictures
+load_pictures, network_pictures, place_pictures, touch_pictures, history_pictures, hand_pictures, trace_pictures
                the pictures, each of what the figures can show
 """
 

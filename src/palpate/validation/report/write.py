@@ -16,6 +16,7 @@ from palpate.validation.report.hand_pictures import hand_pictures
 from palpate.validation.report.history_pictures import history_pictures
 from palpate.validation.report.load_pictures import load_pictures
 from palpate.validation.report.network_pictures import network_rows
+from palpate.validation.report.place_pictures import place_pictures
 from palpate.validation.report.style import Picture
 from palpate.validation.report.summary import story
 from palpate.validation.report.tables import check_rows, flat, sources, tables, timing_rows
@@ -31,6 +32,7 @@ TITLE = "What the hand will feel"
 
 PICTURES: tuple[Callable[[Chapter, str], list[Picture]], ...] = (
     load_pictures,
+    place_pictures,
     touch_pictures,
     history_pictures,
     hand_pictures,

@@ -13,13 +13,14 @@ from palpate.cli.table_options import Json
 from palpate.errors import UsageError
 
 if TYPE_CHECKING:
+    from palpate.export.check_points import Comparison
     from palpate.network import Network
     from palpate.surrogates import Surrogate
 
 __all__ = ["export_app"]
 
 export_app = typer.Typer(
-    help="Take a learnt body or a network into other tools: C99, a shared library, an FMU.",
+    help="Take a learnt body or a network into other tools: C99, a library, an FMU, ONNX, one HTML file.",
     no_args_is_help=True,
 )
 
@@ -191,3 +192,70 @@ def _body(file: Path) -> Surrogate:
             fix="Take the network out as C99: palpate export c.",
         )
     return thing
+
+
+@export_app.command("onnx")
+def to_onnx(
+    file: LearntFile,
+    out: Annotated[
+        Path | None, typer.Option(help="File. Default: the model's name, ending in .onnx.")
+    ] = None,
+    single: Annotated[
+        bool, typer.Option("--float", help="Numbers of 32 bits, which browsers' runtimes take.")
+    ] = False,
+    elastic: Annotated[bool, typer.Option("--elastic", help="Leave a memory out.")] = False,
+    no_check: Annotated[bool, typer.Option("--no-check", help="Don't compare with palpate.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Write an ONNX model: energy, force, stiffness and trust from one graph, for many places at a time.
+
+    It is run in ONNX Runtime and compared with palpate at 1,000 places; one that differs is refused.
+    """
+    from palpate.export.onnx_export import export_onnx
+
+    console = Console(as_json)
+    path = file.with_suffix(".onnx") if out is None else out
+    done = export_onnx(_read(file), path, single=single, elastic=elastic, check=not no_check)
+    _tell(console, done.file, done.hash, done.comparison, "ONNX Runtime", no_check=no_check)
+
+
+@export_app.command("html")
+def to_html(
+    file: LearntFile,
+    out: Annotated[
+        Path | None, typer.Option(help="File. Default: the model's name, ending in .html.")
+    ] = None,
+    no_check: Annotated[bool, typer.Option("--no-check", help="Don't compare with palpate.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Write one HTML file with the body in it, which is touched in any browser: from disk, without a network."""
+    from palpate.surrogates import Surrogate
+    from palpate.viewer.file_page import export_html
+
+    thing = _read(file)
+    if not isinstance(thing, Surrogate):
+        raise UsageError(
+            f"{file} holds a network, and a page shows a body.",
+            fix="Export it with `palpate export onnx` or `palpate export c`.",
+        )
+    console = Console(as_json)
+    done = export_html(thing, file.with_suffix(".html") if out is None else out, check=not no_check)
+    _tell(console, done.file, done.hash, done.comparison, "wasmtime", no_check=no_check)
+
+
+def _tell(
+    console: Console, file: Path, sha256: str, comparison: Comparison | None, runtime: str, *, no_check: bool
+) -> None:
+    """Print what was written, and how far it is from palpate."""
+    if comparison is None:
+        console.say(
+            "not compared with palpate: " + ("not asked for" if no_check else f"{runtime} is not installed")
+        )
+    lines = [f"{file}  {file.stat().st_size / 1e6:.2f} MB"]
+    lines += [] if comparison is None else [str(comparison)]
+    parts = {} if comparison is None else comparison.parts
+    compared = {k: {"relative": v.relative, "allowed": v.allowed} for k, v in parts.items()}
+    console.result(
+        "\n".join(lines),
+        {"file": str(file), "bytes": file.stat().st_size, "sha256": sha256, "compared": compared},
+    )

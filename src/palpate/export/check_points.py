@@ -225,7 +225,7 @@ def compare_body(
     if surrogate.memory is not None:
         parts |= _stroke(surrogate, asker, precision)
     if field:
-        parts["field"] = _field(surrogate, asker, field, X[:40], precision)
+        parts["field"] = _field(surrogate, asker, field, X[~deep][:40], precision)
     return Comparison(parts, precision.single)
 
 

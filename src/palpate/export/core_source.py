@@ -6,7 +6,10 @@ from importlib import resources
 
 from palpate.export.weights_block import WeightsBlock
 
-__all__ = ["core_file", "core_source"]
+__all__ = ["core_file", "core_source", "generic_source"]
+
+_BASELINES = ("contact_baseline.c", "pad_baseline.c", "constant_baseline.c")
+_MEMORIES = ("relaxation.c", "indentation.c", "iwan_elements.c")
 
 
 def core_file(name: str) -> str:
@@ -29,6 +32,23 @@ def core_source(block: WeightsBlock) -> str:
     if block.field:
         parts.append(core_file("field.c"))
     return "\n".join(parts)
+
+
+def generic_source(*programs: str) -> str:
+    """Return the core with all baselines and memories of palpate, and programs that read blocks of weights.
+
+    Parameters
+    ----------
+    programs : str
+        The last of the core's files, for example ``fmi2.c``.
+    """
+    surrogates = resources.files("palpate.surrogates")
+    texts = [core_file(name) for name in ("palpate_core.h", "prelude.c", "network.c", "surface.c")]
+    texts += [(surrogates / "baselines" / name).read_text("utf-8") for name in _BASELINES]
+    texts += [core_file("generic.c"), core_file("energy.c")]
+    texts += [(surrogates / "memories" / name).read_text("utf-8") for name in _MEMORIES]
+    texts += [core_file(name) for name in ("generic_memory.c", "block.c", *programs)]
+    return "\n".join(texts)
 
 
 def _hooks(name: str) -> str:

@@ -20,7 +20,7 @@ from importlib import resources
 from pathlib import Path
 
 from palpate.errors import ResourceError
-from palpate.export.core_source import core_file
+from palpate.export.core_source import generic_source
 
 __all__ = ["build_binaries", "built_binaries", "fmu_source", "main"]
 
@@ -44,22 +44,12 @@ _OPTIONS = (
 )
 _PAGE = 14  # bits: the parts of a universal file begin at pages of 16 KiB
 _HASHES = "hashes.json"
-_PARTS = ("palpate_core.h", "prelude.c", "network.c", "surface.c")
-_REST = ("generic_memory.c", "block.c", "fmi2.c")
 _LONGEST = 600.0  # s
 
 
 def fmu_source() -> str:
     """Return the whole source of the generic binary as one text."""
-    surrogates = resources.files("palpate.surrogates")
-    baselines = [f"baselines/{kind}_baseline.c" for kind in ("contact", "pad", "constant")]
-    memories = [f"memories/{kind}.c" for kind in ("relaxation", "indentation", "iwan_elements")]
-    texts = [core_file(name) for name in _PARTS]
-    texts += [(surrogates / file).read_text("utf-8") for file in baselines]
-    texts += [core_file("generic.c"), core_file("energy.c")]
-    texts += [(surrogates / file).read_text("utf-8") for file in memories]
-    texts += [core_file(name) for name in _REST]
-    return "\n".join(texts)
+    return generic_source("fmi2.c")
 
 
 def built_binaries() -> dict[str, bytes]:

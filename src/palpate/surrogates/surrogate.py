@@ -7,9 +7,11 @@ be drawn.
 
 from __future__ import annotations
 
+import html
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -114,6 +116,30 @@ class Surrogate:
     def parameters(self) -> tuple[Range, ...]:
         """The inputs that the hand does not supply."""
         return self.energy.parameters
+
+    def to_html(self) -> str:
+        """Return the body as one HTML page that is touched from disk, without a server or a network.
+
+        Raises
+        ------
+        UsageError
+            If the body is drawn as a line, or a part of it has no C source.
+        """
+        # by name: pages stand above bodies, and only whoever asks for one needs them
+        page = import_module("palpate.viewer.file_page")
+        return str(page.html_page(self))
+
+    def _repr_html_(self) -> str | None:
+        """Show the body in a notebook, in a frame of its own; None where it can't be a page."""
+        try:
+            page = self.to_html()
+        except UsageError:
+            return None
+        source = html.escape(page, quote=True)
+        return (
+            f'<iframe srcdoc="{source}" title="{html.escape(self.name, quote=True)}" '
+            'style="width: 100%; height: 640px; border: 0"></iframe>'
+        )
 
     def with_energy(self, energy: LearntEnergy, meta: Mapping[str, Any] | None = None) -> Surrogate:
         """Return the same fields with another energy, such as one that measured forces have corrected.

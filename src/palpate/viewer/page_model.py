@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from palpate.viewer.part_messages import TrustMap
 from palpate.viewer.surface_drawing import SurfaceDrawing
 from palpate.viewer.trust_map import trust_map
 
-__all__ = ["LineDrawing", "PageModel", "swing", "vector"]
+__all__ = ["HandSettings", "LineDrawing", "PageModel", "swing", "vector"]
 
 FREQUENCY = 2.0  # Hz, a pace that the eye can follow; the model's file holds no mass
 DAMPING = 0.25  # of critical: at rest again within two seconds
@@ -39,6 +39,22 @@ _NO_TOUCH: dict[str, Any] = {
     "coefficients": np.zeros(0),
     "indentation": np.zeros(0),
 }
+
+
+class HandSettings(Protocol):
+    """The reach of a hand, as a page is told: a tick of the loop knows it, and so does a page without a loop."""
+
+    @property
+    def scale(self) -> float:
+        """Metres of body per metre of hand."""
+
+    @property
+    def radius(self) -> float:
+        """Radius of the hand's workspace, m."""
+
+    @property
+    def max_force(self) -> float:
+        """The force limit, N."""
 
 
 class PageModel:
@@ -85,13 +101,13 @@ class PageModel:
         assert isinstance(self._drawing, SurfaceDrawing)
         return trust_map(self._drawing)
 
-    def hello(self, state: State, rate: float, device: str = "") -> Hello:
+    def hello(self, state: HandSettings, rate: float, device: str = "") -> Hello:
         """Return what every page is told first.
 
         Parameters
         ----------
-        state : State
-            A tick of the loop, for its settings.
+        state : HandSettings
+            A tick of the loop, or other settings.
         rate : float
             Ticks per second that the loop aims at, Hz.
         device : str

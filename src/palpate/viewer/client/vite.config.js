@@ -8,7 +8,7 @@ const here = import.meta.dirname;
 /** Names of the files that the bundle is made of; the tests compare their digest with the bundle's. */
 function sources() {
   const inside = (folder) => readdirSync(join(here, folder)).map((name) => `${folder}/${name}`);
-  const own = ["index.html", "package-lock.json", "package.json", "tsconfig.json", "vite.config.js"];
+  const own = ["index.html", "package-lock.json", "package.json", "tsconfig.json", "vite.config.js", "vite.file.config.js"];
   return [...own, ...inside("public"), ...inside("src")].sort();
 }
 

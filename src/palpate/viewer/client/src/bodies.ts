@@ -1,7 +1,7 @@
 // The three ways in which a touched body is drawn and held: a line, a surface that is pressed, a patch that is held.
 
 import type { Arrow } from "./arrow";
-import type { Connection } from "./connection";
+import type { Link } from "./connection";
 import { Field, Indentation } from "./field";
 import { PullHand } from "./hand";
 import type { Hand } from "./hand";
@@ -11,6 +11,7 @@ import { decodeModes, decodeSurface, decodeTrustMap } from "./messages";
 import type { FieldInfo, Frame, Hello, Surface, TrustMap, Vec3 } from "./messages";
 import { Panel } from "./panel";
 import { PressHand } from "./press";
+import { get } from "./resources";
 import { PadView, PressView } from "./touch_view";
 import { element, fixed, input, measured } from "./units";
 import type { View } from "./view";
@@ -36,7 +37,7 @@ export interface Body {
   mark?(places: readonly Vec3[]): void;
 }
 
-export function bodyOf(hello: Hello, canvas: HTMLCanvasElement, connection: Connection, panel: Panel): Body {
+export function bodyOf(hello: Hello, canvas: HTMLCanvasElement, connection: Link, panel: Panel): Body {
   if (hello.line) return new LineBody(hello, canvas, connection);
   return hello.holds ? new PadBody(hello, canvas, connection) : new PressedBody(hello, canvas, connection, panel);
 }
@@ -48,7 +49,7 @@ class LineBody implements Body {
   constructor(
     private readonly hello: Hello,
     private readonly canvas: HTMLCanvasElement,
-    connection: Connection,
+    connection: Link,
   ) {
     this.hand = new PullHand(canvas, connection, hello);
   }
@@ -89,7 +90,7 @@ class PressedBody implements Body {
   constructor(
     private hello: Hello,
     private readonly canvas: HTMLCanvasElement,
-    connection: Connection,
+    connection: Link,
     panel: Panel,
   ) {
     this.hand = new PressHand(canvas, connection, hello);
@@ -224,7 +225,7 @@ class PadBody implements Body {
   constructor(
     private readonly hello: Hello,
     private readonly canvas: HTMLCanvasElement,
-    connection: Connection,
+    connection: Link,
   ) {
     this.hand = new PullHand(canvas, connection, hello);
   }
@@ -268,12 +269,6 @@ function certainty({ values, high }: TrustMap): Float32Array {
 
 function same(a: Float32Array, b: Float32Array): boolean {
   return a.length === b.length && a.every((x, i) => x === b[i]);
-}
-
-async function get(path: string): Promise<ArrayBuffer> {
-  const answer = await fetch(`./${path}`);
-  if (!answer.ok) throw new Error(`${path}: ${answer.status}`);
-  return answer.arrayBuffer();
 }
 
 function plain(numbers: number): Float32Array {

@@ -28,7 +28,15 @@ export interface Listener {
   lost(): void;
 }
 
-export class Connection {
+/** What a page of a touched body needs of whoever answers it. */
+export type Link = Pick<Connection, "connected" | "send" | "record" | "stop" | "ready" | "take">;
+
+/** Join the server. */
+export function joinServer(listener: Listener): Link {
+  return new Connection(listener);
+}
+
+class Connection {
   connected = false;
 
   private readonly worker = new Worker(new URL("./socket_worker.ts", import.meta.url), { type: "module" });

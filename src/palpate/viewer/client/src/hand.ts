@@ -2,7 +2,7 @@
 // rate while it holds, else every 50 ms.
 
 import type { Vector2, Vector3 } from "three";
-import type { Connection } from "./connection";
+import type { Link } from "./connection";
 import type { Pad } from "./gamepad";
 import type { Hello, Vec3 } from "./messages";
 
@@ -29,7 +29,7 @@ export abstract class Hand {
 
   constructor(
     protected readonly canvas: HTMLCanvasElement,
-    private readonly connection: Connection,
+    private readonly connection: Link,
     protected readonly hello: Hello,
   ) {
     setInterval(() => performance.now() - this.lastSent > 0.9 * BEAT && this.send(), BEAT);

@@ -1,5 +1,6 @@
 // The page of a part: it is set up, then solved and learnt, and touched as soon as there is something to touch.
 
+import { joinServer } from "./connection";
 import { say, status } from "./flags";
 import { Learning } from "./learning";
 import {
@@ -149,13 +150,14 @@ function work(message: PartNews): void {
 }
 
 function joinTouch(): Touched {
-  const joined = touch((version) => {
+  const renewed = (version: number): void => {
     if (view) {
       view.dispose();
       view = null;
     }
     root.dataset["touching"] = String(version);
-  });
+  };
+  const joined = touch({ connect: joinServer, renewed });
   if (progress) joined.mark(progress.places);
   return joined;
 }

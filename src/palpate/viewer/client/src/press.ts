@@ -1,7 +1,7 @@
 // The hand that presses. Hold the mouse button, a finger or the space bar on the body: the probe goes in, to the depth
 // that the wheel and the slider set; moving slides it over the surface.
 
-import type { Connection } from "./connection";
+import type { Link } from "./connection";
 import type { Pad } from "./gamepad";
 import { Hand } from "./hand";
 import type { Hello, Vec3 } from "./messages";
@@ -36,7 +36,7 @@ export class PressHand extends Hand {
   private force = NaN; // of a pen or a trigger, 0 … 1
   private lastTick = 0;
 
-  constructor(canvas: HTMLCanvasElement, connection: Connection, hello: Hello) {
+  constructor(canvas: HTMLCanvasElement, connection: Link, hello: Hello) {
     super(canvas, connection, hello);
     if (hello.device) return; // a device holds the hand
     canvas.addEventListener("pointerleave", () => this.pointer === null && !this.grabbed && this.hover(null));

@@ -2,7 +2,7 @@
 
 import { bodyOf } from "./bodies";
 import type { Body } from "./bodies";
-import { Connection } from "./connection";
+import type { Link, Listener } from "./connection";
 import { describe, say, status, warn } from "./flags";
 import { Pads } from "./gamepad";
 import { LineView } from "./line_view";
@@ -26,8 +26,18 @@ export interface Touched {
   readonly version: number;
 }
 
-/** Show a touched body; `changed` hears of each version of it once it is drawn. */
-export function touch(renewed: (version: number) => void = () => {}): Touched {
+/** How a page of a touched body is joined to what answers it. */
+export interface Joint {
+  /** Hears of each version of the body once it is drawn. */
+  renewed?(version: number): void;
+  /** Join whoever answers: the server, or the page itself. */
+  connect(listener: Listener): Link;
+  /** Hears of each picture. */
+  seen?(frame: Frame): void;
+}
+
+/** Show a touched body. */
+export function touch({ connect, renewed = () => {}, seen = () => {} }: Joint): Touched {
   const panel = new Panel();
   let hello: Hello | null = null;
   let body: Body | null = null;
@@ -40,7 +50,7 @@ export function touch(renewed: (version: number) => void = () => {}): Touched {
   let drawable = 0; // version of the body
   let next: { version: number; take: () => void; hello: Hello } | null = null; // comes with the first picture of it
 
-  const connection = new Connection({
+  const connection = connect({
     hello: start,
     notice: warn,
     lost,
@@ -148,6 +158,7 @@ export function touch(renewed: (version: number) => void = () => {}): Touched {
       describe(frame, drops.without);
       if (changed(frame, drawn)) show(frame);
       panel.update(frame);
+      seen(frame);
       if (body?.hand.byPad) pads?.rumble(frame.force, now);
     } else if (connection.connected && latest && now - lastFrame > SILENT) {
       status("warn", "no pictures from the server");

@@ -1,0 +1,199 @@
+"""Export to ONNX: energy, force, stiffness and trust of a learnt body in one graph, compared with palpate.
+
+A body that remembers has a state; it is refused by the name of its memory unless its elastic part alone is asked for.
+Its outputs ``amplitude`` and ``slope`` are what a memory walks, for those who write one of their own.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import AccuracyError, UsageError
+from palpate.export.check_points import ANSWERS, Comparison, Precision, compare_body, compare_network
+from palpate.export.onnx_body import add_body
+from palpate.export.onnx_graph import Graph, require_onnx
+from palpate.export.onnx_network import add_network
+from palpate.export.weights_block import WeightsBlock
+from palpate.files import write_file
+from palpate.network import Network
+from palpate.surrogates import Surrogate
+
+__all__ = ["ExportedOnnx", "OnnxAsker", "export_onnx"]
+
+CONTACT, TRUSTED, NOT_A_NUMBER, TOO_DEEP = 1, 2, 4, 8
+COLUMNS = {"energy": slice(0, 1), "depth": slice(1, 2), "force": slice(2, 5), "stiffness": slice(5, 14)}
+COLUMNS |= {"amplitude": slice(15, 16), "slope": slice(16, 19), "deviation": slice(19, 20)}
+
+
+@dataclass(frozen=True)
+class ExportedOnnx:
+    """A model that was written, and how far it is from palpate.
+
+    Attributes
+    ----------
+    file : Path
+        The model.
+    hash : str
+        SHA-256 of the weights, as in every other export of the body.
+    comparison : Comparison, optional
+        How far it is from palpate; None where ONNX Runtime is not installed, or nothing was to be compared.
+    """
+
+    file: Path
+    hash: str
+    comparison: Comparison | None
+
+
+def export_onnx(
+    thing: Surrogate | Network,
+    path: str | os.PathLike[str],
+    *,
+    single: bool = False,
+    elastic: bool = False,
+    check: bool = True,
+    tolerance: float = 1e-2,
+) -> ExportedOnnx:
+    """Write a body or a network as an ONNX model, and compare it with palpate in ONNX Runtime if that is installed.
+
+    Parameters
+    ----------
+    thing : Surrogate or Network
+        What goes out.
+    path : path
+        The file, which is replaced.
+    single : bool
+        Whether numbers are of 32 bits; the browser's runtimes take no others.
+    elastic : bool
+        Whether a memory is left out.
+    check : bool
+        Whether it is compared.
+    tolerance : float
+        Largest difference in single precision, relative to the largest value.
+
+    Raises
+    ------
+    UsageError
+        If the package onnx is missing, or the baseline or the memory has no ONNX form.
+    AccuracyError
+        If it does not answer as palpate does; nothing is written.
+    """
+    require_onnx()
+    if isinstance(thing, Surrogate) and thing.memory is not None:
+        if not elastic:
+            raise UsageError(
+                f"The memory {thing.memory.name!r} has no ONNX form.",
+                why="A graph has no state of its own, and this memory's is not written as inputs and outputs.",
+                fix="Export it with `palpate export c` or `lib`, or with --elastic its answer without memory.",
+            )
+        thing = replace(thing, memory=None)
+    graph = Graph(np.float32 if single else np.float64)
+    block: WeightsBlock
+    if isinstance(thing, Network):
+        block, name = WeightsBlock.of_network(thing), "network"
+        add_network(graph, thing)
+    else:
+        block, name = WeightsBlock.of(replace(thing, fields={})), thing.name
+        add_body(graph, thing.energy)
+    model = graph.model(name, _metadata(thing, block.hash))
+    comparison = _compared(thing, model, Precision(single, tolerance)) if check else None
+    if comparison is not None and not comparison.passed:
+        raise AccuracyError(
+            f"The ONNX model of {name} does not answer as palpate does.",
+            why=str(comparison),
+            fix="Export it in double precision."
+            if single
+            else "Nothing was written. Report this with the model file.",
+        )
+    return ExportedOnnx(write_file(Path(path), model.SerializeToString()), block.hash, comparison)
+
+
+def _metadata(thing: Surrogate | Network, sha256: str) -> dict[str, str]:
+    """Return names, units, limits and the hash, as the model's properties."""
+    inputs = [{"name": r.name, "unit": r.unit, "low": r.low, "high": r.high} for r in thing.inputs]
+    plain = {"inputs": json.dumps(inputs), "sha256": sha256, "producer": "palpate"}
+    if isinstance(thing, Network):
+        return plain | {"outputs": json.dumps([{"name": q.name, "unit": q.unit} for q in thing.outputs])}
+    units = {
+        "energy": "J",
+        "force": "N",
+        "stiffness": "N/m",
+        "depth": "m",
+        "amplitude": "J^0.5",
+        "slope": "J^0.5/m",
+    }
+    about = "force is that on the hand; inside tells whether it may be trusted, deviation is relative to the force"
+    return plain | {"outputs": json.dumps(units), "about": about, "name": thing.name}
+
+
+def _compared(thing: Surrogate | Network, model: Any, precision: Precision) -> Comparison | None:
+    try:
+        import onnxruntime  # type: ignore[import-untyped,unused-ignore]
+    except ImportError:
+        return None
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1
+    session = onnxruntime.InferenceSession(model.SerializeToString(), options)
+    if isinstance(thing, Network):
+        kind = np.float32 if precision.single else np.float64
+
+        def ask(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            y, slopes = session.run(["y", "jacobian"], {"x": X.astype(kind)})
+            return np.asarray(y, dtype=np.float64), np.asarray(slopes, dtype=np.float64)
+
+        return compare_network(thing, ask, precision)
+    bare = replace(thing, fields={})
+    return compare_body(bare, OnnxAsker(session, bare), precision, deviation=thing.energy.root is not None)
+
+
+class OnnxAsker:
+    """An ONNX Runtime session as an export is asked.
+
+    Parameters
+    ----------
+    session : InferenceSession
+        Of an exported body.
+    surrogate : Surrogate
+        The body.
+    """
+
+    def __init__(self, session: Any, surrogate: Surrogate) -> None:
+        self._session, self._energy = session, surrogate.energy
+        self._kind = np.float32 if session.get_inputs()[0].type == "tensor(float)" else np.float64
+
+    def answers(self, X: np.ndarray) -> np.ndarray:
+        """Return an answer's 19 numbers, the deviation and the flags for each row of X (N, 3 + p)."""
+        baseline, names = self._energy.baseline, [o.name for o in self._session.get_outputs()]
+        D = baseline.directions
+        finite = np.isfinite(X).all(axis=1)
+        X = np.where(finite[:, None], X, np.nan)  # an infinite place along one axis is none along another
+        U = X if len(D) == 3 else np.hstack([X[:, :3] @ D.T, X[:, 3:]])
+        got = dict(zip(names, self._session.run(None, {"x": U.astype(self._kind)}), strict=True))
+        out = np.full((len(X), ANSWERS), np.nan)
+        for name, columns in COLUMNS.items():
+            if name in got:
+                out[:, columns] = np.reshape(got[name], (len(X), -1))
+        out[:, 14] = out[:, 0] + baseline.offset
+        depth = out[:, 1]
+        touching = np.full(len(X), True) if baseline.holds else depth > 0
+        radius: Any = 0.0 if not np.isfinite(baseline.radius) else baseline.radius
+        if baseline.radius_input is not None:
+            radius = U[:, baseline.radius_input]
+        flags = (
+            CONTACT * touching + TRUSTED * got["inside"][:, 0] + TOO_DEEP * (depth > baseline.inner + radius)
+        )
+        out[:, 20] = np.where(finite, flags, NOT_A_NUMBER)
+        return out
+
+    def walk(self, X: np.ndarray) -> np.ndarray:
+        """Refuse: a graph has no memory."""
+        raise NotImplementedError
+
+    def shapes(self, X: np.ndarray) -> np.ndarray:
+        """Refuse: a graph has no field."""
+        raise NotImplementedError

@@ -1,0 +1,222 @@
+"""A graph of ONNX operators, written as one writes arrays: sums, products and functions of values of a graph.
+
+Opset 13 with IR 8 is all that is used, so that runtimes of several years take it. Each scalar is a column (N, 1), N
+being the free number of rows; nothing else of a shape is known here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import UsageError
+
+__all__ = ["OPSET", "Graph", "Value", "require_onnx"]
+
+OPSET, IR = 13, 8
+
+
+def require_onnx() -> Any:
+    """Return the package onnx.
+
+    Raises
+    ------
+    UsageError
+        If it is not installed.
+    """
+    try:
+        import onnx
+    except ImportError:
+        raise UsageError(
+            "The package onnx is not installed.",
+            why="Only exports to ONNX need it, so it does not come with palpate.",
+            fix='Run: pip install "palpate[onnx]"',
+        ) from None
+    return onnx
+
+
+class Value:
+    """A tensor that a graph computes; arithmetic with it adds operators to its graph."""
+
+    __slots__ = ("graph", "name")
+    __array_priority__ = 100  # arrays on the left leave the arithmetic to this class
+
+    def __init__(self, graph: Graph, name: str) -> None:
+        self.graph, self.name = graph, name
+
+    def __add__(self, other: Any) -> Value:
+        return self.graph.op("Add", self, other)
+
+    def __radd__(self, other: Any) -> Value:
+        return self.graph.op("Add", other, self)
+
+    def __sub__(self, other: Any) -> Value:
+        return self.graph.op("Sub", self, other)
+
+    def __rsub__(self, other: Any) -> Value:
+        return self.graph.op("Sub", other, self)
+
+    def __mul__(self, other: Any) -> Value:
+        return self.graph.op("Mul", self, other)
+
+    def __rmul__(self, other: Any) -> Value:
+        return self.graph.op("Mul", other, self)
+
+    def __truediv__(self, other: Any) -> Value:
+        return self.graph.op("Div", self, other)
+
+    def __rtruediv__(self, other: Any) -> Value:
+        return self.graph.op("Div", other, self)
+
+    def __neg__(self) -> Value:
+        return self.graph.op("Neg", self)
+
+    def __matmul__(self, other: Any) -> Value:
+        return self.graph.op("MatMul", self, other)
+
+    def __rmatmul__(self, other: Any) -> Value:
+        return self.graph.op("MatMul", other, self)
+
+    def __gt__(self, other: Any) -> Value:
+        return self.graph.op("Greater", self, other)
+
+    def __lt__(self, other: Any) -> Value:
+        return self.graph.op("Less", self, other)
+
+    def __le__(self, other: Any) -> Value:
+        return self.graph.op("LessOrEqual", self, other)
+
+    def __and__(self, other: Value) -> Value:
+        return self.graph.op("And", self, other)
+
+    def __or__(self, other: Value) -> Value:
+        return self.graph.op("Or", self, other)
+
+    def __invert__(self) -> Value:
+        return self.graph.op("Not", self)
+
+    def columns(self, start: int, stop: int) -> Value:
+        """Return columns start … stop − 1 of a table (N, n)."""
+        numbers = [self.graph.integers([value]) for value in (start, stop, 1)]
+        return self.graph.op("Slice", self, numbers[0], numbers[1], numbers[2])
+
+    def reshape(self, *shape: int) -> Value:
+        """Return the tensor in another shape; one length may be −1."""
+        return self.graph.op("Reshape", self, self.graph.integers(shape))
+
+    def sum(self, *axes: int) -> Value:
+        """Return the sum over axes, which stay with length 1."""
+        return self.graph.op("ReduceSum", self, self.graph.integers(axes), keepdims=1)
+
+    def least(self, axis: int) -> Value:
+        """Return the least along an axis, which stays with length 1."""
+        return self.graph.op("ReduceMin", self, axes=[axis], keepdims=1)
+
+    def swap(self) -> Value:
+        """Return matrices (N, a, b) turned over, (N, b, a)."""
+        return self.graph.op("Transpose", self, perm=[0, 2, 1])
+
+
+class Graph:
+    """Operators and constants of one graph, of one precision.
+
+    Parameters
+    ----------
+    dtype : type
+        float64 or float32, of all numbers.
+    """
+
+    def __init__(self, dtype: type[np.floating]) -> None:
+        self.onnx = require_onnx()
+        self.dtype = dtype
+        self._nodes: list[Any] = []
+        self._constants: dict[tuple[Any, ...], str] = {}
+        self._tensors: list[Any] = []
+        self._inputs: list[Any] = []
+        self._outputs: list[Any] = []
+
+    def input(self, name: str, columns: int) -> Value:
+        """Return an input (N, columns) of the graph."""
+        self._inputs.append(self._info(name, self.dtype, [None, columns]))
+        return Value(self, name)
+
+    def output(self, name: str, value: Value, shape: Sequence[int], kind: Any = None) -> None:
+        """Name a value as an output (N, *shape) of the graph."""
+        self._nodes.append(self.onnx.helper.make_node("Identity", [value.name], [name]))
+        self._outputs.append(self._info(name, kind or self.dtype, [None, *shape]))
+
+    def _info(self, name: str, dtype: Any, shape: list[int | None]) -> Any:
+        kind = self.onnx.helper.np_dtype_to_tensor_dtype(np.dtype(dtype))
+        return self.onnx.helper.make_tensor_value_info(name, kind, ["N", *shape[1:]])
+
+    def integers(self, values: Sequence[int]) -> Value:
+        """Return a constant of whole numbers (n,)."""
+        return self._constant(np.asarray(values, dtype=np.int64))
+
+    def constant(self, values: Any) -> Value:
+        """Return a constant in the graph's precision."""
+        return self._constant(np.asarray(values, dtype=self.dtype))
+
+    def _constant(self, values: np.ndarray) -> Value:
+        key = (values.dtype.str, values.shape, values.tobytes())
+        if key not in self._constants:
+            name = f"c{len(self._constants)}"
+            self._constants[key] = name
+            self._tensors.append(self.onnx.numpy_helper.from_array(np.ascontiguousarray(values), name))
+        return Value(self, self._constants[key])
+
+    def op(self, kind: str, *operands: Any, **attributes: Any) -> Value:
+        """Return what an operator makes of values, numbers and arrays."""
+        names = [(v if isinstance(v, Value) else self.constant(v)).name for v in operands]
+        name = f"v{len(self._nodes)}"
+        self._nodes.append(self.onnx.helper.make_node(kind, names, [name], **attributes))
+        return Value(self, name)
+
+    def exp(self, value: Value) -> Value:
+        """Return e to the power of a value."""
+        return self.op("Exp", value)
+
+    def sqrt(self, value: Value) -> Value:
+        """Return the square root of a value."""
+        return self.op("Sqrt", value)
+
+    def tanh(self, value: Value) -> Value:
+        """Return the hyperbolic tangent of a value."""
+        return self.op("Tanh", value)
+
+    def maximum(self, a: Any, b: Any) -> Value:
+        """Return the larger of two values."""
+        return self.op("Max", a, b)
+
+    def minimum(self, a: Any, b: Any) -> Value:
+        """Return the smaller of two values."""
+        return self.op("Min", a, b)
+
+    def where(self, condition: Value, a: Any, b: Any) -> Value:
+        """Return a where a condition holds, else b."""
+        return self.op("Where", condition, a, b)
+
+    def join(self, *values: Any, axis: int = 1) -> Value:
+        """Return values one after the other along an axis."""
+        return self.op("Concat", *values, axis=axis)
+
+    def whole(self, value: Value) -> Value:
+        """Return a value cut to a whole number of int64."""
+        return self.op("Cast", value, to=self.onnx.TensorProto.INT64)
+
+    def real(self, value: Value) -> Value:
+        """Return whole numbers or truth values as numbers of the graph's precision."""
+        return self.op("Cast", value, to=self.onnx.helper.np_dtype_to_tensor_dtype(np.dtype(self.dtype)))
+
+    def model(self, name: str, metadata: Mapping[str, str]) -> Any:
+        """Return the model (a `ModelProto`), checked with its shapes."""
+        helper = self.onnx.helper
+        graph = helper.make_graph(self._nodes, name, self._inputs, self._outputs, self._tensors)
+        model = helper.make_model(
+            graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR, producer_name="palpate"
+        )
+        helper.set_model_props(model, dict(metadata))
+        self.onnx.checker.check_model(model, full_check=True)
+        return model

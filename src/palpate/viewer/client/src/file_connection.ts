@@ -1,0 +1,168 @@
+// The server's place in a page that is one file: takes the hand, asks the evaluator, and makes the pictures' numbers itself.
+//
+// Force and shape are of the same place, as they are from the server. There is no real-time loop: a hand that moves is followed
+// in steps of 2 ms between two pictures, and what the body remembers with it.
+
+import type { Listener } from "./connection";
+import { CONTACT, TOO_DEEP, TRUSTED } from "./evaluator";
+import type { Answer, Evaluator } from "./evaluator";
+import { Hold, Loop } from "./messages";
+import type { Frame, Hand, Hello, Vec3 } from "./messages";
+
+const STEP = 0.002; // s
+const LONGEST = 0.1; // s between two pictures; what is longer was no touch
+const FREE = 0.04; // s, time constant of the withdrawal that is drawn, as the server has it
+const STILL = 1e-3; // share of the deepest depth below which the body counts as at rest
+const NOWHERE: Vec3 = [0, 0, 0];
+
+export class FileConnection {
+  connected = false;
+
+  private hand: Hand | null = null;
+  private place: Vec3;
+  private force: Vec3 = NOWHERE;
+  private answer: Answer | null = null;
+  private parameters: Float32Array;
+  private tick = 0;
+  private last = performance.now();
+  private released = { at: -Infinity, depth: 0, place: NOWHERE, normal: NOWHERE };
+  private stopped = false;
+  private clamped = false;
+
+  constructor(
+    private readonly listener: Listener,
+    private readonly hello: Hello,
+    private readonly evaluator: Evaluator,
+  ) {
+    this.place = [...hello.centre];
+    this.parameters = Float32Array.from(hello.parameters, ({ low, high }) => (low + high) / 2);
+    queueMicrotask(() => {
+      this.connected = true;
+      listener.hello(hello);
+    });
+  }
+
+  send(hand: Hand): void {
+    this.hand = hand;
+  }
+
+  record(): void {
+    // a file records nothing
+  }
+
+  stop(stop: boolean): void {
+    this.stopped = stop;
+    this.listener.reason({ now: stop ? "Stopped." : "", stopped: stop, dropped: "", ago: 0 });
+  }
+
+  ready(): void {
+    // a file holds one version of its body
+  }
+
+  /** The picture of this moment. */
+  take(): Frame | null {
+    const now = performance.now();
+    const elapsed = Math.min((now - this.last) / 1000, LONGEST);
+    this.last = now;
+    const { hand } = this;
+    if (hand?.parameters.length) this.parameters = Float32Array.from(hand.parameters);
+    const held = hand !== null && hand.grabbed && !hand.hidden && !this.stopped;
+    if (held) this.follow(this.wanted(hand.target), elapsed);
+    else if (this.answer) this.letGo(now);
+    return this.frame(now / 1000, held, elapsed);
+  }
+
+  /** Where the hand wants the probe's centre, or what it holds, m. */
+  private wanted(target: Vec3): Vec3 {
+    const [x, y, z] = target.map((v) => v * this.hello.scale) as Vec3;
+    const moved: Vec3 = [x, -z, y]; // a device's y is up, a solid's z
+    return this.hello.holds ? moved : (moved.map((v, k) => v + this.hello.centre[k]!) as Vec3);
+  }
+
+  private follow(to: Vec3, elapsed: number): void {
+    const from = this.answer ? this.place : to; // the hand has just taken hold
+    const count = Math.max(1, Math.ceil(elapsed / STEP));
+    for (let k = 1; k <= count; k++) {
+      const between = to.map((v, i) => from[i]! + ((v - from[i]!) * k) / count) as Vec3;
+      this.answer = this.evaluator.step(between, this.parameters, elapsed / count);
+    }
+    this.place = to;
+    const size = Math.hypot(...this.answer!.force);
+    this.clamped = size > this.hello.max_force;
+    const share = this.clamped ? this.hello.max_force / size : 1;
+    const free = (this.answer!.flags & TOO_DEEP) !== 0; // the body has let go
+    this.force = Number.isFinite(size) && !free ? (this.answer!.force.map((v) => v * share) as Vec3) : NOWHERE;
+  }
+
+  private letGo(now: number): void {
+    const touched = this.evaluator.touch(this.place, this.parameters);
+    this.released = {
+      at: now,
+      depth: touched?.depth ?? 0,
+      place: this.place,
+      normal: touched?.normal ?? NOWHERE,
+    };
+    this.answer = null;
+    this.force = NOWHERE;
+  }
+
+  /** Where the probe is drawn: at the hand's place, or on its way out. */
+  private drawn(now: number): Vec3 | null {
+    if (this.answer) return this.place;
+    const { at, depth, place, normal } = this.released;
+    const left = depth * Math.exp(-(now - at / 1000) / FREE);
+    if (left < STILL * this.hello.deepest) return null;
+    return place.map((v, k) => v + (depth - left) * normal[k]!) as Vec3;
+  }
+
+  private frame(time: number, held: boolean, elapsed: number): Frame {
+    const { hello, answer, evaluator } = this;
+    const at = hello.holds ? null : this.drawn(time);
+    const touched = at && evaluator.touch(at, this.parameters);
+    const contact = answer !== null && (answer.flags & CONTACT) !== 0;
+    this.tick += 1;
+    return {
+      version: hello.version,
+      tick: this.tick,
+      time,
+      echo: this.hand?.sent ?? 0,
+      position: this.place,
+      force: this.force,
+      rate: elapsed > 0 ? 1 / elapsed : 0,
+      lateness: 0,
+      lateness_p50: 0,
+      lateness_p99: 0,
+      lateness_max: 0,
+      work_p50: 0,
+      faults: 0,
+      fault: 0,
+      last_fault: 0,
+      loop: Loop.RUNNING,
+      hold: held ? Hold.YOURS : Hold.FREE,
+      inside: !answer || (answer.flags & TRUSTED) !== 0,
+      clamped: held && this.clamped,
+      grabbed: held,
+      resting: !held,
+      stalled: false,
+      parameters: this.parameters,
+      contact: touched ? touched.contact : hello.holds ? hello.centre : NOWHERE,
+      normal: touched ? touched.normal : NOWHERE,
+      depth: answer ? answer.depth : 0,
+      stiffness: answer && contact ? along(answer) : 0,
+      deviation: contact ? evaluator.deviation(this.place, this.parameters) : 0,
+      drawn: touched ? touched.depth : 0,
+      displacement: new Float32Array(),
+      coefficients: touched ? touched.numbers : new Float32Array(evaluator.shapeNumbers),
+      indentation: new Float32Array(),
+    };
+  }
+}
+
+/** Stiffness along the force, N/m, positive for a body that resists. */
+function along({ force, stiffness }: Answer): number {
+  const squared = force.reduce((sum, v) => sum + v * v, 0);
+  if (!(squared > 0)) return 0;
+  let total = 0;
+  for (let i = 0; i < 3; i++) for (let j = 0; j < 3; j++) total -= force[i]! * stiffness[3 * i + j]! * force[j]!;
+  return total / squared;
+}

@@ -37,7 +37,7 @@ from benchmarks.table import Claim, Column, Table
 from palpate.files import TemporaryFolder
 from palpate.learning import Learner
 from palpate.physics.shapes.sample_part import write_sample_part
-from palpate.processes import available_cores, helper_environment
+from palpate.processes import available_cores, helper_environment, kill_group
 from palpate.runtime.loop_report import percentile
 from palpate.study.part_study import part_study, part_text
 from palpate.surrogates import Surrogate
@@ -219,10 +219,8 @@ def _solving(folder: Path) -> Iterator[Callable[[float], None]]:
     try:
         yield time.sleep
     finally:
+        kill_group(process)
         process.stdin.close()
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            process.wait(10.0)
-        process.kill()
 
 
 @contextlib.contextmanager

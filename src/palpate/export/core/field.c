@@ -137,13 +137,18 @@ PP_PART int32_t pp_touch_shape(const pp_model *m, const pp_real *x, const pp_rea
   return PP_CONTACT;
 }
 
-/* add four modes that are `all` numbers apart, so that the values are loaded and stored less often */
-PP_PART void pp_add_modes(pp_real *restrict values, const int16_t *restrict modes, int32_t all, int32_t wanted, pp_real a,
-                          pp_real b, pp_real c, pp_real d) {
-  const int16_t *restrict second = modes + all, *restrict third = second + all, *restrict fourth = third + all;
-  int32_t i;
-  for (i = 0; i < wanted; i++) {
-    values[i] += (a * (pp_real)modes[i] + b * (pp_real)second[i]) + (c * (pp_real)third[i] + d * (pp_real)fourth[i]);
+#define PP_TOGETHER 32 /* values that are summed over all modes in registers; gcc unrolls shorter loops, to no good */
+
+/* PP_TOGETHER sums of modes (1 + k rows, `all` numbers apart): a loop of fixed length, for vector instructions */
+PP_PART void pp_sum_modes(const int16_t *restrict table, int32_t all, int32_t modes, const pp_real *restrict z,
+                          const pp_real *restrict scales, pp_real *restrict sums) {
+  int32_t k;
+  int l;
+  for (l = 0; l < PP_TOGETHER; l++) sums[l] = R(0);
+  for (k = 0; k <= modes; k++) {
+    const int16_t *restrict row = table + (size_t)k * (size_t)all;
+    const pp_real a = z[k] * scales[k];
+    for (l = 0; l < PP_TOGETHER; l++) sums[l] += a * (pp_real)row[l];
   }
 }
 
@@ -157,14 +162,17 @@ PP_PART void pp_shape_values(const pp_model *m, const pp_real *shape, int32_t fi
   const int16_t *table = m->a[PP_FIELD + 4].small + first * components;
   const pp_array *nodes = &m->a[PP_FIELD + 6];
   const int32_t wide = 4 * components;
+  pp_real sums[PP_TOGETHER];
   int32_t i, k, low = 0, high = nodes->n[0];
-  for (i = 0; i < wanted; i++) values[i] = z[0] * scales[0] * (pp_real)table[i];
-  if (frame[1] == R(0)) return;
-  for (k = 1; k + 3 <= modes; k += 4) {
-    pp_add_modes(values, table + (size_t)k * (size_t)all, all, wanted, z[k] * scales[k], z[k + 1] * scales[k + 1],
-                 z[k + 2] * scales[k + 2], z[k + 3] * scales[k + 3]);
+  for (i = 0; i + PP_TOGETHER <= wanted; i += PP_TOGETHER) {
+    pp_sum_modes(table + i, all, modes, z, scales, sums);
+    memcpy(values + i, sums, sizeof sums);
   }
-  for (; k <= modes; k++) pp_add_modes(values, table + (size_t)k * (size_t)all, 0, wanted, z[k] * scales[k], R(0), R(0), R(0));
+  for (; i < wanted; i++) {
+    values[i] = R(0);
+    for (k = 0; k <= modes; k++) values[i] += z[k] * scales[k] * (pp_real)table[(size_t)k * (size_t)all + (size_t)i];
+  }
+  if (frame[1] == R(0)) return;
   while (low < high) { /* the first moving node that is wanted */
     const int32_t middle = (low + high) / 2;
     if (nodes->whole[middle] < first) low = middle + 1;

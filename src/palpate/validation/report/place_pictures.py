@@ -70,7 +70,7 @@ def plot_places(
     if field is not None:
         ends = silhouette(field.points, field.triangles, view.out)
         lines = 1e3 * view.flat(field.points[ends.ravel()]).reshape(-1, 2, 2)
-        axis.add_collection(LineCollection(lines, colors=INK, linewidths=0.9, alpha=0.6))
+        axis.add_collection(LineCollection(list(lines), colors=INK, linewidths=0.9, alpha=0.6))
     deepest = max(float(energy.depth(X).max()) for X in (learnt, unseen) if len(X))
     for X, looks, name in (
         (learnt, {"color": BLUE, "linewidths": 0}, "learnt from"),

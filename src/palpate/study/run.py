@@ -27,6 +27,7 @@ from palpate.learning.learn_dataset import filter_record
 from palpate.learning.plastic import LoadHistories
 from palpate.processes import CASE_LIMIT
 from palpate.study.memory_stages import learn_histories, sweep_histories
+from palpate.study.relaxation_stage import with_relaxation
 from palpate.study.study import Study
 from palpate.study.study_paths import Paths
 from palpate.surrogates import Surrogate
@@ -294,6 +295,7 @@ def learn_study(
     if isinstance(train, Dataset):
         options = _options(study, train, test, progress, log) | ({} if watch is None else {"watch": watch})
         model, history = learn_dataset(train, **options)
+        model = with_relaxation(study, model, log)
     else:
         model, history = learn_histories(study, train)
     return _with_meta(model, {"runtime": study.runtime.model_dump()}), history

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
+import types
 from collections.abc import Iterator
 from pathlib import Path
 
 import httpx
+import numpy as np
 import pytest
 
 from palpate.errors import FileFormatError, PortInUseError, UsageError
 from palpate.surrogates import Surrogate
-from palpate.viewer import Viewer
+from palpate.viewer import Viewer, show
+from palpate.viewer.shown_body import ShownBody, ShownStep
+from palpate.viewer.web_server import in_notebook
 
 SCRIPT = """
 import sys
@@ -93,3 +98,21 @@ def test_after_a_failed_start_nothing_is_left(rod: Surrogate):
             second.start()
         assert not hasattr(second, "loop")
         assert httpx.get(first.url).status_code == 200
+
+
+def test_a_notebook_goes_on_while_its_page_is_served(monkeypatch, capsys):
+    class Shell:
+        kernel = object()
+
+    monkeypatch.setitem(sys.modules, "IPython", types.SimpleNamespace(get_ipython=Shell))
+    corners = np.vstack([np.zeros(3), np.eye(3)])
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    viewer = show(ShownBody("tetrahedron", corners, faces, [ShownStep(0 * corners)]), port=0)
+    try:
+        assert viewer.url in capsys.readouterr().err
+        with socket.create_connection(("127.0.0.1", viewer.port), timeout=5):
+            pass
+    finally:
+        viewer.stop()
+    monkeypatch.setitem(sys.modules, "IPython", types.SimpleNamespace(get_ipython=lambda: None))
+    assert not in_notebook()

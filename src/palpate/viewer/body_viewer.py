@@ -119,8 +119,8 @@ def show(
     token: bool = True,
     open_browser: bool = False,
     on_ready: Callable[[BodyViewer], object] | None = None,
-) -> None:
-    """Show solved bodies in the browser until interrupted (Ctrl-C) or terminated.
+) -> BodyViewer:
+    """Show solved bodies in the browser until interrupted (Ctrl-C) or terminated; in a notebook, go on at once.
 
     Parameters
     ----------
@@ -130,9 +130,15 @@ def show(
         Called once with the running `BodyViewer`; by default its address is written to stderr, because a script
         that waits here must say where to look.
 
+    Returns
+    -------
+    BodyViewer
+        In a notebook it runs on until its `stop` or the notebook's end; elsewhere it has ended.
+
     Notes
     -----
     The other parameters and the errors are those of `BodyViewer`, which does the same without waiting.
     """
     viewer = BodyViewer(source, name=name, port=port, host=host, strict_port=strict_port, token=token)
     wait_until_interrupted(viewer, open_browser=open_browser, on_ready=on_ready)
+    return viewer

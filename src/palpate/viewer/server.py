@@ -220,8 +220,8 @@ def serve(
     dead_man: bool = False,
     open_browser: bool = False,
     on_ready: Callable[[Viewer], object] | None = None,
-) -> None:
-    """Show a body in the browser until interrupted (Ctrl-C) or terminated.
+) -> Viewer:
+    """Show a body in the browser until interrupted (Ctrl-C) or terminated; in a notebook, go on at once.
 
     Parameters
     ----------
@@ -230,6 +230,11 @@ def serve(
     on_ready : callable, optional
         Called once with the running `Viewer`; by default its address is written to stderr, because a script
         that waits here must say where to look.
+
+    Returns
+    -------
+    Viewer
+        In a notebook it runs on until its `stop` or the notebook's end; elsewhere it has ended.
 
     Notes
     -----
@@ -250,3 +255,4 @@ def serve(
         dead_man=dead_man,
     )
     wait_until_interrupted(viewer, open_browser=open_browser, on_ready=on_ready)
+    return viewer

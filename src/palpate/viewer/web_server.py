@@ -5,6 +5,7 @@ Who may talk to it stands in `guard`, how its pages share it in `traffic`.
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import errno
 import functools
@@ -37,6 +38,7 @@ __all__ = [
     "TRIES",
     "LocalServer",
     "free_port",
+    "in_notebook",
     "listen",
     "local_application",
     "wait_until_interrupted",
@@ -273,7 +275,7 @@ ServerT = TypeVar("ServerT", bound=LocalServer)
 def wait_until_interrupted(
     server: ServerT, *, open_browser: bool, on_ready: Callable[[ServerT], object] | None
 ) -> None:
-    """Start a server and keep it until Ctrl-C or SIGTERM.
+    """Start a server and keep it until Ctrl-C or SIGTERM; in a notebook, leave it running and return at once.
 
     Parameters
     ----------
@@ -285,20 +287,36 @@ def wait_until_interrupted(
         Called once with the running server; by default its address is written to stderr, because a script that waits
         here must say where to look.
     """
+    if in_notebook():
+        server.start()
+        atexit.register(server.stop)
+        _announce(server, on_ready, "Its stop() ends it.")
+        return
     with _termination_interrupts(), contextlib.suppress(KeyboardInterrupt), server:
-        if on_ready is None:
-            sys.stderr.write(f"{server.url} shows {server.caption} Ctrl-C ends it.\n")
-            if not server.cookies:
-                sys.stderr.write(
-                    "Warning: this page asks for no token; every user and program of this machine can open it.\n"
-                )
-            sys.stderr.flush()
-        else:
-            on_ready(server)
+        _announce(server, on_ready, "Ctrl-C ends it.")
         with way_in(server) if open_browser else contextlib.nullcontext(server.url) as way:
             if open_browser:
                 webbrowser.open(way)
             server.wait()
+
+
+def _announce(server: ServerT, on_ready: Callable[[ServerT], object] | None, end: str) -> None:
+    """Say where the page is and how it ends, or call the function that does."""
+    if on_ready is not None:
+        on_ready(server)
+        return
+    sys.stderr.write(f"{server.url} shows {server.caption} {end}\n")
+    if not server.cookies:
+        sys.stderr.write(
+            "Warning: this page asks for no token; every user and program of this machine can open it.\n"
+        )
+    sys.stderr.flush()
+
+
+def in_notebook() -> bool:
+    """Return whether this is a notebook, whose cells must come back: an interactive Python with a kernel."""
+    ask = getattr(sys.modules.get("IPython"), "get_ipython", None)
+    return hasattr(ask() if ask else None, "kernel")
 
 
 @contextlib.contextmanager

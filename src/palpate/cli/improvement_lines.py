@@ -123,7 +123,8 @@ def improve_and_print(
         **options,
     ):
         last = step
-        if step.phase in {"learnt", "judged"}:
+        # a surrogate of an earlier run is told once, when it is judged
+        if step.phase == "judged" or (step.phase == "learnt" and (steps or not step.unseen)):
             console.say(step_line(step))
             if step.unseen:
                 steps.append({"solves": step.solves, "force_p95": step.error, "seconds": step.seconds})

@@ -93,7 +93,7 @@ def improve_study(
     steps = improve(
         problem,
         until=until,
-        limit=limit,
+        limit=max(0.0, limit),
         most=most,
         unseen=wanted["points"],
         seed=study.sweep.seed,

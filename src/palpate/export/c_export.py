@@ -18,6 +18,7 @@ from palpate.export.weights_block import ROOT, WeightsBlock, identifier
 from palpate.files import write_file
 from palpate.network import Network
 from palpate.surrogates import Surrogate
+from palpate.surrogates.model_card import card_of
 
 __all__ = ["ExportedC", "block_of", "compare_c", "export_c"]
 
@@ -112,6 +113,8 @@ def export_c(
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     texts = c_files(thing, block, name, single=single)
+    card = card_of(thing).with_hash("weights", block.hash)
+    texts |= {f"{name}_card.md": card.to_markdown(), f"{name}_card.json": card.to_json()}
     files = tuple(write_file(folder / file, text) for file, text in texts.items())
     done = ExportedC(files, name, block.hash, block.field, None)
     path = find_compiler(compiler) if check else None

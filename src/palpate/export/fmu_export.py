@@ -22,6 +22,7 @@ from palpate.export.fmu_binaries import built_binaries, fmu_source
 from palpate.export.weights_block import WeightsBlock, identifier
 from palpate.files import write_file
 from palpate.surrogates import Surrogate
+from palpate.surrogates.model_card import card_of
 from palpate.units import Range
 
 __all__ = ["ExportedFmu", "export_fmu", "model_description"]
@@ -122,6 +123,11 @@ def export_fmu(
         "modelDescription.xml": model_description(surrogate, name, block.hash).encode(),
         "resources/weights.bin": block.to_bytes(),
         "sources/palpate_fmu.c": fmu_source().encode(),
+    }
+    card = card_of(surrogate).with_hash("weights", block.hash)
+    entries |= {
+        "documentation/card.md": card.to_markdown().encode(),
+        "documentation/card.json": card.to_json().encode(),
     }
     for file, content in binaries.items():
         folder, _, ending = file.partition("/")

@@ -23,6 +23,7 @@ from palpate.export.weights_block import WeightsBlock
 from palpate.files import write_file
 from palpate.network import Network
 from palpate.surrogates import Surrogate
+from palpate.surrogates.model_card import card_of
 
 __all__ = ["ExportedOnnx", "OnnxAsker", "export_onnx"]
 
@@ -116,7 +117,8 @@ def export_onnx(
 def _metadata(thing: Surrogate | Network, sha256: str) -> dict[str, str]:
     """Return names, units, limits and the hash, as the model's properties."""
     inputs = [{"name": r.name, "unit": r.unit, "low": r.low, "high": r.high} for r in thing.inputs]
-    plain = {"inputs": json.dumps(inputs), "sha256": sha256, "producer": "palpate"}
+    card = card_of(thing).with_hash("weights", sha256)
+    plain = {"inputs": json.dumps(inputs), "sha256": sha256, "producer": "palpate", "card": card.to_json()}
     if isinstance(thing, Network):
         return plain | {"outputs": json.dumps([{"name": q.name, "unit": q.unit} for q in thing.outputs])}
     units = {

@@ -10,7 +10,7 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +61,10 @@ class ModelCard:
     limits: tuple[str, ...]
     warnings: tuple[str, ...]
     hashes: Mapping[str, str]
+
+    def with_hash(self, name: str, sha256: str) -> ModelCard:
+        """Return the card with a further hash, such as that of the weights that an export writes."""
+        return replace(self, hashes={**self.hashes, name: sha256})
 
     def as_dict(self) -> dict[str, Any]:
         """Return the card as plain data for JSON."""

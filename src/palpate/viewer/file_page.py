@@ -29,6 +29,7 @@ from palpate.files import write_file
 from palpate.runtime.devices import device_traits
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import ContactBaseline, FieldSurrogate, Surrogate
+from palpate.surrogates.model_card import card_of
 from palpate.viewer.messages import Modes, Surface
 from palpate.viewer.page_model import PageModel
 
@@ -170,11 +171,12 @@ def _page(surrogate: Surrogate, block: WeightsBlock) -> str:
         "core": built_core("core.wasm"),
         "weights": _by_weight(block.to_bytes()),
     }
-    return _document(surrogate.name, parts)
+    card = card_of(surrogate).with_hash("weights", block.hash)
+    return _document(surrogate.name, parts, card.to_json())
 
 
-def _document(name: str, parts: dict[str, bytes]) -> str:
-    """Return the page's skeleton with style, script and parts put into it."""
+def _document(name: str, parts: dict[str, bytes], card: str) -> str:
+    """Return the page's skeleton with style, script, parts and model card put into it."""
     skeleton = (STATIC / "index.html").read_text("utf-8")
     body = re.search(r"<body>.*</body>", skeleton, re.DOTALL)
     assert body is not None
@@ -197,6 +199,7 @@ def _document(name: str, parts: dict[str, bytes]) -> str:
 </head>
 {body.group(0).replace("</body>", "")}
 {packed}
+<script type="application/json" id="palpate-card">{card.replace("</", "<" + chr(92) + "/")}</script>
 <script>{script}</script>
 </body>
 </html>

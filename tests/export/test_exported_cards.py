@@ -1,0 +1,51 @@
+"""Every export carries the model card, with the hash of the weights that went out."""
+
+from __future__ import annotations
+
+import json
+import re
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import onnx
+import pytest
+
+from exported_bodies import body
+from palpate.export import export_c, export_fmu
+from palpate.export.onnx_export import export_onnx
+from palpate.surrogates import Surrogate
+from palpate.viewer.file_page import export_html
+
+
+def _c(thing: Surrogate, folder: Path) -> tuple[str, str]:
+    done = export_c(thing, folder, check=False)
+    assert (folder / f"{done.name}_card.md").read_text("utf-8").startswith("# Model card")
+    return (folder / f"{done.name}_card.json").read_text("utf-8"), done.hash
+
+
+def _fmu(thing: Surrogate, folder: Path) -> tuple[str, str]:
+    done = export_fmu(thing, folder / "body.fmu")
+    with zipfile.ZipFile(done.path) as file:
+        return file.read("documentation/card.json").decode(), done.hash
+
+
+def _onnx(thing: Surrogate, folder: Path) -> tuple[str, str]:
+    done = export_onnx(thing, folder / "body.onnx", check=False)
+    return {p.key: p.value for p in onnx.load(done.file).metadata_props}["card"], done.hash
+
+
+def _html(thing: Surrogate, folder: Path) -> tuple[str, str]:
+    done = export_html(thing, folder / "body.html", check=False)
+    found = re.search(r'id="palpate-card">(.*?)</script>', done.file.read_text("utf-8"), re.DOTALL)
+    assert found is not None
+    return found.group(1), done.hash
+
+
+@pytest.mark.parametrize("export", [_c, _fmu, _onnx, _html])
+def test_the_card_goes_out(export: Callable[[Surrogate, Path], tuple[str, str]], tmp_path: Path):
+    thing = body("contact").signed(author="A. Author </script>", licence="CC-BY-4.0")
+    text, weights = export(thing, tmp_path)
+    card = json.loads(text)
+    assert (card["author"], card["licence"]) == ("A. Author </script>", "CC-BY-4.0")
+    assert card["hashes"]["weights"] == weights

@@ -3,8 +3,8 @@
     python -m benchmarks.ten_parts [PART …] [--minutes 30] [--until 2%] [--refined 4] [--folder DIR] [--out FILE.json]
 
 Not one of the tables that run by themselves: it takes as long as its limit for each part. It runs `palpate touch PART
---no-view` as a user does, one after the other, and takes the figures from its output. With `--refined` some unseen solves
-are repeated on elements of 0.6 of the size: what the mesh adds to the error.
+--no-view` as a user does, one after the other, and takes the figures from its output. With `--refined` some unseen
+solves are repeated on elements of 0.6 of the size: what the mesh adds to the error.
 """
 
 from __future__ import annotations

@@ -91,6 +91,16 @@ def test_a_series_for_paraview_is_read_by_meshio(block, tmp_path):
         np.testing.assert_array_equal(grid.point_data["displacement"], block.displacement[row])
 
 
+def test_a_series_replaces_its_own_states_and_nobodys_folder(block, tmp_path):
+    series = series_of_dataset(block, [0])
+    write_shapes(series, tmp_path / "block.pvd")
+    write_shapes(series, tmp_path / "block.pvd")
+    (tmp_path / "block" / "block.c").write_text("int x;")
+    with pytest.raises(UsageError, match=r"holds block\.c"):
+        write_shapes(series, tmp_path / "block.pvd")
+    assert (tmp_path / "block" / "block.c").read_text() == "int x;"
+
+
 def parts_of(path):
     """Scene and accessors of a GLB file, read by the specification."""
     raw = path.read_bytes()

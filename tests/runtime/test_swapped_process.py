@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import threading
 import time
 
@@ -9,7 +11,7 @@ import pytest
 
 import held
 import pressed
-from palpate.errors import FileFormatError, UsageError
+from palpate.errors import DeviceError, FileFormatError, UsageError
 from palpate.runtime import LoopProcess, now
 from palpate.runtime.replay import Replay, is_recorded_model
 from palpate.runtime.touchable import load_touchable
@@ -97,3 +99,11 @@ def test_a_replay_takes_no_other_surrogate(files, tmp_path):
         wait_for(lambda: loop.recording.ticks > 100)
     with LoopProcess(files[1.0], replay=path) as loop, pytest.raises(UsageError, match="replayed"):
         loop.swap(files[1.5])
+
+
+def test_a_loop_that_has_died_takes_nothing_and_stops_in_good_order(files):
+    with LoopProcess(files[1.0], device="simulated:frequency=3") as loop:
+        os.kill(loop.pid, signal.SIGKILL)
+        wait_for(lambda: not loop.alive)
+        with pytest.raises(DeviceError, match="has ended"):
+            loop.swap(files[1.5])

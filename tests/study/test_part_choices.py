@@ -119,3 +119,17 @@ def test_a_file_that_has_changed_is_told(tmp_path: Path):
     ]
     with pytest.raises(UsageError, match="of 5121 triangles; there are 5120"):
         picked.body.model_copy(update={"surfaces": tuple(surfaces)}).surface_names()
+
+
+def test_a_face_of_a_step_file_is_not_picked_in_part(tmp_path: Path):
+    """What faces up cuts a lying cylinder's side; with another face it is no pick of whole faces any more."""
+    from netgen.occ import Cylinder, Pnt, X
+
+    Cylinder(Pnt(0, 0, 0), X, r=10, h=30).WriteStep(str(tmp_path / "bar.step"))
+    study = part_study(tmp_path / "bar.step", radius=0.004)[0]
+    part = shown_part(study)
+    touched = part.touched | (
+        part.face_of == next(f for f in part.face_of if not part.touched[part.face_of == f].any())
+    )
+    with pytest.raises(UsageError, match="only a part is touched"):
+        chosen_study(study, dataclasses.replace(part.choices, touched=np.flatnonzero(touched)))

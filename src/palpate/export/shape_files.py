@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,8 @@ __all__ = ["SHAPES", "series_of_dataset", "series_of_surrogate", "write_shapes",
 
 SHAPES = (".pvd", ".vtu", ".glb")
 """Ends of the names of files that hold shapes."""
+
+_STATE = re.compile(r"\d{4,}\.vtu")  # files of a series
 
 
 def write_shapes(
@@ -68,6 +71,7 @@ def write_vtu_series(series: ShapeSeries, path: str | os.PathLike[str]) -> Path:
     """
     target = Path(path)
     folder = target.with_suffix("")
+    _require_own(folder, target)
     collection = ElementTree.Element("VTKFile", type="Collection", version="0.1")
     entries = ElementTree.SubElement(collection, "Collection")
     with writing_folder(folder) as part:
@@ -80,6 +84,19 @@ def write_vtu_series(series: ShapeSeries, path: str | os.PathLike[str]) -> Path:
     with writing(target) as part:
         ElementTree.ElementTree(collection).write(part, encoding="utf-8", xml_declaration=True)
     return target
+
+
+def _require_own(folder: Path, target: Path) -> None:
+    """Refuse a folder that holds anything but the states of an earlier series: it would be replaced."""
+    if not folder.exists():
+        return
+    other = [folder] if not folder.is_dir() else [p for p in folder.iterdir() if not _STATE.fullmatch(p.name)]
+    if other:
+        raise UsageError(
+            f"The folder {folder} would be replaced by the states of {target.name}, and it holds {other[0].name}.",
+            why="The states of a series lie in a folder of its name.",
+            fix="Give the series another name with -o, or move what is there.",
+        )
 
 
 def _write_state(series: ShapeSeries, step: int, path: Path) -> None:

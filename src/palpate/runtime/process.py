@@ -6,6 +6,7 @@ main module again, which fails for scripts without a guard, notebooks and standa
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import queue
@@ -199,6 +200,8 @@ class LoopProcess:
                 fix="Start the loop without a replay.",
             )
         with self._swapping:
+            if not self.alive:
+                raise self._failure("The real-time process has ended.")
             body = prepared(load_touchable(model))
             facts = model_facts(Path(model).absolute())
             self._wishes += 1
@@ -352,7 +355,8 @@ class LoopProcess:
             self._end(process)
             if self._listener is not None:
                 self._listener.join()
-            process.stdin.close()
+            with contextlib.suppress(OSError):  # what a dead process was still to be told
+                process.stdin.close()
         if self.recording is not None:
             self.recording.stop(lambda: {"report": self.report().as_dict()} if self._state().tick else {})
         if self._shared is not None and self._last is None:

@@ -164,6 +164,8 @@ def _picked(
         name, faces = _free_name(role, skin), _whole_faces(skin, mask)
         surfaces = [surface for surface in surfaces if surface["name"] != name]
         if mask.any():
+            if not faces and getattr(body.bare(), "is_step", False):
+                raise _in_part(skin, mask, role)
             listed = (
                 {"faces": faces} if faces else {"triangles": triangle_text(np.flatnonzero(mask), len(mask))}
             )
@@ -173,6 +175,17 @@ def _picked(
         else:
             touched, touches = mask, name
     return held, touched & ~held, surfaces, fixed, touches
+
+
+def _in_part(skin: BodyMesh, mask: np.ndarray, role: str) -> UsageError:
+    """Return the error of a pick that takes a face of a STEP file in part."""
+    numbers = np.unique(skin.surface_of[mask])
+    part = next(n for n in numbers if not mask[skin.surface_of == n].all())
+    return UsageError(
+        f"Of {skin.surfaces[part]} only a part is {role}.",
+        why="Faces of a STEP file are picked whole; the study's own choice of what faces up may cut them.",
+        fix=f"Click that face until all of it is {role}, or none; or choose by `facing` in the study file.",
+    )
 
 
 def _whole_faces(skin: BodyMesh, mask: np.ndarray) -> tuple[str, ...]:

@@ -199,7 +199,7 @@ def _document(name: str, parts: dict[str, bytes], card: str) -> str:
 </head>
 {body.group(0).replace("</body>", "")}
 {packed}
-<script type="application/json" id="palpate-card">{card.replace("</", "<" + chr(92) + "/")}</script>
+<script type="application/json" id="palpate-card">{card.replace("<", chr(92) + "u003c")}</script>
 <script>{script}</script>
 </body>
 </html>

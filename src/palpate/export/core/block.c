@@ -1,7 +1,8 @@
 /* A binary block of weights, opened where it lies; see docs/method/weights-block.md.
  *
  * Everything that indexes memory is checked here once, so that a damaged or hostile block ends in a refusal. Blocks are
- * little-endian, as are all machines for which the generic binaries are built.
+ * little-endian, as are all machines for which the generic binaries are built. The arrays of a field are not checked: only
+ * a page in a browser asks for them, whose memory is its own.
  */
 #define PP_BLOCK_HEAD 64
 #define PP_BLOCK_ROW 40
@@ -31,6 +32,9 @@ PP_PART uint64_t pp_checksum(const unsigned char *bytes, uint64_t size) {
   for (i = 0; i + 8 <= size; i += 8) total = (total ^ pp_word(bytes + i)) * UINT64_C(0x100000001B3);
   return total;
 }
+
+/* whether an array is there with a number for each place of its shape: only the tables of a surface may be tiled */
+PP_PART int pp_dense(const pp_array *a) { return a->real && !a->whole; }
 
 PP_PART int pp_is(const pp_array *a, int32_t n0, int32_t n1, int real) {
   return a->n[0] == n0 && a->n[1] == n1 && (real ? a->real && !a->whole : a->whole && !a->real);
@@ -89,7 +93,7 @@ PP_PART int pp_net_fits(const pp_array *net, int32_t n, int32_t felt) {
   if (!pp_is(&net[PP_SIZES], 7, 1, 0) || sizes[0] != n || n < 1 || n > PP_MOST) return 0;
   if (sizes[1] < 0 || sizes[1] > PP_MOST * PP_MOST || sizes[2] < 0 || sizes[2] > PP_MOST || sizes[3] < 0) return 0;
   if (sizes[4] != 1 || sizes[5] < 0 || sizes[5] > 2 || sizes[6] != felt * (felt + 1) / 2) return 0;
-  if (!pp_is(&net[PP_SCALES], 2, n, 1) || !net[PP_TAIL].real || net[PP_TAIL].n[0] < 1 + n) return 0;
+  if (!pp_is(&net[PP_SCALES], 2, n, 1) || !pp_dense(&net[PP_TAIL]) || net[PP_TAIL].n[0] < 1 + n) return 0;
   groups = (sizes[3] + PP_LANES - 1) / PP_LANES;
   if (groups == 0) return net[PP_UNITS].n[0] == 0;
   if (!pp_is(&net[PP_UNITS], groups, sizes[1] + sizes[2] + sizes[6] + 1, 1) || net[PP_UNITS].n[2] != PP_LANES) return 0;
@@ -105,7 +109,7 @@ PP_PART int pp_net_fits(const pp_array *net, int32_t n, int32_t felt) {
 PP_PART int pp_surface_fits(const pp_array *surface) {
   const int flat = surface[2].n[0] > 0;
   int i;
-  if (!surface[0].real || surface[0].n[0] != (flat ? 15 : 4) || !(surface[0].real[3] > R(0)) || !surface[1].real) return 0;
+  if (!pp_dense(&surface[0]) || surface[0].n[0] != (flat ? 15 : 4) || !(surface[0].real[3] > R(0)) || !surface[1].real) return 0;
   for (i = 0; i < (flat ? 2 : 3); i++) {
     if (surface[1].n[i] < 4) return 0;
   }
@@ -117,11 +121,11 @@ PP_PART int pp_baseline_fits(const pp_array *a, const int32_t *head) {
   const int32_t n = head[PP_INPUTS], k = head[PP_FELT];
   int32_t i;
   if (head[PP_BASELINE_CODE] == 1) {
-    if (k != 3 || !own[0].real || own[0].n[0] != 6 || !pp_surface_fits(own + 1)) return 0;
+    if (k != 3 || !pp_dense(&own[0]) || own[0].n[0] != 6 || !pp_surface_fits(own + 1)) return 0;
     return own[0].real[4] >= R(-1) && own[0].real[4] < (pp_real)(n - 3) && own[0].real[5] > R(0);
   }
-  if (head[PP_BASELINE_CODE] == 3) return own[0].real && own[0].n[0] == 1;
-  if (!pp_is(&own[0], k, 3, 1) || !own[1].real || own[1].n[1] != k * (k + 1) / 2 || !pp_is(&own[2], own[1].n[0], 2, 0)) return 0;
+  if (head[PP_BASELINE_CODE] == 3) return pp_dense(&own[0]) && own[0].n[0] == 1;
+  if (!pp_is(&own[0], k, 3, 1) || !pp_dense(&own[1]) || own[1].n[1] != k * (k + 1) / 2 || !pp_is(&own[2], own[1].n[0], 2, 0)) return 0;
   for (i = 0; i < 2 * own[1].n[0]; i++) {
     if (own[2].whole[i] < -1 || own[2].whole[i] >= n - k) return 0;
   }
@@ -129,7 +133,7 @@ PP_PART int pp_baseline_fits(const pp_array *a, const int32_t *head) {
   for (i = 0; i < own[3].n[0] * n; i++) {
     if (own[4].whole[i] < 0 || own[4].whole[i] > 5) return 0;
   }
-  return own[3].n[0] == 0 || own[3].real;
+  return own[3].n[0] == 0 || pp_dense(&own[3]);
 }
 
 PP_PART int pp_memory_fits(const pp_array *a, const int32_t *head) {
@@ -139,14 +143,14 @@ PP_PART int pp_memory_fits(const pp_array *a, const int32_t *head) {
   if (code == 0) return head[PP_STATE] == 0;
   if (code == 1) {
     const int32_t n = own[2].n[0];
-    if (!pp_is(&own[0], points, 3, 1) || !pp_is(&own[1], 3, 1, 1) || !own[4].real || points > 100000 || n > 100) return 0;
+    if (!pp_is(&own[0], points, 3, 1) || !pp_is(&own[1], 3, 1, 1) || !pp_dense(&own[4]) || points > 100000 || n > 100) return 0;
     if (n > 0 && (!pp_is(&own[2], n, 1, 1) || !pp_is(&own[3], n, 1, 1))) return 0;
     size = 1 + points * (3 + n) + 3 * n;
   } else if (code == 2) {
     for (i = 0; i < 3; i++) {
       if (!pp_is(&own[i], own[0].n[0], 1, 1) || own[i].n[0] < 2) return 0;
     }
-    if (!pp_is(&own[3], points, 3, 1) || !own[4].real) return 0;
+    if (!pp_is(&own[3], points, 3, 1) || !pp_dense(&own[4])) return 0;
     size = 2 * points;
   } else {
     for (i = 0; i < 4; i++) {

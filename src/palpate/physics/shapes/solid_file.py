@@ -28,7 +28,7 @@ from palpate.physics.shapes.mesh import BodyMesh, body_mesh, to_ngsolve
 from palpate.physics.shapes.meshing import FineMesh, mesh_solid
 from palpate.physics.shapes.naming import INTERFACE, plain_name
 from palpate.physics.shapes.shape import Shape, require_size
-from palpate.physics.shapes.step_patches import FacePatches, number_faces
+from palpate.physics.shapes.step_patches import FacePatches, cuts_faces, number_faces
 from palpate.physics.shapes.stl_file import bodies_apart, fill_surface, name_parts, read_stl
 
 __all__ = [
@@ -87,7 +87,12 @@ def read_step(
     low, high = body.bounding_box
     require_size(path, max(high[i] - low[i] for i in range(3)), "stated in the file")
     _name_interfaces(body)
-    if any(patch.facing is not None for patch in patches):
+    outer = [face for face in body.faces if face.name != INTERFACE]
+    names, centres = (
+        tuple(face.name for face in outer),
+        np.array([[f.center[i] for i in range(3)] for f in outer]),
+    )
+    if any(cuts_faces(patch, names, centres) for patch in patches):
         return body, notes, number_faces(patches, body)
     _name_patches(patches, body)
     return body, notes, None

@@ -1,6 +1,6 @@
-"""Names for parts of the faces of a STEP file: by the way that they face.
+"""Names for parts of the faces of a STEP file: by the way that they face, or by a box in which no face has its centre.
 
-A curved face faces many ways, and the CAD kernel knows it as one. So where a patch is chosen by its direction, faces
+A curved face faces many ways, and the CAD kernel knows it as one. So where a patch takes parts of faces, they
 carry their numbers into the mesh, and the mesh's triangles get their names there: those of one face that belong to
 different patches become faces of the mesh of their own. They stay on the CAD face, so curved elements follow it.
 """
@@ -15,7 +15,7 @@ import numpy as np
 from palpate.physics.shapes.body_file import SurfacePatch, apply_patches
 from palpate.physics.shapes.naming import INTERFACE
 
-__all__ = ["FacePatches", "number_faces"]
+__all__ = ["FacePatches", "cuts_faces", "number_faces"]
 
 MARK = "#"  # before a face's number; `plain_name` leaves none in the names of a file
 
@@ -81,11 +81,18 @@ class FacePatches:
         label = np.array([self.names[i] for i in face], dtype=object)
         given = label.copy()
         for patch in self.patches:
-            # a patch without a direction takes whole faces, as it does where no patch has one
-            places = centres if patch.facing is not None else self.centres[face]
+            cut = cuts_faces(patch, self.names, self.centres)
+            places = centres if cut else self.centres[face]
             left, index = apply_patches(*_numbered(given), places, (patch,), normals)
             label[np.array([left[i] == patch.name for i in index])] = patch.name
         return [str(name) for name in label]
+
+
+def cuts_faces(patch: SurfacePatch, names: tuple[str, ...], centres: np.ndarray) -> bool:
+    """Return whether a patch takes parts of faces: by their direction, or in a box in which no face has its centre."""
+    if patch.facing is not None:
+        return True
+    return not patch.contains(centres, None, np.array(names, dtype=object)).any()
 
 
 def _numbered(names: np.ndarray) -> tuple[tuple[str, ...], np.ndarray]:

@@ -18,11 +18,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import trimesh
+from websockets.sync.client import connect
 
+import pressed
+from palpate.cli.console import Console
+from palpate.cli.touch_page import TouchedPart
+from palpate.errors import UsageError
 from palpate.study import Study
+from palpate.study.part_choices import shown_part
 from palpate.study.part_study import part_study
 from palpate.study.part_work import rough_study, work_on
 from palpate.study.run import Paths
+from palpate.viewer.part_messages import StartWish
+from palpate.viewer.part_page import serve_part
 
 
 @pytest.fixture
@@ -50,14 +58,15 @@ class Improvement:
                 ("learnt", 16),
                 ("ended", 16),
             ):
-                yield self.step(paths, phase, solves)
+                yield self.step(study, paths, phase, solves)
         finally:
             self.ended.append(study.name)
 
-    def step(self, paths: Paths, phase: str, solves: int) -> SimpleNamespace:
+    def step(self, study: Study, paths: Paths, phase: str, solves: int) -> SimpleNamespace:
         is_new = phase == "learnt"
         if is_new:
-            paths.model.write_text("surrogate")
+            origin = {"provenance": {"problem": study.problem().describe()}}
+            pressed.surrogate(meta={"dataset": origin}).save(paths.model)
         return SimpleNamespace(
             phase=phase, solves=solves, unseen=0, error=float("nan"), median=float("nan"), seconds=1.0, is_new=is_new,
             reached=False, reason="The time is over." * (phase == "ended"), places=np.zeros((solves, 3)),
@@ -92,6 +101,66 @@ def test_the_same_command_goes_on_with_what_there_is(study, tmp_path, monkeypatc
     said = carried_out(study, tmp_path)
     assert bodies(said[:1]) == ["pad.palpate"], "what was learnt before can be touched at once"
     assert [name for name, _, _ in work.studies] == ["pad-rough", "pad", "pad"]
+
+
+def test_a_surrogate_of_another_study_is_not_put_into_the_hand(study, tmp_path, monkeypatch):
+    work = Improvement(monkeypatch)
+    carried_out(study, tmp_path)
+    harder = study.interaction.model_copy(update={"pad": 1e7})
+    changed = study.model_copy(update={"interaction": harder})
+    said = carried_out(changed, tmp_path)
+    assert [name for name, _, _ in work.studies] == ["pad-rough", "pad"] * 2
+    assert "body" not in said[0]
+    (tmp_path / "pad.palpate").write_text("no surrogate")
+    again = carried_out(changed, tmp_path)
+    assert bodies(again[:1]) == ["pad-rough.palpate"], "the rough one is of this study"
+
+
+def test_the_batch_that_is_solved_when_it_is_stopped_is_learnt_from(study, tmp_path, monkeypatch):
+    work = Improvement(monkeypatch)
+    said = carried_out(study, tmp_path, stopped=lambda: len(work.studies) == 2)
+    assert bodies(said) == ["pad-rough.palpate", "pad.palpate"]
+    assert [line["step"]["phase"] for line in said if "step" in line] == ["solved", "solved", "learnt"]
+
+
+def test_a_page_can_not_start_work_that_has_begun(study):
+    chosen: list[object] = []
+    with serve_part("pad", on_start=chosen.append, port=0) as page:
+        page.show_part(shown_part(study), begun=True)
+        cookies = "; ".join(f"{name}={value}" for name, value in page.cookies.items())
+        with connect(
+            f"{page.address.replace('http', 'ws', 1)}part",
+            origin=page.address.rstrip("/"),
+            additional_headers={"Cookie": cookies},
+        ) as socket:
+            assert json.loads(socket.recv(timeout=5))["stage"] == "working"
+            socket.send(StartWish("ecoflex 00-30", "", "", "", "5 mm", "2 mm").to_json())
+            assert "begun already" in json.loads(socket.recv(timeout=5))["problem"]
+    assert not chosen
+
+
+def test_the_work_on_a_part_begins_once(tmp_path):
+    """A second start is refused before its study is written; one that fails has not begun."""
+    touched = TouchedPart(0.02, 60.0, 1, Console())
+    written: list[str] = []
+
+    def write(name: str) -> Path:
+        written.append(name)
+        return tmp_path / f"{name}.toml"
+
+    def refuse() -> Path:
+        raise UsageError("These choices don't fit.")
+
+    try:
+        with serve_part("pad", on_start=written.append, port=0) as touched.page:
+            with pytest.raises(UsageError, match="don't fit"):
+                touched.begin(refuse)
+            touched.begin(lambda: write("first"))
+            with pytest.raises(UsageError, match="begun already"):
+                touched.begin(lambda: write("second"))
+    finally:
+        touched.close()
+    assert written == ["first"]
 
 
 def test_it_stops_after_the_batch_that_is_solved(study, tmp_path, monkeypatch):

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import itertools
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from pressed_problem import PressedSlab, learn_affine, truth
 
 import palpate as pp
+import pressed
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
+from palpate.format import share
 from palpate.improvement.improve import FIRST, RULES
 from palpate.sweeps import ExternalProblem, local_cluster
 from palpate.sweeps.plan import config_hash
@@ -67,6 +70,23 @@ def test_it_ends_when_the_error_is_kept_on_all_unseen_solves(improve):
     *_, last = improve(until=0.9)
     assert last.reached
     assert (last.solves, last.unseen) == (FIRST, 10)
+
+
+def test_a_surrogate_that_misses_begins_the_row_anew(improve):
+    """Surrogates of 12 and 20 solves are seven times too stiff; the one of 16, which stays in the hand, counts once."""
+
+    def learn(data: Dataset, effort: float):
+        if len(data) in {12, 20}:
+            return pressed.surrogate(factor=7.0), SimpleNamespace()
+        return learn_affine(data, effort)
+
+    steps = list(improve(until=0.9, learner=learn))
+    learnt = [step for step in steps if step.phase == "learnt"]
+    assert [step.solves for step in learnt] == [12, 16, 20, 24, 28]
+    assert not learnt[2].is_new
+    assert learnt[2].error == learnt[1].error < 0.9, "the error shown is that of what is kept"
+    assert steps[-1].reached
+    assert share(steps[-1].error) in steps[-1].reason
 
 
 @pytest.mark.parametrize("rule", RULES)

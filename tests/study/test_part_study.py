@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import meshio
@@ -18,7 +19,7 @@ from palpate.study.improve_study import conclude, improve_study
 from palpate.study.material_records import SolidMaterialRecord
 from palpate.study.part_records import PartRecord
 from palpate.study.part_study import part_study
-from palpate.study.run import Paths, report_study
+from palpate.study.run import Paths, load_model, report_study
 from palpate.surrogates import Surrogate
 
 SIZE = (0.04, 0.03, 0.02)
@@ -319,6 +320,13 @@ def test_a_part_goes_the_whole_way(folder, tmp_path):
     page = report_study(tmp_path / "report.html", [outcome]).read_text(encoding="utf-8")
     assert "Solid of pad.stl" in page
     assert "fixed at table" in page
+    others = last.train.take(np.arange(10))  # as if these were all solves, and the surrogate one of fewer
+    conclude(study, paths, replace(last, train=others, phase="solved"))
+    with pytest.raises(UsageError, match="other solves"):
+        load_model(paths, others)
+    conclude(study, paths, replace(last, train=others))
+    known, _ = load_model(paths, others)  # all were learnt from, which gave nothing better
+    assert known.meta["dataset"]["hash"] == last.train.hash, "what it was learnt from stays as it is"
     again = list(improve_study(study, paths, **wanted))
     assert [step.phase for step in again] == ["learnt", "judged", "ended"], (
         "nothing is solved or learnt again"

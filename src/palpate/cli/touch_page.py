@@ -18,7 +18,7 @@ import numpy as np
 
 from palpate.cli.console import Console
 from palpate.cli.improvement_lines import step_line
-from palpate.errors import PalpateError
+from palpate.errors import PalpateError, UsageError
 from palpate.format import duration
 from palpate.processes import helper_environment, kill_group
 from palpate.study import Study
@@ -54,9 +54,10 @@ class _Work:
 
     def __iter__(self) -> Any:
         assert self._process.stdout is not None
-        for line in self._process.stdout:
-            with contextlib.suppress(ValueError):  # cut off by a kill
-                yield dict(json.loads(line))
+        with self._process.stdout as lines:
+            for line in lines:
+                with contextlib.suppress(ValueError):  # cut off by a kill
+                    yield dict(json.loads(line))
 
     def close(self) -> int:
         """End the process and all that it started; return its exit code."""
@@ -100,7 +101,7 @@ class TouchedPart:
         self._made = time.monotonic()
         self._progress = Progress("starting", target=until)
         self._work = _Work()
-        self._stopped = False
+        self._stopped, self._begun, self._beginning = False, False, threading.Lock()
         self._bodies: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         self._threads: list[threading.Thread] = []
 
@@ -109,8 +110,28 @@ class TouchedPart:
         if name not in self.times:
             self.times[name] = time.monotonic() - self._made
 
-    def begin(self, file: Path) -> None:
-        """Let the work on a study file begin, and return at once."""
+    def begin(self, file_of: Callable[[], Path]) -> None:
+        """Let the work on a study file begin, and return at once.
+
+        Parameters
+        ----------
+        file_of : callable
+            Writes the study where that is to be done, and returns its file. Where it fails nothing has begun.
+
+        Raises
+        ------
+        UsageError
+            If the work has begun before; then nothing is written.
+        """
+        with self._beginning:
+            if self._begun:
+                raise UsageError(
+                    "The work has begun already.",
+                    why="A part's page carries out one study.",
+                    fix="Touch what comes of it, or end the command and give it again.",
+                )
+            file = file_of()
+            self._begun = True
         self.mark("start")
         wish = {"study": str(file), "until": self.until, "limit": self.limit, "workers": self.workers}
         self._work.ask(json.dumps(wish))
@@ -124,6 +145,8 @@ class TouchedPart:
         self._stopped = True
         self._bodies.put(None)
         self._work.close()
+        for thread in self._threads:
+            thread.join(1.0)
 
     def _heed_stop(self) -> None:
         while not self._stopped:
@@ -252,8 +275,7 @@ def touch_on_page(
     failures: list[BaseException] = []
 
     def begin(choices: PartChoices) -> None:
-        study = chosen_study(known[0], choices)
-        touched.begin(write(study))
+        touched.begin(lambda: write(chosen_study(known[0], choices)))
 
     def take_unit(unit: str) -> ShownPart:
         known[:] = [study_of(unit)[0]]
@@ -264,9 +286,9 @@ def touch_on_page(
             study, file, there = study_of(None)
             known.append(study)
             part = shown_part(study)
-            page.show_part(part)
+            page.show_part(part, begun=there or at_once)
             if there:
-                touched.begin(file)
+                touched.begin(lambda: file)
             elif at_once:
                 begin(part.choices)
         except PalpateError as error:

@@ -258,7 +258,8 @@ class _Improvement:
     best: tuple[Surrogate, Any] | None = None
     learnt_from: int = 0
     values: np.ndarray = field(default_factory=lambda: np.empty(0))
-    errors: list[float] = field(default_factory=list)
+    error: float = math.nan  # of the surrogate that is kept
+    errors: list[float] = field(default_factory=list)  # of each surrogate that was learnt, kept or not
 
     def run(self, known: tuple[Surrogate, Any] | None) -> Iterator[ImprovementStep]:
         if len(self.kept) < FIRST:
@@ -272,8 +273,8 @@ class _Improvement:
             self._learn(QUICK)
         yield self._step("learnt", is_new=True)  # a hand can feel it before it is judged
         self._judge_by(max(UNSEEN_FIRST, len(self.judging)))
-        error = self._error(self.best)
-        self.errors.append(error)
+        self.error = self._error(self.best)
+        self.errors.append(self.error)
         yield self._step("judged")
         while not (reason := self._reason()):
             below = self.errors[-1] <= self.stop.until
@@ -297,9 +298,10 @@ class _Improvement:
             len(self.errors) == 1
         ):  # a surrogate of an earlier run: all unseen solves judge it before anything else
             self._judge_by(len(self.unseen))
-            self.errors[-1] = self._error(self.best)
+            self.error = self.errors[-1] = self._error(self.best)
         return self.stop.reason(
             self.errors,
+            kept=self.error,
             complete=self._is_complete,
             solves=len(self.kept),
             seconds=time.monotonic() - self.began,
@@ -323,7 +325,7 @@ class _Improvement:
         if self.rule == "sobol":  # the sequence that began, taken further
             return [x[None] for x in self.problem.design(solved + self.size, self.seed, depths=1)[solved:]]
         model = self._fit()
-        near = bool(self.errors) and self.errors[-1] <= NEAR * self.stop.until
+        near = self.error <= NEAR * self.stop.until
         singles = self.problem.design(CANDIDATES, self.seed + 7919 * (1 + solved), depths=1)
         parts = [singles]
         if near and self.rule == "variance":
@@ -402,7 +404,7 @@ class _Improvement:
 
     def _learn_and_judge(self) -> bool:
         """Learn from all solves, keep the better of the new and the last surrogate, and return whether it's new."""
-        near = self.errors[-1] <= NEAR * self.stop.until
+        near = self.error <= NEAR * self.stop.until
         result = self._learn(PROPER if near else QUICK)
         error, before = self._error(result), self._error(self.best)
         if not near and error <= NEAR * self.stop.until:
@@ -412,7 +414,8 @@ class _Improvement:
         is_new = not error > BETTER * before
         if is_new:
             self._take(result)
-        self.errors.append(error if is_new else before)
+        self.errors.append(error)  # its own: one lucky surrogate, kept after a miss, would count as two
+        self.error = error if is_new else before
         return is_new
 
     def _error(self, result: tuple[Surrogate, Any] | None) -> float:

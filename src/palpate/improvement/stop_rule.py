@@ -41,7 +41,8 @@ class StopRule:
     """The rule that ends an improvement.
 
     A single error below the wanted one may be luck: many surrogates are judged by the same solves, and the search for
-    each scatters. So the error must hold for two surrogates in a row, and the second is judged by all unseen solves.
+    each scatters. So the error must hold for two surrogates in a row, whether the second is kept or not, and the second
+    is judged by all unseen solves.
 
     Attributes
     ----------
@@ -74,7 +75,15 @@ class StopRule:
                 f"The limits are {self.limit} s and {self.most} solves.", fix="Give positive numbers."
             )
 
-    def reason(self, errors: Sequence[float], *, complete: bool, solves: int, seconds: float) -> str:
+    def reason(
+        self,
+        errors: Sequence[float],
+        *,
+        complete: bool,
+        solves: int,
+        seconds: float,
+        kept: float | None = None,
+    ) -> str:
         """Return why to stop, as a sentence; empty to go on.
 
         Parameters
@@ -87,9 +96,12 @@ class StopRule:
             Solves to learn from.
         seconds : float
             Time since the beginning.
+        kept : float, optional
+            Error of the surrogate that is kept, to be told; by default that of the last one.
         """
         if self.is_reached(errors, complete=complete):
-            return f"The force error is {share(errors[-1])} on unseen solves, {share(self.until)} were asked for."
+            told = errors[-1] if kept is None else kept
+            return f"The force error is {share(told)} on unseen solves, {share(self.until)} were asked for."
         if seconds >= self.limit:
             return f"The limit of {duration(self.limit)} is over."
         if solves >= self.most:

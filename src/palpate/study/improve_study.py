@@ -124,11 +124,13 @@ def conclude(study: Study, paths: Paths, step: ImprovementStep) -> Outcome:
         raise UsageError("This step has no solves yet.", fix="Conclude with the last step.")
     train, test = split_rows(study, step.train, step.test)
     validation = validate_study(study, step.surrogate, test, step.history)
-    # the last batch may have brought nothing: the surrogate of fewer solves has still not seen the unseen ones
-    origin = (
-        {**step.surrogate.meta.get("dataset", {}), "hash": train.hash} if isinstance(train, Dataset) else {}
-    )
-    surrogate = replace(step.surrogate, meta={**step.surrogate.meta, "dataset": origin})
+    surrogate = step.surrogate
+    origin = surrogate.meta.get("dataset", {})
+    if step.phase != "solved" and isinstance(train, Dataset) and origin.get("hash") != train.hash:
+        # a surrogate of all solves was learnt, and was worse; this one of fewer has not seen the unseen ones either
+        surrogate = replace(
+            surrogate, meta={**surrogate.meta, "dataset": {**origin, "no_better": train.hash}}
+        )
     model = with_validation(surrogate, validation, earlier_curve(paths, study.name), step.solves)
     save_model(paths, model, step.history)
     return Outcome(study, model, train, test, validation, step.history)

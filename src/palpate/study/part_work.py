@@ -92,8 +92,9 @@ def work_on(
 
     began = time.monotonic()
     rough = rough_study(study)
-    kept = [paths.model] if rough is None else [paths.model, Paths(paths.folder, rough.name).model]
-    known = next((path for path in kept if path.exists()), None)
+    known = _known(study, paths)
+    if known is None and rough is not None:
+        known = _known(rough, Paths(paths.folder, rough.name))
     if known is not None:
         say({"body": str(known)})
     elif rough is not None:
@@ -121,6 +122,21 @@ def work_on(
             **_callbacks(say),
         )
         _carry_out(study, paths, steps, say, stopped)
+
+
+def _known(study: Study, paths: Paths) -> Path | None:
+    """Return the file of a study's surrogate, where there is one that was learnt from this very body and ball."""
+    from palpate.surrogates import Surrogate
+
+    if not paths.model.exists():
+        return None
+    try:
+        origin = Surrogate.load(paths.model).meta.get("dataset", {}).get("provenance", {})
+        wanted = study.problem().describe()
+    except PalpateError:  # what is wrong with the study is said when it is solved
+        return None
+    # compared as the file has it: tuples are lists there
+    return paths.model if origin.get("problem") == json.loads(json.dumps(wanted)) else None
 
 
 def _first_touch(rough: Study, paths: Paths, cluster: Any, say: Say) -> None:
@@ -152,7 +168,7 @@ def _carry_out(
         if step.is_new and step.model_path is not None:
             own = step.model_path.with_name(f"{study.name}-{step.solves}.palpate")
             say({"body": str(own if own.exists() else step.model_path)})
-        if stopped() and step.phase != "ended":
+        if stopped() and step.phase in {"learnt", "judged"}:  # what was solved has been learnt from
             break
     reason = last.reason or "It was stopped."
     if last.train is None or not last.unseen or last.surrogate is None:

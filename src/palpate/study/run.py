@@ -357,13 +357,17 @@ def save_model(paths: Paths, model: Any, history: Any) -> None:
 def load_model(paths: Paths, train: Rows) -> tuple[Any, Any]:
     """Read what was learnt, and the record of its filter where there is one.
 
+    It was learnt from just these rows, or from the first of them where all of them gave no better one: then the
+    ``no_better`` of its dataset is the hash of all.
+
     Raises
     ------
     UsageError
         If it was learnt from other rows than these: rows that it has seen might be taken for unseen ones.
     """
     model = Surrogate.load(paths.model)
-    if isinstance(train, Dataset) and model.meta.get("dataset", {}).get("hash") != train.hash:
+    origin = model.meta.get("dataset", {})
+    if isinstance(train, Dataset) and train.hash not in (origin.get("hash"), origin.get("no_better")):
         raise UsageError(
             f"{paths.model} was learnt from other solves than this study trains with.",
             why="The sweep or its split was changed since, and what is unseen here may have been seen there.",

@@ -187,12 +187,20 @@ class PartPage(LocalServer):
         """The part's name."""
         return f"{self.name}. Set it up there, and touch it;"
 
-    def show_part(self, part: ShownPart) -> None:
-        """Show a part, on which a person now chooses what is held and touched."""
+    def show_part(self, part: ShownPart, *, begun: bool = False) -> None:
+        """Show a part, on which a person now chooses what is held and touched.
+
+        Parameters
+        ----------
+        part : ShownPart
+            The part.
+        begun : bool
+            Whether the work begins without a person's choice: no page can start it then.
+        """
         self._part = part if self._on_unit is not None else replace(part, units=())
         self._parts = BinaryAnswers(keep=True)
         self._parts_shown += 1
-        self._turn("choosing", "")
+        self._turn("working" if begun else "choosing", "")
 
     def show_progress(self, progress: Progress) -> None:
         """Show how far solves and learning are; where nobody has pressed *start*, the work begins without."""

@@ -20,7 +20,7 @@ from conftest import require_program
 from exported_bodies import BODIES, body, networks
 from models import linear_network
 from palpate.errors import AccuracyError, UsageError
-from palpate.export import export_c, export_lib
+from palpate.export import export_c, export_fmu, export_lib
 from palpate.export.c_export import block_of, compare_c
 from palpate.export.check_points import Comparison, Precision, compare_body, places, true_answers
 from palpate.export.check_program import CheckProgram
@@ -208,11 +208,21 @@ def test_a_damaged_table_is_found(tmp_path):
     assert not compare_c(thing, block, done, compiler, single=False).passed
 
 
-def test_an_export_that_differs_is_refused(tmp_path, monkeypatch):
+def test_an_export_that_differs_is_refused_and_leaves_no_file(tmp_path, monkeypatch):
     require_program("gcc")
     thing = pp.Surrogate(body("pad").energy)
-    monkeypatch.setattr(
-        "palpate.export.c_export.compare_c", lambda *_, **__: compare_body(thing, _Off(thing, 1.1))
-    )
-    with pytest.raises(AccuracyError, match="do not answer as palpate does"):
-        export_c(thing, tmp_path)
+    off = compare_body(thing, _Off(thing, 1.1))
+    monkeypatch.setattr("palpate.export.c_export.compare_c", lambda *_, **__: off)
+    monkeypatch.setattr("palpate.export.lib_export.compare_body", lambda *_, **__: off)
+
+    def differs(_, fmu, **__):
+        fmu.answers(np.zeros((1, 3 + len(thing.parameters))))
+        return off
+
+    monkeypatch.setattr("palpate.export.fmu_export.compare_body", differs)
+    for export in (export_c, export_lib):
+        with pytest.raises(AccuracyError, match="not answer as palpate does"):
+            export(thing, tmp_path / "out")
+    with pytest.raises(AccuracyError, match="not answer as palpate does"):
+        export_fmu(thing, tmp_path / "pad.fmu")
+    assert list(tmp_path.iterdir()) == []

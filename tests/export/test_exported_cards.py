@@ -25,7 +25,7 @@ def _c(thing: Surrogate, folder: Path) -> tuple[str, str]:
 
 
 def _fmu(thing: Surrogate, folder: Path) -> tuple[str, str]:
-    done = export_fmu(thing, folder / "body.fmu")
+    done = export_fmu(thing, folder / "body.fmu", check=False)
     with zipfile.ZipFile(done.path) as file:
         return file.read("documentation/card.json").decode(), done.hash
 

@@ -185,6 +185,13 @@ def test_a_long_series_is_thinned_to_what_viewers_show(tmp_path):
     assert scene["meshes"][0]["extras"]["targetNames"][0] == "0"
 
 
+def test_cells_that_are_no_triangles_are_refused_in_words():
+    with pytest.raises(UsageError, match="no triangles") as raised:
+        ShapeSeries(np.eye(3), np.array([[0, 1, 3]]), np.zeros((1, 3, 3)), np.zeros(1))
+    assert raised.value.why
+    assert raised.value.fix
+
+
 def test_a_learnt_bodys_stroke_goes_out(tmp_path):
     body = Surrogate(touch_energy(), {"displacement": field()}, meta={"name": "slab"})
     X = stroke_of(body, 5)

@@ -56,7 +56,11 @@ def card(
                 fix="Add --save, which writes them into the file.",
             )
         if not hasattr(model, "signed"):
-            raise UsageError(f"{file} is no learnt body; its card can't be signed.")
+            raise UsageError(
+                f"{file} is no learnt body; its card can't be signed.",
+                why="Author and licence stand in the files of learnt bodies alone.",
+                fix="Leave out --author, --licence and --save, or name the file that `palpate learn` wrote of a body.",
+            )
         model = model.signed(author, licence)
         model.save(file)
     found = card_of(model, file)

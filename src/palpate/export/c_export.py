@@ -106,30 +106,34 @@ def export_c(
     UsageError
         If the name is no identifier, or a part of the body has no C source.
     AccuracyError
-        If the compiled files differ from palpate by more than they may.
+        If the compiled files differ from palpate by more than they may; nothing is written.
     """
     name = require_name(identifier(_default_name(thing)) if name is None else name)
     block = block_of(thing, field=field, with_field=with_field, deviation=deviation)
-    folder = Path(out)
-    folder.mkdir(parents=True, exist_ok=True)
     texts = c_files(thing, block, name, single=single)
     card = card_of(thing).with_hash("weights", block.hash)
     texts |= {f"{name}_card.md": card.to_markdown(), f"{name}_card.json": card.to_json()}
-    files = tuple(write_file(folder / file, text) for file, text in texts.items())
-    done = ExportedC(files, name, block.hash, block.field, None)
-    path = find_compiler(compiler) if check else None
-    if path is None:
-        return done
-    comparison = compare_c(thing, block, done, path, single=single)
-    if not comparison.passed:
-        raise AccuracyError(
-            f"The exported files do not answer as palpate does: {comparison}.",
-            why="Single precision is too coarse for this body."
-            if single
-            else "The compiler may bend the arithmetic.",
-            fix="Export in double precision." if single else "Try another compiler, and report this.",
-        )
-    return ExportedC(files, name, block.hash, block.field, comparison)
+    path, comparison = find_compiler(compiler) if check else None, None
+    if path is not None:
+        with tempfile.TemporaryDirectory() as place:
+            tried = ExportedC(_write(Path(place), texts), name, block.hash, block.field, None)
+            comparison = compare_c(thing, block, tried, path, single=single)
+        if not comparison.passed:
+            raise AccuracyError(
+                f"The exported files do not answer as palpate does: {comparison}.",
+                why="Single precision is too coarse for this body."
+                if single
+                else "The compiler may bend the arithmetic.",
+                fix="Nothing was written. "
+                + ("Export in double precision." if single else "Try another compiler, and report this."),
+            )
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    return ExportedC(_write(folder, texts), name, block.hash, block.field, comparison)
+
+
+def _write(folder: Path, texts: dict[str, str]) -> tuple[Path, ...]:
+    return tuple(write_file(folder / file, text) for file, text in texts.items())
 
 
 def block_of(

@@ -72,7 +72,11 @@ class ShapeSeries:
                 fix="Leave out states that did not converge.",
             )
         if cells.ndim != 2 or cells.shape[1] not in {2, 3} or (cells.size and cells.max() >= len(points)):
-            raise UsageError("The cells are no triangles or pieces of a line of these points.")
+            raise UsageError(
+                f"The cells {cells.shape} are no triangles or pieces of a line of {len(points)} points.",
+                why="A row of cells has the numbers of 3 or of 2 points, counted from 0.",
+                fix="Split other faces into triangles, and check that the cells belong to these points.",
+            )
         for name, value in (("points", points), ("displacement", states), ("cells", cells)):
             object.__setattr__(self, name, value)
         object.__setattr__(self, "values", np.asarray(self.values, dtype=float))

@@ -7,9 +7,12 @@ is compiled by this machine's compiler; without one the sources and their CMake 
 from __future__ import annotations
 
 import os
+import shutil
 import sys
+import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from palpate.errors import AccuracyError
 from palpate.export.c_export import ExportedC, block_of, export_c
@@ -90,29 +93,61 @@ def export_lib(
     ResourceError
         If the compiler refuses the sources.
     AccuracyError
-        If the library differs from palpate by more than it may.
+        If the library differs from palpate by more than it may; nothing is written.
     """
-    folder = Path(out)
     parts = {"field": field, "with_field": with_field, "deviation": deviation}
-    done = export_c(surrogate, folder, name=name, check=False, **parts)  # type: ignore[arg-type]
+    # a library that was loaded can't be removed on Windows
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as place:
+        built = _build(surrogate, Path(place), name, parts, compiler, check=check)
+        return _copy(built, Path(out))
+
+
+def _build(
+    surrogate: Surrogate,
+    folder: Path,
+    name: str | None,
+    parts: dict[str, Any],
+    compiler: str | None,
+    *,
+    check: bool,
+) -> ExportedLibrary:
+    """Return the library and all beside it, written into a folder and compared there."""
+    done = export_c(surrogate, folder, name=name, check=False, **parts)
     wrappers = tuple(write_file(folder / file, text) for file, text in _wrappers(surrogate, done).items())
     path = find_compiler(compiler)
     if path is None:
         return ExportedLibrary(done, wrappers, None, None)
     library = folder / library_name(done.name)
-    compile_c(path, list(done.sources), library, options=("-shared", "-fPIC"))
+    compile_c(path, list(done.sources), library, options=("-shared", "-fPIC", *_install_name(library.name)))
     whole = ExportedLibrary(done, wrappers, library, None)
     if not check:
         return whole
-    block = block_of(surrogate, **parts)  # type: ignore[arg-type]
+    block = block_of(surrogate, **parts)
     asked = CheckLibrary(folder / f"{done.name}.py")
     comparison = compare_body(surrogate, asked, field=block.field, deviation=ROOT in block.tables)
     if not comparison.passed:
         raise AccuracyError(
             f"The library does not answer as palpate does: {comparison}.",
-            fix="Try another compiler, and report this.",
+            fix="Nothing was written. Try another compiler, and report this.",
         )
     return replace(whole, comparison=comparison)
+
+
+def _install_name(file: str) -> tuple[str, ...]:
+    """Return the options that keep the folder of the build out of a library of macOS."""
+    return (f"-Wl,-install_name,@rpath/{file}",) if sys.platform == "darwin" else ()
+
+
+def _copy(built: ExportedLibrary, folder: Path) -> ExportedLibrary:
+    """Write all files into a folder, which is made if need be."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for file in built.files:
+        write_file(folder / file.name, file.read_bytes())
+    library = None if built.library is None else folder / built.library.name
+    if built.library is not None and library is not None:
+        shutil.copymode(built.library, library)
+    sources = replace(built.sources, files=tuple(folder / f.name for f in built.sources.files))
+    return ExportedLibrary(sources, tuple(folder / f.name for f in built.wrappers), library, built.comparison)
 
 
 def _wrappers(surrogate: Surrogate, done: ExportedC) -> dict[str, str]:

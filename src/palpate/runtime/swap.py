@@ -188,9 +188,16 @@ def swap_between(
             fix="Learn it again.",
         )
     evaluator = new.evaluator()
-    if len(evaluator.indentation) > MAX_PLACES or len(evaluator.loads) > MAX_INPUTS:
+    if len(evaluator.loads) > MAX_INPUTS:
+        raise UsageError(
+            f"{new.name} has {len(evaluator.loads)} inputs; the runtime carries {MAX_INPUTS}.",
+            why="The memory that loop and viewer share has room for no more.",
+            fix="Learn it with fewer inputs.",
+        )
+    if len(evaluator.indentation) > MAX_PLACES:
         raise UsageError(
             f"{new.name} keeps indentations at {len(evaluator.indentation)} places; the runtime carries {MAX_PLACES}.",
+            why="The memory that loop and viewer share has room for no more.",
             fix="Save it with a larger spacing.",
         )
     return Swap(_Successor(evaluator, carry, largest, _gap(old, new)), seconds)

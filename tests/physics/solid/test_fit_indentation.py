@@ -83,6 +83,8 @@ def test_what_an_indentation_can_not_tell_is_refused(solved):
         fit("yeoh", solved, poisson=0.45)
     with pytest.raises(UsageError, match="one modulus"):
         fit(Yeoh, solved, poisson=0.45)
+    with pytest.raises(UsageError, match="has no force"):
+        fit(None, IndentationTest(DEPTHS, 0 * DEPTHS, RADIUS, THICKNESS), poisson=0.45)
     with pytest.raises(UsageError, match="from 0 to"):
         IndentationTest(DEPTHS * 1000, DEPTHS, RADIUS, THICKNESS)
     with pytest.raises(UsageError, match="radius of the ball"):

@@ -1,8 +1,10 @@
 """Constants of a material from tests on specimens: `fit`.
 
-The constants minimise Σ ((model − measured)/scale)² over all rows of all tests. Stresses are linear in moduli, so that
-exponents alone need a search, and moduli are their (non-negative) linear least squares: variable projection (Golub &
-Pereyra 1973) with SciPy's `least_squares`, a trust region with bounds (Branch, Coleman & Li 1999), and `nnls`.
+The constants minimise Σ ((model − measured)/scale)² over all rows of all tests. Stresses of an incompressible law are
+linear in its moduli, so that exponents alone need a search, and moduli are their (non-negative) linear least squares:
+variable projection (Golub & Pereyra 1973) with SciPy's `least_squares`, a trust region with bounds (Branch, Coleman &
+Li 1999), and `nnls`. Of a compressible law the sides' stretch depends on the ratio of the moduli, so that this is a
+first guess, from which `least_squares` (a dogleg in a box, Voglis & Lagaris 2004) searches all constants at once.
 Intervals are those of the linearised model, s² (JᵀJ)⁻¹ with Student's t; of moduli whose sign is known, in their
 logarithm. A law is stable if Drucker's criterion holds in every mode as far as I₁ − 3 goes in the data, and `margin`
 farther. Laws are compared by Akaike's criterion for few rows (Hurvich & Tsai 1989), N ln(RSS/N) + 2k +
@@ -37,6 +39,7 @@ _WEIGHTS = ("peak", "stress", "relative")
 _SMALL = 0.02  # of a test's largest stress: below it a relative error no longer counts
 _DIFFERENCE = 1e-5  # of a coordinate, for the Jacobian
 _REFUSED = 1e6  # residual of constants that no material has
+_STEPS = 60  # of the last search of a compressible law, which begins near its end
 _VOLUME = (-0.02, 0.02)  # J − 1 over which a nearly incompressible law is asked
 _MODES = ("uniaxial", "equibiaxial", "planar", "simple shear")
 
@@ -102,7 +105,11 @@ def fit(
 
         return fit_indentation(law, records, poisson, confidence)
     if not -1 < poisson <= 0.5:
-        raise UsageError(f"Poisson's ratio is {poisson!r}.", why="It lies above -1 and is at most 0.5.")
+        raise UsageError(
+            f"Poisson's ratio is {poisson!r}.",
+            why="It lies above -1 and is at most 0.5.",
+            fix="Pass 0.5 for elastomers and wet tissue, or the ratio that was measured.",
+        )
     names = CANDIDATES if law is None else law if isinstance(law, list | tuple) else (law,)
     problem = _Problem(tuple(records), poisson, weight, margin)
     found, failures = [], []
@@ -194,29 +201,69 @@ class _Problem:
         if form.origin is not None:
             found = self._search(form, form.origin, measured)
             return None if found is None else self._solved(form, found, measured)
-        best: tuple[float, np.ndarray] | None = None
+        bends = self.poisson < 0.5 and form.moduli > 1  # stresses are not linear in the moduli
+        best: tuple[float, np.ndarray, tuple[float, ...]] | None = None
         for start in form.starts:
             exponents = self._exponents(form, start, measured, stable=stable)
             x, residual = self._moduli(form, exponents, measured, stable=stable)
+            if not _is_material(form, x, self.poisson):
+                continue
+            residual = self._residuals(form, x, measured) if bends else residual
             cost = float(residual @ residual)
-            if (best is None or cost < best[0]) and _is_material(form, x, self.poisson):
-                best = cost, x
-        return None if best is None else self._solved(form, best[1], measured)
+            if np.abs(residual).max() < _REFUSED and (best is None or cost < best[0]):
+                best = cost, x, start
+        if best is None:
+            return None
+        _, x, start = best
+        x = self._refine(form, x, start, measured, stable=stable) if bends else x
+        return self._solved(form, x, measured)
 
     def _search(self, form: LawForm, origin: np.ndarray, measured: np.ndarray) -> np.ndarray | None:
         """Return the constants (n,) of a user's law, from its first guesses."""
         from scipy.optimize import least_squares
 
         def residuals(x: np.ndarray) -> np.ndarray:
-            try:
-                values = self.model(form, x) - measured
-            except PalpateError:  # constants that no material has
-                return np.full(len(measured), _REFUSED)
-            return np.where(np.isfinite(values), values, _REFUSED)
+            return self._residuals(form, x, measured)
 
         scale = np.where(origin == 0, 1.0, np.abs(origin))
         found = least_squares(residuals, origin, jac="3-point", x_scale=scale, xtol=1e-10, ftol=1e-12)
         return None if np.abs(found.fun).max() >= _REFUSED else np.asarray(found.x)
+
+    def _residuals(self, form: LawForm, x: np.ndarray, measured: np.ndarray) -> np.ndarray:
+        """Return model − measured (N,), which is large of constants that no material has."""
+        try:
+            values = self.model(form, x) - measured
+        except PalpateError:
+            return np.full(len(measured), _REFUSED)
+        return np.where(np.isfinite(values), values, _REFUSED)
+
+    def _refine(
+        self, form: LawForm, x: np.ndarray, start: tuple[float, ...], measured: np.ndarray, *, stable: bool
+    ) -> np.ndarray:
+        """Return the best coordinates (n,) of a compressible law near a first guess; a modulus can end at 0."""
+        from scipy.optimize import least_squares
+
+        size = np.append(np.full(form.moduli, np.abs(x[: form.moduli]).max()), np.abs(x[form.moduli :]))
+        low, high = form.exponent_bounds(start)
+
+        def residuals(z: np.ndarray) -> np.ndarray:
+            return self._residuals(form, z * size, measured)
+
+        found = least_squares(
+            residuals,
+            x / size,
+            jac="3-point",
+            bounds=(
+                np.append(np.full(form.moduli, 0.0 if stable else -np.inf), low / size[form.moduli :]),
+                np.append(np.full(form.moduli, np.inf), high / size[form.moduli :]),
+            ),
+            method="dogbox",  # which leaves a modulus at 0 exactly
+            xtol=1e-10,
+            ftol=1e-12,
+            gtol=1e-12,
+            max_nfev=_STEPS,
+        )
+        return np.asarray(found.x * size)
 
     def _exponents(
         self, form: LawForm, start: tuple[float, ...], measured: np.ndarray, *, stable: bool
@@ -243,7 +290,10 @@ class _Problem:
     def _moduli(
         self, form: LawForm, exponents: np.ndarray | tuple[()], measured: np.ndarray, *, stable: bool
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the coordinates (n,) whose moduli are the least squares at these exponents, and residuals (N,)."""
+        """Return the coordinates (n,) whose moduli are the least squares at these exponents, and residuals (N,).
+
+        Both are exact of an incompressible law, and of one with a single modulus.
+        """
         from scipy.optimize import nnls
 
         unit = float(max(np.abs(t.stress).max() for t in self.tests))
@@ -255,6 +305,8 @@ class _Problem:
             moved[i] += unit
             columns.append(self.model(form, moved) - first)
         A = np.stack(columns, axis=1)
+        if not np.isfinite(A).all():  # no sides' stretch was found at these exponents
+            return origin, np.full(len(measured), _REFUSED)
         found = nnls(A, measured)[0] if stable else np.linalg.lstsq(A, measured, rcond=None)[0]
         return np.append(found * unit, exponents), A @ found - measured
 

@@ -1,6 +1,7 @@
 """Laws whose constants can be fitted: each as coordinates of a search, and as the material that they make.
 
-The coordinates of a search begin with moduli, in which stresses are linear, and end with exponents. Ogden's law is
+The coordinates of a search begin with moduli, in which an incompressible law's stresses are linear, and end with
+exponents. Ogden's law is
 searched by sₚ = ½ μₚ αₚ ≥ 0, the shares of its shear modulus: with none of them negative it is stable for every strain.
 """
 

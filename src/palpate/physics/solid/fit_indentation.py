@@ -63,7 +63,7 @@ def fit_indentation(law: Any, tests: Sequence[Any], poisson: float, confidence: 
     Raises
     ------
     UsageError
-        If indentations are mixed with other tests, or the forces don't push the ball back.
+        If indentations are mixed with other tests, or the forces are 0 or don't push the ball back.
     SolverError
         If the slab can't be solved.
     """
@@ -72,6 +72,12 @@ def fit_indentation(law: Any, tests: Sequence[Any], poisson: float, confidence: 
             "Indentations and tests of stress can't be fitted together.",
             why="An indentation tells one modulus, that of a law of given shape.",
             fix="Fit the tests of stress first, and scale the law that comes out: fit(found.material, indentation).",
+        )
+    if not min(np.abs(t.force).max() for t in tests) > 0:
+        raise UsageError(
+            "An indentation has no force.",
+            why="All its forces are 0, and a modulus is the scale of a force.",
+            fix="Check the column of the force, and that the rows go beyond the first contact.",
         )
     base = _law_of(law, poisson, tests)
     curves = [_Curve.of(base, test) for test in tests]
@@ -218,7 +224,11 @@ def _law_of(law: Any, poisson: float, tests: Sequence[IndentationTest]) -> Any:
         or law is NeoHookean
     ):
         if not -1 < poisson <= 0.5:
-            raise UsageError(f"Poisson's ratio is {poisson!r}.", why="It lies above -1 and is at most 0.5.")
+            raise UsageError(
+                f"Poisson's ratio is {poisson!r}.",
+                why="It lies above -1 and is at most 0.5.",
+                fix="Pass 0.45 to 0.5 for soft tissue and elastomers, or the ratio that was measured.",
+            )
         ratio = min(poisson, HIGHEST)
         guess = float(np.mean([hertz_modulus(t, ratio) for t in tests]))
         return NeoHookean(max(guess, 1.0) if math.isfinite(guess) else 1.0, ratio)

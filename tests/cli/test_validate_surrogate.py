@@ -29,10 +29,11 @@ def test_a_good_surrogate_is_told_from_its_file_and_passes(palpate, folder):
         "Force against depth",
         "Error on the touched surface",
         "Where to trust it",
+        "Where the ball went",
         "Worst cases",
     ):
         assert heading in page
-    assert page.count("<svg") == 4
+    assert page.count("<svg") == 5
 
 
 def test_a_miss_is_exit_code_one_in_plain_words(palpate, folder):

@@ -192,6 +192,12 @@ def test_two_moduli_of_a_compressible_law_come_back_exactly():
     assert all(c.high - c.low < 1e-4 * c.value for c in found.constants)
 
 
+def test_terms_of_a_compressible_ogden_law_come_back():
+    law = pp.materials.Ogden.with_poisson(0.45, mu=(1e3, -40.0), alpha=(1.8, -4.0))
+    found = fit("ogden-2", records_of(law, ("equibiaxial", "planar")), poisson=0.45)
+    np.testing.assert_allclose([c.value for c in found.constants], (1e3, -40.0, 1.8, -4.0), rtol=1e-5)
+
+
 def gent(F, mu=1.0, limit=1.0):
     from palpate.physics.materials.tensors import log
 

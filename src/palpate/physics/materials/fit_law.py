@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -201,11 +201,14 @@ class _Problem:
         if form.origin is not None:
             found = self._search(form, form.origin, measured)
             return None if found is None else self._solved(form, found, measured)
-        bends = self.poisson < 0.5 and form.moduli > 1  # stresses are not linear in the moduli
+        bends = (
+            self.poisson < 0.5
+        )  # stresses are not linear in the moduli; the incompressible law is a first guess
+        first = replace(self, poisson=0.5)
         best: tuple[float, np.ndarray, tuple[float, ...]] | None = None
         for start in form.starts:
-            exponents = self._exponents(form, start, measured, stable=stable)
-            x, residual = self._moduli(form, exponents, measured, stable=stable)
+            exponents = first._exponents(form, start, measured, stable=stable)
+            x, residual = first._moduli(form, exponents, measured, stable=stable)
             if not _is_material(form, x, self.poisson):
                 continue
             residual = self._residuals(form, x, measured) if bends else residual

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
-import shutil
 import signal
 
 import pytest
 from hypothesis import settings
+
+from system_programs import require_program
 
 # machines are shared and kernels compile on first use: time is no law here; examples are the same on every run
 settings.register_profile("palpate", deadline=None, derandomize=True)
@@ -20,17 +21,6 @@ for library in ("OMP", "OPENBLAS", "MKL"):
 # a run in the background of a shell ignores interrupts, and so would the programs that tests interrupt
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
-
-
-def require_program(*names: str) -> str:
-    """Path of the first system program found; skips by name where none is, fails where CI promised it."""
-    for name in names:
-        if path := shutil.which(name):
-            return path
-    message = f"needs the system program {' or '.join(names)}"
-    if os.environ.get("PALPATE_CI"):
-        pytest.fail(message + ", which .ci/run installs")
-    pytest.skip(message)
 
 
 @pytest.fixture(scope="session")

@@ -6,8 +6,8 @@ import json
 
 import pytest
 
-from conftest import require_program
 from exported_bodies import body, networks
+from system_programs import require_program
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,6 @@ import numpy as np
 import pytest
 
 import palpate as pp
-from conftest import require_program
 from exported_bodies import BODIES, body, networks
 from models import linear_network
 from palpate.errors import AccuracyError, UsageError
@@ -29,6 +28,7 @@ from palpate.export.onnx_export import export_onnx
 from palpate.export.wasm_core import WasmCore
 from palpate.surrogates import LearntEnergy
 from palpate.surrogates.memories import Memory, MemoryState
+from system_programs import require_program
 
 SANITIZED = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 

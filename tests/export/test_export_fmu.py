@@ -11,7 +11,6 @@ import fmpy.validation
 import numpy as np
 import pytest
 
-from conftest import require_program
 from exported_bodies import body
 from palpate.errors import UsageError
 from palpate.export import export_fmu
@@ -20,6 +19,7 @@ from palpate.export.check_points import compare_body
 from palpate.export.fmu_binaries import built_binaries, fmu_source
 from palpate.export.weights_block import WeightsBlock, fnv
 from palpate.surrogates import LearntEnergy, Surrogate
+from system_programs import require_program
 
 NAMES = ["contact", "relaxation", "indentation", "pad", "constant", "iwan"]
 

@@ -10,9 +10,9 @@ import sys
 import numpy as np
 import pytest
 
-from conftest import require_program
 from exported_bodies import body
 from palpate.export import export_lib
+from system_programs import require_program
 
 
 @pytest.fixture(scope="module")

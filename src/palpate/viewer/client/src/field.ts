@@ -6,6 +6,8 @@ import type { FieldInfo, Modes, Surface, Vec3 } from "./messages";
 
 const OFFSETS = 4; // 1 and three coordinates
 
+type Rows = [Float32Array, Float32Array, Float32Array, Float32Array];
+
 export class Field {
   /** components of each point */
   readonly values: Float32Array;
@@ -30,7 +32,15 @@ export class Field {
     const { values, modes } = this;
     const n = values.length;
     values.set(modes.rest);
-    for (let k = 0; k < this.info.modes; k++) {
+    // four modes at a time: the values are loaded and stored less often
+    let k = 0;
+    for (; k + 4 <= this.info.modes; k += 4) {
+      const [a, b, c, d] = [numbers[k]!, numbers[k + 1]!, numbers[k + 2]!, numbers[k + 3]!];
+      if (a === 0 && b === 0 && c === 0 && d === 0) continue;
+      const [p, q, r, t] = [0, 1, 2, 3].map((j) => modes.modes.subarray((k + j) * n, (k + j + 1) * n)) as Rows;
+      for (let i = 0; i < n; i++) values[i]! += a * p[i]! + b * q[i]! + (c * r[i]! + d * t[i]!);
+    }
+    for (; k < this.info.modes; k++) {
       const b = numbers[k]!;
       if (b === 0) continue;
       const mode = modes.modes.subarray(k * n, (k + 1) * n);
@@ -43,11 +53,13 @@ export class Field {
   sizes(): Float32Array {
     const [u, per] = [this.values, this.info.components];
     if (per === 1) return u;
-    return Float32Array.from({ length: u.length / per }, (_, i) => {
+    const out = new Float32Array(u.length / per);
+    for (let i = 0, at = 0; i < out.length; i++) {
       let sum = 0;
-      for (let c = 0; c < per; c++) sum += u[per * i + c]! ** 2;
-      return Math.sqrt(sum);
-    });
+      for (let c = 0; c < per; c++, at++) sum += u[at]! * u[at]!;
+      out[i] = Math.sqrt(sum);
+    }
+    return out;
   }
 
   private local(profile: Float32Array, contact: Vec3): void {
@@ -55,19 +67,28 @@ export class Field {
     const { values, points } = this;
     const { reach, rows } = this.modes;
     const per = this.info.components;
-    for (const i of this.touched) {
-      const offset = [1, ...contact.map((o, c) => (points[3 * i + c]! - o) / reach)];
-      const far = Math.hypot(offset[1]!, offset[2]!, offset[3]!);
-      if (far >= 1) continue;
-      const t = far * (rows - 3);
+    const [cx, cy, cz] = contact;
+    const { touched } = this;
+    const cells = rows - 3;
+    const wide = OFFSETS * per;
+    const w = new Float64Array(4);
+    // this runs for thousands of points a picture: nothing is allocated in it
+    for (let k = 0; k < touched.length; k++) {
+      const i = touched[k]!;
+      const x = (points[3 * i]! - cx) / reach;
+      const y = (points[3 * i + 1]! - cy) / reach;
+      const z = (points[3 * i + 2]! - cz) / reach;
+      const square = x * x + y * y + z * z;
+      if (square >= 1) continue;
+      const t = Math.sqrt(square) * cells;
       const first = Math.min(Math.floor(t), rows - 4);
-      const w = weights(t - first);
+      weights(t - first, w);
       for (let c = 0; c < per; c++) {
         let sum = 0;
-        for (let h = 0; h < OFFSETS; h++) {
-          let along = 0;
-          for (let j = 0; j < 4; j++) along += w[j]! * profile[((first + j) * OFFSETS + h) * per + c]!;
-          sum += offset[h]! * along;
+        for (let j = 0; j < 4; j++) {
+          const at = (first + j) * wide + c;
+          const along = profile[at]! + x * profile[at + per]! + y * profile[at + 2 * per]! + z * profile[at + 3 * per]!;
+          sum += w[j]! * along;
         }
         values[per * i + c]! += sum;
       }
@@ -94,13 +115,11 @@ export class Indentation {
   }
 }
 
-/** The four uniform cubic B-splines at u in [0, 1] of a cell. */
-function weights(u: number): [number, number, number, number] {
+/** The four uniform cubic B-splines at u in [0, 1] of a cell, into `out`. */
+function weights(u: number, out: Float64Array): void {
   const v = 1 - u;
-  return [
-    v ** 3 / 6,
-    (3 * u ** 3 - 6 * u ** 2 + 4) / 6,
-    (3 * v ** 3 - 6 * v ** 2 + 4) / 6,
-    u ** 3 / 6,
-  ];
+  out[0] = (v * v * v) / 6;
+  out[1] = (3 * u * u * u - 6 * u * u + 4) / 6;
+  out[2] = (3 * v * v * v - 6 * v * v + 4) / 6;
+  out[3] = (u * u * u) / 6;
 }

@@ -48,8 +48,8 @@ def touch(name: str, folder: Path, until: str, minutes: float) -> dict[str, Any]
         }
     row: dict[str, Any] = {"part": part.name, "seconds": time.perf_counter() - began, "code": done.returncode}
     start = done.stdout.find("{")
-    if start >= 0:
-        said = json.loads(done.stdout[start:])
+    said = json.loads(done.stdout[start:]) if start >= 0 else {}
+    if "steps" in said:
         row |= {
             "steps": said["steps"],
             "reached": said["reached"],
@@ -57,7 +57,7 @@ def touch(name: str, folder: Path, until: str, minutes: float) -> dict[str, Any]
             "model": said["model"],
         }
     else:
-        row["error"] = " ".join(done.stderr.split("error:")[-1].split())[:400]
+        row["error"] = json.dumps(said) if said else " ".join(done.stderr.split("error:")[-1].split())[:400]
     return row
 
 

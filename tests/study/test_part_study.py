@@ -335,3 +335,19 @@ def test_a_part_goes_the_whole_way(folder, tmp_path):
     assert (tmp_path / "pad-12.palpate").is_file()
     with pytest.raises(StudyError, match="no such key"):
         study_of(folder, HEAD + SMALL.replace("samples = 6", "sample = 6"))
+
+
+def test_a_ring_is_touched_on_itself_and_a_mesh_keeps_its_elements(tmp_path):
+    """The hole of a ring is no place to press; elements of a mesh that are no larger than the ball are not halved."""
+    from netgen.occ import Cylinder, Pnt, Z
+
+    ring = Cylinder(Pnt(0, 0, 0), Z, r=30, h=12) - Cylinder(Pnt(0, 0, -1), Z, r=21, h=14)
+    ring.WriteStep(str(tmp_path / "ring.step"))
+    study = part_study(tmp_path / "ring.step", radius=0.006)[0]
+    (low, _), (high, _) = study.interaction.over
+    assert (low, high) == pytest.approx((-0.024, 0.024), abs=2e-4)
+    mesh = Block(size=(0.06, 0.06, 0.02), element=0.006).rest()
+    meshio.Mesh(1e3 * mesh.points, [("tetra", mesh.tetrahedra)]).write(tmp_path / "plate.vtu")
+    plate = part_study(tmp_path / "plate.vtu")[0]
+    assert plate.interaction.over is None
+    assert plate.sweep.element >= 0.005

@@ -35,6 +35,7 @@ LARGEST = 0.3  # radius over the least extent, that a large surface may ask for
 CELLS = 300  # squares of an element's length on the footprint: about 15,000 unknowns, seconds a solve
 COARSE = 0.5  # element over the radius: coarser ones do not feel the ball
 LEAST_DEPTH = 1 / 25  # of the depth
+MARGIN = 3.0  # radii within the box of the touched surface, that places keep by themselves
 NICE = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 LISTED = 20  # faces in the comments
 
@@ -107,13 +108,44 @@ def part_study(
             "radius": radius,
             "depth": (_nice(LEAST_DEPTH * deepest), deepest),
         },
-        "sweep": {"samples": 60, "depths": 3}
-        | ({"element": element} if path.suffix.lower() in CAD_ENDINGS else {}),
+        "sweep": {"samples": 60, "depths": 3, "element": element},
         "test": {"samples": 24, "depths": 2},  # many places: several depths of one tell less
     }
     study = _study_of(content) if touched else _with_touched(content, named)
+    study = _suited(study, content, element)
     regions = study.body.shape().regions  # type: ignore[union-attr]  # it is a part
     return study, tuple(_notes(path, unit, faces, regions, low, high))
+
+
+def _suited(study: Study, content: dict[str, Any], element: float) -> Study:
+    """Return the study with what the touched surface asks for: larger elements of a mesh, less margin on a ring.
+
+    A mesh is only refined, by halving, where its elements are larger than asked; so its own are kept where they are no
+    larger than the ball. The places that are touched lie three radii within the surface's box; where that misses the
+    surface, as in the hole of a ring, one radius has to do.
+    """
+    assert isinstance(study.body, PartRecord)
+    skin, acting = study.body.shape().skin, content["interaction"]
+    corners = skin.points[skin.triangles_of(acting["touches"])]
+    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    kept = float(np.median(edges)) if Path(study.body.file).suffix.lower() not in CAD_ENDINGS else 0.0
+    changes: dict[str, Any] = {}
+    if element < kept <= acting["radius"]:
+        changes["sweep"] = content["sweep"] | {"element": _nice(1.1 * kept)}
+    centres = corners.mean(axis=1)[:, :2]
+    low, high = corners[:, :, :2].min(axis=(0, 1)), corners[:, :, :2].max(axis=(0, 1))
+
+    def is_hit(margin: float) -> bool:
+        inside = (centres >= low + margin) & (centres <= high - margin)
+        return bool(inside.all(axis=1).any())
+
+    if not is_hit(MARGIN * acting["radius"]) and is_hit(acting["radius"]):
+        box = low + acting["radius"], high - acting["radius"]
+        changes["interaction"] = acting | {"over": tuple(tuple(corner.round(4).tolist()) for corner in box)}
+    if not changes:
+        return study
+    body = study.body.model_dump()
+    return _study_of(content | changes | {"body": body})
 
 
 def part_text(study: Study, notes: Iterable[str]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import struct
 
 import numpy as np
@@ -19,7 +20,8 @@ from palpate.export.weights_block import fnv
 def test_a_built_core_is_small_and_what_its_sources_give(target, tmp_path):
     built = built_core(target.file)  # refuses one of other sources
     assert len(built) <= 200_000
-    pytest.importorskip("ziglang", reason="zig builds the core again")
+    if not os.environ.get("PALPATE_CI"):  # which installs it
+        pytest.importorskip("ziglang", reason="zig builds the core again")
     build(target, tmp_path / target.file)
     assert (tmp_path / target.file).read_bytes() == built
 

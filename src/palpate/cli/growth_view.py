@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from palpate.learning.growth_frames import GrowthRecorder
 
-__all__ = ["growth_lines", "watched"]
+__all__ = ["growth_lines", "watch_growth"]
 
 WIDTH, HEIGHT = 60, 12  # characters of the map
 EVERY = 0.1  # s between pictures
@@ -33,7 +33,7 @@ NAMES = 18
 
 
 @contextlib.contextmanager
-def watched(page: Path | None, name: str, console: Console) -> Iterator[GrowthRecorder | None]:
+def watch_growth(page: Path | None, name: str, console: Console) -> Iterator[GrowthRecorder | None]:
     """Yield a recorder whose growth is shown in a terminal, and written as a page in the end; None without a page.
 
     Parameters

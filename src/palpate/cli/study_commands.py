@@ -151,7 +151,7 @@ def learn_file(study: Path, console: Console, *, watch: bool = False) -> None:
     watch : bool
         Whether to show the growth of the sequential filter, and to write the page that plays it.
     """
-    from palpate.cli.growth_view import watched
+    from palpate.cli.growth_view import watch_growth
     from palpate.study import read_study
     from palpate.study.run import (
         Paths,
@@ -168,7 +168,7 @@ def learn_file(study: Path, console: Console, *, watch: bool = False) -> None:
     train, test = load_data(record, paths)
     console.say(f"Learning from {len(train)} {'solves' if record.memory is None else 'histories'} …")
     page = paths.folder / f"{record.name}.growth.html" if watch else None
-    with watched(page, record.name, console) as recorder:
+    with watch_growth(page, record.name, console) as recorder:
         model, history = learn_study(
             record, train, test, log=lambda stage: console.say(f"{stage} …"), watch=recorder
         )

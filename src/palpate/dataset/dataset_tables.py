@@ -125,14 +125,14 @@ def _units(text: str, count: int) -> list[str]:
     return parts if len(parts) == count else [text if "," not in text else ""] * count
 
 
-def _headed(columns: list[tuple[str, str, np.ndarray]]) -> list[str]:
+def _column_heads(columns: list[tuple[str, str, np.ndarray]]) -> list[str]:
     return [f"{name} [{unit}]" if unit else name for name, unit, _ in columns]
 
 
 def _write_csv(target: Path, columns: list[tuple[str, str, np.ndarray]]) -> Path:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(_headed(columns))
+    writer.writerow(_column_heads(columns))
     cells = [_cells(values) for _, _, values in columns]
     writer.writerows(zip(*cells, strict=True))
     return write_file(target, text.getvalue())

@@ -118,14 +118,14 @@ def c_files(thing: Surrogate | Network, block: WeightsBlock, name: str, *, singl
     files = {f"{name}.h": header, f"{name}.c": _source(facts, public)}
     if block.field:
         files[f"{name}_field.c"] = _field_source(facts)
-    files["example.c"] = _filled(example, facts)
+    files["example.c"] = _fill_template(example, facts)
     sources = " ".join(file for file in files if file.endswith(".c") and file != "example.c")
-    files["CMakeLists.txt"] = _filled(CMAKE, facts).replace("@SOURCES@", sources)
+    files["CMakeLists.txt"] = _fill_template(CMAKE, facts).replace("@SOURCES@", sources)
     return files
 
 
-def _filled(text: str, facts: _Facts) -> str:
-    along = "" if facts.along is None else ", ".join(_braced(row, facts) for row in facts.along)
+def _fill_template(text: str, facts: _Facts) -> str:
+    along = "" if facts.along is None else ", ".join(_braces_around(row, facts) for row in facts.along)
     middle = (
         ", ".join(_number((r.low + r.high) / 2, single=facts.single) for r in facts.inputs[facts.felt :])
         or "0"
@@ -140,7 +140,7 @@ def _filled(text: str, facts: _Facts) -> str:
     return text
 
 
-def _braced(row: np.ndarray, facts: _Facts) -> str:
+def _braces_around(row: np.ndarray, facts: _Facts) -> str:
     return "{" + ", ".join(_number(a, single=facts.single) for a in row.tolist()) + "}"
 
 
@@ -172,22 +172,26 @@ def _body_header(facts: _Facts, surrogate: Surrogate) -> str:
     baseline = surrogate.energy.baseline
     x = "displacement of what the hand holds from its rest" if baseline.holds else "centre of the probe"
     lines = ["", f"x (3) is the {x}, m; p are the inputs after the first {facts.felt}, in their units."]
-    text = _head(facts, lines) + _filled(HEADER, facts)
+    text = _head(facts, lines) + _fill_template(HEADER, facts)
     sizes = {
         "INPUTS": len(facts.inputs),
         "FELT": facts.felt,
         "PARAMETERS": len(facts.inputs) - facts.felt,
         "DEVIATION_WORK": _work_size(facts.block),
     }
-    text += "".join(f"#define {facts.name}_{k} {v}\n" for k, v in sizes.items()) + _filled(BODY_API, facts)
+    text += "".join(f"#define {facts.name}_{k} {v}\n" for k, v in sizes.items()) + _fill_template(
+        BODY_API, facts
+    )
     if facts.block.memory:
         assert surrogate.memory is not None
         size = 4 + _state_size(surrogate)
-        text += _filled(MEMORY_API, facts).replace("@STATE@", str(size))
+        text += _fill_template(MEMORY_API, facts).replace("@STATE@", str(size))
     if facts.block.field:
         nodes, components, size = _shape_sizes(facts.block)
         text += (
-            _filled(FIELD_API, facts).replace("@NODES@", str(nodes)).replace("@COMPONENTS@", str(components))
+            _fill_template(FIELD_API, facts)
+            .replace("@NODES@", str(nodes))
+            .replace("@COMPONENTS@", str(components))
         )
         text = text.replace("@SHAPE@", str(size))
     return text + HEADER_END
@@ -195,9 +199,9 @@ def _body_header(facts: _Facts, surrogate: Surrogate) -> str:
 
 def _network_header(facts: _Facts) -> str:
     named = ["", *(f"output {i}: {q.name} {q.unit}".rstrip() for i, q in enumerate(facts.outputs[:50]))]
-    text = _head(facts, named) + _filled(HEADER, facts)
+    text = _head(facts, named) + _fill_template(HEADER, facts)
     text += f"#define {facts.name}_INPUTS {len(facts.inputs)}\n#define {facts.name}_OUTPUTS {len(facts.outputs)}\n"
-    return text + _filled(NETWORK_API, facts) + HEADER_END
+    return text + _fill_template(NETWORK_API, facts) + HEADER_END
 
 
 def _work_size(block: WeightsBlock) -> int:
@@ -227,7 +231,7 @@ def _shape_sizes(block: WeightsBlock) -> tuple[int, int, int]:
 def _source(facts: _Facts, public: str) -> str:
     first = f'#include "{facts.name}.h"\n' + ("#define PP_SINGLE\n" if facts.single else "")
     tables, external = [], []
-    for place, table in _stored(facts.block):
+    for place, table in _tables_to_store(facts.block):
         if place >= FIELD:
             external += [f"extern const {kind} {word}[];" for kind, word, _ in _parts(facts, place, table)]
         else:
@@ -238,7 +242,9 @@ def _source(facts: _Facts, public: str) -> str:
     body = _comment(["the evaluator core of palpate"]) + core_source(facts.block)
     weights = "\n".join(["\n/* the weights */", *external, *tables, _model(facts)])
     latent = str(int(facts.block.tables[NET].values[4]))
-    last = _filled(public + LIMITS, facts).replace("@HASH@", facts.block.hash).replace("@LATENT@", latent)
+    last = (
+        _fill_template(public + LIMITS, facts).replace("@HASH@", facts.block.hash).replace("@LATENT@", latent)
+    )
     return first + body + weights + last
 
 
@@ -247,7 +253,7 @@ def _field_source(facts: _Facts) -> str:
         f"/* {facts.name}: the field's tables, of the weights {facts.block.hash} */",
         "#include <stdint.h>",
     ]
-    for place, table in _stored(facts.block):
+    for place, table in _tables_to_store(facts.block):
         if place >= FIELD:
             for kind, word, array in _parts(facts, place, table):
                 kind = kind.replace("pp_real", facts.real)
@@ -258,7 +264,7 @@ def _field_source(facts: _Facts) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _stored(block: WeightsBlock) -> list[tuple[int, Table]]:
+def _tables_to_store(block: WeightsBlock) -> list[tuple[int, Table]]:
     """Return the tables that are not empty, each once, with its first place."""
     first: dict[int, tuple[int, Table]] = {}
     for place, table in sorted(block.tables.items()):
@@ -279,7 +285,7 @@ def _parts(facts: _Facts, place: int, table: Table) -> Iterator[tuple[str, str, 
 
 def _model(facts: _Facts) -> str:
     rows = []
-    first = {id(table): place for place, table in _stored(facts.block)}
+    first = {id(table): place for place, table in _tables_to_store(facts.block)}
     places = {"float64": 0, "int32": 1, "float32": 2, "int16": 3}
     for place in range(ARRAYS):
         table, pointers = facts.block.tables.get(place), ["0"] * 4

@@ -63,7 +63,7 @@ def field_tables(surrogate: Surrogate, name: str, known: Mapping[int, Table]) ->
     assert going is not None
     n_nodes, components = shown.rest.shape
     own = -1 if shown.radius_input is None else shown.radius_input
-    scales, small = _rounded(shown)
+    scales, small = _round_modes(shown)
     knots = 0 if mode is None else mode.table.shape[1]
     low, high = np.array([[r.low for r in shown.inputs], [r.high for r in shown.inputs]])
     reach, nodes, points = shown.moving_arguments()
@@ -87,7 +87,7 @@ def field_tables(surrogate: Surrogate, name: str, known: Mapping[int, Table]) ->
     return tables
 
 
-def _rounded(shown: FieldSurrogate) -> tuple[np.ndarray, np.ndarray]:
+def _round_modes(shown: FieldSurrogate) -> tuple[np.ndarray, np.ndarray]:
     """Return the scales (1 + k,) of rest and modes, and these as whole numbers (1 + k, nodes · components)."""
     rows = np.concatenate([shown.rest[None], shown.modes]).reshape(1 + len(shown.modes), -1)
     scales = np.abs(rows).max(axis=1, initial=0.0) / _LARGEST
@@ -100,5 +100,5 @@ def rounding_error(shown: FieldSurrogate, coefficients: np.ndarray) -> float:
 
     It is half a step of each mode times its coefficient, summed; in the field's unit.
     """
-    scales, _ = _rounded(shown)
+    scales, _ = _round_modes(shown)
     return float((scales[0] + np.abs(coefficients) @ scales[1:]).max(initial=0.0) / 2)

@@ -78,12 +78,12 @@ def build_binaries() -> dict[str, bytes]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "palpate_fmu.c").write_text(fmu_source(), "utf-8")
-        built = {file: _compiled(folder, options) for file, options in TARGETS.items()}
-        built[_MAC] = _universal({kind: _compiled(folder, options) for kind, options in MAC_TARGETS.items()})
+        built = {file: _compile(folder, options) for file, options in TARGETS.items()}
+        built[_MAC] = _universal({kind: _compile(folder, options) for kind, options in MAC_TARGETS.items()})
     return built
 
 
-def _compiled(folder: Path, options: tuple[str, ...]) -> bytes:
+def _compile(folder: Path, options: tuple[str, ...]) -> bytes:
     # in the folder, by relative names: no path of this machine gets into the binary
     command = [
         sys.executable,

@@ -146,7 +146,7 @@ def export_fmu(
     for file, content in binaries.items():
         folder, _, ending = file.partition("/")
         entries[f"binaries/{folder}/{name}{ending}"] = content
-    content, platforms = _zipped(entries), tuple(f.partition("/")[0] for f in binaries)
+    content, platforms = _zip_entries(entries), tuple(f.partition("/")[0] for f in binaries)
     done = ExportedFmu(Path(out), block.hash, platforms, surrogate.memory is None, deviation)
     if check:
         with tempfile.TemporaryDirectory() as place:
@@ -156,7 +156,7 @@ def export_fmu(
     return done
 
 
-def _zipped(entries: Mapping[str, bytes]) -> bytes:
+def _zip_entries(entries: Mapping[str, bytes]) -> bytes:
     from io import BytesIO
 
     whole = BytesIO()

@@ -81,7 +81,7 @@ class ShapeSeries:
             object.__setattr__(self, name, value)
         object.__setattr__(self, "values", np.asarray(self.values, dtype=float))
 
-    def thinned(self, most: int) -> ShapeSeries:
+    def thin(self, most: int) -> ShapeSeries:
         """Return the series with at most so many states, the first and the last among them."""
         kept = np.unique(
             np.linspace(0, len(self.values) - 1, min(most, len(self.values))).round().astype(int)
@@ -142,9 +142,9 @@ def glb_bytes(
         raise UsageError(
             f"{targets} targets over {seconds:g} s make no stroke.", fix="Give 1 or more, over 2 s."
         )
-    series = series.thinned(targets)
+    series = series.thin(targets)
     buffer = _Buffer()
-    rest, moved = _turned(series.points), _turned(series.displacement)
+    rest, moved = _turn_upright(series.points), _turn_upright(series.displacement)
     surface = series.cells.shape[1] == 3
     attributes = {"POSITION": buffer.add(rest, "VEC3", _VERTICES, ends=True)}
     shapes = [{"POSITION": buffer.add(move, "VEC3", _VERTICES, ends=True)} for move in moved]
@@ -198,7 +198,7 @@ def _scene(series: ShapeSeries, primitive: dict[str, Any], sampler: dict[str, An
     }
 
 
-def _turned(vectors: np.ndarray) -> np.ndarray:
+def _turn_upright(vectors: np.ndarray) -> np.ndarray:
     """Return vectors (..., 3) with y up: (x, z, −y)."""
     return np.stack([vectors[..., 0], vectors[..., 2], -vectors[..., 1]], axis=-1)
 

@@ -82,3 +82,65 @@ def test_the_frame_of_unreal_is_left_handed_and_in_centimetres(exported, tmp_pat
     force = body("relaxation").energy.force(np.array([[0.003, -0.004, 0.005]]))[0]
     np.testing.assert_allclose([x, -y, z], force, rtol=1e-12)
     assert stepped == pytest.approx(z, rel=1e-9)
+
+
+UNITY = """
+namespace UnityEngine
+{
+    public struct Vector3
+    {
+        public float x, y, z;
+        public Vector3(float a, float b, float c) { x = a; y = b; z = c; }
+        public static Vector3 zero { get { return new Vector3(0, 0, 0); } }
+        public static Vector3 operator +(Vector3 a, Vector3 b) { return new Vector3(a.x + b.x, a.y + b.y, a.z + b.z); }
+    }
+}
+"""  # as much of Unity as the file uses, with its meaning
+
+UNITY_MAIN = """
+using System;
+using UnityEngine;
+public static class Program
+{
+    static void Print(Vector3 v)
+    {
+        var c = System.Globalization.CultureInfo.InvariantCulture;
+        Console.WriteLine(string.Format(c, "{0:R} {1:R} {2:R}", v.x, v.y, v.z));
+    }
+    public static void Main()
+    {
+        var body = new OrganBody();
+        OrganBody.Flags flags;
+        var place = new Vector3(0.003f, 0.005f, -0.004f);
+        Print(body.Force(place, out flags));
+        Print(body.Step(place, 0f, out flags));
+        var moved = new Vector3[COUNT];
+        body.Deform(place, new Vector3[COUNT], moved);
+        foreach (var v in moved) Print(v);
+    }
+}
+"""
+
+
+def test_the_csharp_file_runs_with_the_frame_of_unity_and_deforms_vertices(exported, tmp_path):
+    compiler, runtime = require_program("mcs"), require_program("mono")
+    organ = body("relaxation")
+    count = len(organ.fields["displacement"].points)
+    (tmp_path / "Unity.cs").write_text(UNITY, "utf-8")
+    (tmp_path / "Program.cs").write_text(UNITY_MAIN.replace("COUNT", str(count)), "utf-8")
+    wrapper = exported.library.parent / "OrganBody.cs"
+    sources = [str(f) for f in (tmp_path / "Unity.cs", tmp_path / "Program.cs", wrapper)]
+    command = [compiler, "-warnaserror", f"-out:{tmp_path / 'unity.exe'}", *sources]
+    built = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert built.returncode == 0, built.stdout + built.stderr
+    where = {"LD_LIBRARY_PATH": str(exported.library.parent), "HOME": str(tmp_path)}
+    done = subprocess.run(
+        [runtime, str(tmp_path / "unity.exe")], capture_output=True, text=True, check=False, env=where
+    )
+    assert done.returncode == 0, done.stderr
+    force, stepped, *moved = np.array([line.split() for line in done.stdout.splitlines()], dtype=float)
+    place = np.array([[0.003, -0.004, 0.005]])
+    np.testing.assert_allclose(force[[0, 2, 1]], organ.energy.force(place)[0], rtol=1e-6)
+    np.testing.assert_allclose(stepped, force, rtol=1e-6)
+    expected = organ.fields["displacement"].values(place)[0]
+    np.testing.assert_allclose(np.array(moved)[:, [0, 2, 1]], expected, atol=2e-4 * np.abs(expected).max())

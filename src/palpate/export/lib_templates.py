@@ -106,7 +106,7 @@ class Body:
 CSHARP = """// NAME in Unity: put this file into Assets and the library into Assets/Plugins.
 //
 // Unity's frame is left-handed with y up, palpate's right-handed with z up, both in m: y and z change places.
-// All vectors here are Unity's. The weights are @HASH@.
+// All vectors here are Unity's.
 using System;
 using System.Runtime.InteropServices;
 using UnityEngine;
@@ -115,11 +115,12 @@ public sealed class CLASS
 {
     [Flags] public enum Flags { None = 0, Contact = 1, Trusted = 2, NotANumber = 4, TooDeep = 8 }
 
-    const string Library = "NAME";
+    const string Library = "NAME", Hash = "@HASH@";
     [DllImport(Library)] static extern int NAME_answer(double[] x, double[] p, double[] answer);
     [DllImport(Library)] static extern int NAME_force(double[] x, double[] p, double[] force);
     [DllImport(Library)] static extern void NAME_sizes(int[] sizes);
     [DllImport(Library)] static extern void NAME_limits(double[] low, double[] high);
+    [DllImport(Library)] static extern IntPtr NAME_hash();
 @MEMORY@    [DllImport(Library)] static extern void NAME_start(double[] state);
 @MEMORY@    [DllImport(Library)]
 @MEMORY@    static extern int NAME_step(double[] state, double[] x, double[] p, double dt, double[] force);
@@ -134,6 +135,8 @@ public sealed class CLASS
 
     public CLASS()
     {
+        if (Marshal.PtrToStringAnsi(NAME_hash()) != Hash)
+            throw new InvalidOperationException("The library NAME holds other weights than this file is for.");
         var sizes = new int[8];
         NAME_sizes(sizes);
         Parameters = new double[Math.Max(1, sizes[2])];
@@ -146,6 +149,7 @@ public sealed class CLASS
         nodes = sizes[6];
         components = sizes[7];
         values = new double[Math.Max(1, nodes * components)];
+@MEMORY@        NAME_start(state);
     }
 
     static Vector3 ToUnity(double a, double b, double c) => new Vector3((float)a, (float)c, (float)b);

@@ -17,7 +17,7 @@ __all__ = ["touched_surface"]
 
 NAME = ".touched_surface"  # in the folder of the store, where Zarr looks for no array
 KIND = "touched-surface"
-BUILT = 1  # another number where distances of the same surface are built otherwise
+BUILT = 2  # another number where distances of the same surface are built otherwise
 
 
 def touched_surface(

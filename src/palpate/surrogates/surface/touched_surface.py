@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from palpate.errors import FileFormatError, UsageError
-from palpate.network.packing import pack, unpack
+from palpate.network.packing import pack, unpack, whole_multiples
 from palpate.surrogates.surface.distance_kernels import distances_into
 
 __all__ = ["TouchedSurface"]
 
 AFTER = 1.0  # of the radius: how much farther inside than `inner` the distance turns back, some cells
 FLAT_FRAME = 15  # numbers that say where a flat surface lies
+QUANTA = 16  # at least 2^16 quanta to a cell, fewer than 2^17
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +27,13 @@ class TouchedSurface:
     surface and of places inside that are equally far from two parts of it. Beyond the surface's border d is the
     distance to the border. Farther outside than `reach` it levels off above it: nothing is felt there. Farther
     inside than `inner` it soon turns back, and levels off two radii later: nothing is felt behind the body.
+
+    The coefficients that `of` makes for a curved surface are whole multiples of a quantum q, the power of two between
+    2⁻¹⁷ and 2⁻¹⁶ of the spacing h (7.5 nm at 0.9 mm), so that files and exports need a third of the room. That is a
+    spline like any other: it has two continuous derivatives, and energy, force and stiffness belong to each other.
+    Within the box it differs from the spline before rounding by at most q/2 in d, 3q/4h < 1.2e-5 in a component of
+    the gradient and 2q/h² < 3.1e-5/h in an entry of the Hessian: the magnitudes of a cubic B-spline's weights add up
+    to 1, those of their first derivatives to 3/2 at most, those of their second ones to 4. A flat surface is exact.
 
     Attributes
     ----------
@@ -131,7 +140,30 @@ class TouchedSurface:
         mesh = OrientedMesh.of(points, triangles)
         measured = MeasuredDistance.of(mesh, radius, shoulder, inner + AFTER * radius)
         table = tabulate(measured, reach, inner, spacing)
-        return cls(table.frame, table.coefficients, table.profile, radius, reach, inner, table.error)
+        return cls(
+            table.frame, table.coefficients, table.profile, radius, reach, inner, table.error
+        ).rounded()
+
+    def rounded(self) -> TouchedSurface:
+        """Return the surface with its coefficients rounded to whole quanta, half a quantum less exact.
+
+        One that is flat, or rounded already, is returned as it is.
+        """
+        if self.profile.size or self._is_rounded:
+            return self
+        quantum = self._quantum
+        # adding zero takes the sign from those that became minus zero
+        coefficients = quantum * np.rint(self.coefficients / quantum) + 0.0
+        return replace(self, coefficients=coefficients, error=self.error + quantum / 2)
+
+    @property
+    def _quantum(self) -> float:
+        return 2.0 ** (math.frexp(self.spacing)[1] - 1 - QUANTA)
+
+    @property
+    def _is_rounded(self) -> bool:
+        multiples = whole_multiples(self.coefficients)
+        return multiples is not None and 2.0 ** multiples[1] >= self._quantum
 
     @property
     def spacing(self) -> float:
@@ -163,11 +195,18 @@ class TouchedSurface:
         return np.asarray(radius - self.at(C)[0])
 
     def raised(self, height: float) -> TouchedSurface:
-        """Return the surface of distance d − height (m): higher everywhere along its normal, as exact as this one."""
+        """Return the surface of distance d − height (m): higher everywhere along its normal, as exact as this one.
+
+        One whose coefficients are whole quanta is raised by whole quanta, and so by up to half a quantum more or less
+        than `height`, which is added to its error.
+        """
         # cubic B-splines sum to one, so this moves d by exactly as much
-        table = "profile" if self.profile.size else "coefficients"
-        moved = {table: getattr(self, table) - height}
-        return replace(self, **moved, reach=self.reach - height, inner=self.inner + height)
+        reach, inner = self.reach - height, self.inner + height
+        if self.profile.size:
+            return replace(self, profile=self.profile - height, reach=reach, inner=inner)
+        rise = self._quantum * round(height / self._quantum) if self._is_rounded else height
+        error = self.error + abs(rise - height)
+        return replace(self, coefficients=self.coefficients - rise, reach=reach, inner=inner, error=error)
 
     def compiled(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Arrays that the kernel `distance_into` takes after its own arguments."""

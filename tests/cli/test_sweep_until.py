@@ -6,38 +6,23 @@ import json
 
 import pytest
 
+from few_solves import FEW_SOLVES
 from palpate.dataset import Dataset
 
-TINY = """\
+BLOCK = """\
 name = "tiny"
 [body]
 kind = "block"
-size = ["40 mm", "40 mm", "20 mm"]
+size = ["40 mm", "30 mm", "20 mm"]
 material = { young = "9 kPa" }
 [interaction]
-radius = "8 mm"
-pad = 5e6
-depth = ["0.3 mm", "2 mm"]
-over = [["16 mm", "16 mm"], ["24 mm", "24 mm"]]
-[sweep]
-samples = 6
-depths = 2
-element = "12 mm"
-workers = 1
-[test]
-samples = 2
-depths = 2
-[learning]
-effort = 0.1
-workers = 1
-shape = false
 """
 
 
 @pytest.fixture
 def study(tmp_path):
     path = tmp_path / "tiny.toml"
-    path.write_text(TINY, encoding="utf-8")
+    path.write_text(BLOCK + FEW_SOLVES + "shape = false\n", encoding="utf-8")
     return path
 
 

@@ -10,6 +10,7 @@ import meshio
 import numpy as np
 import pytest
 
+from few_solves import FEW_SOLVES
 from palpate import materials as laws
 from palpate.errors import StudyError, UsageError
 from palpate.physics.shapes import Block
@@ -277,22 +278,7 @@ def test_the_sample_part_is_closed_and_lies_on_its_side(tmp_path):
         write_sample_part(tmp_path / "kidney.step")
 
 
-SMALL = """
-radius = "8 mm"
-pad = 5e6
-depth = ["0.3 mm", "2 mm"]
-over = [["16 mm", "12 mm"], ["24 mm", "18 mm"]]
-[sweep]
-samples = 6
-depths = 2
-element = "12 mm"
-workers = 1
-[test]
-samples = 2
-depths = 2
-[learning]
-effort = 0.1
-workers = 1
+TARGET = """
 [target]
 force_median = 0.2
 force_p95 = 0.3
@@ -303,7 +289,7 @@ force_p95 = 0.3
 @pytest.mark.timeout(300)
 def test_a_part_goes_the_whole_way(folder, tmp_path):
     """Solves, learning, validation and report work on a part as on any body, and are not repeated."""
-    study = study_of(folder, HEAD + SMALL)
+    study = study_of(folder, HEAD + FEW_SOLVES + TARGET)
     paths = Paths(tmp_path, study.name)
     wanted = {"until": 0.5, "progress": False}
     *_, last = improve_study(study, paths, **wanted)
@@ -334,7 +320,7 @@ def test_a_part_goes_the_whole_way(folder, tmp_path):
     assert again[-1].error == last.error
     assert (tmp_path / "pad-12.palpate").is_file()
     with pytest.raises(StudyError, match="no such key"):
-        study_of(folder, HEAD + SMALL.replace("samples = 6", "sample = 6"))
+        study_of(folder, HEAD + FEW_SOLVES.replace("samples = 6", "sample = 6"))
 
 
 def test_a_ring_is_touched_on_itself_and_a_mesh_keeps_its_elements(tmp_path):

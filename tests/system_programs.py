@@ -1,9 +1,11 @@
-"""System programs that some tests need."""
+"""System programs and packages of extras that some tests need."""
 
 from __future__ import annotations
 
+import importlib
 import os
 import shutil
+from typing import Any, NoReturn
 
 import pytest
 
@@ -13,7 +15,18 @@ def require_program(*names: str) -> str:
     for name in names:
         if path := shutil.which(name):
             return path
-    message = f"needs the system program {' or '.join(names)}"
+    return _go_without(f"needs the system program {' or '.join(names)}")
+
+
+def require_package(name: str, extra: str) -> Any:
+    """The package of an extra, imported; skips by name where it is not installed, fails where CI promised it."""
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        return _go_without(f"needs palpate[{extra}]")
+
+
+def _go_without(message: str) -> NoReturn:
     if os.environ.get("PALPATE_CI"):
         pytest.fail(message + ", which .ci/run installs")
     pytest.skip(message)

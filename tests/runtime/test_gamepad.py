@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
+import struct
+import subprocess
 import sys
-import time
 
 import evdev_double
 import numpy as np
@@ -31,6 +31,7 @@ from evdev_double import (
 from palpate.errors import DeviceError, DeviceLostError, UsageError
 from palpate.runtime.devices import device_named
 from palpate.runtime.devices.gamepad import DeadZone, GamepadDevice, GamepadSettings
+from system_programs import require_package, require_program
 
 TICK = 1e-3
 REST = {
@@ -274,7 +275,7 @@ def test_refuses_nonsense(shared, options):
 
 
 def test_the_package_has_what_the_driver_uses():
-    evdev = pytest.importorskip("evdev", reason="needs palpate[gamepad]")
+    evdev = require_package("evdev", "gamepad")
     for name in (
         "capabilities",
         "absinfo",
@@ -301,17 +302,59 @@ def test_the_package_has_what_the_driver_uses():
     assert names == {name: getattr(codes, name) for name in names}
 
 
-def test_a_pad_of_the_kernel_is_read():
-    evdev = pytest.importorskip("evdev", reason="needs palpate[gamepad]")
-    codes = evdev.ecodes
-    axes = [(code, evdev.AbsInfo(*STICK)) for code in (X, Y, RX, RY)]
-    try:
-        virtual = evdev.UInput({codes.EV_KEY: [SOUTH, EAST], codes.EV_ABS: axes}, name="palpate test pad")
-    except (evdev.UInputError, OSError) as error:
-        pytest.skip(f"needs /dev/uinput: {error}")
-    with virtual, contextlib.closing(GamepadDevice(GamepadSettings(path=virtual.device.path))) as device:
-        virtual.write(ABS, Y, 255)
-        virtual.syn()
-        end = time.monotonic() + 5.0
-        while not np.allclose(hand(device), (0.0, -RADIUS, 0.0), **REST):
-            assert time.monotonic() < end
+READS = """\
+from palpate.runtime.devices.gamepad import GamepadDevice
+
+device = GamepadDevice()
+print(device.name)
+place, tick = device.read(0.0).position, 0
+while place[1] > -0.9999 * device.traits.radius:
+    tick += 1
+    place = device.read(1e-3 * tick).position
+print(*place)
+device.close()
+"""
+
+
+def test_a_pad_is_read_through_the_package_as_the_kernel_shows_it(tmp_path):
+    """The package itself asks a pad that umockdev pretends to be: by the kernel's files, requests and events."""
+    require_package("evdev", "gamepad")
+    run, event_file = require_program("umockdev-run"), "/dev/input/event7"
+    axes, keys = (X, Y, RX, RY), (SOUTH, EAST)
+    kinds = [evdev_double.SYN, KEY, ABS]
+    (tmp_path / "pad.umockdev").write_text(
+        "P: /devices/virtual/input/input7/event7\nN: input/event7\n"
+        f"E: DEVNAME={event_file}\nE: SUBSYSTEM=input\nA: dev=13:71\n\n"
+    )
+    requests = {
+        "EVIOCGID": struct.pack("<4H", 3, 1, 2, 3),
+        "EVIOCGVERSION": struct.pack("<i", 0x10001),
+        "EVIOCGNAME(0)": b"Pad of the kernel".ljust(256, b"\0"),
+        "EVIOCGBIT(0)": bits(kinds, 4),
+        f"EVIOCGBIT({KEY})": bits(keys, 96),
+        f"EVIOCGBIT({ABS})": bits(axes, 96),
+        "EVIOCGKEY(0)": bits([], 96),
+        "EVIOCGEFFECTS": struct.pack("<i", 0),
+        **{f"EVIOCGABS({axis})" if axis else "EVIOCGABS": struct.pack("<6i", *STICK) for axis in axes},
+    }
+    lines = [f"{request} 0 {answer.hex().upper()}\n" for request, answer in requests.items()]
+    (tmp_path / "pad.ioctl").write_text("".join([f"@DEV {event_file}\n", *lines]))
+    (tmp_path / "pad.events").write_text(f"E: 0.0 {ABS:04x} {Y:04x} 255\nE: 0.0 0000 0000 0\n")
+    pretend = ["-d", "pad.umockdev", "-i", f"{event_file}=pad.ioctl", "-e", f"{event_file}=pad.events"]
+    done = subprocess.run(
+        [run, *pretend, "--", sys.executable, "-c", READS],
+        check=False,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    name, place = done.stdout.splitlines()
+    assert name == "Pad of the kernel"
+    np.testing.assert_allclose([float(x) for x in place.split()], (0.0, -RADIUS, 0.0), **REST)
+
+
+def bits(codes, size):
+    """The kernel's set of codes, in so many bytes."""
+    return sum(1 << code for code in codes).to_bytes(size, "little")

@@ -76,7 +76,7 @@ PP_PART int pp_inside(const pp_model *m, const pp_real *line, pp_real s) {
   const pp_array *points = &m->a[PP_POINTS], *net = m->a + PP_NET;
   const pp_real *numbers = m->a[PP_NUMBERS].real, *limits = m->a[PP_LIMITS].real;
   const int32_t n = m->a[PP_HEAD].whole[PP_INPUTS], many = points->n[1];
-  pp_real xi[PP_MOST], best[PP_LANES], bound;
+  pp_real xi[PP_MOST], best[PP_LANES], nearest[PP_LANES], bound;
   int32_t i, p;
   int l, inside = 0;
   if (s > numbers[1] * (R(1) + slack)) return 0;
@@ -87,14 +87,16 @@ PP_PART int pp_inside(const pp_model *m, const pp_real *line, pp_real s) {
   if (points->n[0] == 0) return 1;
   pp_scale(net, line, xi);
   bound = numbers[0] * numbers[0] * (R(1) + slack);
+  for (l = 0; l < PP_LANES; l++) nearest[l] = R(2) * bound;
   for (p = 0; p < many; p += PP_LANES) {
     for (l = 0; l < PP_LANES; l++) best[l] = R(0);
     for (i = 0; i < n; i++) {
       const pp_real *row = points->real + (size_t)i * (size_t)many + (size_t)p;
       for (l = 0; l < PP_LANES; l++) best[l] += (xi[i] - row[l]) * (xi[i] - row[l]);
     }
-    for (l = 0; l < PP_LANES; l++) inside |= best[l] <= bound;
+    for (l = 0; l < PP_LANES; l++) nearest[l] = best[l] < nearest[l] ? best[l] : nearest[l];
   }
+  for (l = 0; l < PP_LANES; l++) inside |= nearest[l] <= bound;
   return inside;
 }
 

@@ -20,29 +20,31 @@ static const pp_real PP_TAYLOR[14] = {
 
 /* e[l] = exp(-t[l]) for t >= 0 */
 PP_PART void pp_exponential(const pp_real *restrict t, pp_real *restrict e) {
-  pp_real whole[PP_LANES];
-  pp_bits bits[PP_LANES], shift[PP_LANES];
+  union {
+    pp_real number[PP_LANES];
+    pp_bits bits[PP_LANES];
+  } whole, power;
+  pp_real x[PP_LANES];
   const pp_real log2e = PP_EXPONENTIAL[0], high = PP_EXPONENTIAL[1], low = PP_EXPONENTIAL[2];
   const pp_real magic = PP_EXPONENTIAL[3], limit = PP_EXPONENTIAL[4];
   int l;
+  /* in a loop of its own: GCC would make a branch of it, and take the units one by one */
+  for (l = 0; l < PP_LANES; l++) x[l] = limit < t[l] ? limit : t[l];
   for (l = 0; l < PP_LANES; l++) {
-    const pp_real x = t[l] > limit ? limit : t[l];
-    const pp_real w = magic - x * log2e;
+    const pp_real w = magic - x[l] * log2e;
     const pp_real s = w - magic;
-    const pp_real u = (-x - s * high) - s * low;
+    const pp_real u = (-x[l] - s * high) - s * low;
     /* in pairs (Estrin's scheme), so that no long chain of operations waits for itself */
     const pp_real u2 = u * u, u4 = u2 * u2, u8 = u4 * u4;
     const pp_real a0 = R(1) + u, a1 = PP_TAYLOR[2] + u * PP_TAYLOR[3], a2 = PP_TAYLOR[4] + u * PP_TAYLOR[5];
     const pp_real a3 = PP_TAYLOR[6] + u * PP_TAYLOR[7], a4 = PP_TAYLOR[8] + u * PP_TAYLOR[9];
     const pp_real a5 = PP_TAYLOR[10] + u * PP_TAYLOR[11], a6 = PP_TAYLOR[12] + u * PP_TAYLOR[13];
-    e[l] = ((a0 + u2 * a1) + u4 * (a2 + u2 * a3)) + u8 * ((a4 + u2 * a5) + u4 * a6);
-    whole[l] = w;
+    power.number[l] = ((a0 + u2 * a1) + u4 * (a2 + u2 * a3)) + u8 * ((a4 + u2 * a5) + u4 * a6);
+    whole.number[l] = w;
   }
   /* the last bits of `whole` are s; added to the exponent they multiply by 2^s */
-  memcpy(bits, e, sizeof bits);
-  memcpy(shift, whole, sizeof shift);
-  for (l = 0; l < PP_LANES; l++) bits[l] += shift[l] << PP_SHIFT;
-  memcpy(e, bits, sizeof bits);
+  for (l = 0; l < PP_LANES; l++) power.bits[l] += whole.bits[l] << PP_SHIFT;
+  memcpy(e, power.number, sizeof power.number);
 }
 
 /* g(q) and, by q, g' and g'' of PP_LANES units */
@@ -83,19 +85,25 @@ PP_PART void pp_distances(const pp_array *net, const pp_real *restrict unit, con
                           pp_real (*restrict v)[PP_LANES], pp_real *restrict q) {
   const int32_t *layout = net[PP_LAYOUT].whole;
   const int32_t e = net[PP_SIZES].whole[1], r = net[PP_SIZES].whole[2];
-  int32_t a, i;
+  int32_t a, i = 0;
   int l;
-  for (a = 0; a < r; a++) {
-    for (l = 0; l < PP_LANES; l++) v[a][l] = -unit[(e + a) * PP_LANES + l];
-  }
-  for (i = 0; i < e; i++) {
-    const pp_real t = xi[layout[2 * i + 1]];
-    pp_real *row = v[layout[2 * i]];
-    for (l = 0; l < PP_LANES; l++) row[l] += unit[i * PP_LANES + l] * t;
-  }
   for (l = 0; l < PP_LANES; l++) q[l] = R(0);
   for (a = 0; a < r; a++) {
-    for (l = 0; l < PP_LANES; l++) q[l] += v[a][l] * v[a][l];
+    const pp_real *shift = unit + (e + a) * PP_LANES;
+    pp_real *row = v[a];
+    for (l = 0; l < PP_LANES; l++) row[l] = -shift[l];
+    /* two entries in one pass: each pass reads and writes the row */
+    for (; i + 1 < e && layout[2 * i + 2] == a; i += 2) {
+      const pp_real *one = unit + i * PP_LANES, *other = one + PP_LANES;
+      const pp_real t = xi[layout[2 * i + 1]], t2 = xi[layout[2 * i + 3]];
+      for (l = 0; l < PP_LANES; l++) row[l] = (row[l] + one[l] * t) + other[l] * t2;
+    }
+    if (i < e && layout[2 * i] == a) {
+      const pp_real *one = unit + i * PP_LANES, t = xi[layout[2 * i + 1]];
+      for (l = 0; l < PP_LANES; l++) row[l] += one[l] * t;
+      i++;
+    }
+    for (l = 0; l < PP_LANES; l++) q[l] += row[l] * row[l];
   }
 }
 
@@ -132,7 +140,7 @@ PP_PART pp_real pp_second_order(const pp_array *net, const pp_real *xi, int32_t 
   const int32_t record = (e + r + pairs + 1) * PP_LANES;
   const pp_real *tail = net[PP_TAIL].real, *scales = net[PP_SCALES].real + n;
   pp_real v[PP_MOST][PP_LANES], u[3][PP_LANES], distance[PP_LANES], phi[PP_LANES], d1[PP_LANES], d2[PP_LANES];
-  pp_real value[PP_LANES], slopes[3][PP_LANES], bends[6][PP_LANES], total;
+  pp_real value[PP_LANES], slopes[3][PP_LANES], bends[6][PP_LANES], bent[PP_LANES], total;
   int32_t k, i, j, pair;
   int l;
   for (l = 0; l < PP_LANES; l++) value[l] = R(0);
@@ -155,10 +163,13 @@ PP_PART pp_real pp_second_order(const pp_array *net, const pp_real *xi, int32_t 
     }
     pair = 0;
     for (i = 0; i < q; i++) {
-      for (l = 0; l < PP_LANES; l++) slopes[i][l] += d1[l] * u[i][l];
+      for (l = 0; l < PP_LANES; l++) {
+        bent[l] = d2[l] * u[i][l];
+        slopes[i][l] += d1[l] * u[i][l];
+      }
       for (j = i; j < q; j++, pair++) {
         const pp_real *square = gram + pair * PP_LANES;
-        for (l = 0; l < PP_LANES; l++) bends[pair][l] += d1[l] * square[l] + d2[l] * u[i][l] * u[j][l];
+        for (l = 0; l < PP_LANES; l++) bends[pair][l] += d1[l] * square[l] + bent[l] * u[j][l];
       }
     }
   }

@@ -3,6 +3,9 @@
 
 #ifdef __clang__
 #pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__)
+/* GCC leaves a loop over PP_LANES numbers a loop at -O2; written out, a network takes a quarter less time */
+#pragma GCC optimize("peel-loops")
 #endif
 
 #define R(number) ((pp_real)(number))

@@ -14,6 +14,7 @@ name = "tiny"
 [body]
 kind = "block"
 size = ["40 mm", "30 mm", "20 mm"]
+element = "20 mm"
 material = { young = "9 kPa" }
 [interaction]
 """

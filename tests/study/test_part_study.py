@@ -289,7 +289,8 @@ force_p95 = 0.3
 @pytest.mark.timeout(300)
 def test_a_part_goes_the_whole_way(folder, tmp_path):
     """Solves, learning, validation and report work on a part as on any body, and are not repeated."""
-    study = study_of(folder, HEAD + FEW_SOLVES + TARGET)
+    coarse = HEAD.replace("[interaction]", 'element = "20 mm"\n[interaction]')
+    study = study_of(folder, coarse + FEW_SOLVES + TARGET)
     paths = Paths(tmp_path, study.name)
     wanted = {"until": 0.5, "progress": False}
     *_, last = improve_study(study, paths, **wanted)

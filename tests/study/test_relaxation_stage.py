@@ -18,11 +18,11 @@ CONTENT = {
     "body": {
         "kind": "block",
         "size": (0.04, 0.04, 0.02),
-        "element": 0.01,
+        "element": 0.02,
         "material": {"young": 9e3, "poisson": 0.4, "prony": TERMS},
     },
     "interaction": {"radius": 0.008, "depth": (2e-4, 0.003), "over": ((0.018, 0.018), (0.022, 0.022))},
-    "sweep": {"samples": 6, "depths": 2, "element": 0.006, "workers": 1},
+    "sweep": {"samples": 6, "depths": 2, "element": 0.012, "workers": 1},
     "test": {"samples": 2, "depths": 2},
     "learning": {"effort": 0.02, "workers": 1},
 }
@@ -30,12 +30,12 @@ CONTENT = {
 
 def test_a_held_press_goes_from_the_instantaneous_to_the_relaxed_body():
     """At once the force is the base law's; after long it is that of the law whose distortion has relaxed."""
-    block = pp.shapes.Block((0.04, 0.04, 0.02), element=0.01)
+    block = pp.shapes.Block((0.04, 0.04, 0.02), element=0.02)
     base = pp.materials.NeoHookean(9e3, 0.4)
     probe = pp.SphereProbe(0.008, depth=(0.0, 0.003), over=((0.0195, 0.0195), (0.0205, 0.0205)))
 
     def problem(material):
-        return pp.Body(block, material, fixed="bottom").problem(probe, element=0.005)
+        return pp.Body(block, material, fixed="bottom").problem(probe, element=0.01)
 
     touch = (0.02, 0.02, 0.028)
     gel = problem(Viscoelastic(base, TERMS))

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ctypes
+import math
 import re
+import runpy
 import subprocess
 import sys
 
@@ -12,6 +14,7 @@ import pytest
 
 from exported_bodies import body
 from palpate.export import export_lib
+from palpate.surrogates.moving_rest import MovingRest
 from system_programs import require_program
 
 
@@ -38,6 +41,36 @@ def test_the_python_wrapper_needs_no_other_package(exported):
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "True" in done.stdout
+
+
+def test_a_rod_that_is_let_go_lies_where_palpate_finds_it(tmp_path):
+    require_program("gcc")
+    rod, none = body("iwan"), np.zeros(0)
+    done = export_lib(rod, tmp_path, compiler="gcc", check=False)
+    out = runpy.run_path(str(tmp_path / "rod.py"))["Body"](str(done.library))
+    evaluate, state = rod.energy.evaluator(), rod.memory.start()
+    resting = MovingRest(evaluate, state, rod.energy.baseline.directions[0])
+    stroke = 0.03 * np.sin(np.linspace(0.0, 4.0, 50))[:, None] * rod.energy.baseline.directions
+    largest = 0.0
+    for seconds in (0.0, 0.4):
+        for place in stroke:
+            evaluate(place, none)
+            state.step(place, evaluate.amplitude, evaluate.slope, 0.01)
+            largest = max(largest, np.abs(out.step(0.01, place)[0]).max())
+        resting.lies[:] = stroke[-1]
+        assert resting.release(seconds, none)
+        place, flags = out.release(seconds, stroke[-1])
+        size = np.linalg.norm(resting.lies)
+        assert size > 1e-4
+        assert not flags & 4
+        np.testing.assert_allclose(place, resting.lies, rtol=0, atol=1e-9 * size)
+        np.testing.assert_allclose(out.ledger[:2], [state.stored, state.lost], rtol=1e-9)
+        np.testing.assert_allclose(out.step(0.0, place)[0], 0.0, atol=1e-9 * largest)
+    assert out.release(math.nan, place)[1] & 4
+    np.testing.assert_allclose(out.ledger[1], state.lost, rtol=1e-9)
+    (tmp_path / "main.cpp").write_text('#include "rod_unreal.h"\nint main() { RodBody body; }\n', "utf-8")
+    command = [require_program("g++", "clang++"), "-Wall", "-Werror", "-fsyntax-only", "main.cpp"]
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
 
 
 def test_the_wrapper_refuses_other_weights(exported, tmp_path):

@@ -24,6 +24,8 @@ from palpate.export.c_templates import (
     NETWORK,
     NETWORK_API,
     NETWORK_EXAMPLE,
+    RELEASE_API,
+    RELEASE_CODE,
 )
 from palpate.export.core_source import core_source
 from palpate.export.weights_block import ARRAYS, FIELD, NET, ROOT, Table, WeightsBlock
@@ -186,6 +188,7 @@ def _body_header(facts: _Facts, surrogate: Surrogate) -> str:
         assert surrogate.memory is not None
         size = 4 + _state_size(surrogate)
         text += _fill_template(MEMORY_API, facts).replace("@STATE@", str(size))
+        text += _fill_template(RELEASE_API, facts) if facts.block.releases else ""
     if facts.block.field:
         nodes, components, size = _shape_sizes(facts.block)
         text += (
@@ -329,7 +332,9 @@ def _number(value: float, *, single: bool) -> str:
 
 
 def _memory_part(block: WeightsBlock) -> str:
-    return MEMORY_CODE.replace("@LAW@", block.memory) if block.memory else ""
+    text = MEMORY_CODE if block.memory else ""
+    text += RELEASE_CODE if block.releases else ""
+    return text.replace("@LAW@", block.memory)
 
 
 def _field_part(block: WeightsBlock) -> str:

@@ -83,6 +83,11 @@ void NAME_start(NAME_state *state);
  * input is not finite nothing changes, the force is not-a-number, and the flags say so. */
 int32_t NAME_step(NAME_state *state, const NAME_real *x, const NAME_real *p, NAME_real dt, NAME_real *force);
 """
+RELEASE_API = """
+/* Let go of the body for dt seconds. x (3), where the hand held it, becomes the place where it lies then: there nothing
+ * pulls. Where an input is not finite nothing changes, and the flags say so. */
+int32_t NAME_release(NAME_state *state, NAME_real *x, const NAME_real *p, NAME_real dt);
+"""
 FIELD_API = """
 #define NAME_NODES @NODES@
 #define NAME_COMPONENTS @COMPONENTS@
@@ -169,6 +174,25 @@ int32_t NAME_step(NAME_state *state, const NAME_real *x, const NAME_real *p, NAM
   if (!@LAW@_step(&NAME_model, state->numbers, x, answer[PP_AMPLITUDE], answer + PP_SLOPE, dt, force)) {
     flags |= PP_NOT_A_NUMBER;
     for (i = 0; i < 3; i++) force[i] = pp_nan();
+  }
+  return flags;
+}
+"""
+RELEASE_CODE = """
+int32_t NAME_release(NAME_state *state, NAME_real *x, const NAME_real *p, NAME_real dt) {
+  const pp_real *axis = NAME_model.a[PP_AXES].real; /* the one direction that is felt */
+  pp_real answer[PP_ANSWER], wanted;
+  int32_t flags = pp_answer(&NAME_model, x, p, answer);
+  int i, k;
+  if (flags & PP_NOT_A_NUMBER || !pp_finite(dt) || dt < R(0)) return flags | PP_NOT_A_NUMBER;
+  wanted = @LAW@_release(&NAME_model, state->numbers, dt);
+  for (k = 0; k < 12; k++) { /* Newton's method: the amplitude grows with the place along the axis */
+    const pp_real *s = answer + PP_SLOPE, steep = axis[0] * s[0] + axis[1] * s[1] + axis[2] * s[2];
+    const pp_real missing = wanted - answer[PP_AMPLITUDE];
+    if (steep > R(0) && PP_ABS(missing) > R(1e-12) * PP_ABS(wanted)) {
+      for (i = 0; i < 3; i++) x[i] += missing / steep * axis[i];
+    }
+    flags = pp_answer(&NAME_model, x, p, answer);
   }
   return flags;
 }

@@ -165,7 +165,12 @@ def _wrappers(surrogate: Surrogate, done: ExportedC) -> dict[str, str]:
         "CLASS": name[0].upper() + name[1:] + "Body",
         "NAME": name,
     }
-    has = {"@MEMORY@": surrogate.memory is not None, "@FIELD@": bool(done.field)}
+    memory = surrogate.memory
+    has = {
+        "@MEMORY@": memory is not None,
+        "@RELEASE@": memory is not None and memory.moves_rest,
+        "@FIELD@": bool(done.field),
+    }
     texts = {
         f"{name}.py": PYTHON,
         f"{words['CLASS']}.cs": CSHARP,

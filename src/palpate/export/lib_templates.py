@@ -83,6 +83,12 @@ class Body:
         flags = self._call("step")(self._state, place, parameters, ctypes.c_double(seconds), out)
         return list(out), flags
 
+@RELEASE@    def release(self, seconds, place, parameters=()):
+@RELEASE@        """Let go of the body at a place for seconds; return the place where it lies then, and flags."""
+@RELEASE@        place, parameters = _numbers(place, 3), _numbers(parameters, self.parameters)
+@RELEASE@        flags = self._call("release")(self._state, place, parameters, ctypes.c_double(seconds))
+@RELEASE@        return list(place), flags
+@RELEASE@
     @property
     def ledger(self):
         """Energies stored, lost so far, of the hand's work, and lost in the last step, in J."""
@@ -124,6 +130,7 @@ public sealed class CLASS
 @MEMORY@    [DllImport(Library)] static extern void NAME_start(double[] state);
 @MEMORY@    [DllImport(Library)]
 @MEMORY@    static extern int NAME_step(double[] state, double[] x, double[] p, double dt, double[] force);
+@RELEASE@    [DllImport(Library)] static extern int NAME_release(double[] state, double[] x, double[] p, double dt);
 @FIELD@    [DllImport(Library)] static extern int NAME_touched(double[] x, double[] p, double[] touch);
 @FIELD@    [DllImport(Library)] static extern void NAME_shape(double[] touch, int first, int count, double[] values);
 
@@ -172,6 +179,14 @@ public sealed class CLASS
 @MEMORY@        return (flags & Flags.TooDeep) != 0 ? Vector3.zero : ToUnity(force[0], force[1], force[2]);
 @MEMORY@    }
 @MEMORY@
+@RELEASE@    /// <summary>Let go of the body at a place; return where it lies after so many seconds.</summary>
+@RELEASE@    public Vector3 Release(Vector3 place, float seconds, out Flags flags)
+@RELEASE@    {
+@RELEASE@        Take(place);
+@RELEASE@        flags = (Flags)NAME_release(state, x, Parameters, seconds);
+@RELEASE@        return ToUnity(x[0], x[1], x[2]);
+@RELEASE@    }
+@RELEASE@
 @MEMORY@    public void Restart() { NAME_start(state); }
 @FIELD@
 @FIELD@    /// <summary>Add the displacement of a touch to the body's vertices at rest, in m.</summary>
@@ -231,6 +246,14 @@ public:
 @MEMORY@        Flags = NAME_step(&State, X, Parameters, Seconds, F);
 @MEMORY@        return Turned(F, Flags);
 @MEMORY@    }
+@RELEASE@
+@RELEASE@    /** Let go of the body, which was held at a place: where it lies after so many seconds. */
+@RELEASE@    CLASSVector Release(const CLASSVector& Place, double Seconds, int32_t& Flags)
+@RELEASE@    {
+@RELEASE@        double X[3] = {0.01 * Place.X, -0.01 * Place.Y, 0.01 * Place.Z};
+@RELEASE@        Flags = NAME_release(&State, X, Parameters, Seconds);
+@RELEASE@        return CLASSVector{100.0 * X[0], -100.0 * X[1], 100.0 * X[2]};
+@RELEASE@    }
 
 private:
     static CLASSVector Turned(const double* F, int32_t Flags)
@@ -254,6 +277,7 @@ void NAME_limits(double *low, double *high);
 char *NAME_hash(void);
 @MEMORY@void NAME_start(double *state);
 @MEMORY@int NAME_step(double *state, double *x, double *p, double dt, double *force);
+@RELEASE@int NAME_release(double *state, double *x, double *p, double dt);
 @FIELD@int NAME_touched(double *x, double *p, double *touch);
 @FIELD@void NAME_shape(double *touch, int first, int count, double *values);
 """

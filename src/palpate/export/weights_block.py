@@ -125,6 +125,11 @@ class WeightsBlock:
     sources: Mapping[str, str] = field(default_factory=dict)
     field: str = ""
 
+    @property
+    def releases(self) -> bool:
+        """Whether the memory moves the rest of a body that nobody holds: its C source defines NAME_release."""
+        return f" {self.memory}_release(" in self.sources.get(self.memory, "")
+
     @classmethod
     def of(cls, surrogate: Surrogate, *, field: str | None = None, deviation: bool = True) -> WeightsBlock:
         """Return the block of a learnt body.
@@ -164,6 +169,8 @@ class WeightsBlock:
         if memory is not None:
             step = memory.c_source()
             if step is None:
+                raise _refused("memory", memory.name)
+            if memory.moves_rest and f" {identifier(memory.name)}_release(" not in step:
                 raise _refused("memory", memory.name)
             sources[identifier(memory.name)] = step
             code, size = _code(memory.name, _MEMORIES), memory.c_size()

@@ -156,8 +156,8 @@ class Memory(ABC):
     def c_source(self) -> str | None:
         """Return the step in C99 for exporters, which refuse a memory without it by name.
 
-        The text defines ``NAME_step`` (docs/guide/export.md); `c_arguments` are its arrays, `c_size` says how large
-        its state is.
+        The text defines ``NAME_step``, and ``NAME_release`` where the memory moves the rest (docs/guide/export.md);
+        `c_arguments` are its arrays, `c_size` says how large its state is.
         """
         return None
 

@@ -73,6 +73,18 @@ def test_clamped_says_so():
     assert not safety.clamped
 
 
+def test_damping_that_was_added_does_not_add_up():
+    """A damper that pushes more than the slew allows a tick: what is sent is the body's force less the damping."""
+    limits, damping = Limits(2.0, slew=100.0), np.array([0.0, 0.0, 1.0])
+    safety = Safety(limits, PERIOD, np.zeros(3))
+    body = Safety(limits, PERIOD, np.zeros(3))
+    for wanted in [*np.linspace(0.0, 1.5, 200), *np.full(100, 1.5)]:
+        for each in (safety, body):
+            each.apply(np.array([0.0, wanted, 0.0]), gate=True)
+        np.testing.assert_array_equal(safety.force, body.force)
+        safety.force -= damping
+
+
 @pytest.mark.parametrize(
     "arguments",
     [(0.0,), (-1.0,), (math.inf,), (math.nan,), (1.0, -1.0), (1.0, 1.0, 0.049), (1.0, 1.0, math.nan)],
@@ -88,6 +100,20 @@ def test_stall_is_an_age():
     assert stalled(1.0, -math.inf, 0.02), "never heard of"
     assert stalled(1.0, math.nan, 0.02)
     assert stalled(1.0, 1.0, math.nan)
+
+
+def test_damping_warms_the_motors_too():
+    """A body that pushes little, and damping on top of it: what is allowed comes down to the continuous force."""
+    limits = Limits(10.0, continuous=4.0)
+    safety = Safety(limits, 0.01, np.zeros(3))
+    squares = []
+    for _ in range(6000):
+        safety.apply(np.array([0.0, 1.0, 0.0]), gate=True)
+        safety.force *= safety.allowed / max(np.linalg.norm(safety.force), 1e-9)
+        squares.append(float(safety.force @ safety.force))
+    mean = np.convolve(squares, np.ones(1000) / 1000, mode="valid")  # of ten seconds
+    assert max(squares) == pytest.approx(limits.max_force**2)
+    assert mean[-1] <= limits.continuous**2 * 1.1
 
 
 def test_warm_motors_get_their_continuous_force():

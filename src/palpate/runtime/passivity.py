@@ -11,7 +11,7 @@ ended is f F[k−n−2] + (1 − f) F[k−n−1]. Where E < 0 the controller add
     F ← F − α v        α = min(α_max, −E/(T |v|²)),  none below a speed of 1 mm/s
 
 Damping already sent that has not acted yet counts towards E, so that a late device isn't damped several times for one
-debt. The controller comes last: nothing but the largest force of the device bounds what it adds.
+debt. The controller comes last: nothing but the largest force that the device bears bounds what it adds.
 
 **The promise.** Let U be the energy that the hand feels and K its largest curvature, N/m. A force held for a tick
 leaks at most ½ K |Δx|², one that is also d late at most K (½ + d/T) |Δx|², hence without any controller
@@ -93,7 +93,7 @@ class PassivityController:
     period : float
         Nominal time of a tick, s.
     max_force : float
-        Largest ‖F‖ that may be sent, N.
+        Largest ‖F‖ that may be sent, N; may change at any tick.
     max_damping : float
         α_max, N·s/m; 0 observes only, as for a device without motors.
 

@@ -4,10 +4,14 @@ Inside the loop nothing raises: a fault is a value (`Fault`), and the force is z
 whatever the model says:
 
 - *limit*: ‖F‖ ≤ F_max; a larger force is shortened, never turned;
-- *slew*: while the gate is open, ‖F_k − F_{k−1}‖ ≤ s T, T being the tick;
+- *slew*: while the gate is open, ‖F_k − F_{k−1}‖ ≤ s T, T being the tick and F the force of the body before damping;
 - *ramp-in*: after the gate opens (a grab, a start, the end of a fault) the force grows from zero over at
   least 50 ms, counted in ticks, so that a late tick can't shorten it;
-- *heat*: where the device states a continuous force, the mean of ‖F‖² over ten seconds doesn't exceed its square.
+- *heat*: where the device states a continuous force, the mean of ‖F‖² over ten seconds doesn't exceed its square;
+  F is the force as sent, and `Safety.allowed` bounds damping, too.
+
+The passivity controller adds its damping after these laws, to `Safety.force`. The slew goes on from the force without
+it: it would otherwise be subtracted from itself in every tick, and a damper faster than the slew would run away.
 
 A closed gate means zero at once: letting go of the motors is the safe direction. After a fault it opens again only
 where the body holds no energy (`HandEvaluator.release`), and after a stop only when a person says so (`Stop`).
@@ -126,7 +130,8 @@ class Safety:
     Attributes
     ----------
     force : (3,)
-        What may be sent, N; the array given, overwritten by each `apply`.
+        What may be sent, N; the array given, overwritten by each `apply`. What is added to it until the next one, as
+        damping, was sent.
     clamped : bool
         Whether the force limit acted on the latest tick.
     """
@@ -161,9 +166,14 @@ class Safety:
         self._was = (u + part * dx, v + part * dy, w + part * dz)
         self.force[0], self.force[1], self.force[2] = self._was
 
+    @property
+    def allowed(self) -> float:
+        """Largest ‖F‖ that the device bears at the latest tick, N: less while its motors are warm."""
+        return self._allowed
+
     def _warm(self) -> None:
         """Bring the limit down towards the continuous force as the motors get warm."""
-        u, v, w = self._was
+        u, v, w = self.force.tolist()  # as sent
         self._heat += self._cooling * (u * u + v * v + w * w - self._heat)
         bearable = self._continuous**2
         spare = (bearable - self._heat) / ((1.0 - _WARM) * bearable)

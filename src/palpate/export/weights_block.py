@@ -127,7 +127,7 @@ class WeightsBlock:
 
     @property
     def releases(self) -> bool:
-        """Whether the memory moves the rest of a body that nobody holds: its C source defines NAME_release."""
+        """True where the memory moves the rest of a body that nobody holds: its C source defines NAME_release."""
         return f" {self.memory}_release(" in self.sources.get(self.memory, "")
 
     @classmethod

@@ -11,6 +11,7 @@ import hashlib
 import os
 import platform
 import threading
+import time
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
@@ -25,7 +26,8 @@ from palpate.runtime.trace_file import TraceWriter
 __all__ = ["TraceRecorder", "machine_facts", "model_facts"]
 
 _LOOK, _CHUNK = 0.1, 0.5  # s between two looks at the ring, and between two chunks of the file
-_BEGIN = 10.0  # s within which a running loop begins a recording
+_BEGIN, _PAUSE = 10.0, 0.01  # s within which a running loop begins a recording, and between two looks at that
+_LAST = 0.2  # s that the loop's first state may still be on its way where a recording is stopped at once
 
 
 class TraceRecorder:
@@ -65,8 +67,8 @@ class TraceRecorder:
         self._lost = ring.lost
         self._ending, self._end = threading.Event(), threading.Event()
         ring.read = int(ring.head)
-        self._number = int(ring.begun) + 1
-        ring.asked[()] = self._number
+        ring.number += 1
+        ring.asked[()] = self._number = ring.number
         self._thread = threading.Thread(target=self._work, name="palpate-recorder", daemon=True)
 
     def start(self) -> None:
@@ -137,13 +139,16 @@ class TraceRecorder:
 
     def _begin(self) -> None:
         """Wait for the loop's first word, and write down what it remembers."""
-        for _ in range(round(_BEGIN / 0.01)):
-            if int(self._ring.begun) == self._number:
-                break
-            if self._ending.wait(0.01):
-                return
-        else:
-            raise DeviceError(f"The recording {self.path} has not begun.", why="The loop doesn't tick.")
+        left = _BEGIN
+        while int(self._ring.begun) != self._number:
+            if self._ending.is_set():
+                left = min(left, _LAST)
+            if left <= 0.0:
+                if self._ending.is_set():
+                    return
+                raise DeviceError(f"The recording {self.path} has not begun.", why="The loop doesn't tick.")
+            time.sleep(_PAUSE)
+            left -= _PAUSE
         self._writer.add_json("loop", self._ring.facts)
         state = self._ring.state
         if state is None:

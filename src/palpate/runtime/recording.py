@@ -6,7 +6,8 @@ oldest ticks, which are counted and told.
 
 A record holds all that a tick depends on (its time, what the device said, the parameters in force, whether the driver
 failed) and what came of it, so that a `replay` gives the same forces to the last bit and can say so. What a loop
-remembers from before a recording is saved once, at its first tick (`snapshot`).
+remembers from before a recording is copied once, at its first tick (`snapshot`); a thread beside the loop puts the copy
+into the ring.
 """
 
 from __future__ import annotations
@@ -14,9 +15,12 @@ from __future__ import annotations
 import json
 import mmap
 import pickle
+import queue
+import threading
+import weakref
 import zlib
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -24,6 +28,7 @@ from palpate.errors import DeviceError
 from palpate.network import shared_memory
 from palpate.runtime.devices.device import Device, Sample, Traits
 from palpate.runtime.passivity import LEDGER
+from palpate.runtime.realtime import obtain_beside
 from palpate.runtime.shared_state import MAX_INPUTS
 from palpate.runtime.snapshot import snapshot
 
@@ -107,7 +112,9 @@ class Ring:
     asked : () int64
         Number of the recording that the reader wants, 0 for none.
     begun : () int64
-        Number of the recording that the loop has begun.
+        Number of the recording that the loop has begun, and whose first state is in the ring.
+    number : int
+        Of the latest recording that this side has asked for; counted by the reader.
     """
 
     def __init__(self, name: str, memory: mmap.mmap) -> None:
@@ -125,7 +132,7 @@ class Ring:
         self.slots = np.frombuffer(slots, np.uint8, self.length * TICK.itemsize).reshape(
             self.length, TICK.itemsize
         )
-        self.read, self.lost = 0, 0
+        self.read, self.lost, self.number = 0, 0, 0
 
     @classmethod
     def create(cls, rate: float) -> Ring:
@@ -240,6 +247,19 @@ def _intact(rows: np.ndarray) -> int:
     return len(rows)
 
 
+_Begun: TypeAlias = tuple[int, dict[str, Any] | None]
+
+
+def _keep_states(states: queue.SimpleQueue[_Begun | None], ring: Ring) -> None:
+    """Put what a loop remembers into the ring as each recording begins, until there is no more to come."""
+    while (begun := states.get()) is not None:
+        number, state = begun
+        if state is not None:
+            obtain_beside()
+            ring.keep(state)
+        ring.begun[()] = number
+
+
 class RecordedDevice:
     """A device whose samples, failures and forces are noted for the recording.
 
@@ -303,10 +323,13 @@ class TickRecorder:
     ----------
     record : record of dtype `TICK`, shape ()
         The tick that was written last.
+    number : int
+        Of the recording whose ticks are written; 0 for none.
     """
 
     def __init__(self, ring: Ring) -> None:
-        self.ring = ring
+        self.ring, self.number = ring, int(ring.begun)
+        self._states: queue.SimpleQueue[_Begun | None] = queue.SimpleQueue()
         self._bytes = np.zeros(TICK.itemsize, np.uint8)
         record = self._bytes.view(TICK).reshape(())
         self._covered = self._bytes[:-4].data
@@ -316,6 +339,8 @@ class TickRecorder:
 
     def watch(self, device: Device) -> RecordedDevice:
         """Return the device to be used in place of `device`."""
+        threading.Thread(target=_keep_states, args=(self._states, self.ring), daemon=True).start()
+        weakref.finalize(self, self._states.put, None)
         self._device = RecordedDevice(device, self.record)
         return self._device  # type: ignore[no-any-return]
 
@@ -324,20 +349,19 @@ class TickRecorder:
 
         None begins while two surrogates are blended: a replay finds one in the hand.
         """
-        ring = self.ring
-        asked = int(ring.asked)
+        asked = int(self.ring.asked)
         if asked and loop.swap is not None:
             return
-        if asked != int(ring.begun):
-            if asked:
-                ring.keep(snapshot(loop))
-            ring.begun[()] = asked
+        if asked != self.number:
+            # to encode the copy would take longer than the rest of a tick
+            self._states.put((asked, snapshot(loop) if asked else None))
+            self.number = asked
 
     def tick(self, loop: Loop, lateness: float) -> None:
         """Take over the tick that has just ended, `lateness` (s) behind its schedule."""
         ring = self.ring
         asked = int(ring.asked)
-        if not asked or asked != int(ring.begun):
+        if not asked or asked != self.number:
             self.begin(loop)
             return
         views, published, device = self._views, loop.out.record, self._device

@@ -203,8 +203,8 @@ class Replay:
             state=seen.state, indentation=seen.indentation, command=self._commands.command
         )
         self._orphaned, ring = False, Ring.private()
-        self._recorder = TickRecorder(ring)
         ring.asked[()] = ring.begun[()] = 1  # what is recorded is compared with what was
+        self._recorder = TickRecorder(ring)
         self.loop = Loop(
             model,
             self.device,

@@ -15,16 +15,17 @@ def pad(tmp_path_factory):
     return body("pad").save(tmp_path_factory.mktemp("pad") / "pad.palpate")
 
 
-@pytest.mark.parametrize("kind", ["c", "lib", "fmu"])
-def test_a_body_goes_out_and_is_compared(kind, palpate, pad, tmp_path):
+@pytest.mark.parametrize("words", [("c",), ("lib",), ("fmu",), ("fmu", "--fmi", "3.0")])
+def test_a_body_goes_out_and_is_compared(words, palpate, pad, tmp_path):
     require_program("gcc")
-    out = tmp_path / ("pad.fmu" if kind == "fmu" else "out")
-    answer = palpate("export", kind, pad, "--out", out, "--json")
+    out = tmp_path / ("pad.fmu" if words[0] == "fmu" else "out")
+    answer = palpate("export", *words, pad, "--out", out, "--json")
     assert answer.code == 0, answer.err
     said = json.loads(answer.out)
     assert out.exists()
     assert set(said["compared"]) >= {"energy", "force", "stiffness", "flags"}
     assert len(said["hash"]) == 64
+    assert said.get("fmi") == {("fmu",): "2.0", ("fmu", "--fmi", "3.0"): "3.0"}.get(words)
 
 
 def test_a_network_goes_out_as_c_alone(palpate, tmp_path):

@@ -1,4 +1,9 @@
-/* A host that calls an FMU's functions in legal and illegal orders; compiled together with the FMU's source. */
+/* A host that calls an FMU's functions in legal and illegal orders, compiled together with the FMU's source.
+ *
+ *     host VERSION HASH RESOURCES STATES        states: number of continuous ones, -1 where there is no model exchange
+ */
+#include "palpate_fmu.c"
+
 #define EXPECT(call, wanted)                                                                        \
   do {                                                                                              \
     const int came = (int)(call);                                                                   \
@@ -10,121 +15,16 @@
 
 static int errors, warnings;
 
-static void logged(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status, fmi2String category, fmi2String text, ...) {
-  (void)environment, (void)name, (void)category, (void)text;
-  if (status == fmi2Warning) warnings++;
-  if (status == fmi2Error) errors++;
-}
-
-static int exchange(const char *guid, const char *resources, const fmi2CallbackFunctions *calls) {
-  fmi2Component c = fmi2Instantiate("exchange", fmi2ModelExchange, guid, resources, calls, 0, 1);
-  const fmi2ValueReference inputs[3] = {0, 1, 2}, outputs[4] = {3, 4, 5, 6};
-  const double place[3] = {0.001, -0.002, 0.003}, seed[3] = {1.0, 0.0, 0.0};
-  double values[4], slopes[4];
-  fmi2EventInfo info;
-  fmi2Boolean event, end;
-  if (!c) return 1;
-  EXPECT(fmi2DoStep(c, 0.0, 0.001, 1), fmi2Error);
-  EXPECT(fmi2GetReal(c, outputs, 4, values), fmi2Error);
-  EXPECT(fmi2EnterContinuousTimeMode(c), fmi2Error);
-  EXPECT(fmi2SetupExperiment(c, 0, 0.0, 0.0, 1, 1.0), fmi2OK);
-  EXPECT(fmi2EnterInitializationMode(c), fmi2OK);
-  EXPECT(fmi2EnterInitializationMode(c), fmi2Error);
-  EXPECT(fmi2SetReal(c, inputs, 3, place), fmi2OK);
-  EXPECT(fmi2GetReal(c, outputs, 4, values), fmi2OK);
-  EXPECT(fmi2ExitInitializationMode(c), fmi2OK);
-  EXPECT(fmi2NewDiscreteStates(c, &info), fmi2OK);
-  EXPECT(info.newDiscreteStatesNeeded, 0);
-  EXPECT(fmi2EnterContinuousTimeMode(c), fmi2OK);
-  EXPECT(fmi2SetTime(c, 0.5), fmi2OK);
-  EXPECT(fmi2GetDirectionalDerivative(c, outputs, 4, inputs, 3, seed, slopes), fmi2OK);
-  EXPECT(slopes[3] == -values[0], 1);
-  EXPECT(fmi2GetDirectionalDerivative(c, inputs, 1, inputs, 3, seed, slopes), fmi2Error);
-  EXPECT(fmi2GetContinuousStates(c, values, 0), fmi2OK);
-  EXPECT(fmi2GetDerivatives(c, values, 1), fmi2Error);
-  EXPECT(fmi2CompletedIntegratorStep(c, 1, &event, &end), fmi2OK);
-  EXPECT(fmi2EnterEventMode(c), fmi2OK);
-  EXPECT(fmi2EnterEventMode(c), fmi2Error);
-  EXPECT(fmi2Terminate(c), fmi2OK);
-  EXPECT(fmi2SetReal(c, inputs, 3, place), fmi2Error);
-  EXPECT(fmi2Reset(c), fmi2OK);
-  EXPECT(fmi2EnterInitializationMode(c), fmi2OK);
-  fmi2FreeInstance(c);
-  return 0;
-}
-
-static int simulation(const char *guid, const char *resources, const fmi2CallbackFunctions *calls) {
-  fmi2Component c = fmi2Instantiate("simulation", fmi2CoSimulation, guid, resources, calls, 0, 1);
-  const fmi2ValueReference inputs[3] = {0, 1, 2}, outputs[3] = {3, 4, 5}, strange[1] = {99}, output[1] = {3};
-  const double place[3] = {0.001, -0.002, 0.003}, far[3] = {10.0, 0.0, -0.03}, none[3] = {0.0 / 0.0, 0.0, 0.0};
-  double values[3], again[3];
-  fmi2Boolean flags[3];
-  fmi2FMUstate state = 0, other = 0;
-  fmi2Byte bytes[1 << 16];
-  size_t size = 0;
-  int i;
-  if (!c) return 1;
-  EXPECT(fmi2Terminate(c), fmi2Error);
-  EXPECT(fmi2EnterInitializationMode(c), fmi2OK);
-  EXPECT(fmi2SetReal(c, inputs, 3, place), fmi2OK);
-  EXPECT(fmi2ExitInitializationMode(c), fmi2OK);
-  EXPECT(fmi2SetupExperiment(c, 0, 0.0, 0.0, 1, 1.0), fmi2Error);
-  EXPECT(fmi2SetReal(c, strange, 1, place), fmi2Error);
-  EXPECT(fmi2SetReal(c, output, 1, place), fmi2Error);
-  EXPECT(fmi2GetReal(c, strange, 1, values), fmi2Error);
-  EXPECT(fmi2GetBoolean(c, strange, 1, flags), fmi2Error);
-  EXPECT(fmi2GetString(c, strange, 0, 0), fmi2OK);
-  EXPECT(fmi2GetInteger(c, strange, 1, 0), fmi2Error);
-  for (i = 0; i < 20; i++) EXPECT(fmi2DoStep(c, 0.001 * i, 0.001, 1), fmi2OK);
-  EXPECT(fmi2GetFMUstate(c, &state), fmi2OK);
-  for (i = 0; i < 20; i++) EXPECT(fmi2DoStep(c, 0.02 + 0.001 * i, 0.001, 1), fmi2OK);
-  EXPECT(fmi2GetReal(c, outputs, 3, values), fmi2OK);
-  EXPECT(fmi2SerializedFMUstateSize(c, state, &size), fmi2OK);
-  EXPECT(size <= sizeof bytes, 1);
-  EXPECT(fmi2SerializeFMUstate(c, state, bytes, size - 1), fmi2Error);
-  EXPECT(fmi2SerializeFMUstate(c, state, bytes, size), fmi2OK);
-  EXPECT(fmi2DeSerializeFMUstate(c, bytes, size - 1, &other), fmi2Error);
-  EXPECT(fmi2DeSerializeFMUstate(c, bytes, size, &other), fmi2OK);
-  EXPECT(fmi2SetFMUstate(c, other), fmi2OK);
-  for (i = 0; i < 20; i++) EXPECT(fmi2DoStep(c, 0.02 + 0.001 * i, 0.001, 1), fmi2OK);
-  EXPECT(fmi2GetReal(c, outputs, 3, again), fmi2OK);
-  EXPECT(memcmp(values, again, sizeof values), 0);
-  EXPECT(fmi2FreeFMUstate(c, &state), fmi2OK);
-  EXPECT(fmi2FreeFMUstate(c, &other), fmi2OK);
-  EXPECT(state == 0, 1);
-  EXPECT(fmi2DoStep(c, 0.0, -1.0, 1), fmi2Error);
-  EXPECT(fmi2EnterEventMode(c), fmi2Error);
-  EXPECT(fmi2CancelStep(c), fmi2Error);
-  warnings = 0;
-  EXPECT(fmi2SetReal(c, inputs, 3, far), fmi2OK);
-  for (i = 0; i < 5; i++) EXPECT(fmi2DoStep(c, 0.1, 0.001, 1), fmi2OK);
-  EXPECT(fmi2SetReal(c, inputs, 3, none), fmi2OK);
-  EXPECT(fmi2DoStep(c, 0.1, 0.001, 1), fmi2OK);
-  EXPECT(fmi2GetReal(c, outputs, 3, values), fmi2OK);
-  EXPECT(values[0] != values[0], 1);
-  EXPECT(warnings <= 1, 1); /* once an excursion, never an error */
-  EXPECT(fmi2Terminate(c), fmi2OK);
-  EXPECT(fmi2GetReal(c, outputs, 3, values), fmi2OK);
-  fmi2FreeInstance(c);
-  return 0;
-}
+#include "fmu2_host.c"
+#include "fmu3_host.c"
 
 int main(int count, char **words) {
-  const fmi2CallbackFunctions calls = {logged, calloc, free, 0, 0};
-  const char *guid = words[1], *resources = words[2];
-  if (count != 4) return 3;
-  EXPECT(fmi2Instantiate("x", fmi2CoSimulation, "0", resources, &calls, 0, 0) == 0, 1);
-  EXPECT(fmi2Instantiate("x", fmi2CoSimulation, guid, "file:///nowhere", &calls, 0, 0) == 0, 1);
-  EXPECT(fmi2Instantiate("x", fmi2CoSimulation, guid, "http://x/y", &calls, 0, 0) == 0, 1);
-  EXPECT(fmi2Instantiate("", fmi2CoSimulation, guid, resources, &calls, 0, 0) == 0, 1);
-  EXPECT(fmi2Instantiate("x", fmi2CoSimulation, 0, resources, &calls, 0, 0) == 0, 1);
-  EXPECT(fmi2DoStep(0, 0.0, 0.1, 1), fmi2Error);
-  EXPECT(fmi2GetReal(0, 0, 0, 0), fmi2Error);
-  if (strcmp(words[3], "remembers") && exchange(guid, resources, &calls)) return 1;
-  if (!strcmp(words[3], "remembers")) {
-    EXPECT(fmi2Instantiate("x", fmi2ModelExchange, guid, resources, &calls, 0, 0) == 0, 1);
+  if (count != 5) return 3;
+  if (!strcmp(words[1], "2.0")) {
+    if (orders2(words[2], words[3], atoi(words[4]))) return 1;
+  } else {
+    if (orders3(words[2], words[3], atoi(words[4]))) return 1;
   }
-  if (simulation(guid, resources, &calls)) return 1;
   EXPECT(errors > 5, 1);
   return 0;
 }

@@ -150,11 +150,14 @@ def to_fmu(
     file: LearntFile,
     out: Annotated[Path | None, typer.Option("-o", "--out", help="File. Default: NAME.fmu.")] = None,
     name: Name = None,
+    fmi: Annotated[
+        str, typer.Option("--fmi", help="Version of FMI: 2.0, which most tools import, or 3.0.")
+    ] = "2.0",
     no_deviation: NoDeviation = False,
     no_check: NoCheck = False,
     as_json: Json = False,
 ) -> None:
-    """Write an FMU (FMI 2.0) for Simulink and others; nothing is compiled.
+    """Write an FMU (FMI 2.0 or 3.0) for Simulink and others; nothing is compiled.
 
     Where FMPy is installed the FMU is loaded, and compared with palpate at 1,000 places; one that differs is refused.
     """
@@ -162,18 +165,21 @@ def to_fmu(
 
     thing, console = _body(file), Console(as_json)
     path = out if out is not None else Path(f"{name or file.stem}.fmu")
-    done = export_fmu(thing, path, name=name, deviation=not no_deviation, check=not no_check)
+    done = export_fmu(thing, path, name=name, fmi=fmi, deviation=not no_deviation, check=not no_check)
     comparison = done.comparison
     if comparison is None:
         console.say(
             "not compared with palpate: " + ("not asked for" if no_check else "FMPy is not installed")
         )
-    kinds = "co-simulation and model exchange" if done.exchange else "co-simulation"
-    lines = [f"{path}  {path.stat().st_size / 1e3:.0f} kB, {kinds}, {', '.join(done.platforms)}"]
+    kinds = "co-simulation and model exchange" if done.exchange else "co-simulation alone"
+    lines = [
+        f"{path}  {path.stat().st_size / 1e3:.0f} kB, FMI {done.fmi}, {kinds}, {', '.join(done.platforms)}"
+    ]
     lines += [] if comparison is None else [str(comparison)]
     content = {
         "file": str(path),
         "hash": done.hash,
+        "fmi": done.fmi,
         "platforms": list(done.platforms),
         "exchange": done.exchange,
     }

@@ -1,23 +1,164 @@
-"""An FMU that answers through FMPy, which loads it as other tools do."""
+"""An FMU that answers through FMPy, which loads it as other tools do; one class for each version of FMI."""
 
 from __future__ import annotations
 
 import shutil
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from palpate.errors import ResourceError
 from palpate.export.check_points import ANSWERS, CONTACT, NOT_A_NUMBER, TOO_DEEP, TRUSTED
 
-__all__ = ["CheckFmu"]
+__all__ = ["CheckFmu", "FmuInstance", "open_instance"]
 
-_PLACE, _OUTPUTS, _PARAMETER = [0, 1, 2], [6, 7, 3, 4, 5], 16
+_PLACE, _OUTPUTS, _PARAMETERS = [0, 1, 2], [6, 7, 3, 4, 5], range(16, 64)
+
+
+class FmuInstance(Protocol):
+    """An instance of an FMU in co-simulation or model exchange; variables go by their value references."""
+
+    def begin(self) -> None:
+        """Go to the start, and through initialization."""
+
+    def write(self, references: list[int], values: list[float]) -> None:
+        """Set real variables."""
+
+    def read(self, references: list[int]) -> list[float]:
+        """Return real variables."""
+        ...
+
+    def flags(self) -> list[bool]:
+        """Return inside, contact, too deep."""
+        ...
+
+    def step(self, time: float, dt: float) -> None:
+        """Take a step of co-simulation from a time, s."""
+
+    def slopes(self, unknown: list[int], known: list[int], seed: list[float]) -> list[float]:
+        """Return directional derivatives."""
+        ...
+
+    def close(self) -> None:
+        """End it."""
+
+
+def open_instance(description: Any, folder: str, *, exchange: bool = False) -> FmuInstance:
+    """Return an instance of an FMU.
+
+    Parameters
+    ----------
+    description : fmpy.model_description.ModelDescription
+        Its description.
+    folder : str
+        Where it is unpacked.
+    exchange : bool
+        Whether in model exchange.
+    """
+    kind = _Instance2 if description.fmiVersion == "2.0" else _Instance3
+    return kind(description, folder, exchange=exchange)
+
+
+class _Instance2:
+    """Of FMI 2.0."""
+
+    def __init__(self, description: Any, folder: str, *, exchange: bool) -> None:
+        from fmpy.fmi2 import (
+            FMU2Model,
+            FMU2Slave,
+            defaultCallbacks,
+            fmi2CallbackFunctions,
+            fmi2CallbackLoggerTYPE,
+        )
+
+        # warnings of places outside are what is asked for here: nothing is printed
+        self._calls = fmi2CallbackFunctions()
+        self._calls.logger = fmi2CallbackLoggerTYPE(lambda *_: None)
+        self._calls.allocateMemory = defaultCallbacks.allocateMemory
+        self._calls.freeMemory = defaultCallbacks.freeMemory
+        self.fmu: Any = (FMU2Model if exchange else FMU2Slave)(
+            **_identity(description, folder, exchange=exchange)
+        )
+        self.fmu.instantiate(callbacks=self._calls)
+
+    def begin(self) -> None:
+        self.fmu.reset()
+        self.fmu.setupExperiment(startTime=0.0)
+        self.fmu.enterInitializationMode()
+        self.fmu.exitInitializationMode()
+
+    def write(self, references: list[int], values: list[float]) -> None:
+        self.fmu.setReal(references, values)
+
+    def read(self, references: list[int]) -> list[float]:
+        return list(self.fmu.getReal(references))
+
+    def flags(self) -> list[bool]:
+        return [bool(flag) for flag in self.fmu.getBoolean([0, 1, 2])]
+
+    def step(self, time: float, dt: float) -> None:
+        self.fmu.doStep(currentCommunicationPoint=time, communicationStepSize=dt)
+
+    def slopes(self, unknown: list[int], known: list[int], seed: list[float]) -> list[float]:
+        return list(self.fmu.getDirectionalDerivative(unknown, known, seed))
+
+    def close(self) -> None:
+        self.fmu.terminate()
+        self.fmu.freeInstance()
+
+
+class _Instance3:
+    """Of FMI 3.0."""
+
+    def __init__(self, description: Any, folder: str, *, exchange: bool) -> None:
+        from fmpy.fmi3 import FMU3Model, FMU3Slave
+
+        self.fmu: Any = (FMU3Model if exchange else FMU3Slave)(
+            **_identity(description, folder, exchange=exchange)
+        )
+        self.fmu.instantiate(logMessage=lambda *_: None)
+
+    def begin(self) -> None:
+        self.fmu.reset()
+        self.fmu.enterInitializationMode(startTime=0.0)
+        self.fmu.exitInitializationMode()
+
+    def write(self, references: list[int], values: list[float]) -> None:
+        self.fmu.setFloat64(references, values)
+
+    def read(self, references: list[int]) -> list[float]:
+        return list(self.fmu.getFloat64(references))
+
+    def flags(self) -> list[bool]:
+        return [bool(flag) for flag in self.fmu.getBoolean([12, 13, 14])]
+
+    def step(self, time: float, dt: float) -> None:
+        self.fmu.doStep(currentCommunicationPoint=time, communicationStepSize=dt)
+
+    def slopes(self, unknown: list[int], known: list[int], seed: list[float]) -> list[float]:
+        return list(self.fmu.getDirectionalDerivative(unknown, known, seed))
+
+    def close(self) -> None:
+        self.fmu.terminate()
+        self.fmu.freeInstance()
+
+
+def _identity(description: Any, folder: str, *, exchange: bool) -> dict[str, str]:
+    kind = description.modelExchange if exchange else description.coSimulation
+    return {
+        "guid": description.guid,
+        "unzipDirectory": folder,
+        "modelIdentifier": kind.modelIdentifier,
+        "instanceName": "checked",
+    }
 
 
 class CheckFmu:
-    """An FMU in co-simulation; a context manager.
+    """An FMU that is asked as every export is; a context manager.
+
+    Steps are those of co-simulation. The force at a place of a body with a memory is that of model exchange where there
+    is one, at a body that remembers nothing.
 
     Parameters
     ----------
@@ -33,59 +174,52 @@ class CheckFmu:
     def __init__(self, path: Path) -> None:
         try:
             import fmpy
-            from fmpy.fmi2 import FMU2Slave, defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
         except ImportError as error:
             raise ResourceError(
                 "An FMU is compared with palpate through FMPy.", fix="pip install fmpy"
             ) from error
         self._description = fmpy.read_model_description(str(path))
         self._folder = fmpy.extract(str(path))
+        variables = self._description.modelVariables
         self._parameters = [
-            v.valueReference for v in self._description.modelVariables if v.valueReference >= _PARAMETER
+            v.valueReference
+            for v in variables
+            if v.valueReference in _PARAMETERS and v.causality == "parameter"
         ]
-        self._elastic = self._description.modelExchange is not None
-        self._fmu: Any = FMU2Slave(
-            guid=self._description.guid,
-            unzipDirectory=self._folder,
-            modelIdentifier=self._description.coSimulation.modelIdentifier,
-            instanceName="checked",
+        self._remembers = any(v.name == "stored" for v in variables)
+        self._steps = open_instance(self._description, self._folder)
+        self._felt = self._remembers and self._description.modelExchange is not None
+        self._places = (
+            open_instance(self._description, self._folder, exchange=True) if self._felt else self._steps
         )
-        # warnings of places outside are what is asked for here: nothing is printed
-        self._calls = fmi2CallbackFunctions()
-        self._calls.logger = fmi2CallbackLoggerTYPE(lambda *_: None)
-        self._calls.allocateMemory = defaultCallbacks.allocateMemory
-        self._calls.freeMemory = defaultCallbacks.freeMemory
-        self._fmu.instantiate(callbacks=self._calls)
 
     def __enter__(self) -> CheckFmu:
         return self
 
     def __exit__(self, *ignored: object) -> None:
-        self._fmu.terminate()
-        self._fmu.freeInstance()
+        self._steps.close()
+        if self._felt:
+            self._places.close()
         shutil.rmtree(self._folder, ignore_errors=True)
-
-    def _begin(self) -> None:
-        self._fmu.reset()
-        self._fmu.setupExperiment(startTime=0.0)
-        self._fmu.enterInitializationMode()
-        self._fmu.exitInitializationMode()
 
     def answers(self, X: np.ndarray) -> np.ndarray:
         """Return `ANSWERS` numbers for each row of X (N, 3 + p); not-a-number what an FMU does not tell."""
-        rows = np.full((len(X), ANSWERS), np.nan)
-        self._begin()
+        rows, asked = np.full((len(X), ANSWERS), np.nan), self._places
+        self._steps.begin()
+        if self._felt:
+            asked.begin()
         for row, x in zip(rows, X.tolist(), strict=True):
-            self._fmu.setReal([*_PLACE, *self._parameters], x)
-            if not self._elastic:  # the force is the memory's; energy, depth and flags are of the place
-                row[0], row[1] = self._fmu.getReal(_OUTPUTS[:2])
+            asked.write([*_PLACE, *self._parameters], x)
+            if self._remembers and not self._felt:  # the force is the memory's
+                row[:2] = asked.read(_OUTPUTS[:2])
             else:
-                row[:5] = self._fmu.getReal(_OUTPUTS)
+                row[:5] = asked.read(_OUTPUTS)
+            if not self._remembers:
                 for i in range(3):
                     seed = [float(i == j) for j in range(3)]
-                    row[[5 + i, 8 + i, 11 + i]] = self._fmu.getDirectionalDerivative([3, 4, 5], _PLACE, seed)
-            row[19] = self._fmu.getReal([8])[0]
-            inside, contact, deep = self._fmu.getBoolean([0, 1, 2])
+                    row[[5 + i, 8 + i, 11 + i]] = asked.slopes([3, 4, 5], _PLACE, seed)
+            row[19] = asked.read([8])[0]
+            inside, contact, deep = asked.flags()
             finite = all(map(np.isfinite, x))
             row[20] = TRUSTED * inside + CONTACT * contact + TOO_DEEP * deep if finite else NOT_A_NUMBER
         return rows
@@ -93,12 +227,12 @@ class CheckFmu:
     def walk(self, X: np.ndarray) -> np.ndarray:
         """Return force, stored and lost energy (N, 5) of each step X (N, 1 + 3 + p)."""
         rows, time = np.empty((len(X), 5)), 0.0
-        self._begin()
+        self._steps.begin()
         for row, x in zip(rows, X.tolist(), strict=True):
-            self._fmu.setReal([*_PLACE, *self._parameters], x[1:])
-            self._fmu.doStep(currentCommunicationPoint=time, communicationStepSize=x[0])
+            self._steps.write([*_PLACE, *self._parameters], x[1:])
+            self._steps.step(time, x[0])
             time += x[0]
-            row[:] = self._fmu.getReal([3, 4, 5, 10, 11])
+            row[:] = self._steps.read([3, 4, 5, 10, 11])
         return rows
 
     def shapes(self, X: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""The generic binaries of FMUs: one for each platform, built of the evaluator core and kept with the package.
+"""The generic binaries of FMUs: one for each platform and both versions of FMI, kept with the package.
 
     .ci/build_fmu_binaries [--check]
 
@@ -24,16 +24,21 @@ from palpate.export.core_source import generic_source
 
 __all__ = ["build_binaries", "built_binaries", "fmu_source", "main"]
 
-_LINUX, _MAC = ("-target", "x86_64-linux-gnu.2.17"), "darwin64/.dylib"
+_SOURCES = ("memory_states.c", "fmi_instance.c", "fmi_body.c", "fmi_derivatives.c", "fmi2.c", "fmi3.c")
+# small code for macOS: both machines' parts stand in one file of FMI 2.0, which is to be less than 200 kB
 TARGETS: Mapping[str, tuple[str, ...]] = {
-    "linux64/.so": _LINUX,
-    "win64/.dll": ("-target", "x86_64-windows-gnu"),
+    "x86_64-linux/.so": ("-target", "x86_64-linux-gnu.2.17", "-O2"),
+    "x86_64-windows/.dll": ("-target", "x86_64-windows-gnu", "-O2"),
+    "x86_64-darwin/.dylib": ("-target", "x86_64-macos.11.0", "-Os"),
+    "aarch64-darwin/.dylib": ("-target", "aarch64-macos.11.0", "-Os"),
 }
-MAC_TARGETS = {"x86_64": ("-target", "x86_64-macos.11.0"), "aarch64": ("-target", "aarch64-macos.11.0")}
-_MAC_KINDS = {"x86_64": (0x01000007, 3), "aarch64": (0x0100000C, 0)}  # of <mach/machine.h>
+"""What is built: folder in an FMU of FMI 3.0 and ending, and the compiler's options."""
+_FOLDERS2 = {"linux64/.so": "x86_64-linux/.so", "win64/.dll": "x86_64-windows/.dll"}
+_UNIVERSAL = "darwin64/.dylib"
+# kind of processor of <mach/machine.h>, and the bits of its pages, at which its part of a universal file begins
+_MAC_KINDS = {"x86_64-darwin/.dylib": (0x01000007, 3, 12), "aarch64-darwin/.dylib": (0x0100000C, 0, 14)}
 _OPTIONS = (
     "-std=c99",
-    "-O2",
     "-g0",
     "-s",
     "-shared",
@@ -42,25 +47,31 @@ _OPTIONS = (
     "-Wall",
     "-Wextra",
 )
-_PAGE = 14  # bits: the parts of a universal file begin at pages of 16 KiB
 _HASHES = "hashes.json"
 _LONGEST = 600.0  # s
 
 
 def fmu_source() -> str:
     """Return the whole source of the generic binary as one text."""
-    return generic_source("fmi2.c")
+    return generic_source(*_SOURCES)
 
 
-def built_binaries() -> dict[str, bytes]:
-    """Return the binaries that are kept with the package, by folder and ending: "linux64/.so"."""
+def built_binaries(version: str = "3.0") -> dict[str, bytes]:
+    """Return the binaries that are kept with the package, by an FMU's folder and ending: "x86_64-linux/.so".
+
+    Parameters
+    ----------
+    version : str
+        Of FMI: in 2.0 the folders have other names, and one file serves both kinds of macOS.
+    """
     folder = resources.files("palpate.export") / "binaries"
-    found = {}
-    for file in (*TARGETS, _MAC):
-        kept = folder / _file_of(file)
-        if kept.is_file():
-            found[file] = kept.read_bytes()
-    return found
+    kept = {file: folder / _file_of(file) for file in TARGETS}
+    there = {file: path.read_bytes() for file, path in kept.items() if path.is_file()}
+    if version == "3.0":
+        return there
+    binaries = {name: there[file] for name, file in _FOLDERS2.items() if file in there}
+    parts = {file: there[file] for file in _MAC_KINDS if file in there}
+    return binaries | ({_UNIVERSAL: _universal(parts)} if parts else {})
 
 
 def _file_of(target: str) -> str:
@@ -78,9 +89,7 @@ def build_binaries() -> dict[str, bytes]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "palpate_fmu.c").write_text(fmu_source(), "utf-8")
-        built = {file: _compile(folder, options) for file, options in TARGETS.items()}
-        built[_MAC] = _universal({kind: _compile(folder, options) for kind, options in MAC_TARGETS.items()})
-    return built
+        return {file: _compile(folder, options) for file, options in TARGETS.items()}
 
 
 def _compile(folder: Path, options: tuple[str, ...]) -> bytes:
@@ -120,13 +129,14 @@ def _cache() -> Path:
 
 def _universal(parts: Mapping[str, bytes]) -> bytes:
     """Return one file for both kinds of Mac: a head in big-endian order, then each part at a page of its own."""
-    head, offset = struct.pack(">II", 0xCAFEBABE, len(parts)), 1 << _PAGE
-    body = b""
-    for kind, content in parts.items():
-        body += bytes(-len(body) % (1 << _PAGE))
-        head += struct.pack(">5I", *_MAC_KINDS[kind], offset + len(body), len(content), _PAGE)
+    head, body = struct.pack(">II", 0xCAFEBABE, len(parts)), b""
+    offset = len(head) + 20 * len(parts)
+    for file, content in parts.items():
+        kind, variant, bits = _MAC_KINDS[file]
+        body += bytes(-(offset + len(body)) % (1 << bits))
+        head += struct.pack(">5I", kind, variant, offset + len(body), len(content), bits)
         body += content
-    return head + bytes(offset - len(head)) + body
+    return head + body
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -141,6 +151,8 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"other than those that are kept: {other}" if other else "the same as those that are kept")  # noqa: T201
         return 1 if other else 0
     folder.mkdir(exist_ok=True)
+    for old in folder.glob("*_palpate_fmu.*"):
+        old.unlink()
     for file, content in built.items():
         (folder / _file_of(file)).write_bytes(content)
         print(f"{_file_of(file)}  {len(content) / 1e3:.0f} kB")  # noqa: T201

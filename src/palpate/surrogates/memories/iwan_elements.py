@@ -285,6 +285,12 @@ class IwanElements(Memory):
         """Return how many numbers the state of that step has, after the four of the ledger."""
         return 1 + 2 * len(self)
 
+    def c_states(self) -> tuple[tuple[str, ...], ...] | None:
+        """Return the names of a_i, the amplitude that dashpot i has given way by; None where an element slips."""
+        if np.isfinite(self.limit).any():
+            return None
+        return tuple((f"a_{i + 1}",) for i in np.flatnonzero(np.isfinite(self.time)))
+
     def start(self) -> IwanState:
         """Return the state of a virgin body."""
         return IwanState(self)

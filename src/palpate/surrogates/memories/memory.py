@@ -169,6 +169,14 @@ class Memory(ABC):
         """Return how many numbers the state of `c_source` has, after the four of the ledger."""
         return 0
 
+    def c_states(self) -> tuple[tuple[str, ...], ...] | None:
+        """Return the names of its continuous states, in groups, for simulators that integrate by a solver of their own.
+
+        The rate of a state depends on where the hand is and on the states of its own group. None, the default, says
+        that what is remembered follows the path of the hand and no differential equation in time.
+        """
+        return None
+
     def spread(self, patches: Patches, spacing: float) -> Memory:
         """Return the same memory, kept at places of the surface that are `spacing` (m) apart.
 

@@ -120,6 +120,11 @@ class Relaxation(Memory):
         patches, terms = len(self.patches or Patches.single()), len(self.terms)
         return 1 + patches * (3 + terms) + 3 * terms
 
+    def c_states(self) -> tuple[tuple[str, ...], ...]:
+        """Return the names of z_ij, a group for each patch j."""
+        patches, branches = len(self.patches or Patches.single()), range(1, 1 + len(self.terms))
+        return tuple(tuple(f"z_{j + 1}_{i}" for i in branches) for j in range(patches))
+
     def start(self) -> RelaxationState:
         """Return the state of a body at rest."""
         return RelaxationState(self)

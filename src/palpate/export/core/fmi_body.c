@@ -1,0 +1,238 @@
+/* What both versions of FMI ask of a body: values, steps, states, and their derivatives. */
+
+/* the memory's answer to a step that is taken on a copy of what it keeps */
+static void try_step(Instance *c, const double *kept, double dt) {
+  memcpy(c->trial, kept, (size_t)c->size * sizeof(double));
+  if (!pp_step(&c->model, c->trial, c->now.x, c->answer[PP_AMPLITUDE], c->answer + PP_SLOPE, dt, c->now.force)) {
+    c->now.force[0] = c->now.force[1] = c->now.force[2] = pp_nan();
+  }
+  c->stored = c->trial[0];
+}
+
+/* Renew the answer, and warn once where the place leaves the trained region.
+ *
+ * In co-simulation the force of a body with a memory is that of its last step; while derivatives are asked for it is that
+ * which the same step would have ended in. In model exchange it follows place and states at once. */
+static void renew(Instance *c) {
+  if (c->known) return;
+  c->flags = pp_answer(&c->model, c->now.x, c->now.p, c->answer);
+  c->known = 1;
+  c->deviated = c->rated = 0;
+  c->stored = c->size ? c->numbers[0] : 0.0;
+  c->lost = c->size ? c->numbers[1] : 0.0;
+  if (c->size && c->now.stepped) {
+    if (c->probing) {
+      try_step(c, c->before, c->now.step);
+      c->lost = c->trial[1];
+    }
+  } else if (c->size && (c->exchange || c->now.remembers)) {
+    try_step(c, c->numbers, 0.0);
+  } else { /* before its first step a body with a memory answers as one that nothing was done to */
+    memcpy(c->now.force, c->answer + PP_FORCE, sizeof c->now.force);
+  }
+  if (c->flags & PP_TOO_DEEP) memset(c->now.force, 0, sizeof c->now.force);
+  if (c->flags & PP_TRUSTED) {
+    c->now.warned = 0;
+  } else if (!c->now.warned && !c->probing && (c->now.phase & RUNNING)) {
+    c->now.warned = 1;
+    say(c, WARNING, c->flags & PP_NOT_A_NUMBER ? "An input is not a finite number." : "The place is outside of the trained region.");
+  }
+}
+
+static const double *rates(Instance *c) {
+  renew(c);
+  if (!c->rated) {
+    double force[3], stored = c->stored;
+    memcpy(force, c->now.force, sizeof force);
+    try_step(c, c->numbers, 0.0);
+    pp_rates(&c->model, c->trial, c->answer[PP_AMPLITUDE], c->rates);
+    memcpy(c->now.force, force, sizeof force);
+    c->stored = stored;
+    c->rated = 1;
+  }
+  return c->rates;
+}
+
+static void advance(Instance *c, double dt) {
+  c->now.step = dt;
+  renew(c);
+  if (!c->size) return;
+  memcpy(c->before, c->numbers, (size_t)c->size * sizeof(double));
+  c->now.stepped = 1;
+  if (!pp_step(&c->model, c->numbers, c->now.x, c->answer[PP_AMPLITUDE], c->answer + PP_SLOPE, dt, c->now.force)) {
+    c->now.force[0] = c->now.force[1] = c->now.force[2] = pp_nan();
+  }
+  if (c->flags & PP_TOO_DEEP) memset(c->now.force, 0, sizeof c->now.force);
+  c->stored = c->numbers[0];
+  c->lost = c->numbers[1];
+  c->rated = 0;
+}
+
+static int take_step(Instance *c, double time, double step) {
+  if (!(step >= 0.0) || !pp_finite(step) || !pp_finite(time)) return refuse(c, "A step takes a finite time that is not negative.");
+  advance(c, step);
+  c->now.time = time + step;
+  return OK;
+}
+
+/* the state that a value reference is, or -1 */
+static int32_t state_of(const Instance *c, uint32_t v) {
+  return v >= STATE && (int64_t)v - STATE < c->states ? (int32_t)(v - STATE) : -1;
+}
+
+/* the state that a value reference is the rate of, or -1 */
+static int32_t rate_of(const Instance *c, uint32_t v) {
+  const int64_t i = (int64_t)v - STATE - c->states;
+  return i >= 0 && i < c->states ? (int32_t)i : -1;
+}
+
+static int is_parameter(const Instance *c, uint32_t v) { return v >= PARAMETER && v < PARAMETER + (uint32_t)c->parameters; }
+
+/* 0 where there is no real variable of this reference */
+static int value_of(Instance *c, uint32_t v, double *value) {
+  if (v < 3) *value = c->now.x[v];
+  else if (v == SCALE) *value = c->now.scale;
+  else if (v == TIME) *value = c->now.time;
+  else if (is_parameter(c, v)) *value = c->now.p[v - PARAMETER];
+  else if (v >= STATE) {
+    if (state_of(c, v) >= 0) *value = pp_state(&c->model, c->numbers, state_of(c, v));
+    else if (rate_of(c, v) >= 0) *value = rates(c)[rate_of(c, v)];
+    else return 0;
+  } else {
+    renew(c);
+    if (v <= FZ) *value = c->now.scale * c->now.force[v - FX];
+    else if (v == ENERGY) *value = c->now.scale * c->answer[PP_ENERGY];
+    else if (v == DEPTH) *value = c->answer[PP_DEPTH];
+    else if (v == DEVIATION) {
+      if (!c->deviated) c->deviation = pp_deviation(&c->model, c->now.x, c->now.p, c->answer, c->work);
+      c->deviated = 1;
+      *value = c->deviation;
+    } else if (v == STORED && c->size) *value = c->now.scale * c->stored;
+    else if (v == LOST && c->size) *value = c->now.scale * c->lost;
+    else return 0;
+  }
+  return 1;
+}
+
+/* whether the variable could be set */
+static int set_value(Instance *c, uint32_t v, double value) {
+  if (v < 3) c->now.x[v] = value;
+  else if (v == SCALE) c->now.scale = value;
+  else if (is_parameter(c, v)) c->now.p[v - PARAMETER] = value;
+  else if (state_of(c, v) >= 0 && (c->now.phase & (INSTANTIATED | INITIALIZING))) {
+    pp_set_state(&c->model, c->numbers, state_of(c, v), value);
+    c->now.remembers = 1;
+  } else return 0;
+  c->known = 0;
+  return 1;
+}
+
+static int get_reals(Instance *c, const uint32_t *which, size_t count, double *values) {
+  size_t i;
+  if (count && (!which || !values)) return refuse(c, "Real values need references and room for values.");
+  for (i = 0; i < count; i++) {
+    if (!value_of(c, which[i], &values[i])) return refuse(c, "There is no real variable of this reference.");
+  }
+  return OK;
+}
+
+static int set_reals(Instance *c, const uint32_t *which, size_t count, const double *values) {
+  size_t i;
+  if (count && (!which || !values)) return refuse(c, "Real values need references and values.");
+  for (i = 0; i < count; i++) {
+    if (!set_value(c, which[i], values[i])) return refuse(c, "There is no real variable of this reference that may be set now.");
+  }
+  return OK;
+}
+
+/* flag i of inside, contact, too deep: while a solver integrates, as at the last event */
+static int flag_of(Instance *c, uint32_t i) {
+  static const int bits[3] = {PP_TRUSTED, PP_CONTACT, PP_TOO_DEEP};
+  renew(c);
+  return ((c->now.phase == CONTINUOUS ? c->now.flags : c->flags) & bits[i]) != 0;
+}
+
+static void end_initialization(Instance *c) {
+  c->now.phase = c->exchange ? EVENT : STEPPING;
+  c->known = 0;
+  renew(c);
+}
+
+static void begin_continuous(Instance *c) {
+  renew(c);
+  c->now.flags = c->flags;
+  c->now.phase = CONTINUOUS;
+}
+
+/* whether a flag has changed since the last event, so that there must be another */
+static int needs_event(Instance *c) {
+  renew(c);
+  return c->now.flags != c->flags;
+}
+
+static size_t moment_size(const Instance *c) { return sizeof(Moment) + 2 * (size_t)c->size * sizeof(double); }
+
+static int get_moment(Instance *c, void **moment) {
+  if (!moment) return refuse(c, "A state needs a place.");
+  if (!*moment) *moment = malloc(moment_size(c));
+  if (!*moment) return refuse(c, "There is no memory for a state.");
+  memcpy(*moment, &c->now, sizeof(Moment));
+  memcpy((char *)*moment + sizeof(Moment), c->numbers, 2 * (size_t)c->size * sizeof(double));
+  return OK;
+}
+
+static int set_moment(Instance *c, const void *moment) {
+  if (!moment) return refuse(c, "This is no state.");
+  memcpy(&c->now, moment, sizeof(Moment));
+  memcpy(c->numbers, (const char *)moment + sizeof(Moment), 2 * (size_t)c->size * sizeof(double));
+  c->known = 0;
+  return OK;
+}
+
+static int write_moment(Instance *c, const void *moment, void *bytes, size_t size) {
+  if (!moment || !bytes) return refuse(c, "A state is written to a place.");
+  if (size < moment_size(c)) return refuse(c, "A state needs more room than this.");
+  memcpy(bytes, moment, moment_size(c));
+  return OK;
+}
+
+static int read_moment(Instance *c, const void *bytes, size_t size, void **moment) {
+  Moment read;
+  if (!bytes || !moment) return refuse(c, "A state is read from bytes to a place.");
+  if (size != moment_size(c)) return refuse(c, "This is no state of this body.");
+  memcpy(&read, bytes, sizeof read);
+  if (read.phase <= 0 || read.phase > TERMINATED || (read.phase & (read.phase - 1))) return refuse(c, "This is no state of this body.");
+  if (read.phase & (c->exchange ? STEPPING : EVENT | CONTINUOUS)) return refuse(c, "This is a state of the other kind of simulation.");
+  if (!*moment) *moment = malloc(size);
+  if (!*moment) return refuse(c, "There is no memory for a state.");
+  memcpy(*moment, bytes, size);
+  return OK;
+}
+
+static int get_states(Instance *c, double *values, size_t count) {
+  int32_t i;
+  if ((int64_t)count != c->states || (count && !values)) return refuse(c, "There is another number of continuous states.");
+  for (i = 0; i < c->states; i++) values[i] = pp_state(&c->model, c->numbers, i);
+  return OK;
+}
+
+static int set_states(Instance *c, const double *values, size_t count) {
+  int32_t i;
+  if ((int64_t)count != c->states || (count && !values)) return refuse(c, "There is another number of continuous states.");
+  for (i = 0; i < c->states; i++) pp_set_state(&c->model, c->numbers, i, values[i]);
+  c->known = 0;
+  return OK;
+}
+
+static int get_rates(Instance *c, double *values, size_t count) {
+  if ((int64_t)count != c->states || (count && !values)) return refuse(c, "There is another number of continuous states.");
+  if (count) memcpy(values, rates(c), count * sizeof(double));
+  return OK;
+}
+
+static int get_nominals(Instance *c, double *values, size_t count) {
+  int32_t i;
+  if ((int64_t)count != c->states || (count && !values)) return refuse(c, "There is another number of continuous states.");
+  for (i = 0; i < c->states; i++) values[i] = i < c->states - 1 ? c->usual : c->usual * c->usual;
+  return OK;
+}

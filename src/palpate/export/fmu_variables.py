@@ -1,0 +1,225 @@
+"""The variables of an FMU, the same for both versions of FMI: inputs, parameters, outputs, states and their rates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from palpate.export.weights_block import identifier
+from palpate.surrogates import Surrogate
+from palpate.units import bounds
+
+__all__ = ["Variable", "body_variables", "defined_units", "has_exchange"]
+
+PARAMETER, STATE, FLAGS, SCALE = 16, 64, 12, 9  # value references, as in core/fmi_instance.c
+_MOST_STATES = 2000  # solvers keep a square matrix of them, and each is described by two variables
+_PLACES = (0, 1, 2)
+_UNITS: Mapping[str, str] = {
+    "m": 'm="1"',
+    "N": 'kg="1" m="1" s="-2"',
+    "J": 'kg="1" m="2" s="-2"',
+    "W": 'kg="1" m="2" s="-3"',
+    "Pa": 'kg="1" m="-1" s="-2"',
+    "N/m": 'kg="1" s="-2"',
+    "s": 's="1"',
+    "1": "",
+}
+_ROOT, _ROOT_RATE = "J^0.5", "J^0.5/s"  # no whole powers of SI's base units
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A scalar variable.
+
+    Attributes
+    ----------
+    name, words : str
+        Its name, and what it is.
+    reference : int
+        Value reference; all are different.
+    causality : str
+        Of FMI.
+    variability : str
+        Of FMI; what is discrete is Boolean, all else real.
+    unit : str
+        As `defined_units` defines it; "" for Booleans.
+    start, low, high, nominal : float, optional
+        Value at the start, range, and usual size.
+    rate_of : int, optional
+        Value reference of the state that it is the rate of.
+    depends : tuple of int, optional
+        Value references of inputs and states that it depends on while a simulation runs; None for all of them.
+    """
+
+    name: str
+    words: str
+    reference: int
+    causality: Literal["input", "output", "parameter", "local"]
+    variability: Literal["continuous", "discrete", "tunable"]
+    unit: str = ""
+    start: float | None = None
+    low: float | None = None
+    high: float | None = None
+    nominal: float | None = None
+    rate_of: int | None = None
+    depends: tuple[int, ...] | None = _PLACES
+
+    @property
+    def is_state(self) -> bool:
+        """Whether it is a continuous state."""
+        return self.causality == "local" and self.rate_of is None
+
+    @property
+    def is_unknown(self) -> bool:
+        """Whether it follows from others: an output or a rate."""
+        return self.causality == "output" or self.rate_of is not None
+
+
+def has_exchange(surrogate: Surrogate) -> bool:
+    """Return whether a body goes out for model exchange, too.
+
+    It does without a memory, and with one that follows differential equations of at most 2,000 states.
+    """
+    if surrogate.memory is None:
+        return True
+    groups = surrogate.memory.c_states()
+    return groups is not None and sum(map(len, groups)) < _MOST_STATES
+
+
+def body_variables(surrogate: Surrogate) -> list[Variable]:
+    """Return the variables in the order in which a description lists them."""
+    return [
+        *_inputs(surrogate),
+        *_parameters(surrogate),
+        *_outputs(surrogate),
+        *(_states(surrogate) if surrogate.memory is not None and has_exchange(surrogate) else []),
+    ]
+
+
+def _inputs(surrogate: Surrogate) -> list[Variable]:
+    held = surrogate.energy.baseline.holds
+    place = "displacement of what the hand holds" if held else "centre of the probe"
+    # where nothing is felt: at rest, or as high as it may be in the middle of the ranges
+    start = [0.0] * 3 if held else [*(_middles(surrogate)[:2]), float(surrogate.inputs[2].high)]
+    return [
+        Variable(axis, f"{place}, {axis}", i, "input", "continuous", "m", start=value)
+        for i, (axis, value) in enumerate(zip("xyz", start, strict=True))
+    ]
+
+
+def _parameters(surrogate: Surrogate) -> list[Variable]:
+    scale = Variable(
+        "force_scale", "factor of forces and energies", SCALE, "parameter", "tunable", "1", start=1.0
+    )
+    return [scale] + [
+        Variable(
+            identifier(r.name),
+            r.name,
+            PARAMETER + i,
+            "parameter",
+            "tunable",
+            r.unit or "1",
+            start=(r.low + r.high) / 2,
+            low=r.low,
+            high=r.high,
+        )
+        for i, r in enumerate(surrogate.parameters)
+    ]
+
+
+def _outputs(surrogate: Surrogate) -> list[Variable]:
+    states = surrogate.memory is not None and has_exchange(surrogate)
+    felt = None if states else _PLACES
+    rows = [
+        _output(f"f{axis}", f"force on the hand, {axis}", 3 + i, "N", felt) for i, axis in enumerate("xyz")
+    ]
+    rows += [
+        _output("energy", "elastic energy", 6, "J"),
+        _output("depth", "depth of the probe, negative in the air; or way of the hand", 7, "m"),
+        _output("deviation", "standard deviation of the force relative to its size", 8, "1"),
+    ]
+    if surrogate.memory is not None:
+        rows += [
+            _output("stored", "energy that can be had back", 10, "J", felt),
+            _output("lost", "energy lost since the start", 11, "J", felt),
+        ]
+    flags = {
+        "inside": "inside of the trained region",
+        "contact": "the probe touches the body",
+        "too_deep": "the body has let go of the probe: no force",
+    }
+    return rows + [
+        Variable(name, words, FLAGS + i, "output", "discrete")
+        for i, (name, words) in enumerate(flags.items())
+    ]
+
+
+def _output(
+    name: str, words: str, reference: int, unit: str, depends: tuple[int, ...] | None = _PLACES
+) -> Variable:
+    return Variable(name, words, reference, "output", "continuous", unit, depends=depends)
+
+
+def _states(surrogate: Surrogate) -> list[Variable]:
+    """Return the continuous states and their rates: what is remembered, and last the energy that was lost."""
+    assert surrogate.memory is not None
+    groups, usual = surrogate.memory.c_states() or (), _usual_amplitude(surrogate)
+    names = [name for group in groups for name in group]
+    rates, states, slopes = STATE + len(names) + 1, [], []
+    first = STATE
+    for group in groups:
+        own = (*_PLACES, *range(first, first + len(group)))
+        for i, name in enumerate(group, first):
+            words = f"remembered amplitude {name.partition('_')[2]}"
+            states.append(_state(name, words, i, _ROOT, usual))
+            slopes.append(_rate(name, rates + i - STATE, i, _ROOT_RATE, own))
+        first += len(group)
+    states.append(_state("dissipated", "energy lost since the start, of force_scale 1", first, "J", usual**2))
+    slopes.append(_rate("dissipated", rates + first - STATE, first, "W", None))
+    return states + slopes
+
+
+def _state(name: str, words: str, reference: int, unit: str, usual: float) -> Variable:
+    return Variable(name, words, reference, "local", "continuous", unit, start=0.0, nominal=usual)
+
+
+def _rate(name: str, reference: int, state: int, unit: str, depends: tuple[int, ...] | None) -> Variable:
+    return Variable(
+        f"der_{name}",
+        f"rate of {name}",
+        reference,
+        "local",
+        "continuous",
+        unit,
+        rate_of=state,
+        depends=depends,
+    )
+
+
+def _middles(surrogate: Surrogate) -> list[float]:
+    return [(r.low + r.high) / 2 for r in surrogate.inputs]
+
+
+def _usual_amplitude(surrogate: Surrogate) -> float:
+    """Return |q| of a deep press, √J: what the binary takes for the usual size of a state (core/fmi_instance.c)."""
+    energy, middles = surrogate.energy, np.array(_middles(surrogate))
+    low, high = bounds(energy.inputs)
+    felt = len(energy.baseline.directions)
+    place = (
+        np.array([*middles[:2], low[2]])
+        if not energy.baseline.holds
+        else high[:felt] @ energy.baseline.directions
+    )
+    evaluate = energy.evaluator()
+    evaluate(np.ascontiguousarray(place), middles[felt:])
+    size = abs(float(evaluate.amplitude))
+    return size if 0.0 < size < math.inf else 1.0
+
+
+def defined_units(variables: list[Variable]) -> dict[str, str | None]:
+    """Return the units by name: SI's base exponents as attributes, None for one that has no whole ones."""
+    return {unit: _UNITS.get(unit) for unit in sorted({v.unit for v in variables if v.unit})}

@@ -61,7 +61,7 @@ def open_instance(description: Any, folder: str, *, exchange: bool = False) -> F
 
 
 class _Instance2:
-    """Of FMI 2.0."""
+    """An instance of FMI 2.0, see `FmuInstance`."""
 
     def __init__(self, description: Any, folder: str, *, exchange: bool) -> None:
         from fmpy.fmi2 import (
@@ -109,7 +109,7 @@ class _Instance2:
 
 
 class _Instance3:
-    """Of FMI 3.0."""
+    """An instance of FMI 3.0, see `FmuInstance`."""
 
     def __init__(self, description: Any, folder: str, *, exchange: bool) -> None:
         from fmpy.fmi3 import FMU3Model, FMU3Slave

@@ -70,12 +70,12 @@ class Variable:
 
     @property
     def is_state(self) -> bool:
-        """Whether it is a continuous state."""
+        """True for a continuous state."""
         return self.causality == "local" and self.rate_of is None
 
     @property
     def is_unknown(self) -> bool:
-        """Whether it follows from others: an output or a rate."""
+        """True for what follows from others: an output or a rate."""
         return self.causality == "output" or self.rate_of is not None
 
 

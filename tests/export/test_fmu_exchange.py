@@ -15,7 +15,7 @@ from exported_bodies import body
 from palpate.export import export_fmu
 from palpate.export.check_fmu import open_instance
 from palpate.export.fmu_export import VERSIONS
-from palpate.surrogates.memories import IwanElements, Relaxation
+from palpate.surrogates.memories import IwanElements, Patches, Relaxation
 
 TERMS = ((0.3, 0.05), (0.2, 0.4))
 PLACE, FORCE, STORED, LOST, STATE = [0, 1, 2], [3, 4, 5], 10, 11, 64
@@ -173,6 +173,16 @@ def ctypes_array(count):
     return (ctypes.c_double * count)()
 
 
+def test_more_states_than_solvers_can_take_are_left_out(tmp_path):
+    thing = BODIES["relaxation"]()
+    for count, exchange in ((999, True), (1001, False)):
+        patches = Patches(np.random.default_rng(0).uniform(-0.01, 0.01, (count, 3)), 0.004)
+        many = dataclasses.replace(thing, memory=Relaxation(TERMS, patches=patches))
+        done = export_fmu(many, tmp_path / "many.fmu", check=False)
+        assert done.exchange == exchange
+        assert (fmpy.read_model_description(str(done.path)).modelExchange is not None) == exchange
+
+
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("name", ["relaxation", "creep"])
 def test_derivatives_in_model_exchange_are_those_of_one_energy(name, version, files):
@@ -293,3 +303,23 @@ def test_a_state_that_was_kept_goes_on_in_another_instance(name, version, files)
         first.fmu.freeFMUState(kept)
         second.fmu.freeFMUState(read)
     assert np.ptp(np.array(gone_on)[:, 3]) > 0
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("name", ["relaxation", "creep"])
+def test_both_kinds_begin_with_the_states_that_are_set(name, version, files):
+    thing = BODIES[name]()
+    with instances(files / f"{name}-{version}.fmu", True, False) as (description, exchange, steps):
+        count = description.numberOfContinuousStates
+        states, rates = list(range(STATE, STATE + count)), list(range(STATE + count, STATE + 2 * count))
+        begun = (1e-3 * np.random.default_rng(1).uniform(0.2, 1.0, count)).tolist()
+        answers = []
+        for instance in (exchange, steps):
+            instance.fmu.reset()
+            instance.write([*PLACE, *states], [*middle(thing).tolist(), *begun])
+            instance.begin(again=False)
+            answers.append(instance.read([*FORCE, STORED, LOST, *states, *rates]))
+    np.testing.assert_array_equal(*answers)
+    np.testing.assert_allclose(answers[0][5 : 5 + count], begun, rtol=1e-15)
+    fresh = thing.energy.force(np.atleast_2d(felt(thing, middle(thing))))[0]
+    assert np.linalg.norm(answers[0][:3]) < np.linalg.norm(fresh)  # what gave way pushes less

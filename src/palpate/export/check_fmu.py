@@ -19,8 +19,8 @@ _PLACE, _OUTPUTS, _PARAMETERS = [0, 1, 2], [6, 7, 3, 4, 5], range(16, 64)
 class FmuInstance(Protocol):
     """An instance of an FMU in co-simulation or model exchange; variables go by their value references."""
 
-    def begin(self) -> None:
-        """Go to the start, and through initialization."""
+    def begin(self, *, again: bool = True) -> None:
+        """Go through initialization; first back to the start, with all that was set, where `again` is true."""
 
     def write(self, references: list[int], values: list[float]) -> None:
         """Set real variables."""
@@ -82,8 +82,9 @@ class _Instance2:
         )
         self.fmu.instantiate(callbacks=self._calls)
 
-    def begin(self) -> None:
-        self.fmu.reset()
+    def begin(self, *, again: bool = True) -> None:
+        if again:
+            self.fmu.reset()
         self.fmu.setupExperiment(startTime=0.0)
         self.fmu.enterInitializationMode()
         self.fmu.exitInitializationMode()
@@ -119,8 +120,9 @@ class _Instance3:
         )
         self.fmu.instantiate(logMessage=lambda *_: None)
 
-    def begin(self) -> None:
-        self.fmu.reset()
+    def begin(self, *, again: bool = True) -> None:
+        if again:
+            self.fmu.reset()
         self.fmu.enterInitializationMode(startTime=0.0)
         self.fmu.exitInitializationMode()
 

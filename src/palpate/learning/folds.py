@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import KDTree
 
 __all__ = ["fold_masks", "fold_numbers", "held_out", "near_places"]
 
@@ -37,6 +34,9 @@ def near_places(X: np.ndarray) -> np.ndarray:
     reach = _NEAR * float(np.median(_neighbour_distances(exact, some, neighbours)))
     if reach <= 0.0:
         return np.asarray(own.ravel())
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     # what is in one cell is near: so pairs are sought among cells, however many copies a place has
     cells = np.floor(exact * (np.sqrt(exact.shape[1]) / reach))
     _, first, cell = np.unique(cells, axis=0, return_index=True, return_inverse=True)
@@ -49,6 +49,8 @@ def near_places(X: np.ndarray) -> np.ndarray:
 def _neighbour_distances(X: np.ndarray, some: np.ndarray, k: int) -> np.ndarray:
     """Return the distance of each of some samples (S, n) of X (N, n) to its k-th neighbour."""
     if X.shape[1] <= _TREE:
+        from scipy.spatial import KDTree
+
         return np.asarray(KDTree(X).query(some, k + 1)[0])[:, -1]
     squares = (X * X).sum(axis=1)
     step = max(1, _DISTANCES // len(X))
@@ -64,6 +66,8 @@ def _pairs_within(X: np.ndarray, reach: float) -> np.ndarray:
 
     Of many inputs pairs are sought along the six directions in which samples differ most, and then looked at in all.
     """
+    from scipy.spatial import KDTree
+
     if X.shape[1] <= _TREE:
         return np.asarray(KDTree(X).query_pairs(reach, output_type="ndarray"))
     axes = np.linalg.eigh(np.cov(X.T))[1][:, -_TREE:]

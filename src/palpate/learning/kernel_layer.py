@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import lapack
-from scipy.optimize import minimize
 
 from palpate.network.radial import RadialFunction, radial
 
@@ -114,6 +113,8 @@ def likely_metric(
 
     The likelihood is climbed from a metric near the optimum, `start`, or else from two ridges.
     """
+    from scipy.optimize import minimize
+
     X, Y = X[:samples], Y[:samples]
     one = _tail(X)
     Y = Y - one @ np.linalg.lstsq(one, Y, rcond=None)[0]

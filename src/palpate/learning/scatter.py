@@ -11,7 +11,6 @@ Končar & Jones 1997, Neural Comput. Appl. 5, 131–133).
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 __all__ = ["noise_variance", "spacing"]
 
@@ -72,5 +71,7 @@ def spacing(X: np.ndarray) -> float:
 
 
 def _nearest(X: np.ndarray, places: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    from scipy.spatial import cKDTree
+
     distance, near = cKDTree(X).query(places, count)
     return np.asarray(distance), np.asarray(near)

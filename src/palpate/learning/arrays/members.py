@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from palpate.learning.arrays.held_out import RIDGE, HeldOut, carry
 from palpate.learning.kernel_layer import KernelLayer, Metric, likely_metric
@@ -117,6 +116,8 @@ class Crossed:
         Left out is one whose distance from the pointwise median is, at one in a hundred places half way from a sample
         to another near it, above three times what it is for the median network: one that was caught elsewhere.
         """
+        from scipy.spatial import KDTree
+
         tree = KDTree(self.X[: 2 * ROWS])
         some = self.X[:ROWS]
         near = np.asarray(tree.query(some, min(4, len(tree.data)))[1])[:, -1]

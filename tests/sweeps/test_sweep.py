@@ -12,7 +12,7 @@ from sweep_problems import LoneSpring, Spring
 from palpate.dataset import Dataset
 from palpate.errors import FileFormatError, SolverError, UsageError
 from palpate.physics import Cantilever, Circle, LinearElastic, TipLoad, preset
-from palpate.sweeps import Scheduler, grow, is_begun, sweep
+from palpate.sweeps import OnDemandCluster, Scheduler, grow, is_begun, sweep
 from palpate.sweeps.sweep import reporter
 
 BODY = Cantilever(1.0, Circle(0.005), LinearElastic(2e9, 0.43), elements=5)
@@ -49,6 +49,18 @@ def test_the_number_of_workers_changes_no_bit(cluster):
     two = sweep(BODY, TipLoad(0, 5), samples=40, cluster=cluster)
     one = sweep(BODY, TipLoad(0, 5), samples=40, workers=1)
     assert one.hash == two.hash
+
+
+def test_workers_on_demand_serve_all_sweeps_and_start_for_none_that_is_solved(tmp_path):
+    with OnDemandCluster(1) as workers:
+        data = sweep(Spring(), points=[1.0, 2.0], path=tmp_path / "a.zarr", cluster=workers)
+        (process,) = workers.start().process_ids
+        sweep(Spring(), points=[3.0], cluster=workers)
+        assert workers.start().process_ids == (process,)
+    none = OnDemandCluster(0)
+    assert sweep(Spring(), points=[1.0, 2.0], path=tmp_path / "a.zarr", cluster=none).hash == data.hash
+    with pytest.raises(UsageError, match="0 workers"):
+        sweep(Spring(), points=[3.0], cluster=none)
 
 
 def test_points_and_progress_of_ones_own(cluster):

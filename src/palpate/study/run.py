@@ -6,6 +6,7 @@ written by `carry_out` and by the command line.
 
 from __future__ import annotations
 
+import contextlib
 import importlib.metadata
 import json
 import os
@@ -31,7 +32,7 @@ from palpate.study.relaxation_stage import with_relaxation
 from palpate.study.study import Study
 from palpate.study.study_paths import Paths
 from palpate.surrogates import Surrogate
-from palpate.sweeps import grow, sweep
+from palpate.sweeps import OnDemandCluster, grow, sweep
 from palpate.sweeps.grow_sweep import CHOSEN
 from palpate.validation import Chapter, Validation, validate, write_report
 from palpate.validation.more_solves import learning_curve
@@ -125,7 +126,7 @@ def sweep_study(
     paths : Paths, optional
         Where datasets are written as they grow; an interrupted sweep goes on where it stopped.
     cluster : optional
-        A running `local_cluster`, to share between studies; by default processes of the sweep's own.
+        A running `local_cluster`, to share between studies; by default processes of its own serve both sweeps.
     progress : bool or callable
         A bar on standard error; or a function (done, total).
     case_limit : float
@@ -152,27 +153,28 @@ def sweep_study(
             train.save(paths.histories)
             test.save(paths.unseen_histories)
         return train, test
-    common: dict[str, Any] = {
-        "cluster": cluster if cluster is not None else study.sweep.scheduler,
-        "workers": study.sweep.workers,
-        "progress": progress,
-        "case_limit": case_limit,
-    }
-    log(f"{count(study.sweep.samples, 'solve')} to learn from{_solved_part(study, problem)}")
-    wanted = study.sweep.arguments(problem)
-    data = grow(paths.data, problem, wanted) if paths else None
-    if data is None:
-        data = sweep(problem, path=paths.data if paths else None, **wanted, **common)
-    elif paths and data.provenance.get("design") == CHOSEN:
-        log(f"{paths.data} holds {count(len(data), 'solve')} that were chosen; they stay as they are")
-    further = study.test.arguments(problem)
-    if further is None:
-        return data, None
-    log("further solves for testing only, which learning never sees")
-    unseen = grow(paths.random, problem, further) if paths else None
-    if unseen is None:
-        unseen = sweep(problem, path=paths.random if paths else None, **further, **common)
-    return data, unseen
+    with contextlib.ExitStack() as stack:
+        if cluster is None:
+            own = OnDemandCluster(
+                study.sweep.workers
+            )  # both sweeps: to start workers takes seconds, and to open a body
+            cluster = study.sweep.scheduler or stack.enter_context(own)
+        common: dict[str, Any] = {"cluster": cluster, "progress": progress, "case_limit": case_limit}
+        log(f"{count(study.sweep.samples, 'solve')} to learn from{_solved_part(study, problem)}")
+        wanted = study.sweep.arguments(problem)
+        data = grow(paths.data, problem, wanted) if paths else None
+        if data is None:
+            data = sweep(problem, path=paths.data if paths else None, **wanted, **common)
+        elif paths and data.provenance.get("design") == CHOSEN:
+            log(f"{paths.data} holds {count(len(data), 'solve')} that were chosen; they stay as they are")
+        further = study.test.arguments(problem)
+        if further is None:
+            return data, None
+        log("further solves for testing only, which learning never sees")
+        unseen = grow(paths.random, problem, further) if paths else None
+        if unseen is None:
+            unseen = sweep(problem, path=paths.random if paths else None, **further, **common)
+        return data, unseen
 
 
 def _solved_part(study: Study, problem: Any) -> str:

@@ -13,7 +13,7 @@
     grow_sweep.py  a finished sweep that is asked for more samples
 """
 
-from palpate.sweeps.cluster import LocalCluster, Scheduler, local_cluster
+from palpate.sweeps.cluster import LocalCluster, OnDemandCluster, Scheduler, local_cluster
 from palpate.sweeps.grow_sweep import grow, is_begun
 from palpate.sweeps.problem import (
     Answer,
@@ -37,6 +37,7 @@ __all__ = [
     "Designed",
     "ExternalProblem",
     "LocalCluster",
+    "OnDemandCluster",
     "Problem",
     "Resettable",
     "Scheduler",

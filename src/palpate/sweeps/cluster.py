@@ -25,7 +25,7 @@ from palpate.errors import SolverError, UsageError
 from palpate.files import TemporaryFolder
 from palpate.processes import available_cores, helper_environment
 
-__all__ = ["LocalCluster", "Scheduler", "local_cluster"]
+__all__ = ["LocalCluster", "OnDemandCluster", "Scheduler", "local_cluster"]
 
 _GRACE = 1.0  # s to end by themselves; a worker in the midst of a solve does not
 _SPARE_LIVES = 16  # workers started again after a crash, per cluster
@@ -179,6 +179,38 @@ def local_cluster(workers: int | None = None) -> LocalCluster:
             f"A sweep can't run on {count} workers.", why="It needs one at least.", fix="Ask for more."
         )
     return LocalCluster(count)
+
+
+class OnDemandCluster:
+    """Workers on this machine that start with the first sweep that has something to solve, and serve those after it.
+
+    A context manager; closing it ends the workers. A problem that one sweep has opened stays open for the next.
+
+    Parameters
+    ----------
+    workers : int, optional
+        Number of worker processes; by default one for each core.
+    """
+
+    def __init__(self, workers: int | None = None) -> None:
+        self._workers = workers
+        self._running: LocalCluster | None = None
+
+    def start(self) -> LocalCluster:
+        """Return the running cluster, started if it is new."""
+        if self._running is None:
+            self._running = local_cluster(self._workers)
+        return self._running
+
+    def __enter__(self) -> OnDemandCluster:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._running is not None:
+            self._running.close()
+            self._running = None
 
 
 @dataclass(frozen=True)

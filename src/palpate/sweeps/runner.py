@@ -23,7 +23,7 @@ from palpate.dataset import Field
 from palpate.errors import ResourceError
 from palpate.processes import end_by_sigterm
 from palpate.sweeps.case import Columns, Task, failed_rows, solve_chain
-from palpate.sweeps.cluster import LocalCluster, Scheduler, local_cluster
+from palpate.sweeps.cluster import LocalCluster, OnDemandCluster, Scheduler, local_cluster
 from palpate.sweeps.problem import Problem
 
 if TYPE_CHECKING:
@@ -41,8 +41,8 @@ _KEPT = "What is solved is kept where the sweep has a path: the same command goe
 def connect(cluster: Any, workers: int | None) -> Iterator[tuple[distributed.Client, Callable[[], None]]]:
     """Yield a client of `cluster`, and a function that starts dead workers again.
 
-    A `LocalCluster`, a `Scheduler` or its address, or a cluster or client of Dask's is used and left running; for
-    ``None`` a cluster is started and ended.
+    A `LocalCluster` or an `OnDemandCluster`, a `Scheduler` or its address, or a cluster or client of Dask's is used and
+    left running; for ``None`` a cluster is started and ended.
 
     Raises
     ------
@@ -54,6 +54,8 @@ def connect(cluster: Any, workers: int | None) -> Iterator[tuple[distributed.Cli
     with contextlib.ExitStack() as stack:
         if cluster is None:
             cluster = stack.enter_context(local_cluster(workers))
+        elif isinstance(cluster, OnDemandCluster):
+            cluster = cluster.start()
         revive = cluster.revive if isinstance(cluster, LocalCluster) else _nothing
         if isinstance(cluster, distributed.Client):
             yield cluster, revive

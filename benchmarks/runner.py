@@ -30,6 +30,7 @@ BENCHMARKS = (
     "latency",
     "literature",
     "online",
+    "page_speed",
     "peers",
     "punctuality",
     "refinement",

@@ -59,7 +59,7 @@ def page(thing: pp.Surrogate, folder: Path) -> Comparison:
     del folder
     name = next(iter(thing.fields), None)
     block = block_of(thing, field=name, with_field=name is not None, deviation=True)
-    core = WasmCore(block.to_bytes(), thing.fields[name] if block.field else None)
+    core = WasmCore(block.to_bytes(), [thing.fields[name]] if block.field else [])
     return compare_body(thing, core, field=block.field)
 
 

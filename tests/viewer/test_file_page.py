@@ -10,12 +10,16 @@ import numpy as np
 import pytest
 from chromium_page import assert_no
 from playwright.sync_api import Browser, Page
-from slabs import family
+from slabs import dents, family, touched_slab
 
 from palpate.errors import UsageError
+from palpate.runtime.touchable import touchable
 from palpate.surrogates import Surrogate
+from palpate.viewer import file_page
 from palpate.viewer.file_page import export_html
+from palpate.viewer.indentation_drawing import IndentationDrawing
 
+VIEWPORT = {"width": 1200, "height": 800}
 ASK = """(X) => {
   const { evaluator } = palpate;
   return X.map((x) => {
@@ -25,21 +29,30 @@ ASK = """(X) => {
 }"""
 
 
+PARTS = """() => {
+  const { surface: { rest, triangles, touchable }, fields } = palpate;
+  const list = (numbers) => Array.from(numbers);
+  const all = fields.map((field) =>
+    Object.fromEntries(["rest", "modes", "touched"].map((name) => [name, list(field[name])])));
+  return { rest: list(rest), triangles: list(triangles), touchable: list(touchable), fields: all };
+}"""
+KEPT = """() => {
+  const { surface: { rest, yielding, normals }, evaluator, kept } = palpate;
+  const points = Array.from(yielding, (i) => Array.from(rest.slice(3 * i, 3 * i + 3))).flat();
+  const [amplitudes, depths] = [evaluator.amplitudes, kept.depths].map((numbers) => Array.from(numbers));
+  return { points, normals: Array.from(normals), amplitudes, depths };
+}"""
+
+
 @pytest.fixture(scope="module")
 def pressed() -> Surrogate:
     """A slab that relaxes, with a further input."""
     return replace(family(), meta={"name": "slab"})
 
 
-@pytest.fixture(scope="module")
-def opened(pressed: Surrogate, browser: Browser, tmp_path_factory) -> Iterator[tuple[Page, list[str]]]:
-    """The page of a pressed body with a field and a memory, and what the browser complains of."""
-    done = export_html(pressed, tmp_path_factory.mktemp("page") / "body.html")
-    assert done.comparison is not None
-    assert done.comparison.passed
-    assert done.file.stat().st_size < 5_000_000
-    context = browser.new_context(viewport={"width": 1200, "height": 800}, offline=True)
-    page, complaints = context.new_page(), []
+def open_file(browser: Browser, file: Path) -> tuple[Page, list[str]]:
+    """The page of a file in a browser without a network, and what the browser complains of."""
+    page, complaints = browser.new_context(viewport=VIEWPORT, offline=True).new_page(), []
     page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
     page.on("pageerror", lambda error: complaints.append(str(error)))
     page.on(
@@ -48,10 +61,41 @@ def opened(pressed: Surrogate, browser: Browser, tmp_path_factory) -> Iterator[t
             None if request.url.startswith(("file:", "data:", "blob:")) else complaints.append(request.url)
         ),
     )
-    page.goto(done.file.as_uri())
+    page.goto(file.as_uri())
     page.wait_for_function("document.documentElement.dataset.middle !== undefined")
+    return page, complaints
+
+
+@pytest.fixture(scope="module")
+def opened(pressed: Surrogate, browser: Browser, tmp_path_factory) -> Iterator[tuple[Page, list[str]]]:
+    """The page of a pressed body with a memory, and what the browser complains of."""
+    done = export_html(pressed, tmp_path_factory.mktemp("page") / "body.html")
+    assert done.comparison is not None
+    assert done.comparison.passed
+    assert done.file.stat().st_size < 5_000_000
+    page, complaints = open_file(browser, done.file)
     yield page, complaints
-    context.close()
+    page.context.close()
+
+
+@pytest.fixture(scope="module")
+def yielding() -> Surrogate:
+    """A slab that keeps indentations, with a displacement and a stretch."""
+    return touched_slab().with_memory(dents(0.002), spacing=0.002)
+
+
+@pytest.fixture(scope="module")
+def opened_yielding(
+    yielding: Surrogate, browser: Browser, tmp_path_factory
+) -> Iterator[tuple[Page, list[str]]]:
+    """Its page."""
+    done = export_html(yielding, tmp_path_factory.mktemp("yielding") / "body.html")
+    assert done.left_out == ()
+    assert done.comparison is not None
+    assert {"field displacement", "field largest stretch"} <= set(done.comparison.parts)
+    page, complaints = open_file(browser, done.file)
+    yield page, complaints
+    page.context.close()
 
 
 def test_the_page_answers_as_palpate_does(opened: tuple[Page, list[str]], pressed: Surrogate):
@@ -72,11 +116,7 @@ def test_the_page_answers_as_palpate_does(opened: tuple[Page, list[str]], presse
 
 def test_the_page_is_pressed_with_the_mouse(opened: tuple[Page, list[str]]):
     page, complaints = opened
-    x, y = map(float, page.evaluate("document.documentElement.dataset.middle").split())
-    page.mouse.move(x, y)
-    page.mouse.down()
-    page.wait_for_function("parseFloat(document.getElementById('force-norm').textContent) > 0")
-    page.wait_for_function("document.documentElement.dataset.sinking === 'false'")
+    press(page)
     # the curve of force over depth has been drawn
     drawn = "(c) => c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some((v) => v > 0)"
     assert page.locator("#curve-plot").evaluate(drawn)
@@ -100,3 +140,93 @@ def test_a_notebook_shows_the_page(pressed: Surrogate):
     assert shown.startswith("<iframe srcdoc=")
     assert "<b>body</b>" not in shown
     assert "<title>&lt;b&gt;body&lt;/b&gt;" in bare.to_html()
+
+
+def test_the_surface_and_its_fields_are_those_of_the_body(
+    opened_yielding: tuple[Page, list[str]], yielding: Surrogate
+):
+    page, _ = opened_yielding
+    got = page.evaluate(PARTS)
+    rest = np.reshape(got["rest"], (-1, 3))
+    shown = yielding.fields["displacement"]
+    nodes = nearest_nodes(rest, shown.points)
+    assert np.abs(rest - shown.points[nodes]).max() < 1e-5 * np.ptp(shown.points)
+    triangles = nodes[np.reshape(got["triangles"], (-1, 3)).astype(int)]
+    assert turned(triangles) == turned(shown.triangles)
+    touched = {tuple(sorted(t)) for t in triangles[np.array(got["touchable"]) > 0].tolist()}
+    assert touched == {tuple(sorted(t)) for t in shown.triangles.tolist() if (shown.points[t, 2] == 0).all()}
+    for name, field in zip(yielding.fields, got["fields"], strict=True):
+        own = yielding.fields[name]
+        X = deep_touches(yielding)
+        modes = np.reshape(field["modes"], (len(own.modes), len(rest), -1))
+        off = np.tensordot(own.coefficients(X), modes - own.modes[:, nodes], axes=1)
+        off += np.reshape(field["rest"], (len(rest), -1)) - own.rest[nodes]
+        assert np.abs(off).max() <= 1e-4 * np.abs(own.values(X) - own.rest).max()
+        assert set(np.array(field["touched"], dtype=int)) == set(np.flatnonzero(own.touched[nodes]))
+
+
+def test_another_field_colours_the_body(opened_yielding: tuple[Page, list[str]]):
+    page, complaints = opened_yielding
+    page.get_by_role("button", name="largest stretch").click()
+    assert page.locator("#legend-title").inner_text() == "largest stretch"
+    press(page)
+    assert float(page.evaluate("document.documentElement.dataset.largest")) > 1.0
+    page.mouse.up()
+    page.get_by_role("button", name="displacement").click()
+    assert_no(complaints)
+
+
+def test_an_indentation_stays_on_the_page(opened_yielding: tuple[Page, list[str]], yielding: Surrogate):
+    page, complaints = opened_yielding
+    press(page)
+    page.mouse.up()
+    page.wait_for_function("parseFloat(document.getElementById('force-norm').textContent) === 0")
+    page.wait_for_function("palpate.kept.pending === 0")
+    # what is left once the probe is gone: the indentation alone
+    page.wait_for_function(
+        "Math.abs(document.documentElement.dataset.largest - Math.max(...palpate.kept.depths)) < 1e-6"
+    )
+    got = page.evaluate(KEPT)
+    drawing = IndentationDrawing(touchable(yielding), np.reshape(got["points"], (-1, 3)))
+    wanted = drawing.depths(np.array(got["amplitudes"]))
+    assert wanted.max() > 2e-4
+    np.testing.assert_allclose(got["depths"], wanted, rtol=0, atol=1e-3 * wanted.max())
+    np.testing.assert_allclose(np.reshape(got["normals"], (-1, 3)), drawing.normals, rtol=0, atol=1e-3)
+    assert_no(complaints)
+
+
+def test_fields_for_which_there_is_no_room_are_left_out_and_named(
+    yielding: Surrogate, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(file_page, "LARGEST", 500_000)
+    done = export_html(yielding, tmp_path / "small.html", check=False)
+    assert done.left_out == ("largest stretch",)
+
+
+def press(page: Page) -> None:
+    """Hold the mouse button on the body until the probe is as deep as it goes."""
+    x, y = map(float, page.evaluate("document.documentElement.dataset.middle").split())
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.wait_for_function("parseFloat(document.getElementById('force-norm').textContent) > 0")
+    page.wait_for_function("document.documentElement.dataset.sinking === 'false'")
+
+
+def deep_touches(body: Surrogate) -> np.ndarray:
+    """Inputs (40, n) of deep touches."""
+    low, high = np.array([[r.low, r.high] for r in body.inputs]).T
+    X = np.random.default_rng(1).uniform(low, high, (40, len(low)))
+    X[:, 2] = low[2]
+    return X
+
+
+def nearest_nodes(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """The node (n,) nearest to each point."""
+    return np.array([((nodes - p) ** 2).sum(axis=1).argmin() for p in points])
+
+
+def turned(triangles: np.ndarray) -> list[tuple[int, ...]]:
+    """Triangles, each from its smallest node on, in order."""
+    first = triangles.argmin(axis=1)
+    rows = np.take_along_axis(triangles, (first[:, None] + np.arange(3)) % 3, axis=1)
+    return sorted(map(tuple, rows.tolist()))

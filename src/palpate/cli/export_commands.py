@@ -246,6 +246,8 @@ def to_html(
         )
     console = Console(as_json)
     done = export_html(thing, file.with_suffix(".html") if out is None else out, check=not no_check)
+    if done.left_out:
+        console.say(f"not in the file: {', '.join(done.left_out)} (5 MB are full, or it is on other nodes)")
     _tell(console, done.file, done.hash, done.comparison, "wasmtime", no_check=no_check)
 
 

@@ -50,7 +50,13 @@ TARGETS = (
     Target(
         "core.wasm",
         ("field.c", "wasm.c"),
-        ("-target", "wasm32-wasi", "-mexec-model=reactor", "-Wl,--export=__heap_base"),
+        (
+            "-target",
+            "wasm32-wasi",
+            "-msimd128",  # in browsers since 2023 at the latest; an answer takes 5 instead of 8 µs
+            "-mexec-model=reactor",
+            "-Wl,--export=__heap_base",
+        ),
     ),
 )
 

@@ -17,6 +17,7 @@ from typing import Protocol
 
 import numpy as np
 
+from palpate.export.field_tables import PROMISE, deepest_touches
 from palpate.network import Network
 from palpate.network.network_kernels import regressor_rows_into
 from palpate.surrogates import FieldSurrogate, LearntEnergy, Surrogate
@@ -29,6 +30,7 @@ __all__ = [
     "Difference",
     "Precision",
     "compare_body",
+    "compare_field",
     "compare_network",
     "condition",
     "places",
@@ -46,6 +48,7 @@ _PARTS = {
     "amplitude": [15],
 }
 _ROUND_OFF = 1e-14  # m, of a depth
+_TOUCHES = 24  # places at which a field is compared, beside the deepest touches
 _STROKE = 300  # steps of a memory's stroke
 
 
@@ -225,7 +228,9 @@ def compare_body(
     if surrogate.memory is not None:
         parts |= _stroke(surrogate, asker, precision)
     if field:
-        parts["field"] = _field(surrogate, asker, field, X[~deep][:40], precision)
+        shown = surrogate.fields[field]
+        assert isinstance(shown, FieldSurrogate)
+        parts["field"] = compare_field(surrogate, shown, asker, precision)
     return Comparison(parts, precision.single)
 
 
@@ -376,10 +381,26 @@ def _stroke(surrogate: Surrogate, asker: Asker, precision: Precision) -> dict[st
     }
 
 
-def _field(surrogate: Surrogate, asker: Asker, name: str, X: np.ndarray, precision: Precision) -> Difference:
-    """Compare a field, whose modes were rounded: to 1e-4 of its largest value."""
-    shown = surrogate.fields[name]
-    assert isinstance(shown, FieldSurrogate)
+def compare_field(
+    surrogate: Surrogate, shown: FieldSurrogate, asker: Asker, precision: Precision | None = None
+) -> Difference:
+    """Return how far the field of an export is from palpate, at places of `places` and at the deepest trained touches.
+
+    Its modes were rounded: it may be off by 1e-4 of its largest value.
+
+    Parameters
+    ----------
+    surrogate : Surrogate
+        The body.
+    shown : FieldSurrogate
+        A field of it.
+    asker : Asker
+        Its export, which answers `shapes` of this field.
+    precision : Precision, optional
+        Double by default.
+    """
+    X = np.vstack([places(surrogate)[:_TOUCHES], deepest_touches(surrogate, shown)])
+    X = X[(true_answers(surrogate.energy, X)[:, 20].astype(int) & TOO_DEEP) == 0]
     wanted, got = shown.values(X), asker.shapes(X)
-    limit = np.full(len(X), 1e-4 if not precision.single else 1e-3)
+    limit = np.full(len(X), PROMISE if precision is None or not precision.single else 1e-3)
     return _difference(wanted.reshape(len(X), -1), got.reshape(len(X), -1), limit)

@@ -1,8 +1,18 @@
-"""A field's arrays for the evaluator core: rest and modes as whole numbers of two bytes, each with its own scale."""
+"""A field's arrays for the evaluator core: rest and modes as whole numbers of two bytes, each with its own scale.
+
+A mode is not kept more precisely than the eye needs. At any touch the field may be off by
+
+    Σ_k |c_k| q_k / 2  ≤  0.9e-4 · (largest change of the field from rest)
+
+c_k being the coefficients and q_k the scales. The scales are q_k = t / max |c_k|, so that every mode has an equal part
+in the error, with the largest t that keeps the bound at all trained touches; a mode that would need more than two bytes
+takes the finest scale that they allow. Numbers of later modes are small then, and pack well.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,10 +20,76 @@ from palpate.errors import UsageError
 from palpate.export.weights_block import BASELINE, FIELD, FIELD_NET, Table, net_tables
 from palpate.surrogates import FieldSurrogate, Surrogate
 
-__all__ = ["SURFACE", "VARIED", "chosen_field", "field_tables", "rounding_error"]
+__all__ = ["PROMISE", "SURFACE", "VARIED", "RoundedModes", "chosen_field", "deepest_touches", "field_tables"]
 
 SURFACE, VARIED = 49, 52
+PROMISE = 1e-4  # of a field's largest change: how far the field that goes out may be off
 _LARGEST = 32767
+_SHARE = (
+    0.9  # of the promise that rounding the modes may use up; the rest is for places, and for single precision
+)
+_DEEPEST = 24  # touches from which the largest change is taken
+_HALVINGS = 60
+
+
+@dataclass(frozen=True, eq=False)
+class RoundedModes:
+    """Rest and modes of a field as whole numbers of two bytes.
+
+    Attributes
+    ----------
+    scales : (1 + k,)
+        What 1 stands for in the rest and in each mode.
+    small : (1 + k, nodes, components) int16
+        The rest, then the modes.
+    """
+
+    scales: np.ndarray
+    small: np.ndarray
+
+    @classmethod
+    def of(cls, surrogate: Surrogate, shown: FieldSurrogate) -> RoundedModes:
+        """Return the modes of a body's field, rounded as the head of this file says."""
+        rows = np.concatenate([shown.rest[None], shown.modes])
+        size = np.abs(rows).reshape(len(rows), -1)
+        largest = size.max(axis=1, initial=0.0)
+        exact = ((size == 0.0) | (size == largest[:, None])).all(
+            axis=1
+        )  # none, or 1 everywhere as a stretch at rest
+        finest, X = largest / _LARGEST, _trained_touches(surrogate, shown)
+        share = np.hstack([np.ones((len(X), 1)), np.abs(shown.coefficients(X))]) * ~exact
+        most = np.maximum(share.max(axis=0, initial=0.0), 1e-300)
+        allowed = 2.0 * _SHARE * PROMISE * _largest_change(shown, deepest_touches(surrogate, shown))
+        low, high = 0.0, allowed
+        for _ in range(_HALVINGS):
+            t = (low + high) / 2.0
+            fits = (share @ np.minimum(np.maximum(finest, t / most), largest)).max(initial=0.0) <= allowed
+            low, high = (t, high) if fits else (low, t)
+        scales = np.where(exact, largest, np.minimum(np.maximum(finest, low / most), largest))
+        safe = np.where(scales > 0.0, scales, 1.0)
+        return cls(scales, np.rint(rows / safe[:, None, None]).astype(np.int16))
+
+    def error(self, coefficients: np.ndarray) -> float:
+        """Return the most by which a field of these coefficients (N, k) can be off, in the field's unit."""
+        return float((self.scales[0] + np.abs(coefficients) @ self.scales[1:]).max(initial=0.0) / 2.0)
+
+
+def _trained_touches(surrogate: Surrogate, shown: FieldSurrogate) -> np.ndarray:
+    """Return trained inputs (N, n) at which the probe touches."""
+    X = surrogate.energy.trained_rows()
+    return X[surrogate.energy.inside(X) & (shown.depth(X) > 0.0)]
+
+
+def deepest_touches(surrogate: Surrogate, shown: FieldSurrogate) -> np.ndarray:
+    """Return the deepest trained touches (N, n) of a body, at most 24."""
+    X = _trained_touches(surrogate, shown)
+    return X[np.argsort(shown.depth(X))[-_DEEPEST:]]
+
+
+def _largest_change(shown: FieldSurrogate, X: np.ndarray) -> float:
+    """Return the largest size of a field's change from rest at inputs X (N, n), in its unit."""
+    change = shown.values(X) - shown.rest
+    return float(np.sqrt((change**2).sum(axis=2)).max(initial=0.0))
 
 
 def chosen_field(surrogate: Surrogate, name: str | None) -> str | None:
@@ -63,7 +139,7 @@ def field_tables(surrogate: Surrogate, name: str, known: Mapping[int, Table]) ->
     assert going is not None
     n_nodes, components = shown.rest.shape
     own = -1 if shown.radius_input is None else shown.radius_input
-    scales, small = _round_modes(shown)
+    rounded = RoundedModes.of(surrogate, shown)
     knots = 0 if mode is None else mode.table.shape[1]
     low, high = np.array([[r.low for r in shown.inputs], [r.high for r in shown.inputs]])
     reach, nodes, points = shown.moving_arguments()
@@ -72,8 +148,8 @@ def field_tables(surrogate: Surrogate, name: str, known: Mapping[int, Table]) ->
         FIELD: Table.of(np.array([n_nodes, components, len(shown.modes), own, knots])),
         FIELD + 1: Table.of(np.array(numbers)),
         FIELD + 2: Table.of(np.array([low, high, going.widths])),
-        FIELD + 3: Table.of(scales),
-        FIELD + 4: Table.of(small),
+        FIELD + 3: Table.of(rounded.scales),
+        FIELD + 4: Table.of(rounded.small.reshape(1 + len(shown.modes), -1)),
         **net_tables(shown.network, FIELD_NET, 0),
         **{SURFACE + i: known[BASELINE + 1 + i] for i in range(3)},
     }
@@ -85,20 +161,3 @@ def field_tables(surrogate: Surrogate, name: str, known: Mapping[int, Table]) ->
             arrays = (varied.table.reshape(q * m, -1), varied.powers, varied.axes, varied.scales)
             tables |= {VARIED + i: Table.of(a) for i, a in enumerate(arrays)}
     return tables
-
-
-def _round_modes(shown: FieldSurrogate) -> tuple[np.ndarray, np.ndarray]:
-    """Return the scales (1 + k,) of rest and modes, and these as whole numbers (1 + k, nodes · components)."""
-    rows = np.concatenate([shown.rest[None], shown.modes]).reshape(1 + len(shown.modes), -1)
-    scales = np.abs(rows).max(axis=1, initial=0.0) / _LARGEST
-    safe = np.where(scales > 0, scales, 1.0)
-    return scales, np.rint(rows / safe[:, None]).astype(np.int16)
-
-
-def rounding_error(shown: FieldSurrogate, coefficients: np.ndarray) -> float:
-    """Return the most by which a field of these coefficients (N, k) can be off through rounding its modes.
-
-    It is half a step of each mode times its coefficient, summed; in the field's unit.
-    """
-    scales, _ = _round_modes(shown)
-    return float((scales[0] + np.abs(coefficients) @ scales[1:]).max(initial=0.0) / 2)

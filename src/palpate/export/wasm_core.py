@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -34,8 +35,10 @@ class WasmCore:
     ----------
     block : bytes
         Of `WeightsBlock.to_bytes`.
-    field : FieldSurrogate, optional
-        The field whose coefficients the block knows.
+    fields : sequence of FieldSurrogate
+        The field whose coefficients the block knows, then those of further blocks; by default there is none.
+    further : sequence of bytes
+        Blocks with the arrays of one more field each.
 
     Raises
     ------
@@ -43,7 +46,9 @@ class WasmCore:
         If wasmtime is not installed, or the core refuses the block.
     """
 
-    def __init__(self, block: bytes, field: FieldSurrogate | None = None) -> None:
+    def __init__(
+        self, block: bytes, fields: Sequence[FieldSurrogate] = (), further: Sequence[bytes] = ()
+    ) -> None:
         wasmtime = wasmtime_module()
         if wasmtime is None:
             raise UsageError(
@@ -52,27 +57,40 @@ class WasmCore:
                 fix="Run: pip install wasmtime",
             )
         engine = wasmtime.Engine()
-        self._store, self._field = wasmtime.Store(engine), field
+        self._store, self._fields, self._shown = wasmtime.Store(engine), tuple(fields), 0
         instance = wasmtime.Instance(self._store, wasmtime.Module(engine, built_core("core.wasm")), [])
         self._exports = instance.exports(self._store)
         self._memory = self._exports["memory"]
         self._call("_initialize")
-        room = self._call("room")
-        self._reserve(room + len(block))
-        self._memory.write(self._store, block, room)
-        if fault := self._call("open", len(block)):
-            raise UsageError(
-                f"The core refuses this block of weights (fault {fault}).",
-                why="It is damaged, of another version, or of a kind of body that is not in the core.",
-                fix="Export the body again.",
-            )
-        self._reserve(room + len(block) + self._call("needs", len(block)) + 64)
+        at = room = self._call("room")
+        for place, part in enumerate((block, *further)):
+            self._reserve(at + len(part))
+            self._memory.write(self._store, part, at)
+            fault = self._call("open_field", at, len(part)) if place else self._call("open", len(part))
+            if fault:
+                raise UsageError(
+                    f"The core refuses this block of weights (fault {fault}).",
+                    why="It is damaged, of another version, or of a kind of body that is not in the core.",
+                    fix="Export the body again.",
+                )
+            at += len(part)
+        self._reserve(at + self._call("needs", at - room) + 64)
         self._call("start")
 
     @classmethod
-    def of(cls, block: WeightsBlock, field: FieldSurrogate | None = None) -> WasmCore:
-        """Return the core with a block that is not yet bytes."""
-        return cls(block.to_bytes(), field)
+    def of(
+        cls,
+        block: WeightsBlock,
+        fields: Sequence[FieldSurrogate] = (),
+        further: Sequence[WeightsBlock] = (),
+    ) -> WasmCore:
+        """Return the core with blocks that are not yet bytes."""
+        return cls(block.to_bytes(), fields, [part.to_bytes() for part in further])
+
+    def show(self, index: int) -> WasmCore:
+        """Return the core itself, which from now on answers `shapes` of this field."""
+        self._shown = index
+        return self
 
     def _call(self, name: str, *arguments: Any) -> Any:
         return self._exports[name](self._store, *arguments)
@@ -112,14 +130,13 @@ class WasmCore:
 
     def shapes(self, X: np.ndarray) -> np.ndarray:
         """Return the field (N, nodes, components) for each row of X (N, 3 + p), summed up as the page does."""
-        field = self._field
-        assert field is not None
+        field = self._fields[self._shown]
         out = np.repeat(field.rest[None], len(X), axis=0)
         for value, x in zip(out, X, strict=True):
             self._ask(x)
-            if not self._call("touch") & 1:
+            if not self._call("touch", self._shown) & 1:
                 continue
-            shape = self._read(self._call("shaped"), self._call("shape_size"))
+            shape = self._read(self._call("shaped"), self._call("shape_size", self._shown))
             numbers, modes = shape[FRAME + MOST + 1 :], len(field.modes)
             value += np.tensordot(numbers[:modes], field.modes, axes=1)
             if field.local_mode is not None:

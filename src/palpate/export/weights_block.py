@@ -317,11 +317,14 @@ def _energy_tables(energy: LearntEnergy, *, deviation: bool) -> dict[int, Table]
         filled[:, : points.shape[1]] = points
         tables[POINTS] = Table.of(filled)
     if deviation and energy.root is not None:
-        tables[ROOT] = _root_table(*energy.posterior)
+        root, some = energy.posterior
+        # a block's shapes have no zeros: where no unit has a covariance, the first one has one of zero
+        units = min(max(some.units, 1), energy.network.units)
+        tables[ROOT] = _root_table(np.pad(root, [(0, units - some.units), (0, 0)]), units)
     return tables
 
 
-def _root_table(root: np.ndarray, network: Network) -> Table:
+def _root_table(root: np.ndarray, units: int) -> Table:
     """Return the lower triangular root of the same covariance, column by column, see `pp_deviation`."""
     lower = np.asarray(np.linalg.qr(root.T, mode="r")).T
     rows, columns = lower.shape
@@ -331,7 +334,7 @@ def _root_table(root: np.ndarray, network: Network) -> Table:
         column = np.zeros(whole)
         column[c:rows] = lower[c:, c]
         parts.append(column[c - c % LANES :])
-    return Table(np.concatenate(parts).astype(np.float32), (columns, network.units, whole))
+    return Table(np.concatenate(parts).astype(np.float32), (columns, units, whole))
 
 
 def net_tables(network: Network, first: int, felt: int) -> dict[int, Table]:

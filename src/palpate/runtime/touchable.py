@@ -31,7 +31,6 @@ from palpate.units import Range, bounds
 
 __all__ = ["Touchable", "load_touchable", "touchable"]
 
-_SAMPLES = 4096  # of the trained ranges, for what is largest there
 _SHARE = 0.75  # of the deepest trained depth: how deep a scripted stroke goes
 _WAY, _PAUSE = 9, 0.1  # places on the way to an end, and the time from one to the next, s
 _SLIVER = 1e-3  # of the deepest depth: shallower is no press
@@ -138,13 +137,7 @@ class Touchable:
         UsageError
             If there is none.
         """
-        low, high = bounds(self.inputs)
-        X = np.random.default_rng(0).uniform(low, high, (_SAMPLES, len(low)))
-        X[0] = (low + high) / 2.0
-        region = self.energy.region
-        if region is not None:
-            scaling = self.energy.network.scaling
-            X = np.vstack([X, scaling.input_centre + scaling.input_half * region.points])
+        X = self.energy.trained_rows()
         if self.holds:  # what is held is stiffest and goes farthest at the ends
             X = np.vstack([X, list(itertools.product(*((r.low, r.high) for r in self.inputs)))])
         depth = self.depth(X)

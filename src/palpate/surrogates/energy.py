@@ -40,6 +40,7 @@ from palpate.units import Range, bounds
 
 __all__ = ["LearntEnergy"]
 
+_SAMPLES = 4096  # of the trained ranges, for what is largest there
 _PART = 2000  # answers that are worth a thread: about 10 ms
 
 
@@ -129,6 +130,16 @@ class LearntEnergy:
         """The continuation, which is always there once the value is made."""
         assert self.continuation is not None
         return self.continuation
+
+    def trained_rows(self) -> np.ndarray:
+        """Return inputs (N, n) within the trained ranges: their middle, random ones, and those learnt from."""
+        low, high = bounds(self.inputs)
+        X = np.random.default_rng(0).uniform(low, high, (_SAMPLES, len(low)))
+        X[0] = (low + high) / 2.0
+        if self.region is None:
+            return X
+        scaling = self.network.scaling
+        return np.vstack([X, scaling.input_centre + scaling.input_half * self.region.points])
 
     @cached_property
     def _constants(self) -> tuple[Any, ...]:

@@ -1,8 +1,8 @@
 """A learnt body as one HTML file that works from disk: no server, no network, nothing else beside it.
 
 The page's own script, in one piece, asks the evaluator core as WebAssembly in place of the server. Everything that it
-needs is in the file, packed by gzip: the core, the weights, the surface, the field's modes as whole numbers of two
-bytes with a scale for each mode, and what the page is told first.
+needs is in the file, packed by gzip: the core, the weights, the surface, the modes of the fields (`packed_surface`),
+and what the page is told first.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import html
 import json
 import os
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,8 +22,8 @@ import numpy as np
 
 from palpate.errors import AccuracyError, UsageError
 from palpate.export.build_core import built_core
-from palpate.export.check_points import Comparison, compare_body
-from palpate.export.field_tables import chosen_field
+from palpate.export.check_points import Comparison, compare_body, compare_field
+from palpate.export.field_tables import PROMISE, SURFACE, field_tables
 from palpate.export.wasm_core import WasmCore, wasmtime_module
 from palpate.export.weights_block import FIELD, WeightsBlock
 from palpate.files import write_file
@@ -30,7 +31,8 @@ from palpate.runtime.devices import device_traits
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import ContactBaseline, FieldSurrogate, Surrogate
 from palpate.surrogates.model_card import card_of
-from palpate.viewer.messages import Modes, Surface
+from palpate.viewer.messages import Hello
+from palpate.viewer.packed_surface import PackedSurface, rounded_points
 from palpate.viewer.page_model import PageModel
 
 __all__ = ["ExportedPage", "export_html", "html_page"]
@@ -41,9 +43,12 @@ DRAWN_BY_THE_PAGE = (
     FIELD + 6,
     FIELD + 7,
 )  # modes and moving nodes: the page sums the shape up itself
-LARGEST = 32767
+LARGEST = 5_000_000  # bytes of a file, more than which no further field makes it
 DEEP = 2.0  # of the deepest trained depth, at which the body lets go
 RATE = 60.0  # Hz, of the pictures
+_MARGIN = 20_000  # bytes for facts, card and the document around the parts
+MOVED = 0.1  # of the promise for a field: by how much rounding a place may move it
+FINEST = 2**-28  # of the body's size, least step of its places; without a field it is 2**-19
 
 
 class _Settings(NamedTuple):
@@ -64,11 +69,14 @@ class ExportedPage:
         SHA-256 of the weights.
     comparison : Comparison, optional
         How far it is from palpate; None where wasmtime is not installed, or nothing was to be compared.
+    left_out : tuple of str
+        Fields that are not in it, since it would be larger than 5 MB, or since they are on other nodes than the first.
     """
 
     file: Path
     hash: str
     comparison: Comparison | None
+    left_out: tuple[str, ...] = ()
 
 
 def export_html(surrogate: Surrogate, path: str | os.PathLike[str], *, check: bool = True) -> ExportedPage:
@@ -90,19 +98,15 @@ def export_html(surrogate: Surrogate, path: str | os.PathLike[str], *, check: bo
     AccuracyError
         If the core does not answer as palpate does; nothing is written.
     """
-    surrogate = _with_one_field(surrogate)
-    block = _block(surrogate)
-    comparison = None
-    if check and wasmtime_module() is not None:
-        field = next((f for f in surrogate.fields.values() if isinstance(f, FieldSurrogate)), None)
-        comparison = compare_body(surrogate, WasmCore.of(block, field), field=block.field)
-        if not comparison.passed:
-            raise AccuracyError(
-                f"The page of {surrogate.name} does not answer as palpate does.",
-                why=str(comparison),
-                fix="Nothing was written. Report this with the model file.",
-            )
-    return ExportedPage(write_file(Path(path), _page(surrogate, block)), block.hash, comparison)
+    page = _Page.of(surrogate)
+    comparison = page.compare() if check and wasmtime_module() is not None else None
+    if comparison is not None and not comparison.passed:
+        raise AccuracyError(
+            f"The page of {surrogate.name} does not answer as palpate does.",
+            why=str(comparison),
+            fix="Nothing was written. Report this with the model file.",
+        )
+    return ExportedPage(write_file(Path(path), page.text), page.block.hash, comparison, page.left_out)
 
 
 def html_page(surrogate: Surrogate) -> str:
@@ -113,20 +117,115 @@ def html_page(surrogate: Surrogate) -> str:
     UsageError
         If the body is drawn as a line, or a part of it has no C source.
     """
-    surrogate = _with_one_field(surrogate)
-    return _page(surrogate, _block(surrogate))
+    return _Page.of(surrogate).text
 
 
-def _with_one_field(surrogate: Surrogate) -> Surrogate:
-    """Return the body with the field that is drawn alone."""
+@dataclass(frozen=True, eq=False)
+class _PageField:
+    """A field of a page.
+
+    Attributes
+    ----------
+    shown, rounded : FieldSurrogate
+        As it is, and as the page holds it.
+    block : WeightsBlock
+        Its weights without modes; of the first field those of the body, too.
+    facts : mapping
+        What the numbers of its modes mean.
+    weights, modes : str
+        Block and modes as they stand in the file.
+    """
+
+    shown: FieldSurrogate
+    rounded: FieldSurrogate
+    block: WeightsBlock
+    facts: dict[str, Any]
+    weights: str
+    modes: str
+
+
+@dataclass(frozen=True, eq=False)
+class _Page:
+    """A page's text, and what is compared with palpate."""
+
+    surrogate: Surrogate
+    block: WeightsBlock
+    fields: tuple[_PageField, ...]
+    left_out: tuple[str, ...]
+    text: str
+
+    @classmethod
+    def of(cls, surrogate: Surrogate) -> _Page:
+        """Return the page of a body with as many of its fields as it has room for."""
+        _refuse_lines(surrogate)
+        surrogate = _shallow(surrogate)
+        model = PageModel(touchable(surrogate))
+        assert model.surface is not None
+        traits = device_traits("page")
+        place = model.body.workspace(traits.radius)
+        hello = model.hello(_Settings(place.scale, place.radius, traits.max_force), RATE)
+        surface = PackedSurface.of(model.surface, _step(np.asarray(model.surface.rest), hello))
+        keys = {field.name: key for key, field in surrogate.fields.items()}
+        names = [info.name for info in hello.fields]
+        block = WeightsBlock.of(surrogate, field=keys[names[0]] if names else None)
+        bare = _without_modes(block)
+        parts = {
+            "surface": _packed(surface.data),
+            "core": _packed(built_core("core.wasm")),
+            "weights-0": _packed(_by_weight(bare.to_bytes())),
+        }
+        room = LARGEST - sum(map(len, parts.values())) - sum(len(text) for text in _statics())
+        fields: list[_PageField] = []
+        for index, name in enumerate(names):
+            own = block if index == 0 else _block_of_field(surrogate, keys[name], block)
+            further = _page_field(surrogate.fields[keys[name]], own, model, index, surface)
+            size = len(further.modes) + len(further.weights) * (index > 0)
+            if index == 0 or size <= room - _MARGIN:
+                fields.append(further)
+                room -= size
+        kept = {field.shown.name for field in fields}
+        left_out = tuple(field.name for field in surrogate.fields.values() if field.name not in kept)
+        hello = replace(
+            hello,
+            fields=tuple(info for info in hello.fields if info.name in kept),
+            meta={**hello.meta, **({"fields that are not in this file": list(left_out)} if left_out else {})},
+        )
+        for i, field in enumerate(fields):
+            parts[f"field-{i}"] = field.modes
+            if i > 0:
+                parts[f"weights-{i}"] = field.weights
+        facts = {
+            "places": _places(model),
+            "surface": surface.facts,
+            "fields": [field.facts for field in fields],
+        }
+        parts |= {"hello": _packed(hello.to_json().encode()), "facts": _packed(json.dumps(facts).encode())}
+        card = card_of(surrogate).with_hash("weights", bare.hash)
+        text = _document(surrogate.name, parts, card.to_json())
+        return cls(surrogate, bare, tuple(fields), left_out, text)
+
+    def compare(self) -> Comparison:
+        """Return how far the core is from palpate, with the fields as the page sums them up."""
+        rounded, further = (
+            [field.rounded for field in self.fields],
+            [field.block for field in self.fields[1:]],
+        )
+        core = WasmCore.of(self.block, rounded, further)
+        whole = compare_body(self.surrogate, core)
+        parts = {
+            f"field {field.shown.name}": compare_field(self.surrogate, field.shown, core.show(i))
+            for i, field in enumerate(self.fields)
+        }
+        return replace(whole, parts={**whole.parts, **parts})
+
+
+def _refuse_lines(surrogate: Surrogate) -> None:
     if touchable(surrogate).line is not None:
         raise UsageError(
             f"The body {surrogate.name!r} can't be a page that is one file.",
             why="It is drawn as a line, and the shape of a bent beam has no C source.",
             fix="Export its force with `palpate export c`, or show it with `palpate view`.",
         )
-    name = chosen_field(surrogate, None)
-    return _shallow(replace(surrogate, fields={} if name is None else {name: surrogate.fields[name]}))
 
 
 def _shallow(surrogate: Surrogate) -> Surrogate:
@@ -147,43 +246,62 @@ def _shallow(surrogate: Surrogate) -> Surrogate:
     return replace(surrogate, energy=energy, fields=fields)
 
 
-def _block(surrogate: Surrogate) -> WeightsBlock:
-    """Return the weights without what the page draws with."""
-    block = WeightsBlock.of(surrogate, field=next(iter(surrogate.fields), None))
-    return replace(
-        block, tables={k: table for k, table in block.tables.items() if k not in DRAWN_BY_THE_PAGE}
-    )
+def _places(model: PageModel) -> dict[str, Any] | None:
+    """Return where the body keeps indentations that the page draws; None where there are none."""
+    memory = model.body.indentation
+    if memory is None or model.surface is None or not len(model.surface.yielding):
+        return None
+    return {"points": memory.points.tolist(), "width": float(memory.width)}
 
 
-def _page(surrogate: Surrogate, block: WeightsBlock) -> str:
-    """Return the text of the file."""
-    model = PageModel(touchable(surrogate))
-    assert model.surface is not None
-    traits = device_traits("page")
-    place = model.body.workspace(traits.radius)
-    hello = model.hello(_Settings(place.scale, place.radius, traits.max_force), RATE)
-    modes = model.modes(0) if model.field_count else None
-    sizes, numbers = _lists(model.surface, modes)
-    parts = {
-        "hello": hello.to_json().encode(),
-        "sizes": json.dumps(sizes).encode(),
-        "surface": numbers,
-        "core": built_core("core.wasm"),
-        "weights": _by_weight(block.to_bytes()),
-    }
-    card = card_of(surrogate).with_hash("weights", block.hash)
-    return _document(surrogate.name, parts, card.to_json())
+def _step(rest: np.ndarray, hello: Hello) -> float:
+    """Return the step of the points' coordinates, m, so that a field is moved by little of what it may be off."""
+    points = rest.reshape(-1, 3)
+    size = float(np.ptp(points, axis=0).max())
+    moves = bool(hello.fields) and hello.fields[0].components == 3
+    wanted = 2.0 * MOVED * PROMISE * hello.fields[0].high if moves else size * 2**-19
+    return max(wanted, size * FINEST)
 
 
-def _document(name: str, parts: dict[str, bytes], card: str) -> str:
-    """Return the page's skeleton with style, script, parts and model card put into it."""
+def _block_of_field(surrogate: Surrogate, name: str, block: WeightsBlock) -> WeightsBlock:
+    """Return the arrays of one more field of a body; its surface is in the body's own block."""
+    tables = field_tables(surrogate, name, block.tables)
+    return WeightsBlock({k: v for k, v in tables.items() if not SURFACE <= k < SURFACE + 3}, field=name)
+
+
+def _page_field(
+    shown: Any, block: WeightsBlock, model: PageModel, index: int, surface: PackedSurface
+) -> _PageField:
+    """Return a field of the page from the block with its modes."""
+    scales, small = block.tables[FIELD + 3].values, block.tables[FIELD + 4].values
+    facts, data = surface.field(model.modes(index), scales)
+    rows = (small.reshape(len(scales), -1) * scales[:, None]).reshape(len(scales), *shown.rest.shape)
+    points = rounded_points(shown.points, surface.facts["step"])
+    rounded = replace(shown, rest=rows[0], modes=rows[1:], points=points)
+    bare = _without_modes(block)
+    return _PageField(shown, rounded, bare, facts, _packed(_by_weight(bare.to_bytes())), _packed(data))
+
+
+def _without_modes(block: WeightsBlock) -> WeightsBlock:
+    """Return a block without what the page draws with."""
+    tables = {k: table for k, table in block.tables.items() if k not in DRAWN_BY_THE_PAGE}
+    return replace(block, tables=tables)
+
+
+def _statics() -> tuple[str, str]:
+    """Return style and script of every page."""
+    style = (STATIC / "assets" / "page.css").read_text("utf-8")
+    return style, (STATIC / "assets" / "file.js").read_text("utf-8").replace("</script", "<\\/script")
+
+
+def _document(name: str, parts: Mapping[str, str], card: str) -> str:
+    """Return the page's skeleton with style, script, packed parts and model card put into it."""
     skeleton = (STATIC / "index.html").read_text("utf-8")
     body = re.search(r"<body>.*</body>", skeleton, re.DOTALL)
     assert body is not None
-    style = (STATIC / "assets" / "page.css").read_text("utf-8")
-    script = (STATIC / "assets" / "file.js").read_text("utf-8").replace("</script", "<\\/script")
+    style, script = _statics()
     packed = "\n".join(
-        f'<script type="application/octet-stream" id="palpate-{key}">{_packed(part)}</script>'
+        f'<script type="application/octet-stream" id="palpate-{key}">{part}</script>'
         for key, part in parts.items()
     )
     icon = base64.b64encode((STATIC / "favicon.svg").read_bytes()).decode()
@@ -213,34 +331,3 @@ def _by_weight(data: bytes) -> bytes:
 
 def _packed(data: bytes) -> str:
     return base64.b64encode(gzip.compress(data, compresslevel=9, mtime=0)).decode("ascii")
-
-
-def _lists(surface: Surface, modes: Modes | None) -> tuple[dict[str, Any], bytes]:
-    """Return the sizes of a surface and its field, and their lists as bytes, each to a multiple of eight.
-
-    The order is that of ``file.ts``: rest, triangles, creases, which may be touched; then scales, rest and modes of the
-    field as whole numbers of two bytes, and the points that its local mode moves.
-    """
-    points = np.asarray(surface.rest, dtype=np.float64).reshape(-1, 3)
-    lists = [
-        points.astype("<f4"),
-        np.asarray(surface.triangles).astype("<u4"),
-        np.asarray(surface.creases).astype("<u4"),
-        np.asarray(surface.touchable).astype("u1"),
-    ]
-    sizes = {
-        "points": len(points),
-        "triangles": lists[1].size // 3,
-        "creases": lists[2].size // 2,
-        "modes": -1,
-        "reach": 0.0,
-        "rows": 0,
-        "touched": 0,
-    }
-    if modes is not None:
-        rows = np.vstack([np.ravel(modes.rest), np.reshape(modes.modes, (-1, np.size(modes.rest)))])
-        scales = np.maximum(np.abs(rows).max(axis=1), 1e-300) / LARGEST
-        small = [np.round(row / scale).astype("<i2") for row, scale in zip(rows, scales, strict=True)]
-        lists += [scales.astype("<f8"), *small, np.asarray(modes.touched).astype("<u4")]
-        sizes |= {"modes": len(rows) - 1, "reach": modes.reach, "rows": modes.rows, "touched": lists[-1].size}
-    return sizes, b"".join(part.tobytes() + bytes(-part.nbytes % 8) for part in lists)

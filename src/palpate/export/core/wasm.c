@@ -5,8 +5,12 @@
 #include <stdint.h>
 #define PP_EXPORT(name) __attribute__((export_name(name)))
 
+#define WASM_FIELDS 16
+
 static pp_array wasm_arrays[PP_ARRAYS];
 static const pp_model wasm_model = {wasm_arrays};
+static pp_array wasm_further[WASM_FIELDS][PP_ARRAYS]; /* of further fields of the same body */
+static int32_t wasm_fields;                           /* how many these are */
 static pp_real wasm_asked[3 + PP_MOST], wasm_answer[PP_ANSWER + 1];
 static pp_real *wasm_work; /* behind the block: for the deviation, the state of the memory, the shape of a touch */
 static pp_real *wasm_state, *wasm_shape;
@@ -20,14 +24,45 @@ PP_EXPORT("open") int32_t wasm_open(uint32_t size) {
   return pp_open((const uint8_t *)(uintptr_t)wasm_room(), size, wasm_arrays);
 }
 
-/* bytes that are needed behind a sound block */
+/* Open a block at `at` that holds the arrays of one more field and no others; what is wrong with it. */
+PP_EXPORT("open_field") int32_t wasm_open_field(uint32_t at, uint32_t size) {
+  const unsigned char *bytes = (const unsigned char *)(uintptr_t)at;
+  pp_array *own = wasm_further[wasm_fields];
+  int32_t i;
+  if (wasm_fields == WASM_FIELDS || size < PP_BLOCK_HEAD + PP_ARRAYS * PP_BLOCK_ROW || memcmp(bytes, "PALPATE", 8)) return PP_NO_BLOCK;
+  if (pp_word(bytes + 16) != size || size % 8) return PP_DAMAGED;
+  if (pp_checksum(bytes + PP_BLOCK_HEAD, size - PP_BLOCK_HEAD) != pp_word(bytes + 24)) return PP_DAMAGED;
+  for (i = 0; i < PP_ARRAYS; i++) {
+    if (!pp_find(bytes, size, bytes + PP_BLOCK_HEAD + PP_BLOCK_ROW * i, &own[i])) return PP_MISFIT;
+  }
+  own[PP_HEAD] = wasm_arrays[PP_HEAD];
+  for (i = 0; i < 3; i++) own[PP_FIELD_SURFACE + i] = wasm_arrays[PP_FIELD_SURFACE + i];
+  if (!own[PP_FIELD].whole) return PP_MISFIT;
+  wasm_fields++;
+  return PP_OPEN;
+}
+
+static int32_t wasm_size_of(const pp_array *arrays) {
+  const pp_model model = {arrays};
+  return arrays[PP_FIELD].whole ? pp_shape_size(&model) : 0;
+}
+
+/* the arrays of field k, 0 being that of the body's own block */
+static const pp_array *wasm_field(int32_t k) { return k > 0 && k <= wasm_fields ? wasm_further[k - 1] : wasm_arrays; }
+
+/* bytes that are needed behind sound blocks, `size` bytes of all together */
 PP_EXPORT("needs") uint32_t wasm_needs(uint32_t size) {
   const uint32_t state = 4u + (uint32_t)wasm_arrays[PP_HEAD].whole[PP_STATE];
-  const uint32_t shape = wasm_arrays[PP_FIELD].whole ? (uint32_t)pp_shape_size(&wasm_model) : 0u;
+  uint32_t shape = 0u;
+  int32_t k;
   const uint32_t work = (uint32_t)pp_deviation_size(&wasm_model);
   wasm_work = (pp_real *)(uintptr_t)((wasm_room() + size + 15u) & ~15u);
   wasm_state = wasm_work + work;
   wasm_shape = wasm_state + state;
+  for (k = 0; k <= wasm_fields; k++) {
+    const uint32_t own = (uint32_t)wasm_size_of(wasm_field(k));
+    shape = own > shape ? own : shape;
+  }
   return (work + state + shape) * (uint32_t)sizeof(pp_real) + 32u;
 }
 
@@ -37,10 +72,8 @@ PP_EXPORT("answered") uint32_t wasm_answer_at(void) { return (uint32_t)(uintptr_
 PP_EXPORT("shaped") uint32_t wasm_shape_at(void) { return (uint32_t)(uintptr_t)wasm_shape; }
 PP_EXPORT("state") uint32_t wasm_state_at(void) { return (uint32_t)(uintptr_t)wasm_state; }
 
-/* numbers of a shape: eight of the frame, the further inputs, 1, coefficients, profile */
-PP_EXPORT("shape_size") int32_t wasm_shape_size(void) {
-  return wasm_arrays[PP_FIELD].whole ? pp_shape_size(&wasm_model) : 0;
-}
+/* numbers of a shape of field k: eight of the frame, the further inputs, 1, coefficients, profile */
+PP_EXPORT("shape_size") int32_t wasm_shape_size(int32_t k) { return wasm_size_of(wasm_field(k)); }
 
 /* Energy, depth, force, stiffness and the rest; the flags. */
 PP_EXPORT("answer") int32_t wasm_ask(void) { return pp_answer(&wasm_model, wasm_asked, wasm_asked + 3, wasm_answer); }
@@ -68,5 +101,8 @@ PP_EXPORT("start") void wasm_start(void) {
   memset(wasm_state, 0, (4u + (size_t)wasm_arrays[PP_HEAD].whole[PP_STATE]) * sizeof *wasm_state);
 }
 
-/* Find the shape of a touch. */
-PP_EXPORT("touch") int32_t wasm_touch(void) { return pp_touch_shape(&wasm_model, wasm_asked, wasm_asked + 3, wasm_shape); }
+/* Find the shape of a touch by field k. */
+PP_EXPORT("touch") int32_t wasm_touch(int32_t k) {
+  const pp_model model = {wasm_field(k)};
+  return pp_touch_shape(&model, wasm_asked, wasm_asked + 3, wasm_shape);
+}

@@ -83,6 +83,7 @@ class PressedBody implements Body {
   private infos: FieldInfo[] = [];
   private indentation: Indentation | null = null;
   private still = new Float32Array();
+  private shares = new Float32Array();
   private places: readonly Vec3[] = [];
   private chosen = 0;
   private latest: Frame | null = null;
@@ -145,6 +146,7 @@ class PressedBody implements Body {
   private take(surface: Surface, fields: Field[], trust: TrustMap | null): void {
     [this.surface, this.fields] = [surface, fields];
     this.still = new Float32Array(surface.rest.length);
+    this.shares = new Float32Array(surface.rest.length / 3);
     this.indentation = new Indentation(surface);
     const first = this.infos.length === 0;
     this.trust = trust;
@@ -208,7 +210,7 @@ class PressedBody implements Body {
     const moved = first?.info.components === 3 ? first.values : this.still;
     this.indentation?.into(moved, latest.indentation);
     const values = fields[this.chosen]?.sizes() ?? (this.trust ? deviations(this.trust) : this.still);
-    const colours = this.trusting ? certainty(this.trust!) : info ? shares(info, values) : plain(this.still.length);
+    const colours = this.trusting ? certainty(this.trust!) : info ? shares(info, values, this.shares) : plain(this.still.length);
     document.documentElement.dataset["summed"] = String(performance.now() - began); // ms
     const layers = { ghost: input("show-ghost").checked, mesh: input("show-mesh").checked };
     view.touch(latest, this.hand.radius, moved, colours, layers);
@@ -275,8 +277,11 @@ function plain(numbers: number): Float32Array {
   return new Float32Array(numbers / 3);
 }
 
+let corner: DOMRect | null = null; // of the canvas in the window; asked for each picture, it would make the browser lay out the page
+for (const event of ["resize", "scroll"]) addEventListener(event, () => (corner = null), { capture: true, passive: true });
+
 /** For programs that drive the page: where a place is, in pixels of the window. */
 function mark(name: string, at: { x: number; y: number }, canvas: HTMLCanvasElement): void {
-  const box = canvas.getBoundingClientRect();
-  document.documentElement.dataset[name] = `${at.x + box.left} ${at.y + box.top}`;
+  corner ??= canvas.getBoundingClientRect();
+  document.documentElement.dataset[name] = `${at.x + corner.left} ${at.y + corner.top}`;
 }

@@ -3,16 +3,17 @@
 import type { Evaluator } from "./evaluator";
 import { TRUSTED } from "./evaluator";
 import type { Frame, Hello, Vec3 } from "./messages";
+import { Sheet } from "./plot";
 import { css, element, tidy } from "./units";
 
-const POINTS = 80;
+const POINTS = 48;
 const EVERY = 100; // ms
 const STEP = 1e-5; // m
 const BEYOND = 1.25; // of the deepest trained depth
 const MARGIN = { left: 46, right: 8, top: 8, bottom: 22 }; // px
 
 export class DepthCurve {
-  private readonly canvas = element<HTMLCanvasElement>("curve-plot");
+  private readonly sheet = new Sheet(element<HTMLCanvasElement>("curve-plot"));
   private drawnAt = 0;
 
   constructor(
@@ -40,8 +41,9 @@ export class DepthCurve {
       return { depth, force: Math.hypot(...force), known: (flags & TRUSTED) !== 0 };
     });
     const high = Math.max(...points.map((p) => p.force), Math.hypot(...frame.force), 1e-12);
-    const pen = this.clear();
-    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
+    const pen = this.sheet.clear();
+    if (!pen) return;
+    const { width, height } = this.sheet;
     const x = (depth: number): number => MARGIN.left + (depth / most) * (width - MARGIN.left - MARGIN.right);
     const y = (force: number): number => height - MARGIN.bottom - (force / high) * (height - MARGIN.top - MARGIN.bottom);
     pen.fillStyle = css("--soft");
@@ -75,6 +77,7 @@ export class DepthCurve {
 
   /** The way out of the body: along it the depth falls fastest. */
   private outward(frame: Frame): Vec3 | null {
+    if (Math.hypot(...frame.normal) > 0) return frame.normal;
     const way = [0, 1, 2].map((axis) => {
       const [one, other] = [-STEP, STEP].map((step) => {
         const place = frame.position.map((v, k) => v + (k === axis ? step : 0)) as Vec3;
@@ -84,15 +87,5 @@ export class DepthCurve {
     });
     const size = Math.hypot(...way);
     return size > 0 ? (way.map((v) => v / size) as Vec3) : null;
-  }
-
-  private clear(): CanvasRenderingContext2D {
-    const { canvas } = this;
-    const ratio = window.devicePixelRatio;
-    [canvas.width, canvas.height] = [canvas.clientWidth * ratio, canvas.clientHeight * ratio];
-    const pen = canvas.getContext("2d")!;
-    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-    pen.font = "11px system-ui, sans-serif";
-    return pen;
   }
 }

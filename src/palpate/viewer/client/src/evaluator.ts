@@ -6,6 +6,7 @@ import type { Vec3 } from "./messages";
 const PAGE = 65536; // bytes of WebAssembly memory
 const FRAME = 8; // numbers of a shape before the further inputs: s, f, contact point, normal
 const MOST = 16; // further inputs and more
+const LEDGER = 4; // numbers of energy at the head of a memory's state
 const FAULTS = [
   "",
   "they are none, or were written by a later version",
@@ -26,12 +27,14 @@ interface Core {
   asked(): number;
   answered(): number;
   shaped(): number;
-  shape_size(): number;
+  open_field(at: number, size: number): number;
+  shape_size(field: number): number;
   answer(): number;
   trust(): number;
+  state(): number;
   step(dt: number): number;
   start(): void;
-  touch(): number;
+  touch(field: number): number;
 }
 
 /** What a body answers at a place. */
@@ -43,22 +46,41 @@ export interface Answer {
   stiffness: Float64Array; // (9), N/m, row by row
 }
 
-export class Evaluator {
-  private constructor(private readonly core: Core) {}
+/** The shape of a touch. */
+export interface Touch {
+  depth: number; // m
+  contact: Vec3;
+  normal: Vec3;
+  numbers: Float32Array;
+}
 
-  /** Rejects a block that is damaged or of another version. */
-  static async of(module: BufferSource, block: Uint8Array): Promise<Evaluator> {
+export class Evaluator {
+  private constructor(
+    private readonly core: Core,
+    readonly fields: number,
+    private readonly places: number,
+  ) {}
+
+  /**
+   * A body from its block of weights and those of its further fields; rejects one that is damaged or of another version.
+   * `places`: at how many it keeps indentations.
+   */
+  static async of(module: BufferSource, blocks: Uint8Array[], places = 0): Promise<Evaluator> {
     const { instance } = await WebAssembly.instantiate(module);
     const core = instance.exports as unknown as Core;
     core._initialize();
     const room = core.room();
-    reserve(core.memory, room + block.length);
-    new Uint8Array(core.memory.buffer, room).set(block);
-    const fault = core.open(block.length);
-    if (fault !== 0) throw new Error(`The weights of this body can't be used: ${FAULTS[fault] ?? "their fault is unknown"}.`);
-    reserve(core.memory, room + block.length + core.needs(block.length) + 64);
+    let at = room;
+    blocks.forEach((block, i) => {
+      reserve(core.memory, at + block.length);
+      new Uint8Array(core.memory.buffer, at).set(block);
+      const fault = i === 0 ? core.open(block.length) : core.open_field(at, block.length);
+      if (fault !== 0) throw new Error(`The weights of this body can't be used: ${FAULTS[fault] ?? "their fault is unknown"}.`);
+      at += block.length;
+    });
+    reserve(core.memory, at + core.needs(at - room) + 64);
     core.start();
-    return new Evaluator(core);
+    return new Evaluator(core, core.shape_size(0) === 0 ? 0 : blocks.length, places);
   }
 
   answer(place: Vec3, parameters: ArrayLike<number>): Answer {
@@ -79,30 +101,39 @@ export class Evaluator {
     return this.numbers(this.core.answered(), 20)[19]!;
   }
 
+  /** Amplitudes (√J) of the indentations at the places that keep them; overwritten by each step. */
+  get amplitudes(): Float64Array {
+    return this.numbers(this.core.state() + 8 * LEDGER, this.places);
+  }
+
   /** Forget all that was done to the body. */
   start(): void {
     this.core.start();
   }
 
-  /** The shape of a touch, null without contact; `numbers` are coefficients of the modes, then the profile of the local mode. */
-  touch(place: Vec3, parameters: ArrayLike<number>): { depth: number; contact: Vec3; normal: Vec3; numbers: Float32Array } | null {
-    const size = this.core.shape_size();
-    if (size === 0) return null;
+  /** The shape of a touch, null without contact; `numbers` are for each field coefficients of its modes, then the local mode's profile. */
+  touch(place: Vec3, parameters: ArrayLike<number>): Touch | null {
+    if (this.fields === 0) return null;
     this.ask(place, parameters);
-    const touched = (this.core.touch() & CONTACT) !== 0;
-    const shape = this.numbers(this.core.shaped(), size);
-    if (!touched) return null;
-    return {
-      depth: shape[0]!,
-      contact: [shape[2]!, shape[3]!, shape[4]!],
-      normal: [shape[5]!, shape[6]!, shape[7]!],
-      numbers: Float32Array.from(shape.subarray(FRAME + MOST + 1)),
-    };
+    const numbers = new Float32Array(this.shapeNumbers);
+    let [at, first]: [number, Float64Array | null] = [0, null];
+    for (let field = 0; field < this.fields; field++) {
+      const touched = (this.core.touch(field) & CONTACT) !== 0;
+      const shape = this.numbers(this.core.shaped(), this.core.shape_size(field));
+      if (!touched) return null;
+      first ??= shape.slice(0, FRAME);
+      numbers.set(shape.subarray(FRAME + MOST + 1), at);
+      at += shape.length - FRAME - MOST - 1;
+    }
+    const [depth, , x, y, z, u, v, w] = first as unknown as number[];
+    return { depth: depth!, contact: [x!, y!, z!], normal: [u!, v!, w!], numbers };
   }
 
-  /** How many numbers a shape has for modes and local mode. */
+  /** How many numbers a shape has for modes and local modes of all fields. */
   get shapeNumbers(): number {
-    return Math.max(0, this.core.shape_size() - FRAME - MOST - 1);
+    let total = 0;
+    for (let field = 0; field < this.fields; field++) total += this.core.shape_size(field) - FRAME - MOST - 1;
+    return total;
   }
 
   private ask(place: Vec3, parameters: ArrayLike<number>): void {

@@ -12,6 +12,7 @@ export class Field {
   /** components of each point */
   readonly values: Float32Array;
   readonly touched: Int32Array;
+  private readonly size: Float32Array;
 
   constructor(
     readonly info: FieldInfo,
@@ -20,6 +21,7 @@ export class Field {
   ) {
     this.values = Float32Array.from(modes.rest);
     this.touched = Int32Array.from(modes.touched);
+    this.size = new Float32Array(this.values.length / info.components);
   }
 
   /** Numbers of `Frame.coefficients` that this field takes. */
@@ -49,11 +51,10 @@ export class Field {
     if (modes.rows > 0) this.local(numbers.subarray(this.info.modes), contact);
   }
 
-  /** The size of the field at each point. */
+  /** The size of the field at each point; overwritten by the next call. */
   sizes(): Float32Array {
-    const [u, per] = [this.values, this.info.components];
+    const [u, per, out] = [this.values, this.info.components, this.size];
     if (per === 1) return u;
-    const out = new Float32Array(u.length / per);
     for (let i = 0, at = 0; i < out.length; i++) {
       let sum = 0;
       for (let c = 0; c < per; c++, at++) sum += u[at]! * u[at]!;

@@ -6,6 +6,7 @@
 import type { Listener } from "./connection";
 import { CONTACT, TOO_DEEP, TRUSTED } from "./evaluator";
 import type { Answer, Evaluator } from "./evaluator";
+import type { IndentationDrawing } from "./indentation_drawing";
 import { Hold, Loop } from "./messages";
 import type { Frame, Hand, Hello, Vec3 } from "./messages";
 
@@ -14,6 +15,7 @@ const LONGEST = 0.1; // s between two pictures; what is longer was no touch
 const FREE = 0.04; // s, time constant of the withdrawal that is drawn, as the server has it
 const STILL = 1e-3; // share of the deepest depth below which the body counts as at rest
 const NOWHERE: Vec3 = [0, 0, 0];
+const NOTHING = new Float32Array();
 
 export class FileConnection {
   connected = false;
@@ -33,6 +35,7 @@ export class FileConnection {
     private readonly listener: Listener,
     private readonly hello: Hello,
     private readonly evaluator: Evaluator,
+    private readonly kept: IndentationDrawing | null,
   ) {
     this.place = [...hello.centre];
     this.parameters = Float32Array.from(hello.parameters, ({ low, high }) => (low + high) / 2);
@@ -81,7 +84,8 @@ export class FileConnection {
 
   private follow(to: Vec3, elapsed: number): void {
     const from = this.answer ? this.place : to; // the hand has just taken hold
-    const count = Math.max(1, Math.ceil(elapsed / STEP));
+    // a body that remembers nothing hears of the last place alone
+    const count = this.hello.remembers ? Math.max(1, Math.ceil(elapsed / STEP)) : 1;
     for (let k = 1; k <= count; k++) {
       const between = to.map((v, i) => from[i]! + ((v - from[i]!) * k) / count) as Vec3;
       this.answer = this.evaluator.step(between, this.parameters, elapsed / count);
@@ -119,6 +123,12 @@ export class FileConnection {
     const { hello, answer, evaluator } = this;
     const at = hello.holds ? null : this.drawn(time);
     const touched = at && evaluator.touch(at, this.parameters);
+    const coefficients = touched ? touched.numbers : new Float32Array(evaluator.shapeNumbers);
+    this.kept?.update();
+    if (this.kept && touched) {
+      const share = this.kept.elastic(touched.depth, touched.contact, touched.normal);
+      for (let i = 0; i < coefficients.length; i++) coefficients[i]! *= share;
+    }
     const contact = answer !== null && (answer.flags & CONTACT) !== 0;
     this.tick += 1;
     return {
@@ -152,8 +162,8 @@ export class FileConnection {
       deviation: contact ? evaluator.deviation(this.place, this.parameters) : 0,
       drawn: touched ? touched.depth : 0,
       displacement: new Float32Array(),
-      coefficients: touched ? touched.numbers : new Float32Array(evaluator.shapeNumbers),
-      indentation: new Float32Array(),
+      coefficients,
+      indentation: this.kept?.depths ?? NOTHING,
     };
   }
 }

@@ -6,6 +6,7 @@ import { element } from "./units";
 
 const DEAD = 0.12; // of a stick's way: sticks rest anywhere within
 const PRESSED = 0.02; // of a trigger's way
+const SEARCH = 200; // ms between two looks for a gamepad where there was none: a look may take a millisecond
 const EFFECT = 100; // ms; it lapses by itself when no other follows
 const EVERY = 50; // ms between two effects
 const CHANGE = 0.1; // s in which the whole force must come or go to fill the strong motor
@@ -42,6 +43,7 @@ export class Pads {
   private mute = ""; // why the gamepad in use doesn't rumble
   private last = { time: 0, force: 0 };
   private active: Gamepad | null = null;
+  private looked = -Infinity;
 
   /** `full`: the largest force (N); `stop`: hears of the button that stops. */
   constructor(
@@ -54,6 +56,9 @@ export class Pads {
 
   /** The gamepad as it is now; null where there is none that can be read. */
   read(): Pad | null {
+    const now = performance.now();
+    if (!this.active && now - this.looked < SEARCH) return null;
+    this.looked = now;
     const all = this.all();
     const pad = all.find((one) => one.mapping === "standard" && one.connected);
     if (pad?.id !== this.active?.id) this.mute = "";

@@ -43,7 +43,8 @@ export function largest(info: FieldInfo | null, values: Float32Array): number {
   element("largest-section").hidden = !info;
   if (!info) return 0;
   const { size, unit } = scale(info);
-  const most = values.reduce((a, b) => Math.max(a, b), -Infinity);
+  let most = -Infinity;
+  for (let i = 0; i < values.length; i++) if (values[i]! > most) most = values[i]!;
   element("largest-title").textContent = info.name.startsWith("largest") ? capital(info.name) : `Largest ${info.name}`;
   element("largest").textContent = tidy(most / size);
   element("largest-unit").textContent = unit;
@@ -56,9 +57,11 @@ export function nothing({ low, high }: FieldInfo): number {
   return low < 0 ? Math.min(-low / (high - low), 1) : 0;
 }
 
-/** Each point's share of the scale. */
-export function shares(info: FieldInfo, values: Float32Array): Float32Array {
-  return values.map((v) => (v - info.low) / (info.high - info.low));
+/** Each point's share of the scale, into `out` if that is given. */
+export function shares(info: FieldInfo, values: Float32Array, out = new Float32Array(values.length)): Float32Array {
+  const [low, scale] = [info.low, 1 / (info.high - info.low)];
+  for (let i = 0; i < values.length; i++) out[i] = (values[i]! - low) * scale;
+  return out;
 }
 
 function scale(info: FieldInfo): { size: number; unit: string } {

@@ -13,7 +13,33 @@ export interface Scale {
   stepped: boolean; // a value belongs to the whole time since the one before
 }
 
+/** A canvas to draw on; nothing is drawn where it is not shown. */
+export class Sheet {
+  width = 0; // px
+  height = 0;
+
+  constructor(private readonly canvas: HTMLCanvasElement) {
+    // asked at each drawing, the size would make the browser lay out the page each time
+    new ResizeObserver(() => ([this.width, this.height] = [canvas.clientWidth, canvas.clientHeight])).observe(canvas);
+  }
+
+  /** A pen on the empty canvas; null where it is not shown. */
+  clear(): CanvasRenderingContext2D | null {
+    const { canvas } = this;
+    if (this.width === 0) return null;
+    const ratio = Math.min(devicePixelRatio, 2);
+    const [width, height] = [this.width * ratio, this.height * ratio].map(Math.round);
+    const pen = canvas.getContext("2d")!;
+    if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width!, height!];
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    pen.clearRect(0, 0, this.width, this.height);
+    pen.font = "11px system-ui, sans-serif";
+    return pen;
+  }
+}
+
 export class Plot {
+  private readonly sheet: Sheet;
   private readonly times = new Float64Array(CAPACITY);
   private readonly values = new Float64Array(CAPACITY);
   private count = 0;
@@ -22,9 +48,10 @@ export class Plot {
   private line = "";
 
   constructor(
-    private readonly canvas: HTMLCanvasElement,
+    canvas: HTMLCanvasElement,
     private readonly variable: string,
   ) {
+    this.sheet = new Sheet(canvas);
     this.recolour();
   }
 
@@ -50,8 +77,9 @@ export class Plot {
   }
 
   draw(now: number, scale: Scale, marks: readonly number[] = []): void {
-    const pen = this.clear();
-    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
+    const pen = this.sheet.clear();
+    if (!pen) return;
+    const { width, height } = this.sheet;
     const [left, top, bottom] = [46, 7, height - 7];
     const x = (time: number): number => width - 2 - ((now - time) / SECONDS) * (width - 2 - left);
     const y = (value: number): number => bottom - share(value, scale) * (bottom - top);
@@ -76,19 +104,6 @@ export class Plot {
     pen.lineWidth = scale.stepped ? 1 : 1.8;
     pen.lineJoin = "round";
     pen.stroke();
-  }
-
-  private clear(): CanvasRenderingContext2D {
-    const ratio = Math.min(devicePixelRatio, 2);
-    const [width, height] = [this.canvas.clientWidth * ratio, this.canvas.clientHeight * ratio].map(Math.round);
-    const pen = this.canvas.getContext("2d")!;
-    if (this.canvas.width !== width || this.canvas.height !== height) {
-      [this.canvas.width, this.canvas.height] = [width!, height!];
-    }
-    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-    pen.clearRect(0, 0, this.canvas.clientWidth, this.canvas.clientHeight);
-    pen.font = "11px system-ui, sans-serif";
-    return pen;
   }
 
   private each(now: number, visit: (time: number, value: number) => void): void {

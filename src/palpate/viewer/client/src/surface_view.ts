@@ -22,6 +22,7 @@ import {
   Vector3,
 } from "three";
 import { palette } from "./colour";
+import { normalsInto } from "./mesh";
 import type { Surface, Vec3 } from "./messages";
 import { css, round125 } from "./units";
 import { View } from "./view";
@@ -52,7 +53,9 @@ export class SurfaceView extends View {
   readonly cell: number; // m, spacing of the floor's grid
 
   protected readonly geometry = new BufferGeometry();
+  protected readonly triangles: Uint32Array;
   private readonly position: BufferAttribute;
+  private readonly facing: BufferAttribute;
   private readonly colour: BufferAttribute;
   protected readonly body: Mesh<BufferGeometry, MeshPhongMaterial>;
   private readonly wires: Mesh<BufferGeometry, MeshBasicMaterial>;
@@ -62,7 +65,7 @@ export class SurfaceView extends View {
   private readonly fixed: LineSegments<BufferGeometry, LineBasicMaterial>;
   private readonly floor: LineSegments<BufferGeometry, LineBasicMaterial>;
   protected readonly probe: Mesh<SphereGeometry, MeshLambertMaterial>;
-  private colours = palette();
+  private colours = numbers(palette());
   private readonly unknown = new Color();
   private readonly low = new Vector3().setScalar(Infinity);
   private readonly high = new Vector3().setScalar(-Infinity);
@@ -77,13 +80,16 @@ export class SurfaceView extends View {
     before: View | null = null,
   ) {
     super(canvas, words, STANCE, before);
-    const { rest, triangles } = surface;
+    const { rest } = surface;
+    this.triangles = Uint32Array.from(surface.triangles);
     this.position = new BufferAttribute(Float32Array.from(rest), 3);
+    this.facing = new BufferAttribute(new Float32Array(rest.length), 3);
     this.colour = new BufferAttribute(new Float32Array(rest.length), 3);
     this.geometry.setAttribute("position", this.position);
+    this.geometry.setAttribute("normal", this.facing); // a material that first sees a geometry without normals stays flat
     this.geometry.setAttribute("color", this.colour);
-    this.geometry.setIndex(Array.from(triangles));
-    this.geometry.computeVertexNormals(); // a material that first sees a geometry without normals stays flat
+    this.geometry.setIndex(new BufferAttribute(this.triangles, 1));
+    normalsInto(this.facing.array as Float32Array, rest, this.triangles);
     this.body = new Mesh(
       this.geometry,
       new MeshPhongMaterial({ vertexColors: true, side: DoubleSide, shininess: 24, specular: 0x1c1c1c }),
@@ -133,14 +139,9 @@ export class SurfaceView extends View {
     const { rest } = this.surface;
     const at = this.position.array as Float32Array;
     for (let i = 0; i < at.length; i++) at[i] = rest[i]! + factor * displacement[i]!;
-    for (let i = 0; i < shares.length; i++) {
-      const share = shares[i]!;
-      const tint = share < UNKNOWN ? this.unknown : this.colours[Math.round(255 * Math.min(Math.max(share, 0), 1))]!;
-      this.colour.setXYZ(i, tint.r, tint.g, tint.b);
-    }
-    this.position.needsUpdate = this.colour.needsUpdate = true;
-    this.geometry.computeVertexNormals();
-    this.geometry.computeBoundingSphere();
+    this.tint(shares);
+    normalsInto(this.facing.array as Float32Array, at, this.triangles);
+    this.position.needsUpdate = this.facing.needsUpdate = this.colour.needsUpdate = true;
     this.moveDots();
     this.probe.visible = probe !== null;
     if (probe) {
@@ -150,6 +151,19 @@ export class SurfaceView extends View {
     this.wires.visible = layers.mesh;
     this.ghost.visible = this.still.visible = layers.ghost;
     this.dirty = true;
+  }
+
+  private tint(shares: ArrayLike<number>): void {
+    const [tints, colours] = [this.colour.array, this.colours];
+    const { r, g, b } = this.unknown;
+    for (let i = 0; i < shares.length; i++) {
+      const share = shares[i]!;
+      const known = share >= UNKNOWN;
+      const k = 3 * Math.round(255 * Math.min(Math.max(share, 0), 1));
+      tints[3 * i] = known ? colours[k]! : r;
+      tints[3 * i + 1] = known ? colours[k + 1]! : g;
+      tints[3 * i + 2] = known ? colours[k + 2]! : b;
+    }
   }
 
   /** Draw dots at places (m) of the surface at rest; they move with it. */
@@ -191,7 +205,7 @@ export class SurfaceView extends View {
 
   /** Set the share of the colour scale at which there is nothing to show. */
   neutral(none: number): void {
-    this.colours = palette(none);
+    this.colours = numbers(palette(none));
   }
 
   override recolour(): void {
@@ -233,7 +247,7 @@ export class SurfaceView extends View {
   private atRest(rest: BufferAttribute): BufferGeometry {
     const geometry = new BufferGeometry();
     geometry.setAttribute("position", rest);
-    geometry.setIndex(Array.from(this.surface.triangles));
+    geometry.setIndex(new BufferAttribute(this.triangles, 1));
     return geometry;
   }
 
@@ -270,6 +284,11 @@ export class SurfaceView extends View {
     const near = 1e-3 * this.across();
     return fixed.length > 0 && Array.from(fixed).every((i) => rest[3 * i + 2]! - this.low.z < near);
   }
+}
+
+/** Colours as red, green, blue, one after the other. */
+function numbers(colours: Color[]): Float32Array {
+  return Float32Array.from(colours.flatMap(({ r, g, b }) => [r, g, b]));
 }
 
 /** Mark the pixels that a material draws. */

@@ -202,16 +202,22 @@ export function touch({ connect, renewed = () => {}, seen = () => {} }: Joint): 
   };
 }
 
+let [measuredFor, width, height] = [0, 0, 0];
+
 /** The force in words beside the arrow's end, where it hides neither the arrow nor what is held. */
 function label(view: NonNullable<Body["view"]>, frame: Frame): void {
   const tag = element("arrow-label");
   tag.hidden = !view.arrow.group.visible;
   if (tag.hidden) return;
-  tag.textContent = `${fixed(Math.hypot(...frame.force), 2)} N`;
+  const words = `${fixed(Math.hypot(...frame.force), 2)} N`;
   const [at, from] = [view.project(view.arrow.end), view.project(view.grip)];
-  const [width, height] = [tag.offsetWidth, tag.offsetHeight];
+  tag.textContent = words;
+  if (words.length !== measuredFor) {
+    measuredFor = words.length; // digits have one width; to measure makes the browser lay out the page
+    [width, height] = [tag.offsetWidth, tag.offsetHeight];
+  }
   const level = Math.abs(at.x - from.x) > Math.abs(at.y - from.y);
-  const beside = at.x + 16 + width < canvas.clientWidth ? at.x + 12 : at.x - 12 - width;
+  const beside = at.x + 16 + width < view.size()[0] ? at.x + 12 : at.x - 12 - width;
   const x = level ? at.x - width / 2 : beside;
   const y = level ? at.y - height - 14 : at.y - 12;
   tag.style.transform = `translate(${Math.max(x, 4)}px, ${Math.max(y, 4)}px)`;
@@ -223,6 +229,6 @@ function changed(a: Frame, b: Frame | null): boolean {
   const parts = ["displacement", "coefficients", "indentation", "contact", "force", "position", "parameters"] as const;
   return parts.some((name) => {
     const [p, q]: ArrayLike<number>[] = [a[name], b[name]];
-    return p!.length !== q!.length || Array.from(p!).some((x, i) => Math.abs(x - q![i]!) > SAME);
+    return p !== q && (p!.length !== q!.length || Array.from(p!).some((x, i) => Math.abs(x - q![i]!) > SAME));
   });
 }

@@ -3,6 +3,7 @@
 import { CylinderGeometry, DoubleSide, Mesh, MeshLambertMaterial, Plane, SphereGeometry, Vector3 } from "three";
 import type { Vector2 } from "three";
 import { Arrow } from "./arrow";
+import { normalsInto, Target } from "./mesh";
 import type { Frame, Hello, Surface, Vec3 } from "./messages";
 import { SurfaceView } from "./surface_view";
 import type { Layers } from "./surface_view";
@@ -21,6 +22,8 @@ export class PressView extends SurfaceView {
   readonly arrow: Arrow;
   readonly grip = new Vector3(); // the probe's centre
 
+  private readonly target: Target;
+  private readonly resting: Float32Array; // normals of the points at rest
   private readonly hover: Mesh<SphereGeometry, MeshLambertMaterial>;
   private nearby: Vector3 | null = null; // m, of the device's centre
 
@@ -39,8 +42,10 @@ export class PressView extends SurfaceView {
     );
     this.hover.visible = this.arrow.group.visible = false;
     this.probe.material.opacity = 0.45; // the dent is seen through it
-    this.still.geometry.computeVertexNormals();
     this.still.material.side = DoubleSide;
+    this.resting = new Float32Array(surface.rest.length);
+    normalsInto(this.resting, surface.rest, this.triangles);
+    this.target = new Target(surface.rest, this.triangles);
     this.scene.add(this.hover, this.arrow.group);
     this.roof = 2 * hello.radius + LONG * this.across(); // the probe and its arrow
     this.recolour();
@@ -69,12 +74,18 @@ export class PressView extends SurfaceView {
 
   /** The place on the surface at rest under a point of the canvas (CSS pixels); null beside the body. */
   spotAt(x: number, y: number): Spot | null {
-    const ray = this.ray(x, y);
-    const hit = ray.intersectObject(this.still, false)[0];
-    if (!hit?.normal || hit.faceIndex == null) return null;
-    const normal = hit.normal.clone().normalize();
-    const touchable = this.surface.touchable[hit.faceIndex]! > 0 && ray.ray.direction.dot(hit.face!.normal) < 0;
-    return { point: hit.point.toArray() as Vec3, normal: normal.toArray() as Vec3, touchable };
+    const { origin, direction } = this.ray(x, y).ray;
+    const toward = direction.toArray() as Vec3;
+    const hit = this.target.meet(origin.toArray() as Vec3, toward);
+    if (!hit) return null;
+    const facing = direction.dot(new Vector3(...hit.across)) < 0;
+    const normal = new Vector3();
+    hit.shares.forEach((share, k) => {
+      const corner = 3 * this.triangles[3 * hit.triangle + k]!;
+      normal.addScaledVector(new Vector3().fromArray(this.resting, corner), facing ? share : -share);
+    });
+    const touchable = this.surface.touchable[hit.triangle]! > 0 && facing;
+    return { point: hit.point, normal: normal.normalize().toArray() as Vec3, touchable };
   }
 
   /** Where the touchable point at rest that is nearest to a ball's centre (m) is on the canvas, CSS pixels. */

@@ -35,6 +35,7 @@ export abstract class View {
   private readonly renderer: WebGLRenderer;
   private readonly resolution: Resolution;
   private readonly caster = new Raycaster();
+  private canvasSize: Size = [0, 0]; // asked for each picture, the canvas's size would make the browser lay out the page
 
   constructor(
     readonly canvas: HTMLCanvasElement,
@@ -84,7 +85,7 @@ export abstract class View {
   }
 
   resize(): void {
-    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
+    const [width, height] = (this.canvasSize = [this.canvas.clientWidth, this.canvas.clientHeight]);
     if (!width || !height) return;
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
@@ -127,12 +128,14 @@ export abstract class View {
 
   /** The ray through a point of the canvas, CSS pixels. */
   protected ray(x: number, y: number): Raycaster {
-    const at = new Vector2((2 * x) / this.canvas.clientWidth - 1, 1 - (2 * y) / this.canvas.clientHeight);
+    const [width, height] = this.size();
+    const at = new Vector2((2 * x) / width - 1, 1 - (2 * y) / height);
     this.caster.setFromCamera(at, this.camera);
     return this.caster;
   }
 
-  protected size(): Size {
-    return [this.canvas.clientWidth || 1, this.canvas.clientHeight || 1];
+  size(): Size {
+    if (!this.canvasSize[0]) this.canvasSize = [this.canvas.clientWidth, this.canvas.clientHeight];
+    return [this.canvasSize[0] || 1, this.canvasSize[1] || 1];
   }
 }

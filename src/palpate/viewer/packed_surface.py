@@ -1,0 +1,201 @@
+"""A surface with its fields in few bytes, for a page that is one file.
+
+Everything is whole numbers, and each number is stored as what it differs from a guess:
+
+- **Triangles** are put in an order in which nearly each one stands across an edge of an earlier one, its *gate*. So a
+  triangle is which gate, and its third corner, counted back from the newest point; points are numbered as they appear.
+- **Values at points** (coordinates, rest and modes of fields) are guessed by the parallelogram rule of Touma and
+  Gotsman (1998, Triangle mesh compression): a new point across the edge a–b from the point d has a + b − d.
+- Differences become numbers without sign (0, −1, 1, −2 … as 0, 1, 2, 3 …), whose bytes of equal weight stand together.
+
+Small differences repeat, so gzip packs them well. Coordinates are multiples of a step that the caller chooses, fields
+those of the scales with which the modes went out. `client/src/packed.ts` reads all this.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from palpate.viewer.messages import Modes, Surface
+
+__all__ = ["PackedSurface", "rounded_points"]
+
+_DIRECTIONS = 1e-3  # step of a normal's components
+
+
+@dataclass
+class _Lists:
+    """Lists of whole numbers as bytes, and how many numbers and bytes a number each has."""
+
+    sizes: list[tuple[int, int]] = field(default_factory=list)
+    parts: list[bytes] = field(default_factory=list)
+
+    def add(self, numbers: np.ndarray) -> None:
+        """Append a list of whole numbers."""
+        flat = np.asarray(numbers, dtype=np.int64).ravel()
+        plain = ((flat << 1) ^ (flat >> 63)).astype("<u4")
+        most = int(plain.max(initial=0))
+        width = max(1, (most.bit_length() + 7) // 8)
+        self.sizes.append((len(plain), width))
+        self.parts.append(plain.view(np.uint8).reshape(-1, 4).T[:width].tobytes())
+
+    @property
+    def data(self) -> bytes:
+        """All lists, one after the other."""
+        return b"".join(self.parts)
+
+
+@dataclass(frozen=True, eq=False)
+class _Order:
+    """Triangles and points in the order of the file.
+
+    Attributes
+    ----------
+    points : (n,)
+        The point of before that stands at each place.
+    places : (n,)
+        Place of each point of before.
+    triangles : (t,)
+        The triangle of before that stands at each place.
+    gates, thirds : (t,)
+        How many triangles back each one's gate is, times three, plus the edge; 0 for none. Its third corner, counted
+        back from the newest point.
+    starts : (3 s,)
+        Corners of the triangles without a gate, counted so.
+    parents : (n, 3)
+        a, b and d of each point; −1 for those that none are known of.
+    """
+
+    points: np.ndarray
+    places: np.ndarray
+    triangles: np.ndarray
+    gates: np.ndarray
+    thirds: np.ndarray
+    starts: np.ndarray
+    parents: np.ndarray
+
+
+def _order_of(triangles: np.ndarray, count: int) -> _Order:
+    """Return the order of triangles (t, 3) of so many points: depth first, since near gates have small numbers."""
+    across = {}
+    for t, (a, b, c) in enumerate(triangles.tolist()):
+        across[a, b], across[b, c], across[c, a] = (t, c), (t, a), (t, b)
+    places, parents = [-1] * count, np.full((count, 3), -1)
+    order: list[int] = []
+    gates: list[int] = []
+    thirds: list[int] = []
+    starts: list[int] = []
+    points: list[int] = []
+    seen = [False] * len(triangles)
+
+    def code(corner: int) -> int:
+        if places[corner] < 0:
+            places[corner] = len(points)
+            points.append(corner)
+            return 0
+        return len(points) - places[corner]
+
+    for first in range(len(triangles)):
+        if seen[first]:
+            continue
+        a, b, c = triangles[first].tolist()
+        starts += [code(a), code(b), code(c)]
+        gates.append(0)
+        thirds.append(0)
+        seen[first] = True
+        order.append(first)
+        # triangle's place, edge of it, the edge's ends and the corner beside them
+        stack = [(len(order) - 1, e, *ends) for e, ends in enumerate(((a, b, c), (b, c, a), (c, a, b)))]
+        while stack:
+            place, edge, a, b, d = stack.pop()
+            t, c = across.get((b, a), (-1, -1))
+            if t < 0 or seen[t]:
+                continue
+            seen[t] = True
+            if places[c] < 0:
+                parents[len(points)] = places[a], places[b], places[d]
+            gates.append(3 * (len(order) - place) + edge)
+            thirds.append(code(c))
+            order.append(t)
+            stack += [(len(order) - 1, e, *ends) for e, ends in enumerate(((b, a, c), (a, c, b), (c, b, a)))]
+    lists = (points, places, order, gates, thirds, starts)
+    one, two, three, four, five, six = (np.array(numbers, dtype=np.int64) for numbers in lists)
+    return _Order(one, two, three, four, five, six, parents)
+
+
+def _differences(values: np.ndarray, parents: np.ndarray) -> np.ndarray:
+    """Return what whole numbers (n, …) at points differ from their guesses, or else from those of the point before."""
+    guess = np.zeros_like(values)
+    guess[1:] = values[:-1]
+    known = parents[:, 0] >= 0
+    a, b, d = parents[known].T
+    guess[known] = values[a] + values[b] - values[d]
+    return np.asarray(values - guess)
+
+
+def rounded_points(points: np.ndarray, step: float) -> np.ndarray:
+    """Return points (n, 3) at multiples of a step, both in m."""
+    return np.asarray(step * np.rint(points / step))
+
+
+@dataclass(frozen=True, eq=False)
+class PackedSurface:
+    """A surface as bytes, and the order in which its points stand there.
+
+    Attributes
+    ----------
+    facts : mapping
+        What the numbers mean, for JSON.
+    data : bytes
+        The numbers.
+    """
+
+    facts: dict[str, Any]
+    data: bytes
+    _order: _Order
+
+    @classmethod
+    def of(cls, surface: Surface, step: float) -> PackedSurface:
+        """Return a surface whose coordinates are multiples of a step, m."""
+        points = np.asarray(surface.rest, dtype=np.float64).reshape(-1, 3)
+        triangles = np.asarray(surface.triangles, dtype=np.int64).reshape(-1, 3)
+        order, lists = _order_of(triangles, len(points)), _Lists()
+        for numbers in (order.gates, order.thirds, order.starts):
+            lists.add(numbers)
+        lists.add(np.asarray(surface.touchable, dtype=np.int64)[order.triangles])
+        lists.add(_differences(np.rint(points / step).astype(np.int64)[order.points], order.parents).T)
+        lists.add(_deltas(order.places[np.asarray(surface.creases, dtype=np.int64)].reshape(-1, 2).T))
+        yielding = order.places[np.asarray(surface.yielding, dtype=np.int64)]
+        sorting = np.argsort(yielding)
+        lists.add(_deltas(yielding[sorting][None]))
+        normals = np.asarray(surface.normals, dtype=np.float64).reshape(-1, 3)[sorting]
+        lists.add(_deltas(np.rint(normals / _DIRECTIONS).astype(np.int64).T))
+        facts = {"points": len(points), "step": step, "direction": _DIRECTIONS, "lists": lists.sizes}
+        return cls(facts, lists.data, order)
+
+    def field(self, modes: Modes, scales: np.ndarray) -> tuple[dict[str, Any], bytes]:
+        """Return what the numbers of a field mean, and the numbers.
+
+        Parameters
+        ----------
+        modes : Modes
+            Rest and modes at the surface's points.
+        scales : (1 + k,) array
+            What 1 stands for in the rest and in each mode.
+        """
+        lists, order = _Lists(), self._order
+        rows = np.vstack([np.ravel(modes.rest), np.reshape(modes.modes, (-1, np.size(modes.rest)))])
+        rows = rows.reshape(len(rows), len(order.points), -1)
+        for row, scale in zip(rows, np.where(scales > 0, scales, 1.0), strict=True):
+            lists.add(_differences(np.rint(row / scale).astype(np.int64)[order.points], order.parents).T)
+        lists.add(_deltas(np.sort(order.places[np.asarray(modes.touched, dtype=np.int64)])[None]))
+        facts = {"reach": modes.reach, "rows": modes.rows, "scales": scales.tolist(), "lists": lists.sizes}
+        return facts, lists.data
+
+
+def _deltas(rows: np.ndarray) -> np.ndarray:
+    """Return what each number of rows (r, m) differs from the one before it in its row."""
+    return np.diff(rows, axis=1, prepend=0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -125,6 +126,21 @@ def test_the_page_is_pressed_with_the_mouse(opened: tuple[Page, list[str]]):
     assert page.locator("#about").is_visible()
     assert not page.locator("#timing").is_visible()  # there is no loop
     assert_no(complaints)
+
+
+def test_the_page_shows_its_model_card(opened: tuple[Page, list[str]], pressed: Surrogate):
+    page, _ = opened
+    shown = page.locator("#meta").text_content()
+    card = json.loads(page.locator("#palpate-card").text_content())
+    for words in (
+        card["author"],
+        card["licence"],
+        *card["limits"],
+        *card["warnings"],
+        card["hashes"]["weights"],
+    ):
+        assert words in shown
+    assert "real-time loop" not in page.locator("#flags").inner_text()  # there is none that could be late
 
 
 def test_a_page_is_refused_where_its_shape_has_no_c_source(rod: Surrogate, tmp_path: Path):

@@ -83,6 +83,14 @@ class ModelCard:
             "hashes": dict(self.hashes),
         }
 
+    def in_words(self) -> dict[str, Any]:
+        """Return the card for people: titles and what stands under them, sentences as lists and figures as words."""
+        words: dict[str, Any] = {"author": self.author, "licence": self.licence}
+        for title, part in (("errors", self.errors), ("trained on", self.trained_on)):
+            words[title] = {name: _plain(name, value) for name, value in _flat(part)}
+        words |= {"limits": list(self.limits), "warnings": list(self.warnings), "SHA-256": dict(self.hashes)}
+        return {title: part for title, part in words.items() if part}
+
     def to_json(self) -> str:
         """Return the card as JSON."""
         return json.dumps(self.as_dict(), indent=2, ensure_ascii=False)
@@ -238,14 +246,21 @@ def _flat(part: Mapping[str, Any], path: str = "") -> list[tuple[str, Any]]:
     return rows
 
 
-def _words(name: str, value: Any) -> str:
+def _plain(name: str, value: Any) -> str:
+    """Return a value of the card in words."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
         return share(value) if any(word in name for word in _RELATIVE) else f"{value:.6g}"
     if isinstance(value, list | tuple):
-        return "`" + json.dumps(value, ensure_ascii=False)[:400].replace("`", "'") + "`"
-    return _escaped(str(value))
+        return json.dumps(value, ensure_ascii=False)[:400]
+    return str(value)
+
+
+def _words(name: str, value: Any) -> str:
+    """Return a value of the card in words, as Markdown takes them."""
+    words = _plain(name, value)
+    return f"`{words.replace('`', chr(39))}`" if isinstance(value, list | tuple) else _escaped(words)
 
 
 def _escaped(text: str) -> str:

@@ -185,10 +185,12 @@ class _Page:
                 room -= size
         kept = {field.shown.name for field in fields}
         left_out = tuple(field.name for field in surrogate.fields.values() if field.name not in kept)
+        card = card_of(surrogate).with_hash("weights", bare.hash)
+        missing = {"fields that are not in this file": ", ".join(left_out)} if left_out else {}
         hello = replace(
             hello,
             fields=tuple(info for info in hello.fields if info.name in kept),
-            meta={**hello.meta, **({"fields that are not in this file": list(left_out)} if left_out else {})},
+            meta={**card.in_words(), **missing},
         )
         for i, field in enumerate(fields):
             parts[f"field-{i}"] = field.modes
@@ -200,7 +202,6 @@ class _Page:
             "fields": [field.facts for field in fields],
         }
         parts |= {"hello": _packed(hello.to_json().encode()), "facts": _packed(json.dumps(facts).encode())}
-        card = card_of(surrogate).with_hash("weights", bare.hash)
         text = _document(surrogate.name, parts, card.to_json())
         return cls(surrogate, bare, tuple(fields), left_out, text)
 

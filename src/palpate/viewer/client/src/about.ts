@@ -1,9 +1,10 @@
 // Facts about the model: its own figures, and the record of its making in its file.
 
-import { fixed, tidy } from "./units";
+import { fixed, tidy, worded } from "./units";
 
 const ROWS = 80; // of one group
-const FIRST = ["validation", "errors"]; // groups that matter most stand first and open
+const FIRST = ["validation", "errors", "limits", "warnings"]; // groups that matter most stand first and open
+const HASH = /^[0-9a-f]{32,}$/;
 const UNITS: Record<string, readonly [unit: string, factor: number]> = {
   young: ["GPa", 1e-9],
   density: ["kg/m³", 1],
@@ -25,13 +26,14 @@ interface Known {
 /** `own`: what the kind of body has to say of itself. */
 export function about(hello: Known, own: Row[]): void {
   const entries = Object.entries(hello.meta);
-  const loose = entries.filter(([, value]) => !isGroup(value)).flatMap(([key, value]) => rows([key], value));
-  const groups = entries.filter(([, value]) => isGroup(value));
+  const apart = (value: unknown): boolean => isGroup(value) || areSentences(value);
+  const loose = entries.filter(([, value]) => !apart(value)).flatMap(([key, value]) => rows([key], value));
+  const groups = entries.filter(([, value]) => apart(value));
   const rank = (key: string): number => (FIRST.includes(key) ? FIRST.indexOf(key) : FIRST.length);
   groups.sort(([a], [b]) => rank(a) - rank(b));
   document
     .getElementById("meta")!
-    .replaceChildren(table([...own, ...figures(hello), ...loose]), ...groups.map(([key, value]) => group(key, value)));
+    .replaceChildren(table([...loose, ...own, ...figures(hello)]), ...groups.map(([key, value]) => group(key, value)));
 }
 
 function figures(hello: Known): Row[] {
@@ -45,8 +47,14 @@ function group(key: string, value: unknown): HTMLElement {
   const [details, summary] = [document.createElement("details"), document.createElement("summary")];
   summary.textContent = key.replaceAll("_", " ");
   details.open = FIRST.includes(key);
-  details.append(summary, table([...rows([], value)].slice(0, ROWS)));
+  details.append(summary, areSentences(value) ? sentences(value) : table([...rows([], value)].slice(0, ROWS)));
   return details;
+}
+
+function sentences(all: readonly string[]): HTMLElement {
+  const list = document.createElement("ul");
+  list.append(...all.map((words) => worded("li", words)));
+  return list;
 }
 
 function table(all: Row[]): HTMLElement {
@@ -54,9 +62,14 @@ function table(all: Row[]): HTMLElement {
   for (const [key, value] of all) {
     const [term, words] = [document.createElement("dt"), document.createElement("dd")];
     [term.textContent, words.textContent] = [key, value];
+    words.classList.toggle("hash", HASH.test(value));
     list.append(term, words);
   }
   return list;
+}
+
+function areSentences(value: unknown): value is string[] {
+  return Array.isArray(value) && value.length > 0 && value.every((words) => typeof words === "string" && words.endsWith("."));
 }
 
 function isGroup(value: unknown): boolean {
@@ -88,7 +101,6 @@ function plain(value: unknown): string {
   if (typeof value === "number") return whole(value) ? fixed(value, 0) : tidy(value);
   if (typeof value === "boolean") return value ? "yes" : "no";
   const words = String(value);
-  if (/^[0-9a-f]{32,}$/.test(words)) return `${words.slice(0, 12)}…`;
   // to the minute, and the zone only where it is the common one
   return words.replace(/^(\d{4}-\d\d-\d\d)T(\d\d:\d\d)\S*\+00:00$/, "$1 $2 UTC");
 }

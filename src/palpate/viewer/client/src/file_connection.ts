@@ -72,7 +72,7 @@ export class FileConnection {
     const held = hand !== null && hand.grabbed && !hand.hidden && !this.stopped;
     if (held) this.follow(this.wanted(hand.target), elapsed);
     else if (this.answer) this.letGo(now);
-    return this.frame(now / 1000, held, elapsed);
+    return this.frame(now / 1000, held);
   }
 
   /** Where the hand wants the probe's centre, or what it holds, m. */
@@ -119,7 +119,7 @@ export class FileConnection {
     return place.map((v, k) => v + (depth - left) * normal[k]!) as Vec3;
   }
 
-  private frame(time: number, held: boolean, elapsed: number): Frame {
+  private frame(time: number, held: boolean): Frame {
     const { hello, answer, evaluator } = this;
     const at = hello.holds ? null : this.drawn(time);
     const touched = at && evaluator.touch(at, this.parameters);
@@ -138,7 +138,7 @@ export class FileConnection {
       echo: this.hand?.sent ?? 0,
       position: this.place,
       force: this.force,
-      rate: elapsed > 0 ? 1 / elapsed : 0,
+      rate: hello.rate, // there is no loop that could be late
       lateness: 0,
       lateness_p50: 0,
       lateness_p99: 0,

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -347,7 +348,7 @@ def _opened(path: str) -> Any:
             device.close()
     if len(pads) == 1:
         return pads[0]
-    names = ", ".join(f"{pad.name} at {pad.path}" for pad in pads)
+    names = ", ".join(f"{pad.name} at {os.fsdecode(pad.path)}" for pad in pads)
     for pad in pads:
         pad.close()
     raise DeviceError(

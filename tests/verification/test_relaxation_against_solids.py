@@ -23,7 +23,7 @@ GEL = NeoHookean(young=9e3, poisson=0.45)
 def problem(material):
     # small elements only where it goes
     probe = SphereProbe(radius=RADIUS, depth=(0.0, 0.006), over=((0.021, 0.024), (0.027, 0.025)))
-    return Body(Block(SIZE), material).problem(probe, element=0.018)
+    return Body(Block(SIZE, element=0.018), material).problem(probe, element=0.009)
 
 
 def motion():

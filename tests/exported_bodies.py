@@ -8,15 +8,23 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.append(str(Path(__file__).parent / "surrogates"))
+sys.path += [str(Path(__file__).parent / "surrogates" / part) for part in ("", "surface")]
 
+import skins
 from field_made import field
 from touch_made import PROBE, SOFT, ball, touch_energy
 
 import palpate as pp
 from held import pad, yielding_rod
 from palpate.network import Network, Scaling, TrainedRegion
-from palpate.surrogates import ConstantBaseline, LearntEnergy, PadBaseline, RestStiffness, Stiffening
+from palpate.surrogates import (
+    ConstantBaseline,
+    LearntEnergy,
+    PadBaseline,
+    RestStiffness,
+    Stiffening,
+    TouchedSurface,
+)
 from palpate.surrogates.memories import Indentation, IwanElements, Patches, Relaxation
 
 __all__ = ["BODIES", "body", "networks"]
@@ -97,6 +105,15 @@ def _yielding() -> pp.Surrogate:
     )
 
 
+def _egg() -> pp.Surrogate:
+    """An ellipsoid of 72, 60 and 42 mm, touched from all sides, its top the origin."""
+    points, triangles = skins.ball(0.03, 7)
+    surface = TouchedSurface.of(
+        points * [1.2, 1.0, 0.7] - [0.0, 0.0, 0.021], triangles, radius=0.006, reach=0.013, spacing=0.002
+    )
+    return pp.Surrogate(touch_energy(surface=surface), meta={"name": "egg"})
+
+
 def _block() -> pp.Surrogate:
     """A flat body with a field of a family."""
     return pp.Surrogate(
@@ -107,6 +124,7 @@ def _block() -> pp.Surrogate:
 BODIES = {
     "contact": _block,
     "relaxation": _organ,
+    "closed": _egg,
     "indentation": _yielding,
     "pad": _glued_pad,
     "constant": _node,

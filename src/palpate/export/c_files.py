@@ -236,11 +236,13 @@ def _source(facts: _Facts, public: str) -> str:
     tables, external = [], []
     for place, table in _tables_to_store(facts.block):
         if place >= FIELD:
-            external += [f"extern const {kind} {word}[];" for kind, word, _ in _parts(facts, place, table)]
+            external += [
+                f"extern const {kind} {declarator};" for kind, declarator, _ in _parts(facts, place, table)
+            ]
         else:
             tables += [
-                _table_text(f"static const {kind} {word}[]", array, facts)
-                for kind, word, array in _parts(facts, place, table)
+                _table_text(f"static const {kind} {declarator}", array, facts)
+                for kind, declarator, array in _parts(facts, place, table)
             ]
     body = _comment(["the evaluator core of palpate"]) + core_source(facts.block)
     weights = "\n".join(["\n/* the weights */", *external, *tables, _model(facts)])
@@ -258,11 +260,11 @@ def _field_source(facts: _Facts) -> str:
     ]
     for place, table in _tables_to_store(facts.block):
         if place >= FIELD:
-            for kind, word, array in _parts(facts, place, table):
+            for kind, declarator, array in _parts(facts, place, table):
                 kind = kind.replace("pp_real", facts.real)
                 lines += [
-                    f"extern const {kind} {word}[];",
-                    _table_text(f"const {kind} {word}[]", array, facts),
+                    f"extern const {kind} {declarator};",
+                    _table_text(f"const {kind} {declarator}", array, facts),
                 ]
     return "\n".join(lines) + "\n"
 
@@ -276,27 +278,34 @@ def _tables_to_store(block: WeightsBlock) -> list[tuple[int, Table]]:
     return list(first.values())
 
 
-_C_KINDS = {"float64": "pp_real", "int32": "int32_t", "float32": "float", "int16": "int16_t"}
+_C_KINDS = {
+    "float64": "pp_real",
+    "int32": "int32_t",
+    "float32": "float",
+    "int16": "int16_t",
+    "uint8": "char",
+}
 
 
 def _parts(facts: _Facts, place: int, table: Table) -> Iterator[tuple[str, str, np.ndarray]]:
-    """Return kind, name and numbers of a table, and of its tiles."""
-    yield _C_KINDS[table.values.dtype.name], f"{facts.name}_{place}", table.values
+    """Return kind, declarator and numbers of a table, and of its tiles."""
+    rows = f"[{table.values.shape[1]}]" if table.values.dtype == np.uint8 else ""
+    yield _C_KINDS[table.values.dtype.name], f"{facts.name}_{place}[]{rows}", table.values
     if table.tiles is not None:
-        yield "int32_t", f"{facts.name}_{place}_tiles", table.tiles
+        yield "int32_t", f"{facts.name}_{place}_tiles[]", table.tiles
 
 
 def _model(facts: _Facts) -> str:
     rows = []
     first = {id(table): place for place, table in _tables_to_store(facts.block)}
-    places = {"float64": 0, "int32": 1, "float32": 2, "int16": 3}
+    places = {"float64": 0, "int32": 1, "float32": 2, "int16": 3, "uint8": 4}
     for place in range(ARRAYS):
-        table, pointers = facts.block.tables.get(place), ["0"] * 4
+        table, pointers = facts.block.tables.get(place), ["0"] * 5
         if table is None or not table.values.size:
-            rows.append("  {0, 0, 0, 0, {0, 1, 1, 1}},")
+            rows.append("  {0, 0, 0, 0, 0, {0, 1, 1, 1}},")
             continue
         word = f"{facts.name}_{first[id(table)]}"
-        pointers[places[table.values.dtype.name]] = word
+        pointers[places[table.values.dtype.name]] = word + "[0]" * (table.values.dtype == np.uint8)
         if table.tiles is not None:
             pointers[1] = f"{word}_tiles"
         rows.append(f"  {{{', '.join(pointers)}, {{{', '.join(map(str, table.four))}}}}},")
@@ -305,7 +314,9 @@ def _model(facts: _Facts) -> str:
 
 
 def _table_text(declared: str, array: np.ndarray, facts: _Facts) -> str:
-    if array.dtype == np.float64:
+    if array.dtype == np.uint8:  # rows of characters that need no care between quotes, each before a zero
+        words = [f'"{row.tobytes().rstrip(bytes(1)).decode("ascii")}"' for row in array]
+    elif array.dtype == np.float64:
         words = [_number(v, single=facts.single) for v in array.ravel().tolist()]
     elif array.dtype == np.float32:
         words = [_number(v, single=True) for v in array.ravel().tolist()]
@@ -313,7 +324,7 @@ def _table_text(declared: str, array: np.ndarray, facts: _Facts) -> str:
         words = [str(v) for v in array.ravel().tolist()]
     lines, line = [], ""
     for word in words:
-        if len(line) + len(word) + 1 > _WIDTH:
+        if line and len(line) + len(word) + 1 > _WIDTH:
             lines.append(line)
             line = ""
         line += word + ","

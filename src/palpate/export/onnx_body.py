@@ -18,7 +18,7 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.export.onnx_graph import Graph, Value
 from palpate.export.onnx_network import Slopes, network_slopes, regressors
-from palpate.export.onnx_surface import distance
+from palpate.export.onnx_surface import Distance, distance_to
 from palpate.surrogates.baselines import ConstantBaseline, ContactBaseline, PadBaseline
 from palpate.surrogates.energy import LearntEnergy
 
@@ -44,6 +44,7 @@ class _Known:
 class _Touch:
     """A probe at a surface: its depth, and how far that is beyond training."""
 
+    distance: Distance  # to the surface, of any places
     depth: Value  # s (N, 1)
     contact: Value  # bool (N, 1)
     normal: Value  # ∇d (N, 3)
@@ -122,14 +123,15 @@ def _touch(graph: Graph, energy: LearntEnergy, X: Value, place: Value) -> _Touch
     assert isinstance(baseline, ContactBaseline)
     at = baseline.radius_at
     radius: Any = baseline.probe_radius if at is None else X.columns(at, at + 1)
-    d, normal, bend = distance(graph, baseline.touched, place)
+    distance = distance_to(graph, baseline.touched)
+    d, normal, bend = distance(place)
     s = radius - d
     contact = s > 0.0
     if not math.isfinite(energy.going.deepest):
         zero = s * 0.0
-        return _Touch(s, contact, normal, bend, zero, zero + 1.0, zero)
+        return _Touch(distance, s, contact, normal, bend, zero, zero + 1.0, zero)
     held, slope, curvature = _saturated(graph, s, energy.going.deepest, energy.going.depth_width)
-    return _Touch(s, contact, normal, bend, s - held, slope, curvature)
+    return _Touch(distance, s, contact, normal, bend, s - held, slope, curvature)
 
 
 def _known(graph: Graph, energy: LearntEnergy, place: Value, touch: _Touch | None, xi: Value) -> _Known:
@@ -261,7 +263,7 @@ def _leave(graph: Graph, baseline: Any, touch: _Touch, slopes: Slopes, place: Va
     d, g, H = touch.normal, slopes.gradient, slopes.hessian
     m, rest, curvature = touch.excess, 1.0 - touch.slope, touch.curvature
     usual = baseline.probe_radius if math.isfinite(baseline.probe_radius) else baseline.touched.reach
-    bend = _bend(graph, baseline, place, g, STEP * usual)
+    bend = _bend(graph, touch.distance, place, g, STEP * usual)
     matrix = [value.reshape(-1, 1, 1) for value in (m, rest, curvature)]
     outer = _outer(d, d)
     J = matrix[0] * touch.bend - matrix[1] * outer + np.eye(3)
@@ -277,13 +279,13 @@ def _leave(graph: Graph, baseline: Any, touch: _Touch, slopes: Slopes, place: Va
     return Slopes(slopes.value, new, hessian)
 
 
-def _bend(graph: Graph, baseline: ContactBaseline, place: Value, g: Value, step: float) -> Value:
+def _bend(graph: Graph, distance: Distance, place: Value, g: Value, step: float) -> Value:
     """Return the derivative of ∇²d along g, by differences of fourth order."""
     size = graph.sqrt((g * g).sum(1))
     way = g / graph.where(size > 0.0, size, 1.0)
     parts = []
     for many, weight in ((1.0, 8.0), (-1.0, -8.0), (2.0, -1.0), (-2.0, 1.0)):
-        bend = distance(graph, baseline.touched, place + (many * step) * way)[2]
+        bend = distance(place + (many * step) * way)[2]
         parts.append((size * (weight / (12.0 * step))).reshape(-1, 1, 1) * bend)
     first, second, third, last = parts
     return first + second + third + last

@@ -159,6 +159,10 @@ class Graph:
         """Return a constant in the graph's precision."""
         return self._constant(np.asarray(values, dtype=self.dtype))
 
+    def table(self, values: np.ndarray) -> Value:
+        """Return a constant of the numbers' own kind: int32 or int64."""
+        return self._constant(values)
+
     def _constant(self, values: np.ndarray) -> Value:
         key = (values.dtype.str, values.shape, values.tobytes())
         if key not in self._constants:

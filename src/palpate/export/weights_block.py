@@ -5,8 +5,9 @@ generic program reads: little-endian, all arrays at multiples of eight bytes,
 
     64 bytes    "PALPATE\0", version (uint32), number of arrays (uint32), bytes in all (uint64), FNV-1a checksum of
                 all that follows the head (uint64), SHA-256 of the same (32 bytes)
-    40 bytes    for each array: kind (int32: 0 none, 1 float64, 2 int32, 3 float32, 4 int16, 5 float64 in tiles), shape
-                (4 int32), zero (int32), offset of its numbers and of its tiles' places in the block (2 uint64)
+    40 bytes    for each array: kind (int32: 0 none, 1 float64, 2 int32, 3 float32, 4 int16, 5 float64 in tiles,
+                6 digits of tiles), shape (4 int32), zero (int32), offset of its numbers and of its tiles' places in
+                the block (2 uint64)
     the rest    the arrays
 
 `core/palpate_core.h` tells the places. See docs/method/weights-block.md.
@@ -63,7 +64,7 @@ HEAD, NUMBERS, LIMITS, POINTS, AXES, NET, ROOT, BASELINE, MEMORY, FIELD, FIELD_N
 ROOM = 12  # arrays of a baseline, and of a memory
 ENDLESS = 1e30  # stands for infinity
 FAR = 1e15  # where points are that fill a row up
-_KINDS = {"float64": 1, "int32": 2, "float32": 3, "int16": 4}
+_KINDS = {"float64": 1, "int32": 2, "float32": 3, "int16": 4, "uint8": 6}
 _TILES = 5
 
 
@@ -74,11 +75,13 @@ class Table:
     Attributes
     ----------
     values : array
-        Of float64, int32, float32 or int16; of a table in tiles its numbers (m,).
+        Of float64, int32, float32 or int16; of a table in tiles its numbers (m,), or its digits as rows of characters
+        (uint8), see `palpate.export.lattice_tiles`.
     shape : tuple of int
         Up to four; of a table in tiles that of the whole table.
     tiles : (t,) int32, optional
-        Where each tile's numbers begin; see `pp_gather` in core/surface.c.
+        Where each tile's numbers begin; see `pp_gather` in core/surface.c. Of digits (3 + t/8,): what `lattice_tiles`
+        tells.
     """
 
     values: np.ndarray
@@ -228,7 +231,8 @@ class WeightsBlock:
                 data += bytes(-len(data) % 8)
                 parts.append(data)
                 offset += len(data)
-            kind = _TILES if table.tiles is not None else _KINDS[table.values.dtype.name]
+            kind = _KINDS[table.values.dtype.name]
+            kind = _TILES if kind == 1 and table.tiles is not None else kind
             rows.append(struct.pack("<6i2Q", kind, *table.four, 0, *starts))
             written[id(table)] = rows[-1]
         return b"".join(rows + parts)

@@ -37,12 +37,29 @@ PP_PART uint64_t pp_checksum(const unsigned char *bytes, uint64_t size) {
 PP_PART int pp_dense(const pp_array *a) { return a->real && !a->whole; }
 
 PP_PART int pp_is(const pp_array *a, int32_t n0, int32_t n1, int real) {
-  return a->n[0] == n0 && a->n[1] == n1 && (real ? a->real && !a->whole : a->whole && !a->real);
+  return a->n[0] == n0 && a->n[1] == n1 && !a->digits && (real ? a->real && !a->whole : a->whole && !a->real);
+}
+
+/* whether the digits of all tiles are within so many bytes, and what they say can be summed up */
+PP_PART int pp_digits_fit(const pp_array *a, uint64_t tiles, uint64_t room) {
+  const uint32_t last = UINT32_C(1) << 30; /* more digits than any table has */
+  uint64_t t, place = 0;
+  if (room > last) room = last;
+  if (tiles > room || pp_digit_place((uint32_t)tiles) > room) return 0;
+  for (t = 0; t < tiles; t++) {
+    const uint32_t code = pp_tile_code(a, (uint32_t)t);
+    const int32_t begins = a->whole[3 + t / PP_GROUP];
+    if (code > 2 + PP_WIDEST || begins < 0) return 0;
+    if (t % PP_GROUP == 0) place = (uint64_t)begins;
+    place += pp_tile_length(code);
+    if (place > last || pp_digit_place((uint32_t)place) > room) return 0;
+  }
+  return 1;
 }
 
 /* Find one array; 0 where it reaches beyond the block. */
 PP_PART int pp_find(const unsigned char *bytes, uint64_t size, const unsigned char *row, pp_array *a) {
-  static const uint64_t width[6] = {0, 8, 4, 4, 2, 8};
+  static const uint64_t width[7] = {0, 8, 4, 4, 2, 8, 1};
   const int32_t kind = pp_whole(row);
   const uint64_t at = pp_word(row + 24), tiles = pp_word(row + 32);
   uint64_t count = 1, many = 1;
@@ -50,7 +67,7 @@ PP_PART int pp_find(const unsigned char *bytes, uint64_t size, const unsigned ch
   memset(a, 0, sizeof *a);
   a->n[1] = a->n[2] = a->n[3] = 1;
   if (kind == 0) return 1;
-  if (kind < 0 || kind > 5) return 0;
+  if (kind < 0 || kind > 6) return 0;
   for (i = 0; i < 4; i++) {
     a->n[i] = pp_whole(row + 4 + 4 * i);
     if (a->n[i] < 1 || a->n[i] > (1 << 24)) return 0;
@@ -73,6 +90,12 @@ PP_PART int pp_find(const unsigned char *bytes, uint64_t size, const unsigned ch
     a->whole = places;
     a->real = (const pp_real *)(const void *)(bytes + at);
     return 1;
+  }
+  if (kind == 6) {
+    if (tiles < PP_BLOCK_HEAD || tiles > size || 3 + (many + PP_GROUP - 1) / PP_GROUP > (size - tiles) / 4) return 0;
+    a->whole = (const int32_t *)(const void *)(bytes + tiles);
+    a->digits = (const char *)(bytes + at);
+    return a->n[2] >= 4 && a->n[3] == 1 && pp_digits_fit(a, many, size - at);
   }
   if (kind == 3) { /* the lower triangular root: see pp_deviation */
     int32_t c;
@@ -109,7 +132,8 @@ PP_PART int pp_net_fits(const pp_array *net, int32_t n, int32_t felt) {
 PP_PART int pp_surface_fits(const pp_array *surface) {
   const int flat = surface[2].n[0] > 0;
   int i;
-  if (!pp_dense(&surface[0]) || surface[0].n[0] != (flat ? 15 : 4) || !(surface[0].real[3] > R(0)) || !surface[1].real) return 0;
+  if (!pp_dense(&surface[0]) || surface[0].n[0] != (flat ? 15 : 4) || !(surface[0].real[3] > R(0))) return 0;
+  if (!surface[1].real && !surface[1].digits) return 0;
   for (i = 0; i < (flat ? 2 : 3); i++) {
     if (surface[1].n[i] < 4) return 0;
   }

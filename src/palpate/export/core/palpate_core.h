@@ -20,12 +20,13 @@ typedef float pp_real;
 typedef double pp_real;
 #endif
 
-/* one array of a model: the pointer of its own kind of number is set, all others are 0 */
+/* one array of a model: the pointer of its own kind of number is set, all others are 0; tiles have places in `whole` */
 typedef struct {
   const pp_real *real;
   const int32_t *whole;
   const float *brief;
   const int16_t *small;
+  const char *digits; /* of tiles of whole numbers: see pp_gather_digits in surface.c */
   int32_t n[4]; /* its shape, filled up with ones; a missing array has n[0] = 0 */
 } pp_array;
 

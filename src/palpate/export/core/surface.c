@@ -1,10 +1,19 @@
 /* The distance to a touched surface: value, gradient and Hessian, from cubic splines on a grid.
  *
  * arrays: frame (4), or (15) of a flat surface; coefficients (i, j, k); profile (m, n) of a flat surface.
- * A table is dense, or has only some of its tiles (see `pp_gather`).
+ * A table is dense, or in tiles of numbers (see `pp_gather`) or of digits (see `pp_gather_digits`).
  */
 #define PP_FAR R(1e6) /* cells beyond the box after which nothing changes */
 #define PP_TILE 4     /* nodes along each side of a tile */
+
+/* of tiles of digits: see export/lattice_tiles.py */
+#define PP_ROW 4095u /* digits to a row, after which a zero stands */
+#define PP_GROUP 8   /* tiles to a place */
+#define PP_BASE_DIGITS 5
+#define PP_SLOPE_DIGITS 3
+#define PP_TILE_HEAD (PP_BASE_DIGITS + 3 * PP_SLOPE_DIGITS)
+#define PP_WIDEST 26 /* most bits of what remains */
+#define PP_LONGEST (PP_TILE_HEAD + (64 * PP_WIDEST + 5) / 6)
 
 /* first node of four, their weights, and the weights' first and second derivatives */
 PP_PART int32_t pp_weights(pp_real u, int32_t nodes, pp_real *b, pp_real *p, pp_real *q) {
@@ -38,36 +47,119 @@ PP_PART int32_t pp_weights(pp_real u, int32_t nodes, pp_real *b, pp_real *p, pp_
   return i - 1;
 }
 
+/* the six bits of a digit */
+PP_PART uint32_t pp_digit(char digit) { return 93u * (uint32_t)(unsigned char)digit >> 7 & 63u; }
+
+/* digits of a tile by its code */
+PP_PART uint32_t pp_tile_length(uint32_t code) { return code < 2 ? 0u : PP_TILE_HEAD + (64u * (code - 2) + 5u) / 6u; }
+
+/* the place of a digit, rows' ends counted */
+PP_PART size_t pp_digit_place(uint32_t number) { return (size_t)number + number / PP_ROW; }
+
+PP_PART uint32_t pp_tile_code(const pp_array *table, uint32_t tile) { return pp_digit(table->digits[pp_digit_place(tile)]); }
+
+/* where a tile's digits are; those that go over the end of a row are put together in room for PP_LONGEST */
+PP_PART const char *pp_tile_digits(const pp_array *table, uint32_t tile, uint32_t code, char *room) {
+  uint32_t number = (uint32_t)table->whole[3 + tile / PP_GROUP], other, left;
+  const uint32_t length = pp_tile_length(code);
+  const char *own;
+  for (other = tile - tile % PP_GROUP; other < tile; other++) number += pp_tile_length(pp_tile_code(table, other));
+  left = PP_ROW - number % PP_ROW;
+  own = table->digits + pp_digit_place(number);
+  if (length <= left) return own;
+  memcpy(room, own, left);
+  memcpy(room + left, own + left + 1, length - left);
+  return room;
+}
+
+/* The nodes of a tile from low to before high along each axis, into c, where node (x, y, z) has number 16 x + 4 y + z. */
+PP_PART void pp_gather_tile(const pp_array *table, uint32_t tile, const int32_t *low, const int32_t *high, pp_real *c,
+                            int32_t shift) {
+  const uint32_t code = pp_tile_code(table, tile), width = code < 2 ? 0 : code - 2, mask = (UINT32_C(1) << width) - 1;
+  const pp_real quantum = (pp_real)ldexp(1.0, (int)table->whole[0]);
+  int32_t plane[4] = {0, 0, 0, 0}, line, a, z; /* base and slopes */
+  const char *own = table->digits;
+  char room[PP_LONGEST];
+  if (code < 2) {
+    plane[0] = table->whole[1 + code];
+  } else {
+    own = pp_tile_digits(table, tile, code, room);
+    for (a = 0; a < 4; a++) {
+      const int count = a == 0 ? PP_BASE_DIGITS : PP_SLOPE_DIGITS;
+      int digit;
+      for (digit = count - 1; digit >= 0; digit--) plane[a] = plane[a] << 6 | (int32_t)pp_digit(own[digit]);
+      plane[a] -= 1 << (6 * count - 1);
+      own += count;
+    }
+  }
+  for (line = PP_TILE * low[0]; line < PP_TILE * high[0]; line++) {
+    const int32_t y = line % PP_TILE, start = plane[0] + line / PP_TILE * plane[1] + y * plane[2];
+    const uint32_t bit = width * (uint32_t)(PP_TILE * line + low[2]);
+    const char *next = own + bit / 6;
+    uint32_t bits = 0, have = 0; /* bits that were read and are not used yet */
+    if (y < low[1] || y >= high[1]) continue;
+    if (width) {
+      bits = pp_digit(*next++) >> bit % 6;
+      have = 6 - bit % 6;
+    }
+    for (z = low[2]; z < high[2]; z++) {
+      for (; have < width; have += 6) bits |= pp_digit(*next++) << have;
+      c[shift + PP_TILE * line + z] = (pp_real)(start + z * plane[3] + (int32_t)(bits & mask)) * quantum;
+      bits >>= width;
+      have -= width;
+    }
+  }
+}
+
+/* 4 x 4 x 4 coefficients from a node on into c, of tiles of whole numbers: the eight tiles that may have some of them.
+ *
+ * A tile's code is 0 or 1 where all its numbers are whole[1] or whole[2], and 2 + w for a plane and w bits of what
+ * remains of each number. All are multiples of 2^whole[0], exactly. The tiles' codes stand first among the digits; those
+ * of tile 8 g begin at number whole[3 + g], rows' ends not counted. */
+PP_PART void pp_gather_digits(const pp_array *table, const int32_t *from, pp_real *c) {
+  int32_t corner, low[3], high[3], a;
+  for (corner = 0; corner < 8; corner++) {
+    int32_t tile = 0, shift = 0, some = 1;
+    for (a = 0; a < 3; a++) {
+      const int32_t own = from[a] / PP_TILE + (corner >> a & 1), before = PP_TILE * own - from[a];
+      low[a] = before < 0 ? -before : 0;
+      high[a] = before > 0 ? PP_TILE - before : PP_TILE;
+      some = some && low[a] < high[a];
+      tile = tile * ((table->n[a] + PP_TILE - 1) / PP_TILE) + own;
+      shift = shift * PP_TILE + before;
+    }
+    if (some) pp_gather_tile(table, (uint32_t)tile, low, high, c, shift);
+  }
+}
+
 /* 4 x 4 x 4 (or 4 x 4, for n[2] = 1) coefficients from a node on into c.
  *
  * A table whose `whole` is set is made of tiles of 4 nodes along each side: whole[tile] is the place in `real` of its
  * numbers, or -1 - the place of a constant and three slopes (by nodes) of a tile on which the table is straight. */
 PP_PART void pp_gather(const pp_array *table, int32_t i, int32_t j, int32_t k, pp_real *c) {
-  const int32_t n1 = table->n[1], n2 = table->n[2], deep = n2 == 1 ? 1 : 4;
-  int32_t a, b, d;
-  if (!table->whole) {
-    for (a = 0; a < 4; a++) {
-      for (b = 0; b < 4; b++) {
-        const pp_real *line = table->real + ((size_t)(i + a) * (size_t)n1 + (size_t)(j + b)) * (size_t)n2 + (size_t)k;
-        for (d = 0; d < deep; d++) c[(4 * a + b) * deep + d] = line[d];
-      }
-    }
+  const uint32_t n1 = (uint32_t)table->n[1], n2 = (uint32_t)table->n[2], deep = n2 == 1 ? 1 : PP_TILE;
+  const uint32_t tiles1 = (n1 + PP_TILE - 1) / PP_TILE, tiles2 = (n2 + PP_TILE - 1) / PP_TILE;
+  const int32_t from[3] = {i, j, k};
+  uint32_t node;
+  if (table->digits) {
+    pp_gather_digits(table, from, c);
     return;
   }
-  for (a = 0; a < 4; a++) {
-    for (b = 0; b < 4; b++) {
-      for (d = 0; d < deep; d++) {
-        const int32_t x = i + a, y = j + b, z = k + d;
-        const int32_t tiles1 = (n1 + PP_TILE - 1) / PP_TILE, tiles2 = n2 == 1 ? 1 : (n2 + PP_TILE - 1) / PP_TILE;
-        const int32_t tile = table->whole[(x / PP_TILE * tiles1 + y / PP_TILE) * tiles2 + z / PP_TILE];
-        const int32_t rx = x % PP_TILE, ry = y % PP_TILE, rz = z % PP_TILE;
-        const pp_real *own = table->real + (tile < 0 ? -1 - tile : tile);
-        if (tile < 0) {
-          c[(4 * a + b) * deep + d] = own[0] + (pp_real)rx * own[1] + (pp_real)ry * own[2] + (pp_real)rz * own[3];
-        } else {
-          c[(4 * a + b) * deep + d] = own[(PP_TILE * rx + ry) * (n2 == 1 ? 1 : PP_TILE) + rz];
-        }
-      }
+  for (node = 0; node < 4 * PP_TILE * deep; node++) {
+    const uint32_t line = deep == 1 ? node : node / 4, x = (uint32_t)i + line / 4, y = (uint32_t)j + line % 4;
+    const uint32_t z = deep == 1 ? 0 : (uint32_t)k + node % 4;
+    const pp_real *own = table->real;
+    int32_t place;
+    if (!table->whole) {
+      c[node] = own[((size_t)x * n1 + y) * n2 + z];
+      continue;
+    }
+    place = table->whole[(x / PP_TILE * tiles1 + y / PP_TILE) * tiles2 + z / PP_TILE];
+    own += place < 0 ? -1 - place : place;
+    if (place < 0) {
+      c[node] = own[0] + (pp_real)(x % PP_TILE) * own[1] + (pp_real)(y % PP_TILE) * own[2] + (pp_real)(z % PP_TILE) * own[3];
+    } else {
+      c[node] = own[(PP_TILE * (x % PP_TILE) + y % PP_TILE) * deep + z % PP_TILE];
     }
   }
 }

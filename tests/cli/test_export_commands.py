@@ -28,6 +28,13 @@ def test_a_body_goes_out_and_is_compared(words, palpate, pad, tmp_path):
     assert said.get("fmi") == {("fmu",): "2.0", ("fmu", "--fmi", "3.0"): "3.0"}.get(words)
 
 
+def test_a_memory_without_model_exchange_is_named(palpate, tmp_path):
+    file = body("indentation").save(tmp_path / "clay.palpate")
+    answer = palpate("export", "fmu", file, "--out", tmp_path / "clay.fmu", "--no-check")
+    assert answer.code == 0, answer.err
+    assert "co-simulation alone because of the memory 'indentation'" in answer.out
+
+
 def test_a_network_goes_out_as_c_alone(palpate, tmp_path):
     require_program("gcc")
     file = networks()[1].save(tmp_path / "map.palpate")

@@ -171,7 +171,9 @@ def to_fmu(
         console.say(
             "not compared with palpate: " + ("not asked for" if no_check else "FMPy is not installed")
         )
-    kinds = "co-simulation and model exchange" if done.exchange else "co-simulation alone"
+    kinds = "co-simulation and model exchange"
+    if not done.exchange and thing.memory is not None:
+        kinds = f"co-simulation alone because of the memory {thing.memory.name!r}"
     lines = [
         f"{path}  {path.stat().st_size / 1e3:.0f} kB, FMI {done.fmi}, {kinds}, {', '.join(done.platforms)}"
     ]

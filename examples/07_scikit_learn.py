@@ -27,13 +27,13 @@ rng = np.random.default_rng(0)
 X = rng.uniform(LOW, HIGH, (240, 3))
 y = deflection(X)
 
-refined = RBFNetworkRegressor(target=2e-3, random_state=0)
+refined = RBFNetworkRegressor(target=2e-3, effort=0.2, random_state=0)
 print(f"refined, cross-validated R²: {cross_val_score(refined, X, y, cv=3).mean():.5f}")
 
 # scikit-learn's own tools change the inputs: length and thickness in logarithms
 logarithms = FunctionTransformer(lambda X: np.column_stack([X[:, 0], np.log(X[:, 1:])]))
 search = GridSearchCV(
-    make_pipeline(logarithms, RBFNetworkRegressor(random_state=0, units_max=12)),
+    make_pipeline(logarithms, RBFNetworkRegressor(effort=0.1, random_state=0, units_max=12)),
     {"rbfnetworkregressor__form": ["isotropic", "axis-aligned", "rotated"]},
     cv=3,
 )

@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import math
 import re
+import tokenize
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -18,7 +19,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 
-__all__ = ["Quantity", "Range", "bounds", "registry", "si_conversion", "to_si"]
+__all__ = ["Quantity", "Range", "bounds", "registry", "si_conversion", "to_base_si", "to_si"]
 
 # units in which quantities are stated, by what they measure; the first that fits is taken
 _STATED: tuple[str, ...] = ("m", "m/s", "m/s²", "N", "N/m", "Pa", "J", "s", "Hz", "kg", "kg/m³", "m²", "m³")
@@ -87,7 +88,7 @@ class Range:
         return f"{self.name} {self.low + 0.0:g} … {self.high:g} {self.unit}".rstrip()
 
 
-def _rounded_once(text: str, quantity: Any, unit: str) -> float:
+def _rounded_once(text: str, quantity: Any, unit: Any) -> float:
     """Return a quantity in a unit; its digits are rounded once where one unit is a whole number of the other.
 
     So "0.12 mm" is 0.00012 to the last bit, and not a rounded number times a rounded thousandth.
@@ -157,8 +158,39 @@ def _stated(name: str) -> Any:
 
 
 def _no_quantity(pint: Any) -> tuple[type[Exception], ...]:
-    """Return what Pint raises of a text that is no quantity."""
-    return (pint.errors.PintError, ValueError, TypeError, AttributeError, AssertionError, SyntaxError)
+    """Return what Pint raises of a text that is no quantity.
+
+    It reads texts as Python does and computes what they say: brackets that nobody closes are a `TokenError`, 1/0 an
+    `ArithmeticError`, a thousand brackets a `RecursionError`.
+    """
+    read = (ValueError, TypeError, AttributeError, AssertionError, SyntaxError, tokenize.TokenError)
+    return (pint.errors.PintError, *read, ArithmeticError, RecursionError)
+
+
+def to_base_si(value: str) -> float:
+    """Convert a quantity of any dimension, such as ``"110 GPa"``, to a number in SI base units.
+
+    Parameters
+    ----------
+    value : str
+        Text with a number and a unit; a number alone is a pure number.
+
+    Raises
+    ------
+    UsageError
+        If the text is no quantity.
+    """
+    import pint
+
+    try:
+        quantity = registry().Quantity(value)
+        return _rounded_once(value.strip(), quantity, quantity.to_base_units().units)
+    except _no_quantity(pint) as error:
+        raise UsageError(
+            f"{value!r} is no number and no quantity with a unit.",
+            why=f"{error}.",
+            fix='Write a number, or a quantity such as "110 GPa".',
+        ) from error
 
 
 def to_si(value: str | float, unit: str) -> float:

@@ -32,6 +32,7 @@ from palpate.physics import (
     named_material,
 )
 from palpate.study.quantities import Densities, Pascals, Record
+from palpate.units import to_base_si
 
 __all__ = [
     "BeamMaterial",
@@ -242,12 +243,10 @@ def _number_of(value: float | str) -> float:
     """Return a number; of text with a unit, in SI base units."""
     if not isinstance(value, str):
         return float(value)
-    from palpate.units import registry
-
     try:
-        return float(registry().Quantity(value).to_base_units().magnitude)
-    except Exception as error:  # Pint raises errors of many kinds
-        raise ValueError(f"{value!r} is no number and no quantity with a unit") from error
+        return to_base_si(value)
+    except UsageError as error:
+        raise ValueError(str(error).replace("\n", " ")) from error
 
 
 def _user_material(record: SolidMaterialRecord) -> UserMaterial:

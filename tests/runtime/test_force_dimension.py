@@ -398,10 +398,14 @@ def test_a_clutch_is_a_button_and_the_others_are_passed_on(dhd):
     device = connect(dhd, clutch=1.0)
     dhd.buttons = 0b101
     sample = drive(device, dhd, 2)
-    assert (sample.clutched, sample.buttons) == (False, 0b101)
+    assert (sample.clutched, sample.buttons) == (False, 0b11)
     dhd.buttons = 0b110
     sample = drive(device, dhd, 2)
-    assert (sample.clutched, sample.buttons) == (True, 0b100)
+    assert (sample.clutched, sample.buttons) == (True, 0b10)
+    device.close()
+    device = connect(dhd, clutch=0.0)
+    dhd.buttons = 0b010
+    assert drive(device, dhd, 2).buttons == 1, "the first of the others is the dead-man button"
     device.close()
 
 

@@ -399,11 +399,20 @@ def test_a_dead_mans_button_holds(service, clock):
     device.close()
 
 
+@pytest.mark.parametrize(("hand", "first"), [("a", "b"), ("b", "a")])
+def test_the_first_button_that_is_not_the_hand_is_the_dead_mans(service, clock, hand, first):
+    device = connect(service, hold=hand)
+    service.buttons.update({hand: True, first: True})
+    drive(device, clock, 3)
+    assert (device.sample.holding, device.sample.buttons) == (True, 1)
+    device.close()
+
+
 def test_buttons_of_the_grip_reach_the_loop(service, clock):
     device = connect(service, hold="a")
     service.buttons.update(a=True, c=True)
     drive(device, clock, 3)
-    assert (device.sample.holding, device.sample.buttons) == (True, 0b100)
+    assert (device.sample.holding, device.sample.buttons) == (True, 0b10)
     service.buttons.update(a=False, c=False)
     drive(device, clock, 3)
     assert (device.sample.holding, device.sample.buttons) == (False, 0)

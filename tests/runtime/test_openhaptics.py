@@ -269,7 +269,7 @@ def test_buttons_clutch_inkwell_and_switch(connect, drive, library):
     library.safety_switch, library.buttons = 1, 0b1011
     drive(device, 1)
     sample = device.sample
-    assert (sample.holding, sample.clutched, sample.buttons) == (True, True, 0b1001)
+    assert (sample.holding, sample.clutched, sample.buttons) == (True, True, 0b101)
     library.inkwell = 1
     drive(device, 1)
     assert not sample.holding

@@ -150,6 +150,9 @@ def test_a_hardware_like_failure_is_recorded(spring_file):
 def test_a_dead_man_button_needs_a_button(spring_file):
     with pytest.raises(UsageError, match="no button to hold"):
         LoopProcess(spring_file, device="page", dead_man=True)
+    with pytest.raises(UsageError, match="'gamepad:hold=button' has no button to hold"):
+        LoopProcess(spring_file, device="gamepad:hold=button", dead_man=True)
+    LoopProcess(spring_file, device="gamepad", dead_man=True)
 
 
 def test_a_python_that_cannot_run_is_explained(spring_file, monkeypatch):

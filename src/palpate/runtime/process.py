@@ -98,8 +98,8 @@ class LoopProcess:
         traits = device_traits(device)
         if dead_man and not traits.buttons:
             raise UsageError(
-                f"The device {device.partition(':')[0]!r} has no button to hold.",
-                why="A dead-man button is the first button of a device.",
+                f"The device {device!r} has no button to hold.",
+                why="A dead-man button is the first button of a device that none of its options takes.",
                 fix="Leave it out; with the page the mouse button itself has to be held.",
             )
         self.device, self.rate = device, rate

@@ -91,8 +91,8 @@ class Sample:
     clutched : bool
         A clutch is pressed: the device moves alone, and nothing is felt until it is let go.
     buttons : int
-        Buttons that are pressed, one bit each, without those that the driver itself uses. The first is the dead-man
-        button where one is asked for; any other stops the force.
+        Buttons that are pressed, one bit each, counted without those that the driver itself uses. The first is the
+        dead-man button where one is asked for; any other stops the force. See `free_buttons`.
     stop : bool
         A stop switch of the device is pressed.
     """
@@ -135,6 +135,24 @@ class Device(Protocol):
     def close(self) -> None:
         """Zero force, then let go. Harmless when repeated."""
         ...
+
+
+def free_buttons(pressed: int, own: int) -> int:
+    """Return the bits of the buttons that are left when one is the driver's own: those above it move down.
+
+    So the first of the others is the dead-man button, whichever the driver has taken.
+
+    Parameters
+    ----------
+    pressed : int
+        One bit for each button.
+    own : int
+        Place of the driver's button, counted from 0; negative for none.
+    """
+    if own < 0:
+        return pressed
+    below = (1 << own) - 1
+    return (pressed & below) | (pressed >> 1 & ~below)
 
 
 _Settings = TypeVar("_Settings")

@@ -26,7 +26,7 @@ from typing import ClassVar
 import numpy as np
 
 from palpate.errors import DeviceError, DeviceLostError, DeviceStopError, UsageError
-from palpate.runtime.devices.device import Sample, Traits, settings_from
+from palpate.runtime.devices.device import Sample, Traits, free_buttons, settings_from
 from palpate.runtime.devices.force_dimension_library import FORCES_OFF, LOST, DhdLibrary, Status
 from palpate.runtime.devices.profiles import DeviceProfile, device_profile
 from palpate.runtime.shared_state import Block
@@ -139,7 +139,7 @@ class ForceDimensionDevice:
         self._x, self._y, self._z = c_double(), c_double(), c_double()
         self._place = byref(self._x), byref(self._y), byref(self._z)
         self._status = Status()
-        self._clutch = 1 << int(settings.clutch) if settings.clutch >= 0.0 else 0
+        self._clutch = int(settings.clutch)
         self._position, self._push = self._dhd.dhdGetPosition, self._dhd.dhdSetForce
         self._now, self._looked, self._pushed = -math.inf, -math.inf, -math.inf
         self._on, self._cause = False, -1  # no cause: forces have not been on yet
@@ -177,7 +177,8 @@ class ForceDimensionDevice:
         else:
             raise self._failure("tells no position", code)
         mask = self._dhd.dhdGetButtonMask(self._id) & _MASK
-        sample.clutched, sample.buttons = bool(mask & self._clutch), mask & ~self._clutch
+        sample.clutched = self._clutch >= 0 and bool(mask >> self._clutch & 1)
+        sample.buttons = free_buttons(mask, self._clutch)
         return sample
 
     def write(self, force: np.ndarray) -> None:

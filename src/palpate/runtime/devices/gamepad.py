@@ -18,7 +18,7 @@ import contextlib
 import math
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -162,6 +162,11 @@ class GamepadDevice:
             with contextlib.suppress(OSError):  # opened for reading alone, or no room for an effect
                 self._shake(0.0, 0.0)
             self.rumbles = self._effect >= 0
+
+    @classmethod
+    def traits_of(cls, options: Mapping[str, str]) -> Traits:
+        """Return the traits: with ``hold=button`` the one button is taken."""
+        return replace(cls.traits, buttons=0) if options.get("hold") == "button" else cls.traits
 
     @classmethod
     def open(cls, commands: Block, options: Mapping[str, str]) -> GamepadDevice:

@@ -27,7 +27,7 @@ from urllib.parse import urlsplit
 import numpy as np
 
 from palpate.errors import DeviceError, DeviceLostError, DeviceStopError, UsageError
-from palpate.runtime.devices.device import Sample, Traits, settings_from
+from palpate.runtime.devices.device import Sample, Traits, free_buttons, settings_from
 from palpate.runtime.devices.websocket_channel import WebsocketChannel
 from palpate.runtime.shared_state import Block
 
@@ -68,7 +68,8 @@ class HaplySettings:
     scale : {"refuse", "compensate"}
         Answer to a service that scales forces by a factor other than 1.
     hold : str
-        Dead-man button of a grip, such as a; forces act only while it is pressed. Empty: they always act.
+        Button of a grip, such as a, that is the hand: it holds the body only while the button is pressed. Empty: it
+        always holds. Of the others the first is the dead-man button where one is asked for.
     wait : float
         Longest wait for an outstanding answer, s.
     search : float
@@ -288,11 +289,10 @@ class HaplyDevice:
         for family in ("verse_grip", "wireless_verse_grip"):
             for grip in frame.get(family) or ():
                 buttons = (grip.get("state") or {}).get("buttons") or {}
-                for k, name in enumerate(sorted(buttons)):
-                    if buttons[name] and name == own:
-                        sample.holding = True
-                    elif buttons[name]:
-                        sample.buttons |= 1 << k
+                names = sorted(buttons)
+                mask = sum(1 << k for k, name in enumerate(names) if buttons[name])
+                sample.holding = sample.holding or bool(buttons.get(own))
+                sample.buttons |= free_buttons(mask, names.index(own) if own in names else -1)
 
     def _watch_events(self) -> None:
         if self._settings.events:

@@ -24,7 +24,7 @@ from typing import ClassVar
 import numpy as np
 
 from palpate.errors import DeviceError, DeviceLostError, DeviceStopError, UsageError
-from palpate.runtime.devices.device import Sample, Traits, settings_from
+from palpate.runtime.devices.device import Sample, Traits, free_buttons, settings_from
 from palpate.runtime.devices.openhaptics_library import LOST, NO_DEVICE, Code, HdError, HdLibrary
 from palpate.runtime.devices.openhaptics_servo import (
     CAUSE,
@@ -78,7 +78,8 @@ class OpenHapticsSettings:
     rate : float
         Frames per second of the library's scheduler, Hz; 500 or 1000.
     clutch : float
-        Button, 1 to 4, that works as a clutch; 0 for none.
+        Button, 1 to 4, that works as a clutch; 0 for none. Of the others the first is the dead-man button where one is
+        asked for, and each stops the force else.
     inkwell : {"rest", "ignore"}
         Whether a stylus that stands in its inkwell lets go of the body.
     switch : {"ignore", "hold"}
@@ -141,7 +142,7 @@ class OpenHapticsDevice:
         self._settings = settings = settings or OpenHapticsSettings()
         self._hd = HdLibrary(load_library("openhaptics", settings.library))
         self.sample, self.frames, self.name = Sample(), 0, f"The OpenHaptics device {settings.device!r}"
-        self._clutch = 1 << int(settings.clutch) >> 1
+        self._clutch = int(settings.clutch) - 1
         self._rests, self._needs_switch = settings.inkwell == "rest", settings.switch == "hold"
         self._place, self._now = np.zeros(3), -math.inf
         # stops that were told and that are over; what was told, and until when it lasts at least
@@ -175,7 +176,8 @@ class OpenHapticsDevice:
             np.multiply(self._place, _MM, out=sample.position)
             sample.position -= self._centre
             sample.holding = not (inkwell and self._rests) and (switch or not self._needs_switch)
-            sample.clutched, sample.buttons = bool(mask & self._clutch), mask & ~self._clutch
+            sample.clutched = self._clutch >= 0 and bool(mask >> self._clutch & 1)
+            sample.buttons = free_buttons(mask, self._clutch)
         if cells[FATAL] != 0.0:
             raise self._failure()
         if (stops := int(cells[STOPS])) != self._resumed:

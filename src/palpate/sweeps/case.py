@@ -11,7 +11,7 @@ import pickle
 import threading
 import time
 import traceback
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -257,7 +257,7 @@ def _record(row: Columns, schema: Sequence[Field], answer: Answer) -> None:
         return
     answers = {field.name: _value(answer, field) for field in schema if field.name not in _BOOKKEEPING_NAMES}
     if wrong := [
-        name for name, value in answers.items() if value is not None and not _is_finite(_stated(name, value))
+        name for name in answers if answers[name] is not None and not _is_finite(_stated(name, answers))
     ]:
         row["converged"][0] = False
         row["message"][0] = (
@@ -269,17 +269,20 @@ def _record(row: Columns, schema: Sequence[Field], answer: Answer) -> None:
             row[name][0] = value
 
 
-def _stated(name: str, value: Any) -> Any:
+def _stated(name: str, answers: Mapping[str, Any]) -> Any:
     """Return a quantity without what its solver does not state.
 
     A family of bodies does not state how the force varies with a material's numbers: these rows and columns of the
-    gradient are not-a-number altogether. Without any number nothing is left out.
+    gradient are not-a-number altogether. Of a layer's thickness or the probe's radius it does not state the slope of
+    the energy either, which is that entry of the response. Without any number nothing is left out.
     """
-    if name != "response_gradient" or not np.isfinite(value).any():
+    value, gradient = answers[name], answers.get("response_gradient")
+    if name not in {"response", "response_gradient"} or gradient is None or not np.isfinite(gradient).any():
         return value
-    gradient = np.asarray(value)
-    known = np.isfinite(gradient).any(axis=1)
-    return gradient[np.ix_(known, np.isfinite(gradient).any(axis=0))]
+    value, known = np.asarray(value), np.isfinite(gradient)
+    if name == "response_gradient":
+        return value[np.ix_(known.any(axis=1), known.any(axis=0))]
+    return value[known.any(axis=1) | ~np.isnan(value)]
 
 
 def _is_finite(value: Any) -> bool:

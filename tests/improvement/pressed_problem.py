@@ -25,9 +25,14 @@ RADIUS, DEEPEST, SIDE = 0.010, 0.006, 0.02
 HEIGHT = 1.0e4  # J/m³
 
 
+def _depth(X: np.ndarray) -> np.ndarray:
+    """Depth (N,), m, of a probe whose radius is the fourth input, where there is one."""
+    return np.asarray((X[:, 3] if X.shape[1] == 4 else RADIUS) - X[:, 2])
+
+
 def truth(X: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """U (N,), F (N, 3) and ∂F/∂c (N, 3, 3) of U = A s³ exp(b + 0.3 x), b a bump beside the middle of the slab."""
-    x, y, s = X[:, 0] / SIDE - 0.4, X[:, 1] / SIDE, RADIUS - X[:, 2]
+    x, y, s = X[:, 0] / SIDE - 0.4, X[:, 1] / SIDE, _depth(X)
     b = 0.8 * np.exp(-3.0 * (x**2 + y**2))
     U = HEIGHT * s**3 * np.exp(b + 0.3 * (x + 0.4))
     g = np.stack([(0.3 - 6.0 * x * b) / SIDE, -6.0 * y * b / SIDE, -3.0 / s], axis=1)
@@ -83,25 +88,48 @@ class PressedSlab:
         return series.reshape(-1, 3)[:samples]
 
 
-def learn_affine(data: Dataset, effort: float) -> tuple[Surrogate, Any]:
-    """A learner that takes no time: ln(U/s³) as an affine function of the place, by least squares.
+@dataclass(frozen=True)
+class PressedByAnySize(PressedSlab):
+    """The slab under probes of several radii: how the energy varies with the radius is not stated."""
+
+    radii: tuple[float, float] = (0.008, 0.012)
+
+    @property
+    def ranges(self) -> tuple[Range, ...]:
+        x, y, _ = super().ranges
+        low, high = self.radii
+        return (x, y, Range("c_z", low - DEEPEST, high, "m"), Range("probe.radius", low, high, "m"))
+
+    def describe(self) -> dict[str, Any]:
+        return super().describe() | {"varied": [{"path": "probe.radius", "range": list(self.radii)}]}
+
+    def design(self, samples: int, seed: int = 0, *, depths: int = 1) -> np.ndarray:
+        points = PressedSlab().design(samples, seed, depths=depths)
+        low, high = self.radii
+        share = np.random.default_rng(seed).random(-(-samples // depths))  # the same of a longer design
+        radii = np.repeat(low + (high - low) * share, depths)[:samples]
+        points[:, 2] += radii - RADIUS
+        return np.column_stack([points, radii])
+
+
+def learn_affine(data: Dataset, effort: float, problem: PressedSlab | None = None) -> tuple[Surrogate, Any]:
+    """A learner that takes no time: ln(U/s³) as an affine function of the inputs, by least squares.
 
     Its record has the error of each solve as those of a search have it, here of solves that were not left out.
     """
-    problem = PressedSlab()
+    problem = problem or PressedSlab()
     low, high = bounds(problem.ranges)
     scaled = (2.0 * data.X - low - high) / (high - low)
-    target = np.log(data.potential_energy / (RADIUS - data.X[:, 2]) ** 3)
+    target = np.log(data.potential_energy / _depth(data.X) ** 3)
     tail = np.linalg.lstsq(np.column_stack([np.ones(len(data)), scaled]), target)[0]
     layout = problem.layout
-    surface = TouchedSurface.of(layout.rest, layout.triangles, radius=RADIUS, spacing=0.003)
-    baseline = ContactBaseline(ContactLaw("pad"), surface, RADIUS)
+    surface = TouchedSurface.of(layout.rest, layout.triangles, radius=high[2], spacing=0.003)
+    baseline = ContactBaseline(ContactLaw("pad"), surface, RADIUS, 3 if len(low) == 4 else None)
     network = linear_network(list(problem.ranges), [Quantity("ln U/U0")], tail[None])
     going = Continuation.of(problem.ranges, deepest=DEEPEST)
     energy = LearntEnergy(network, baseline, continuation=going)
-    missed = np.linalg.norm(energy.force(data.X) - data.response, axis=1) / np.linalg.norm(
-        data.response, axis=1
-    )
+    force = data.response[:, :3]
+    missed = np.linalg.norm(energy.force(data.X) - force, axis=1) / np.linalg.norm(force, axis=1)
     return Surrogate(energy, meta={"name": "slab"}), SimpleNamespace(energy=SimpleNamespace(errors=missed))
 
 
@@ -111,6 +139,9 @@ class _Solver:
 
     def solve(self, x: np.ndarray) -> Any:
         U, F, K = truth(x[None])
+        n = len(x)
+        response, gradient = np.full(n, np.nan), np.full((n, n), np.nan)
+        response[:3], gradient[:3, :3] = F[0], K[0]
         converged = bool(x[0] <= self.problem.failing)
         return SimpleNamespace(
             converged=converged,
@@ -120,8 +151,8 @@ class _Solver:
             displacement=np.zeros((4, 3)),
             potential_energy=float(U[0]),
             strain_energy=float(U[0]),
-            response=F[0],
-            response_gradient=K[0],
+            response=response,
+            response_gradient=gradient,
             penetration=0.0,
             least_volume_ratio=1.0,
         )

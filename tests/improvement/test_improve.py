@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from pressed_problem import PressedSlab, learn_affine, truth
+from pressed_problem import PressedByAnySize, PressedSlab, learn_affine, truth
 
 import palpate as pp
 import pressed
@@ -64,6 +64,25 @@ def test_steps_solve_learn_and_judge_in_turn(improve):
     assert all(after <= before for before, after in itertools.pairwise(errors)), "the better one stays"
     seen, unseen = (set(map(tuple, data.X)) for data in (last.train, last.test))
     assert not seen & unseen
+
+
+def test_a_family_in_the_probes_radius_is_improved(cluster):
+    """Solves state no slope of the energy by the radius: they count all the same, and radii are chosen, too."""
+    family = PressedByAnySize()
+    options = {
+        "cluster": cluster,
+        "progress": False,
+        "unseen": 10,
+        "batch": 4,
+        "most": FIRST + 8,
+        "until": 1e-4,
+    }
+    *_, last = pp.improve(family, learner=partial(learn_affine, problem=family), **options)
+    assert (last.solves, last.unseen) == (FIRST + 8, 10)
+    assert last.error < 0.5
+    assert np.isnan(last.train.response[:, 3]).all()
+    assert len(np.unique(last.train.X[:, 3])) == FIRST + 8
+    assert np.isfinite(last.train.response[:, :3]).all()
 
 
 def test_it_ends_when_the_error_is_kept_on_all_unseen_solves(improve):

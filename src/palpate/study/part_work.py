@@ -2,7 +2,8 @@
 
 A study is improved here beside the page and the real-time loop, at a lower priority, and one core is left to the loop
 once there is something to touch. First comes a *rough* surrogate, of twelve solves on elements as large as the ball,
-which takes a fraction of the time; then the study itself, whose surrogates take the rough one's place.
+which takes a fraction of the time; then the study itself, whose surrogates take the rough one's place. The study's own
+first solves, which the rough surrogate has not learnt from, tell its error until then.
 
 Standard input brings one line of JSON with what to do, then perhaps the line ``stop``: no further batch of solves
 begins, and what there is is concluded. Its end ends this process and all that it started. Standard output carries lines
@@ -20,6 +21,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 import signal
 import sys
@@ -28,6 +30,8 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from palpate.errors import PalpateError
 from palpate.processes import available_cores, end_by_sigterm, end_group
@@ -99,7 +103,7 @@ def work_on(
         say({"body": str(known)})
     elif rough is not None:
         with local_cluster(workers) as cluster:
-            _first_touch(rough.with_workers(workers), Paths(paths.folder, rough.name), cluster, say)
+            known = _first_touch(rough.with_workers(workers), Paths(paths.folder, rough.name), cluster, say)
     if stopped():
         say(
             {
@@ -121,7 +125,7 @@ def work_on(
             cluster=cluster,
             **_callbacks(say),
         )
-        _carry_out(study, paths, steps, say, stopped)
+        _carry_out(study, paths, steps, say, stopped, known)
 
 
 def _known(study: Study, paths: Paths) -> Path | None:
@@ -139,8 +143,8 @@ def _known(study: Study, paths: Paths) -> Path | None:
     return paths.model if origin.get("problem") == json.loads(json.dumps(wanted)) else None
 
 
-def _first_touch(rough: Study, paths: Paths, cluster: Any, say: Say) -> None:
-    """Learn a first surrogate on large elements; what fails here is left to the study itself."""
+def _first_touch(rough: Study, paths: Paths, cluster: Any, say: Say) -> Path | None:
+    """Learn a first surrogate on large elements, and return its file; what fails here is left to the study itself."""
     from palpate.study.improve_study import improve_study
 
     say({"log": "a rough surrogate first, on elements as large as the ball"})
@@ -148,14 +152,35 @@ def _first_touch(rough: Study, paths: Paths, cluster: Any, say: Say) -> None:
         for step in improve_study(rough, paths, cluster=cluster, **_callbacks(say)):
             if step.phase == "learnt":
                 say({"body": str(step.model_path)})
-                return
+                return Path(step.model_path)
             say({"step": _figures(step)})
     except PalpateError as error:
         say({"log": f"no rough surrogate: {error.what}"})
+    return None
+
+
+def _errors_of(rough: Path | None, step: Any) -> dict[str, float]:
+    """Return the force error of the surrogate in the hand, while the study has none of its own yet.
+
+    It was learnt on other elements: all solves of the study are unseen to it.
+    """
+    from palpate.improvement.stop_rule import relative_errors
+    from palpate.surrogates import Surrogate
+
+    if rough is None or step.surrogate is not None or step.train is None:
+        return {}
+    errors = relative_errors(Surrogate.load(rough), step.train)
+    median, p95 = np.quantile(errors, (0.5, 0.95)) if errors.size else (math.nan, math.nan)
+    return {"error": float(p95), "median": float(median)}
 
 
 def _carry_out(
-    study: Study, paths: Paths, steps: Iterator[Any], say: Say, stopped: Callable[[], bool]
+    study: Study,
+    paths: Paths,
+    steps: Iterator[Any],
+    say: Say,
+    stopped: Callable[[], bool],
+    in_hand: Path | None,
 ) -> None:
     """Go through the steps, and conclude with the last."""
     from palpate.study.improve_study import conclude
@@ -164,7 +189,7 @@ def _carry_out(
     last: Any = None
     for step in steps:
         last = step
-        say({"step": _figures(step)})
+        say({"step": _figures(step) | _errors_of(in_hand, step)})
         if step.is_new and step.model_path is not None:
             own = step.model_path.with_name(f"{study.name}-{step.solves}.palpate")
             say({"body": str(own if own.exists() else step.model_path)})

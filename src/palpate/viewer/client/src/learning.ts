@@ -41,10 +41,17 @@ export class Learning {
 
   private errors(): void {
     const { latest } = this;
-    if (!latest || latest.error_p95 === null) return;
+    if (!latest) return;
+    if (latest.error_p95 === null) {
+      element("error-p95").textContent = element("error-median").textContent = "–";
+      element("improved").textContent = "not checked yet";
+      this.shown = NaN;
+      return;
+    }
     const error = latest.error_p95;
     element("error-p95").textContent = tidy(100 * error, 2);
     element("error-median").textContent = latest.error_median === null ? "–" : share(latest.error_median);
+    if (Number.isNaN(this.shown)) element("improved").textContent = "";
     if (error !== this.shown && !Number.isNaN(this.shown)) {
       const words = `${error < this.shown ? "improved" : "changed"}: ${share(this.shown)} → ${share(error)}`;
       element("improved").textContent = words;

@@ -152,7 +152,7 @@ def _first_touch(rough: Study, paths: Paths, cluster: Any, say: Say) -> Path | N
         for step in improve_study(rough, paths, cluster=cluster, **_callbacks(say)):
             if step.phase == "learnt":
                 say({"body": str(step.model_path)})
-                return Path(step.model_path)
+                return step.model_path
             say({"step": _figures(step)})
     except PalpateError as error:
         say({"log": f"no rough surrogate: {error.what}"})

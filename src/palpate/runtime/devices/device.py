@@ -18,7 +18,7 @@ from palpate.errors import UsageError
 from palpate.runtime.safety import HARDWARE_PATIENCE
 from palpate.runtime.workspace import PLAIN_AXES, Axes
 
-__all__ = ["Device", "Sample", "Traits", "settings_from"]
+__all__ = ["Device", "Sample", "Traits", "free_buttons", "settings_from"]
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,11 @@ import { PullHand } from "./hand";
 import type { Hand } from "./hand";
 import { choices, largest, legend, nothing, shares, trusted } from "./legend";
 import { LineView } from "./line_view";
-import { decodeModes, decodeSurface, decodeTrustMap } from "./messages";
+import { decodeTrustMap } from "./messages";
 import type { FieldInfo, Frame, Hello, Surface, TrustMap, Vec3 } from "./messages";
 import { Panel } from "./panel";
 import { PressHand } from "./press";
-import { get } from "./resources";
+import { get, parts } from "./resources";
 import { PadView, PressView } from "./touch_view";
 import { element, fixed, input, measured } from "./units";
 import type { View } from "./view";
@@ -132,12 +132,12 @@ class PressedBody implements Body {
 
   /** Fetch a version of the body. */
   private async load(hello: Hello): Promise<[Surface, Field[], TrustMap | null]> {
-    const version = `?version=${hello.version}`;
+    const { version } = hello;
     const learnt = "learning" in document.documentElement.dataset;
     const [surface, trust, ...modes] = await Promise.all([
-      get(`surface${version}`).then(decodeSurface),
-      learnt ? get(`trust${version}`).then(decodeTrustMap) : null,
-      ...hello.fields.map(async (_, i) => decodeModes(await get(`fields/${i}${version}`))),
+      parts().surface(version),
+      learnt ? get(`trust?version=${version}`).then(decodeTrustMap) : null,
+      ...hello.fields.map((_, i) => parts().modes(i, version)),
     ]);
     return [surface, hello.fields.map((info, i) => new Field(info, modes[i]!, surface.rest)), trust];
   }
@@ -233,7 +233,7 @@ class PadBody implements Body {
   }
 
   async open(): Promise<void> {
-    this.surface = decodeSurface(await get("surface"));
+    this.surface = await parts().surface(this.hello.version);
     this.view = new PadView(this.canvas, this.surface, this.hello, WORDS.map(element));
     this.hand.attach(this.view);
   }

@@ -15,11 +15,14 @@ const MARGIN = { left: 46, right: 8, top: 8, bottom: 22 }; // px
 export class DepthCurve {
   private readonly sheet = new Sheet(element<HTMLCanvasElement>("curve-plot"));
   private drawnAt = 0;
+  private colours: Record<"soft" | "accent" | "ink", string> | null = null; // of the theme
 
   constructor(
     private readonly hello: Hello,
     private readonly evaluator: Evaluator,
-  ) {}
+  ) {
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => (this.colours = null));
+  }
 
   /** Follow a picture; the curve is drawn anew ten times a second at most. */
   update(frame: Frame): void {
@@ -44,15 +47,16 @@ export class DepthCurve {
     const pen = this.sheet.clear();
     if (!pen) return;
     const { width, height } = this.sheet;
+    const { soft, accent, ink } = (this.colours ??= { soft: css("--soft"), accent: css("--accent"), ink: css("--ink") });
     const x = (depth: number): number => MARGIN.left + (depth / most) * (width - MARGIN.left - MARGIN.right);
     const y = (force: number): number => height - MARGIN.bottom - (force / high) * (height - MARGIN.top - MARGIN.bottom);
-    pen.fillStyle = css("--soft");
+    pen.fillStyle = soft;
     pen.textAlign = "right";
     pen.fillText(`${tidy(high)} N`, MARGIN.left - 4, y(high) + 8);
     pen.fillText("0", MARGIN.left - 4, y(0));
     pen.fillText(`${tidy(1000 * most)} mm deep`, width - MARGIN.right, height - 6);
     for (const known of [false, true]) {
-      pen.strokeStyle = css(known ? "--accent" : "--soft");
+      pen.strokeStyle = known ? accent : soft;
       pen.lineWidth = known ? 2 : 1;
       pen.setLineDash(known ? [] : [4, 3]);
       pen.beginPath();
@@ -69,7 +73,7 @@ export class DepthCurve {
       pen.stroke();
     }
     pen.setLineDash([]);
-    pen.fillStyle = css("--ink");
+    pen.fillStyle = ink;
     pen.beginPath();
     pen.arc(x(Math.min(Math.max(frame.depth, 0), most)), y(Math.hypot(...frame.force)), 4, 0, 2 * Math.PI);
     pen.fill();

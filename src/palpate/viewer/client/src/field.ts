@@ -34,12 +34,22 @@ export class Field {
     const { values, modes } = this;
     const n = values.length;
     values.set(modes.rest);
-    // four modes at a time: the values are loaded and stored less often
+    // eight modes at a time, then four: the values are loaded and stored less often
     let k = 0;
+    for (; k + 8 <= this.info.modes; k += 8) {
+      const [a, b, c, d] = [numbers[k]!, numbers[k + 1]!, numbers[k + 2]!, numbers[k + 3]!];
+      const [e, f, g, h] = [numbers[k + 4]!, numbers[k + 5]!, numbers[k + 6]!, numbers[k + 7]!];
+      if (a === 0 && b === 0 && c === 0 && d === 0 && e === 0 && f === 0 && g === 0 && h === 0) continue;
+      const [p, q, r, t] = this.rows(k);
+      const [u, v, w, x] = this.rows(k + 4);
+      for (let i = 0; i < n; i++) {
+        values[i]! += a * p[i]! + b * q[i]! + (c * r[i]! + d * t[i]!) + (e * u[i]! + f * v[i]! + (g * w[i]! + h * x[i]!));
+      }
+    }
     for (; k + 4 <= this.info.modes; k += 4) {
       const [a, b, c, d] = [numbers[k]!, numbers[k + 1]!, numbers[k + 2]!, numbers[k + 3]!];
       if (a === 0 && b === 0 && c === 0 && d === 0) continue;
-      const [p, q, r, t] = [0, 1, 2, 3].map((j) => modes.modes.subarray((k + j) * n, (k + j + 1) * n)) as Rows;
+      const [p, q, r, t] = this.rows(k);
       for (let i = 0; i < n; i++) values[i]! += a * p[i]! + b * q[i]! + (c * r[i]! + d * t[i]!);
     }
     for (; k < this.info.modes; k++) {
@@ -49,6 +59,12 @@ export class Field {
       for (let i = 0; i < n; i++) values[i]! += b * mode[i]!;
     }
     if (modes.rows > 0) this.local(numbers.subarray(this.info.modes), contact);
+  }
+
+  /** Modes k to k + 3. */
+  private rows(k: number): Rows {
+    const n = this.values.length;
+    return [0, 1, 2, 3].map((j) => this.modes.modes.subarray((k + j) * n, (k + j + 1) * n)) as Rows;
   }
 
   /** The size of the field at each point; overwritten by the next call. */

@@ -7,7 +7,6 @@ import { say } from "./flags";
 import { FileConnection } from "./file_connection";
 import { IndentationDrawing } from "./indentation_drawing";
 import type { Places } from "./indentation_drawing";
-import { encodeModes, encodeSurface } from "./messages";
 import type { Hello } from "./messages";
 import { PackedSurface } from "./packed";
 import type { FieldFacts, SurfaceFacts } from "./packed";
@@ -20,11 +19,18 @@ interface Facts {
   fields: FieldFacts[];
 }
 
+/** Bytes from base64. */
+function bytes(text: string): Uint8Array<ArrayBuffer> {
+  const own = Uint8Array as unknown as { fromBase64?: (text: string) => Uint8Array<ArrayBuffer> }; // of newer browsers
+  if (own.fromBase64) return own.fromBase64(text);
+  const decoded = atob(text);
+  const out = new Uint8Array(decoded.length);
+  for (let i = 0; i < decoded.length; i++) out[i] = decoded.charCodeAt(i);
+  return out;
+}
+
 async function part(name: string): Promise<Uint8Array<ArrayBuffer>> {
-  const text = atob(document.getElementById(`palpate-${name}`)!.textContent!);
-  const bytes = new Uint8Array(text.length);
-  for (let i = 0; i < text.length; i++) bytes[i] = text.charCodeAt(i);
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+  const stream = new Blob([bytes(document.getElementById(`palpate-${name}`)!.textContent!)]).stream().pipeThrough(new DecompressionStream("gzip"));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
@@ -36,7 +42,7 @@ async function json<Type>(name: string): Promise<Type> {
 function words(bytes: Uint8Array): Uint8Array {
   const count = bytes.length / 8;
   const out = new Uint8Array(bytes.length);
-  for (let b = 0; b < 8; b++) for (let i = 0; i < count; i++) out[8 * i + b] = bytes[b * count + i]!;
+  for (let i = 0; i < count; i++) for (let b = 0; b < 8; b++) out[8 * i + b] = bytes[b * count + i]!;
   return out;
 }
 
@@ -52,10 +58,7 @@ async function open(): Promise<void> {
   ]);
   const packed = new PackedSurface(facts.surface, mesh);
   const fields = facts.fields.map((own, i) => packed.field(own, modes[i]!));
-  provide(async (path) => {
-    const field = /^fields\/(\d+)/.exec(path)?.[1];
-    return field === undefined ? encodeSurface(packed.surface) : encodeModes(fields[+field]!);
-  });
+  provide({ surface: async () => packed.surface, modes: async (field) => fields[field]! });
   const evaluator = await Evaluator.of(module, blocks.map(words), facts.places?.points.length);
   const kept = facts.places && new IndentationDrawing(evaluator, hello, packed.surface, facts.places);
   const curve = new DepthCurve(hello, evaluator);

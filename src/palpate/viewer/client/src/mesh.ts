@@ -122,26 +122,39 @@ export class Target {
 
   /** A ball around a block: its centre, and the square of its radius. */
   private around(block: number): number[] {
-    const corners = Array.from(this.order.subarray(block * BLOCK, (block + 1) * BLOCK)).flatMap((t) => [
-      ...this.triangles.subarray(3 * t, 3 * t + 3),
-    ]);
-    const place = (i: number): number[] => [0, 1, 2].map((k) => this.points[3 * i + k]!);
+    const { points, triangles } = this;
+    const some = this.order.subarray(block * BLOCK, (block + 1) * BLOCK);
     const low = [Infinity, Infinity, Infinity];
     const high = [-Infinity, -Infinity, -Infinity];
-    for (const i of corners) {
-      place(i).forEach((v, k) => ([low[k], high[k]] = [Math.min(low[k]!, v), Math.max(high[k]!, v)]));
-    }
+    for (const t of some) for (let k = 0; k < 3; k++) widen(low, high, points, triangles[3 * t + k]!);
     const centre = low.map((v, k) => (v + high[k]!) / 2);
-    const square = Math.max(...corners.map((i) => place(i).reduce((sum, v, k) => sum + (v - centre[k]!) ** 2, 0)));
-    return [...centre, square * (1 + 1e-5)]; // single precision
+    let most = 0;
+    for (const t of some) {
+      for (let k = 0; k < 3; k++) {
+        const i = 3 * triangles[3 * t + k]!;
+        const square = (points[i]! - centre[0]!) ** 2 + (points[i + 1]! - centre[1]!) ** 2 + (points[i + 2]! - centre[2]!) ** 2;
+        if (square > most) most = square;
+      }
+    }
+    return [...centre, most * (1 + 1e-5)]; // single precision
+  }
+}
+
+/** Widen a box, its lowest and highest coordinates, to hold point i. */
+function widen(low: number[], high: number[], points: Float32Array, i: number): void {
+  for (let k = 0; k < 3; k++) {
+    const v = points[3 * i + k]!;
+    if (v < low[k]!) low[k] = v;
+    if (v > high[k]!) high[k] = v;
   }
 }
 
 /** Triangles in the order of a curve through space (Morton 1966): what is near in it is near. */
 function along(points: Float32Array, triangles: Uint32Array): Uint32Array {
   const count = triangles.length / 3;
-  const low = [0, 1, 2].map((k) => points.reduce((least, v, i) => (i % 3 === k && v < least ? v : least), Infinity));
-  const high = [0, 1, 2].map((k) => points.reduce((most, v, i) => (i % 3 === k && v > most ? v : most), -Infinity));
+  const low = [Infinity, Infinity, Infinity];
+  const high = [-Infinity, -Infinity, -Infinity];
+  for (let i = 0; 3 * i < points.length; i++) widen(low, high, points, i);
   const size = Math.max(...high.map((v, k) => v - low[k]!)) || 1;
   const keys = new Uint32Array(count);
   for (let t = 0; t < count; t++) {
@@ -151,5 +164,7 @@ function along(points: Float32Array, triangles: Uint32Array): Uint32Array {
       for (let b = 0; b < BITS; b++) keys[t]! |= ((cell >> b) & 1) << (3 * b + k);
     }
   }
-  return Uint32Array.from({ length: count }, (_, t) => t).sort((a, b) => keys[a]! - keys[b]!);
+  const order = new Uint32Array(count);
+  for (let t = 0; t < count; t++) order[t] = t;
+  return order.sort((a, b) => keys[a]! - keys[b]!);
 }

@@ -17,6 +17,7 @@ export interface Scale {
 export class Sheet {
   width = 0; // px
   height = 0;
+  private pen: CanvasRenderingContext2D | null = null;
 
   constructor(private readonly canvas: HTMLCanvasElement) {
     // asked at each drawing, the size would make the browser lay out the page each time
@@ -29,11 +30,13 @@ export class Sheet {
     if (this.width === 0) return null;
     const ratio = Math.min(devicePixelRatio, 2);
     const [width, height] = [this.width * ratio, this.height * ratio].map(Math.round);
-    const pen = canvas.getContext("2d")!;
-    if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width!, height!];
-    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    const pen = (this.pen ??= canvas.getContext("2d")!);
+    if (canvas.width !== width || canvas.height !== height || !pen.font.startsWith("11px")) {
+      [canvas.width, canvas.height] = [width!, height!];
+      pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+      pen.font = "11px system-ui, sans-serif"; // to set it takes longer than to draw
+    }
     pen.clearRect(0, 0, this.width, this.height);
-    pen.font = "11px system-ui, sans-serif";
     return pen;
   }
 }

@@ -22,7 +22,7 @@ export class PressView extends SurfaceView {
   readonly arrow: Arrow;
   readonly grip = new Vector3(); // the probe's centre
 
-  private readonly target: Target;
+  private target: Target | null = null; // made when the pointer first comes
   private readonly resting: Float32Array; // normals of the points at rest
   private readonly hover: Mesh<SphereGeometry, MeshLambertMaterial>;
   private nearby: Vector3 | null = null; // m, of the device's centre
@@ -45,7 +45,6 @@ export class PressView extends SurfaceView {
     this.still.material.side = DoubleSide;
     this.resting = new Float32Array(surface.rest.length);
     normalsInto(this.resting, surface.rest, this.triangles);
-    this.target = new Target(surface.rest, this.triangles);
     this.scene.add(this.hover, this.arrow.group);
     this.roof = 2 * hello.radius + LONG * this.across(); // the probe and its arrow
     this.recolour();
@@ -76,6 +75,7 @@ export class PressView extends SurfaceView {
   spotAt(x: number, y: number): Spot | null {
     const { origin, direction } = this.ray(x, y).ray;
     const toward = direction.toArray() as Vec3;
+    this.target ??= new Target(this.surface.rest, this.triangles);
     const hit = this.target.meet(origin.toArray() as Vec3, toward);
     if (!hit) return null;
     const facing = direction.dot(new Vector3(...hit.across)) < 0;

@@ -71,10 +71,11 @@ export class Field {
   sizes(): Float32Array {
     const [u, per, out] = [this.values, this.info.components, this.size];
     if (per === 1) return u;
-    for (let i = 0, at = 0; i < out.length; i++) {
-      let sum = 0;
-      for (let c = 0; c < per; c++, at++) sum += u[at]! * u[at]!;
-      out[i] = Math.sqrt(sum);
+    for (let i = 0, at = 0; i < out.length; i++, at += 3) {
+      const x = u[at]!;
+      const y = u[at + 1]!;
+      const z = u[at + 2]!;
+      out[i] = Math.sqrt(x * x + y * y + z * z);
     }
     return out;
   }

@@ -159,7 +159,7 @@ export class SurfaceView extends View {
     for (let i = 0; i < shares.length; i++) {
       const share = shares[i]!;
       const known = share >= UNKNOWN;
-      const k = 3 * Math.round(255 * Math.min(Math.max(share, 0), 1));
+      const k = 3 * (share > 0 ? (share < 1 ? (255 * share + 0.5) | 0 : 255) : 0);
       tints[3 * i] = known ? colours[k]! : r;
       tints[3 * i + 1] = known ? colours[k + 1]! : g;
       tints[3 * i + 2] = known ? colours[k + 2]! : b;

@@ -52,6 +52,37 @@ def test_a_model_goes_out_as_a_picture_that_moves(palpate, folder):
     answer = palpate("export", "vtu", folder / "small.palpate", "-o", folder / "small.pvd")
     assert answer.code == 0, answer.err
     assert len(list((folder / "small").iterdir())) == 20
+    answer = palpate("export", "gltf", folder / "small.palpate", "--at", "0,0,0")
+    assert answer.code == 2
+    assert "follows from its loads" in answer.err
+
+
+def test_files_of_others_stay(palpate, folder):
+    model, data = folder / "small.palpate", folder / "small.zarr"
+    for words, file in (
+        (("export", "gltf", model), "small.glb"),
+        (("export", "vtu", model, "--steps", "2"), "small/0000.vtu"),
+        (("dataset", "export", data, "-o", folder / "a.csv", "--fields"), "a-fields.csv"),
+        (("dataset", "export", data, "-o", folder / "b.parquet"), "b.parquet"),
+        (("card", model, "-o", folder / "card.md"), "card.md"),
+    ):
+        assert palpate(*words).code == 0
+        again = palpate(*words)  # tables can't be told from other ones
+        assert again.code == (2 if words[0] == "dataset" else 0), again.err
+        (folder / file).write_text("mine")
+        answer = palpate(*words)
+        assert answer.code == 2
+        assert "exists already" in answer.err
+        assert (folder / file).read_text() == "mine"
+        assert palpate(*words, "--force").code == 0
+    assert palpate("card", model, "-o", folder / "card.pdf").code == 2
+
+
+def test_a_beam_goes_out_without_its_shape_and_says_so(palpate, folder):
+    answer = palpate("export", "c", folder / "small.palpate", "--no-check")
+    assert answer.code == 0, answer.err
+    assert "left out: the field displacement" in answer.err
+    assert "left out" not in palpate("export", "c", folder / "small.palpate", "--no-check", "--no-field").err
 
 
 def test_a_card_is_printed_signed_and_written(palpate, folder):

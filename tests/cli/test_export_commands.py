@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import shutil
+import subprocess
 
 import pytest
 
@@ -41,10 +43,15 @@ def test_a_network_goes_out_as_c_alone(palpate, tmp_path):
     answer = palpate("export", "c", file, "--out", tmp_path / "map", "--name", "map", "--compiler", "gcc")
     assert answer.code == 0, answer.err
     assert "derivatives" in answer.out
+    line = answer.err.splitlines()[-1].removeprefix("Next: ").replace("cc ", "gcc ", 1)
+    subprocess.run(
+        line, shell=True, check=True, cwd=tmp_path
+    )  # the line that is printed compiles and runs it
     for kind in ("lib", "fmu"):
         answer = palpate("export", kind, file, "--out", tmp_path / kind)
         assert answer.code == 2
         assert "holds a network alone" in answer.err
+        assert "palpate export c` or `palpate export onnx" in answer.err
         assert not (tmp_path / kind).exists()
 
 
@@ -64,3 +71,63 @@ def test_nothing_is_compared_where_that_is_not_asked(palpate, pad, tmp_path):
     assert answer.code == 0, answer.err
     assert "not compared with palpate: not asked for" in answer.err
     assert "typedef float pad_real;" in (tmp_path / "out" / "pad.h").read_text("utf-8")
+
+
+def test_names_are_those_of_the_file_and_lie_beside_it(palpate, pad, tmp_path):
+    file = shutil.copy(pad, tmp_path / "my-liver.palpate")
+    for kind in ("c", "fmu", "html"):
+        answer = palpate("export", kind, file, "--no-check")
+        assert answer.code == 0, answer.err
+    assert (tmp_path / "my-liver" / "my_liver.h").exists()
+    assert {f.name for f in tmp_path.iterdir()} == {
+        "my-liver.palpate",
+        "my-liver",
+        "my-liver.fmu",
+        "my-liver-page.html",
+    }
+
+
+def test_an_export_replaces_its_own_files_and_no_others(palpate, pad, tmp_path):
+    require_program("gcc")
+    file = shutil.copy(pad, tmp_path / "pad.palpate")
+    report = tmp_path / "pad.html"
+    report.write_text("<html>the report of palpate validate</html>")
+    for kind, written in (
+        ("c", "pad/example.c"),
+        ("lib", "pad/pad.py"),
+        ("fmu", "pad.fmu"),
+        ("onnx", "pad.onnx"),
+        ("html", "pad-page.html"),
+    ):
+        for _ in range(2):  # the second one replaces the files of the first
+            answer = palpate("export", kind, file, "--no-check")
+            assert answer.code == 0, answer.err
+        own = tmp_path / written
+        own.write_text("my own work")
+        answer = palpate("export", kind, file, "--no-check")
+        assert answer.code == 2
+        assert "exists already" in answer.err
+        assert "--force" in answer.err
+        assert own.read_text() == "my own work"
+        answer = palpate("export", kind, file, "--no-check", "--force")
+        assert answer.code == 0, answer.err
+        assert b"my own work" not in own.read_bytes()
+    assert "palpate validate" in report.read_text()
+
+
+def test_wrong_places_endings_and_compilers_are_refused(palpate, pad, tmp_path):
+    (tmp_path / "file").touch()
+    for words, said in (
+        (("c", "--out", tmp_path / "file"), "is a file"),
+        (("c", "--out", tmp_path / "no" / "folder"), "does not exist"),
+        (("c", "--out", tmp_path / "out", "--compiler", "nosuchcc"), "no compiler 'nosuchcc'"),
+        (("lib", "--out", tmp_path / "out", "--compiler", "nosuchcc"), "no compiler 'nosuchcc'"),
+        (("fmu", "--out", tmp_path / "pad.onnx"), "does not end in .fmu"),
+        (("onnx", "--out", tmp_path / "pad.fmu"), "does not end in .onnx"),
+        (("html", "--out", tmp_path / "no" / "pad.html"), "does not exist"),
+        (("html", "--out", tmp_path), "does not end in .html"),
+    ):
+        answer = palpate("export", *words[:1], pad, *words[1:])
+        assert answer.code == 2, words
+        assert said in answer.err
+    assert [f.name for f in tmp_path.iterdir()] == ["file"]

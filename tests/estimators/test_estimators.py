@@ -360,4 +360,4 @@ def test_without_scikit_learn_the_way_is_told():
         "except UsageError as error:\n    print(error)\n"
     )
     done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
-    assert 'pip install "palpate[sklearn]"' in done.stdout
+    assert "pip install 'palpate[sklearn]'" in done.stdout

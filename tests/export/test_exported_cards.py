@@ -18,8 +18,8 @@ from palpate.surrogates import Surrogate
 from palpate.viewer.file_page import export_html
 
 
-def _c(thing: Surrogate, folder: Path) -> tuple[str, str]:
-    done = export_c(thing, folder, check=False)
+def _c(thing: Surrogate, folder: Path, **parts: bool) -> tuple[str, str]:
+    done = export_c(thing, folder, check=False, **parts)
     assert (folder / f"{done.name}_card.md").read_text("utf-8").startswith("# Model card")
     return (folder / f"{done.name}_card.json").read_text("utf-8"), done.hash
 
@@ -48,4 +48,19 @@ def test_the_card_goes_out(export: Callable[[Surrogate, Path], tuple[str, str]],
     text, weights = export(thing, tmp_path)
     card = json.loads(text)
     assert (card["author"], card["licence"]) == ("A. Author </script>", "CC-BY-4.0")
-    assert card["hashes"]["weights"] == weights
+    named = {name: value for name, value in card["hashes"].items() if name.startswith("weights")}
+    assert list(named.values()) == [weights]
+
+
+def test_the_card_says_of_which_weights_the_hash_is(tmp_path: Path):
+    thing = body("relaxation")
+    labels = {}
+    for number, parts in enumerate(({}, {"with_field": False}, {"deviation": False, "with_field": False})):
+        text, _ = _c(thing, tmp_path / str(number), **parts)
+        labels |= json.loads(text)["hashes"]
+    assert [name for name in labels if name.startswith("weights")] == [
+        "weights with the field displacement",
+        "weights without a field",
+        "weights without a field, without the deviation",
+    ]
+    assert len(set(labels.values())) == len(labels)

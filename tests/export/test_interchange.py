@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import struct
 import sys
 from pathlib import Path
@@ -18,7 +19,7 @@ import trimesh
 import xarray as xr
 
 from bent import body as bent_body
-from palpate.cli.exchange_commands import stroke_of
+from palpate.cli.drawn_stroke import reservations_about, stroke_of
 from palpate.dataset.dataset_tables import write_fields_csv, write_table
 from palpate.errors import UsageError
 from palpate.export.gltf import ShapeSeries, write_glb
@@ -29,7 +30,7 @@ from solved import solved
 
 sys.path.append(str(Path(__file__).parents[1] / "surrogates"))
 from field_made import field
-from touch_made import touch_energy
+from touch_made import ball, touch_energy
 
 
 @pytest.fixture(scope="module")
@@ -206,6 +207,26 @@ def test_a_learnt_bodys_stroke_goes_out(tmp_path):
     shifted = stroke_of(body, 2, at="0.01,0.0,0.0", depth=0.002)
     np.testing.assert_allclose(shifted[-1, 0], 0.01, atol=1e-9)
     assert body.energy.depth(shifted)[-1] == pytest.approx(0.002, rel=1e-6)
+
+
+def test_a_stroke_touches_where_it_is_told_to_and_along_the_normal():
+    body = Surrogate(touch_energy(surface=ball()), {"displacement": field(curved=True)}, meta={"name": "cap"})
+    centre = np.array([0.0, 0.0, -0.03])  # of the ball whose cap is pressed
+    place = centre + 0.03 * np.array([0.28, 0.0, 0.96])
+    X = stroke_of(body, 4, at=",".join(map(str, place)), depth=0.004)
+    np.testing.assert_allclose(np.cross(X - centre, place - centre), 0.0, atol=2e-6)  # the normal of a ball
+    np.testing.assert_allclose(body.energy.depth(X), [0.001, 0.002, 0.003, 0.004], atol=1e-4)
+    assert reservations_about(body, X) == []
+    assert "deeper than the 12 mm" in reservations_about(body, stroke_of(body, 4, depth=0.0125))[0]
+    for at, depth, said in (
+        ("0,0,0.02", None, r"No contact at 0,0,0\.02"),
+        ("0.5,0,0", None, "nearest place of the surface is --at"),
+        ("nan,0,0", None, "no place of three numbers"),
+        (None, 0.06, "leaves the surface"),
+    ):
+        with pytest.raises(UsageError) as error:
+            stroke_of(body, 4, at=at, depth=depth)
+        assert re.search(said, str(error.value) + str(error.value.fix))
 
 
 def test_what_can_not_go_out_is_refused(block, tmp_path):

@@ -3,32 +3,31 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from palpate.cli.console import Console
 from palpate.cli.export_commands import export_app
-from palpate.cli.table_options import Json
+from palpate.cli.table_options import Force, Json
 from palpate.errors import UsageError
+from palpate.output_files import require_outputs
 
-if TYPE_CHECKING:
-    import numpy as np
-
-    from palpate.surrogates import Surrogate
-
-__all__ = ["card", "export_dataset", "stroke_of"]
+__all__ = ["card", "export_dataset"]
 
 Steps = Annotated[int, typer.Option(min=1, help="States of the stroke, from first contact to the deepest.")]
 Place = Annotated[
     str | None,
     typer.Option(
-        help="Place of the probe's contact, x,y,z in m; of a held body the displacement. Default: the middle, "
-        "straight in."
+        help="Place of contact on the body's surface, x,y,z in m ([bold]palpate ask --at[/] takes the ball's centre); "
+        "the probe goes in against the surface there. Of a held body its displacement. Default: the middle."
     ),
 ]
 Depth = Annotated[
-    float | None, typer.Option(min=0, help="Largest depth in m. Default: the deepest trained one.")
+    float | None,
+    typer.Option(
+        min=0, help="Largest depth of the probe in the surface, m. Default: the deepest trained one."
+    ),
 ]
 
 
@@ -40,13 +39,17 @@ def card(
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="File for the card: .md or .json. Default: stdout.")
     ] = None,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Print the card of a model: what it was trained on, by whom, its errors, limits, hashes and licence."""
     from palpate.files import write_file
     from palpate.learning.loading import load
+    from palpate.output_files import sealed
     from palpate.surrogates.model_card import card_of
 
+    if out is not None:
+        require_outputs([out], endings=(".md", ".json"), overwrite=force)
     model: Any = load(file)
     if author or licence:
         if not save:
@@ -66,7 +69,7 @@ def card(
     found = card_of(model, file)
     if out is not None:
         text = found.to_json() + "\n" if out.suffix.lower() == ".json" else found.to_markdown()
-        write_file(out, text)
+        write_file(out, sealed(out, text))
         Console(as_json).result(str(out), {"card": str(out)})
         return
     Console(as_json).result(found.to_markdown().rstrip(), found.as_dict())
@@ -90,6 +93,7 @@ def export_dataset(
         bool, typer.Option("--fields", help="For .csv: also the fields at the nodes, to NAME-fields.csv.")
     ] = False,
     targets: Annotated[int, typer.Option(min=1, help="For .glb: most states of the body.")] = 8,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Write a dataset for other tools: a table of its solves, or the shapes of the body."""
@@ -110,14 +114,20 @@ def export_dataset(
     written = []
     if ending in SHAPES:
         written.append(
-            write_shapes(series_of_dataset(data, _rows(rows, len(data)), dataset.stem), out, targets=targets)
+            write_shapes(
+                series_of_dataset(data, _rows(rows, len(data)), dataset.stem),
+                out,
+                targets=targets,
+                overwrite=force,
+            )
         )
     else:
         if rows is not None:
             raise UsageError("--rows chooses shapes; a table has all solves.", fix="Omit it.")
-        written.append(write_table(data, out))
-        if fields:
-            written.append(write_fields_csv(data, out.with_name(f"{out.stem}-fields.csv")))
+        beside = [out.with_name(f"{out.stem}-fields.csv")] if fields else []
+        require_outputs([out, *beside], overwrite=force)
+        written.append(write_table(data, out, overwrite=force))
+        written += [write_fields_csv(data, path, overwrite=force) for path in beside]
     Console(as_json).result("\n".join(map(str, written)), {"files": [str(path) for path in written]})
 
 
@@ -140,14 +150,19 @@ def to_gltf(
     file: Annotated[
         Path, typer.Argument(help="Model file (.palpate) of a body that was learnt with its shape.")
     ],
-    out: Annotated[Path | None, typer.Option("-o", "--out", help="File. Default: NAME.glb.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="File. Default: NAME.glb, beside the file.")
+    ] = None,
     at: Place = None,
     depth: Depth = None,
     steps: Steps = 8,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Write the body under a stroke as glTF (GLB), with the deformation as morph targets, for viewers and web pages."""
-    _write(file, out or file.with_suffix(".glb"), at, depth, steps, Console(as_json))
+    path = out or file.with_suffix(".glb")
+    require_outputs([path], endings=(".glb",), overwrite=force)
+    _write(file, path, stroke=(at, depth, steps), force=force, console=Console(as_json))
 
 
 @export_app.command("vtu")
@@ -156,90 +171,36 @@ def to_vtu(
         Path, typer.Argument(help="Model file (.palpate) of a body that was learnt with its shape.")
     ],
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="File (.pvd or .vtu). Default: NAME.pvd.")
+        Path | None,
+        typer.Option("-o", "--out", help="File (.pvd or .vtu). Default: NAME.pvd, beside the file."),
     ] = None,
     at: Place = None,
     depth: Depth = None,
     steps: Steps = 20,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Write the body under a stroke as VTU files and a PVD file, which ParaView plays."""
-    _write(file, out or file.with_suffix(".pvd"), at, depth, steps, Console(as_json))
+    path = out or file.with_suffix(".pvd")
+    require_outputs([path], endings=(".pvd", ".vtu"), overwrite=force)
+    _write(file, path, stroke=(at, depth, steps), force=force, console=Console(as_json))
 
 
-def _write(file: Path, out: Path, at: str | None, depth: float | None, steps: int, console: Console) -> None:
+def _write(
+    file: Path, out: Path, *, stroke: tuple[str | None, float | None, int], force: bool, console: Console
+) -> None:
+    from palpate.cli.drawn_stroke import reservations_about, stroke_of
     from palpate.export.shape_files import series_of_surrogate, write_shapes
     from palpate.surrogates import Surrogate
 
+    at, depth, steps = stroke
     body = Surrogate.load(file)
-    series = series_of_surrogate(body, stroke_of(body, steps, at, depth))
-    path = write_shapes(series, out, targets=steps, card=body.card(file).as_dict())
+    X = stroke_of(body, steps, at, depth)
+    for warning in reservations_about(body, X):
+        console.say(f"warning: {warning}")
+    series = series_of_surrogate(body, X)
+    path = write_shapes(series, out, targets=steps, card=body.card(file).as_dict(), overwrite=force)
     size = path.stat().st_size
     console.result(
         f"{path}  {size / 1e3:.0f} kB, {steps} states", {"file": str(path), "states": steps, "bytes": size}
     )
-
-
-def stroke_of(body: Surrogate, steps: int, at: str | None = None, depth: float | None = None) -> np.ndarray:
-    """Return the inputs (steps, n) of a stroke from just after rest to the deepest place.
-
-    Parameters
-    ----------
-    body : Surrogate
-        The learnt body.
-    steps : int
-        Number of states.
-    at : str, optional
-        x,y,z in m: the place of contact of a pressed body, the displacement in the end of a held one. By default the
-        middle of what was trained, straight into the body.
-    depth : float, optional
-        Largest depth in m; by default the deepest trained one.
-
-    Raises
-    ------
-    UsageError
-        If the place is no three numbers.
-    """
-    import numpy as np
-
-    from palpate.runtime.touchable import touchable
-    from palpate.units import bounds
-
-    shares = np.arange(1, steps + 1) / steps
-    given = None if at is None else _numbers(at)
-    shown = body.fields.get("displacement")
-    asked: Any = getattr(shown, "asked_by", None)
-    if asked not in {None, "load"}:
-        raise UsageError(
-            f"The shape of {body.name!r} depends on what came before.",
-            why="It remembers, so that a place alone does not tell its shape.",
-            fix="Record a touch and export that: palpate run --record, palpate trace export.",
-        )
-    if asked == "load":
-        low, high = bounds(shown.inputs)  # type: ignore[union-attr]  # it has a field of nodes; from no load to all
-        return np.asarray(shares[:, None] * np.where(np.abs(high) >= np.abs(low), high, low))
-    hand = touchable(body)
-    low, high = bounds(body.inputs)
-    far = hand.deepest if depth is None else depth
-    if hand.surface is not None:
-        centre, normal = np.asarray(hand.home), np.asarray(hand.normal)
-        if given is not None:  # first contact is a radius above the place on the surface
-            centre = given + hand.radius * normal
-        places = centre - far * shares[:, None] * normal
-    else:
-        whole = given if given is not None else np.array([0.0, 0.0, far])[: len(low)]
-        places = shares[:, None] * whole
-    rest = np.tile((low + high)[None, places.shape[1] :] / 2, (steps, 1))
-    return np.hstack([places, rest])
-
-
-def _numbers(text: str) -> np.ndarray:
-    import numpy as np
-
-    try:
-        values = np.array([float(part) for part in text.split(",")])
-    except ValueError as error:
-        raise UsageError(f"{text!r} is no place.", fix="Write x,y,z in m, such as 0.05,0.05,0.05.") from error
-    if len(values) != 3:
-        raise UsageError(f"{text!r} has {len(values)} numbers; a place has three.", fix="Write x,y,z in m.")
-    return values

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -9,10 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from palpate.cli.console import Console
-from palpate.cli.table_options import Json
+from palpate.cli.table_options import Force, Json
 from palpate.errors import UsageError
 
 if TYPE_CHECKING:
+    from palpate.export.c_export import ExportedC
     from palpate.export.check_points import Comparison
     from palpate.network import Network
     from palpate.surrogates import Surrogate
@@ -27,7 +29,7 @@ export_app = typer.Typer(
 LearntFile = Annotated[
     Path, typer.Argument(help="Model file (.palpate), of [bold]palpate learn[/] or [bold]palpate fit[/].")
 ]
-Name = Annotated[str | None, typer.Option(help="Beginning of all names in C. Default: the body's name.")]
+Name = Annotated[str | None, typer.Option(help="Beginning of all names in C. Default: the file's name.")]
 FieldName = Annotated[str | None, typer.Option(help="The field that goes out. Default: the displacement.")]
 NoField = Annotated[bool, typer.Option("--no-field", help="Leave the field out.")]
 NoDeviation = Annotated[
@@ -40,6 +42,14 @@ Compiler = Annotated[
         help="C compiler for the comparison. Default: that of the variable CC, or the first one found."
     ),
 ]
+
+
+_MISSING = {
+    "FMPy": "FMPy is not installed (pip install 'palpate[check]')",
+    "wasmtime": "wasmtime is not installed (pip install 'palpate[check]')",
+    "ONNX Runtime": "ONNX Runtime is not installed (pip install 'palpate[onnx]')",
+}
+"""What is said where an export is not compared, by the program that would run it."""
 
 
 def _read(file: Path) -> Surrogate | Network:
@@ -65,10 +75,30 @@ def _read(file: Path) -> Surrogate | Network:
     return thing
 
 
+def _name_of(file: Path) -> str:
+    """Return the beginning of names in C after a file."""
+    from palpate.export.weights_block import identifier
+
+    name = identifier(file.stem)
+    return f"model{name}" if name.startswith("_") else name
+
+
+def _say_left_out(console: Console, thing: Surrogate | Network, done: ExportedC, *, no_field: bool) -> None:
+    """Say that the shape of a beam did not go out, and why."""
+    fields = list(getattr(thing, "fields", ()))
+    if fields and not done.field and not no_field:
+        console.say(
+            f"left out: the field {fields[0]}, since it is at the nodes of a beam, and the evaluator core knows "
+            "fields on surfaces; force and energy are the same"
+        )
+
+
 @export_app.command("c")
 def to_c(
     file: LearntFile,
-    out: Annotated[Path | None, typer.Option(help="Folder for the files. Default: the body's name.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the files. Default: the file's name, beside it.")
+    ] = None,
     name: Name = None,
     single: Annotated[bool, typer.Option("--float", help="Numbers of single precision.")] = False,
     field: FieldName = None,
@@ -76,6 +106,7 @@ def to_c(
     no_deviation: NoDeviation = False,
     no_check: NoCheck = False,
     compiler: Compiler = None,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Write C99: a header, a source with the weights as tables, an example and a CMake file.
@@ -89,34 +120,41 @@ def to_c(
     console = Console(as_json)
     done = export_c(
         thing,
-        Path(name or file.stem) if out is None else out,
-        name=name,
+        file.with_name(name or file.stem) if out is None else out,
+        name=name or _name_of(file),
         single=single,
         field=field,
         with_field=not no_field,
         deviation=not no_deviation,
         check=not no_check,
         compiler=compiler,
+        overwrite=force,
     )
     if done.comparison is None:
         console.say(
             "not compared with palpate: " + ("not asked for" if no_check else "no C compiler was found")
         )
+    _say_left_out(console, thing, done, no_field=no_field)
     lines = [f"{f}  {f.stat().st_size / 1e3:.0f} kB" for f in done.files]
     lines += [] if done.comparison is None else [str(done.comparison)]
     console.result("\n".join(lines), done.as_dict())
+    words = shlex.join(map(str, (done.example, *done.sources)))
+    console.say(f"Next: cc -O2 {words} -lm && ./a.out")
 
 
 @export_app.command("lib")
 def to_library(
     file: LearntFile,
-    out: Annotated[Path | None, typer.Option(help="Folder for the files. Default: the body's name.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the files. Default: the file's name, beside it.")
+    ] = None,
     name: Name = None,
     field: FieldName = None,
     no_field: NoField = False,
     no_deviation: NoDeviation = False,
     no_check: NoCheck = False,
     compiler: Compiler = None,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Compile a shared library with a plain C ABI, with wrappers for Python, Unity, Unreal and MATLAB.
@@ -125,19 +163,21 @@ def to_library(
     """
     from palpate.export import export_lib
 
-    console = Console(as_json)
+    thing, console = _body(file), Console(as_json)
     done = export_lib(
-        _body(file),
-        Path(name or file.stem) if out is None else out,
-        name=name,
+        thing,
+        file.with_name(name or file.stem) if out is None else out,
+        name=name or _name_of(file),
         field=field,
         with_field=not no_field,
         deviation=not no_deviation,
         check=not no_check,
         compiler=compiler,
+        overwrite=force,
     )
     if done.library is None:
         console.say("no C compiler was found: build the library with CMake, -DBUILD_SHARED_LIBS=ON")
+    _say_left_out(console, thing, done.sources, no_field=no_field)
     lines = [f"{f}  {f.stat().st_size / 1e3:.0f} kB" for f in done.files]
     lines += [] if done.comparison is None else [str(done.comparison)]
     content = replace(done.sources, comparison=done.comparison).as_dict()
@@ -148,13 +188,16 @@ def to_library(
 @export_app.command("fmu")
 def to_fmu(
     file: LearntFile,
-    out: Annotated[Path | None, typer.Option("-o", "--out", help="File. Default: NAME.fmu.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="File, NAME.fmu. Default: the file's name, beside it.")
+    ] = None,
     name: Name = None,
     fmi: Annotated[
         str, typer.Option("--fmi", help="Version of FMI: 2.0, which most tools import, or 3.0.")
     ] = "2.0",
     no_deviation: NoDeviation = False,
     no_check: NoCheck = False,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Write an FMU (FMI 2.0 or 3.0) for Simulink and others; nothing is compiled.
@@ -164,13 +207,19 @@ def to_fmu(
     from palpate.export import export_fmu
 
     thing, console = _body(file), Console(as_json)
-    path = out if out is not None else Path(f"{name or file.stem}.fmu")
-    done = export_fmu(thing, path, name=name, fmi=fmi, deviation=not no_deviation, check=not no_check)
+    path = out if out is not None else file.with_name(f"{name or file.stem}.fmu")
+    done = export_fmu(
+        thing,
+        path,
+        name=name or _name_of(file),
+        fmi=fmi,
+        deviation=not no_deviation,
+        check=not no_check,
+        overwrite=force,
+    )
     comparison = done.comparison
     if comparison is None:
-        console.say(
-            "not compared with palpate: " + ("not asked for" if no_check else "FMPy is not installed")
-        )
+        console.say("not compared with palpate: " + ("not asked for" if no_check else _MISSING["FMPy"]))
     kinds = "co-simulation and model exchange"
     if not done.exchange and thing.memory is not None:
         kinds = f"co-simulation alone because of the memory {thing.memory.name!r}"
@@ -197,7 +246,7 @@ def _body(file: Path) -> Surrogate:
         raise UsageError(
             f"{file} holds a network alone.",
             why="This way out is for learnt bodies, which answer a hand.",
-            fix="Take the network out as C99: palpate export c.",
+            fix="Take the network out with `palpate export c` or `palpate export onnx`.",
         )
     return thing
 
@@ -206,13 +255,14 @@ def _body(file: Path) -> Surrogate:
 def to_onnx(
     file: LearntFile,
     out: Annotated[
-        Path | None, typer.Option(help="File. Default: the model's name, ending in .onnx.")
+        Path | None, typer.Option("-o", "--out", help="File, NAME.onnx. Default: the file's name, beside it.")
     ] = None,
     single: Annotated[
         bool, typer.Option("--float", help="Numbers of 32 bits, which browsers' runtimes take.")
     ] = False,
     elastic: Annotated[bool, typer.Option("--elastic", help="Leave a memory out.")] = False,
     no_check: Annotated[bool, typer.Option("--no-check", help="Don't compare with palpate.")] = False,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Write an ONNX model: energy, force, stiffness and trust from one graph, for many places at a time.
@@ -223,7 +273,7 @@ def to_onnx(
 
     console = Console(as_json)
     path = file.with_suffix(".onnx") if out is None else out
-    done = export_onnx(_read(file), path, single=single, elastic=elastic, check=not no_check)
+    done = export_onnx(_read(file), path, single=single, elastic=elastic, check=not no_check, overwrite=force)
     _tell(console, done.file, done.hash, done.comparison, "ONNX Runtime", no_check=no_check)
 
 
@@ -231,23 +281,20 @@ def to_onnx(
 def to_html(
     file: LearntFile,
     out: Annotated[
-        Path | None, typer.Option(help="File. Default: the model's name, ending in .html.")
+        Path | None,
+        typer.Option("-o", "--out", help="File. Default: NAME-page.html beside the file NAME.palpate."),
     ] = None,
     no_check: Annotated[bool, typer.Option("--no-check", help="Don't compare with palpate.")] = False,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Write one HTML file with the body in it, which is touched in any browser: from disk, without a network."""
-    from palpate.surrogates import Surrogate
     from palpate.viewer.file_page import export_html
 
-    thing = _read(file)
-    if not isinstance(thing, Surrogate):
-        raise UsageError(
-            f"{file} holds a network, and a page shows a body.",
-            fix="Export it with `palpate export onnx` or `palpate export c`.",
-        )
-    console = Console(as_json)
-    done = export_html(thing, file.with_suffix(".html") if out is None else out, check=not no_check)
+    thing, console = _body(file), Console(as_json)
+    # NAME.html is the report of `palpate validate`
+    path = file.with_name(f"{file.stem}-page.html") if out is None else out
+    done = export_html(thing, path, check=not no_check, overwrite=force)
     if done.left_out:
         console.say(f"not in the file: {', '.join(done.left_out)} (5 MB are full, or it is on other nodes)")
     _tell(console, done.file, done.hash, done.comparison, "wasmtime", no_check=no_check)
@@ -258,9 +305,7 @@ def _tell(
 ) -> None:
     """Print what was written, and how far it is from palpate."""
     if comparison is None:
-        console.say(
-            "not compared with palpate: " + ("not asked for" if no_check else f"{runtime} is not installed")
-        )
+        console.say("not compared with palpate: " + ("not asked for" if no_check else _MISSING[runtime]))
     lines = [f"{file}  {file.stat().st_size / 1e6:.2f} MB"]
     lines += [] if comparison is None else [str(comparison)]
     parts = {} if comparison is None else comparison.parts

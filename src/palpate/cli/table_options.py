@@ -11,9 +11,12 @@ import typer
 
 from palpate.errors import UsageError
 
-__all__ = ["Json", "MissingOption", "column_list", "with_table_options"]
+__all__ = ["Force", "Json", "MissingOption", "column_list", "with_table_options"]
 
 Json = Annotated[bool, typer.Option("--json", help="Print the results as one JSON object.")]
+Force = Annotated[
+    bool, typer.Option("--force", help="Replace files that exist and that no export of palpate wrote.")
+]
 MissingOption = Annotated[
     str, typer.Option("--missing", help="Rows in which a value is missing: leave-out or refuse.")
 ]

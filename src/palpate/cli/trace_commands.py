@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from palpate.cli.console import Console
-from palpate.cli.table_options import Json
+from palpate.cli.table_options import Force, Json
 from palpate.errors import UsageError
 
 if TYPE_CHECKING:
@@ -199,15 +199,16 @@ def _why_not(trace: Trace) -> str:
 def export(
     file: TraceFile,
     out: Annotated[Path, typer.Option("-o", "--out", help="Table to write: .csv, .npz or .parquet.")],
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Write a trace as a table for other programs: CSV, NumPy's NPZ, or Parquet (with palpate[results])."""
+    """Write a trace as a table for other programs: CSV, NumPy's NPZ, or Parquet (with pyarrow)."""
     from palpate.format import count
     from palpate.runtime.trace_export import export_trace
 
     console = Console(as_json)
     trace = _read(file, console)
-    path = export_trace(trace, out)
+    path = export_trace(trace, out, overwrite=force)
     console.result(f"{path}: {count(len(trace), 'row')}", {"file": str(path), "rows": len(trace)})
 
 

@@ -20,6 +20,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.files import write_file, writing
+from palpate.output_files import require_outputs
 
 if TYPE_CHECKING:
     from palpate.dataset.dataset import Dataset
@@ -32,7 +33,7 @@ TABLES = (".csv", ".parquet", ".nc")
 _FIELD_DIMS = ("node", "component")
 
 
-def write_table(data: Dataset, path: str | os.PathLike[str]) -> Path:
+def write_table(data: Dataset, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
     """Write the solves of a dataset to a file; its ending decides the format: .csv, .parquet or .nc.
 
     Parameters
@@ -41,14 +42,19 @@ def write_table(data: Dataset, path: str | os.PathLike[str]) -> Path:
         The dataset; rows that did not converge are written too, with their reason in `message`.
     path : path
         File to write.
+    overwrite : bool
+        True replaces a file that exists.
 
     Raises
     ------
     UsageError
-        For another ending, or where Parquet files can't be written since pyarrow is not installed.
+        For another ending, for a file that exists, or where Parquet files can't be written since pyarrow is not
+        installed.
     """
     target = Path(path)
     ending = target.suffix.lower()
+    if ending in TABLES:
+        require_outputs([target], overwrite=overwrite)
     if ending == ".csv":
         return _write_csv(target, columns_of(data))
     if ending == ".parquet":
@@ -79,7 +85,7 @@ def columns_of(data: Dataset) -> list[tuple[str, str, np.ndarray]]:
     return columns
 
 
-def write_fields_csv(data: Dataset, path: str | os.PathLike[str]) -> Path:
+def write_fields_csv(data: Dataset, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
     """Write the fields over the nodes as CSV: a row for each node of each solve that converged.
 
     Parameters
@@ -88,12 +94,15 @@ def write_fields_csv(data: Dataset, path: str | os.PathLike[str]) -> Path:
         The dataset.
     path : path
         File to write, such as ``NAME-fields.csv``.
+    overwrite : bool
+        True replaces a file that exists.
 
     Raises
     ------
     UsageError
-        If the dataset has no fields.
+        If the dataset has no fields, or the file exists.
     """
+    require_outputs([path], endings=(".csv",), overwrite=overwrite)
     fields = [
         str(n) for n in data.data.data_vars if "node" in data.data[n].dims and "sample" in data.data[n].dims
     ]
@@ -157,7 +166,7 @@ def _write_parquet(target: Path, data: Dataset) -> Path:
         raise UsageError(
             "Parquet files can't be written.",
             why="The package pyarrow is not installed.",
-            fix="pip install palpate[results]",
+            fix="Run: pip install 'palpate[parquet]'",
         ) from error
     columns = columns_of(data)
     arrays = [pa.array(values.tolist() if values.dtype.kind in "OU" else values) for _, _, values in columns]

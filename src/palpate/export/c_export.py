@@ -15,8 +15,9 @@ from palpate.export.check_program import CheckProgram
 from palpate.export.compilers import find_compiler
 from palpate.export.field_tables import chosen_field
 from palpate.export.weights_block import ROOT, WeightsBlock, identifier
-from palpate.files import write_file
+from palpate.files import system_errors, write_file
 from palpate.network import Network
+from palpate.output_files import require_outputs, sealed
 from palpate.surrogates import Surrogate
 from palpate.surrogates.model_card import card_of
 
@@ -52,6 +53,11 @@ class ExportedC:
         """The .c files that belong into a program."""
         return tuple(f for f in self.files if f.suffix == ".c" and f.name != "example.c")
 
+    @property
+    def example(self) -> Path:
+        """The program that presses the body once."""
+        return next(f for f in self.files if f.name == "example.c")
+
     def as_dict(self) -> dict[str, Any]:
         """Return what was written and compared, for JSON."""
         parts = {} if self.comparison is None else self.comparison.parts
@@ -79,6 +85,7 @@ def export_c(
     deviation: bool = True,
     check: bool = True,
     compiler: str | None = None,
+    overwrite: bool = False,
 ) -> ExportedC:
     """Write a body or a network as C99, and compare it with palpate at 1,000 places if there is a C compiler.
 
@@ -87,7 +94,7 @@ def export_c(
     thing : Surrogate or Network
         What goes out.
     out : path
-        Folder for the files; it is made if need be.
+        Folder for the files; it is made where it is missing, in a folder that exists.
     name : str, optional
         Beginning of all names in C; by default the body's name.
     single : bool
@@ -100,19 +107,24 @@ def export_c(
         Whether it is compiled and compared.
     compiler : str, optional
         Name of the compiler to compare with; by default that of the variable CC, or the first one found.
+    overwrite : bool
+        True replaces files whatever they are; by default those alone that an earlier export wrote.
 
     Raises
     ------
     UsageError
-        If the name is no identifier, or a part of the body has no C source.
+        If the name is no identifier, a part of the body has no C source, there is no such compiler, or a file exists
+        that no export wrote.
     AccuracyError
         If the compiled files differ from palpate by more than they may; nothing is written.
     """
     name = require_name(identifier(_default_name(thing)) if name is None else name)
     block = block_of(thing, field=field, with_field=with_field, deviation=deviation)
     texts = c_files(thing, block, name, single=single)
-    card = card_of(thing).with_hash("weights", block.hash)
+    card = card_of(thing).with_hash(block.label, block.hash)
     texts |= {f"{name}_card.md": card.to_markdown(), f"{name}_card.json": card.to_json()}
+    folder = Path(out)
+    require_outputs((folder / file for file in texts), folder=folder, overwrite=overwrite)
     path, comparison = find_compiler(compiler) if check else None, None
     if path is not None:
         with tempfile.TemporaryDirectory() as place:
@@ -127,13 +139,13 @@ def export_c(
                 fix="Nothing was written. "
                 + ("Export in double precision." if single else "Try another compiler, and report this."),
             )
-    folder = Path(out)
-    folder.mkdir(parents=True, exist_ok=True)
+    with system_errors(f"The folder {folder} could not be made."):
+        folder.mkdir(exist_ok=True)
     return ExportedC(_write(folder, texts), name, block.hash, block.field, comparison)
 
 
 def _write(folder: Path, texts: dict[str, str]) -> tuple[Path, ...]:
-    return tuple(write_file(folder / file, text) for file, text in texts.items())
+    return tuple(write_file(folder / file, sealed(file, text)) for file, text in texts.items())
 
 
 def block_of(

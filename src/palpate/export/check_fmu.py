@@ -178,7 +178,7 @@ class CheckFmu:
             import fmpy
         except ImportError as error:
             raise ResourceError(
-                "An FMU is compared with palpate through FMPy.", fix="pip install fmpy"
+                "An FMU is compared with palpate through FMPy.", fix="Run: pip install 'palpate[check]'"
             ) from error
         self._description = fmpy.read_model_description(str(path))
         self._folder = fmpy.extract(str(path))

@@ -8,7 +8,7 @@ import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
-from palpate.errors import ResourceError
+from palpate.errors import ResourceError, UsageError
 
 __all__ = ["COMPILERS", "STRICT", "compile_c", "find_compiler"]
 
@@ -18,7 +18,20 @@ _LONGEST = 300.0  # s
 
 
 def find_compiler(name: str | None = None) -> str | None:
-    """Return the path of a C compiler: that of a name, of the variable CC, or the first one known; None without any."""
+    """Return the path of a C compiler: that of a name, of the variable CC, or the first one known; None without any.
+
+    Raises
+    ------
+    UsageError
+        If there is no compiler of that name.
+    """
+    if name and shutil.which(name) is None:
+        raise UsageError(
+            f"There is no compiler {name!r}.",
+            why="No program of that name is found in the folders of PATH.",
+            fix="Give another name or a path, or leave it out to take the first one of "
+            f"{', '.join(COMPILERS)} that is found.",
+        )
     for word in [name] if name else [os.environ.get("CC"), *COMPILERS]:
         if word and (path := shutil.which(word)):
             return path

@@ -23,6 +23,7 @@ from palpate.export.fmu_description import SOURCE, build_description, model_desc
 from palpate.export.fmu_variables import has_exchange
 from palpate.export.weights_block import WeightsBlock, identifier
 from palpate.files import write_file
+from palpate.output_files import require_outputs
 from palpate.surrogates import Surrogate
 from palpate.surrogates.model_card import card_of
 
@@ -92,6 +93,7 @@ def export_fmu(
     fmi: str = "2.0",
     deviation: bool = True,
     check: bool = True,
+    overwrite: bool = False,
 ) -> ExportedFmu:
     """Write a body as an FMU, and compare it with palpate at 1,000 places if FMPy is installed.
 
@@ -109,11 +111,14 @@ def export_fmu(
         Whether the deviation of the force goes out.
     check : bool
         Whether it is compared.
+    overwrite : bool
+        True replaces files whatever they are; by default those alone that an earlier export wrote.
 
     Raises
     ------
     UsageError
-        If its baseline or memory is none of those that the generic binary holds, or there is no such version.
+        If its baseline or memory is none of those that the generic binary holds, there is no such version, the name
+        does not end in ``.fmu``, or a file exists that no export wrote.
     AccuracyError
         If it differs from palpate by more than it may; nothing is written.
     """
@@ -123,6 +128,7 @@ def export_fmu(
             why="FMUs of different versions are different files.",
             fix=f"Give {' or '.join(VERSIONS)}.",
         )
+    require_outputs([out], endings=(".fmu",), overwrite=overwrite)
     name = require_name(identifier(surrogate.name) if name is None else name)
     block = WeightsBlock.of(surrogate, deviation=deviation)
     _, _, baseline, memory = block.tables[0].values[:4].tolist()
@@ -142,7 +148,7 @@ def export_fmu(
     }
     if fmi == "3.0":
         entries["sources/buildDescription.xml"] = build_description(name).encode()
-    card = card_of(surrogate).with_hash("weights", block.hash)
+    card = card_of(surrogate).with_hash(block.label, block.hash)
     entries |= {
         "documentation/card.md": card.to_markdown().encode(),
         "documentation/card.json": card.to_json().encode(),

@@ -19,6 +19,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.files import write_file
+from palpate.output_files import require_outputs
 
 __all__ = ["MOST_TARGETS", "ShapeSeries", "glb_bytes", "write_glb"]
 
@@ -99,6 +100,7 @@ def write_glb(
     targets: int = MOST_TARGETS,
     seconds: float = 2.0,
     card: dict[str, Any] | None = None,
+    overwrite: bool = False,
 ) -> Path:
     """Write a series of shapes as GLB and return its path.
 
@@ -114,20 +116,16 @@ def write_glb(
         Duration of the stroke; it goes on to the last state and back.
     card : mapping, optional
         Model card for the file's `extras`.
+    overwrite : bool
+        True replaces files whatever they are; by default those alone that an earlier export wrote.
 
     Raises
     ------
     UsageError
-        For another ending.
+        For another ending, or a file that exists and that no export wrote.
     """
-    target = Path(path)
-    if target.suffix.lower() != ".glb":
-        raise UsageError(
-            f"The file {target} doesn't end in .glb.",
-            why="Viewers tell the format by the name.",
-            fix=f"Write to {target.with_suffix('.glb').name}.",
-        )
-    return write_file(target, glb_bytes(series, targets=targets, seconds=seconds, card=card))
+    require_outputs([path], endings=(".glb",), overwrite=overwrite)
+    return write_file(path, glb_bytes(series, targets=targets, seconds=seconds, card=card))
 
 
 def glb_bytes(

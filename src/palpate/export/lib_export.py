@@ -21,7 +21,8 @@ from palpate.export.check_points import Comparison, compare_body
 from palpate.export.compilers import compile_c, find_compiler
 from palpate.export.lib_templates import CSHARP, MATLAB_EXAMPLE, MATLAB_HEADER, PYTHON, UNREAL
 from palpate.export.weights_block import ROOT
-from palpate.files import write_file
+from palpate.files import system_errors, write_file
+from palpate.output_files import require_outputs, sealed
 from palpate.surrogates import Surrogate
 
 __all__ = ["ExportedLibrary", "export_lib", "library_name"]
@@ -70,6 +71,7 @@ def export_lib(
     deviation: bool = True,
     check: bool = True,
     compiler: str | None = None,
+    overwrite: bool = False,
 ) -> ExportedLibrary:
     """Write a body as a shared library with its sources and wrappers.
 
@@ -78,18 +80,21 @@ def export_lib(
     surrogate : Surrogate
         The body.
     out : path
-        Folder for the files.
+        Folder for the files; it is made where it is missing, in a folder that exists.
     name, field, with_field, deviation : optional
         As `palpate.export.export_c` takes them.
     check : bool
         Whether the library is compared with palpate.
     compiler : str, optional
         Name of the compiler; by default that of the variable CC, or the first one found.
+    overwrite : bool
+        True replaces files whatever they are; by default those alone that an earlier export wrote.
 
     Raises
     ------
     UsageError
-        If the name is no identifier, or a part of the body has no C source.
+        If the name is no identifier, a part of the body has no C source, there is no such compiler, or a file exists
+        that no export wrote.
     ResourceError
         If the compiler refuses the sources.
     AccuracyError
@@ -99,7 +104,7 @@ def export_lib(
     # a library that was loaded can't be removed on Windows
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as place:
         built = _build(surrogate, Path(place), name, parts, compiler, check=check)
-        return _copy(built, Path(out))
+        return _copy(built, Path(out), overwrite=overwrite)
 
 
 def _build(
@@ -113,7 +118,9 @@ def _build(
 ) -> ExportedLibrary:
     """Return the library and all beside it, written into a folder and compared there."""
     done = export_c(surrogate, folder, name=name, check=False, **parts)
-    wrappers = tuple(write_file(folder / file, text) for file, text in _wrappers(surrogate, done).items())
+    wrappers = tuple(
+        write_file(folder / file, sealed(file, text)) for file, text in _wrappers(surrogate, done).items()
+    )
     path = find_compiler(compiler)
     if path is None:
         return ExportedLibrary(done, wrappers, None, None)
@@ -138,9 +145,11 @@ def _install_name(file: str) -> tuple[str, ...]:
     return (f"-Wl,-install_name,@rpath/{file}",) if sys.platform == "darwin" else ()
 
 
-def _copy(built: ExportedLibrary, folder: Path) -> ExportedLibrary:
-    """Write all files into a folder, which is made if need be."""
-    folder.mkdir(parents=True, exist_ok=True)
+def _copy(built: ExportedLibrary, folder: Path, *, overwrite: bool) -> ExportedLibrary:
+    """Write all files into a folder, which is made where it is missing."""
+    require_outputs((folder / file.name for file in built.files), folder=folder, overwrite=overwrite)
+    with system_errors(f"The folder {folder} could not be made."):
+        folder.mkdir(exist_ok=True)
     for file in built.files:
         write_file(folder / file.name, file.read_bytes())
     library = None if built.library is None else folder / built.library.name

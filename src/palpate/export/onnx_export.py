@@ -22,6 +22,7 @@ from palpate.export.onnx_network import add_network
 from palpate.export.weights_block import WeightsBlock
 from palpate.files import write_file
 from palpate.network import Network
+from palpate.output_files import require_outputs
 from palpate.surrogates import Surrogate
 from palpate.surrogates.model_card import card_of
 
@@ -59,6 +60,7 @@ def export_onnx(
     elastic: bool = False,
     check: bool = True,
     tolerance: float = 1e-2,
+    overwrite: bool = False,
 ) -> ExportedOnnx:
     """Write a body or a network as an ONNX model, and compare it with palpate in ONNX Runtime if that is installed.
 
@@ -67,7 +69,7 @@ def export_onnx(
     thing : Surrogate or Network
         What goes out.
     path : path
-        The file, which is replaced.
+        The file, NAME.onnx.
     single : bool
         Whether numbers are of 32 bits; the browser's runtimes take no others.
     elastic : bool
@@ -76,14 +78,18 @@ def export_onnx(
         Whether it is compared.
     tolerance : float
         Largest difference in single precision, relative to the largest value.
+    overwrite : bool
+        True replaces files whatever they are; by default those alone that an earlier export wrote.
 
     Raises
     ------
     UsageError
-        If the package onnx is missing, or the baseline or the memory has no ONNX form.
+        If the package onnx is missing, the baseline or the memory has no ONNX form, the name does not end in
+        ``.onnx``, or a file exists that no export wrote.
     AccuracyError
         If it does not answer as palpate does; nothing is written.
     """
+    require_outputs([path], endings=(".onnx",), overwrite=overwrite)
     require_onnx()
     if isinstance(thing, Surrogate) and thing.memory is not None:
         if not elastic:
@@ -101,7 +107,7 @@ def export_onnx(
     else:
         block, name = WeightsBlock.of(replace(thing, fields={})), thing.name
         add_body(graph, thing.energy)
-    model = graph.model(name, _metadata(thing, block.hash))
+    model = graph.model(name, _metadata(thing, block))
     comparison = _compared(thing, model, Precision(single, tolerance)) if check else None
     if comparison is not None and not comparison.passed:
         raise AccuracyError(
@@ -114,11 +120,16 @@ def export_onnx(
     return ExportedOnnx(write_file(Path(path), model.SerializeToString()), block.hash, comparison)
 
 
-def _metadata(thing: Surrogate | Network, sha256: str) -> dict[str, str]:
+def _metadata(thing: Surrogate | Network, block: WeightsBlock) -> dict[str, str]:
     """Return names, units, limits and the hash, as the model's properties."""
     inputs = [{"name": r.name, "unit": r.unit, "low": r.low, "high": r.high} for r in thing.inputs]
-    card = card_of(thing).with_hash("weights", sha256)
-    plain = {"inputs": json.dumps(inputs), "sha256": sha256, "producer": "palpate", "card": card.to_json()}
+    card = card_of(thing).with_hash(block.label, block.hash)
+    plain = {
+        "inputs": json.dumps(inputs),
+        "sha256": block.hash,
+        "producer": "palpate",
+        "card": card.to_json(),
+    }
     if isinstance(thing, Network):
         return plain | {"outputs": json.dumps([{"name": q.name, "unit": q.unit} for q in thing.outputs])}
     units = {

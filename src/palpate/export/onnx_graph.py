@@ -32,7 +32,7 @@ def require_onnx() -> Any:
         raise UsageError(
             "The package onnx is not installed.",
             why="Only exports to ONNX need it, so it does not come with palpate.",
-            fix='Run: pip install "palpate[onnx]"',
+            fix="Run: pip install 'palpate[onnx]'",
         ) from None
     return onnx
 

@@ -15,6 +15,7 @@ from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.export.gltf import MOST_TARGETS, ShapeSeries, write_glb
 from palpate.files import writing, writing_folder
+from palpate.output_files import require_outputs, seal
 
 __all__ = ["SHAPES", "series_of_dataset", "series_of_surrogate", "write_shapes", "write_vtu_series"]
 
@@ -30,6 +31,7 @@ def write_shapes(
     *,
     targets: int = MOST_TARGETS,
     card: dict[str, Any] | None = None,
+    overwrite: bool = False,
 ) -> Path:
     """Write shapes; the ending decides: .pvd (VTU files for ParaView), .vtu (the last state alone), or .glb.
 
@@ -43,18 +45,21 @@ def write_shapes(
         Most morph targets of a GLB file.
     card : mapping, optional
         Model card, for a GLB file.
+    overwrite : bool
+        True replaces files whatever they are; by default those alone that an earlier export wrote.
 
     Raises
     ------
     UsageError
-        For another ending.
+        For another ending, or a file that exists and that no export wrote.
     """
     ending = Path(path).suffix.lower()
     if ending == ".glb":
-        return write_glb(series, path, targets=targets, card=card)
+        return write_glb(series, path, targets=targets, card=card, overwrite=overwrite)
     if ending == ".pvd":
-        return write_vtu_series(series, path)
+        return write_vtu_series(series, path, overwrite=overwrite)
     if ending == ".vtu":
+        require_outputs([path], overwrite=overwrite)
         _write_state(series, len(series.values) - 1, Path(path))
         return Path(path)
     raise UsageError(
@@ -64,14 +69,17 @@ def write_shapes(
     )
 
 
-def write_vtu_series(series: ShapeSeries, path: str | os.PathLike[str]) -> Path:
-    """Write a PVD file, which ParaView plays, and a folder of VTU files beside it; rest comes first.
+def write_vtu_series(series: ShapeSeries, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+    """Write a PVD file, which ParaView plays, and a folder of VTU files beside it.
 
     Points are those at rest in m, z up; point data are ``displacement`` (m) and the series' other fields, in SI units.
+    `overwrite` is that of `write_shapes`.
     """
     target = Path(path)
     folder = target.with_suffix("")
     _require_own(folder, target)
+    states = sorted(folder.iterdir()) if folder.exists() else []
+    require_outputs([target, *states], overwrite=overwrite)
     collection = ElementTree.Element("VTKFile", type="Collection", version="0.1")
     entries = ElementTree.SubElement(collection, "Collection")
     with writing_folder(folder) as part:
@@ -83,6 +91,7 @@ def write_vtu_series(series: ShapeSeries, path: str | os.PathLike[str]) -> Path:
             ElementTree.SubElement(entries, "DataSet", entry)
     with writing(target) as part:
         ElementTree.ElementTree(collection).write(part, encoding="utf-8", xml_declaration=True)
+        seal(part)
     return target
 
 
@@ -108,6 +117,7 @@ def _write_state(series: ShapeSeries, step: int, path: Path) -> None:
     grid = meshio.Mesh(series.points, [(kind, series.cells)], point_data=data)
     with writing(path) as part:
         meshio.vtu.write(part, grid, header_type="UInt64")
+        seal(part)
 
 
 def series_of_dataset(data: Dataset, rows: Sequence[int] | None = None, name: str = "body") -> ShapeSeries:

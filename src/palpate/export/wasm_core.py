@@ -54,7 +54,7 @@ class WasmCore:
             raise UsageError(
                 "WebAssembly can't be run from Python here.",
                 why="The package wasmtime is not installed.",
-                fix="Run: pip install wasmtime",
+                fix="Run: pip install 'palpate[check]'",
             )
         engine = wasmtime.Engine()
         self._store, self._fields, self._shown = wasmtime.Store(engine), tuple(fields), 0

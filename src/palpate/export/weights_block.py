@@ -129,6 +129,14 @@ class WeightsBlock:
     field: str = ""
 
     @property
+    def label(self) -> str:
+        """Name of the weights in a model card: their hash is another one with other parts."""
+        if not self.baseline:
+            return "weights"
+        shown = f"with the field {self.field}" if self.field else "without a field"
+        return f"weights {shown}" + ("" if ROOT in self.tables else ", without the deviation")
+
+    @property
     def releases(self) -> bool:
         """True where the memory moves the rest of a body that nobody holds: its C source defines NAME_release."""
         return f" {self.memory}_release(" in self.sources.get(self.memory, "")

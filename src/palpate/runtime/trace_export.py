@@ -3,7 +3,7 @@
 =========  ============================================================================
 ``.csv``   text, with a head of names and units
 ``.npz``   arrays of NumPy, with the header as JSON
-``.parquet``  columns with their types; needs ``pip install palpate[results]``
+``.parquet``  columns with their types; needs ``pip install 'palpate[parquet]'``
 =========  ============================================================================
 """
 
@@ -19,6 +19,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.files import writing
+from palpate.output_files import require_outputs
 from palpate.runtime.recording import FLAGS
 from palpate.runtime.trace_file import Trace
 
@@ -79,13 +80,15 @@ def trace_table(trace: Trace) -> dict[str, np.ndarray]:
     return table | {"fault": ticks["fault"]} | {name: trace.flag(name) for name in FLAGS}
 
 
-def export_trace(trace: Trace, path: str | os.PathLike[str]) -> Path:
+def export_trace(trace: Trace, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
     """Write a trace as a table; the file's ending says in which of `FORMATS`.
+
+    A file that exists is replaced where `overwrite` is True.
 
     Raises
     ------
     UsageError
-        If the ending is another one, or pyarrow is missing for Parquet.
+        If the ending is another one, the file exists, or pyarrow is missing for Parquet.
     ResourceError
         If the disk is full or write-protected.
     """
@@ -95,6 +98,7 @@ def export_trace(trace: Trace, path: str | os.PathLike[str]) -> Path:
         raise UsageError(
             f"{target.name} names no format of a table.", fix=f"Let it end with {', '.join(FORMATS)}."
         )
+    require_outputs([target], overwrite=overwrite)
     with writing(target) as part:
         write(trace, part)
     return target
@@ -127,7 +131,7 @@ def _write_parquet(trace: Trace, path: Path) -> None:
     except ImportError as error:
         raise UsageError(
             "Parquet files need pyarrow, which is not installed.",
-            fix="Give pip install 'palpate[results]', or export to .npz or .csv.",
+            fix="Give pip install 'palpate[parquet]', or export to .npz or .csv.",
         ) from error
     table = pa.table(trace_table(trace))
     metadata = {"palpate": json.dumps(dict(trace.header)), "units": json.dumps(UNITS)}

@@ -27,6 +27,7 @@ from palpate.export.field_tables import PROMISE, SURFACE, field_tables
 from palpate.export.wasm_core import WasmCore, wasmtime_module
 from palpate.export.weights_block import FIELD, WeightsBlock
 from palpate.files import write_file
+from palpate.output_files import require_outputs, sealed
 from palpate.runtime.devices import device_traits
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import ContactBaseline, FieldSurrogate, Surrogate
@@ -79,7 +80,9 @@ class ExportedPage:
     left_out: tuple[str, ...] = ()
 
 
-def export_html(surrogate: Surrogate, path: str | os.PathLike[str], *, check: bool = True) -> ExportedPage:
+def export_html(
+    surrogate: Surrogate, path: str | os.PathLike[str], *, check: bool = True, overwrite: bool = False
+) -> ExportedPage:
     """Write a learnt body as one HTML file, and compare what it answers with palpate if wasmtime is installed.
 
     Parameters
@@ -87,17 +90,21 @@ def export_html(surrogate: Surrogate, path: str | os.PathLike[str], *, check: bo
     surrogate : Surrogate
         A body that a probe presses or a pad holds.
     path : path
-        The file, which is replaced.
+        The file, NAME.html.
     check : bool
         Whether it is compared.
+    overwrite : bool
+        True replaces files whatever they are; by default those alone that an earlier export wrote.
 
     Raises
     ------
     UsageError
-        If the body is drawn as a line, or a part of it has no C source.
+        If the body is drawn as a line, a part of it has no C source, the name does not end in ``.html``, or a file
+        exists that no export wrote.
     AccuracyError
         If the core does not answer as palpate does; nothing is written.
     """
+    require_outputs([path], endings=(".html", ".htm"), overwrite=overwrite)
     page = _Page.of(surrogate)
     comparison = page.compare() if check and wasmtime_module() is not None else None
     if comparison is not None and not comparison.passed:
@@ -106,7 +113,8 @@ def export_html(surrogate: Surrogate, path: str | os.PathLike[str], *, check: bo
             why=str(comparison),
             fix="Nothing was written. Report this with the model file.",
         )
-    return ExportedPage(write_file(Path(path), page.text), page.block.hash, comparison, page.left_out)
+    file = write_file(Path(path), sealed(path, page.text))
+    return ExportedPage(file, page.block.hash, comparison, page.left_out)
 
 
 def html_page(surrogate: Surrogate) -> str:
@@ -185,7 +193,7 @@ class _Page:
                 room -= size
         kept = {field.shown.name for field in fields}
         left_out = tuple(field.name for field in surrogate.fields.values() if field.name not in kept)
-        card = card_of(surrogate).with_hash("weights", bare.hash)
+        card = card_of(surrogate).with_hash(f"{bare.label}, of a page", bare.hash)
         missing = {"fields that are not in this file": ", ".join(left_out)} if left_out else {}
         hello = replace(
             hello,

@@ -488,7 +488,7 @@ def test_forms_that_only_vtk_reads(tmp_path: Path, name: str, monkeypatch: pytes
     (tmp_path / "other").mkdir()
     FORMS[name](tmp_path / "other" / name)
     said = refused(mesh_of(tmp_path / "other" / name, labels="tissue"))
-    assert 'pip install "palpate[results]"' in said
+    assert "pip install 'palpate[results]'" in said
 
 
 def test_boxes_of_vtk(tmp_path: Path):

@@ -161,7 +161,7 @@ def read_parquet(path: Path) -> Results:
         from pyarrow import parquet
     except ImportError:
         raise UsageError(
-            f"{path} can't be read without PyArrow.", fix='Install it: pip install "palpate[results]"'
+            f"{path} can't be read without PyArrow.", fix="Install it: pip install 'palpate[parquet]'"
         ) from None
     try:
         table = parquet.read_table(path)

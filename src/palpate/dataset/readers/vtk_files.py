@@ -1,6 +1,6 @@
 """Files of the VTK family, as ParaView and many solvers write them: ``.vtu``, ``.vtp``, ``.vtk``, and series ``.pvd``.
 
-PyVista reads them where it is installed (``pip install "palpate[results]"``). Without it meshio, which palpate has
+PyVista reads them where it is installed (``pip install 'palpate[results]'``). Without it meshio, which palpate has
 always, reads ``.vtu`` files of the usual codings.
 """
 
@@ -23,7 +23,7 @@ __all__ = ["SUFFIXES", "read_vtk"]
 
 FORMAT = "VTK"
 SUFFIXES = (".pvd", ".vtu", ".vtp", ".vtk")
-INSTALL = 'Install PyVista: pip install "palpate[results]"'
+INSTALL = "Install PyVista: pip install 'palpate[results]'"
 # VTK's numbers of the cells that have faces; the second of a pair has nodes between the corners
 _KINDS = {
     5: "triangle",

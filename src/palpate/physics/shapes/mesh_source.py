@@ -136,7 +136,7 @@ def _read_with_pyvista(path: str) -> Any:
         raise UsageError(
             f"The file {path} can't be read without the package pyvista.",
             why="It is damaged, or of a form that only VTK reads: LZ4, legacy 5.1, texts among the numbers, boxes.",
-            fix='pip install "palpate[results]", or export it with zlib compression or as legacy VTK 4.2.',
+            fix="pip install 'palpate[results]', or export it with zlib compression or as legacy VTK 4.2.",
         )
     import pyvista
 

@@ -1,0 +1,141 @@
+"""The stroke under which a learnt body is drawn: from first contact, or from rest, to the deepest place."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import UsageError
+from palpate.format import share
+from palpate.runtime.touchable import Touchable, touchable
+from palpate.surrogates import Surrogate, TouchedSurface
+from palpate.units import bounds
+
+__all__ = ["reservations_about", "stroke_of"]
+
+_ROUNDING = 1e-9  # of a depth
+
+
+def stroke_of(body: Surrogate, steps: int, at: str | None = None, depth: float | None = None) -> np.ndarray:
+    """Return the inputs (steps, n) of a stroke from just after rest to the deepest place.
+
+    Parameters
+    ----------
+    body : Surrogate
+        The learnt body.
+    steps : int
+        Number of states.
+    at : str, optional
+        x,y,z in m: the place of contact on the surface of a pressed body, where the probe goes in against the normal;
+        the displacement in the end of a held one. By default the middle of what was trained.
+    depth : float, optional
+        Largest depth in m; by default the deepest trained one.
+
+    Raises
+    ------
+    UsageError
+        If the place is no three numbers or not on the surface, the probe would be let go, or the body's shape follows
+        from loads or from what came before.
+    """
+    shares = np.arange(1, steps + 1) / steps
+    given = None if at is None else _numbers(at)
+    shown = body.fields.get("displacement")
+    asked: Any = getattr(shown, "asked_by", None)
+    if asked not in {None, "load"}:
+        raise UsageError(
+            f"The shape of {body.name!r} depends on what came before.",
+            why="It remembers, so that a place alone does not tell its shape.",
+            fix="Record a touch and export that: palpate run --record, palpate trace export.",
+        )
+    if asked == "load":
+        if given is not None or depth is not None:
+            raise UsageError(
+                f"The shape of {body.name!r} follows from its loads, and no place is pressed.",
+                why="Its stroke goes from no load to the full one.",
+                fix="Leave out --at and --depth.",
+            )
+        low, high = bounds(shown.inputs)  # type: ignore[union-attr]  # it has a field of nodes; from no load to all
+        return np.asarray(shares[:, None] * np.where(np.abs(high) >= np.abs(low), high, low))
+    hand = touchable(body)
+    low, high = bounds(body.inputs)
+    far = hand.deepest if depth is None else depth
+    if hand.surface is not None:
+        places = _press(hand, hand.surface, given, far * shares)
+    else:
+        whole = given if given is not None else np.array([0.0, 0.0, far])[: len(low)]
+        places = shares[:, None] * whole
+    rest = np.tile((low + high)[None, places.shape[1] :] / 2, (steps, 1))
+    return np.hstack([places, rest])
+
+
+def _press(
+    hand: Touchable, surface: TouchedSurface, given: np.ndarray | None, depths: np.ndarray
+) -> np.ndarray:
+    """Return the centres (k, 3) of a probe at depths (k,) below a place of the surface, in m."""
+    centre, normal = np.asarray(hand.home), np.asarray(hand.normal)
+    if given is not None:
+        distance, slope, _ = surface.at(given[None])
+        if not abs(distance[0]) <= max(depths[-1], surface.spacing):
+            raise UsageError(
+                f"No contact at {_place(given)}: it does not lie on the touched surface.",
+                why="--at is the place of contact on the surface, and not the ball's centre as in `palpate ask --at`.",
+                fix=_nearest(hand, surface, given),
+            )
+        normal = slope[0] / np.linalg.norm(slope[0])
+        centre = given + (hand.radius - distance[0]) * normal
+    places = centre - depths[:, None] * normal
+    reached = surface.depth(places, hand.radius)
+    if (
+        not (reached > 0.0).all()
+        or not (np.diff(reached) > 0.0).all()
+        or depths[-1] > surface.inner + hand.radius
+    ):
+        raise UsageError(
+            f"A stroke of {1e3 * depths[-1]:.3g} mm at {_place(centre - hand.radius * normal)} leaves the surface.",
+            why="The body lets go of a probe that is too deep, or comes nearer to another side.",
+            fix=f"Give a smaller --depth; the deepest trained one is {1e3 * hand.deepest:.3g} mm.",
+        )
+    return np.asarray(places)
+
+
+def _nearest(hand: Touchable, surface: TouchedSurface, given: np.ndarray) -> str:
+    """Return in words the place of the surface that is nearest among the nodes of the shape."""
+    points = np.asarray(getattr(hand.fields.get("displacement"), "points", np.zeros((0, 3))))
+    touched = points[np.abs(surface.at(points)[0]) <= surface.spacing] if len(points) else points
+    if not len(touched):
+        low, high = surface.box
+        return f"Give a place of the surface, which lies between {_place(low)} and {_place(high)}."
+    place = touched[np.argmin(np.linalg.norm(touched - given, axis=1))]
+    return f"The nearest place of the surface is --at {_place(place)}."
+
+
+def _place(values: np.ndarray) -> str:
+    return ",".join(f"{v:.4g}" for v in values + 0.0)
+
+
+def reservations_about(body: Surrogate, X: np.ndarray) -> list[str]:
+    """Return warnings about the shapes at inputs X (k, n): deeper than trained, or elsewhere."""
+    if getattr(body.fields.get("displacement"), "asked_by", None) is not None:
+        return []
+    hand = touchable(body)
+    deepest = float(hand.depth(X).max())
+    if deepest > hand.deepest * (1.0 + _ROUNDING):
+        return [
+            f"{1e3 * deepest:.3g} mm is deeper than the {1e3 * hand.deepest:.3g} mm that were trained: the shapes "
+            "beyond are continued, and not learnt"
+        ]
+    outside = float(1.0 - body.energy.inside(X).mean())
+    if outside:
+        return [f"{share(outside)} of the states lie outside of what was trained: their shapes are continued"]
+    return []
+
+
+def _numbers(text: str) -> np.ndarray:
+    try:
+        values = np.array([float(part) for part in text.split(",")])
+    except ValueError as error:
+        raise UsageError(f"{text!r} is no place.", fix="Write x,y,z in m, such as 0.05,0.05,0.05.") from error
+    if len(values) != 3 or not np.isfinite(values).all():
+        raise UsageError(f"{text!r} is no place of three numbers.", fix="Write x,y,z in m.")
+    return values

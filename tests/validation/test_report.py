@@ -225,6 +225,8 @@ def test_a_browser_shows_it_without_complaint(
             hacked: "hacked" in window,
             figures: [...document.querySelectorAll("figure svg")].map(s => s.getBoundingClientRect().height),
             pictures: [...document.querySelectorAll("svg image")].map(i => i.getBoundingClientRect().width),
+            scrolled: [...document.querySelectorAll("figure .scroll")]
+                .filter(s => s.scrollWidth > s.clientWidth).length,
             ink: getComputedStyle(document.body).color,
             text: getComputedStyle(document.querySelector("svg text")).fill,
         })"""
@@ -232,6 +234,8 @@ def test_a_browser_shows_it_without_complaint(
     assert found["wide"] <= width
     assert not found["hacked"]
     assert len(found["figures"]) == 24
+    if width == 1200:
+        assert found["scrolled"] == 0
     assert min(found["figures"]) > 60
     assert len(found["pictures"]) > 6
     assert min(found["pictures"]) > 1

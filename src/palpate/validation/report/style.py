@@ -45,6 +45,7 @@ INK = "#0a0b0c"
 
 BLUE, ORANGE, GREEN, PURPLE, SKY, GOLD = "#2f7fc1", "#d9642b", "#149b76", "#b565a7", "#4fb0e3", "#c99a1a"
 SERIES = (BLUE, ORANGE, GREEN, PURPLE, SKY, GOLD)
+_HALF = 600  # px: the widest picture that one of two columns holds in readable size
 DASHES = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)), (0, (6, 1.5, 1.5, 1.5)), (0, (3, 1)), (0, (8, 2)))
 
 _STYLE: dict[str, Any] = {
@@ -149,6 +150,12 @@ class Picture:
     alt: str
     caption: str
     svg: str
+
+    @property
+    def wide(self) -> bool:
+        """It takes both columns of the page: in one it would have to be scrolled."""
+        natural = re.search(r"--natural: (\d+)px", self.svg)
+        return natural is not None and int(natural.group(1)) > _HALF
 
 
 def inline_svg(figure: Figure, key: str, alt: str) -> str:

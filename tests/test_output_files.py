@@ -60,7 +60,7 @@ def test_names_that_can_not_be_written_to_are_refused(tmp_path):
     (tmp_path / "folder.fmu").mkdir()
     for files, options, said in (
         (["a.onnx"], {"endings": (".fmu",)}, r"does not end in \.fmu"),
-        (["folder.fmu"], {"endings": (".fmu",), "overwrite": True}, "is a folder"),
+        (["folder.fmu"], {"endings": (".c",), "overwrite": True}, "is a folder"),
         (["missing/a.fmu"], {}, "missing does not exist"),
         (["file.fmu/a.c"], {"folder": "file.fmu"}, "is a file"),
         (["missing/out/a.c"], {"folder": "missing/out"}, "missing does not exist"),

@@ -75,17 +75,17 @@ def require_outputs(
             f"{place} is a file.", why="This export writes several files.", fix="Name a folder for them."
         )
     for path in paths:
-        if endings and path.suffix.lower() not in endings:
-            raise UsageError(
-                f"{path} does not end in {' or '.join(endings)}.",
-                why="Other programs tell the format by the name.",
-                fix=f"Write to {path.with_suffix(endings[0]).name}.",
-            )
         if path.is_dir():
             raise UsageError(
                 f"{path} is a folder.",
                 why="A file goes there.",
                 fix="Name a file, such as one in that folder.",
+            )
+        if endings and path.suffix.lower() not in endings:
+            raise UsageError(
+                f"{path} does not end in {' or '.join(endings)}.",
+                why="Other programs tell the format by the name.",
+                fix=f"Write to {path.with_suffix(endings[0]).name}.",
             )
         around = path.parent if place is None else place.parent
         if not around.is_dir():

@@ -125,7 +125,7 @@ def test_wrong_places_endings_and_compilers_are_refused(palpate, pad, tmp_path):
         (("fmu", "--out", tmp_path / "pad.onnx"), "does not end in .fmu"),
         (("onnx", "--out", tmp_path / "pad.fmu"), "does not end in .onnx"),
         (("html", "--out", tmp_path / "no" / "pad.html"), "does not exist"),
-        (("html", "--out", tmp_path), "does not end in .html"),
+        (("html", "--out", tmp_path), "is a folder"),
     ):
         answer = palpate("export", *words[:1], pad, *words[1:])
         assert answer.code == 2, words

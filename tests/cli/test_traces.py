@@ -109,6 +109,10 @@ def test_a_table_holds_every_bit(palpate, trace, tmp_path):
     assert len(rows) == len(known["time"])
     column = next(i for i, name in enumerate(head) if name == "force_z [N]")
     np.testing.assert_array_equal([float(row[column]) for row in rows], known["force_z"])
+    again = palpate("trace", "export", trace, "--out", tmp_path / "t.csv")
+    assert again.code == UsageError.exit_code
+    assert "--force" in again.err
+    assert palpate("trace", "export", trace, "--out", tmp_path / "t.csv", "--force").code == 0
     assert palpate("trace", "export", trace, "--out", tmp_path / "t.npz").code == 0
     with np.load(tmp_path / "t.npz") as archive:
         np.testing.assert_array_equal(archive["velocity_y"], known["velocity_y"])

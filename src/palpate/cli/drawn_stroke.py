@@ -100,7 +100,11 @@ def _press(
 
 
 def _nearest(hand: Touchable, surface: TouchedSurface, given: np.ndarray) -> str:
-    """Return in words the place of the surface that is nearest among the nodes of the shape."""
+    """Return in words the nearest place of the surface: below a place near it, else among the nodes of the shape."""
+    distance, slope, _ = surface.at(given[None])
+    below = given - distance[0] * slope[0] / max(float(np.linalg.norm(slope[0])), _ROUNDING)
+    if abs(surface.at(below[None])[0][0]) <= surface.spacing:
+        return f"The nearest place of the surface is --at {_place(below)}."
     points = np.asarray(getattr(hand.fields.get("displacement"), "points", np.zeros((0, 3))))
     touched = points[np.abs(surface.at(points)[0]) <= surface.spacing] if len(points) else points
     if not len(touched):
@@ -111,7 +115,7 @@ def _nearest(hand: Touchable, surface: TouchedSurface, given: np.ndarray) -> str
 
 
 def _place(values: np.ndarray) -> str:
-    return ",".join(f"{v:.4g}" for v in values + 0.0)
+    return ",".join(f"{v:.4g}" for v in np.round(values, 6) + 0.0)
 
 
 def reservations_about(body: Surrogate, X: np.ndarray) -> list[str]:

@@ -18,12 +18,15 @@ import pytest
 import trimesh
 import xarray as xr
 
+import palpate
 from bent import body as bent_body
 from palpate.cli.drawn_stroke import reservations_about, stroke_of
 from palpate.dataset.dataset_tables import write_fields_csv, write_table
 from palpate.errors import UsageError
 from palpate.export.gltf import ShapeSeries, write_glb
 from palpate.export.shape_files import series_of_dataset, series_of_surrogate, write_shapes
+from palpate.learning import Fitted
+from palpate.runtime.touchable import touchable
 from palpate.surrogates import Surrogate
 from palpate.surrogates.model_card import NOT_STATED, card_of
 from solved import solved
@@ -275,7 +278,6 @@ def test_the_card_says_what_the_file_says(tmp_path):
         "misses a limit",
         "1.2 %",
         "limited to 3 N",
-        "deepest trained press",
         r"my\_body \| \*bold\*",
     ):
         assert words in text
@@ -284,9 +286,63 @@ def test_the_card_says_what_the_file_says(tmp_path):
     assert Surrogate.load(signed.save(tmp_path / "signed.palpate")).card().licence == "CC-BY-4.0"
 
 
+def test_the_card_says_where_the_body_lets_go():
+    energy = touch_energy()
+    surface, radius = energy.baseline.surface, energy.baseline.radius
+    end = surface.inner + radius
+    limits = " ".join(Surrogate(energy).card().limits)
+    assert f"deepest trained press is {1e3 * energy.going.deepest:g} mm" in limits
+    assert f"lets go, without force, at a depth of {1e3 * end:g} mm" in limits
+    # the loop lets go there, and no earlier
+    body = touchable(Surrogate(energy))
+    loop, no_more = body.evaluator(), np.zeros(0)
+    top = np.array([0.0, 0.0, radius])  # touches the face z = 0
+    for depth, gone in ((0.98 * end, False), (1.02 * end, True)):
+        loop(body.away, no_more)
+        loop(top - [0.0, 0.0, depth], no_more)
+        assert loop.let_go is gone
+
+
+def test_the_card_reads_without_raw_data():
+    body = {
+        "type": "Body",
+        "material": {"skin": {"law": "NeoHookean", "young": 9e3, "form": None}},
+        "fixed": ["bottom"],
+    }
+    ball = {"type": "SphereProbe", "depth": [0.0, 0.006], "over": [[0.05, 0.05], [0.07, 0.07]], "stop": None}
+    provenance = {"problem": {"body": body, "interactions": [ball]}}
+    lines = str(
+        Surrogate(touch_energy(), meta={**META, "dataset": {"provenance": provenance}}).card()
+    ).splitlines()
+    for line in (
+        "- body: Body",
+        "    - skin: NeoHookean",
+        "      - young: 9000 Pa",
+        "  - fixed: bottom",
+        "- acting on it: SphereProbe",
+        "  - depth: 0 to 0.006 m",
+        "  - over: (0.05, 0.05), (0.07, 0.07) m",
+        "- unseen solves: 8",
+        "  - force error, median: 1.2 %",
+    ):
+        assert line in lines
+    assert not any(mark in line for line in lines for mark in ('{"', "null", "\\"))
+
+
 def test_a_network_has_a_card_too():
     network = touch_energy().network
     card = card_of(network)
     assert card.answers["outputs"]
     assert "extrapolated" in " ".join(card.limits)
     assert "not checked" in " ".join(card.warnings)
+
+
+def test_the_card_of_a_fit_says_what_its_file_says(tmp_path):
+    X = np.linspace(-1.0, 1.0, 60)
+    fitted = Fitted.load(palpate.fit(X, np.sin(2 * X), effort=0.01).save(tmp_path / "sine.palpate"))
+    card = card_of(fitted, tmp_path / "sine.palpate")
+    assert card.trained_on["samples"] == 60
+    assert card.errors["error on samples held out, relative to the outputs' spread"] == fitted.heldout
+    assert card.warnings == fitted.notes
+    assert "samples that it was learnt from" in " ".join(card.limits)
+    assert not {"finite-element", "solves", NOT_STATED} & set(" ".join(card.limits + card.warnings).split())

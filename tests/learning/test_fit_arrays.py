@@ -178,6 +178,9 @@ def test_printed_it_says_what_and_how_good(found):
     assert found.form in text
     assert f"{found.heldout:.1e}" in text
     assert 3 <= len(text.splitlines()) <= 9
+    listed = [line for line in text.splitlines() if "chosen; judged anew" in line]
+    assert len(listed) == 1
+    assert f"{found.form} {found.radial}" in listed[0]
 
 
 BAD = {

@@ -60,6 +60,16 @@ def test_the_exact_surrogate_has_no_error() -> None:
     v.raise_if_failed()
 
 
+def test_too_few_solves_are_cautioned_of_wherever_they_are_read() -> None:
+    few, enough = (validate(surrogate(), solves(places(n))) for n in (5, 20))
+    assert "5 unseen solves can't judge much" in few.caution
+    assert few.caution in str(few)
+    assert few.as_dict()["caution"] == few.summary()["caution"] == few.caution
+    assert enough.caution == enough.as_dict()["caution"] == ""
+    assert "caution" not in enough.summary()
+    assert "Caution" not in str(enough)
+
+
 def test_a_force_too_large_by_a_tenth_fails_the_lines_of_its_size_alone() -> None:
     """U, F and K are all 1.1 of the truth: 10 % misses the limits of the force and keeps that of the stiffness."""
     v = validate(surrogate(factor=1.1), solves())

@@ -72,7 +72,7 @@ def card(
         write_file(out, sealed(out, text))
         Console(as_json).result(str(out), {"card": str(out)})
         return
-    Console(as_json).result(found.to_markdown().rstrip(), found.as_dict())
+    Console(as_json).result(str(found).rstrip(), found.as_dict())
 
 
 def export_dataset(

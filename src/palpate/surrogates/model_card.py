@@ -8,20 +8,22 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from palpate.format import share
+from palpate.errors import UsageError
+from palpate.format import count, millimetres
+from palpate.surrogates.card_text import bullets, escape_markdown, rows
 from palpate.units import Range
 
 __all__ = ["FORMAT_VERSION", "NOT_STATED", "ModelCard", "card_of"]
 
 FORMAT_VERSION = 1
 NOT_STATED = "not stated"
-_RELATIVE = ("error", "RMSE", "percentile", "median", "p95")  # figures that are shares
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,7 @@ class ModelCard:
         """Return the card for people: titles and what stands under them, sentences as lists and figures as words."""
         words: dict[str, Any] = {"author": self.author, "licence": self.licence}
         for title, part in (("errors", self.errors), ("trained on", self.trained_on)):
-            words[title] = {name: _plain(name, value) for name, value in _flat(part)}
+            words[title] = rows(part)
         words |= {"limits": list(self.limits), "warnings": list(self.warnings), "SHA-256": dict(self.hashes)}
         return {title: part for title, part in words.items() if part}
 
@@ -97,27 +99,29 @@ class ModelCard:
 
     def to_markdown(self) -> str:
         """Return the card as Markdown."""
-        lines = [f"# Model card: {_escaped(self.name)}", "", _escaped(self.kind), ""]
-        lines += [f"- Author: {_escaped(self.author)}", f"- Licence: {_escaped(self.licence)}", ""]
+        return self._page(escape_markdown)
+
+    def __str__(self) -> str:
+        return self._page(str)
+
+    def _page(self, escape: Callable[[str], str]) -> str:
+        """Return the card's headings, bullets and table, each text of the file escaped."""
+        lines = [f"# Model card: {escape(self.name)}", "", escape(self.kind), ""]
+        lines += [f"- Author: {escape(self.author)}", f"- Licence: {escape(self.licence)}", ""]
         lines += ["## Inputs", "", "| input | trained from | to | unit |", "|---|--:|--:|---|"]
         lines += [
-            f"| {_escaped(r['name'])} | {r['low']:.6g} | {r['high']:.6g} | {_escaped(r['unit']) or '–'} |"
+            f"| {escape(r['name'])} | {r['low']:.6g} | {r['high']:.6g} | {escape(r['unit']) or '–'} |"
             for r in self.answers["inputs"]
         ]
-        lines += ["", "Answers: " + "; ".join(map(_escaped, self.answers["outputs"])) + ".", ""]
+        lines += ["", "Answers: " + "; ".join(map(escape, self.answers["outputs"])) + ".", ""]
+        lines += [f"Inside: {escape(self.answers['inside'])}.", ""]
         for title, part in (("Trained on", self.trained_on), ("Errors", self.errors)):
-            lines += [f"## {title}", ""]
-            lines += [f"- {name}: {_words(name, value)}" for name, value in _flat(part)] or [
-                f"- {NOT_STATED}"
-            ]
-            lines += [""]
+            lines += [f"## {title}", "", *(bullets(part, escape) or [f"- {NOT_STATED}"]), ""]
         for title, sentences in (("Limits", self.limits), ("Warnings", self.warnings)):
             if sentences:
-                lines += [f"## {title}", "", *(f"- {_escaped(sentence)}" for sentence in sentences), ""]
+                lines += [f"## {title}", "", *(f"- {escape(sentence)}" for sentence in sentences), ""]
         lines += ["## Hashes (SHA-256)", "", *(f"- {name}: `{value}`" for name, value in self.hashes.items())]
         return "\n".join(lines).rstrip() + "\n"
-
-    __str__ = to_markdown
 
 
 def card_of(model: Any, file: str | os.PathLike[str] | None = None) -> ModelCard:
@@ -129,89 +133,131 @@ def card_of(model: Any, file: str | os.PathLike[str] | None = None) -> ModelCard
         The learnt value.
     file : path, optional
         Its file, whose SHA-256 goes into the card.
+
+    Raises
+    ------
+    UsageError
+        If the value is of another kind, such as load histories.
     """
-    meta: Mapping[str, Any] = getattr(model, "meta", None) or {}
     network = getattr(model, "network", model)
-    energy = getattr(model, "energy", None)
-    stated = meta.get("card", {}) if isinstance(meta.get("card"), Mapping) else {}
-    origin = meta.get("dataset", {}) if isinstance(meta.get("dataset"), Mapping) else {}
-    provenance = origin.get("provenance", {}) if isinstance(origin.get("provenance"), Mapping) else {}
+    if not (hasattr(model, "energy") or hasattr(network, "outputs")):
+        raise UsageError(
+            f"A value of kind {type(model).__name__} has no model card.",
+            why="Learnt bodies and networks have one.",
+            fix="Name the .palpate file that `palpate learn` or `palpate fit` has written.",
+        )
+    meta = _record(getattr(model, "meta", None) or getattr(network, "meta", None))
+    origin = _record(meta.get("dataset"))
+    provenance = _record(origin.get("provenance"))
     hashes = {
         "file": None if file is None else hashlib.sha256(Path(file).read_bytes()).hexdigest(),
-        "dataset": origin.get("hash") or meta.get("training", {}).get("hash"),
+        "dataset": origin.get("hash") or _record(meta.get("training")).get("hash"),
         "configuration": provenance.get("config_hash"),
     }
-    inputs: Sequence[Range] = network.inputs if energy is None else model.inputs
-    outputs = (
-        [f"{q.name} ({q.unit or '1'})" for q in network.outputs]
-        if energy is None
-        else [
-            "energy (J), force (N), stiffness (N/m)",
-            *(f"{n} ({f.unit or '1'})" for n, f in model.fields.items()),
-        ]
-    )
+    parts = _of_body(model, meta) if hasattr(model, "energy") else _of_network(network, meta)
+    inputs: Sequence[Range] = parts.pop("inputs")
+    answers = {
+        "inputs": [{"name": r.name, "low": r.low, "high": r.high, "unit": r.unit} for r in inputs],
+        "outputs": parts.pop("outputs"),
+        "inside": parts.pop("inside"),
+    }
+    stated = _record(meta.get("card"))
     return ModelCard(
         name=str(meta.get("name") or (Path(file).stem if file else "model")),
-        kind=str(model).splitlines()[0],
         author=str(stated.get("author") or NOT_STATED),
         licence=str(stated.get("licence") or NOT_STATED),
-        answers={
-            "inputs": [{"name": r.name, "low": r.low, "high": r.high, "unit": r.unit} for r in inputs],
-            "outputs": outputs,
-        },
-        trained_on=_training_of(meta, provenance),
-        errors=_errors_of(meta),
-        limits=tuple(_limits_of(model, meta)),
-        warnings=tuple(_warnings_of(meta)),
+        answers=answers,
+        trained_on=_stated({**_training_of(meta, provenance), **parts.pop("trained_on")}),
         hashes={name: str(value) for name, value in hashes.items() if value},
+        **parts,
     )
+
+
+def _of_body(body: Any, meta: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the card of a learnt body says that no network's does."""
+    correction = _record(meta.get("correction"))
+    errors = {
+        "unseen solves": meta.get("validation"),
+        "solves left out in turn, relative force error": meta.get("left_out"),
+        "corrected body, relative force error": correction.get("force_error"),
+    }
+    warnings = [str(correction["warning"])] if correction.get("warning") else []
+    validation = meta.get("validation")
+    if validation is None:
+        warnings.append("It was not checked on solves that it has not seen, or the file does not say so.")
+    elif _record(validation).get("limits kept") is False:
+        warnings.append("It misses a limit on unseen solves: see the errors.")
+    if caution := _record(validation).get("caution"):
+        warnings.append(str(caution))
+        errors["unseen solves"] = {k: v for k, v in _record(validation).items() if k != "caution"}
+    return {
+        "kind": f"A learnt body: {body.purpose}.",
+        "inputs": body.inputs,
+        "outputs": [
+            "energy (J), force (N), stiffness (N/m)",
+            *(f"{n} ({f.unit or '1'})" for n, f in body.fields.items()),
+        ],
+        "inside": str(body.energy),
+        "trained_on": {"corrected by touches": _record(correction.get("counts")).get("learnt")},
+        "errors": _stated(errors),
+        "limits": tuple(_limits_of(body, meta)),
+        "warnings": tuple(warnings),
+    }
+
+
+def _of_network(network: Any, meta: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the card of a network of data says; `palpate.fit` records its choice and its error."""
+    choice, n, m = _record(meta.get("choice")), len(network.inputs), len(network.outputs)
+    errors = {
+        "error on samples held out, relative to the outputs' spread": choice.get("heldout"),
+        "share of unseen samples that an interval is made to hold": choice.get("level"),
+    }
+    warnings = [str(note) for note in choice.get("notes", ())]
+    if choice.get("heldout") is None:
+        warnings.append("It was not checked on samples that it has not seen, or the file does not say so.")
+    limits = [
+        "The answers hold between the trained ends of every input, where samples lie; beyond, they are extrapolated.",
+        "It is as true as the samples that it was learnt from, and repeats their errors; it is no medical device.",
+    ]
+    return {
+        "kind": f"A network learnt from data: {count(n, 'input')}, {count(m, 'output')}.",
+        "inputs": network.inputs,
+        "outputs": [f"{q.name} ({q.unit or '1'})" for q in network.outputs],
+        "inside": f"{count(network.units, 'unit')}, {choice.get('form') or network.form}, {network.radial}",
+        "trained_on": {"columns of inputs": choice.get("columns")},
+        "errors": _stated(errors),
+        "limits": tuple(limits),
+        "warnings": tuple(warnings),
+    }
 
 
 def _training_of(meta: Mapping[str, Any], provenance: Mapping[str, Any]) -> dict[str, Any]:
     """Return what the file says of its making."""
-    problem = provenance.get("problem", {}) if isinstance(provenance.get("problem"), Mapping) else {}
-    training = {
+    problem = _record(provenance.get("problem"))
+    return {
         "body": problem.get("body") or provenance.get("words"),
         "acting on it": problem.get("interactions") or problem.get("loads"),
         "solves": meta.get("solves"),
-        "samples": meta.get("samples") or meta.get("training", {}).get("samples"),
+        "samples": meta.get("samples") or _record(meta.get("training")).get("samples"),
         "design": provenance.get("design"),
         "seed": provenance.get("seed"),
         "solved": provenance.get("created"),
         "versions": provenance.get("versions"),
         "machine": provenance.get("machine"),
-        "corrected by touches": (meta.get("correction") or {}).get("counts", {}).get("learnt"),
     }
-    return {name: value for name, value in training.items() if value not in (None, "", {}, [])}
 
 
-def _errors_of(meta: Mapping[str, Any]) -> dict[str, Any]:
-    """Return figures on unseen solves and by leaving out."""
-    errors = {
-        "unseen solves": meta.get("validation"),
-        "solves left out in turn, relative force error": meta.get("left_out"),
-        "corrected body, relative force error": (meta.get("correction") or {}).get("force_error"),
-    }
-    return {name: value for name, value in errors.items() if value not in (None, {}, [])}
-
-
-def _limits_of(model: Any, meta: Mapping[str, Any]) -> list[str]:
-    """Return sentences on where the answers hold."""
-    energy, memory = getattr(model, "energy", None), getattr(model, "memory", None)
+def _limits_of(body: Any, meta: Mapping[str, Any]) -> list[str]:
+    """Return sentences on where the answers of a body hold."""
     limits = [
-        "The answers hold between the trained ends of every input; elsewhere they are continued and marked."
+        "The answers hold between the trained ends of every input; elsewhere they are continued and marked.",
+        *_depths_of(body.energy),
     ]
-    if energy is None:
-        limits = ["The answers hold between the trained ends of every input; beyond, they are extrapolated."]
-    else:
-        deepest = float(energy.going.deepest)
-        if 0 < deepest < 1e3:
-            limits.append(f"The deepest trained press is {1e3 * deepest:.3g} mm; deeper, the body lets go.")
-        known = "say" if energy.root is not None else "do not say"
-        limits.append(f"The answers {known} how far the force may be off from place to place.")
-        remembers = "Elastic: a force depends on the place alone, not on what came before."
-        limits.append(remembers if memory is None else f"It remembers: {memory}.")
-    runtime = meta.get("runtime", {}) if isinstance(meta.get("runtime"), Mapping) else {}
+    known = "say" if body.energy.root is not None else "do not say"
+    limits.append(f"The answers {known} how far the force may be off from place to place.")
+    remembers = "Elastic: a force depends on the place alone, not on what came before."
+    limits.append(remembers if body.memory is None else f"It remembers: {body.memory}.")
+    runtime = _record(meta.get("runtime"))
     if runtime.get("max_force"):
         limits.append(
             f"Forces on a hand are limited to {runtime['max_force']:g} N, at {runtime.get('rate', 1000):g} Hz."
@@ -222,49 +268,28 @@ def _limits_of(model: Any, meta: Mapping[str, Any]) -> list[str]:
     return limits
 
 
-def _warnings_of(meta: Mapping[str, Any]) -> list[str]:
-    warnings = []
-    if (meta.get("correction") or {}).get("warning"):
-        warnings.append(str(meta["correction"]["warning"]))
-    validation = meta.get("validation")
-    if validation is None:
-        warnings.append("It was not checked on solves that it has not seen, or the file does not say so.")
-    elif isinstance(validation, Mapping) and validation.get("limits kept") is False:
-        warnings.append("It misses a limit on unseen solves: see the errors.")
-    return warnings
+def _depths_of(energy: Any) -> list[str]:
+    """Return to which depth of the ball the answers are trained, and from which the body gives no force any more."""
+    deepest, inner, radius = energy.going.deepest, energy.baseline.inner, energy.baseline.radius
+    sentences = []
+    if math.isfinite(deepest):
+        sentences.append(
+            f"The deepest trained press is {millimetres(deepest)}; deeper, the force is continued and not vouched for."
+        )
+    if math.isfinite(inner):
+        # the loop and every export compare the depth of the ball with `inner` and its radius
+        at = (
+            f"with the ball's centre {millimetres(inner)} inside the surface"
+            if math.isnan(radius)
+            else f"at a depth of {millimetres(inner + radius)}"
+        )
+        sentences.append(f"The body lets go, without force, {at} at the latest.")
+    return sentences
 
 
-def _flat(part: Mapping[str, Any], path: str = "") -> list[tuple[str, Any]]:
-    """Return names and plain values of nested data; lists as compact JSON."""
-    rows: list[tuple[str, Any]] = []
-    for name, value in part.items():
-        where = f"{path}, {name}" if path else str(name)
-        if isinstance(value, Mapping):
-            rows += _flat(value, where)
-        elif value not in (None, "", []):
-            rows.append((where, value))
-    return rows
+def _record(value: Any) -> Mapping[str, Any]:
+    return value if isinstance(value, Mapping) else {}
 
 
-def _plain(name: str, value: Any) -> str:
-    """Return a value of the card in words."""
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float):
-        return share(value) if any(word in name for word in _RELATIVE) else f"{value:.6g}"
-    if isinstance(value, list | tuple):
-        return json.dumps(value, ensure_ascii=False)[:400]
-    return str(value)
-
-
-def _words(name: str, value: Any) -> str:
-    """Return a value of the card in words, as Markdown takes them."""
-    words = _plain(name, value)
-    return f"`{words.replace('`', chr(39))}`" if isinstance(value, list | tuple) else _escaped(words)
-
-
-def _escaped(text: str) -> str:
-    """Return text that Markdown and HTML take as it stands."""
-    for mark in ("\\", "`", "*", "_", "[", "]", "<", ">", "|", "#"):
-        text = text.replace(mark, f"\\{mark}" if mark not in "<>" else {"<": "&lt;", ">": "&gt;"}[mark])
-    return text.replace("\n", " ")
+def _stated(part: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in part.items() if value not in (None, "", {}, [])}

@@ -8,6 +8,7 @@ be drawn.
 from __future__ import annotations
 
 import html
+import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -18,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import FileFormatError, UsageError
-from palpate.format import share
+from palpate.format import count, millimetres, share
 from palpate.network import load_archive
 from palpate.network.codec import load_value, save_value
 from palpate.surrogates.energy import LearntEnergy
@@ -88,15 +89,24 @@ class Surrogate:
             )
 
     def __str__(self) -> str:
-        head = f"Surrogate {self.name!r}: {', '.join(str(r) for r in self.inputs)}; {self.made_of}"
-        return "\n".join([head, *(f"  {shown}" for shown in self.fields.values())])
+        head = f"Surrogate {self.name!r}: {self.purpose}{_training(self.meta)}{self._remembers}"
+        ranges = f"  {', '.join(str(r) for r in self.inputs)}; {self.energy}"
+        return "\n".join([head, ranges, *(f"  {shown}" for shown in self.fields.values())])
 
     __repr__ = __str__
 
     @property
-    def made_of(self) -> str:
-        """Baseline, units, training, correction and memory in words."""
-        return f"{self.energy}{_training(self.meta)}{self._remembers}"
+    def purpose(self) -> str:
+        """What a hand does with the body, how far it was trained, and what is drawn, in plain words."""
+        known, baseline = self.energy.going.deepest, self.energy.baseline
+        if not baseline.holds:
+            ball = "" if math.isnan(baseline.radius) else f" of radius {millimetres(baseline.radius)}"
+            words = f"pressed by a ball{ball}"
+            words += f", trained to a depth of {millimetres(known)}" if math.isfinite(known) else ""
+        else:
+            words = f"held and moved along {count(len(baseline.directions), 'direction')}"
+        shown = ", ".join(name for name in self.fields)
+        return words + (f"; shows its {shown}" if shown else "")
 
     @property
     def _remembers(self) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.errors import AccuracyError
-from palpate.format import criterion_figure
+from palpate.format import count, criterion_figure
 from palpate.learning import History
 from palpate.learning.learn_dataset import LearningHistory
 from palpate.validation.figures import FIGURES
@@ -21,9 +21,12 @@ from palpate.validation.limits import CRITERIA, Check, Limits
 from palpate.validation.subject import Subject
 from palpate.validation.unseen_solves import TouchSolves
 
-__all__ = ["Validation", "checks", "measure", "validate"]
+__all__ = ["ENOUGH", "Validation", "checks", "measure", "validate"]
 
 _NAMES = frozenset(name for name, _ in FIGURES)
+ENOUGH = 20
+"""Unseen solves below which the 95th percentile of their errors is hardly less than the largest."""
+
 _MORE = (
     "Learn from more solves, placed where the worst cases are, or let learning take longer: `samples` in [sweep], "
     "`seconds` and `units_max` in [learning], or options of palpate.learn."
@@ -79,6 +82,16 @@ class Validation:
         """Checks that failed."""
         return tuple(c for c in self.checks if not c.passed)
 
+    @property
+    def caution(self) -> str:
+        """A sentence where the unseen solves are too few to judge by; "" where they suffice, or histories judge."""
+        if self.samples >= ENOUGH or self.force is None:
+            return ""
+        return (
+            f"{count(self.samples, 'unseen solve')} can't judge much: of fewer than {ENOUGH} the 95th percentile is as "
+            f"good as the largest error. Test with {ENOUGH} or more."
+        )
+
     def raise_if_failed(self) -> None:
         """Do nothing if every limit is kept.
 
@@ -89,9 +102,9 @@ class Validation:
         """
         if self.passed:
             return
-        count = f"{len(self.failures)} of {len(self.checks)} limits"
+        missed = f"{len(self.failures)} of {len(self.checks)} limits"
         raise AccuracyError(
-            f"{self.name} misses {count} on {self.samples} solves that it has never seen.",
+            f"{self.name} misses {missed} on {self.samples} solves that it has never seen.",
             why="\n".join(_without_fix(c) for c in self.failures),
             fix=" ".join(dict.fromkeys(c.criterion.fix for c in self.failures)),
         )
@@ -110,7 +123,8 @@ class Validation:
             }
             for c in self.checks
         ]
-        data = {"passed": self.passed, "name": self.name, "samples": self.samples, "notes": self.notes}
+        data = {"passed": self.passed, "name": self.name, "samples": self.samples}
+        data |= {"caution": self.caution, "notes": self.notes}
         plain: dict[str, Any] = _plain({**data, **self.figures, "checks": checks})
         return plain
 
@@ -124,7 +138,8 @@ class Validation:
             found["unseen histories"] = self.histories.count
         found["force error, median"] = force.median
         found["force error, 95th percentile"] = force.p95
-        return {**found, "limits kept": self.passed}
+        found["limits kept"] = self.passed
+        return {**found, "caution": self.caution} if self.caution else found
 
     def details(self) -> list[str]:
         """Return the lines below the table of limits."""
@@ -151,7 +166,8 @@ class Validation:
             "every limit kept" if self.passed else f"{len(self.failures)} of {len(self.checks)} limits missed"
         )
         head = f"{self.name} on {self.samples} unseen solves: {verdict}"
-        return "\n".join([head, *table, *(f"  {line}" for line in (*self.details(), *self.notes))])
+        caution = [f"  Caution: {self.caution}"] if self.caution else []
+        return "\n".join([head, *caution, *table, *(f"  {line}" for line in (*self.details(), *self.notes))])
 
 
 def validate(

@@ -214,12 +214,27 @@ class Fitted:
         ]
         lines += [f"  {note}" for note in self.notes]
         if self.trials:
-            best: dict[str, float] = {}
-            for trial in sorted(self.trials, key=lambda trial: trial.error):
-                best.setdefault(trial.name, trial.error)
-            lines += [f"  {len(best)} tried in {self.seconds:.1f} s, among them:"]
-            lines += [f"    {error:.1e}  {what}" for what, error in list(best.items())[:_SHOWN]]
+            lines += self._tried()
         return "\n".join(lines)
+
+    def _tried(self) -> list[str]:
+        """Return the best networks that were tried, the best of the chosen form among them, as lines.
+
+        Their errors are of the samples that chose. The winner's own is measured anew, on samples in turn that were left
+        out of networks like it, so it may be more than the least one here, which was lucky with its samples.
+        """
+        best: dict[str, Trial] = {}
+        for trial in sorted(self.trials, key=lambda trial: trial.error):
+            best.setdefault(trial.name, trial)
+        chosen = next((t for t in best.values() if (t.form, t.radial) == (self.form, self.radial)), None)
+        shown = list(best.values())[:_SHOWN]
+        if chosen is not None and chosen not in shown:
+            shown = [*shown[: _SHOWN - 1], chosen]
+        head = (
+            f"  {len(best)} tried in {self.seconds:.1f} s, judged only by the samples that chose, among them:"
+        )
+        mark = "  (chosen; judged anew above)"
+        return [head, *(f"    {t.error:.1e}  {t.name}{mark * (t is chosen)}" for t in shown)]
 
     def _points(self, X: Any) -> np.ndarray:
         return points(X, self.network.inputs, self.columns)

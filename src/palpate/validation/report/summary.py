@@ -53,6 +53,8 @@ def story(chapter: Chapter) -> Story:
     """Tell a chapter's results to a person."""
     v = chapter.validation
     verdict = "Every limit kept" if v.passed else f"{len(v.failures)} of {len(v.checks)} limits missed"
+    if v.caution:
+        verdict += f" on only {count(v.samples, 'unseen solve')}"
     return Story(
         verdict, v.passed, tuple(_facts(chapter)), _solves_in_words(chapter), _learnt(chapter), _good(v)
     )

@@ -134,7 +134,7 @@ def report_context(chapter: Chapter, key: str) -> dict[str, Any]:
         "pictures": pictures(chapter, key),
         "checks": check_rows(v),
         "failures": [str(c) for c in v.failures],
-        "notes": (*remarks, *v.notes),
+        "notes": tuple(filter(None, (v.caution, *remarks, *v.notes))),
         "networks": [] if loads is None else network_rows(loads),
         "tables": tables(chapter),
         "timings": timing_rows(chapter.timings),

@@ -1,0 +1,156 @@
+"""The record of a model card as lines that a person reads: nested bullets, numbers with SI units.
+
+The same names and values stand in the card's JSON as the file has them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from palpate.format import share
+
+__all__ = ["bullets", "escape_markdown", "rows"]
+
+_RELATIVE = ("error", "RMSE", "percentile", "median", "p95", "share")  # figures that are shares
+_METRES = (
+    "radius",
+    "depth",
+    "over",
+    "stop",
+    "length",
+    "height",
+    "thickness",
+    "width",
+    "size",
+    "element",
+    "amplitude",
+)
+_PASCALS = ("young", "shear", "bulk", "shear_modulus", "bulk_modulus", "yield_stress", "saturation", "mu")
+_UNITS: dict[str, str] = {
+    **dict.fromkeys(_METRES, "m"),
+    **dict.fromkeys(_PASCALS, "Pa"),
+    "density": "kg/m³",
+    "gravity": "m/s²",
+    "pad": "N/m³",
+    "within": "°",
+    "feature_angle": "°",
+    "lower": "m",
+    "upper": "m",
+}
+_INTERVALS = ("depth",)  # two numbers are the ends of a range
+_HEADS = ("type", "law", "name")  # what a part is, in the line of its name
+_MOST = 12  # values of a list that are shown
+
+
+def bullets(part: Mapping[str, Any], escape: Callable[[str], str] = str, depth: int = 0) -> list[str]:
+    """Return a nested record as nested Markdown bullets; what is empty is left out.
+
+    Parameters
+    ----------
+    part : mapping
+        Names and values as JSON knows them.
+    escape : callable
+        Applied to each text of the record.
+    depth : int
+        How far the bullets are indented.
+    """
+    lines: list[str] = []
+    for name, value in part.items():
+        if _is_empty(value):
+            continue
+        label = escape(str(name).replace("_", " "))
+        if _is_record(value):
+            lines += _record_lines(label, name, value, escape, depth)
+        elif isinstance(value, list | tuple) and any(_is_record(item) for item in value):
+            for item in value:
+                lines += _record_lines(label, name, item, escape, depth)
+        else:
+            lines.append(_line(depth, label, escape(_words(str(name), value))))
+    return lines
+
+
+def rows(part: Mapping[str, Any]) -> dict[str, str]:
+    """Return a nested record as rows: the names on the way to each value, and the value in words."""
+    found: dict[str, str] = {}
+    path: list[str] = []
+    for line in bullets(part):
+        depth = (len(line) - len(line.lstrip())) // 2
+        name, _, words = line.lstrip()[2:].partition(": ")
+        path = [*path[:depth], name]
+        if words:
+            where = ", ".join(path)
+            found[where] = f"{found[where]}; {words}" if where in found else words
+    return found
+
+
+def escape_markdown(text: str) -> str:
+    """Return text that Markdown and HTML take as it stands."""
+    for mark in ("\\", "`", "*", "_", "[", "]", "<", ">", "|", "#"):
+        text = text.replace(mark, f"\\{mark}" if mark not in "<>" else {"<": "&lt;", ">": "&gt;"}[mark])
+    return text.replace("\n", " ")
+
+
+def _record_lines(label: str, name: str, value: Any, escape: Callable[[str], str], depth: int) -> list[str]:
+    """Return the line of a part, which says what it is, and the lines of its own parts below."""
+    if not _is_record(value):
+        return [_line(depth, label, escape(_words(name, value)))]
+    rest = dict(value)
+    # a count of the same name, or the kind of the part, stands in the part's own line
+    heads = [rest.pop(key) for key in (name, *_HEADS) if key in rest and isinstance(rest[key], str | int)]
+    shown = list(dict.fromkeys(str(head) for head in heads if str(head)))
+    return [_line(depth, label, escape(", ".join(shown))), *bullets(rest, escape, depth + 1)]
+
+
+def _line(depth: int, label: str, words: str) -> str:
+    return f"{'  ' * depth}- {label}" + (f": {words}" if words else "")
+
+
+def _is_record(value: Any) -> bool:
+    return isinstance(value, Mapping)
+
+
+def _is_empty(value: Any) -> bool:
+    """Return whether nothing is said: none, no text, or a list or record of such."""
+    if isinstance(value, Mapping):
+        return all(map(_is_empty, value.values()))
+    if isinstance(value, list | tuple):
+        return all(map(_is_empty, value))
+    return value is None or value == ""
+
+
+def _words(name: str, value: Any) -> str:
+    """Return a plain value, or a list of plain values, with its unit."""
+    unit = _UNITS.get(name, "")
+    if isinstance(value, list | tuple):
+        if name in _INTERVALS and len(value) == 2:
+            return f"{_plain(name, value[0])} to {_plain(name, value[1])} {unit}"
+        return _listed(name, value) + (f" {unit}" if unit and _has_numbers(value) else "")
+    text = _plain(name, value)
+    return f"{text} {unit}" if unit and _has_numbers([value]) else text
+
+
+def _listed(name: str, values: Sequence[Any]) -> str:
+    shown = [
+        "any" if _is_empty(v) else f"({_listed(name, v)})" if isinstance(v, list | tuple) else _plain(name, v)
+        for v in values[:_MOST]
+    ]
+    return ", ".join(shown) + (f", … ({len(values)} in all)" if len(values) > _MOST else "")
+
+
+def _has_numbers(values: Sequence[Any]) -> bool:
+    return any(
+        _has_numbers(v)
+        if isinstance(v, list | tuple)
+        else isinstance(v, int | float) and not isinstance(v, bool)
+        for v in values
+    )
+
+
+def _plain(name: str, value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float) and math.isfinite(value):
+        return share(value) if any(word in name for word in _RELATIVE) else f"{value:.6g}"
+    return str(value)

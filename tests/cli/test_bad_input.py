@@ -6,7 +6,10 @@ import json
 import shutil
 import socket
 
+import numpy as np
 import pytest
+
+import palpate as pp
 
 from .conftest import SMALL
 
@@ -207,6 +210,50 @@ def test_solves_that_were_trained_with_do_not_pass_for_unseen(palpate, copy):
     answer = palpate("validate", path)
     assert answer.code == 2
     assert "learnt from other solves" in answer.err
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """A folder with files that are not what a command takes, and a network of data."""
+    folder = tmp_path_factory.mktemp("files")
+    x = np.linspace(-1.0, 1.0, 30)
+    network = pp.fit(x, np.sin(x), effort=0.01).save(folder / "net.palpate")
+    (folder / "t.csv").write_text("a,b\n1,2\n", encoding="utf-8")
+    (folder / "empty.palpate").write_bytes(b"")
+    (folder / "cut.palpate").write_bytes(network.read_bytes()[:1500])
+    (folder / "text.palpate").write_text("these are words", encoding="utf-8")
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("learn none.zarr", ["does not exist", "palpate sweep"]),
+        ("view net.palpate", ["holds a network of data", "a learnt body is needed", "palpate ask"]),
+        ("run net.palpate", ["holds a network of data", "palpate ask"]),
+        ("export gltf net.palpate -o net.glb", ["holds a network of data"]),
+        ("ask t.csv", ["is not a .palpate file: it is a file of data", "palpate fit"]),
+        ("ask empty.palpate", ["is empty", "Copy the file again"]),
+        ("ask cut.palpate", ["is cut off", "Copy the file again"]),
+        ("ask text.palpate", ["is not a .palpate file, or its beginning is lost"]),
+        ("ask net.palpate --at 1,2", ["It has 1 input:", "Give 1 number"]),
+        ("material fit none.csv", ["none.csv: no such file"]),
+        ("init t.csv", ["can't be called", "a file of data", "palpate fit"]),
+        ("init net.palpate", ["the name of a model file"]),
+        ("sweep net.palpate", ["is a model file, not a study file", "palpate view"]),
+        ("learn net.palpate", ["is a model file"]),
+        ("learn t.csv", ["is a file of data, not a study file"]),
+        ("touch t.csv", ["none of the formats of parts and meshes", "STL", "palpate fit"]),
+    ],
+)
+def test_a_file_in_a_wrong_place_is_named_with_a_way_forward(palpate, files, monkeypatch, command, words):
+    monkeypatch.chdir(files)
+    answer = palpate(*command.split())
+    assert answer.code in {1, 2, 4}
+    text = " ".join(answer.err.split())
+    for word in words:
+        assert word in text
+    assert not any(jargon in text for jargon in ("header", "codec", "Traceback", "--force", "Error("))
 
 
 def test_a_folder_is_no_study(palpate, tmp_path):

@@ -145,7 +145,7 @@ def test_every_network_comes_back_bit_for_bit(tmp_path, form, radial, modes):
 
 
 def test_a_file_of_several_networks_is_not_one(path, archive, tmp_path):
-    with pytest.raises(FileFormatError, match="'networks' is needed"):
+    with pytest.raises(FileFormatError, match="a network of data is needed"):
         Network.load(path)
     several = save_archive(tmp_path / "two.palpate", replace(archive, kind="networks"))
     with pytest.raises(FileFormatError, match="2 networks"):

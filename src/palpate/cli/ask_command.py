@@ -12,6 +12,7 @@ import numpy as np
 from palpate.cli.answer_at_place import Answer, Deflection, outside, predictions
 from palpate.cli.console import Console
 from palpate.errors import UsageError
+from palpate.format import count
 from palpate.learning import Fitted
 from palpate.learning.loading import load
 from palpate.learning.plastic.load_histories import LoadHistories
@@ -157,7 +158,7 @@ def _place(text: str, inputs: Sequence[Range]) -> list[float]:
         example = ",".join(f"{(r.low + r.high) / 2:.4g}" for r in inputs)
         raise UsageError(
             f"{text!r} is no place of this model.",
-            why=f"It has {len(inputs)} inputs: {names}.",
-            fix=f"Give as many numbers with commas between, for example --at {example}.",
+            why=f"It has {count(len(inputs), 'input')}: {names}.",
+            fix=f"Give {count(len(inputs), 'number')}, for example --at {example}; commas stand between several.",
         )
     return values

@@ -7,6 +7,7 @@ from pathlib import Path
 import typer
 
 from palpate.errors import UsageError
+from palpate.file_kinds import file_kind, way_for
 from palpate.files import write_file
 
 __all__ = ["init_study"]
@@ -53,6 +54,11 @@ def init_study(
         text = part_text(record, notes)
         target = study_file(path)
     else:
+        if (kind := file_kind(path)) not in ("", "a study file"):
+            raise UsageError(
+                f"A study file can't be called {path}: that is the name of {kind}.",
+                fix=f"Name the study NAME.toml, or a part. {way_for(path)}",
+            )
         if unit is not None:
             raise UsageError("A unit belongs to a part.", fix="Name the part's file, or leave out --unit.")
         record, target = preset_study(preset), path

@@ -261,6 +261,11 @@ def fit_material(
     """
     from palpate.files import write_file
 
+    if missing := [str(file) for file in tables.files if not file.is_file()]:
+        raise UsageError(
+            f"{', '.join(missing)}: no such file.",
+            fix="Give the path of a table, as text (CSV and its kin) or .xlsx.",
+        )
     kinds = [tables.kind(i) for i in range(len(tables.files))]
     if "relaxation" in kinds:
         found = _fit_relaxation(tables, options)

@@ -183,6 +183,7 @@ def _chosen(study: Study) -> str:
 
     acting, held = study.interaction, ", ".join(study.body.fixed_names())
     assert isinstance(acting, ProbeRecord)
+    held = "what it stands on" if held == "held" else held
     surface = "the surface that faces up" if acting.touches == "touched" else acting.touches
     ball = f"a ball of {1e3 * acting.radius:g} mm"
     return f"Held at {held}; {ball} presses {surface}, up to {1e3 * acting.depth[1]:g} mm deep."

@@ -107,7 +107,7 @@ def _attributes(path: Path) -> dict[str, Any]:
             fix="Open a store that palpate wrote, a folder NAME.zarr.",
         ) from error
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise _corrupt(path, f"zarr.json can't be read: {error!r}.") from error
+        raise _corrupt(path, f"its zarr.json can't be read ({type(error).__name__}).") from error
     if not isinstance(attrs, dict):
         raise _corrupt(path, "the attributes in zarr.json are no table.")
     return attrs
@@ -130,12 +130,18 @@ def _load(path: Path) -> xarray.Dataset:
         computed = _checksum(data)
     # the kinds of errors that Zarr, its codecs and xarray raise on broken bytes
     except (OSError, ValueError, KeyError, TypeError, RuntimeError, AttributeError) as error:
-        raise _corrupt(path, f"it can't be decoded: {error!r}.") from error
+        raise _corrupt(path, f"a part of its data is damaged or cut off{_said(error)}.") from error
     if computed != written:
         raise _corrupt(
             path, f"its contents don't match its checksum ({computed[:12]} against {written[:12]})."
         )
     return data
+
+
+def _said(error: Exception) -> str:
+    """Return the first line of what a library said, in brackets; "" if it said nothing."""
+    lines = str(error).strip().splitlines()
+    return f" ({lines[0].strip().rstrip('.')})" if lines else ""
 
 
 def _part_without_metadata(path: Path) -> str:

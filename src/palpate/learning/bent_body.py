@@ -32,6 +32,7 @@ from threadpoolctl import threadpool_limits
 
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
+from palpate.format import count
 from palpate.learning.energy import EnergyHistory, learn_energy
 from palpate.learning.growth_frames import GrowthRecorder
 from palpate.learning.learn import Learned, learn
@@ -209,7 +210,7 @@ def _refuse_unfit(good: Dataset) -> None:
     """Refuse too few converged solves, and solves in space."""
     if len(good) < FEWEST:
         raise UsageError(
-            f"{len(good)} converged solves are too few to learn from.",
+            f"{count(len(good), 'converged solve')}: too few to learn from.",
             fix=f"Sweep at least {FEWEST}, better 26 or more.",
         )
     if good.rest.shape[1] != 2:

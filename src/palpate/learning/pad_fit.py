@@ -16,6 +16,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from palpate.errors import UsageError
+from palpate.format import count
 from palpate.learning.energy.energy_images import images_of
 from palpate.learning.energy.energy_samples import EnergySamples
 from palpate.rbf.regressors import pairs
@@ -84,7 +85,7 @@ def fit_pad(
         )
     if len(solves.X) < FEWEST:
         raise UsageError(
-            f"{len(solves.X)} converged solves are too few to learn a held body from.",
+            f"{count(len(solves.X), 'converged solve')}: too few to learn a held body from.",
             fix=f"Sweep at least {FEWEST}, better 20 or more.",
         )
     unknown = _baseline(RestStiffness.even(np.eye(3), n - 3), n)

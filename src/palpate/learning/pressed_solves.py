@@ -10,6 +10,7 @@ import numpy as np
 
 from palpate.dataset import Dataset, Layout
 from palpate.errors import UsageError
+from palpate.format import count
 from palpate.learning.dataset_symmetry import declared_symmetry, widen_ranges
 from palpate.learning.fields import Snapshots, lumped_mass
 from palpate.learning.kept_surface import touched_surface
@@ -93,7 +94,7 @@ class PressedSolves:
         data = data.ok
         if len(data) < FEWEST:
             raise UsageError(
-                f"{len(data)} converged solves are too few to learn a touched body from.",
+                f"{count(len(data), 'converged solve')}: too few to learn a touched body from.",
                 fix=f"Sweep at least {FEWEST}, better 40 or more.",
             )
         rest, triangles, touched = _surface(data, layout, str(probe["touches"]))

@@ -38,6 +38,16 @@ __all__ = [
     "save_archive",
 ]
 
+_WORDS = {
+    "networks": "a network of data",
+    "surrogate": "a learnt body",
+    "held-paths": "load histories",
+    "touched-surface": "a touched surface",
+}
+_WAYS = {
+    "networks": "`palpate ask {0} --at …` answers, `palpate export c {0}` and `palpate export onnx {0}` export it.",
+    "surrogate": "`palpate view {0}` shows it, `palpate run {0}` times it, `palpate ask {0} --at …` answers.",
+}
 _PARTS = ("factors", "shifts", "weights", "tail")
 _SCALES = ("input_centre", "input_half", "output_centre", "output_scale")
 _EXTRA = "extra/"
@@ -114,9 +124,11 @@ def load_archive(path: str | os.PathLike[str], *, kind: str | None = None) -> Ar
     container = read_container(path)
     if kind is not None and container.kind != kind:
         raise FileFormatError(
-            f"{path} holds {container.kind!r}; {kind!r} is needed here.",
-            why="A learnt body, networks of arrays and load histories are files of different kinds.",
-            fix="Read it with palpate.load, or give a file of the other kind.",
+            f"{path} holds {_WORDS.get(container.kind, repr(container.kind))}; "
+            f"{_WORDS.get(kind, repr(kind))} is needed here.",
+            why="Learnt bodies, networks of data and load histories are files of different kinds.",
+            fix=_WAYS.get(container.kind, "`palpate ask` says what the file holds.").format(path)
+            + " `palpate learn` writes a learnt body, `palpate fit` a network.",
         )
     try:
         return _archive(container)

@@ -24,12 +24,14 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import FileFormatError
+from palpate.file_kinds import file_kind, way_for
 from palpate.files import write_file
 
 __all__ = ["MAKE_ANEW", "Container", "read_container", "write_container"]
 
 VERSION = 2
 MAKE_ANEW = "Copy the file again, or make it anew with `palpate learn`."
+_HEADER_MAX = 100_000_000  # bytes, of safetensors
 _KINDS = {"BOOL", "U8", "I8", "U16", "I16", "U32", "I32", "U64", "I64", "F16", "F32", "F64"}
 
 
@@ -116,14 +118,30 @@ def _read(path: Path) -> tuple[dict[str, str], dict[str, np.ndarray]]:
         raise FileFormatError(
             f"{path} {state}.", fix="`palpate learn` writes such a file; or give the path of another."
         )
+    _refuse_foreign(path)
     try:
         with safe_open(path, framework="numpy") as file:
             header = dict(file.metadata() or {})
             return header, {name: _tensor(file, name) for name in file.keys()}  # noqa: SIM118 - not a mapping
     except (SafetensorError, OSError, ValueError, TypeError, KeyError) as error:
         raise FileFormatError(
-            f"{path} is not a network file, or it is truncated.", why=str(error), fix=MAKE_ANEW
+            f"{path} is cut off or damaged: its contents are not where its first bytes say.", fix=MAKE_ANEW
         ) from error
+
+
+def _refuse_foreign(path: Path) -> None:
+    """Refuse a file that doesn't begin as an archive does: eight bytes of a length, then as many of a JSON table."""
+    with path.open("rb") as file:
+        begin = file.read(9)
+    if not begin:
+        raise FileFormatError(f"{path} is empty.", fix=MAKE_ANEW)
+    if begin[8:] == b"{" and int.from_bytes(begin[:8], "little") < _HEADER_MAX:
+        return
+    if file_kind(path) == "a model file":
+        raise FileFormatError(f"{path} is not a .palpate file, or its beginning is lost.", fix=MAKE_ANEW)
+    kind = f": it is {file_kind(path)}" if file_kind(path) else ""
+    way = way_for(path) or "Give the path of a .palpate file, as `palpate learn` writes it."
+    raise FileFormatError(f"{path} is not a .palpate file{kind}.", fix=way)
 
 
 def _tensor(file: Any, name: str) -> np.ndarray:

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.format import count
 from palpate.network.network import Network
 from palpate.network.radial import radial
 
@@ -110,7 +111,7 @@ class Uncertainty:
         z, rank = _quantile(level), _ceil((len(X) + 1) * level)
         if rank > len(X):
             raise UsageError(
-                f"{len(X)} samples are too few to calibrate intervals of {level:.0%}.",
+                f"{count(len(X), 'sample')} can't calibrate intervals of {level:.0%}.",
                 fix=f"Keep at least {_ceil(level / (1.0 - level))} apart from training.",
             )
         deviation = self.deviation(X)

@@ -16,6 +16,7 @@ from pydantic import BaseModel, ValidationError
 from tomlkit.items import AoT
 
 from palpate.errors import StudyError
+from palpate.file_kinds import file_kind, way_for
 from palpate.study.body_records import BODIES
 from palpate.study.interaction_records import INTERACTIONS
 from palpate.study.quantities import Unit
@@ -49,10 +50,20 @@ def read_study(path: str | os.PathLike[str]) -> Study:
         If the file is missing, is no TOML, or says something that a study can't mean: all such places are listed.
     """
     path = Path(path)
+    kind = file_kind(path)
+    if kind and kind != "a study file" and path.exists():
+        raise StudyError(
+            f"{path} is {kind}, not a study file.",
+            fix=f"{way_for(path)} A study file is a text, NAME.toml: write one with `palpate init`.",
+        )
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
-        raise StudyError(f"{path} does not exist.", fix="Write one with `palpate init`.") from error
+        fix = {
+            "a dataset of solves": "Write one with `palpate sweep STUDY.toml`, or give the path of another.",
+            "a model file": "Name a study file, NAME.toml; `palpate learn` writes the model file.",
+        }.get(kind, "Write one with `palpate init`.")
+        raise StudyError(f"{path} does not exist.", fix=fix) from error
     except (OSError, UnicodeDecodeError) as error:
         raise StudyError(
             f"{path} can't be read as a study.",

@@ -97,7 +97,7 @@ class Surrogate:
 
     @property
     def purpose(self) -> str:
-        """What a hand does with the body, how far it was trained, and what is drawn, in plain words."""
+        """The use of the body in plain words: what a hand does with it, how far it was trained, and what is drawn."""
         known, baseline = self.energy.going.deepest, self.energy.baseline
         if not baseline.holds:
             ball = "" if math.isnan(baseline.radius) else f" of radius {millimetres(baseline.radius)}"

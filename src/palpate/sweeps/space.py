@@ -12,6 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.format import count
 from palpate.units import Range, bounds
 
 __all__ = [
@@ -105,7 +106,7 @@ class Space:
         if values.ndim != 2 or values.shape[1] != len(self) or not np.isfinite(values).all():
             raise UsageError(
                 f"Points of shape {values.shape} can't be taken in this space.",
-                why=f"It has {len(self)} inputs ({', '.join(self.names)}), and all values must be finite.",
+                why=f"It has {count(len(self), 'input')} ({', '.join(self.names)}), and all values must be finite.",
                 fix=f"Give an array of shape (N, {len(self)}).",
             )
         return values

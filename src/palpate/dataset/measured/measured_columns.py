@@ -199,7 +199,9 @@ class Columns:
         depths = own in ({*_PRESSED, *_PLACE}, set(_PRESSED)) and (placed or set(_PLACE) <= own)
         if not (positions or depths):
             raise UsageError(
-                f"Columns {' '.join(self.names)} make no measurement.",
+                f"Columns {' '.join(self.names)} make no measurement."
+                if self.names
+                else "No column has the name of something measured.",
                 why="A measurement is a position with a force, or a depth with the force against it, at a place.",
                 fix="Give x y z with Fx Fy Fz or one of them; or depth F with x y z, or with a `place` in the sidecar.",
             )

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.format import count
 from palpate.learning.automatic import check_target, ranges_of
 from palpate.network import Network, Scaling
 from palpate.network.radial import RadialFunction
@@ -252,7 +253,7 @@ def _check_rows(X: np.ndarray, Y: np.ndarray, names: Sequence[str]) -> None:
         )
     if len(X) < FEWEST:
         raise UsageError(
-            f"{len(X)} samples are too few to choose a network by.",
+            f"{count(len(X), 'sample')}: too few to choose a network by.",
             why="Some must be held out to judge by.",
             fix=f"Give {FEWEST} at least.",
         )

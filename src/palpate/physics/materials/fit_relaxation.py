@@ -185,7 +185,7 @@ def fit_relaxation(
         branches = _fewer(x)
     if not tried:
         raise UsageError(
-            f"{len(t)} rows are too few.", why="One term needs four.", fix="Give a longer record."
+            f"The record has too few rows: {len(t)}.", why="One term needs four.", fix="Give a longer record."
         )
     least = min(score for score, _, _ in tried)
     _, kept, rest = next(entry for entry in reversed(tried) if entry[0] <= least + STRONG)

@@ -22,6 +22,7 @@ import numpy as np
 
 from palpate import checks
 from palpate.errors import FileFormatError, UsageError
+from palpate.file_kinds import way_for
 from palpate.physics.advice import advise
 from palpate.physics.shapes.naming import require_known, require_name
 from palpate.physics.shapes.triangle_list import read_triangles
@@ -146,6 +147,13 @@ def read_with_meshio(path: str) -> Any:
 
     import meshio
 
+    if Path(path).suffix.lower() not in meshio.extension_to_filetypes:
+        raise FileFormatError(
+            f"{path} is in none of the formats of parts and meshes.",
+            why=f"Its name ends in {Path(path).suffix or 'nothing'}.",
+            fix="Give STL or STEP (a surface or solids), or a mesh: VTU, VTK, MSH, INP, NAS, MED or XDMF. "
+            + way_for(path),
+        )
     try:
         # Where no reader takes the file, meshio prints and ends the program. Its reader of STL takes four letters
         # of an ASCII file for a count, which may overflow: no harm.

@@ -12,7 +12,7 @@ sys.path += [str(Path(__file__).parent / "surrogates" / part) for part in ("", "
 
 import skins
 from field_made import field
-from touch_made import PROBE, SOFT, ball, touch_energy
+from touch_made import PROBE, SOFT, ball, inside_points, touch_energy
 
 import palpate as pp
 from held import pad, yielding_rod
@@ -27,7 +27,7 @@ from palpate.surrogates import (
 )
 from palpate.surrogates.memories import Indentation, IwanElements, Patches, Relaxation
 
-__all__ = ["BODIES", "body", "networks"]
+__all__ = ["BODIES", "body", "networks", "without_units"]
 
 
 def _random_network(inputs, seed: int, radial: str = "gaussian") -> Network:
@@ -137,6 +137,12 @@ BODIES = {
 def body(name: str) -> pp.Surrogate:
     """Return one of them."""
     return BODIES[name]()
+
+
+def without_units() -> tuple[pp.Surrogate, np.ndarray]:
+    """Return a body whose network is a slope alone, and places in touch."""
+    model = pp.Surrogate(touch_energy(units=0), meta={"name": "plain"})
+    return model, inside_points(20)
 
 
 def networks() -> list[Network]:

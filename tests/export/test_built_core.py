@@ -8,7 +8,7 @@ import struct
 import numpy as np
 import pytest
 
-from exported_bodies import body
+from exported_bodies import body, without_units
 from palpate.errors import UsageError
 from palpate.export.build_core import TARGETS, build, built_core
 from palpate.export.c_export import block_of
@@ -24,6 +24,12 @@ def test_a_built_core_is_small_and_what_its_sources_give(target, tmp_path):
         pytest.importorskip("ziglang", reason="zig builds the core again")
     build(target, tmp_path / target.file)
     assert (tmp_path / target.file).read_bytes() == built
+
+
+def test_a_body_whose_network_has_no_units_states_its_deviation():
+    model, X = without_units()
+    core = WasmCore(block_of(model, field=None, with_field=False, deviation=True).to_bytes())
+    np.testing.assert_allclose(core.answers(X)[:, 19], model.energy.deviation(X), rtol=1e-5)
 
 
 def test_weights_that_are_not_sound_are_refused():

@@ -70,7 +70,7 @@ PP_PART int pp_find(const unsigned char *bytes, uint64_t size, const unsigned ch
   if (kind < 0 || kind > 6) return 0;
   for (i = 0; i < 4; i++) {
     a->n[i] = pp_whole(row + 4 + 4 * i);
-    if (a->n[i] < 1 || a->n[i] > (1 << 24)) return 0;
+    if (a->n[i] < (kind == 3 && i == 1 ? 0 : 1) || a->n[i] > (1 << 24)) return 0; /* a root may know no units */
     count *= (uint64_t)a->n[i];
     if (count > (UINT64_C(1) << 31)) return 0;
     if (i < 3) many *= (uint64_t)((a->n[i] + (i == 2 && a->n[2] == 1 ? 0 : PP_TILE - 1)) / (i == 2 && a->n[2] == 1 ? 1 : PP_TILE));

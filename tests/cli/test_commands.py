@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import signal
 import subprocess
 import sys
 import warnings
@@ -17,6 +18,7 @@ from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.learning.loading import load
 from palpate.physics.advice import advise
+from palpate.processes import end_by_sigterm
 from palpate.runtime import LoopReport
 from palpate.study import Study, preset_names, preset_study, read_study
 from programs import one_core
@@ -224,6 +226,13 @@ def test_ctrl_c_says_what_is_kept(palpate, carried_out, monkeypatch):
     answer = palpate("sweep", carried_out / "study.toml")
     assert answer.code == 130
     assert "Interrupted. What is solved is kept: the same command goes on." in answer.err
+
+
+def test_sigterm_says_what_is_kept(palpate, carried_out, monkeypatch):
+    monkeypatch.setattr("palpate.study.Study.with_workers", lambda *_: end_by_sigterm(signal.SIGTERM, None))
+    answer = palpate("sweep", carried_out / "study.toml")
+    assert answer.code == 128 + signal.SIGTERM
+    assert "Ended from outside (SIGTERM). What is solved is kept: the same command goes on." in answer.err
 
 
 def test_advice_is_told_once_and_without_the_line_of_code(palpate, carried_out, monkeypatch):

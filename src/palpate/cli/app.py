@@ -78,6 +78,7 @@ Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open the 
 
 STUDY = Path("study.toml")
 _INTERRUPTED = 130  # the shell's code of a program that Ctrl-C has ended
+_TERMINATED = 128 + signal.SIGTERM  # and of one that was asked to end
 
 
 @app.callback(invoke_without_command=True)
@@ -103,7 +104,10 @@ def demo(
     ] = True,
     quick: Annotated[
         bool,
-        typer.Option("--quick", help="Use coarse elements and few solves. This takes less than two minutes."),
+        typer.Option(
+            "--quick",
+            help="Use coarse elements and few solves. Takes under two minutes on two idle cores.",
+        ),
     ] = False,
     workers: Workers = None,
     case_limit: CaseLimit = CASE_LIMIT,
@@ -112,7 +116,7 @@ def demo(
     token: AskToken = True,
     as_json: Json = False,
 ) -> None:
-    """Run named studies completely: solve, learn, check, and show the result. The two beams take about a minute."""
+    """Run named studies completely: solve, learn, check, show. The two beams take about a minute on two idle cores."""
     from palpate.cli.demo_command import run_demo
 
     console = Console(as_json)
@@ -417,6 +421,8 @@ def _serve(
 ) -> None:
     from palpate.cli.run_command import aim_device
     from palpate.runtime.touchable import load_touchable
+
+    Console().say(f"Opening the page of {model} …")  # the loop's own process takes some seconds to start
     from palpate.viewer import serve
 
     body = load_touchable(model)
@@ -455,8 +461,9 @@ def main(arguments: list[str] | None = None) -> None:
         Console(as_json="--json" in words).error(known)
         sys.exit(known.exit_code)
     except SystemExit as end:
-        if end.code == _INTERRUPTED:  # as which Typer ends by Ctrl-C, without a word
+        if end.code in (_INTERRUPTED, _TERMINATED):  # as which Typer ends by Ctrl-C, without a word
             goes_on = {"sweep", "demo", "touch"} & set(words)
             kept = " What is solved is kept: the same command goes on." if goes_on else ""
-            Console().say(f"\nInterrupted.{kept}")
+            way = "Interrupted" if end.code == _INTERRUPTED else "Ended from outside (SIGTERM)"
+            Console().say(f"\n{way}.{kept}")
         raise

@@ -12,7 +12,7 @@ from typing import Any
 
 from palpate.dataset import Dataset, Layout
 from palpate.errors import UsageError
-from palpate.format import share
+from palpate.format import count, share
 from palpate.learning.bent_body import learn_bent
 from palpate.learning.energy import EnergyHistory, learn_energy
 from palpate.learning.fields import LearntField, learn_snapshots, lumped_mass
@@ -163,6 +163,7 @@ def learn(
         )
     if "input_node" in train:
         began = time.monotonic()
+        log(f"energy and shape of {count(len(train.ok), 'solve')}")
         bent = learn_bent(
             train, name=name, effort=effort, seconds=seconds, workers=workers, seed=seed, **options
         )

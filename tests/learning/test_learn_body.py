@@ -254,7 +254,7 @@ def test_data_that_no_body_can_be_learnt_from_says_why(problem, words):
 
 
 def test_too_few_solves_are_refused():
-    with pytest.raises(UsageError, match="5 converged solves are too few"):
+    with pytest.raises(UsageError, match="5 converged solves: too few"):
         pp.learn(closed_form().take(np.arange(5)))
 
 

@@ -249,6 +249,9 @@ def test_a_body_with_a_corrected_energy_is_drawn_on_its_surface(tmp_path):
     X = around_points(50)
     np.testing.assert_allclose(body.fields["displacement"].depth(X), S.depth(X) + 1e-4, atol=1e-12)
     assert "corrected by 40 measured touches" in str(body)
+    first = str(body).splitlines()[0]  # for users: what is done with it, before its network
+    assert "pressed by a ball of radius" in first
+    assert "units" not in first
     assert touchable(body, "block").name.endswith("corrected by 40 touches")
     again = load(body.save(tmp_path / "b.palpate"))
     np.testing.assert_array_equal(again.energy.force(X), body.energy.force(X))

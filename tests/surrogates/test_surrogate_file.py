@@ -56,7 +56,7 @@ def test_a_missing_a_foreign_and_a_damaged_file_are_refused(tmp_path):
     with pytest.raises(FileFormatError, match="does not exist"):
         Surrogate.load(tmp_path / "none.palpate")
     foreign = body().energy.network.save(tmp_path / "n.palpate")
-    with pytest.raises(FileFormatError, match="surrogate"):
+    with pytest.raises(FileFormatError, match="holds a network of data; a learnt body is needed"):
         Surrogate.load(foreign)
     data = bytearray(path.read_bytes())
     for place in (3, len(data) // 3, len(data) - 9):

@@ -26,6 +26,12 @@ from palpate.units import Range
 __all__ = ["answers_at", "ask", "deflections", "inputs_of"]
 
 _STEPS = 16  # in a radius
+_NOUNS = {
+    "Surrogate": "A learnt body",
+    "Fitted": "A network of data, with intervals",
+    "Network": "A network of data",
+    "LoadHistories": "Load histories",
+}
 
 
 def ask(model: Path, at: Sequence[str], console: Console) -> None:
@@ -44,7 +50,8 @@ def ask(model: Path, at: Sequence[str], console: Console) -> None:
         ranges = [{"name": r.name, "low": r.low, "high": r.high, "unit": r.unit} for r in inputs]
         content = {"model": str(model), "kind": what, "inputs": ranges, "text": str(contents)}
         warning = _warning(contents)
-        console.result("\n".join([f"{what} in {model}\n{contents}", *warning]), content | _as_field(warning))
+        noun = _NOUNS.get(what, what)
+        console.result("\n".join([f"{noun} in {model}\n{contents}", *warning]), content | _as_field(warning))
         return
     line = _line_under_loads(contents)
     if line is not None:

@@ -20,6 +20,7 @@ import numpy as np
 
 from palpate.checks import own_arrays
 from palpate.errors import UsageError
+from palpate.format import count
 from palpate.network import Network, TrainedRegion
 from palpate.network.network_kernels import gram
 from palpate.processes import available_cores
@@ -111,7 +112,9 @@ class LearntEnergy:
 
     def __str__(self) -> str:
         units = (
-            f"{self.network.units} {self.network.form} units" if self.network.units else "an affine factor"
+            f"{count(self.network.units, f'{self.network.form} unit')}"
+            if self.network.units
+            else "an affine factor"
         )
         return f"{self.baseline}; {units}"
 

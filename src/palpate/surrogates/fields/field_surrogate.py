@@ -19,6 +19,7 @@ import numpy as np
 
 from palpate.checks import own_arrays
 from palpate.errors import UsageError
+from palpate.format import count
 from palpate.network import Network
 from palpate.network.network_kernels import Precision
 from palpate.surrogates.arguments import rows_of
@@ -215,11 +216,11 @@ class FieldSurrogate:
 
     def __str__(self) -> str:
         nodes, components = self.rest.shape
-        names = ", ".join(str(r) for r in self.inputs)
+        each = f", {components} numbers each" * (components > 1)
         return (
-            f"FieldSurrogate: {self.name} ({self.unit or '1'}) on {nodes} nodes, {components} each; {names}; "
-            f"{len(self.modes)} modes{self._local_mode_in_words}, amplitude {self.amplitude.name!r}, "
-            f"{self.network.units} units"
+            f"field {self.name}{f' ({self.unit})' * bool(self.unit)} on {nodes} nodes{each}: "
+            f"{count(len(self.modes), 'mode')}{self._local_mode_in_words} that grow with depth "
+            f"({self.amplitude.name} law), {count(self.network.units, 'unit')}"
         )
 
     __repr__ = __str__
@@ -228,7 +229,7 @@ class FieldSurrogate:
     def _local_mode_in_words(self) -> str:
         if self.local_mode is None:
             return ""
-        return " and a local_mode" if self.local_mode.variation is None else " and a local mode that varies"
+        return " and a local mode" if self.local_mode.variation is None else " and a local mode that varies"
 
     @property
     def inputs(self) -> tuple[Range, ...]:

@@ -18,6 +18,7 @@ from numba import njit
 
 from palpate.checks import own_arrays
 from palpate.errors import UsageError
+from palpate.format import count
 from palpate.network import Network
 from palpate.network.network_kernels import value_into
 from palpate.units import Range, bounds
@@ -105,7 +106,9 @@ class NodeField:
 
     def __str__(self) -> str:
         inputs = ", ".join(str(r) for r in self.inputs)
-        return f"{self.name} at {len(self.points)} nodes by {inputs}; {self.network.units} units"
+        return (
+            f"field {self.name} at {len(self.points)} nodes by {inputs}; {count(self.network.units, 'unit')}"
+        )
 
     @property
     def further(self) -> tuple[int, ...]:

@@ -238,7 +238,7 @@ def _refuse_lines(surrogate: Surrogate) -> None:
 
 
 def _shallow(surrogate: Surrogate) -> Surrogate:
-    """Return the same body, which lets go of a probe that is twice as deep as trained: its surface takes less room."""
+    """Return the same body, which lets go of a probe about twice as deep as trained: its surface takes less room."""
     baseline, deepest = surrogate.energy.baseline, touchable(surrogate).deepest
     surface = baseline.surface
     if surface is None or not isinstance(baseline, ContactBaseline):

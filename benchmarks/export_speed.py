@@ -230,6 +230,7 @@ def _builds(
     thing: Surrogate, name: str, loop: str, folder: Path
 ) -> dict[str, Callable[[np.ndarray, int], None]]:
     """Return what asks an exported body, by the compiler and its options."""
+    folder.mkdir()
     return {
         f"{compiler} {' '.join(options)}": _compiled(thing, name, loop, compiler, options, folder / str(k))
         for k, (compiler, options) in enumerate(BUILDS)

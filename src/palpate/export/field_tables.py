@@ -5,8 +5,9 @@ A mode is not kept more precisely than the eye needs. At any touch the field may
     Σ_k |c_k| q_k / 2  ≤  0.9e-4 · (largest change of the field from rest)
 
 c_k being the coefficients and q_k the scales. The scales are q_k = t / max |c_k|, so that every mode has an equal part
-in the error, with the largest t that keeps the bound at all trained touches; a mode that would need more than two bytes
-takes the finest scale that they allow. Numbers of later modes are small then, and pack well.
+in the error, with the largest t that keeps the bound at all trained touches, and at others in the ranges and as far
+beyond them as the field is followed; a mode that would need more than two bytes takes the finest scale that they allow.
+Numbers of later modes are small then, and pack well.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.export.weights_block import BASELINE, FIELD, FIELD_NET, Table, net_tables
 from palpate.surrogates import FieldSurrogate, Surrogate
+from palpate.units import bounds
 
 __all__ = ["PROMISE", "SURFACE", "VARIED", "RoundedModes", "chosen_field", "deepest_touches", "field_tables"]
 
@@ -30,6 +32,7 @@ _SHARE = (
 )
 _DEEPEST = 24  # touches from which the largest change is taken
 _HALVINGS = 60
+_OTHERS = 1000  # places beside the trained ones at which modes are held precise enough
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +59,7 @@ class RoundedModes:
         exact = ((size == 0.0) | (size == largest[:, None])).all(
             axis=1
         )  # none, or 1 everywhere as a stretch at rest
-        finest, X = largest / _LARGEST, _trained_touches(surrogate, shown)
+        finest, X = largest / _LARGEST, _all_touches(surrogate, shown)
         share = np.hstack([np.ones((len(X), 1)), np.abs(shown.coefficients(X))]) * ~exact
         most = np.maximum(share.max(axis=0, initial=0.0), 1e-300)
         allowed = 2.0 * _SHARE * PROMISE * _largest_change(shown, deepest_touches(surrogate, shown))
@@ -78,6 +81,20 @@ def _trained_touches(surrogate: Surrogate, shown: FieldSurrogate) -> np.ndarray:
     """Return trained inputs (N, n) at which the probe touches."""
     X = surrogate.energy.trained_rows()
     return X[surrogate.energy.inside(X) & (shown.depth(X) > 0.0)]
+
+
+def _all_touches(surrogate: Surrogate, shown: FieldSurrogate) -> np.ndarray:
+    """Return trained touches (N, n), and others in the ranges and beyond them, where coefficients may be larger."""
+    going, baseline = shown.continuation, surrogate.energy.baseline
+    assert going is not None
+    low, high = bounds(shown.inputs)
+    unit = np.random.default_rng(0).uniform(size=(_OTHERS, len(low)))
+    X = (low - going.widths) + unit * (high - low + 2.0 * going.widths)
+    radius = shown.radius if shown.radius_input is None else X[:, shown.radius_input]
+    depth = shown.depth(X)
+    return np.vstack(
+        [_trained_touches(surrogate, shown), X[(depth > 0.0) & (depth <= baseline.inner + radius)]]
+    )
 
 
 def deepest_touches(surrogate: Surrogate, shown: FieldSurrogate) -> np.ndarray:
@@ -141,7 +158,7 @@ def field_tables(surrogate: Surrogate, name: str, known: Mapping[int, Table]) ->
     own = -1 if shown.radius_input is None else shown.radius_input
     rounded = RoundedModes.of(surrogate, shown)
     knots = 0 if mode is None else mode.table.shape[1]
-    low, high = np.array([[r.low for r in shown.inputs], [r.high for r in shown.inputs]])
+    low, high = bounds(shown.inputs)
     reach, nodes, points = shown.moving_arguments()
     numbers = [shown.radius, going.deepest, going.depth_width, *shown.amplitude.numbers(), reach]
     tables = {

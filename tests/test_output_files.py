@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from palpate.errors import UsageError
-from palpate.output_files import is_own, require_outputs, sealed
+from palpate.output_files import is_own, require_outputs, with_seal
 from palpate.surrogates.model_card import card_of
 
 
@@ -15,11 +15,11 @@ from palpate.surrogates.model_card import card_of
 def test_a_text_is_its_own_until_a_letter_of_it_changes(tmp_path, name):
     file = tmp_path / name
     for text in ("some text", "some text\n", ""):
-        file.write_text(sealed(name, text), "utf-8", newline="\n")
+        file.write_text(with_seal(name, text), "utf-8", newline="\n")
         assert file.read_text("utf-8").startswith(text)
         assert is_own(file)
         require_outputs([file])
-    written = sealed(name, "some text\n")
+    written = with_seal(name, "some text\n")
     for changed in (
         "some text\n",
         written.replace("some", "same"),

@@ -22,7 +22,7 @@ from pathlib import Path
 
 from palpate.errors import UsageError
 
-__all__ = ["is_own", "require_outputs", "seal", "sealed"]
+__all__ = ["is_own", "require_outputs", "seal", "with_seal"]
 
 _COMMENTS = {
     ".h": ("/* ", " */"),
@@ -102,7 +102,7 @@ def require_outputs(
             )
 
 
-def sealed(file: str | os.PathLike[str], text: str) -> str:
+def with_seal(file: str | os.PathLike[str], text: str) -> str:
     """Return a text with a last line that lets a later export replace it; a format without comments as it stands.
 
     Parameters
@@ -121,7 +121,7 @@ def sealed(file: str | os.PathLike[str], text: str) -> str:
 
 def seal(path: Path) -> None:
     """Add that line to a file that another library wrote."""
-    path.write_text(sealed(path, path.read_text("utf-8")), "utf-8", newline="\n")
+    path.write_text(with_seal(path, path.read_text("utf-8")), "utf-8", newline="\n")
 
 
 def is_own(path: Path) -> bool:

@@ -109,7 +109,7 @@ def test_damping_warms_the_motors_too():
     squares = []
     for _ in range(6000):
         safety.apply(np.array([0.0, 1.0, 0.0]), gate=True)
-        safety.force *= safety.allowed / max(np.linalg.norm(safety.force), 1e-9)
+        safety.force *= safety.bearable_force / max(np.linalg.norm(safety.force), 1e-9)
         squares.append(float(safety.force @ safety.force))
     mean = np.convolve(squares, np.ones(1000) / 1000, mode="valid")  # of ten seconds
     assert max(squares) == pytest.approx(limits.max_force**2)

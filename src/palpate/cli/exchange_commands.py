@@ -45,7 +45,7 @@ def card(
     """Print the card of a model: what it was trained on, by whom, its errors, limits, hashes and licence."""
     from palpate.files import write_file
     from palpate.learning.loading import load
-    from palpate.output_files import sealed
+    from palpate.output_files import with_seal
     from palpate.surrogates.model_card import card_of
 
     if out is not None:
@@ -69,7 +69,7 @@ def card(
     found = card_of(model, file)
     if out is not None:
         text = found.to_json() + "\n" if out.suffix.lower() == ".json" else found.to_markdown()
-        write_file(out, sealed(out, text))
+        write_file(out, with_seal(out, text))
         Console(as_json).result(str(out), {"card": str(out)})
         return
     Console(as_json).result(str(found).rstrip(), found.as_dict())

@@ -17,7 +17,7 @@ from palpate.export.field_tables import chosen_field
 from palpate.export.weights_block import ROOT, WeightsBlock, identifier
 from palpate.files import system_errors, write_file
 from palpate.network import Network
-from palpate.output_files import require_outputs, sealed
+from palpate.output_files import require_outputs, with_seal
 from palpate.surrogates import Surrogate
 from palpate.surrogates.model_card import card_of
 
@@ -145,7 +145,7 @@ def export_c(
 
 
 def _write(folder: Path, texts: dict[str, str]) -> tuple[Path, ...]:
-    return tuple(write_file(folder / file, sealed(file, text)) for file, text in texts.items())
+    return tuple(write_file(folder / file, with_seal(file, text)) for file, text in texts.items())
 
 
 def block_of(

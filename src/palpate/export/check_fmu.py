@@ -60,7 +60,23 @@ def open_instance(description: Any, folder: str, *, exchange: bool = False) -> F
     return kind(description, folder, exchange=exchange)
 
 
-class _Instance2:
+class _Instance:
+    """An instance as both versions have it: calls of the same name in FMPy."""
+
+    fmu: Any
+
+    def step(self, time: float, dt: float) -> None:
+        self.fmu.doStep(currentCommunicationPoint=time, communicationStepSize=dt)
+
+    def slopes(self, unknown: list[int], known: list[int], seed: list[float]) -> list[float]:
+        return list(self.fmu.getDirectionalDerivative(unknown, known, seed))
+
+    def close(self) -> None:
+        self.fmu.terminate()
+        self.fmu.freeInstance()
+
+
+class _Instance2(_Instance):
     """An instance of FMI 2.0, see `FmuInstance`."""
 
     def __init__(self, description: Any, folder: str, *, exchange: bool) -> None:
@@ -77,9 +93,7 @@ class _Instance2:
         self._calls.logger = fmi2CallbackLoggerTYPE(lambda *_: None)
         self._calls.allocateMemory = defaultCallbacks.allocateMemory
         self._calls.freeMemory = defaultCallbacks.freeMemory
-        self.fmu: Any = (FMU2Model if exchange else FMU2Slave)(
-            **_identity(description, folder, exchange=exchange)
-        )
+        self.fmu = (FMU2Model if exchange else FMU2Slave)(**_identity(description, folder, exchange=exchange))
         self.fmu.instantiate(callbacks=self._calls)
 
     def begin(self, *, again: bool = True) -> None:
@@ -98,26 +112,14 @@ class _Instance2:
     def flags(self) -> list[bool]:
         return [bool(flag) for flag in self.fmu.getBoolean([0, 1, 2])]
 
-    def step(self, time: float, dt: float) -> None:
-        self.fmu.doStep(currentCommunicationPoint=time, communicationStepSize=dt)
 
-    def slopes(self, unknown: list[int], known: list[int], seed: list[float]) -> list[float]:
-        return list(self.fmu.getDirectionalDerivative(unknown, known, seed))
-
-    def close(self) -> None:
-        self.fmu.terminate()
-        self.fmu.freeInstance()
-
-
-class _Instance3:
+class _Instance3(_Instance):
     """An instance of FMI 3.0, see `FmuInstance`."""
 
     def __init__(self, description: Any, folder: str, *, exchange: bool) -> None:
         from fmpy.fmi3 import FMU3Model, FMU3Slave
 
-        self.fmu: Any = (FMU3Model if exchange else FMU3Slave)(
-            **_identity(description, folder, exchange=exchange)
-        )
+        self.fmu = (FMU3Model if exchange else FMU3Slave)(**_identity(description, folder, exchange=exchange))
         self.fmu.instantiate(logMessage=lambda *_: None)
 
     def begin(self, *, again: bool = True) -> None:
@@ -134,16 +136,6 @@ class _Instance3:
 
     def flags(self) -> list[bool]:
         return [bool(flag) for flag in self.fmu.getBoolean([12, 13, 14])]
-
-    def step(self, time: float, dt: float) -> None:
-        self.fmu.doStep(currentCommunicationPoint=time, communicationStepSize=dt)
-
-    def slopes(self, unknown: list[int], known: list[int], seed: list[float]) -> list[float]:
-        return list(self.fmu.getDirectionalDerivative(unknown, known, seed))
-
-    def close(self) -> None:
-        self.fmu.terminate()
-        self.fmu.freeInstance()
 
 
 def _identity(description: Any, folder: str, *, exchange: bool) -> dict[str, str]:

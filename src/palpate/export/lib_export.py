@@ -22,7 +22,7 @@ from palpate.export.compilers import compile_c, find_compiler
 from palpate.export.lib_templates import CSHARP, MATLAB_EXAMPLE, MATLAB_HEADER, PYTHON, UNREAL
 from palpate.export.weights_block import ROOT
 from palpate.files import system_errors, write_file
-from palpate.output_files import require_outputs, sealed
+from palpate.output_files import require_outputs, with_seal
 from palpate.surrogates import Surrogate
 
 __all__ = ["ExportedLibrary", "export_lib", "library_name"]
@@ -119,7 +119,7 @@ def _build(
     """Return the library and all beside it, written into a folder and compared there."""
     done = export_c(surrogate, folder, name=name, check=False, **parts)
     wrappers = tuple(
-        write_file(folder / file, sealed(file, text)) for file, text in _wrappers(surrogate, done).items()
+        write_file(folder / file, with_seal(file, text)) for file, text in _wrappers(surrogate, done).items()
     )
     path = find_compiler(compiler)
     if path is None:

@@ -470,7 +470,7 @@ class Loop:
         else:
             self.workspace.force_on_hand(force, sent)
             free = not self.evaluator.force.any() and not sent.any()
-            controller.max_force = self.safety.allowed
+            controller.max_force = self.safety.bearable_force
             controller.apply(self.out.hand, sent, self.now - self._before, free=free)
             if controller.damping > 0.0:
                 self.workspace.force_on_body(sent, force)

@@ -8,7 +8,7 @@ whatever the model says:
 - *ramp-in*: after the gate opens (a grab, a start, the end of a fault) the force grows from zero over at
   least 50 ms, counted in ticks, so that a late tick can't shorten it;
 - *heat*: where the device states a continuous force, the mean of ‖F‖² over ten seconds doesn't exceed its square;
-  F is the force as sent, and `Safety.allowed` bounds damping, too.
+  F is the force as sent, and `Safety.bearable_force` bounds damping, too.
 
 The passivity controller adds its damping after these laws, to `Safety.force`. The slew goes on from the force without
 it: it would otherwise be subtracted from itself in every tick, and a damper faster than the slew would run away.
@@ -167,7 +167,7 @@ class Safety:
         self.force[0], self.force[1], self.force[2] = self._was
 
     @property
-    def allowed(self) -> float:
+    def bearable_force(self) -> float:
         """Largest ‖F‖ that the device bears at the latest tick, N: less while its motors are warm."""
         return self._allowed
 

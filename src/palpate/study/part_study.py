@@ -112,12 +112,12 @@ def part_study(
         "test": {"samples": 24, "depths": 2},  # many places: several depths of one tell less
     }
     study = _study_of(content) if touched else _with_touched(content, named)
-    study = _suited(study, content, element)
+    study = _suit(study, content, element)
     regions = study.body.shape().regions  # type: ignore[union-attr]  # it is a part
     return study, tuple(_notes(path, unit, faces, regions, low, high))
 
 
-def _suited(study: Study, content: dict[str, Any], element: float) -> Study:
+def _suit(study: Study, content: dict[str, Any], element: float) -> Study:
     """Return the study with what the touched surface asks for: larger elements of a mesh, less margin on a ring.
 
     A mesh is only refined, by halving, where its elements are larger than asked; so its own are kept where they are no

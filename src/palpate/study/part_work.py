@@ -96,9 +96,9 @@ def work_on(
 
     began = time.monotonic()
     rough = rough_study(study)
-    known = _known(study, paths)
+    known = _find_surrogate(study, paths)
     if known is None and rough is not None:
-        known = _known(rough, Paths(paths.folder, rough.name))
+        known = _find_surrogate(rough, Paths(paths.folder, rough.name))
     if known is not None:
         say({"body": str(known)})
     elif rough is not None:
@@ -128,7 +128,7 @@ def work_on(
         _carry_out(study, paths, steps, say, stopped, known)
 
 
-def _known(study: Study, paths: Paths) -> Path | None:
+def _find_surrogate(study: Study, paths: Paths) -> Path | None:
     """Return the file of a study's surrogate, where there is one that was learnt from this very body and ball."""
     from palpate.surrogates import Surrogate
 

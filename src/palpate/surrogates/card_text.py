@@ -126,14 +126,18 @@ def _words(name: str, value: Any) -> str:
     if isinstance(value, list | tuple):
         if name in _INTERVALS and len(value) == 2:
             return f"{_plain(name, value[0])} to {_plain(name, value[1])} {unit}"
-        return _listed(name, value) + (f" {unit}" if unit and _has_numbers(value) else "")
+        return _list_text(name, value) + (f" {unit}" if unit and _has_numbers(value) else "")
     text = _plain(name, value)
     return f"{text} {unit}" if unit and _has_numbers([value]) else text
 
 
-def _listed(name: str, values: Sequence[Any]) -> str:
+def _list_text(name: str, values: Sequence[Any]) -> str:
     shown = [
-        "any" if _is_empty(v) else f"({_listed(name, v)})" if isinstance(v, list | tuple) else _plain(name, v)
+        "any"
+        if _is_empty(v)
+        else f"({_list_text(name, v)})"
+        if isinstance(v, list | tuple)
+        else _plain(name, v)
         for v in values[:_MOST]
     ]
     return ", ".join(shown) + (f", … ({len(values)} in all)" if len(values) > _MOST else "")

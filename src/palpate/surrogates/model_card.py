@@ -167,7 +167,7 @@ def card_of(model: Any, file: str | os.PathLike[str] | None = None) -> ModelCard
         author=str(stated.get("author") or NOT_STATED),
         licence=str(stated.get("licence") or NOT_STATED),
         answers=answers,
-        trained_on=_stated({**_training_of(meta, provenance), **parts.pop("trained_on")}),
+        trained_on=_drop_empty({**_training_of(meta, provenance), **parts.pop("trained_on")}),
         hashes={name: str(value) for name, value in hashes.items() if value},
         **parts,
     )
@@ -199,7 +199,7 @@ def _of_body(body: Any, meta: Mapping[str, Any]) -> dict[str, Any]:
         ],
         "inside": str(body.energy),
         "trained_on": {"corrected by touches": _record(correction.get("counts")).get("learnt")},
-        "errors": _stated(errors),
+        "errors": _drop_empty(errors),
         "limits": tuple(_limits_of(body, meta)),
         "warnings": tuple(warnings),
     }
@@ -225,7 +225,7 @@ def _of_network(network: Any, meta: Mapping[str, Any]) -> dict[str, Any]:
         "outputs": [f"{q.name} ({q.unit or '1'})" for q in network.outputs],
         "inside": f"{count(network.units, 'unit')}, {choice.get('form') or network.form}, {network.radial}",
         "trained_on": {"columns of inputs": choice.get("columns")},
-        "errors": _stated(errors),
+        "errors": _drop_empty(errors),
         "limits": tuple(limits),
         "warnings": tuple(warnings),
     }
@@ -291,5 +291,5 @@ def _record(value: Any) -> Mapping[str, Any]:
     return value if isinstance(value, Mapping) else {}
 
 
-def _stated(part: Mapping[str, Any]) -> dict[str, Any]:
+def _drop_empty(part: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in part.items() if value not in (None, "", {}, [])}

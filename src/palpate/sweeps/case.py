@@ -257,7 +257,9 @@ def _record(row: Columns, schema: Sequence[Field], answer: Answer) -> None:
         return
     answers = {field.name: _value(answer, field) for field in schema if field.name not in _BOOKKEEPING_NAMES}
     if wrong := [
-        name for name in answers if answers[name] is not None and not _is_finite(_stated(name, answers))
+        name
+        for name in answers
+        if answers[name] is not None and not _is_finite(_drop_unstated(name, answers))
     ]:
         row["converged"][0] = False
         row["message"][0] = (
@@ -269,7 +271,7 @@ def _record(row: Columns, schema: Sequence[Field], answer: Answer) -> None:
             row[name][0] = value
 
 
-def _stated(name: str, answers: Mapping[str, Any]) -> Any:
+def _drop_unstated(name: str, answers: Mapping[str, Any]) -> Any:
     """Return a quantity without what its solver does not state.
 
     A family of bodies does not state how the force varies with a material's numbers: these rows and columns of the

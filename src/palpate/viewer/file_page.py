@@ -27,7 +27,7 @@ from palpate.export.field_tables import PROMISE, SURFACE, field_tables
 from palpate.export.wasm_core import WasmCore, wasmtime_module
 from palpate.export.weights_block import FIELD, WeightsBlock
 from palpate.files import write_file
-from palpate.output_files import require_outputs, sealed
+from palpate.output_files import require_outputs, with_seal
 from palpate.runtime.devices import device_traits
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import ContactBaseline, FieldSurrogate, Surrogate
@@ -113,7 +113,7 @@ def export_html(
             why=str(comparison),
             fix="Nothing was written. Report this with the model file.",
         )
-    file = write_file(Path(path), sealed(path, page.text))
+    file = write_file(Path(path), with_seal(path, page.text))
     return ExportedPage(file, page.block.hash, comparison, page.left_out)
 
 

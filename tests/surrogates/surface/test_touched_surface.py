@@ -282,7 +282,7 @@ def test_rounding_changes_distance_and_derivatives_by_no_more_than_it_may():
     q, h = quantum_of(sphere()), sphere().spacing
     parts = np.random.default_rng(8).uniform(-0.5, 0.5, sphere().coefficients.shape)
     before = dataclasses.replace(sphere(), coefficients=sphere().coefficients + q * parts)
-    after = before.rounded()
+    after = before.round_to_quanta()
     assert np.array_equal(after.coefficients, sphere().coefficients)
     assert after.error == before.error + q / 2
     C = uniform(*sphere().box, 20_000, seed=9)
@@ -306,8 +306,8 @@ def test_rounding_changes_distance_and_derivatives_by_no_more_than_it_may():
 def test_curved_surfaces_are_made_of_whole_quanta_and_flat_ones_are_exact():
     whole = sphere().coefficients / quantum_of(sphere())
     assert np.array_equal(whole, np.rint(whole))
-    assert sphere().rounded() is sphere()
-    assert face().rounded() is face()
+    assert sphere().round_to_quanta() is sphere()
+    assert face().round_to_quanta() is face()
 
 
 def test_a_surface_goes_through_arrays_unchanged():
@@ -355,7 +355,7 @@ def test_a_raised_surface_is_nearer_everywhere():
     assert 0 < np.abs(off).max() <= quantum_of(sphere()) / 2 + 1e-15
     assert np.ptp(off) < 1e-15
     assert higher.error == pytest.approx(sphere().error + np.abs(off).max(), abs=1e-15)
-    assert higher.rounded() is higher
+    assert higher.round_to_quanta() is higher
     assert np.array_equal(higher.raised(-1e-3).coefficients, sphere().coefficients)
 
 

@@ -214,10 +214,10 @@ class Fitted:
         ]
         lines += [f"  {note}" for note in self.notes]
         if self.trials:
-            lines += self._tried()
+            lines += self._attempt_lines()
         return "\n".join(lines)
 
-    def _tried(self) -> list[str]:
+    def _attempt_lines(self) -> list[str]:
         """Return the best networks that were tried, the best of the chosen form among them, as lines.
 
         Their errors are of the samples that chose. The winner's own is measured anew, on samples in turn that were left

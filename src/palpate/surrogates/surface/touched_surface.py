@@ -142,14 +142,14 @@ class TouchedSurface:
         table = tabulate(measured, reach, inner, spacing)
         return cls(
             table.frame, table.coefficients, table.profile, radius, reach, inner, table.error
-        ).rounded()
+        ).round_to_quanta()
 
-    def rounded(self) -> TouchedSurface:
+    def round_to_quanta(self) -> TouchedSurface:
         """Return the surface with its coefficients rounded to whole quanta, half a quantum less exact.
 
         One that is flat, or rounded already, is returned as it is.
         """
-        if self.profile.size or self._is_rounded:
+        if self.profile.size or self._in_quanta:
             return self
         quantum = self._quantum
         # adding zero takes the sign from those that became minus zero
@@ -161,7 +161,7 @@ class TouchedSurface:
         return 2.0 ** (math.frexp(self.spacing)[1] - 1 - QUANTA)
 
     @property
-    def _is_rounded(self) -> bool:
+    def _in_quanta(self) -> bool:
         multiples = whole_multiples(self.coefficients)
         return multiples is not None and 2.0 ** multiples[1] >= self._quantum
 
@@ -204,7 +204,7 @@ class TouchedSurface:
         reach, inner = self.reach - height, self.inner + height
         if self.profile.size:
             return replace(self, profile=self.profile - height, reach=reach, inner=inner)
-        rise = self._quantum * round(height / self._quantum) if self._is_rounded else height
+        rise = self._quantum * round(height / self._quantum) if self._in_quanta else height
         error = self.error + abs(rise - height)
         return replace(self, coefficients=self.coefficients - rise, reach=reach, inner=inner, error=error)
 

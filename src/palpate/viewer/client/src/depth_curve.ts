@@ -10,7 +10,7 @@ const POINTS = 48;
 const EVERY = 100; // ms
 const STEP = 1e-5; // m
 const BEYOND = 1.25; // of the deepest trained depth
-const MARGIN = { left: 46, right: 8, top: 8, bottom: 22 }; // px
+const MARGIN = { left: 56, right: 8, top: 8, bottom: 22 }; // px
 
 export class DepthCurve {
   private readonly sheet = new Sheet(element<HTMLCanvasElement>("curve-plot"));

@@ -83,7 +83,7 @@ export class Plot {
     const pen = this.sheet.clear();
     if (!pen) return;
     const { width, height } = this.sheet;
-    const [left, top, bottom] = [46, 7, height - 7];
+    const [left, top, bottom] = [56, 7, height - 7];
     const x = (time: number): number => width - 2 - ((now - time) / SECONDS) * (width - 2 - left);
     const y = (value: number): number => bottom - share(value, scale) * (bottom - top);
     for (const level of levels(scale)) {

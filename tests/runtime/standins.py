@@ -18,7 +18,7 @@ class PlainAnswer:
         self.force = np.zeros(3)
         self.stiffness, self.slope = np.zeros((3, 3)), np.zeros(3)
         self.spring, self.poison, self.error = STIFFNESS, 0.0, None
-        self.seen, self.depth = np.full(parameters, np.nan), 0.0
+        self.seen, self.depth, self.energy = np.full(parameters, np.nan), 0.0, 0.0
 
     def __call__(self, position, parameters):
         if self.error is not None:
@@ -26,6 +26,7 @@ class PlainAnswer:
         np.multiply(position, -self.spring, out=self.force)
         self.force[0] += self.poison
         self.depth = float(np.linalg.norm(position))
+        self.energy = 0.5 * self.spring * self.depth**2
         self.seen[:] = parameters
 
 

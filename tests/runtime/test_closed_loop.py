@@ -5,6 +5,7 @@ Each run is a loop as it is, with a learnt body, a simulated hand on a device an
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -26,6 +27,7 @@ LIMITS = Limits(12.0)
 FAST, SLOW = (1000.0, 0.0), (200.0, 0.005)  # Hz, s
 BODIES = {
     "block": pressed.surrogate,
+    "firm block": lambda: pressed.surrogate(factor=2.0),
     "stiff block": lambda: pressed.surrogate(factor=50.0),
     "relaxing block": lambda: pressed.surrogate(factor=50.0, memory=Relaxation(((0.4, 0.1),))),
     "beam": lambda: spring_beam(200.0),
@@ -94,16 +96,41 @@ def test_the_limit_acts_with_the_delay_that_was_measured_and_says_so():
 
 
 def test_without_limit_and_controller_the_body_shakes_the_hand():
-    """The rivals: only the limit keeps the loop calm, and only the controller bounds what a body without it gives."""
+    """The rivals, on a body six times as stiff as is passive: the controller takes what it gives, the limit forestalls."""
     options = {"shape": "adversarial", "override": True}
-    wild = Touch("stiff block", SLOW, 4.0, control=False, **options)
-    kept = Touch("stiff block", SLOW, 4.0, **options)
-    calm = Touch("stiff block", SLOW, 4.0, shape="adversarial")
+    wild = Touch("firm block", SLOW, 4.0, control=False, **options)
+    kept = Touch("firm block", SLOW, 4.0, **options)
+    calm = Touch("firm block", SLOW, 4.0, shape="adversarial")
+    assert wild.loop.bounds.body > 5 * wild.loop.bounds.bound
     assert wild.hand.work > 0.1
     assert kept.hand.work < 0.1 * wild.hand.work
-    assert calm.hand.work < 0.1 * kept.hand.work
+    assert calm.hand.work < kept.hand.work
     assert "as asked" in kept.loop.bounds.warning
-    assert kept.loop.passivity.injected > 0.0
+    assert "controller is off" in wild.loop.bounds.warning
+    assert kept.loop.passivity.injected > 0.0 == wild.loop.passivity.injected
+
+
+def light_hand(control):
+    """Loop and hand: a light device, pressed on a body far too stiff for its delay, whose user wants it so."""
+    body = touchable(BODIES["stiff block"]())
+    space = body.workspace(0.075)
+    settings = SimulatedSettings(
+        **body.stroke(space.scale), shape="press", mass=0.1, damping=0.1, grip_damping=1.0, delay=0.005
+    )
+    hand = SimulatedHand(settings)
+    options = {"rate": 200.0, "stiffness": body.stiffness_max, "override": True, "control": control}
+    return Loop(body, hand, Shared.private(), space, LIMITS, **options), hand
+
+
+@pytest.mark.parametrize("control", [True, False])
+def test_a_force_that_swings_to_and_fro_ends_in_a_stop_that_is_recorded(control):
+    loop, hand = light_hand(control)
+    loop.run_for(3.0)
+    assert loop.out.record["fault_counts"][Fault.UNSTABLE] == 1
+    assert loop.stop.stopped
+    assert not loop.out.force.any()
+    assert np.linalg.norm(hand.velocity) < 1e-3, "the hand has come to rest"
+    assert hand.work < 3.0, "half a second of it, where it would else go on and on"
 
 
 def test_the_softened_body_is_felt_as_body_and_spring_in_series():
@@ -119,6 +146,89 @@ def test_a_repeated_run_gives_the_same_bits():
     first, second = (Touch("relaxing block", SLOW, 1.0, shape="random", seed=3, step=1e-5) for _ in range(2))
     np.testing.assert_array_equal(first.forces, second.forces)
     np.testing.assert_array_equal(first.loop.passivity.state, second.loop.passivity.state)
+
+
+SENSORS = {
+    "steps of 10 µm": {"step": 1e-5},
+    "steps of 55 µm": {"step": 5.5e-5},
+    "steps of 100 µm": {"step": 1e-4},
+    "5 µm": {"noise": 5e-6},
+    "20 µm": {"noise": 2e-5},
+    "50 µm": {"noise": 5e-5},
+    "100 µm and steps of 55 µm": {"noise": 1e-4, "step": 5.5e-5},
+    "300 µm": {"noise": 3e-4},
+    "jitter of a millisecond": {"noise": 5e-6, "jitter": 1e-3},
+}
+PACES = {"1 kHz": FAST, "200 Hz": (200.0, 0.0), "200 Hz, 5 ms": SLOW}
+_clean = {}
+
+
+class Sensed:
+    """A hand on a block by a sensor that is not exact: what the force does from tick to tick, and the energy."""
+
+    def __init__(self, motion, pace, *, control=True, **sensor):
+        body, (rate, delay) = touchable(pressed.surrogate()), pace
+        space = body.workspace(0.1)
+        aim = body.stroke(space.scale)
+        moving = {"still": {"shape": "press"}, "moving": {"frequency": 0.5}}[motion]
+        self.hand = SimulatedHand(
+            SimulatedSettings(**aim | moving, mass=0.1, grip_damping=3.0, delay=delay, seed=5, **sensor)
+        )
+        limits = Limits(3.0)
+        self.loop = Loop(
+            body, self.hand, Shared.private(), space, limits, rate=rate, stiffness=body.stiffness_max, control=control
+        )  # fmt: skip
+        forces, air, lowest = [], 0.0, 0.0
+        outer = np.array([aim["x"], aim["y"], aim["z"]])
+        for k in range(round(4.0 * rate)):
+            self.loop.tick(k / rate)
+            assert self.loop.fault is Fault.NONE
+            forces.append(self.loop.out.force.copy())
+            lowest = min(lowest, self.hand.work)
+            if self.hand.place @ outer < -0.1 * aim["amplitude"]:
+                air = max(air, float(np.linalg.norm(forces[-1])))
+        self.change = np.linalg.norm(np.diff(forces[round(rate) :], axis=0), axis=1).max()
+        self.air, self.stored, self.given = air, -lowest, self.hand.work
+        self.felt = self.loop.bounds.felt
+
+
+@pytest.mark.parametrize("pace", list(PACES))
+@pytest.mark.parametrize("sensor", list(SENSORS))
+@pytest.mark.parametrize("motion", ["still", "moving"])
+def test_a_sensor_as_it_is_neither_shakes_the_hand_nor_hides_what_it_is_given(motion, sensor, pace):
+    """What the body itself answers to the noise is K times its difference, 2 √2 · 4 σ at most: 12 K σ."""
+    options, key = SENSORS[sensor], (motion, pace)
+    if key not in _clean:
+        _clean[key] = Sensed(motion, PACES[pace])
+    clean, touch = _clean[key], Sensed(motion, PACES[pace], **options)
+    speed = 0.2  # m/s, more than this hand's
+    error = max(options.get("noise", 0.0), options.get("step", 0.0), speed * options.get("jitter", 0.0))
+    assert touch.change <= clean.change + 12.0 * touch.felt * error
+    assert touch.air < 1e-3, "nothing is felt in the air"
+    assert touch.given <= 0.01 * touch.stored + 1e-4, "J"
+    assert touch.stored > 1e-4
+
+
+def test_without_the_controller_a_late_loop_gives_more_than_that():
+    """So the two together are no controller that is merely off."""
+    bare = Sensed("moving", SLOW, control=False)
+    assert bare.given > 0.01 * bare.stored + 1e-4
+
+
+def test_a_delay_that_nobody_knows_is_called_so():
+    hand = SimulatedHand(SimulatedSettings())
+    hand.traits = dataclasses.replace(hand.traits, stamped=False)
+    body = touchable(BODIES["block"]())
+    loop = Loop(body, hand, Shared.private(), body.workspace(0.075), LIMITS, stiffness=body.stiffness_max)
+    loop.tick(0.0)
+    assert not loop.bounds.delay_known
+    assert "unknown" in str(loop.bounds)
+    assert "delay of the device is unknown" in loop.bounds.warning
+    assert not loop.out.record["delay_known"]
+    for known in ({"delay": 0.001}, {"stamped": True}):
+        hand.traits = dataclasses.replace(hand.traits, **known)
+        loop = Loop(body, hand, Shared.private(), body.workspace(0.075), LIMITS)
+        assert loop.bounds.delay_known
 
 
 def test_a_gripped_pad_is_softened_too():

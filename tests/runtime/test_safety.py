@@ -27,6 +27,8 @@ def sent(limits, pieces):
     for wanted, gate, ticks in pieces:
         for _ in range(ticks):
             safety.apply(np.array(wanted), gate=gate)
+            if gate:
+                safety.slew()
             age = age + 1 if gate else 0
             yield gate, np.array(wanted), safety.force.copy(), age
 
@@ -73,16 +75,20 @@ def test_clamped_says_so():
     assert not safety.clamped
 
 
-def test_damping_that_was_added_does_not_add_up():
-    """A damper that pushes more than the slew allows a tick: what is sent is the body's force less the damping."""
+def test_the_slew_holds_for_all_that_is_sent_and_damping_does_not_add_up():
+    """A damper that pushes more than the slew allows a tick is reached by and by, and is not subtracted from itself."""
     limits, damping = Limits(2.0, slew=100.0), np.array([0.0, 0.0, 1.0])
     safety = Safety(limits, PERIOD, np.zeros(3))
-    body = Safety(limits, PERIOD, np.zeros(3))
+    before = np.zeros(3)
     for wanted in [*np.linspace(0.0, 1.5, 200), *np.full(100, 1.5)]:
-        for each in (safety, body):
-            each.apply(np.array([0.0, wanted, 0.0]), gate=True)
-        np.testing.assert_array_equal(safety.force, body.force)
+        safety.apply(np.array([0.0, wanted, 0.0]), gate=True)
         safety.force -= damping
+        changed = safety.slew()
+        step = np.linalg.norm(safety.force - before)
+        assert step <= 0.1 + 1e-12
+        assert not changed or step == pytest.approx(0.1)
+        before = safety.force.copy()
+    np.testing.assert_allclose(safety.force, [0.0, 1.5, -1.0])
 
 
 @pytest.mark.parametrize(

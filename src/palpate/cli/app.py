@@ -21,7 +21,7 @@ from palpate.cli.sweep_command import sweep
 from palpate.cli.table_commands import correct, fit
 from palpate.cli.table_options import Json, with_table_options
 from palpate.cli.touch_command import touch
-from palpate.cli.touch_options import DeadMan, Device, Unsoftened
+from palpate.cli.touch_options import DeadMan, Device, NoController, Unsoftened
 from palpate.cli.trace_commands import replay, trace_app
 from palpate.errors import AccuracyError, PalpateError, UsageError
 from palpate.files import explain_system_error
@@ -247,6 +247,7 @@ def view(
     token: AskToken = True,
     device: Device = "page",
     unsoftened: Unsoftened = False,
+    no_controller: NoController = False,
     dead_man: DeadMan = False,
 ) -> None:
     """Open a page on which you can touch the model, with the mouse or a device. Only this machine can reach it."""
@@ -258,6 +259,7 @@ def view(
         token=token,
         device=device,
         unsoftened=unsoftened,
+        controller=not no_controller,
         dead_man=dead_man,
     )
 
@@ -324,6 +326,7 @@ def run(
         typer.Option(min=10, max=10000, help="Ticks per second (Hz). Default: that of the study."),
     ] = None,
     unsoftened: Unsoftened = False,
+    no_controller: NoController = False,
     dead_man: DeadMan = False,
     record: Annotated[
         Path | None, typer.Option(help="New file that takes every tick; see [bold]palpate replay[/].")
@@ -340,6 +343,7 @@ def run(
         rate,
         Console(as_json),
         unsoftened=unsoftened,
+        controller=not no_controller,
         dead_man=dead_man,
         record=record,
     )
@@ -417,6 +421,7 @@ def _serve(
     strict_port: bool = False,
     device: str = "page",
     unsoftened: bool = False,
+    controller: bool = True,
     dead_man: bool = False,
 ) -> None:
     from palpate.cli.run_command import aim_device
@@ -437,6 +442,7 @@ def _serve(
         token=token,
         device=aim_device(device, body),
         unsoftened=unsoftened,
+        controller=controller,
         dead_man=dead_man,
     )
 

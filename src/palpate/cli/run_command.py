@@ -79,6 +79,7 @@ def run_loop(
     console: Console,
     *,
     unsoftened: bool = False,
+    controller: bool = True,
     dead_man: bool = False,
     record: Path | None = None,
 ) -> None:
@@ -98,6 +99,8 @@ def run_loop(
         Takes what is said.
     unsoftened : bool
         Whether a body that is too stiff for the device shall feel so all the same.
+    controller : bool
+        Whether the passivity controller may damp.
     dead_man : bool
         Whether the force acts only while the device's first button is held.
     record : Path, optional
@@ -124,6 +127,7 @@ def run_loop(
             rate=rate,
             max_force=limit,
             unsoftened=unsoftened,
+            controller=controller,
             dead_man=dead_man,
             record=record,
         ) as loop,
@@ -215,7 +219,7 @@ def _wait(
         with_motors = state.felt_stiffness.damping is not None
         if with_motors and not math.isclose(state.coupling, coupling, rel_tol=_HEEDED):
             coupling = state.coupling
-            console.say(state.felt_stiffness.warning or f"{state.felt_stiffness}.")
+            console.say(" ".join([f"{state.felt_stiffness}.", *state.felt_stiffness.cautions]))
         if end - left - shown > 1.0 / _REFRESH:
             shown = end - left
             show(state)

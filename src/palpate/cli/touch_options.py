@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-__all__ = ["DeadMan", "Device", "Unsoftened"]
+__all__ = ["DeadMan", "Device", "NoController", "Unsoftened"]
 
 Device = Annotated[
     str,
@@ -16,6 +16,13 @@ Unsoftened = Annotated[
     bool,
     typer.Option(
         "--unsoftened", help="Let a body that is too stiff for the device feel so. It may hum or oscillate."
+    ),
+]
+NoController = Annotated[
+    bool,
+    typer.Option(
+        "--no-controller",
+        help="Let the passivity controller only count: nothing damps a force that gives the hand energy.",
     ),
 ]
 DeadMan = Annotated[

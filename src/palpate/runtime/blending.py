@@ -67,6 +67,11 @@ class Blend:
         return self._new.remembers
 
     @property
+    def stored(self) -> float:
+        """Energy, J, that the blend holds at the last call."""
+        return (1.0 - self.share) * self._old.stored + self.share * self._new.stored
+
+    @property
     def gain(self) -> float:
         """V_new − V_old at the last call, J."""
         return self._new.stored - self._old.stored

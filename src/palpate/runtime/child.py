@@ -62,6 +62,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--unsoftened", action="store_true", help="a body too stiff for the device feels so all the same"
     )
+    parser.add_argument("--no-controller", action="store_true", help="the passivity controller only counts")
     parser.add_argument(
         "--dead-man", action="store_true", help="force only while the device's first button is held"
     )
@@ -102,6 +103,7 @@ def _run(options: argparse.Namespace) -> int:
         rate=options.rate,
         stiffness=model.stiffness_max if traits.damping is not None else 0.0,
         override=options.unsoftened,
+        control=not options.no_controller,
         dead_man=options.dead_man,
         orphaned=orphaned,
         recorder=recorder,

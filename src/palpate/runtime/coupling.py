@@ -102,6 +102,12 @@ class Coupling:
         """True where the body is touched through the spring."""
         return self.stiffness < math.inf
 
+    @property
+    def energy(self) -> float:
+        """Energy ½ k |x − p|² in the spring at the last pull, J."""
+        x, y, z = self.force.tolist()
+        return 0.5 * (x * x + y * y + z * z) / self.stiffness
+
     def change(self, stiffness: float) -> None:
         """Take over another spring; a stiffer one only where this one is slack, else energy would come of it."""
         if stiffness < self.stiffness or np.abs(self.force).max() < _UNFELT**2:

@@ -55,6 +55,7 @@ FAULTS: dict[str, _Kind] = {
     "clock back": _Kind(Fault.CLOCK_JUMP, 0.001, 0.001),
     "answer no number": _Kind(Fault.OUTPUT_NOT_FINITE),
     "answer fails": _Kind(Fault.EVALUATOR_ERROR),
+    "answer shakes": _Kind(Fault.UNSTABLE, 0.3, 0.4),
     "stop command": _Kind(Fault.STOPPED),
     "stop switch": _Kind(Fault.STOPPED),
     "parent gone": _Kind(Fault.PARENT_GONE),
@@ -72,6 +73,7 @@ _LEAP = np.array([0.04, 0.0, 0.0])  # m, within the reach of the device
 _FAR = np.array([0.0, 0.0, 0.9])  # m, beyond it
 _DRIFT = 2.0  # m/s, along the hand's stroke: a motion that is possible
 _FELT = 0.02  # N from which on the hand is in a touch
+_SHAKEN, _HALF_SWING = 6.0, 10  # N and ticks, of an answer that shakes
 _LONGEST = 20.0  # s of the injector's clock for a touch to begin, or a force to come back
 
 
@@ -158,6 +160,7 @@ class _SwitchedAnswer:
     def __init__(self, answer: Any, switch: _Switch) -> None:
         self._answer, self._switch = answer, switch
         self.force, self.slope = answer.force, answer.slope
+        self._calls = 0
 
     def __call__(self, position: np.ndarray, parameters: np.ndarray) -> None:
         if self._switch.fault == "answer fails":
@@ -165,6 +168,9 @@ class _SwitchedAnswer:
         self._answer(position, parameters)
         if self._switch.fault == "answer no number":
             self.force[0] = self.slope[0] = math.nan
+        if self._switch.fault == "answer shakes":
+            self._calls += 1
+            self.force[1] = _SHAKEN * (-1.0) ** (self._calls // _HALF_SWING)
 
     @property
     def amplitude(self) -> float:
@@ -327,7 +333,7 @@ class FaultInjector:
 
     def _clear(self, kind: str) -> None:
         self.device.fault = self._switch.fault = ""
-        if FAULTS[kind].fault is Fault.STOPPED:
+        if FAULTS[kind].fault in {Fault.STOPPED, Fault.UNSTABLE}:
             self._shared.write_command(resume=True)
 
     def _tick(self) -> None:
@@ -347,8 +353,8 @@ class FaultInjector:
         self._opened, self._leaked = False, False
         while self.now < end or self.now == onset:
             self._tick()
-            if self.device.fault == "outside" and np.linalg.norm(self.loop.out.hand) <= self._edge:
-                onset = self.now  # not yet outside
+            if self._harmless:
+                onset = self.now
             elif math.isinf(silence):
                 gone = self.device.push(self.now) == 0.0 and not self.loop.open
                 silence = self.now - onset if gone else math.inf
@@ -359,6 +365,13 @@ class FaultInjector:
             self._tick()
             silence = self.now - onset if self.device.push(self.now) == 0.0 else math.inf
         return silence
+
+    @property
+    def _harmless(self) -> bool:
+        """True where the fault has not begun yet: the hand isn't outside, and nothing has swung to and fro."""
+        if self.device.fault == "outside":
+            return bool(np.linalg.norm(self.loop.out.hand) <= self._edge)
+        return self.device.fault == "answer shakes" and not self.loop.stop.stopped
 
     def _watch(self) -> None:
         """Note whether there is a force before the body may give one again, and where the hand is then."""

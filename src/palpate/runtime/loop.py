@@ -34,11 +34,13 @@ from palpate.runtime.blending import Blend
 from palpate.runtime.coupling import STEPS, Coupling
 from palpate.runtime.devices import Device
 from palpate.runtime.hand_evaluator import HandEvaluator
-from palpate.runtime.passivity import PassivityController, largest_damping
+from palpate.runtime.oscillation import OscillationWatch
+from palpate.runtime.passivity import PassivityController
 from palpate.runtime.publisher import Publisher
 from palpate.runtime.realtime import Metronome, Rest
 from palpate.runtime.recording import TickRecorder
 from palpate.runtime.safety import HARDWARE_PATIENCE, Fault, Limits, PlaceCheck, Safety, Stop, stalled
+from palpate.runtime.sensor_noise import quantisation_noise
 from palpate.runtime.shared_state import MAX_INPUTS, MAX_PLACES, Shared
 from palpate.runtime.stability import FeltStiffness
 from palpate.runtime.swap import Swap
@@ -196,27 +198,33 @@ class Loop:
         traits = self.device.traits
         self.frame = HandFrame(traits.axes)
         self.controlled = self.motors and control
-        self.passivity = PassivityController(self.period, max_force=limits.max_force, max_damping=0.0)
+        self.passivity = PassivityController(
+            self.period,
+            max_force=limits.max_force,
+            mass=traits.mass if self.controlled else 0.0,
+            noise=math.hypot(traits.noise, quantisation_noise(traits.resolution)),
+        )
+        self._own_delay = traits.delay or 0.0
         self.bounds = FeltStiffness(
             self.workspace.felt(stiffness),
             traits.damping,
             rate,
-            traits.delay,
+            self._own_delay,
             override,
             traits.max_stiffness,
+            delay_known=traits.delay is not None or traits.stamped,
+            controlled=self.controlled or not self.motors,
         )
+        self.oscillation = OscillationWatch(self.period, limits.max_force)
         self.coupling = Coupling(hardest=stiffness)
         self._steps = 1 if self.evaluator.remembers else STEPS
-        self.take_delay(traits.delay)
+        self.take_delay(self._own_delay)
 
     def take_delay(self, delay: float) -> None:
         """Draw the consequences of a delay, s: for the coupling's spring, the ledger and the added damping."""
-        traits = self.device.traits
         self._age = delay
         self.bounds = replace(self.bounds, delay=delay)
         self.passivity.delay = delay
-        if self.controlled:
-            self.passivity.max_damping = largest_damping(traits.mass, self.bounds.rate, delay=delay)
         self._take_spring()
 
     def take_stiffness(self, stiffness: float) -> None:
@@ -230,6 +238,7 @@ class Loop:
     def _take_spring(self) -> None:
         self._spring = self.bounds.coupling / self.workspace.scale
         self.coupling.change(self._spring)
+        self.passivity.stiffness = self.bounds.felt
         self.out.stiffness(self.bounds)
 
     def run(self, rehearse: Callable[[], None] = lambda: None) -> None:
@@ -377,7 +386,7 @@ class Loop:
         pressed = self._switch or self._buttons & ~own != 0
         self.stop.heed(int(self._stops), int(self._resumes), pressed=pressed)
         self.released = self.dead_man and not self._buttons & 1
-        if self.stop.stopped:
+        if self.stop.stopped and self.withheld is not Fault.UNSTABLE:
             self.withheld = Fault.STOPPED
         if self.stop.stopped or self.released:
             self.evaluator.release()
@@ -387,7 +396,7 @@ class Loop:
 
         What leaks is proportional to the delay, so that the mean over a tenth of a second is what counts.
         """
-        age = max(0.0, age) + self.device.traits.delay
+        age = max(0.0, age) + self._own_delay
         self._age += (
             (age - self._age) * min(1.0, self.period / _DELAY_TIME) if self._heard else age - self._age
         )
@@ -465,17 +474,43 @@ class Loop:
         """Count the energy, and damp what would give the hand more than it gave."""
         controller, force, sent = self.passivity, self.out.force, self._sent
         if not self.open:
-            sent[:] = 0.0
-            controller.interrupt()
+            self._stop_sending()
         else:
             self.workspace.force_on_hand(force, sent)
             free = not self.evaluator.force.any() and not sent.any()
             controller.max_force = self.safety.bearable_force
-            controller.apply(self.out.hand, sent, self.now - self._before, free=free)
+            controller.apply(
+                self.out.hand,
+                sent,
+                self.now - self._before,
+                stored=self._stored() / self.workspace.scale,
+                clamped=self.safety.clamped,
+                free=free,
+            )
             if controller.damping > 0.0:
                 self.workspace.force_on_body(sent, force)
+            if self.safety.slew():
+                self.workspace.force_on_hand(force, sent)
+                controller.amend(sent)
+            answer = self.bounds.felt * controller.noise
+            if self.motors and self.oscillation.see(sent, answer if math.isfinite(answer) else 0.0):
+                self.fail(Fault.UNSTABLE)
+                self.stop.stopped = True  # it would begin again
+                self.safety.stop()
+                self._stop_sending()
         self._before = self.now
         self.out.passivity(controller)
+
+    def _stop_sending(self) -> None:
+        """Send zero force."""
+        self._sent[:] = 0.0
+        self.passivity.interrupt()
+        self.oscillation.reset()
+
+    def _stored(self) -> float:
+        """Energy that body and spring hold, J."""
+        stored = self.evaluator.stored
+        return stored + self.coupling.energy if self.coupling.active else stored
 
     def write(self) -> None:
         """Push on the hand."""

@@ -114,6 +114,8 @@ class LoopReport:
         Energy that the passivity controller's damping was meant to take, J.
     delay : float
         Measured, from the device's sample to its force, s.
+    sensor_noise : float
+        Standard deviation of the device's places along one axis, stated or measured, m.
     body_stiffness, felt_stiffness : float
         Of the body's stiffest touch, and of what the hand feels of it, N/m in hand metres; 0 where it isn't known.
     stiffness : str
@@ -138,6 +140,7 @@ class LoopReport:
     leak_bound: float = 0.0
     damping_energy: float = 0.0
     delay: float = 0.0
+    sensor_noise: float = 0.0
     body_stiffness: float = 0.0
     felt_stiffness: float = 0.0
     stiffness: str = ""
@@ -186,6 +189,7 @@ class LoopReport:
             leak_bound=bounds.felt * state.leak,
             damping_energy=state.damping_energy,
             delay=bounds.delay,
+            sensor_noise=state.sensor_noise,
             body_stiffness=bounds.body,
             felt_stiffness=bounds.felt,
             stiffness="" if bounds.damping is None else str(bounds),
@@ -199,7 +203,8 @@ class LoopReport:
     def _energy(self) -> str:
         return (
             f"energy    never below {1e3 * min(self.energy_lowest, 0.0):.3g} mJ (sampling can leak "
-            f"{1e3 * self.leak_bound:.3g} mJ), added damping took {1e3 * self.damping_energy:.3g} mJ"
+            f"{1e3 * self.leak_bound:.3g} mJ), added damping took {1e3 * self.damping_energy:.3g} mJ; "
+            f"the sensor's noise {1e6 * self.sensor_noise:.2g} µm"
         )
 
     def __str__(self) -> str:

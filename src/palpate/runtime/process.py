@@ -63,6 +63,9 @@ class LoopProcess:
     unsoftened : bool
         Whether a body that is too stiff for its device, its rate and delay shall feel so all the same; by default it
         is touched through a spring that makes it as soft as they bear.
+    controller : bool
+        Whether the passivity controller may damp; without it it only counts, and nothing protects from a body that
+        gives energy but the watch on oscillations.
     dead_man : bool
         Whether the force acts only while the device's first button is held.
     parameters : (p,) floats
@@ -90,6 +93,7 @@ class LoopProcess:
         max_force: float | None = None,
         slew: float = 0.0,
         unsoftened: bool = False,
+        controller: bool = True,
         dead_man: bool = False,
         parameters: Sequence[float] = (),
         record: str | os.PathLike[str] | None = None,
@@ -113,6 +117,8 @@ class LoopProcess:
         self._arguments = [os.fspath(model), *(f"{key}={value}" for key, value in settings.items())]
         if unsoftened:
             self._arguments.append("--unsoftened")
+        if not controller:
+            self._arguments.append("--no-controller")
         if dead_man:
             self._arguments.append("--dead-man")
         if replay is not None:

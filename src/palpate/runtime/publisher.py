@@ -103,6 +103,7 @@ class Publisher:
         record["device_damping"] = math.nan if bounds.damping is None else bounds.damping
         record["unsoftened"], record["nominal_rate"] = bounds.override, bounds.rate
         record["device_stiffness"] = bounds.stated
+        record["delay_known"], record["uncontrolled"] = bounds.delay_known, not bounds.controlled
 
     def passivity(self, controller: PassivityController) -> None:
         """Take over the energy ledger and the damping that it asked for."""

@@ -4,14 +4,14 @@ Inside the loop nothing raises: a fault is a value (`Fault`), and the force is z
 whatever the model says:
 
 - *limit*: ‖F‖ ≤ F_max; a larger force is shortened, never turned;
-- *slew*: while the gate is open, ‖F_k − F_{k−1}‖ ≤ s T, T being the tick and F the force of the body before damping;
+- *slew*: while the gate is open, ‖F_k − F_{k−1}‖ ≤ s T, T being the tick and F the force as sent, with all damping;
 - *ramp-in*: after the gate opens (a grab, a start, the end of a fault) the force grows from zero over at
   least 50 ms, counted in ticks, so that a late tick can't shorten it;
 - *heat*: where the device states a continuous force, the mean of ‖F‖² over ten seconds doesn't exceed its square;
   F is the force as sent, and `Safety.bearable_force` bounds damping, too.
 
-The passivity controller adds its damping after these laws, to `Safety.force`. The slew goes on from the force without
-it: it would otherwise be subtracted from itself in every tick, and a damper faster than the slew would run away.
+The passivity controller adds its damping to `Safety.force` between `Safety.apply`, which limits what the body wants, and
+`Safety.slew`, which bounds the change of all that is sent and so comes last.
 
 A closed gate means zero at once: letting go of the motors is the safe direction. After a fault it opens again only
 where the body holds no energy (`HandEvaluator.release`), and after a stop only when a person says so (`Stop`).
@@ -49,6 +49,7 @@ class Fault(IntEnum):
     DEVICE_STOPPED = 10
     DEVICE_LOST = 11
     STOPPED = 12
+    UNSTABLE = 13
 
     @property
     def meaning(self) -> str:
@@ -70,6 +71,7 @@ _MEANINGS = {
     Fault.DEVICE_STOPPED: "the device's own safety has stopped it",
     Fault.DEVICE_LOST: "the device is no longer there",
     Fault.STOPPED: "stopped by a person",
+    Fault.UNSTABLE: "the force swung to and fro faster than a hand moves: body, device and delay don't go together",
 }
 
 
@@ -130,8 +132,7 @@ class Safety:
     Attributes
     ----------
     force : (3,)
-        What may be sent, N; the array given, overwritten by each `apply`. What is added to it until the next one, as
-        damping, was sent.
+        What may be sent, N; the array given, overwritten by `apply` and, once damping was added, by `slew`.
     clamped : bool
         Whether the force limit acted on the latest tick.
     """
@@ -147,7 +148,7 @@ class Safety:
         self._was = (0.0, 0.0, 0.0)
 
     def apply(self, wanted: np.ndarray, *, gate: bool) -> None:
-        """Turn the wanted force (3,), finite, N, into the one that may be sent; a closed gate sends zero."""
+        """Turn the wanted force (3,), finite, N, into one within limit and ramp; a closed gate sends zero."""
         if self._continuous < self._max:
             self._warm()
         if not gate:
@@ -158,13 +159,22 @@ class Safety:
         self.clamped = norm > self._allowed
         share = self._gain * (self._allowed / norm if self.clamped else 1.0)
         self._gain = min(1.0, self._gain + self._rise)
+        self.force[0], self.force[1], self.force[2] = share * x, share * y, share * z
+
+    def slew(self) -> bool:
+        """Keep `force` within the slew of what was sent before; return whether it was changed by that."""
+        x, y, z = self.force.tolist()
         u, v, w = self._was
-        dx, dy, dz = share * x - u, share * y - v, share * z - w
+        dx, dy, dz = x - u, y - v, z - w
         change = math.hypot(dx, dy, dz)
-        part = self._step / change if change > self._step else 1.0
+        if change <= self._step:
+            self._was = (x, y, z)
+            return False
+        part = self._step / change
         # both ends lie in the ball of radius F_max, and so does every point between them
         self._was = (u + part * dx, v + part * dy, w + part * dz)
         self.force[0], self.force[1], self.force[2] = self._was
+        return True
 
     @property
     def bearable_force(self) -> float:

@@ -84,6 +84,8 @@ STATE = np.dtype(
         ("max_force", "f8"),  # N
         ("ledger", "f8", LEDGER),  # of the passivity controller, see `State`
         ("delay", "f8"),  # s, measured, from the device's sample to its force
+        ("delay_known", "u1"),  # it was stated or measured
+        ("uncontrolled", "u1"),  # the passivity controller only counts
         ("device_damping", "f8"),  # N·s/m; NaN for a device without motors
         ("device_stiffness", "f8"),  # N/m, the largest that its maker states; inf: none
         ("body_stiffness", "f8"),  # N/m in hand metres, the body's largest; 0 where it isn't known
@@ -171,6 +173,8 @@ class State:
     max_force: float
     ledger: np.ndarray
     delay: float
+    delay_known: bool
+    uncontrolled: bool
     device_damping: float
     device_stiffness: float
     body_stiffness: float
@@ -206,16 +210,28 @@ class State:
 
     @property
     def leak(self) -> float:
-        """Σ (½ + d/T) |Δx|², m²: times the felt stiffness the most that sampling can have leaked, J."""
+        """Σ (½ + d/T) |Δx̄|², m²: times the felt stiffness the most that sampling can have leaked, J."""
         return float(self.ledger[4])
+
+    @property
+    def sensor_noise(self) -> float:
+        """Standard deviation of the device's places along one axis, stated or measured, m."""
+        return float(self.ledger[5])
 
     @property
     def felt_stiffness(self) -> FeltStiffness:
         """The stiffness of the body in this hand, and its bound, with the delay that was measured."""
         damping = None if math.isnan(self.device_damping) else self.device_damping
-        rate = self.nominal_rate
-        own = self.device_stiffness
-        return FeltStiffness(self.body_stiffness, damping, rate, self.delay, self.unsoftened, own)
+        return FeltStiffness(
+            self.body_stiffness,
+            damping,
+            self.nominal_rate,
+            self.delay,
+            self.unsoftened,
+            self.device_stiffness,
+            self.delay_known,
+            not self.uncontrolled,
+        )
 
     @property
     def onsets(self) -> tuple[tuple[float, Fault], ...]:
@@ -230,7 +246,8 @@ class State:
         """Why there is no force now, and what brings it back, in words; empty where it may flow."""
         fault = Fault(self.fault)
         if self.stopped:
-            return "Stopped: the force stays zero until you resume."
+            since = f" since {fault.meaning}" if (fault := Fault(self.withheld)) is Fault.UNSTABLE else ""
+            return f"Stopped{since}: the force stays zero until you resume."
         if fault is not Fault.NONE:
             said = f" ({self.words})" if self.words and fault in _DRIVER else ""
             return f"No force: {fault.meaning}{said}."

@@ -94,6 +94,10 @@ class FeltStiffness:
         Whether the body shall feel as stiff as it is, whatever follows from that.
     stated : float
         Largest stiffness that the device's maker states, N/m; infinite where none is stated.
+    delay_known : bool
+        Whether the delay was stated or measured; an unknown one is taken for none.
+    controlled : bool
+        Whether the passivity controller may damp.
     """
 
     body: float
@@ -102,6 +106,8 @@ class FeltStiffness:
     delay: float = 0.0
     override: bool = False
     stated: float = math.inf
+    delay_known: bool = True
+    controlled: bool = True
 
     @property
     def bound(self) -> float:
@@ -131,10 +137,12 @@ class FeltStiffness:
     def __str__(self) -> str:
         if self.damping is None:
             return f"stiffest touch {self.body:.0f} N/m; the device has no motors"
-        limits = (
-            f"with the device's damping of {self.damping:g} N·s/m, {self.rate:.0f} Hz and a delay of "
-            f"{1e3 * self.delay:.3g} ms the loop is passive up to {self.bound:.0f} N/m"
+        delay = (
+            f"a delay of {1e3 * self.delay:.3g} ms"
+            if self.delay_known
+            else "an unknown delay, taken for none,"
         )
+        limits = f"with the device's damping of {self.damping:g} N·s/m, {self.rate:.0f} Hz and {delay} the loop is passive up to {self.bound:.0f} N/m"
         if self.bound == self.stated:
             limits = f"its maker states {self.stated:.0f} N/m for the device"
         if self.body <= self.bound:
@@ -148,11 +156,26 @@ class FeltStiffness:
 
     @property
     def warning(self) -> str | None:
-        """The sentence for a body that is softened, or is too stiff and must not be; None where neither is so."""
-        return None if self.damping is None or self.body <= self.bound else f"{self}."
+        """The sentences on what may be felt wrongly: a body that is too stiff, an unknown delay, no controller.
+
+        None where there is nothing to warn of.
+        """
+        if self.damping is None:
+            return None
+        return " ".join([*([f"{self}."] if self.body > self.bound else []), *self.cautions]) or None
+
+    @property
+    def cautions(self) -> tuple[str, ...]:
+        """Sentences on what no stiffness shows: a delay that nobody knows, and a controller that is off."""
+        if self.damping is None:
+            return ()
+        unknown = () if self.delay_known else (_UNKNOWN_DELAY,)
+        return unknown if self.controlled else (*unknown, _UNCONTROLLED)
 
 
 _NEXT_TO_NOTHING = 1.0  # N/m
+_UNKNOWN_DELAY = "The delay of the device is unknown: nobody states it, and its samples bear no time; a long one makes it hum."
+_UNCONTROLLED = "The passivity controller is off: nothing damps a force that gives the hand energy."
 
 
 def _check(damping: float, rate: float, delay: float) -> None:

@@ -452,7 +452,7 @@ class Reason(Json):
 
 @dataclass(frozen=True)
 class Feel(Json):
-    """A body that is too stiff for the device, the rate and the delay, server to page.
+    """What may be felt wrongly on the device, such as a body too stiff for its rate and delay, server to page.
 
     Attributes
     ----------
@@ -462,7 +462,7 @@ class Feel(Json):
     override : bool
         Whether the user has asked for the body as stiff as it is.
     words : str
-        All of it in a sentence, with the figures that the limit comes from; empty where the body is not too stiff.
+        All of it in sentences, with the figures that the limit comes from; empty where there is nothing to say.
     """
 
     body: float

@@ -133,6 +133,8 @@ class Viewer(LocalServer):
         Recorded touch that is gone through, instead of a device.
     unsoftened : bool
         Whether a body that is too stiff for the device shall feel so all the same.
+    controller : bool
+        Whether the passivity controller may damp.
     dead_man : bool
         Whether the force acts only while the device's first button is held.
 
@@ -165,6 +167,7 @@ class Viewer(LocalServer):
         recordings: str | os.PathLike[str] = ".",
         replay: str | os.PathLike[str] | None = None,
         unsoftened: bool = False,
+        controller: bool = True,
         dead_man: bool = False,
     ) -> None:
         super().__init__(port, host, strict_port=strict_port, token=token)
@@ -180,6 +183,7 @@ class Viewer(LocalServer):
             max_force=max_force,
             replay=replay,
             unsoftened=unsoftened,
+            controller=controller,
             dead_man=dead_man,
         )
         self._driver = "a recorded touch" if replay is not None else _driver(device)
@@ -217,6 +221,7 @@ def serve(
     recordings: str | os.PathLike[str] = ".",
     replay: str | os.PathLike[str] | None = None,
     unsoftened: bool = False,
+    controller: bool = True,
     dead_man: bool = False,
     open_browser: bool = False,
     on_ready: Callable[[Viewer], object] | None = None,
@@ -252,6 +257,7 @@ def serve(
         recordings=recordings,
         replay=replay,
         unsoftened=unsoftened,
+        controller=controller,
         dead_man=dead_man,
     )
     wait_until_interrupted(viewer, open_browser=open_browser, on_ready=on_ready)

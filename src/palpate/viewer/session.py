@@ -353,7 +353,7 @@ class Session:
 
 
 def softening(stiffness: FeltStiffness) -> Feel:
-    """Return what a page is told of a body that is too stiff for its device; `NOT_SOFTENED` of any other."""
+    """Return what a page is told of what may be felt wrongly on its device; `NOT_SOFTENED` where nothing is."""
     if (words := stiffness.warning) is None:
         return NOT_SOFTENED
     return Feel(stiffness.body, stiffness.bound, stiffness.felt, stiffness.override, words)

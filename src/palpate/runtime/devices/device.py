@@ -41,7 +41,10 @@ class Traits:
     mass : float
         Apparent mass of the handle without a hand, kg: bounds the damping that the passivity controller may add.
     delay : float
-        From a sample to the force that answers it, as far as it is the device's own and no time stamp shows it, s.
+        From a sample to the force that answers it, as far as it is the device's own and no time stamp shows it, s;
+        None where nobody states it.
+    stamped : bool
+        Whether `Sample.time` says when a place was taken, so that its age shows the delay of the transport.
     axes : (3, 3) floats, row by row
         What turns the device's own axes into x right, y up, z towards the user; a rotation, det +1.
     max_stiffness : float
@@ -52,6 +55,11 @@ class Traits:
         No place of the handle is farther from the centre, m; 0 takes twice the radius.
     speed : float
         No handle is faster, m/s: a sample that says so is not believed.
+    resolution : float
+        Steps of the sensor at the handle, m, where nobody states them as large as they are known from such devices.
+    noise : float
+        Standard deviation of a place along one axis while nothing moves, m, besides the rounding to steps. What the
+        loop measures counts where it is larger.
     buttons : int
         How many buttons `Sample.buttons` tells of.
     name : str
@@ -63,12 +71,15 @@ class Traits:
     damping: float | None
     source: str
     mass: float = 0.1
-    delay: float = 0.0
+    delay: float | None = None
+    stamped: bool = False
     axes: Axes = PLAIN_AXES
     max_stiffness: float = math.inf
     continuous_force: float = math.inf
     reach: float = 0.0
     speed: float = 5.0
+    resolution: float = 0.0
+    noise: float = 0.0
     buttons: int = 0
     name: str = ""
 

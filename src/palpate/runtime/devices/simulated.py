@@ -4,7 +4,7 @@
 
 F is the loop's force, b the device's own damping, f its Coulomb friction; the hand holds it by a spring k_g and damper
 b_g and wants it at x_g, which a script moves. The motion is integrated in steps of a tenth of a millisecond, implicit
-in all dampers. What the loop reads is rounded to the encoder's steps and is `delay` seconds old, as its time says. It
+in all dampers. What the loop reads is noisy, rounded to the encoder's steps and `delay` seconds old, as its time says. It
 runs by the loop's own clock, which may be any: live, or as fast as it can be computed.
 """
 
@@ -57,8 +57,12 @@ class SimulatedSettings:
         The hand's spring, N/m, and damper, N·s/m.
     step : float
         Of the encoder, m; 0 for none.
+    noise : float
+        Standard deviation of what is read, along one axis, m; 0 for none.
     delay : float
         Age of what is read, s, at most 0.015.
+    jitter : float
+        What is read is older still by up to this, s, evenly distributed, and its time doesn't say so.
     shape : {"sine", "press", "random", "adversarial"}
         Where the hand wants to be: A sin 2πft along the direction; A within 0.2 s, and stay; A times smooth noise in
         all directions about 0.6 A; or A and 0.2 A by turns, whichever way it already moves, in order to shake.
@@ -82,7 +86,9 @@ class SimulatedSettings:
     grip: float = 300.0
     grip_damping: float = 5.0
     step: float = 0.0
+    noise: float = 0.0
     delay: float = 0.0
+    jitter: float = 0.0
     shape: str = "sine"
     amplitude: float = 0.03
     frequency: float = 0.5
@@ -98,20 +104,20 @@ class SimulatedSettings:
             raise UsageError(
                 f"There is no script of shape {self.shape!r}.", fix=f"Choose one of {', '.join(_SHAPES)}."
             )
-        numbers = (self.mass, self.damping, self.friction, self.grip, self.grip_damping, self.step,
-                   self.delay, self.amplitude, self.frequency, self.x, self.y, self.z, self.seed)  # fmt: skip
+        numbers = (self.mass, self.damping, self.friction, self.grip, self.grip_damping, self.step, self.noise,
+                   self.jitter, self.delay, self.amplitude, self.frequency, self.x, self.y, self.z, self.seed)  # fmt: skip
         if not (
             all(map(math.isfinite, numbers))
             and math.hypot(self.x, self.y, self.z) > 0.0
             and self.mass > 0.0
-            and min(numbers[1:7]) >= 0.0
-            and self.delay <= _LONGEST_DELAY
+            and min(numbers[1:9]) >= 0.0
+            and self.delay + self.jitter <= _LONGEST_DELAY
             and self.seed >= 0.0
         ):
             raise UsageError(
                 "No hand can be simulated with these settings.",
-                why="A mass is positive, dampers, springs and steps are not negative, a delay is at most "
-                f"{1e3 * _LONGEST_DELAY:g} ms, and a direction is not zero.",
+                why="A mass is positive, dampers, springs, steps and noise are not negative, delay and jitter are "
+                f"{1e3 * _LONGEST_DELAY:g} ms at most, and a direction is not zero.",
                 fix="For example simulated:mass=0.3,damping=0.5,grip=300,delay=0.002,y=-1.",
             )
 
@@ -130,7 +136,7 @@ class SimulatedHand:
     """
 
     traits: ClassVar[Traits] = Traits(
-        0.075, 12.0, 0.5, "a simulation; radius and force limit are omega.3's", mass=0.2
+        0.075, 12.0, 0.5, "a simulation; radius and force limit are omega.3's", mass=0.2, stamped=True
     )
 
     def __init__(self, settings: SimulatedSettings | None = None) -> None:
@@ -142,10 +148,13 @@ class SimulatedHand:
             s.damping,
             f"a simulation; radius and limits are those of {limits.name}",
             mass=min(s.mass, known.mass),
+            stamped=True,
+            resolution=s.step,
             max_stiffness=limits.max_stiffness,
             name=f"simulated {limits.name}",
         )
         rng = np.random.default_rng(int(s.seed))
+        self._sensor, self._error = np.random.default_rng(int(s.seed)), np.zeros(3)
         self._along = np.array([s.x, s.y, s.z]) / math.hypot(s.x, s.y, s.z)
         self._frequencies = rng.uniform(_SLOWEST, _FASTEST, (_WAVES, 3))
         self._phases = rng.uniform(0.0, 2.0 * math.pi, (_WAVES, 3))
@@ -169,7 +178,7 @@ class SimulatedHand:
         self.sample = Sample()
         self.sample.holding = True
         self._move(0.0)
-        _delayed(self._past, 1, 0.0, 0.0, self.sample.position)
+        _delayed(self._past, 1, 0.0, 0.0, self._error, self.sample.position)
 
     @classmethod
     def open(cls, commands: Block, options: Mapping[str, str]) -> SimulatedHand:
@@ -196,9 +205,13 @@ class SimulatedHand:
         past[k, 0] = now
         past[k, 1:] = self.place
         self._count += 1
-        seen = max(now - self.settings.delay, self._began)
-        self.sample.time = seen
-        _delayed(past, self._count, seen, self.settings.step, self.sample.position)
+        s = self.settings
+        self.sample.time = seen = max(now - s.delay, self._began)
+        if s.jitter > 0.0:
+            seen = max(seen - s.jitter * self._sensor.random(), self._began)
+        if s.noise > 0.0:
+            self._error[:] = self._sensor.normal(0.0, s.noise, 3)
+        _delayed(past, self._count, seen, s.step, self._error, self.sample.position)
         return self.sample
 
     def _move(self, span: float) -> None:
@@ -295,7 +308,7 @@ def _integrate(place, velocity, push, clock, span, shape, along, figures, freque
 
 
 @_jit
-def _delayed(past, count, seen, step, position):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def _delayed(past, count, seen, step, error, position):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     newest = (count - 1) % _PAST
     k, older = newest, newest
     for _ in range(min(count, _PAST) - 1):
@@ -306,5 +319,5 @@ def _delayed(past, count, seen, step, position):  # type: ignore[no-untyped-def]
     span = past[k, 0] - past[older, 0]
     share = min(1.0, max(0.0, (seen - past[older, 0]) / span)) if span > 0.0 else 1.0
     for i in range(3):
-        value = past[older, 1 + i] + share * (past[k, 1 + i] - past[older, 1 + i])
+        value = past[older, 1 + i] + share * (past[k, 1 + i] - past[older, 1 + i]) + error[i]
         position[i] = math.floor(value / step + 0.5) * step if step > 0.0 else value

@@ -56,7 +56,8 @@ export class Drops {
 export function feel(news: Feel): void {
   const box = element("feel");
   box.hidden = news.words === "";
-  const head = news.override ? "Not softened, as asked: it may hum or oscillate." : "Softened for this device.";
+  const stiff = news.override ? "Not softened, as asked: it may hum or oscillate." : "Softened for this device.";
+  const head = news.body > news.limit ? stiff : "About this device.";
   element("feel-head").textContent = head;
   element("feel-words").textContent = capital(news.words);
   const data = { body: news.body, limit: news.limit, felt: news.felt };

@@ -4,8 +4,8 @@
 
 F is the loop's force, b the device's own damping, f its Coulomb friction; the hand holds it by a spring k_g and damper
 b_g and wants it at x_g, which a script moves. The motion is integrated in steps of a tenth of a millisecond, implicit
-in all dampers. What the loop reads is noisy, rounded to the encoder's steps and `delay` seconds old, as its time says. It
-runs by the loop's own clock, which may be any: live, or as fast as it can be computed.
+in all dampers. What the loop reads is noisy, rounded to the encoder's steps and `delay` seconds old, as its time says.
+It runs by the loop's own clock, which may be any: live, or as fast as it can be computed.
 """
 
 from __future__ import annotations
@@ -104,15 +104,15 @@ class SimulatedSettings:
             raise UsageError(
                 f"There is no script of shape {self.shape!r}.", fix=f"Choose one of {', '.join(_SHAPES)}."
             )
-        numbers = (self.mass, self.damping, self.friction, self.grip, self.grip_damping, self.step, self.noise,
-                   self.jitter, self.delay, self.amplitude, self.frequency, self.x, self.y, self.z, self.seed)  # fmt: skip
+        not_negative = (self.damping, self.friction, self.grip, self.grip_damping, self.step, self.noise, self.jitter,
+                        self.delay, self.seed)  # fmt: skip
+        numbers = (self.mass, *not_negative, self.amplitude, self.frequency, self.x, self.y, self.z)
         if not (
             all(map(math.isfinite, numbers))
             and math.hypot(self.x, self.y, self.z) > 0.0
             and self.mass > 0.0
-            and min(numbers[1:9]) >= 0.0
+            and min(not_negative) >= 0.0
             and self.delay + self.jitter <= _LONGEST_DELAY
-            and self.seed >= 0.0
         ):
             raise UsageError(
                 "No hand can be simulated with these settings.",

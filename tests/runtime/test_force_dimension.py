@@ -162,12 +162,23 @@ def test_each_type_has_a_profile(dhd, number):
     device.close()
 
 
-def test_an_unknown_type_gets_the_smallest_limits(dhd):
-    dhd.type = 91
+@pytest.mark.parametrize("number", [81, 91, 999])
+def test_an_unknown_type_gets_the_smallest_limits_and_says_so(dhd, number):
+    dhd.type = number
     device = connect(dhd)
-    assert device.traits.max_force == min(device_profile(name).max_force for name in TYPES.values())
-    assert "unknown type" in device.traits.source
+    profiles = [device_profile(name) for name in TYPES.values()]
+    assert device.traits.max_force == dhd.max_force == min(profile.max_force for profile in profiles)
+    assert device.traits.radius == min(profile.radius for profile in profiles)
+    assert device.traits.max_stiffness == min(profile.max_stiffness for profile in profiles)
+    for words in (device.traits.source, device.traits.name, device.note):
+        assert "unknown" in words
     device.close()
+
+
+def test_a_dead_man_button_can_be_asked_for(dhd, device, spring_file):
+    """A kind that tells of no button is refused before it is opened."""
+    LoopProcess(spring_file, device="forcedimension", dead_man=True)
+    assert device.traits.buttons == device_traits("forcedimension").buttons
 
 
 @pytest.mark.parametrize(("own", "limit"), [(5.0, 5.0), (30.0, 12.0), (-1.0, 12.0)])

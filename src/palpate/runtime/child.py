@@ -16,9 +16,9 @@ import sys
 import threading
 from collections.abc import Callable, Sequence
 
-from palpate.errors import PalpateError
+from palpate.errors import PalpateError, UsageError
 from palpate.network.kinds import import_when_needed
-from palpate.runtime.devices import device_named
+from palpate.runtime.devices import Device, device_named
 from palpate.runtime.loop import Loop
 from palpate.runtime.realtime import obtain
 from palpate.runtime.recording import Ring, TickRecorder
@@ -89,6 +89,13 @@ def _run(options: argparse.Namespace) -> int:
         recorder = TickRecorder(ring)
     device = device_named(options.device, shared.command)
     traits, radius, max_force = device.traits, options.radius, options.max_force
+    if options.dead_man and not traits.buttons:
+        device.close()
+        raise UsageError(
+            f"{traits.name or options.device} has no button to hold.",
+            why="A dead-man button is the first button of a device, or of its grips, that none of its options takes.",
+            fix="Connect and wake the grip that has one, or leave the dead-man button out.",
+        )
     if traits.damping is not None:  # motors: what the opened device says of itself may not be exceeded
         radius, max_force = min(radius, traits.radius), min(max_force, traits.max_force)
     workspace = model.workspace(radius)
@@ -110,14 +117,18 @@ def _run(options: argparse.Namespace) -> int:
     if recorder is not None:
         recorder.ring.describe(loop_facts(model, loop, limits))
         recorder.begin(loop)
-    _say({"obtained": obtain()})
+    _say({"obtained": obtain(), "device_note": _note(device)})
     rehearsal = Rehearsal(model, workspace, limits, options.rate)
     desk.serve(model, loop, limits, rehearsal)
     loop.run(rehearsal)
     foreign = [name for name in FOREIGN if sys.modules.get(name)]
-    note = str(getattr(device, "note", ""))
-    _say({"foreign": foreign, "device_error": loop.device_error, "device_note": note})
+    _say({"foreign": foreign, "device_error": loop.device_error, "device_note": _note(device)})
     return 0
+
+
+def _note(device: Device) -> str:
+    """Return what a driver says besides its faults; see `Device`."""
+    return str(getattr(device, "note", ""))
 
 
 def _watch_parent(hear: Callable[[str], None]) -> Callable[[], bool]:

@@ -265,12 +265,14 @@ EXPORT int drdStop(bool force, char id) {
 EXPORT const char *dhdGetSystemName(char id) {
   (void)id;
   switch ((int)s.type) {
-    case 33: return "omega.3";
+    case 32: case 33: return "omega.3";
     case 34: case 36: return "omega.6";
     case 35: case 37: return "omega.7";
     case 60: return "Falcon";
-    case 63: return "delta.3";
-    case 104: case 105: return "sigma.7";
+    case 31: case 63: return "delta.3";
+    case 61: case 62: case 64: return "delta.6";
+    case 106: case 107: return "sigma.6+";
+    case 102: case 103: case 104: case 105: return "sigma.7";
     case 108: case 109: return "lambda.7";
     case 203: return "lambda.3";
     case 206: return "sigma.3";

@@ -142,7 +142,9 @@ def test_a_driver_drives_the_makers_device(serve, clock, example):
     assert device.profile is profile
     assert (device.traits.radius, device.traits.max_force) == (profile.radius, profile.max_force)
     assert device.traits.source.startswith(profile.source)
-    assert device.note == ""
+    assert ("doesn't tell whether its origin" in device.note) is (
+        "preset" not in example["frame"]["inverse3"][0]["config"]
+    )
     drive(device, clock, 60, (0.0, 0.0, 0.5))
     device.read(clock.time)
     np.testing.assert_allclose(service.force(), [0.0, 0.0, 0.5])

@@ -454,10 +454,13 @@ class HaplyDevice:
             "configure": {"preset": {"preset": _PRESET}},
             "commands": command,
         }
-        message = {"session": {"configure": {"profile": {"name": "palpate"}}}, "inverse3": [configured]}
+        session: dict[str, Any] = {"configure": {"profile": {"name": "palpate"}}}
+        message = {"session": session, "inverse3": [configured]}
         for sample in range(_FIRST):
             self._channel.send(json.dumps(message))
             message = {"inverse3": [{"device_id": self.device_id, "commands": command}]}
+            if sample == _FIRST - 2:  # the last answer has the configuration
+                message["session"] = {"force_render_full_state": {}}
             entry = self._entry(decode_frame(self._next()))
             if sample > _FIRST // 2:  # several drivers deliver garbage at first
                 state = entry.get("state") or {}
@@ -470,6 +473,17 @@ class HaplyDevice:
                         fix="Calibrate it in the Haply Hub, and hold it still while it is opened.",
                     )
                 self._take(entry)
+        preset = (entry.get("config") or {}).get("preset", "")
+        if preset not in {"", _PRESET}:
+            raise DeviceError(
+                f"Haply device {self.device_id} keeps the preset {preset!r}.",
+                why=f"A body lies where it should only with {_PRESET!r}, whose origin is the middle of the reach.",
+                fix="Close other programs that configure the device, or update the service to 3.5.",
+            )
+        if not preset:
+            self._trust(
+                "the service doesn't tell whether its origin is the middle of the reach: try where a body lies"
+            )
         self._impossible, self.sample.holding = 0, False  # until the loop's first command is answered
 
     def _next(self) -> str:

@@ -107,6 +107,8 @@ class SimulatorFaults:
         Factor of the echoed force; the hand feels the force as it is.
     in_use, powered, calibrated : bool
         Status of the device.
+    deaf : bool
+        The preset stays as it is.
     silent_http : bool
         HTTP knows no routes, as a service before version 3.5 none of the settings.
     plain_http : bool
@@ -125,6 +127,7 @@ class SimulatorFaults:
     in_use: bool = False
     powered: bool = True
     calibrated: bool = True
+    deaf: bool = False
     silent_http: bool = False
     plain_http: bool = False
     position: tuple[float, float, float] | None = None
@@ -292,7 +295,7 @@ class HaplySimulator(ServiceDouble):
 
     def _command(self, device: _Device, entry: dict[str, Any], now: float) -> None:
         preset = ((entry.get("configure") or {}).get("preset") or {}).get("preset")
-        if preset is not None:
+        if preset is not None and not self.faults.deaf:
             device.centred = preset == "arm_front_centered"
         command = (entry.get("commands") or {}).get("set_cursor_force") or {}
         for spelling in self.settings.spellings:
@@ -330,15 +333,14 @@ class HaplySimulator(ServiceDouble):
             "in_use": faults.in_use,
             "power_supply": faults.powered,
         }
-        if faults.bare:
-            return {"device_id": device.device_id, "state": {"cursor_position": now["cursor_position"]}} | (
-                {"config": known["config"]} if full else {}
-            )
         state = known["state"] | {name: now[name] for name in now.keys() & known["state"].keys()}
         entry = known | {"state": state, "status": known.get("status", {}) | status}
         if "preset" in known["config"]:
             preset = "arm_front_centered" if device.centred else "defaults"
             entry["config"] = known["config"] | {"preset": preset}
+        if faults.bare:
+            del entry["status"]
+            entry["state"] = {"cursor_position": now["cursor_position"]}
         if not full:
             del entry["config"]
         return entry

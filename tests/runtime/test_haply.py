@@ -469,8 +469,8 @@ def test_a_grip_that_is_away_holds_nothing(service, clock, field):
 @pytest.mark.parametrize(
     ("grip", "hold", "words"),
     [
-        ("wired", "a", "There are button"),
-        ("wireless", "button", "There are a, b, c"),
+        ("wired", "a", "Its buttons: button"),
+        ("wireless", "button", "Its buttons: a, b, c"),
         ("none", "a", "no grip"),
     ],
 )
@@ -605,13 +605,15 @@ def test_the_double_answers_http(service, path):
 
 
 def test_the_real_loop_on_the_double(spring_file):
-    """In its own process and in real time: the hand moves by itself and feels the body."""
-    with HaplySimulator(SimulatorSettings(port=0, events=0, frequency=2.0)) as service:
+    """In its own process and in real time: the hand moves by itself and feels the body; an unknown type is said."""
+    with HaplySimulator(SimulatorSettings(port=0, events=0, frequency=2.0, kind="inverse4")) as service:
         device = f"haply:ws://127.0.0.1:{service.port},events={service.events_port}"
         with LoopProcess(spring_file, device=device) as loop:
             until, force = now() + 20.0, 0.0
             while now() < until and force < 0.2:
                 time.sleep(0.01)
                 force = loop.read().force[1]
+            assert "unknown type" in loop.read().device
+            assert "least of each limit" in loop.report().device_note, "while it runs"
     assert force >= 0.2, "the hand goes down and is pushed up"
     assert loop.report().foreign == ()

@@ -87,15 +87,8 @@ def _run(options: argparse.Namespace) -> int:
         ring = Ring.attach(options.ring)
         ring.unlink()
         recorder = TickRecorder(ring)
-    device = device_named(options.device, shared.command)
+    device = _open(options, shared)
     traits, radius, max_force = device.traits, options.radius, options.max_force
-    if options.dead_man and not traits.buttons:
-        device.close()
-        raise UsageError(
-            f"{traits.name or options.device} has no button to hold.",
-            why="A dead-man button is the first button of a device, or of its grips, that none of its options takes.",
-            fix="Connect and wake the grip that has one, or leave the dead-man button out.",
-        )
     if traits.damping is not None:  # motors: what the opened device says of itself may not be exceeded
         radius, max_force = min(radius, traits.radius), min(max_force, traits.max_force)
     workspace = model.workspace(radius)
@@ -124,6 +117,19 @@ def _run(options: argparse.Namespace) -> int:
     foreign = [name for name in FOREIGN if sys.modules.get(name)]
     _say({"foreign": foreign, "device_error": loop.device_error, "device_note": _note(device)})
     return 0
+
+
+def _open(options: argparse.Namespace, shared: Shared) -> Device:
+    """Open the device, and refuse one that has no button to hold where one is asked for."""
+    device = device_named(options.device, shared.command)
+    if options.dead_man and not device.traits.buttons:
+        device.close()
+        raise UsageError(
+            f"{device.traits.name or options.device} has no button to hold.",
+            why="A dead-man button is the first button of a device, or of its grips, that none of its options takes.",
+            fix="Connect and wake the grip that has one, or leave the dead-man button out.",
+        )
+    return device
 
 
 def _note(device: Device) -> str:

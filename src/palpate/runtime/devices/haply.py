@@ -438,7 +438,7 @@ class HaplyDevice:
         if own and own not in names:
             raise DeviceError(
                 f"No grip of the Haply service has a button {own!r}.",
-                why=f"There are {', '.join(names)}." if names else "There is no grip that is awake.",
+                why=f"Its buttons: {', '.join(names)}." if names else "There is no grip that is awake.",
                 fix="Connect the grip and wake it, or name another button with hold=NAME.",
             )
         return most

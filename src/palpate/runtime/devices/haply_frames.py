@@ -1,4 +1,4 @@
-"""What the Haply Inverse Service says, in each of the forms that its versions give to frames and answers.
+"""Readers of what the Haply Inverse Service says, in each of the forms that its versions give to frames and answers.
 
 The forms are those of Haply, *Inverse SDK* 3.4 and 3.5 ("Simulation Channel", "WebSocket Protocol", "HTTP", tutorials
 "Print VerseGrip", "Print Wireless VerseGrip" and "Combined"), and of public clients where the maker is silent. A wired

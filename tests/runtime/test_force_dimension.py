@@ -212,6 +212,21 @@ def test_a_device_that_is_not_homed_is_refused_or_homes_itself(dhd):
         connect(dhd, home=1.0)
 
 
+def test_a_falcon_is_homed_by_hand(dhd):
+    """The vendor's examples wait for the hand; the library doesn't move it."""
+    dhd.type, dhd.homed = 60, 0
+    with pytest.raises(DeviceError, match="by hand"):
+        connect(dhd)
+    dhd.hand_homes = 200
+    device = connect(dhd, home=1.0)
+    assert (dhd.homed, dhd.homings) == (1.0, 0.0)
+    np.testing.assert_array_equal(asked(dhd), np.zeros(3))
+    device.close()
+    dhd.homed = dhd.hand_homes = 0
+    with pytest.raises(DeviceError, match="could not be homed"):
+        connect(dhd, home=1.0)
+
+
 def test_without_drd_the_status_tells_of_homing(dhd, monkeypatch):
     from palpate.runtime.devices import force_dimension_library as names
 

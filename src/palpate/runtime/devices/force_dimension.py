@@ -52,6 +52,7 @@ _BUTTONS, _MASK = 8, 0xFF  # bits of the mask that are looked at; most devices h
 _FIRST, _STEP, _FASTEST = 100, 0.001, 1.0  # samples at the start, s between them, m/s
 _TOLERANCE = 1.01  # of the force limit that is read back
 _LOOK, _REST = 0.005, 0.5  # s between looks at the status; s of zero force before forces come back
+_BY_HAND = 4000  # looks, 20 s, until a hand has homed a Falcon
 _RETURNING, _BY_THE_USER = frozenset((2, 3)), frozenset((1, 6))  # causes of forces off
 
 
@@ -348,15 +349,27 @@ class ForceDimensionDevice:
             raise self._failure("is not taken by the vendor's DRD", -1)
         if dhd.drdIsInitialized(device):
             return
+        by_hand = self.profile.name == "falcon"
         if not self._settings.home:
+            way = (
+                "give forcedimension:home=1, and push its handle in and pull it out by hand"
+                if by_hand
+                else "clear its way and give forcedimension:home=1: it then moves by itself"
+            )
             raise DeviceError(
                 f"{self.name} has not been homed: its positions are wrong.",
-                fix="Clear its way and give forcedimension:home=1: it then moves by itself. Or use the vendor's own "
-                "program.",
+                fix=f"Use the vendor's own program; or {way}.",
             )
-        dhd.call("drdAutoInit", device)
-        if dhd.drdIsRunning(device):
-            dhd.call("drdStop", False, device)
+        if by_hand:  # it doesn't home itself: the vendor's examples send no force until a hand has done it
+            for _ in range(_BY_HAND):
+                if dhd.drdIsInitialized(device):
+                    return
+                dhd.call("dhdSetForce", 0.0, 0.0, 0.0, device)
+                dhd.dhdSleep(_LOOK)
+        else:
+            dhd.call("drdAutoInit", device)
+            if dhd.drdIsRunning(device):
+                dhd.call("drdStop", False, device)
         if not dhd.drdIsInitialized(device):
             raise DeviceError(f"{self.name} could not be homed.", fix="Use the vendor's own program.")
 

@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import pytest
 
+from palpate.cli.device_commands import findings_in_words
 from palpate.runtime import device_search
 from palpate.runtime.device_search import HARDWARE, LibrarySearch, Surroundings, search
 from palpate.runtime.devices import device_names
+from palpate.runtime.devices.profiles import PROFILES, weakest_profile
 
 GAMEPAD = """\
 I: Bus=0003 Vendor=046d
@@ -133,6 +135,22 @@ def test_what_is_driven_is_ready_by_its_name(empty, monkeypatch):
     found = [f for f in search(empty) if f.device == "forcedimension"]
     assert [f.state for f in found] == ["ready"]
     assert found[0].remedy == ""
+
+
+@pytest.mark.parametrize("device", ["haply", "forcedimension", "openhaptics"])
+def test_the_list_explains_limits_buttons_and_what_was_seen(empty, device):
+    finding = next(f for f in search(empty) if f.device == device)
+    text = findings_in_words([finding], explain=True)
+    family = [profile for profile in PROFILES.values() if profile.driver == device]
+    weakest = weakest_profile(device)
+    for profile in family:
+        assert f"{profile.name} ±{1e3 * profile.radius:g} mm, {profile.max_force:g} N" in text
+        assert weakest.max_force <= profile.max_force
+        assert weakest.radius <= profile.radius
+    assert f"any other type ±{1e3 * weakest.radius:g} mm, {weakest.max_force:g} N" in text
+    assert "buttons: " in text
+    assert "seen on hardware: no" in text
+    assert "any other type" not in findings_in_words([finding]), "a doctor's list is short"
 
 
 def test_each_library_has_names_for_each_system():

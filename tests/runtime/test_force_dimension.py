@@ -162,12 +162,23 @@ def test_each_type_has_a_profile(dhd, number):
     device.close()
 
 
-def test_an_unknown_type_gets_the_smallest_limits(dhd):
-    dhd.type = 91
+@pytest.mark.parametrize("number", [81, 91, 999])
+def test_an_unknown_type_gets_the_smallest_limits_and_says_so(dhd, number):
+    dhd.type = number
     device = connect(dhd)
-    assert device.traits.max_force == min(device_profile(name).max_force for name in TYPES.values())
-    assert "unknown type" in device.traits.source
+    profiles = [device_profile(name) for name in TYPES.values()]
+    assert device.traits.max_force == dhd.max_force == min(profile.max_force for profile in profiles)
+    assert device.traits.radius == min(profile.radius for profile in profiles)
+    assert device.traits.max_stiffness == min(profile.max_stiffness for profile in profiles)
+    for words in (device.traits.source, device.traits.name, device.note):
+        assert "unknown" in words
     device.close()
+
+
+def test_a_dead_man_button_can_be_asked_for(dhd, device, spring_file):
+    """A kind that tells of no button is refused before it is opened."""
+    LoopProcess(spring_file, device="forcedimension", dead_man=True)
+    assert device.traits.buttons == device_traits("forcedimension").buttons
 
 
 @pytest.mark.parametrize(("own", "limit"), [(5.0, 5.0), (30.0, 12.0), (-1.0, 12.0)])
@@ -198,6 +209,21 @@ def test_a_device_that_is_not_homed_is_refused_or_homes_itself(dhd):
     device.close()
     dhd.homed, dhd.homing_fails = 0, 1
     with pytest.raises(DeviceError, match="timed out"):
+        connect(dhd, home=1.0)
+
+
+def test_a_falcon_is_homed_by_hand(dhd):
+    """The vendor's examples wait for the hand; the library doesn't move it."""
+    dhd.type, dhd.homed = 60, 0
+    with pytest.raises(DeviceError, match="by hand"):
+        connect(dhd)
+    dhd.hand_homes = 200
+    device = connect(dhd, home=1.0)
+    assert (dhd.homed, dhd.homings) == (1.0, 0.0)
+    np.testing.assert_array_equal(asked(dhd), np.zeros(3))
+    device.close()
+    dhd.homed = dhd.hand_homes = 0
+    with pytest.raises(DeviceError, match="could not be homed"):
         connect(dhd, home=1.0)
 
 

@@ -16,6 +16,7 @@ from palpate.runtime import Fault, LoopProcess, Workspace, now
 from palpate.runtime.devices import device_named
 from palpate.runtime.devices.haply import AXES, HaplyDevice, HaplySettings
 from palpate.runtime.devices.haply_simulator import EVENTS, HaplySimulator, SimulatorSettings
+from palpate.runtime.devices.profiles import device_profile, weakest_profile
 from palpate.runtime.devices.websocket_channel import WebsocketChannel
 from palpate.runtime.loop import Loop
 from palpate.runtime.safety import HARDWARE_PATIENCE, Limits
@@ -347,8 +348,8 @@ def test_a_device_may_be_plugged_in_while_it_is_looked_for(service):
         ("in_use", True, "in use by another program"),
         ("powered", False, "not power supply"),
         ("calibrated", False, "not calibrated"),
-        ("device_type", "minverse", "is a Minverse"),
         ("silent_http", True, "does not say how it scales forces"),
+        ("deaf", True, "keeps the preset 'defaults'"),
         ("position", (5.0, 0.0, 0.0), "starts at"),
         ("position", (math.nan, 0.0, 0.0), "starts at"),
         ("closing", True, "closed the connection"),
@@ -393,7 +394,7 @@ def test_a_dead_mans_button_holds(service, clock):
     device = connect(service, hold="a")
     drive(device, clock, 3)
     assert not device.sample.holding
-    service.buttons["a"] = True
+    service.press("a")
     drive(device, clock, 3)
     assert device.sample.holding
     device.close()
@@ -402,7 +403,7 @@ def test_a_dead_mans_button_holds(service, clock):
 @pytest.mark.parametrize(("hand", "first"), [("a", "b"), ("b", "a")])
 def test_the_first_button_that_is_not_the_hand_is_the_dead_mans(service, clock, hand, first):
     device = connect(service, hold=hand)
-    service.buttons.update({hand: True, first: True})
+    service.press(hand, first)
     drive(device, clock, 3)
     assert (device.sample.holding, device.sample.buttons) == (True, 1)
     device.close()
@@ -410,13 +411,150 @@ def test_the_first_button_that_is_not_the_hand_is_the_dead_mans(service, clock, 
 
 def test_buttons_of_the_grip_reach_the_loop(service, clock):
     device = connect(service, hold="a")
-    service.buttons.update(a=True, c=True)
+    service.press("a", "c")
     drive(device, clock, 3)
     assert (device.sample.holding, device.sample.buttons) == (True, 0b10)
-    service.buttons.update(a=False, c=False)
+    service.press("a", "c", down=False)
     drive(device, clock, 3)
     assert (device.sample.holding, device.sample.buttons) == (False, 0)
     device.close()
+
+
+def test_the_button_of_a_wired_grip_stops_holds_and_is_the_dead_mans(clock, plain, shared):
+    """One Boolean named button, where a wireless grip has several by name: nobody saw it pressed."""
+    with serve(clock, grip="wired") as service:
+        loop = Loop(plain, connect(service), shared, Workspace(0.1, 10.0), Limits(10.0), rate=1000.0)
+        assert run(loop, clock, 400)[-1][0] > 0.1
+        service.press("button")
+        assert run(loop, clock, 3)[-1][0] == 0.0
+        assert loop.device.sample.buttons == 1
+        loop.end()
+        device = connect(service, hold="button")
+        assert device.traits.buttons == 0, "the one that there is holds"
+        drive(device, clock, 3)
+        assert (device.sample.holding, device.sample.buttons) == (True, 0)
+        service.press("button", down=False)
+        drive(device, clock, 3)
+        assert not device.sample.holding
+        device.close()
+
+
+@pytest.mark.parametrize("grip", ["wired", "wireless"])
+def test_a_dead_man_button_gives_force_while_it_is_held(clock, plain, shared, grip):
+    button = {"wired": "button", "wireless": "a"}[grip]
+    with serve(clock, grip=grip) as service:
+        limits = Limits(10.0)
+        loop = Loop(plain, connect(service), shared, Workspace(0.1, 10.0), limits, rate=1000.0, dead_man=True)
+        assert not any(force for force, _ in run(loop, clock, 400))
+        service.press(button)
+        assert max(force for force, _ in run(loop, clock, 1500)) > 0.1
+        service.press(button, down=False)
+        assert run(loop, clock, 3)[-1][0] == 0.0
+        loop.end()
+
+
+@pytest.mark.parametrize("field", ["connected", "awake"])
+def test_a_grip_that_is_away_holds_nothing(service, clock, field):
+    """Its buttons are those of a time ago: pressed for ever."""
+    device = connect(service, hold="a")
+    service.press("a", "b")
+    drive(device, clock, 3)
+    assert device.sample.holding
+    service.grips["wireless_verse_grip"][0]["status"][field] = False
+    drive(device, clock, 3)
+    assert (device.sample.holding, device.sample.buttons) == (False, 0)
+    device.close()
+
+
+@pytest.mark.parametrize(
+    ("grip", "hold", "words"),
+    [
+        ("wired", "a", "Its buttons: button"),
+        ("wireless", "button", "Its buttons: a, b, c"),
+        ("none", "a", "no grip"),
+    ],
+)
+def test_a_button_to_hold_that_no_grip_has_is_refused(clock, grip, hold, words):
+    with serve(clock, grip=grip) as service, pytest.raises(DeviceError, match=words):
+        connect(service, hold=hold)
+
+
+def test_of_two_grips_one_is_named(clock):
+    with serve(clock, grip="both") as service:
+        device = connect(service, grip=service.grips["verse_grip"][0]["device_id"])
+        assert device.traits.buttons == 1
+        service.press("a")
+        drive(device, clock, 3)
+        assert device.sample.buttons == 0
+        service.press("button")
+        drive(device, clock, 3)
+        assert device.sample.buttons == 1
+        device.close()
+
+
+def test_a_grip_whose_buttons_are_not_understood_is_said(clock):
+    with serve(clock) as service:
+        state = service.grips["wireless_verse_grip"][0]["state"]
+        state["keys"] = state.pop("buttons")
+        device = connect(service)
+        assert "no button in a form that is known" in device.note
+        assert device.traits.buttons == 0
+        device.close()
+
+
+def test_a_dead_man_button_that_is_not_there_is_refused(spring_file):
+    """Only the opened device knows its grips: here the one button is the hand."""
+    with HaplySimulator(SimulatorSettings(port=0, events=0, grip="wired")) as service:
+        device = f"haply:ws://127.0.0.1:{service.port},events={service.events_port},hold=button"
+        loop = LoopProcess(spring_file, device=device, dead_man=True)
+        with pytest.raises(UsageError, match="no button to hold"):
+            loop.start()
+
+
+@pytest.mark.parametrize(
+    ("kind", "profile"),
+    [("inverse3", "inverse3"), ("inverse3x", "inverse3x"), ("minverse", "minverse"), ("inverse4", "unknown")],
+)
+def test_each_type_has_limits_of_its_own(clock, kind, profile):
+    """A Minverse passed for an Inverse3: 10 N and 0.10 m."""
+    with serve(clock, kind=kind) as service:
+        device = connect(service)
+        limits = weakest_profile("haply") if profile == "unknown" else device_profile(profile)
+        assert device.profile == limits
+        assert (device.traits.radius, device.traits.max_force) == (limits.radius, limits.max_force)
+        assert kind in device.traits.name
+        assert (
+            ("unknown type" in device.traits.name)
+            is ("least of each" in device.note)
+            is (profile == "unknown")
+        )
+        device.close()
+
+
+def test_a_service_without_the_setting_needs_an_explicit_scale(service, clock):
+    """Before version 3.5 nothing tells by how much forces are scaled."""
+    service.faults.silent_http = True
+    with pytest.raises(DeviceError, match="force_scale=1"):
+        connect(service)
+    device = connect(service, force_scale=1.0)
+    assert "no route /settings/devices/force_scale" in device.note
+    drive(device, clock, 3, force=(0.0, 0.0, 2.0))
+    device.read(clock.time)
+    np.testing.assert_allclose(service.force(), [0.0, 0.0, 2.0])
+    device.close()
+    with pytest.raises(DeviceError, match=r"multiplies every force by 0\.5"):
+        connect(service, force_scale=0.5)
+
+
+def test_what_the_service_tells_goes_before_an_explicit_scale(clock):
+    with serve(clock, force_scale=0.5) as service:
+        with pytest.raises(DeviceError, match=r"multiplies every force by 0\.5"):
+            connect(service, force_scale=1.0)
+        service.faults.plain_http = True
+        with pytest.raises(DeviceError, match=r"multiplies every force by 0\.5"):
+            connect(service, force_scale=1.0)
+    with serve(clock, force_scale=0.0) as service, pytest.raises(DeviceError, match="every force by 0"):
+        connect(service, force_scale=1.0)
 
 
 def test_addresses_that_are_none_of_the_service(service, clock):
@@ -438,7 +576,9 @@ def test_addresses_that_are_none_of_the_service(service, clock):
         HaplySimulator(taken).start()
 
 
-@pytest.mark.parametrize("options", ["spelling=both", "scale=2", "http=1.5", "wait=2", "wait=nan"])
+@pytest.mark.parametrize(
+    "options", ["spelling=both", "scale=2", "http=1.5", "wait=2", "wait=nan", "force_scale=20"]
+)
 def test_options_out_of_range(shared, options):
     with pytest.raises(UsageError):
         device_named(f"haply:{options}", shared.command)
@@ -465,13 +605,15 @@ def test_the_double_answers_http(service, path):
 
 
 def test_the_real_loop_on_the_double(spring_file):
-    """In its own process and in real time: the hand moves by itself and feels the body."""
-    with HaplySimulator(SimulatorSettings(port=0, events=0, frequency=2.0)) as service:
+    """In its own process and in real time: the hand moves by itself and feels the body; an unknown type is said."""
+    with HaplySimulator(SimulatorSettings(port=0, events=0, frequency=2.0, kind="inverse4")) as service:
         device = f"haply:ws://127.0.0.1:{service.port},events={service.events_port}"
         with LoopProcess(spring_file, device=device) as loop:
             until, force = now() + 20.0, 0.0
             while now() < until and force < 0.2:
                 time.sleep(0.01)
                 force = loop.read().force[1]
+            assert "unknown type" in loop.read().device
+            assert "least of each limit" in loop.report().device_note, "while it runs"
     assert force >= 0.2, "the hand goes down and is pushed up"
     assert loop.report().foreign == ()

@@ -130,7 +130,7 @@ def test_a_force_is_felt_one_frame_later(device, drive, library):
 @pytest.mark.parametrize(
     ("model", "own", "profile", "force", "stiffness"),
     [(0, 3.3, "touch", 3.3, 400), (0, 2.5, "touch", 2.5, 400), (1, 7.9, "desktop", 7.9, 1000),
-     (2, 12, "desktop", 7.9, 1000), (3, 3.3, "omni", 3.3, 700), (4, 8.5, "touch", 3.3, 400)],
+     (2, 12, "desktop", 7.9, 1000), (3, 3.3, "omni", 3.3, 700), (4, 8.5, "unknown", 3.3, 400)],
 )  # fmt: skip
 def test_of_two_limits_the_smaller_counts(connect, library, model, own, profile, force, stiffness):
     library.model, library.max_force, library.continuous, library.stiffness = model, own, 0.88, 2.0

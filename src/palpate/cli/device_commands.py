@@ -39,16 +39,18 @@ def list_devices(as_json: Json = False) -> None:
     from palpate.runtime.device_search import search
 
     findings = search()
-    Console(as_json).result(findings_in_words(findings), {"devices": [vars(f) for f in findings]})
+    text = findings_in_words(findings, explain=True)
+    Console(as_json).result(text, {"devices": [vars(f) for f in findings]})
 
 
-def findings_in_words(findings: Sequence[Finding]) -> str:
-    """Return findings as lines for a person."""
+def findings_in_words(findings: Sequence[Finding], *, explain: bool = False) -> str:
+    """Return findings as lines for a person; to explain is to say what each driver knows of its devices."""
     lines = []
     for f in findings:
         use = f"   --device {f.device}" if f.state == "ready" else ""
         lines.append(f"{_MARKS[f.state]} {f.name}: {_STATES[f.state]}{use}")
         lines.append(f"    {f.detail}")
+        lines.extend(f"    {fact}" for fact in f.facts if explain)
         if f.looked_for:
             lines.append(f"    looked for {', '.join(f.looked_for)}")
             lines.append(f"    in {', '.join(f.looked_in)}")

@@ -210,6 +210,8 @@ def _wait(
     """Look at the force while the loop runs, show it, and heed the keys."""
     end, shown = time.monotonic() + seconds, -math.inf
     coupling = math.nan  # nothing was said yet
+    if note := loop.report().device_note:
+        console.say(f"{note}.")
     while (left := end - time.monotonic()) > 0:
         time.sleep(min(left, LOOK))
         if wish := keys.wish():

@@ -43,6 +43,12 @@ def haply(
     force_scale: Annotated[
         float, typer.Option(help="Factor by which the service multiplies every force.")
     ] = 1.0,
+    kind: Annotated[
+        str, typer.Option("--type", help="Type of the device: inverse3, inverse3x, minverse, or any other.")
+    ] = "inverse3",
+    grip: Annotated[
+        str, typer.Option(help="Grips that are connected: wireless, wired, both or none.")
+    ] = "wireless",
     silence: Annotated[
         float, typer.Option(min=0.001, help="Seconds without a command until the force lapses.")
     ] = 0.1,
@@ -58,12 +64,14 @@ def haply(
         spellings=("vector", "values") if spelling == "both" else (spelling,),
         silence=silence,
         force_scale=force_scale,
+        kind=kind,
+        grip=grip,
         amplitude=amplitude,
         frequency=frequency,
     )
     with HaplySimulator(settings) as service:
         device = f"haply:ws://localhost:{service.port},events={service.events_port}"
-        console = _listen("A simulated Haply Inverse3 listens.", device, seconds, as_json)
+        console = _listen(f"A simulated Haply {kind} listens.", device, seconds, as_json)
     console.result(
         f"{service.received} commands were answered.", {"device": device, "commands": service.received}
     )
@@ -98,7 +106,7 @@ def crtk(
 def forcedimension(
     folder: Folder = Path("palpate-doubles"),
     kind: Annotated[
-        str, typer.Option("--type", help="Type of the device, such as omega.3, delta.3, sigma.7 or falcon.")
+        str, typer.Option("--type", help="Type of the device, such as omega.3, delta.6, sigma.7 or falcon.")
     ] = "omega.3",
     amplitude: Amplitude = 0.03,
     frequency: Frequency = 0.5,

@@ -16,9 +16,9 @@ import sys
 import threading
 from collections.abc import Callable, Sequence
 
-from palpate.errors import PalpateError
+from palpate.errors import PalpateError, UsageError
 from palpate.network.kinds import import_when_needed
-from palpate.runtime.devices import device_named
+from palpate.runtime.devices import Device, device_named
 from palpate.runtime.loop import Loop
 from palpate.runtime.realtime import obtain
 from palpate.runtime.recording import Ring, TickRecorder
@@ -88,7 +88,7 @@ def _run(options: argparse.Namespace) -> int:
         ring = Ring.attach(options.ring)
         ring.unlink()
         recorder = TickRecorder(ring)
-    device = device_named(options.device, shared.command)
+    device = _open(options, shared)
     traits, radius, max_force = device.traits, options.radius, options.max_force
     if traits.damping is not None:  # motors: what the opened device says of itself may not be exceeded
         radius, max_force = min(radius, traits.radius), min(max_force, traits.max_force)
@@ -112,14 +112,31 @@ def _run(options: argparse.Namespace) -> int:
     if recorder is not None:
         recorder.ring.describe(loop_facts(model, loop, limits))
         recorder.begin(loop)
-    _say({"obtained": obtain()})
+    _say({"obtained": obtain(), "device_note": _note(device)})
     rehearsal = Rehearsal(model, workspace, limits, options.rate)
     desk.serve(model, loop, limits, rehearsal)
     loop.run(rehearsal)
     foreign = [name for name in FOREIGN if sys.modules.get(name)]
-    note = str(getattr(device, "note", ""))
-    _say({"foreign": foreign, "device_error": loop.device_error, "device_note": note})
+    _say({"foreign": foreign, "device_error": loop.device_error, "device_note": _note(device)})
     return 0
+
+
+def _open(options: argparse.Namespace, shared: Shared) -> Device:
+    """Open the device, and refuse one that has no button to hold where one is asked for."""
+    device = device_named(options.device, shared.command)
+    if options.dead_man and not device.traits.buttons:
+        device.close()
+        raise UsageError(
+            f"{device.traits.name or options.device} has no button to hold.",
+            why="A dead-man button is the first button of a device, or of its grips, that none of its options takes.",
+            fix="Connect and wake the grip that has one, or leave the dead-man button out.",
+        )
+    return device
+
+
+def _note(device: Device) -> str:
+    """Return what a driver says besides its faults; see `Device`."""
+    return str(getattr(device, "note", ""))
 
 
 def _watch_parent(hear: Callable[[str], None]) -> Callable[[], bool]:

@@ -13,13 +13,14 @@ import os
 import socket
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Protocol
 
 from palpate.errors import DeviceError
 from palpate.runtime.device_doubles import DOUBLES
 from palpate.runtime.devices import device_names, device_traits
+from palpate.runtime.devices.profiles import limits_in_words
 
 __all__ = [
     "HARDWARE",
@@ -100,6 +101,8 @@ class Finding:
         What to do; empty where it is ready.
     device : str
         Name for ``--device``; empty where this version has no driver.
+    facts : tuple of str
+        What its driver knows of such devices: limits by type, buttons, and whether it was tried on hardware.
     """
 
     name: str
@@ -110,6 +113,7 @@ class Finding:
     looked_in: tuple[str, ...] = ()
     remedy: str = ""
     device: str = ""
+    facts: tuple[str, ...] = ()
 
 
 class _Search(Protocol):
@@ -123,7 +127,33 @@ def search(surroundings: Surroundings | None = None) -> tuple[Finding, ...]:
     surroundings = surroundings or Surroundings()
     hardware = {entry.device for entry in HARDWARE}
     own = (_built_in(name) for name in device_names() if name not in hardware)
-    return (*own, *(entry.look(surroundings) for entry in HARDWARE))
+    return (*own, *(replace(entry.look(surroundings), facts=_facts(entry.device)) for entry in HARDWARE))
+
+
+_FACTS = {
+    "haply": (
+        "type: config.type of the service's inventory",
+        "buttons: button of a wired VerseGrip; a, b, c of a wireless one; each stops the force unless an option has it",
+        "a service before 3.5 tells less: haply:events=0,spelling=values,force_scale=1",
+        "seen on hardware: no; fields after Haply's Inverse SDK 3.4 and 3.5",
+    ),
+    "forcedimension": (
+        "type: dhdGetSystemType; a device that states a smaller force gets that",
+        "buttons: the eight lowest of its mask; each stops the force unless an option has it",
+        "seen on hardware: no; fields after the Haptic SDK 3.16",
+    ),
+    "openhaptics": (
+        "type: HD_DEVICE_MODEL_TYPE; a device that states smaller limits gets those",
+        "buttons: 1 to 4 of the stylus; each stops the force unless an option has it",
+        "seen on hardware: no; fields after the headers of OpenHaptics HD",
+    ),
+}
+
+
+def _facts(device: str) -> tuple[str, ...]:
+    """Return what a driver knows of its devices, a line each."""
+    limits = limits_in_words(device)
+    return (*((f"limits by type: {limits}",) if limits else ()), *_FACTS.get(device, ()))
 
 
 def _built_in(name: str) -> Finding:
@@ -306,7 +336,7 @@ class GamepadSearch:
 
 HARDWARE: tuple[_Search, ...] = (
     ServiceSearch(
-        name="Haply Inverse3, Minverse, VerseGrip",
+        name="Haply Inverse3, Inverse3x, Minverse; VerseGrip",
         device="haply",
         ports={10001: "websocket and HTTP of the service 3.x", 10000: "HTTP and format 3.0", 10020: "events"},
         install="Install and start the Haply Inverse Service 3.x (Haply Inverse SDK), or a double of it: "

@@ -28,7 +28,7 @@ import numpy as np
 from palpate.errors import DeviceError, DeviceLostError, DeviceStopError, UsageError
 from palpate.runtime.devices.device import Sample, Traits, free_buttons, settings_from
 from palpate.runtime.devices.force_dimension_library import FORCES_OFF, LOST, DhdLibrary, Status
-from palpate.runtime.devices.profiles import DeviceProfile, device_profile
+from palpate.runtime.devices.profiles import DeviceProfile, device_profile, weakest_profile
 from palpate.runtime.shared_state import Block
 
 __all__ = ["AXES", "TYPES", "WATCHDOG", "ForceDimensionDevice", "ForceDimensionSettings"]
@@ -36,12 +36,14 @@ __all__ = ["AXES", "TYPES", "WATCHDOG", "ForceDimensionDevice", "ForceDimensionS
 # Force Dimension: x towards the user, y right, z up. Here: x right, y up, z towards the user.
 AXES = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
 
-# the library's number of a type: our profile; a .3 of sigma and lambda has the base of its .7
+# the library's number of a type: our profile; a .3 of sigma and lambda has the base of its .7. Numbers that version
+# 3.16 no longer has (31, 32, 61, 62, 64, 102, 103, 106, 107) are of older devices, which it may still open
 TYPES = {
-    33: "omega.3", 34: "omega.6", 36: "omega.6", 35: "omega.7", 37: "omega.7", 60: "falcon", 63: "delta.3",
-    104: "sigma.7", 105: "sigma.7", 206: "sigma.7", 108: "lambda.7", 109: "lambda.7", 203: "lambda.7",
+    33: "omega.3", 32: "omega.3", 34: "omega.6", 36: "omega.6", 35: "omega.7", 37: "omega.7", 60: "falcon",
+    63: "delta.3", 31: "delta.3", 64: "delta.6", 61: "delta.6", 62: "delta.6", 106: "sigma.6+", 107: "sigma.6+",
+    104: "sigma.7", 105: "sigma.7", 206: "sigma.7", 102: "sigma.7", 103: "sigma.7",
+    108: "lambda.7", 109: "lambda.7", 203: "lambda.7",
 }  # fmt: skip
-_UNKNOWN = "falcon"  # the least of all: a type that is not in the table gets its limits
 
 WATCHDOG = 160  # times 125 µs: 20 ms without a force command, and the firmware turns the forces off
 _DAMPING = 0.5  # N·s/m, assumed
@@ -50,6 +52,7 @@ _BUTTONS, _MASK = 8, 0xFF  # bits of the mask that are looked at; most devices h
 _FIRST, _STEP, _FASTEST = 100, 0.001, 1.0  # samples at the start, s between them, m/s
 _TOLERANCE = 1.01  # of the force limit that is read back
 _LOOK, _REST = 0.005, 0.5  # s between looks at the status; s of zero force before forces come back
+_BY_HAND = 4000  # looks, 20 s, until a hand has homed a Falcon
 _RETURNING, _BY_THE_USER = frozenset((2, 3)), frozenset((1, 6))  # causes of forces off
 
 
@@ -126,6 +129,7 @@ class ForceDimensionDevice:
         "before it is opened: delta.3's, the largest; damping: none is published, 0.5 N·s/m is assumed",
         delay=_DELAY,
         axes=AXES,
+        buttons=_BUTTONS,
     )
 
     def __init__(self, settings: ForceDimensionSettings | None = None) -> None:
@@ -212,8 +216,10 @@ class ForceDimensionDevice:
 
     @property
     def note(self) -> str:
-        """Words on saturated motors and on readings that came too soon; empty for neither."""
+        """Words on an unknown type, on saturated motors and on readings that came too soon; empty for none of it."""
         notes = []
+        if self.profile.name == "unknown":
+            notes.append(f"{self.name}: the least of each limit that this driver knows holds")
         if self.saturations:
             notes.append(f"a motor was saturated {self.saturations} times: less force, in the same direction")
         if self.guarded:
@@ -300,22 +306,25 @@ class ForceDimensionDevice:
         dhd, device = self._dhd, self._id
         kind, called, serial = dhd.dhdGetSystemType(device), dhd.dhdGetSystemName(device), c_ushort()
         numbered = dhd.dhdGetSerialNumber(byref(serial), device) == 0
-        called = called.decode("utf-8", "replace") if called else f"type {kind}"
+        called = called.decode("utf-8", "replace") if called else "device"
         self.name = f"Force Dimension {called}" + (f" {serial.value}" if numbered else "")
         self.left_handed = bool(dhd.dhdIsLeftHanded(device))
-        self.profile: DeviceProfile = device_profile(TYPES.get(kind, _UNKNOWN))
+        known = kind in TYPES
+        self.profile: DeviceProfile = (
+            device_profile(TYPES[kind]) if known else weakest_profile("forcedimension")
+        )
+        self.name += "" if known else f", unknown type {kind}"
         own = float(dhd.dhdGetMaxForce(device))  # negative: no limit of its own
         force = min(self.profile.max_force, own) if own >= 0.0 else self.profile.max_force
         if not force > 0.0:
             raise DeviceError(
                 f"{self.name} allows no force.", fix="Raise its limit in the vendor's own program."
             )
-        known = kind in TYPES
         self.traits = Traits(  # type: ignore[misc]  # a device's word goes before that of its kind
             self.profile.radius,
             force,
             _DAMPING,
-            f"{'the profile' if known else 'an unknown type, so the profile'} of {self.profile.name}"
+            f"{self.profile.name}: {self.profile.source}"
             f"{'; force: the device itself' if force < self.profile.max_force else ''}; damping: none is published, "
             f"{_DAMPING:g} N·s/m is assumed",
             delay=_DELAY,
@@ -340,15 +349,27 @@ class ForceDimensionDevice:
             raise self._failure("is not taken by the vendor's DRD", -1)
         if dhd.drdIsInitialized(device):
             return
+        by_hand = self.profile.name == "falcon"
         if not self._settings.home:
+            way = (
+                "give forcedimension:home=1, and push its handle in and pull it out by hand"
+                if by_hand
+                else "clear its way and give forcedimension:home=1: it then moves by itself"
+            )
             raise DeviceError(
                 f"{self.name} has not been homed: its positions are wrong.",
-                fix="Clear its way and give forcedimension:home=1: it then moves by itself. Or use the vendor's own "
-                "program.",
+                fix=f"Use the vendor's own program; or {way}.",
             )
-        dhd.call("drdAutoInit", device)
-        if dhd.drdIsRunning(device):
-            dhd.call("drdStop", False, device)
+        if by_hand:  # it doesn't home itself: the vendor's examples send no force until a hand has done it
+            for _ in range(_BY_HAND):
+                if dhd.drdIsInitialized(device):
+                    return
+                dhd.call("dhdSetForce", 0.0, 0.0, 0.0, device)
+                dhd.dhdSleep(_LOOK)
+        else:
+            dhd.call("drdAutoInit", device)
+            if dhd.drdIsRunning(device):
+                dhd.call("drdStop", False, device)
         if not dhd.drdIsInitialized(device):
             raise DeviceError(f"{self.name} could not be homed.", fix="Use the vendor's own program.")
 

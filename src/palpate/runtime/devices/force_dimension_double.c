@@ -56,9 +56,9 @@ static const char *const words[] = {
 enum { OFF_NONE, OFF_BUTTON, OFF_VELOCITY, OFF_WATCHDOG, OFF_SOFTWARE, OFF_USB, OFF_DEAD_MAN };
 
 typedef struct {
-  /* the device; present: how many there are; plain: it has no brakes, watchdog and gravity compensation; deaf: it
+  /* the device; present: how many there are; hand_homes: commands until a hand has homed it, 0 for never; plain: it has no brakes, watchdog and gravity compensation; deaf: it
      takes no force limit */
-  double type, serial, left_handed, present, in_use, homed, homing_fails, powered, device_max_force, plain, deaf;
+  double type, serial, left_handed, present, in_use, homed, homing_fails, hand_homes, powered, device_max_force, plain, deaf;
   /* its firmware: time guard (s), speed of the velocity brake (m/s), force that the motors reach (N) */
   double time_guard, brake_speed, motor_force;
   /* buttons, as a mask */
@@ -85,7 +85,7 @@ static State s;
 
 #define ENTRY(name) {#name, &s.name}
 static struct { const char *name; double *value; } const settings[] = {
-    ENTRY(type), ENTRY(serial), ENTRY(left_handed), ENTRY(present), ENTRY(in_use), ENTRY(homed), ENTRY(homing_fails),
+    ENTRY(type), ENTRY(serial), ENTRY(left_handed), ENTRY(present), ENTRY(in_use), ENTRY(homed), ENTRY(homing_fails), ENTRY(hand_homes),
     ENTRY(powered), ENTRY(device_max_force), ENTRY(plain), ENTRY(deaf), ENTRY(time_guard), ENTRY(brake_speed), ENTRY(motor_force), ENTRY(buttons),
     ENTRY(mass), ENTRY(damping), ENTRY(stiffness), ENTRY(amplitude), ENTRY(frequency), ENTRY(scripted), ENTRY(x),
     ENTRY(y), ENTRY(z), ENTRY(lost_after), ENTRY(fail_position), ENTRY(fail_force), ENTRY(fail_error),
@@ -242,6 +242,7 @@ EXPORT bool drdIsInitialized(char id) {
 EXPORT int drdAutoInit(char id) {
   (void)id;
   if (enter()) return -1;
+  if (s.type == 60) return fail(NOT_AVAILABLE); /* a Falcon is homed by hand */
   s.homings++;
   s.regulating = 1;
   if (s.homing_fails) return fail(TIMEOUT);
@@ -265,12 +266,14 @@ EXPORT int drdStop(bool force, char id) {
 EXPORT const char *dhdGetSystemName(char id) {
   (void)id;
   switch ((int)s.type) {
-    case 33: return "omega.3";
+    case 32: case 33: return "omega.3";
     case 34: case 36: return "omega.6";
     case 35: case 37: return "omega.7";
     case 60: return "Falcon";
-    case 63: return "delta.3";
-    case 104: case 105: return "sigma.7";
+    case 31: case 63: return "delta.3";
+    case 61: case 62: case 64: return "delta.6";
+    case 106: case 107: return "sigma.6+";
+    case 102: case 103: case 104: case 105: return "sigma.7";
     case 108: case 109: return "lambda.7";
     case 203: return "lambda.3";
     case 206: return "sigma.3";
@@ -330,6 +333,7 @@ EXPORT int dhdSetForce(double x, double y, double z, char id) {
   double norm = sqrt(x * x + y * y + z * z), share = 1;
   if (enter()) return -1;
   s.commands++;
+  if (s.hand_homes && s.commands >= s.hand_homes) s.homed = 1;
   if (s.fail_force > 0) return s.fail_force--, fail((int)s.fail_error);
   if (!isfinite(norm)) return fail(INVALID);
   if (s.max_force >= 0 && norm > s.max_force) share = s.max_force / norm;

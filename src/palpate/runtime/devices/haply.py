@@ -1,4 +1,4 @@
-"""Haply Inverse3 and Inverse3x through the Haply Inverse Service 3.x, over its websocket.
+"""Haply Inverse3, Inverse3x and Minverse through the Haply Inverse Service 3.x, over its websocket.
 
 The service answers each message with exactly one frame and never sends one unasked (Haply, *Inverse SDK 3.5*,
 "Simulation Channel"). So the driver works in lock-step: `write` sends one command, the next `read` takes its answer.
@@ -8,14 +8,13 @@ tick old, and its time is that of the command it answers.
 
 Two spellings of a force are in use, ``vector`` and ``values``. The service is silent about one that it doesn't know.
 The driver proves itself by the echoed force: an echo that stays zero for 50 commands makes it try the other spelling,
-once.
+once. A service that echoes nothing is asked of its user. What the frames say is read in `haply_frames`.
 
 Only the thread that calls `read` and `write` is used; no call waits for longer than `HaplySettings.wait`.
 """
 
 from __future__ import annotations
 
-import http.client
 import json
 import math
 import time
@@ -28,6 +27,17 @@ import numpy as np
 
 from palpate.errors import DeviceError, DeviceLostError, DeviceStopError, UsageError
 from palpate.runtime.devices.device import Sample, Traits, free_buttons, settings_from
+from palpate.runtime.devices.haply_frames import (
+    OLD_HTTP_PORT,
+    ask_scale,
+    choose_profile,
+    decode_frame,
+    device_types,
+    grips_in,
+    read_buttons,
+    read_vector,
+)
+from palpate.runtime.devices.profiles import PROFILES, DeviceProfile
 from palpate.runtime.devices.websocket_channel import WebsocketChannel
 from palpate.runtime.shared_state import Block
 
@@ -43,6 +53,8 @@ _LOST = 0.010  # s after which an answer counts as lost
 _PROOF, _PROVING_FORCE = 50, 0.05  # commands of more than that many N until an echo is missed
 _FIRST, _FASTEST = 50, 1.0  # samples that are checked and thrown away, m/s
 _REACH, _IMPOSSIBLE = 0.5, 3  # m from the centre that no arm reaches; samples in a row until that is an error
+_DAMPING = 0.5  # N·s/m, assumed
+_BUTTONS = 4  # of the grip that has the most
 _NEEDED = ("power_supply", "calibrated", "ready")
 _STOPS = frozenset(
     ("device-disconnected", "device-busy", "ebrake_triggered", "stall_detected", "stability_ceiling")
@@ -60,16 +72,22 @@ class HaplySettings:
     device : str
         Four-digit id of the device; empty takes the only one.
     http : float
-        Port of the service's HTTP interface; 0: that of the channel, as of version 3.5.
+        Port of the service's HTTP interface; 0 tries that of the channel, as of version 3.5, then 10000.
     events : float
-        Port of the event channel; 0 does without the service's safety events.
+        Port of the event channel, as of version 3.5; 0 does without the service's safety events.
     spelling : {"auto", "vector", "values"}
         How a force is written; "auto" finds it out by the echoed force.
     scale : {"refuse", "compensate"}
         Answer to a service that scales forces by a factor other than 1.
+    force_scale : float
+        Factor of a service that doesn't tell it, as before version 3.5; 0 refuses such a service. What the service
+        tells goes before.
+    grip : str
+        Id of the grip whose buttons count; empty: those of all.
     hold : str
-        Button of a grip, such as a, that is the hand: it holds the body only while the button is pressed. Empty: it
-        always holds. Of the others the first is the dead-man button where one is asked for.
+        Button that is the hand, such as a of a wireless grip or button of a wired one: it holds the body only while
+        the button is pressed. Empty: it always holds. Of the others the first is the dead-man button where one is
+        asked for.
     wait : float
         Longest wait for an outstanding answer, s.
     search : float
@@ -82,6 +100,8 @@ class HaplySettings:
     events: float = 10020.0
     spelling: str = "auto"
     scale: str = "refuse"
+    force_scale: float = 0.0
+    grip: str = ""
     hold: str = ""
     wait: float = 0.0002
     search: float = 2.0
@@ -93,18 +113,25 @@ class HaplySettings:
                 fix="Choose spelling=auto, vector or values, and scale=refuse or compensate.",
             )
         ports = all(port.is_integer() and 0.0 <= port <= 65535.0 for port in (self.http, self.events))
-        if not (ports and 0.0 <= self.wait <= 1.0 and 0.0 <= self.search <= 60.0):
+        scale = self.force_scale == 0.0 or 0.1 <= self.force_scale <= 10.0
+        if not (ports and scale and 0.0 <= self.wait <= 1.0 and 0.0 <= self.search <= 60.0):
             raise UsageError(
-                "A port, wait or search of haply is out of range.",
-                fix="Ports are 0 … 65535, wait is 0 … 1 s, search is 0 … 60 s.",
+                "A port, wait, search or force_scale of haply is out of range.",
+                fix="Ports are 0 … 65535, wait is 0 … 1 s, search is 0 … 60 s, force_scale is 0.1 … 10, or 0.",
             )
 
 
 class HaplyDevice:
-    """One Inverse3 behind the service.
+    """One Inverse3, Inverse3x or Minverse behind the service.
 
     Attributes
     ----------
+    traits : Traits
+        Of the opened device: those of its profile, with as many buttons as its grips have.
+    profile : DeviceProfile
+        The profile that its type has.
+    note : str
+        What was taken on trust when it was opened, as sentences; empty for nothing.
     spelling : str
         The spelling of forces in use.
     proven : bool
@@ -116,12 +143,13 @@ class HaplyDevice:
     """
 
     traits: ClassVar[Traits] = Traits(
-        0.10,
-        10.0,
-        0.5,
-        "radius: the vendor's tutorials; force: the Inverse3's peak; damping: none is published, 0.5 N·s/m is assumed",
+        PROFILES["inverse3"].radius,
+        PROFILES["inverse3"].max_force,
+        _DAMPING,
+        f"before it is opened: the Inverse3's; {PROFILES['inverse3'].source}; damping: none is published, "
+        f"{_DAMPING:g} N·s/m is assumed",
         axes=AXES,
-        buttons=3,
+        buttons=_BUTTONS,
     )
 
     def __init__(self, settings: HaplySettings) -> None:
@@ -134,14 +162,14 @@ class HaplyDevice:
         self._force = np.zeros(3)
         self._outstanding, self._closed, self._switched = 0, False, False
         self._now, self._asked, self._sent = -math.inf, -math.inf, 0.0
-        self._unproven, self._impossible = 0, 0
+        self._unproven, self._impossible, self.note = 0, 0, ""
         self._stop, self._stopped_by, self._stop_kind = "", "", DeviceError
-        self._scale = 1.0 / _force_scale(settings)
+        self._scale = 1.0 / self._ask_scale()
         self._channel = WebsocketChannel(settings.url, "Haply Inverse Service")
         self._events: WebsocketChannel | None = None
         try:
             self._watch_events()
-            self.device_id = self._find()
+            self._identify(self._find())
             self._configure()
         except BaseException:
             self._release()
@@ -162,7 +190,7 @@ class HaplyDevice:
         if frames:
             self.surplus += max(0, len(frames) - self._outstanding)
             self._outstanding = max(0, self._outstanding - len(frames))
-            self._take(self._entry(_decoded(frames[-1])))
+            self._take(self._entry(decode_frame(frames[-1])))
         if self._stop:
             raise self._stop_kind(self._stop, fix="Free the device, then start again.")
         if math.isinf(self._asked):
@@ -225,7 +253,7 @@ class HaplyDevice:
                     fix="Check its power supply and calibrate it in the Haply Hub.",
                 )
         self._prove(state)
-        place = _vector(state, "cursor_position", math.nan)
+        place = read_vector(state, "cursor_position", math.nan)
         if math.hypot(*place) > _REACH:
             self._impossible += 1
             if self._impossible >= _IMPOSSIBLE:
@@ -243,7 +271,13 @@ class HaplyDevice:
         """Compare the echoed force with the one sent: direction and order of magnitude only."""
         if self.proven or self._sent <= _PROVING_FORCE:
             return
-        echo = np.array(_vector(state, "current_cursor_force", 0.0)) / self._scale
+        if "current_cursor_force" not in state:
+            self._stop = (
+                "The Haply service echoes no force, as before version 3.5: nothing shows how a force must be spelt. "
+                "Give spelling=values, and see that the hand is pushed; if not, spelling=vector."
+            )
+            return
+        echo = np.array(read_vector(state, "current_cursor_force", 0.0)) / self._scale
         along = float(echo @ self._force) / self._sent**2
         if 0.1 < along < 10.0:
             self.proven = True
@@ -286,13 +320,39 @@ class HaplyDevice:
         """Take the buttons of the grips, in the order of their names; the one that holds is the driver's own."""
         sample, own = self.sample, self._settings.hold
         sample.holding, sample.buttons = not own, 0
-        for family in ("verse_grip", "wireless_verse_grip"):
-            for grip in frame.get(family) or ():
-                buttons = (grip.get("state") or {}).get("buttons") or {}
-                names = sorted(buttons)
-                mask = sum(1 << k for k, name in enumerate(names) if buttons[name])
-                sample.holding = sample.holding or bool(buttons.get(own))
-                sample.buttons |= free_buttons(mask, names.index(own) if own in names else -1)
+        for grip in grips_in(frame, self._settings.grip):
+            pressed = read_buttons(grip)
+            mask = sum(down << place for place, down in enumerate(pressed.values()))
+            sample.holding = sample.holding or pressed.get(own, False)
+            sample.buttons |= free_buttons(mask, list(pressed).index(own) if own in pressed else -1)
+
+    def _ask_scale(self) -> float:
+        """Ask the service how it scales forces, which it does in silence; return the factor."""
+        settings = self._settings
+        address = urlsplit(settings.url)
+        host, port = address.hostname or "localhost", address.port or 10001
+        ports = (int(settings.http),) if settings.http else (port, OLD_HTTP_PORT)
+        scale, reasons = ask_scale(host, ports)
+        if scale is None:
+            scale = settings.force_scale
+            if scale == 0.0:
+                raise DeviceError(
+                    f"The Haply Inverse Service at {host} does not say how it scales forces.",
+                    why=reasons,
+                    fix="Start the service (or `palpate devices simulate haply`), or give http=PORT. A service before "
+                    "3.5 may not tell: if its scale is 1 in the Haply Hub, give force_scale=1.",
+                )
+            self._trust(
+                f"forces are taken to be scaled by {scale:g}, as force_scale says, since the Haply service doesn't "
+                f"tell ({reasons})"
+            )
+        if scale == 1.0 or (settings.scale == "compensate" and 0.1 <= scale <= 10.0):
+            return scale
+        raise DeviceError(
+            f"The Haply Inverse Service multiplies every force by {scale:g}.",
+            why="A body would feel softer or stiffer than it is.",
+            fix="Set its devices/force_scale to 1, or give scale=compensate, which takes 0.1 … 10.",
+        )
 
     def _watch_events(self) -> None:
         if self._settings.events:
@@ -304,12 +364,13 @@ class HaplyDevice:
                 raise DeviceError(
                     error.what,
                     why="Brakes, stalls and disconnections are reported there.",
-                    fix="Give its port with events=PORT; events=0 goes without these warnings.",
+                    fix="Give its port with events=PORT; events=0 goes without these warnings, as before version 3.5, "
+                    "which has no such channel.",
                 ) from error
 
     def _heed_events(self) -> None:
         for text in self._events.receive(0.0) if self._events else ():
-            event = _decoded(text)
+            event = decode_frame(text)
             data = event.get("data") or {}
             name = data.get("safety_type") or event.get("name", "")
             if data.get("device_id", self.device_id) != self.device_id:
@@ -321,13 +382,14 @@ class HaplyDevice:
                 self._stop_kind = DeviceLostError if name == "device-disconnected" else DeviceStopError
                 self._stop = f"The Haply service reports {name}: {event.get('message') or 'no message'}"
 
-    def _find(self) -> str:
+    def _find(self) -> Mapping[str, Any]:
+        """Look for the device until it is there; return the inventory that has it."""
         end = time.monotonic() + self._settings.search
-        frame = _decoded(self._next())
+        frame = decode_frame(self._next())
         while not frame.get("inverse3") and time.monotonic() < end:
             time.sleep(0.01)
             self._channel.send('{"session":{"force_render_full_state":{}}}')
-            frame = _decoded(self._next())
+            frame = decode_frame(self._next())
         entries = frame.get("inverse3") or []
         wanted = self._settings.device
         names = [e["device_id"] for e in entries] if isinstance(entries, list) else list(entries)
@@ -338,19 +400,51 @@ class HaplyDevice:
                 fix="Connect and switch on the device, or name it with device=ID.",
             )
         self.device_id = wanted or names[0]
+        return frame
+
+    def _identify(self, frame: Mapping[str, Any]) -> None:
+        """Find out from an inventory which device it is, what it may do, and which buttons there are."""
         entry = self._entry(frame)
-        kind = str(((entry.get("config") or {}).get("device_info") or {}).get("device_type", ""))
-        if "minverse" in kind.lower():
-            raise DeviceError(
-                f"Haply device {self.device_id} is a Minverse.",
-                why="Its workspace is smaller, and its largest force is not known here.",
-                fix="Use an Inverse3 or Inverse3x.",
-            )
         if (entry.get("status") or {}).get("in_use"):
             raise DeviceError(
                 f"Haply device {self.device_id} is in use by another program.", fix="Close that program."
             )
-        return self.device_id
+        types = device_types(entry)
+        self.profile: DeviceProfile = choose_profile(types)
+        called = f"Haply {' and '.join(types) or 'device'} {self.device_id}"
+        if self.profile.name == "unknown":
+            called += ", unknown type"
+            self._trust(f"{called}: the least of each limit that this driver knows holds")
+        self.traits = Traits(  # type: ignore[misc]  # a device's word goes before that of its kind
+            self.profile.radius,
+            self.profile.max_force,
+            _DAMPING,
+            f"{self.profile.source}; damping: none is published, {_DAMPING:g} N·s/m is assumed",
+            axes=AXES,
+            buttons=self._count_buttons(frame),
+            name=called,
+        )
+
+    def _count_buttons(self, frame: Mapping[str, Any]) -> int:
+        """Return how many buttons are left to the loop, and refuse a button to hold that no grip has."""
+        own, names = self._settings.hold, dict[str, None]()
+        most = 0
+        for grip in grips_in(frame, self._settings.grip):
+            buttons = read_buttons(grip)
+            if not buttons:
+                self._trust(f"Haply grip {grip.get('device_id')} tells of no button in a form that is known")
+            names |= dict.fromkeys(buttons)
+            most = max(most, len(buttons.keys() - {own}))
+        if own and own not in names:
+            raise DeviceError(
+                f"No grip of the Haply service has a button {own!r}.",
+                why=f"Its buttons: {', '.join(names)}." if names else "There is no grip that is awake.",
+                fix="Connect the grip and wake it, or name another button with hold=NAME.",
+            )
+        return most
+
+    def _trust(self, sentence: str) -> None:
+        self.note += f"{'; ' if self.note else ''}{sentence}"
 
     def _configure(self) -> None:
         """Move the origin to the middle of the reach, and throw the first samples away once they look right."""
@@ -360,15 +454,18 @@ class HaplyDevice:
             "configure": {"preset": {"preset": _PRESET}},
             "commands": command,
         }
-        message = {"session": {"configure": {"profile": {"name": "palpate"}}}, "inverse3": [configured]}
+        session: dict[str, Any] = {"configure": {"profile": {"name": "palpate"}}}
+        message = {"session": session, "inverse3": [configured]}
         for sample in range(_FIRST):
             self._channel.send(json.dumps(message))
             message = {"inverse3": [{"device_id": self.device_id, "commands": command}]}
-            entry = self._entry(_decoded(self._next()))
+            if sample == _FIRST - 2:  # the last answer has the configuration
+                message["session"] = {"force_render_full_state": {}}
+            entry = self._entry(decode_frame(self._next()))
             if sample > _FIRST // 2:  # several drivers deliver garbage at first
                 state = entry.get("state") or {}
-                place = _vector(state, "cursor_position", math.nan)
-                speed = _vector(state, "cursor_velocity", 0.0)
+                place = read_vector(state, "cursor_position", math.nan)
+                speed = read_vector(state, "cursor_velocity", 0.0)
                 if not (math.hypot(*place) <= _REACH and math.hypot(*speed) <= _FASTEST):
                     raise DeviceError(
                         f"Haply device {self.device_id} starts at {place} m with {speed} m/s.",
@@ -376,6 +473,17 @@ class HaplyDevice:
                         fix="Calibrate it in the Haply Hub, and hold it still while it is opened.",
                     )
                 self._take(entry)
+        preset = (entry.get("config") or {}).get("preset", "")
+        if preset not in {"", _PRESET}:
+            raise DeviceError(
+                f"Haply device {self.device_id} keeps the preset {preset!r}.",
+                why=f"A body lies where it should only with {_PRESET!r}, whose origin is the middle of the reach.",
+                fix="Close other programs that configure the device, or update the service to 3.5.",
+            )
+        if not preset:
+            self._trust(
+                "the service doesn't tell whether its origin is the middle of the reach: try where a body lies"
+            )
         self._impossible, self.sample.holding = 0, False  # until the loop's first command is answered
 
     def _next(self) -> str:
@@ -387,45 +495,3 @@ class HaplyDevice:
                 fix="Check that the address is that of its simulation channel, and restart the service.",
             )
         return frames[-1]
-
-
-def _decoded(text: str) -> Mapping[str, Any]:
-    try:
-        frame = json.loads(text)
-    except ValueError as error:
-        raise DeviceError("The Haply service sent a frame that is not JSON.", why=text[:100]) from error
-    return frame if isinstance(frame, Mapping) else {}
-
-
-def _vector(state: Mapping[str, Any], name: str, missing: float) -> list[float]:
-    value = state.get(name) or {}
-    return [float(value.get(axis, missing)) for axis in "xyz"]
-
-
-def _force_scale(settings: HaplySettings) -> float:
-    """Ask the service how it scales forces: it does so in silence."""
-    address = urlsplit(settings.url)
-    host, port = address.hostname or "localhost", int(settings.http) or address.port or 10001
-    connection = http.client.HTTPConnection(host, port, timeout=2.0)
-    try:
-        connection.request("GET", "/settings/devices/force_scale")
-        answer = json.loads(connection.getresponse().read())
-        data = answer["data"]
-        if isinstance(data, Mapping):
-            data = next(v for v in data.values() if isinstance(v, (int, float)))
-        scale = float(data)
-    except (OSError, http.client.HTTPException, ValueError, TypeError, LookupError, StopIteration) as error:
-        raise DeviceError(
-            f"The Haply Inverse Service at {host}:{port} does not say how it scales forces.",
-            why=f"{type(error).__name__}: {error}",
-            fix="Start the service (or `palpate devices simulate haply`), or give http=PORT; before 3.5 it is 10000.",
-        ) from error
-    finally:
-        connection.close()
-    if scale == 1.0 or (settings.scale == "compensate" and 0.1 <= scale <= 10.0):
-        return scale
-    raise DeviceError(
-        f"The Haply Inverse Service multiplies every force by {scale:g}.",
-        why="A body would feel softer or stiffer than it is.",
-        fix="Set its devices/force_scale to 1, or give scale=compensate, which takes 0.1 … 10.",
-    )

@@ -2,7 +2,9 @@
 
 It speaks as the service does (Haply, *Inverse SDK 3.5*, "Simulation Channel", "HTTP", "Events & Monitoring"): an
 inventory on connecting, then exactly one frame per message, a force only in a spelling that it knows, a force that
-lapses without commands. It has the service's faults too; see `SimulatorFaults`.
+lapses without commands. It has the service's faults too; see `SimulatorFaults`. Its devices and grips are those of an
+inventory, whose form it keeps: one that the maker prints as an example can be given, and then every frame has the
+fields of that version of the service and no others.
 
 The hand is a mass on a spring whose other end moves up and down by a sine, with damping; all in the service's axes:
 x right, y away from the user, z up.
@@ -10,9 +12,10 @@ x right, y away from the user, z up.
 
 from __future__ import annotations
 
+import copy
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from http import HTTPStatus
 from typing import TYPE_CHECKING, Any
@@ -29,6 +32,7 @@ if TYPE_CHECKING:
 __all__ = ["EVENTS", "HaplySimulator", "SimulatorFaults", "SimulatorSettings"]
 
 _BASE = np.array([0.0, -0.12, 0.15])  # m, the resting cursor as seen from the device's base
+_GRIPS = ("wireless", "wired", "both", "none")
 _LARGEST_FORCE = 1000.0  # N that is refused as a slip of units
 
 EVENTS = {
@@ -59,6 +63,10 @@ class SimulatorSettings(HandSettings):
         Spellings of a force that are understood; any other is ignored in silence.
     force_scale : float
         Factor on every force.
+    kind : str
+        Type of the devices: inverse3, inverse3x, minverse, or one that nobody knows.
+    grip : {"wireless", "wired", "both", "none"}
+        Grips that are connected. A wired one has one button, ``button``; a wireless one has a, b and c.
     """
 
     port: int = 10001
@@ -67,12 +75,15 @@ class SimulatorSettings(HandSettings):
     host: str = "127.0.0.1"
     spellings: tuple[str, ...] = ("vector", "values")
     force_scale: float = 1.0
+    kind: str = "inverse3"
+    grip: str = "wireless"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if any(s not in {"vector", "values"} for s in self.spellings):
+        if any(s not in {"vector", "values"} for s in self.spellings) or self.grip not in _GRIPS:
             raise UsageError(
-                "The simulated Haply knows no such spelling.", fix="Spellings are vector and values."
+                "The simulated Haply knows no such spelling or grip.",
+                fix=f"Spellings are vector and values, grips are {', '.join(_GRIPS)}.",
             )
 
 
@@ -96,12 +107,14 @@ class SimulatorFaults:
         Factor of the echoed force; the hand feels the force as it is.
     in_use, powered, calibrated : bool
         Status of the device.
+    deaf : bool
+        The preset stays as it is.
     silent_http : bool
-        HTTP knows no routes.
+        HTTP knows no routes, as a service before version 3.5 none of the settings.
+    plain_http : bool
+        HTTP answers with the value alone, without an envelope.
     position : three floats, optional
         Position that is reported instead of the hand's, m; may be NaN.
-    device_type : str
-        In the inventory.
     """
 
     held: bool = False
@@ -114,16 +127,22 @@ class SimulatorFaults:
     in_use: bool = False
     powered: bool = True
     calibrated: bool = True
+    deaf: bool = False
     silent_http: bool = False
+    plain_http: bool = False
     position: tuple[float, float, float] | None = None
-    device_type: str = "inverse3"
 
 
 @dataclass
 class _Device:
-    device_id: str
+    entry: dict[str, Any]  # of the inventory
     hand: MovedMass
     centred: bool = False
+
+    @property
+    def device_id(self) -> str:
+        """The id by which commands name it."""
+        return str(self.entry["device_id"])
 
 
 class HaplySimulator(ServiceDouble):
@@ -137,6 +156,8 @@ class HaplySimulator(ServiceDouble):
         Returns the time, s, by which the hand moves and forces lapse.
     devices : tuple of str
         Ids of the devices.
+    inventory : mapping, optional
+        First frame of a service, with its devices and grips, instead of those of the settings; it is copied.
 
     Attributes
     ----------
@@ -146,8 +167,8 @@ class HaplySimulator(ServiceDouble):
         Messages on the simulation channel.
     port, events_port, legacy_port : int
         Ports in use, once started.
-    buttons : dict
-        Buttons of the grip, by name.
+    grips : dict
+        Entries of the inventory's grips by family; may be changed at any time.
     """
 
     def __init__(
@@ -155,14 +176,16 @@ class HaplySimulator(ServiceDouble):
         settings: SimulatorSettings | None = None,
         clock: Callable[[], float] = time.monotonic,
         devices: tuple[str, ...] = ("04C2",),
+        inventory: Mapping[str, Any] | None = None,
     ) -> None:
         super().__init__("Haply")
         self.settings, self._clock = settings or SimulatorSettings(), clock
         self.faults = SimulatorFaults()
-        self.received, self.session = 0, 1
+        inventory = copy.deepcopy(dict(inventory or _inventory(self.settings, devices)))
+        self.received, self.session = 0, int(inventory.pop("session_id", 1))
         self.port = self.events_port = self.legacy_port = 0
-        self.buttons = {"a": False, "b": False, "c": False}
-        self._devices = [_Device(name, MovedMass(self.settings)) for name in devices]
+        self._devices = [_Device(entry, MovedMass(self.settings)) for entry in inventory.pop("inverse3")]
+        self.grips: dict[str, list[dict[str, Any]]] = inventory
         self._watchers: set[ServerConnection] = set()
         self._clients: set[ServerConnection] = set()
         self._kept: list[tuple[ServerConnection, str]] = []
@@ -175,6 +198,12 @@ class HaplySimulator(ServiceDouble):
     def lapses_at(self, device: int = 0) -> float:
         """Return when the force lapses unless another command comes, s of the clock."""
         return self._devices[device].hand.commanded + self.settings.silence
+
+    def press(self, *names: str, down: bool = True) -> None:
+        """Press or let go of buttons, wherever a grip has one of that name."""
+        for grip in (grip for family in self.grips.values() for grip in family):
+            for places in (grip["state"], grip["state"].get("buttons", {})):
+                places |= {name: down for name in names if name in places}
 
     def release(self) -> None:
         """Send the answers that were held, in their order."""
@@ -266,7 +295,7 @@ class HaplySimulator(ServiceDouble):
 
     def _command(self, device: _Device, entry: dict[str, Any], now: float) -> None:
         preset = ((entry.get("configure") or {}).get("preset") or {}).get("preset")
-        if preset is not None:
+        if preset is not None and not self.faults.deaf:
             device.centred = preset == "arm_front_centered"
         command = (entry.get("commands") or {}).get("set_cursor_force") or {}
         for spelling in self.settings.spellings:
@@ -283,33 +312,37 @@ class HaplySimulator(ServiceDouble):
             devices = []
         else:
             devices = [self._entry(device, full=full) for device in self._devices]
-        grip = {
-            "device_id": "6F1A",
-            "state": {"orientation": {"w": 1, "x": 0, "y": 0, "z": 0}, "buttons": self.buttons},
+        told = {"device_id", "state", "status"} | ({"config"} if full else set())
+        grips = {
+            family: [{key: grip[key] for key in grip.keys() & told} for grip in grips]
+            for family, grips in self.grips.items()
         }
-        frame: dict[str, Any] = {"inverse3": devices, "verse_grip": [grip], "wireless_verse_grip": []}
-        return {"session_id": self.session, **frame} if full else frame
+        return ({"session_id": self.session} if full else {}) | {"inverse3": devices} | grips
 
     def _entry(self, device: _Device, *, full: bool) -> dict[str, Any]:
-        faults, hand = self.faults, device.hand
+        """Return the entry of a device as it is now, with the fields that it has in the inventory."""
+        faults, hand, known = self.faults, device.hand, device.entry
         place = hand.position if device.centred else hand.position + _BASE
-        state = {"cursor_position": _xyz(place if faults.position is None else np.array(faults.position))}
-        entry: dict[str, Any] = {"device_id": device.device_id, "state": state}
-        if not faults.bare:
-            state["cursor_velocity"] = _xyz(hand.velocity)
-            state["current_cursor_force"] = _xyz(faults.echo * hand.force)
-            entry["status"] = {
-                "calibrated": faults.calibrated,
-                "in_use": faults.in_use,
-                "power_supply": faults.powered,
-                "ready": True,
-                "started": True,
-            }
-        if full:
+        now = {
+            "cursor_position": _xyz(place if faults.position is None else np.array(faults.position)),
+            "cursor_velocity": _xyz(hand.velocity),
+            "current_cursor_force": _xyz(faults.echo * hand.force),
+        }
+        status = {
+            "calibrated": faults.calibrated,
+            "in_use": faults.in_use,
+            "power_supply": faults.powered,
+        }
+        state = known["state"] | {name: now[name] for name in now.keys() & known["state"].keys()}
+        entry = known | {"state": state, "status": known.get("status", {}) | status}
+        if "preset" in known["config"]:
             preset = "arm_front_centered" if device.centred else "defaults"
-            info = {"id": device.device_id, "device_type": faults.device_type, "major_version": 3}
-            entry["config"] = {"type": faults.device_type, "device_info": info, "handedness": "right"}
-            entry["config"] |= {"preset": preset, "basis": {"permutation": "XYZ"}}
+            entry["config"] = known["config"] | {"preset": preset}
+        if faults.bare:
+            del entry["status"]
+            entry["state"] = {"cursor_position": now["cursor_position"]}
+        if not full:
+            del entry["config"]
         return entry
 
     def _keyed(self) -> dict[str, Any]:
@@ -330,9 +363,51 @@ class HaplySimulator(ServiceDouble):
         if path not in routes or self.faults.silent_http:
             status, answer = HTTPStatus.NOT_FOUND, {"ok": False, "error": f"no route {path}"}
         else:
-            status, answer = HTTPStatus.OK, {"ok": True, "data": routes[path]()}
+            data = routes[path]()
+            status, answer = HTTPStatus.OK, data if self.faults.plain_http else {"ok": True, "data": data}
         return connection.respond(status, json.dumps(answer))
 
 
 def _xyz(vector: np.ndarray) -> dict[str, float]:
     return dict(zip("xyz", vector.tolist(), strict=True))
+
+
+def _inventory(settings: SimulatorSettings, devices: tuple[str, ...]) -> dict[str, Any]:
+    """Return the inventory of a service 3.5, as far as a driver needs it."""
+    zero, still = {"x": 0.0, "y": 0.0, "z": 0.0}, {"w": 1.0, "x": 0.0, "y": 0.0, "z": 0.0}
+    wired = {
+        "device_id": "61021",
+        "config": {"type": "verse_grip"},
+        "state": {"orientation": still, "hall": 0, "button": False},
+    }
+    wireless = {
+        "device_id": "6F1A",
+        "config": {"type": "wireless_verse_grip"},
+        "state": {
+            "orientation": still,
+            "hall": 0,
+            "buttons": {"a": False, "b": False, "c": False},
+            "battery_level": 0.9,
+        },
+        "status": {"connected": True, "awake": True, "ready": True},
+    }
+    inverse3 = [
+        {
+            "device_id": name,
+            "config": {
+                "type": settings.kind,
+                "device_info": {"id": name, "major_version": 7, "minor_version": 4},
+                "handedness": "right",
+                "preset": "defaults",
+                "basis": {"permutation": "XYZ"},
+            },
+            "state": {"cursor_position": zero, "cursor_velocity": zero, "current_cursor_force": zero},
+            "status": {"ready": True, "started": True},
+        }
+        for name in devices
+    ]
+    return {
+        "inverse3": inverse3,
+        "verse_grip": [wired] if settings.grip in {"wired", "both"} else [],
+        "wireless_verse_grip": [wireless] if settings.grip in {"wireless", "both"} else [],
+    }

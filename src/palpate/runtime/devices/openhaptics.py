@@ -39,7 +39,7 @@ from palpate.runtime.devices.openhaptics_servo import (
     Mailbox,
     servo,
 )
-from palpate.runtime.devices.profiles import DeviceProfile, device_profile
+from palpate.runtime.devices.profiles import DeviceProfile, device_profile, weakest_profile
 from palpate.runtime.safety import HARDWARE_PATIENCE
 from palpate.runtime.shared_state import Block
 from palpate.runtime.workspace import PLAIN_AXES
@@ -50,7 +50,6 @@ AXES = PLAIN_AXES
 
 # a word in the model's name, and the profile; the Touch X took the Desktop's place in the vendor's range
 _MODELS = {"touch x": "desktop", "touchx": "desktop", "desktop": "desktop", "omni": "omni", "touch": "touch"}
-_UNKNOWN = "touch"  # the least of all
 _DAMPING, _MASS = 0.5, 0.045  # N·s/m, assumed; kg, apparent at the tip of a Touch (3D Systems' data sheet)
 _PRIORITY = 0xFFFF  # of the callback, the highest
 _START, _FASTEST = 2.0, 1.0  # s that the frames of the start may take, m/s
@@ -116,6 +115,8 @@ class OpenHapticsDevice:
         The profile that its model has.
     name : str
         Its model and serial number.
+    note : str
+        What was taken on trust when it was opened, as a sentence; empty for nothing.
     frames : int
         Frames so far.
 
@@ -141,6 +142,7 @@ class OpenHapticsDevice:
 
         self._settings = settings = settings or OpenHapticsSettings()
         self._hd = HdLibrary(load_library("openhaptics", settings.library))
+        self.note = ""
         self.sample, self.frames, self.name = Sample(), 0, f"The OpenHaptics device {settings.device!r}"
         self._clutch = int(settings.clutch) - 1
         self._rests, self._needs_switch = settings.inkwell == "rest", settings.switch == "hold"
@@ -275,8 +277,10 @@ class OpenHapticsDevice:
         hd.hdEndFrame(self._device)
         self._refuse(hd.errors(), "can't be asked what it is", "Start it again.")
         known = next((name for word, name in _MODELS.items() if word in model.lower()), "")
-        self.profile: DeviceProfile = device_profile(known or _UNKNOWN)
+        self.profile: DeviceProfile = device_profile(known) if known else weakest_profile("openhaptics")
         self.name = f"3D Systems {model or 'device'}{f' {serial}' if serial else ''}"
+        self.name += "" if known else ", unknown model"
+        self.note = "" if known else f"{self.name}: the least of each limit that this driver knows holds"
         self._centre, inner = _middle(usable)
         outer = [abs(side * _MM - self._centre[i % 3]) for i, side in enumerate(largest)]
         corner = math.hypot(*(max(outer[i], outer[i + 3]) for i in range(3))) if outer else 0.0
@@ -284,9 +288,8 @@ class OpenHapticsDevice:
             min(self.profile.radius, inner),
             min(self.profile.max_force, force),
             _DAMPING,
-            f"the smaller of its own figures and the profile of {self.profile.name}"
-            f"{'' if known else ', since its model is unknown'}; damping: none is published, {_DAMPING:g} N·s/m is "
-            "assumed; mass: the data sheet of a Touch",
+            f"the smaller of its own figures and those of {self.profile.name}: {self.profile.source}; damping: none "
+            f"is published, {_DAMPING:g} N·s/m is assumed; mass: the data sheet of a Touch",
             mass=_MASS,
             delay=2.0 / self._settings.rate,
             axes=AXES,

@@ -45,7 +45,7 @@ typedef struct {
 } HDErrorInfo;
 typedef HDCallbackCode (*HDSchedulerCallback)(void *);
 
-enum { INVALID_ENUM = 0x0100, INVALID_OPERATION = 0x0103, INVALID_HANDLE = 0x0104 };
+enum { INVALID_ENUM = 0x0100, INVALID_VALUE, INVALID_OPERATION, INVALID_INPUT_TYPE, INVALID_HANDLE };
 enum { WARM_MOTORS = 0x0200, EXCEEDED_MAX_FORCE = 0x0201, FORCE_ERROR = 0x0204 };
 enum { DEVICE_FAULT = 0x0300, ALREADY_INITIATED = 0x0301, COMMUNICATION = 0x0302 };
 enum { ILLEGAL_BEGIN = 0x0400, ILLEGAL_END = 0x0401, SCHEDULER_FULL = 0x0501, INVALID_LICENSE = 0x0600 };
@@ -337,6 +337,21 @@ static int give_box(double *values, double x, double y, double z) {
     return give(values, 6, box, s.gives_limits != 0);
 }
 
+/* Refuses a parameter: one that exists is of another type than the function that was asked ('d', 'i', 'b', 's'). */
+static void refuse(HDenum code, char asked) {
+    char type = 0;
+    if (code == 0x2000 || code == 0x2200 || (code >= 0x2553 && code <= 0x2555) || code == 0x2600 || code == 0x2601)
+        type = 'i';
+    else if (code == 0x2001 || code == 0x2002 || code == 0x2201 || code == 0x2202)
+        type = 'b';
+    else if (code >= 0x2501 && code <= 0x2505)
+        type = 's';
+    else if ((code >= 0x2050 && code <= 0x2052) || code == 0x2550 || code == 0x2551 ||
+             (code >= 0x2602 && code <= 0x2605) || code == 0x2700)
+        type = 'd';
+    raise_error(type && type != asked ? INVALID_INPUT_TYPE : INVALID_ENUM);
+}
+
 API void hdGetDoublev(HDenum code, double *values) {
     const double temperature[3] = {0.1, 0.2, 0.1};
     int known = s.gives_limits != 0;
@@ -353,7 +368,7 @@ API void hdGetDoublev(HDenum code, double *values) {
     case 0x2700: give(values, 3, wanted, 1); return;
     default: known = 0;
     }
-    if (!known) raise_error(INVALID_ENUM);
+    if (!known) refuse(code, 'd');
 }
 
 API void hdGetIntegerv(HDenum code, int *values) {
@@ -362,7 +377,7 @@ API void hdGetIntegerv(HDenum code, int *values) {
     case 0x2000: *values = (int)s.buttons; return;
     case 0x2555: *values = (int)s.calibration_style; return;
     case 0x2600: case 0x2601: *values = (int)s.rate; return;
-    default: raise_error(INVALID_ENUM);
+    default: refuse(code, 'i');
     }
 }
 
@@ -371,7 +386,7 @@ API void hdGetBooleanv(HDenum code, HDboolean *values) {
     switch (code) {
     case 0x2001: *values = s.safety_switch != 0; return;
     case 0x2002: *values = s.inkwell != 0; return;
-    default: raise_error(INVALID_ENUM);
+    default: refuse(code, 'b');
     }
 }
 
@@ -382,7 +397,7 @@ API const char *hdGetString(HDenum code) {
     case 0x2502: return "double";
     case 0x2503: return "palpate";
     case 0x2504: return "0001";
-    default: raise_error(INVALID_ENUM); return NULL;
+    default: refuse(code, 's'); return NULL;
     }
 }
 
@@ -431,7 +446,7 @@ API void hdUpdateCalibration(HDenum style) {
 
 API void hdSetSchedulerRate(HDulong rate) {
     if (s.running || (rate != 500 && rate != 1000))
-        raise_error(INVALID_OPERATION);
+        raise_error(s.running ? INVALID_OPERATION : INVALID_VALUE);
     else
         s.rate = (double)rate;
 }

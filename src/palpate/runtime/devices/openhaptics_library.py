@@ -22,7 +22,8 @@ LOST = frozenset((0x0104, 0x0300, 0x0302))  # handle, device, communication: the
 _MEANINGS = {
     0x0100: "a parameter that it doesn't know",
     0x0101: "a value that it doesn't accept",
-    0x0103: "an operation at the wrong time",
+    0x0102: "an operation at the wrong time",
+    0x0103: "a parameter asked for as a number of another type",
     0x0104: "a handle that is no longer valid",
     0x0200: "the motors are too warm",
     0x0201: "the force exceeded its maximum",

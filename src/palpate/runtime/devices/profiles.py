@@ -1,7 +1,8 @@
 """Profiles of haptic devices that are on the market: workspace, largest force, and how stiff and damped each may be.
 
-The figures are those that open drivers carry for these devices (CHAI3D 3.2; Conti et al. 2005), rounded as there. No
-maker has confirmed them. Where an opened device states its own limits, the smaller of both counts.
+Most figures are those that open drivers carry for these devices (CHAI3D 3.2; Conti et al. 2005), rounded as there. No
+maker has confirmed them. Where an opened device states its own limits, the smaller of both counts. A device whose type
+is not in the table gets the least of each limit that its driver knows, see `weakest_profile`.
 
 Reference: F. Conti, F. Barbagli, D. Morris, C. Sewell (2005), CHAI 3D: an open-source library for the rapid development
 of haptic scenes, IEEE World Haptics, Pisa.
@@ -13,7 +14,9 @@ from dataclasses import dataclass
 
 from palpate.errors import UsageError
 
-__all__ = ["PROFILES", "DeviceProfile", "device_profile"]
+__all__ = ["PROFILES", "DeviceProfile", "device_profile", "limits_in_words", "weakest_profile"]
+
+_CHAI3D = "as open drivers have it (CHAI3D 3.2)"
 
 
 @dataclass(frozen=True)
@@ -24,6 +27,8 @@ class DeviceProfile:
     ----------
     name : str
         As its maker calls it, in small letters.
+    driver : str
+        Name of its driver, as in ``--device``.
     max_force : float
         F_max, N.
     max_stiffness : float
@@ -32,33 +37,51 @@ class DeviceProfile:
         The largest virtual damping, B_max, N·s/m; infinite where nobody states one.
     radius : float
         Of a sphere in its workspace, m.
+    source : str
+        Where the figures come from.
     """
 
     name: str
+    driver: str
     max_force: float
     max_stiffness: float
     max_damping: float
     radius: float
+    source: str = _CHAI3D
 
 
 _UNSTATED = float("inf")
+_DHD, _HD, _HAPLY = "forcedimension", "openhaptics", "haply"
 
 PROFILES: dict[str, DeviceProfile] = {
     profile.name: profile
     for profile in (
-        DeviceProfile("omega.3", 12.0, 5000.0, 30.0, 0.075),
-        DeviceProfile("omega.6", 12.0, 5000.0, 30.0, 0.075),
-        DeviceProfile("omega.7", 12.0, 5000.0, 30.0, 0.075),
-        DeviceProfile("delta.3", 20.0, 5000.0, 30.0, 0.15),
-        DeviceProfile("sigma.7", 12.0, 4000.0, 30.0, 0.075),
-        DeviceProfile("lambda.7", 12.0, 8000.0, 30.0, 0.1125),
-        DeviceProfile("falcon", 8.0, 3000.0, 20.0, 0.04),
-        DeviceProfile("touch", 3.3, 400.0, 4.0, 0.075),
-        DeviceProfile("omni", 3.3, 700.0, 5.0, 0.10),
-        DeviceProfile("desktop", 7.9, 1000.0, 5.0, 0.10),
-        DeviceProfile("inverse3", 10.0, _UNSTATED, _UNSTATED, 0.10),
+        DeviceProfile("omega.3", _DHD, 12.0, 5000.0, 30.0, 0.075),
+        DeviceProfile("omega.6", _DHD, 12.0, 5000.0, 30.0, 0.075),
+        DeviceProfile("omega.7", _DHD, 12.0, 5000.0, 30.0, 0.075),
+        DeviceProfile("delta.3", _DHD, 20.0, 5000.0, 30.0, 0.15),
+        DeviceProfile("delta.6", _DHD, 20.0, 5000.0, 30.0, 0.15),
+        DeviceProfile("sigma.6+", _DHD, 12.0, 4000.0, 30.0, 0.09),
+        DeviceProfile("sigma.7", _DHD, 12.0, 4000.0, 30.0, 0.075),
+        DeviceProfile("lambda.7", _DHD, 12.0, 8000.0, 30.0, 0.1125),
+        DeviceProfile("falcon", _DHD, 8.0, 3000.0, 20.0, 0.04),
+        DeviceProfile("touch", _HD, 3.3, 400.0, 4.0, 0.075),
+        DeviceProfile("omni", _HD, 3.3, 700.0, 5.0, 0.10),
+        DeviceProfile("desktop", _HD, 7.9, 1000.0, 5.0, 0.10),
+        DeviceProfile(
+            "inverse3", _HAPLY, 10.0, _UNSTATED, _UNSTATED, 0.10,
+            "radius: the maker's tutorials; force: the Inverse3's peak",
+        ),
+        DeviceProfile(
+            "inverse3x", _HAPLY, 10.0, _UNSTATED, _UNSTATED, 0.10,
+            "radius: the maker's tutorials; force: not published, the Inverse3's is taken",
+        ),
+        DeviceProfile(
+            "minverse", _HAPLY, 3.3, _UNSTATED, _UNSTATED, 0.04,
+            "radius: the maker's tutorials; force: not published, the least of all devices is taken",
+        ),
     )
-}
+}  # fmt: skip
 
 
 def device_profile(name: str) -> DeviceProfile:
@@ -75,3 +98,30 @@ def device_profile(name: str) -> DeviceProfile:
         raise UsageError(
             f"There is no profile of a device {name!r}.", fix=f"Choose one of {', '.join(PROFILES)}."
         ) from error
+
+
+def weakest_profile(driver: str) -> DeviceProfile:
+    """Return what a device of unknown type gets: of each limit the least among the driver's profiles."""
+    family = [profile for profile in PROFILES.values() if profile.driver == driver]
+    return DeviceProfile(
+        "unknown",
+        driver,
+        min(profile.max_force for profile in family),
+        min(profile.max_stiffness for profile in family),
+        min(profile.max_damping for profile in family),
+        min(profile.radius for profile in family),
+        "an unknown type, so the least of each limit that this driver knows",
+    )
+
+
+def limits_in_words(driver: str) -> str:
+    """Return the limits of a driver's devices, and of one of unknown type, as a line; empty where it has none."""
+    family = [profile for profile in PROFILES.values() if profile.driver == driver]
+    if not family:
+        return ""
+    return "; ".join(
+        f"{'any other type' if profile.name == 'unknown' else profile.name} ±{1e3 * profile.radius:g} mm, "
+        f"{profile.max_force:g} N"
+        + (f", {profile.max_stiffness:g} N/m" if profile.max_stiffness < _UNSTATED else "")
+        for profile in (*family, weakest_profile(driver))
+    )

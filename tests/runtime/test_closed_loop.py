@@ -96,7 +96,7 @@ def test_the_limit_acts_with_the_delay_that_was_measured_and_says_so():
 
 
 def test_without_limit_and_controller_the_body_shakes_the_hand():
-    """The rivals, on a body six times as stiff as is passive: the controller takes what it gives, the limit forestalls."""
+    """The rivals, on a body six times too stiff: the controller takes what it gives, the limit forestalls it."""
     options = {"shape": "adversarial", "override": True}
     wild = Touch("firm block", SLOW, 4.0, control=False, **options)
     kept = Touch("firm block", SLOW, 4.0, **options)

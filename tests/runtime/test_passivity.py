@@ -105,7 +105,7 @@ def test_damping_pays_what_an_active_force_owes(late):
 
 
 def stroke(ticks, noise, *, late=0, stiffness=200.0, speed=0.05, seed=0, mass=0.2):
-    """A hand moved to and fro by a script on a spring, seen with noise; the ledger, the work, and the damping's noise."""
+    """A hand led to and fro on a spring and seen with noise: the ledger, the work, and what was added to the force."""
     rng = np.random.default_rng(seed)
     time = T * np.arange(ticks)
     X = np.column_stack([speed * 0.25 * (1.0 - np.cos(time / 0.25)), 0.0 * time, 0.0 * time])

@@ -27,10 +27,10 @@ states, and a constant force leaks nothing. A debt B < 0 is forgotten
 in a second, a credit in a fifth: who holds the device has absorbed the energy by then, and what a body has swallowed is
 no licence to give it back. Damping already sent that has not acted yet counts towards B.
 
-**How much may be damped**: on the apparent mass m, α ≤ m/2(T + d + τ), which is stable without a hand; α times the noise of
-the filtered speed stays below 2 % of the largest force; and below what the body itself answers to the noise, ½K(τ + T)
-for a felt stiffness K. The τ that leaves most is taken. Never more than the body's own force is damped: a body that is
-left doesn't pull, and in the air nothing is felt.
+**How much may be damped**: on the apparent mass m, α ≤ m/2(T + d + τ), which is stable without a hand; α times the
+noise of the filtered speed stays below 2 % of the largest force; and below what the body itself answers to the noise,
+½K(τ + T) for a felt stiffness K. The τ that leaves most is taken. Never more than the body's own force is damped: a
+body that is left doesn't pull, and in the air nothing is felt.
 
 **The promise.** Let U be the energy that the hand feels and K its largest curvature, N/m. A force held for a tick
 leaks at most ½ K |Δx|², one that is also d late at most K (½ + d/T) |Δx|², hence without any controller
@@ -82,13 +82,12 @@ _LIGHTEST = 0.1  # kg: the filter of a loop that only observes is that of such a
 _BALL = 3.0  # standard deviations of the filtered place
 _LONGEST_FILTER = 0.030  # s
 
-_ENERGY, _LOWEST, _DAMPING, _INJECTED, _LEAK, _NOISE, _SEEN, _HEAD, _BALANCE, _STORED, _TICKS, _ALPHA = range(
-    12
-)
-LEDGER = 6  # the first ones, which are outputs
-_PLACE, _WAY, _BOOKED, _FORCE, _SUM = range(
-    12, 27, 3
-)  # filtered: place, its last way, the booked place, force, its sum
+# places in the state: outputs first, then what the next step needs
+_ENERGY, _LOWEST, _DAMPING, _INJECTED, _LEAK, _NOISE = range(6)
+LEDGER = 6
+_SEEN, _HEAD, _BALANCE, _STORED, _TICKS, _ALPHA = range(LEDGER, 12)
+# of three numbers each: filtered place, its way in the last tick, booked place, filtered force and its sum since
+_PLACE, _WAY, _BOOKED, _FORCE, _SUM = range(12, 27, 3)
 _SIZE = 27
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
@@ -266,13 +265,13 @@ class PassivityController:
 
 
 @_jit
-def _stable_damping(mass, period, delay) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def _stable_damping(mass, period, delay):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """½ m/(T + d), N·s/m."""
     return _SHARE * mass / (period + delay)
 
 
 @_jit
-def _filter_time(noise, period, delay, max_force, mass, stiffness) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def _filter_time(noise, period, delay, max_force, mass, stiffness):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """The time constant τ, s, at which the bounds of the damping leave most of it."""
     if noise <= 0.0:
         return 0.0
@@ -286,7 +285,7 @@ def _filter_time(noise, period, delay, max_force, mass, stiffness) -> float:  # 
 
 
 @_jit
-def _damping_bound(noise, time, period, delay, max_force, mass, stiffness) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def _damping_bound(noise, time, period, delay, max_force, mass, stiffness):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """The largest α, N·s/m, on this mass and with this noise."""
     bound = _stable_damping(mass, period, delay + time)
     if noise > 0.0:
@@ -351,7 +350,7 @@ def _begin(state, position, stored):  # type: ignore[no-untyped-def]  # noqa: AN
 
 
 @_jit
-def _damp(state, force, debt, square, bound, payback, max_force, elapsed) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def _damp(state, force, debt, square, bound, payback, max_force, elapsed):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """Add what pays a debt, J, to a force (3,), N; return the energy that it will take in a tick, J."""
     wanted = 0.0
     if debt > 0.0 and square > (_SLOWEST * elapsed) ** 2:

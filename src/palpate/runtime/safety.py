@@ -10,8 +10,8 @@ whatever the model says:
 - *heat*: where the device states a continuous force, the mean of ‖F‖² over ten seconds doesn't exceed its square;
   F is the force as sent, and `Safety.bearable_force` bounds damping, too.
 
-The passivity controller adds its damping to `Safety.force` between `Safety.apply`, which limits what the body wants, and
-`Safety.slew`, which bounds the change of all that is sent and so comes last.
+The passivity controller adds its damping to `Safety.force` between `Safety.apply`, which limits what the body wants,
+and `Safety.slew`, which bounds the change of all that is sent and so comes last.
 
 A closed gate means zero at once: letting go of the motors is the safe direction. After a fault it opens again only
 where the body holds no energy (`HandEvaluator.release`), and after a stop only when a person says so (`Stop`).

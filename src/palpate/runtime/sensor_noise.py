@@ -1,7 +1,7 @@
 """Noise of a position sensor, as it shows while a hand moves: what changes from sample to sample as no hand can.
 
-A hand trembles by a tenth of a millimetre at 10 Hz and strokes by centimetres at 2 Hz; neither can be told from noise by
-its size. Their sixth differences can: of a motion at ω they leave (2 sin ωT/2)⁶, at 200 Hz 0.1 µm of that tremor and
+A hand trembles by a tenth of a millimetre at 10 Hz and strokes by centimetres at 2 Hz; neither can be told from noise
+by its size. Their sixth differences can: of a motion at ω they leave (2 sin ωT/2)⁶, at 200 Hz 0.1 µm of that tremor and
 7 µm of an arm that shakes by 20 mm at 15 Hz, at 1 kHz nothing, while white noise of standard deviation σ grows to
 √924 σ, 924 = Σ binomial(6, j)². The mean square over 50 ms is held like a peak and forgotten in a second. A single
 sample counts at most nine times the mean, so that a glitch doesn't pass for noise.

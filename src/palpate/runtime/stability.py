@@ -142,7 +142,10 @@ class FeltStiffness:
             if self.delay_known
             else "an unknown delay, taken for none,"
         )
-        limits = f"with the device's damping of {self.damping:g} N·s/m, {self.rate:.0f} Hz and {delay} the loop is passive up to {self.bound:.0f} N/m"
+        limits = (
+            f"with the device's damping of {self.damping:g} N·s/m, {self.rate:.0f} Hz and {delay} the loop is passive "
+            f"up to {self.bound:.0f} N/m"
+        )
         if self.bound == self.stated:
             limits = f"its maker states {self.stated:.0f} N/m for the device"
         if self.body <= self.bound:
@@ -174,7 +177,7 @@ class FeltStiffness:
 
 
 _NEXT_TO_NOTHING = 1.0  # N/m
-_UNKNOWN_DELAY = "The delay of the device is unknown: nobody states it, and its samples bear no time; a long one makes it hum."
+_UNKNOWN_DELAY = "The delay of the device is unknown: its samples bear no time, and a long one makes it hum."
 _UNCONTROLLED = "The passivity controller is off: nothing damps a force that gives the hand energy."
 
 

@@ -52,7 +52,7 @@ _MISSED = 1e-3  # share of the ticks that may be missed on a machine that is usa
 class _Spring:
     """The elastic answer F = −k x of a body that is held."""
 
-    amplitude, depth, inside = 0.0, 0.0, True
+    amplitude, depth, inside, energy = 0.0, 0.0, True, 0.0
 
     def __init__(self) -> None:
         self.force, self.slope = np.zeros(3), np.zeros(3)
@@ -60,6 +60,7 @@ class _Spring:
 
     def __call__(self, position: np.ndarray, parameters: np.ndarray) -> None:
         np.multiply(position, -_STIFFNESS, out=self.force)
+        self.energy = 0.5 * _STIFFNESS * float(position @ position)
 
 
 class _SpringModel:

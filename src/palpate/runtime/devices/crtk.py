@@ -51,6 +51,7 @@ _TYPES = {
 _RECEIVED = ("measured_cp", "measured_cv", "operating_state")
 _ABSOLUTE, _ECHO = "body/set_cf_orientation_absolute", "palpate_echo"
 _ECHOES = 20  # messages, of whose round trips the median counts
+_RESOLUTION = 6e-5  # m: none is published, the coarsest of all devices is taken
 _FIRST, _FASTEST, _REACH = 50, 1.0, 0.3  # poses that are checked and thrown away, m/s, m from the first one
 _AGAIN = 0.05  # s after which a force is sent again
 _DRIFT = 2e-4  # by which two clocks may part: four times what a bad crystal does
@@ -218,6 +219,7 @@ class CrtkDevice:
             _DAMPING,
             "radius and force: its options; damping: none is published, 0.5 N·s/m is assumed",
             delay=self._one_way,
+            resolution=_RESOLUTION,
             axes=axes_in_words(s.axes),
             reach=_REACH,
             name=self.name,

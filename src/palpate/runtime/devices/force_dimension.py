@@ -329,6 +329,7 @@ class ForceDimensionDevice:
             f"{_DAMPING:g} N·s/m is assumed",
             delay=_DELAY,
             axes=AXES,
+            resolution=self.profile.resolution,
             max_stiffness=self.profile.max_stiffness,
             buttons=_BUTTONS,
             name=self.name,

@@ -421,6 +421,8 @@ class HaplyDevice:
             _DAMPING,
             f"{self.profile.source}; damping: none is published, {_DAMPING:g} N·s/m is assumed",
             axes=AXES,
+            resolution=self.profile.resolution,
+            stamped=True,  # a sample is as old as the question to it
             buttons=self._count_buttons(frame),
             name=called,
         )

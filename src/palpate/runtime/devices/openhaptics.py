@@ -293,6 +293,7 @@ class OpenHapticsDevice:
             mass=_MASS,
             delay=2.0 / self._settings.rate,
             axes=AXES,
+            resolution=self.profile.resolution,
             max_stiffness=min(self.profile.max_stiffness, stiffness / _MM),
             continuous_force=continuous,
             reach=corner + _MARGIN if math.isfinite(corner) and corner > 0.05 else _UNSTATED_REACH,

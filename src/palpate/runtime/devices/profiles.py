@@ -16,6 +16,7 @@ from palpate.errors import UsageError
 
 __all__ = ["PROFILES", "DeviceProfile", "device_profile", "limits_in_words", "weakest_profile"]
 
+_COARSEST = 6e-5  # m
 _CHAI3D = "as open drivers have it (CHAI3D 3.2)"
 
 
@@ -39,6 +40,8 @@ class DeviceProfile:
         Of a sphere in its workspace, m.
     source : str
         Where the figures come from.
+    resolution : float
+        Steps of the handle's place, m, rounded from data sheets; 60 µm, the coarsest, where none is known.
     """
 
     name: str
@@ -48,6 +51,7 @@ class DeviceProfile:
     max_damping: float
     radius: float
     source: str = _CHAI3D
+    resolution: float = _COARSEST
 
 
 _UNSTATED = float("inf")
@@ -56,18 +60,18 @@ _DHD, _HD, _HAPLY = "forcedimension", "openhaptics", "haply"
 PROFILES: dict[str, DeviceProfile] = {
     profile.name: profile
     for profile in (
-        DeviceProfile("omega.3", _DHD, 12.0, 5000.0, 30.0, 0.075),
-        DeviceProfile("omega.6", _DHD, 12.0, 5000.0, 30.0, 0.075),
-        DeviceProfile("omega.7", _DHD, 12.0, 5000.0, 30.0, 0.075),
-        DeviceProfile("delta.3", _DHD, 20.0, 5000.0, 30.0, 0.15),
-        DeviceProfile("delta.6", _DHD, 20.0, 5000.0, 30.0, 0.15),
+        DeviceProfile("omega.3", _DHD, 12.0, 5000.0, 30.0, 0.075, resolution=1e-5),
+        DeviceProfile("omega.6", _DHD, 12.0, 5000.0, 30.0, 0.075, resolution=1e-5),
+        DeviceProfile("omega.7", _DHD, 12.0, 5000.0, 30.0, 0.075, resolution=1e-5),
+        DeviceProfile("delta.3", _DHD, 20.0, 5000.0, 30.0, 0.15, resolution=3e-5),
+        DeviceProfile("delta.6", _DHD, 20.0, 5000.0, 30.0, 0.15, resolution=3e-5),
         DeviceProfile("sigma.6+", _DHD, 12.0, 4000.0, 30.0, 0.09),
         DeviceProfile("sigma.7", _DHD, 12.0, 4000.0, 30.0, 0.075),
         DeviceProfile("lambda.7", _DHD, 12.0, 8000.0, 30.0, 0.1125),
         DeviceProfile("falcon", _DHD, 8.0, 3000.0, 20.0, 0.04),
         DeviceProfile("touch", _HD, 3.3, 400.0, 4.0, 0.075),
         DeviceProfile("omni", _HD, 3.3, 700.0, 5.0, 0.10),
-        DeviceProfile("desktop", _HD, 7.9, 1000.0, 5.0, 0.10),
+        DeviceProfile("desktop", _HD, 7.9, 1000.0, 5.0, 0.10, resolution=2.3e-5),
         DeviceProfile(
             "inverse3", _HAPLY, 10.0, _UNSTATED, _UNSTATED, 0.10,
             "radius: the maker's tutorials; force: the Inverse3's peak",

@@ -30,7 +30,8 @@ from evdev_double import (
 
 from palpate.errors import DeviceError, DeviceLostError, UsageError
 from palpate.runtime.devices import device_named
-from palpate.runtime.devices.gamepad import DeadZone, GamepadDevice, GamepadSettings
+from palpate.runtime.devices.gamepad import GamepadDevice, GamepadSettings
+from palpate.runtime.devices.steering import DeadZone
 from system_programs import require_package, require_program
 
 TICK = 1e-3

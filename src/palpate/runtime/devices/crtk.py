@@ -107,7 +107,7 @@ class CrtkDevice:
         _DAMPING,
         "before it is opened: the most that its options allow; damping: none is published, 0.5 N·s/m is assumed",
         axes=((0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (-1.0, 0.0, 0.0)),
-        buttons=CrtkSettings().foot_pedals().buttons,
+        buttons=CrtkSettings().console_pedals().buttons,
     )
 
     def __init__(self, settings: CrtkSettings | None = None) -> None:
@@ -116,7 +116,7 @@ class CrtkDevice:
         self.repeated = self.published = 0
         self.operating, self.round_trip = "", 0.0
         self.locked: bool | None = None
-        self._pedals, self._orientation = s.foot_pedals(), dict[str, float]()
+        self._pedals, self._orientation = s.console_pedals(), dict[str, float]()
         self._homed, self._busy, self._complaint = True, False, ""
         self._closed, self._fresh = False, False
         self._now, self._sent, self._sent_at = -math.inf, 0.0, -math.inf
@@ -156,7 +156,7 @@ class CrtkDevice:
     def traits_of(cls, options: Mapping[str, str]) -> Traits:
         """Return the traits: with the buttons that the pedals of the options are."""
         names = ("pedals", "clutch", "dead_man", "hold")
-        pedals = CrtkSettings(**{name: options[name] for name in names if name in options}).foot_pedals()  # type: ignore[arg-type]
+        pedals = CrtkSettings(**{name: options[name] for name in names if name in options}).console_pedals()  # type: ignore[arg-type]
         return replace(cls.traits, buttons=pedals.buttons)
 
     @classmethod

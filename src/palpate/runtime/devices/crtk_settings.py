@@ -118,7 +118,7 @@ class CrtkSettings:
             )
         axes_in_words(self.axes)
 
-    def foot_pedals(self) -> Pedals:
+    def console_pedals(self) -> Pedals:
         """Return the pedals, at rest."""
         return Pedals(self.pedals, self.clutch, self.dead_man, self.hold)
 

@@ -588,6 +588,23 @@ def test_closing_sends_zero_and_refuses_more(service, device):
             call()
 
 
+def test_the_last_zero_arrives_though_positions_were_left_unread(clock):
+    """A socket closed with messages unread resets the connection, and the other end may lose what was sent last."""
+    with serve(clock, rate=10_000.0) as service:
+        for k in range(1, 21):
+            channel = WebsocketChannel(f"ws://127.0.0.1:{service.port}", "ROS bridge")
+            for topic, kind in (("measured_cp", "PoseStamped"), ("measured_cv", "TwistStamped")):
+                message = {"op": "subscribe", "topic": f"/arm/{topic}", "type": f"geometry_msgs/msg/{kind}"}
+                channel.send(json.dumps(message))
+            wrench = {"topic": "/arm/body/servo_cf", "type": "geometry_msgs/msg/WrenchStamped"}
+            channel.send(json.dumps({"op": "advertise", **wrench}))
+            message = example("/MTMR/body/servo_cf", 2, "to_the_arm")
+            assert select.select(channel._poll, (), (), 5.0)[0]
+            channel.send(json.dumps({"op": "publish", "topic": wrench["topic"], "msg": message}))
+            channel.close()
+            assert service.await_wrenches(k), f"the last message of connection {k} was lost"
+
+
 def test_a_hanging_bridge_can_not_hold_up_the_driver(service, device):
     drive(device, service, 3)
     service.hang()

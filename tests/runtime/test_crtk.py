@@ -249,6 +249,19 @@ def test_gravity_and_wrist_are_left_alone_where_that_is_asked_for(service):
     device.close()
 
 
+def test_an_arm_that_was_restarted_is_asked_for_all_again(rig):
+    """Else it would sink, its wrist swing, and a force in its own axes push in another direction."""
+    service = rig.service
+    rig.run(60)
+    service.state = "DISABLED"
+    rig.run(5)
+    service.absolute, service.gravity = False, False
+    service.state = "ENABLED"
+    assert rig.run(30)[-1][1] is Fault.NONE
+    wait_until(lambda: service.locked is not None)
+    assert (service.absolute, service.gravity, service.limp) == (True, True, True)
+
+
 def test_a_wrist_that_swings_again_is_told(service, device):
     drive(device, service, 2)
     service.publish("/arm/orientation_locked", {"data": False})

@@ -8,7 +8,8 @@ where the bridge doesn't know one, the other is tried, once.
 An arm of a da Vinci Research Kit goes limp with the first wrench. So it is asked to bear its own weight before that, by
 ``use_gravity_compensation``, and a master's wrist, passive from then on, to hold its orientation, by
 ``lock_orientation``. Both are asked for again and again while it is opened, since a subscriber may hear a new publisher
-late; other arms don't listen there. The console's pedals are read, too; see `crtk_pedals`.
+late, and after each stop, since an arm that was stopped or restarted has forgotten them; other arms don't listen
+there. The console's pedals are read, too; see `crtk_pedals`.
 
 The bridge takes milliseconds, so the delay is measured and the loop softens bodies that are too stiff for it. Opening
 measures the round trip of short messages through the bridge: half of it is the way of a position, half that of a
@@ -39,6 +40,7 @@ from palpate.runtime.devices.crtk_settings import (
     LARGEST_FORCE,
     LARGEST_RADIUS,
     LONGEST_DELAY,
+    TYPES,
     CrtkSettings,
     axes_in_words,
 )
@@ -49,21 +51,6 @@ from palpate.runtime.shared_state import Block
 __all__ = ["STATES", "CrtkDevice"]
 
 STATES = {"DISABLED": "its motors are off", "PAUSED": "it is paused", "FAULT": "it has a fault"}
-_TYPES = {
-    "measured_cp": "geometry_msgs/PoseStamped",
-    "measured_cv": "geometry_msgs/TwistStamped",
-    "operating_state": "crtk_msgs/OperatingState",
-    "state_command": "crtk_msgs/StringStamped",
-    "body/set_cf_orientation_absolute": "std_msgs/Bool",
-    "palpate_echo": "std_msgs/String",
-    "servo_cf": "geometry_msgs/WrenchStamped",
-    "body/servo_cf": "geometry_msgs/WrenchStamped",
-    "use_gravity_compensation": "std_msgs/Bool",
-    "lock_orientation": "geometry_msgs/Quaternion",
-    "unlock_orientation": "std_msgs/Empty",
-    "orientation_locked": "std_msgs/Bool",
-    "pedal": "sensor_msgs/Joy",
-}
 _RECEIVED = ("measured_cp", "measured_cv", "operating_state")
 _ABSOLUTE, _ECHO = "body/set_cf_orientation_absolute", "palpate_echo"
 _GRAVITY, _LOCK, _UNLOCK, _LOCKED = (
@@ -74,6 +61,7 @@ _GRAVITY, _LOCK, _UNLOCK, _LOCKED = (
 )
 _ECHOES = 20  # messages, of whose round trips the median counts
 _FIRST, _FASTEST, _REACH = 50, 1.0, 0.3  # poses that are checked and thrown away, m/s, m from the first one
+_ASKS = 5  # times that a limp arm is asked to hold its wrist
 _AGAIN = 0.05  # s after which a force is sent again
 _DRIFT = 2e-4  # by which two clocks may part: four times what a bad crystal does
 _DAMPING = 0.5  # N·s/m, assumed
@@ -116,7 +104,8 @@ class CrtkDevice:
         self.repeated = self.published = 0
         self.operating, self.round_trip = "", 0.0
         self.locked: bool | None = None
-        self._pedals, self._orientation = s.console_pedals(), dict[str, float]()
+        self._asks, self._orientation = 0, dict[str, float]()
+        self._pedals = s.console_pedals()
         self._homed, self._busy, self._complaint = True, False, ""
         self._closed, self._fresh = False, False
         self._now, self._sent, self._sent_at = -math.inf, 0.0, -math.inf
@@ -193,7 +182,12 @@ class CrtkDevice:
             raise DeviceError("A force that is not a finite number was kept from the CRTK arm.")
         stops = norm == 0.0 and self._sent > 0.0
         if self._fresh or stops or self._now - self._sent_at >= _AGAIN:
+            if self._asks:
+                self._asks -= 1
+                self._ask_for_axes_and_weight()
             self._publish_force(x, y, z)
+            if self._asks:
+                self._ask_for_wrist(self._orientation)
             self._fresh, self._sent, self._sent_at = False, norm, self._now
 
     @property
@@ -287,6 +281,7 @@ class CrtkDevice:
     def _check_state(self) -> None:
         self.sample.holding = self._settings.state == 0.0 or (self.operating == "ENABLED" and self._homed)
         if not self.sample.holding:
+            self._asks, self.locked = _ASKS, None
             raise DeviceStopError(f"{self.name} {self._state_in_words()}.", fix="Free it in its own program.")
 
     def _state_in_words(self) -> str:
@@ -311,7 +306,7 @@ class CrtkDevice:
             self._take(self._channel.receive(left))
 
     def _type(self, topic: str, types: str) -> str:
-        name = _TYPES[topic]
+        name = TYPES[topic]
         return name if types == "ros1" else name.replace("/", "/msg/")
 
     def _subscribe(self) -> str:
@@ -402,8 +397,7 @@ class CrtkDevice:
         s, trips = self._settings, []
         for k in range(_ECHOES):
             # repeated: a subscriber may hear a new publisher late
-            for topic in (_ABSOLUTE, _GRAVITY) if s.gravity else (_ABSOLUTE,):
-                self._send(op="publish", topic=self._prefix + topic, msg={"data": True})
+            self._ask_for_axes_and_weight()
             if s.delay >= 0.0:
                 continue
             sent = time.monotonic()
@@ -441,8 +435,9 @@ class CrtkDevice:
                 self._fresh, seen = False, seen + 1
                 if first is None:
                     first, held = self._place.copy(), self._orientation
-                if seen % (_FIRST // 5) == 1:
-                    self._let_go(held)
+                if seen % (_FIRST // _ASKS) == 1:
+                    self._publish_force(0.0, 0.0, 0.0)
+                    self._ask_for_wrist(held)
             if seen >= _FIRST:
                 break
         self._check_start(first, seen)
@@ -451,9 +446,12 @@ class CrtkDevice:
             self._origin[:] = self._place
         self._now = -math.inf  # from here on the loop's clock counts
 
-    def _let_go(self, orientation: Mapping[str, float]) -> None:
-        """Publish zero force, and ask for this orientation of the wrist; a place without one has no wrist to hold."""
-        self._publish_force(0.0, 0.0, 0.0)
+    def _ask_for_axes_and_weight(self) -> None:
+        for topic in (_ABSOLUTE, _GRAVITY) if self._settings.gravity else (_ABSOLUTE,):
+            self._send(op="publish", topic=self._prefix + topic, msg={"data": True})
+
+    def _ask_for_wrist(self, orientation: Mapping[str, float]) -> None:
+        """Ask for this orientation of the wrist; a place without one has no wrist to hold."""
         size = math.hypot(*(float(orientation.get(axis) or 0.0) for axis in "xyzw"))
         if self._settings.lock and not self.locked and abs(size - 1.0) < _ROUNDING:
             self._send(op="publish", topic=self._prefix + _LOCK, msg=dict(orientation))

@@ -1,4 +1,4 @@
-"""Settings of the connection to an arm that speaks CRTK."""
+"""Settings of the connection to an arm that speaks CRTK, and the types of its topics as ROS 1 spells them."""
 
 from __future__ import annotations
 
@@ -10,10 +10,33 @@ from palpate.errors import UsageError
 from palpate.runtime.devices.crtk_pedals import PEDALS, Pedals
 from palpate.runtime.workspace import Axes
 
-__all__ = ["LARGEST_FORCE", "LARGEST_RADIUS", "LONGEST_DELAY", "WRENCHES", "CrtkSettings", "axes_in_words"]
+__all__ = [
+    "LARGEST_FORCE",
+    "LARGEST_RADIUS",
+    "LONGEST_DELAY",
+    "TYPES",
+    "WRENCHES",
+    "CrtkSettings",
+    "axes_in_words",
+]
 
 WRENCHES = ("body/servo_cf", "servo_cf")
 LARGEST_RADIUS, LARGEST_FORCE, LONGEST_DELAY = 0.15, 12.0, 0.02  # m, N, s
+TYPES = {
+    "measured_cp": "geometry_msgs/PoseStamped",
+    "measured_cv": "geometry_msgs/TwistStamped",
+    "operating_state": "crtk_msgs/OperatingState",
+    "state_command": "crtk_msgs/StringStamped",
+    "body/set_cf_orientation_absolute": "std_msgs/Bool",
+    "palpate_echo": "std_msgs/String",
+    "servo_cf": "geometry_msgs/WrenchStamped",
+    "body/servo_cf": "geometry_msgs/WrenchStamped",
+    "use_gravity_compensation": "std_msgs/Bool",
+    "lock_orientation": "geometry_msgs/Quaternion",
+    "unlock_orientation": "std_msgs/Empty",
+    "orientation_locked": "std_msgs/Bool",
+    "pedal": "sensor_msgs/Joy",
+}
 
 
 @dataclass(frozen=True)

@@ -340,6 +340,7 @@ class CrtkSimulator(ServiceDouble):
         self._hand.advance(now)
         if self.state != "ENABLED" or not self.homed:
             self._hand.force[:] = 0.0
+            self.limp, self.locked = False, None  # in silence, as the real one does
         if faults.complaint:
             words, faults.complaint = faults.complaint, ""
             await self._send("", json.dumps({"op": "status", "level": "error", "msg": words}))

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
+import select
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,11 +14,14 @@ import pytest
 from palpate.errors import DeviceError, DeviceLostError, PortInUseError, UsageError
 from palpate.runtime import Fault, Workspace
 from palpate.runtime.devices import crtk, device_named, device_traits
-from palpate.runtime.devices.crtk import CrtkDevice, CrtkSettings, axes_in_words
+from palpate.runtime.devices.crtk import CrtkDevice
+from palpate.runtime.devices.crtk_settings import CrtkSettings, axes_in_words
 from palpate.runtime.devices.crtk_simulator import CrtkSimulator, CrtkSimulatorSettings
+from palpate.runtime.devices.websocket_channel import WebsocketChannel
 from palpate.runtime.loop import Loop
 from palpate.runtime.safety import HARDWARE_PATIENCE, Limits
 
+FRAMES = json.loads((Path(__file__).parents[1] / "data/devices/crtk.json").read_text(encoding="utf-8"))
 pytestmark = pytest.mark.timeout(240)
 TICK = 1e-3
 
@@ -123,21 +130,234 @@ def test_both_spellings_of_types_are_found(clock, ros):
             connect(service, types=f"ros{3 - ros}", search=0.5)
 
 
+def example(topic, ros, side="from_the_arm", value=None):
+    """An example message of a topic, of a pedal that of one value."""
+    frames = [f for f in FRAMES[side] if f["topic"] == topic and f["ros"] == ros]
+    return next(f["msg"] for f in frames if value is None or f["msg"]["buttons"] == [value])
+
+
+def shape(value):
+    """The structure of a message: its fields, and of each whether it is a number, a text or a switch."""
+    if isinstance(value, dict):
+        return {name: shape(entry) for name, entry in value.items()}
+    return (
+        "number" if isinstance(value, int | float) and not isinstance(value, bool) else type(value).__name__
+    )
+
+
+@pytest.mark.parametrize("ros", [1, 2])
+def test_example_messages_are_read(clock, ros):
+    with serve(clock, ros=ros, arm="MTMR") as service:
+        device = connect(service, arm="MTMR", origin="base")
+        service.publish("/MTMR/operating_state", example("/MTMR/operating_state", ros))
+        message = example("/MTMR/measured_cp", ros)
+        now = service.clock.loop
+        for delay in (0.0, 0.002):  # the second, 1 s younger by its stamp, came 2 ms later than the first
+            service.publish("/MTMR/measured_cp", message)
+            sample = read_when_it_comes(device, now + 500.0 * delay + delay)
+            np.testing.assert_array_equal(sample.position, [-0.112, 0.034, -0.205])
+            assert now + 500.0 * delay + delay - sample.time == pytest.approx(delay, abs=3e-4)
+            seconds = "secs" if ros == 1 else "sec"
+            message["header"]["stamp"][seconds] += 1
+        message["header"]["stamp"][seconds] -= 2
+        device.write(np.array([0.0, 0.0, 1.0]))
+        assert service.await_wrenches(device.published)
+        assert service.stamp[seconds] == message["header"]["stamp"][seconds] + 1
+        pedals = (
+            ("clutch", 1, (True, 0)),
+            ("clutch", 0, (False, 0)),
+            ("camera", 2, (False, 0b100)),
+            ("coag", 1, (False, 1)),
+        )
+        for pedal, value, meaning in pedals:
+            service.publish(f"/footpedals/{pedal}", example(f"/footpedals/{pedal}", ros, value=value))
+            sample = read_when_it_comes(device, now + 1.0)
+            assert (sample.clutched, sample.buttons) == meaning, pedal
+        device.close()
+
+
+def read_when_it_comes(device, now):
+    """The sample after the next message."""
+    assert select.select(device._channel._poll, (), (), 5.0)[0]
+    return device.read(now)
+
+
+@pytest.mark.parametrize("ros", [1, 2])
+def test_what_is_sent_has_the_fields_and_types_of_the_example_messages(clock, ros):
+    with serve(clock, ros=ros, arm="MTMR") as service:
+        service.state = "DISABLED"
+        device = connect(service, arm="MTMR", enable=1.0)
+        types = dict(service.topics)
+        drive(device, service, 2, (0.0, 0.0, 1.0))
+        device.close()
+        assert service.await_wrenches(device.published)
+        wait_until(lambda: "/MTMR/unlock_orientation" in service.received)
+        for frame in (f for f in FRAMES["to_the_arm"] if f["ros"] == ros):
+            sent, known = shape(service.received[frame["topic"]]), shape(frame["msg"])
+            header, full = sent.pop("header", {}), known.pop("header", {})
+            assert sent == known, frame["topic"]
+            assert header.items() <= full.items(), "the bridge fills in what is left out of a header"
+            assert types[frame["topic"]] == frame["type"]
+
+
+def wait_until(done):
+    deadline = time.monotonic() + 10.0
+    while not done():
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+@pytest.mark.parametrize("ros", [1, 2])
+def test_the_double_writes_what_the_example_messages_have(clock, ros):
+    """Its messages, and none of the driver's, are compared: the double learns nothing from what it feeds."""
+    with serve(clock, ros=ros, arm="MTMR") as service:
+        told = {}
+        channel = WebsocketChannel(f"ws://127.0.0.1:{service.port}", "ROS bridge")
+        frames = [f for f in FRAMES["from_the_arm"] if f["ros"] == ros]
+        for frame in frames:
+            channel.send(json.dumps({"op": "subscribe", "topic": frame["topic"], "type": frame["type"]}))
+        for pedal in {f["topic"] for f in frames if f["type"].endswith("Joy")}:
+            service.press(pedal, 1)
+        deadline = time.monotonic() + 10.0
+        while len(told) < len({f["topic"] for f in frames}) and time.monotonic() < deadline:
+            for text in channel.receive(0.1):
+                message = json.loads(text)
+                assert message["op"] == "publish", message
+                told[message["topic"]] = shape(message["msg"])
+        channel.close()
+        assert told == {f["topic"]: shape(f["msg"]) for f in frames}
+
+
+def test_a_limp_arm_bears_its_weight_and_holds_its_wrist(service, device):
+    """As the maker's own example begins: gravity compensation, the base's axes, no force, and the wrist as it is."""
+    assert (service.gravity, service.absolute, service.limp) == (True, True, True)
+    wait_until(lambda: device.locked or drive(device, service, 1) is None)
+    assert service.locked == pytest.approx({"x": 0.0, "y": 0.0, "z": math.sqrt(0.5), "w": math.sqrt(0.5)})
+    assert device.note == ""
+    drive(device, service, 3, (1.0, 2.0, 3.0))
+    np.testing.assert_array_equal(service.force(), [1.0, 2.0, 3.0])
+    device.close()
+    wait_until(lambda: service.locked is None)
+    assert service.gravity, "an arm that is let go must not fall"
+
+
+def test_gravity_and_wrist_are_left_alone_where_that_is_asked_for(service):
+    device = connect(service, gravity=0.0, lock=0.0)
+    drive(device, service, 3)
+    assert (service.gravity, service.locked) == (False, None)
+    np.testing.assert_array_equal(service.force(), [0.0, 0.0, -service.settings.weight])
+    device.close()
+
+
+def test_an_arm_that_was_restarted_is_asked_for_all_again(rig):
+    """Else it would sink, its wrist swing, and a force in its own axes push in another direction."""
+    service = rig.service
+    rig.run(60)
+    service.state = "DISABLED"
+    rig.run(5)
+    service.absolute, service.gravity = False, False
+    service.state = "ENABLED"
+    assert rig.run(30)[-1][1] is Fault.NONE
+    wait_until(lambda: service.locked is not None)
+    assert (service.absolute, service.gravity, service.limp) == (True, True, True)
+
+
+def test_a_wrist_that_swings_again_is_told(service, device):
+    drive(device, service, 2)
+    service.publish("/arm/orientation_locked", {"data": False})
+    wait_until(lambda: device.locked is False or drive(device, service, 1) is None)
+    assert device.note == "its wrist does not hold its orientation"
+
+
+def test_an_arm_that_could_not_be_opened_was_not_made_limp(service):
+    service.state = "DISABLED"
+    with pytest.raises(DeviceError, match="motors are off"):
+        connect(service)
+    assert (service.limp, service.wrenches) == (False, 0)
+    service.state, service.faults.runaway = "ENABLED", 0.01
+    with pytest.raises(DeviceError, match="Hold it still"):
+        connect(service)
+    wait_until(lambda: "/arm/unlock_orientation" in service.received)
+    assert service.locked is None, "the wrist is free again"
+
+
+def pedal_sample(device, service, pedal, value):
+    service.press(pedal, value)
+    drive(device, service, 1)
+    return device.sample
+
+
+def test_pedals_clutch_stop_and_are_dead_man(service):
+    service.press("footpedals/clutch", 1)  # before it is opened
+    device = connect(service)
+    assert device.traits.buttons == 5
+    sample = pedal_sample(device, service, "footpedals/cam_plus", 0)
+    assert (sample.clutched, sample.holding, sample.buttons) == (True, True, 0)
+    assert not pedal_sample(device, service, "footpedals/clutch", 0).clutched
+    assert pedal_sample(device, service, "footpedals/coag", 1).buttons == 1, "the dead-man pedal is the first"
+    others = ("bicoag", "camera", "cam_minus", "cam_plus")
+    for k, pedal in enumerate(others, start=1):
+        assert pedal_sample(device, service, f"footpedals/{pedal}", 1).buttons == 1 | 1 << k
+        assert pedal_sample(device, service, f"footpedals/{pedal}", 0).buttons == 1
+    assert pedal_sample(device, service, "footpedals/coag", 2).buttons == 0, "a tap holds nothing"
+    service.press("footpedals/camera", 2)
+    wait_until(lambda: drive(device, service, 1) and device.sample.buttons == 0b100)
+    drive(device, service, 1)
+    assert device.sample.buttons == 0, "a tap is one sample long: it stops, and a person resumes"
+    device.close()
+
+
+def test_pedals_stop_the_force_of_a_loop_and_release_it(rig):
+    assert rig.run(60)[-1][0] > 0.0
+    rig.service.press("footpedals/camera", 2)
+    seen = rig.run(30)
+    assert seen[-1] == (0.0, Fault.NONE)
+    assert rig.loop.stop.stopped
+    np.testing.assert_array_equal(rig.service.force(), np.zeros(3))
+
+
+def test_other_pedals_and_consoles(service):
+    device = connect(
+        service, hold="console1/operator_present", dead_man="", clutch="camera", pedals="a/footpedals"
+    )
+    assert (device.traits.buttons, device_traits("crtk").buttons) == (0, 5)
+    assert device_traits("crtk:dead_man=").buttons == 0
+    assert device_traits("crtk:hold=coag,dead_man=bicoag").buttons == 4
+    drive(device, service, 1)
+    assert not device.sample.holding, "an operator who was not seen is not there"
+    assert pedal_sample(device, service, "console1/operator_present", 1).holding
+    assert pedal_sample(device, service, "a/footpedals/camera", 1).clutched
+    assert pedal_sample(device, service, "a/footpedals/clutch", 1).buttons == 0b10, "any other button stops"
+    device.close()
+    device = connect(service, pedals="")
+    assert pedal_sample(device, service, "footpedals/clutch", 1).clutched is False
+    device.close()
+
+
+def test_a_pedal_without_a_button_is_a_fault(service, device):
+    drive(device, service, 1)
+    for message in ({"axes": [], "buttons": []}, {"buttons": [7]}, {}):
+        service.publish("/footpedals/coag", message)
+        with pytest.raises(DeviceError, match="sends no button"):
+            read_when_it_comes(device, service.clock.loop)
+
+
 def test_one_wrench_for_each_fresh_position(service, device):
+    began = device.published
     drive(device, service, 20, (0.0, 1.0, 0.0))
-    assert device.published == service.wrenches == 20
+    assert device.published == service.wrenches == began + 20
     now = service.clock.loop
     for k in range(5):  # no position, no wrench
         device.read(now + 1e-4 * k)
         device.write(np.array([0.0, 1.0, 0.0]))
-    assert device.published == 20
+    assert device.published == began + 20
     device.write(np.zeros(3))  # but a zero force at once
-    assert device.published == 21
-    assert service.await_wrenches(21)
+    assert device.published == began + 21
+    assert service.await_wrenches(began + 21)
     np.testing.assert_array_equal(service.force(), np.zeros(3))
     device.read(now + 0.1)
     device.write(np.zeros(3))
-    assert device.published == 22, "and again from time to time: ROS may lose one"
+    assert device.published == began + 22, "and again from time to time: ROS may lose one"
 
 
 def test_a_wrench_bears_the_stamp_of_its_position(service, device):
@@ -223,7 +443,7 @@ def test_the_delay_softens_a_body(clock, plain, shared):
 
 
 def test_the_round_trip_is_measured(clock, monkeypatch):
-    monkeypatch.setattr(crtk, "_LONGEST_DELAY", 1.0)  # the machine may have much else to do
+    monkeypatch.setattr(crtk, "LONGEST_DELAY", 1.0)  # the machine may have much else to do
     with serve(clock, rate=200.0) as service:
         device = connect(service, delay=-1.0)
         assert 0.0 < device.round_trip < 1.0
@@ -234,7 +454,7 @@ def test_the_round_trip_is_measured(clock, monkeypatch):
             connect(service, delay=-1.0, search=0.5)
         assert "crtk:delay=SECONDS" in caught.value.fix
         service.faults.deaf = False
-        monkeypatch.setattr(crtk, "_LONGEST_DELAY", 1e-6)
+        monkeypatch.setattr(crtk, "LONGEST_DELAY", 1e-6)
         with pytest.raises(DeviceError, match="and back takes"):
             connect(service, delay=-1.0)
 
@@ -381,6 +601,23 @@ def test_closing_sends_zero_and_refuses_more(service, device):
             call()
 
 
+def test_the_last_zero_arrives_though_positions_were_left_unread(clock):
+    """A socket closed with messages unread resets the connection, and the other end may lose what was sent last."""
+    with serve(clock, rate=10_000.0) as service:
+        for k in range(1, 21):
+            channel = WebsocketChannel(f"ws://127.0.0.1:{service.port}", "ROS bridge")
+            for topic, kind in (("measured_cp", "PoseStamped"), ("measured_cv", "TwistStamped")):
+                message = {"op": "subscribe", "topic": f"/arm/{topic}", "type": f"geometry_msgs/msg/{kind}"}
+                channel.send(json.dumps(message))
+            wrench = {"topic": "/arm/body/servo_cf", "type": "geometry_msgs/msg/WrenchStamped"}
+            channel.send(json.dumps({"op": "advertise", **wrench}))
+            message = example("/MTMR/body/servo_cf", 2, "to_the_arm")
+            assert select.select(channel._poll, (), (), 5.0)[0]
+            channel.send(json.dumps({"op": "publish", "topic": wrench["topic"], "msg": message}))
+            channel.close()
+            assert service.await_wrenches(k), f"the last message of connection {k} was lost"
+
+
 def test_a_hanging_bridge_can_not_hold_up_the_driver(service, device):
     drive(device, service, 3)
     service.hang()
@@ -413,7 +650,20 @@ def test_addresses_and_namespaces_that_are_wrong(service):
 
 @pytest.mark.parametrize(
     "options",
-    ["types=ros3", "force=99", "radius=1", "delay=1", "wrench=servo_cp", "axes=xyz", "home=2", "origin=x"],
+    [
+        "types=ros3",
+        "force=99",
+        "radius=1",
+        "delay=1",
+        "wrench=servo_cp",
+        "axes=xyz",
+        "home=2",
+        "origin=x",
+        "gravity=2",
+        "lock=-1",
+        "clutch=coag",
+        "hold=knee",
+    ],
 )
 def test_options_out_of_range(shared, options):
     with pytest.raises(UsageError):

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from evdev_double import Pad
 from library_double import LibraryDouble
+from spnav_double import Daemon
 
 from palpate.errors import UsageError
 from palpate.runtime.device_doubles import DOUBLES
@@ -57,6 +58,9 @@ def served(name, request):
     elif name == "gamepad":
         request.getfixturevalue("monkeypatch").setitem(sys.modules, "evdev", evdev_double.module(Pad()))
         yield name, no_more
+    elif name == "spacemouse":
+        with Daemon() as daemon:
+            yield f"spacemouse:socket={daemon.path}", no_more
     elif name == "trace":
         yield f"trace:file={request.getfixturevalue('recorded_stroke')},repeat=1", no_more
     elif name in DOUBLES:

@@ -27,6 +27,17 @@ def entry(device):
     return next(e for e in HARDWARE if e.device == device)
 
 
+PUCK = """\
+I: Bus=0003 Vendor=046d Product=c626
+N: Name="3Dconnexion SpaceNavigator"
+H: Handlers=event4 js1
+
+I: Bus=0003 Vendor=256f Product=c650
+N: Name="3Dconnexion CadMouse"
+H: Handlers=mouse1 event5
+"""
+
+
 @pytest.fixture
 def empty(tmp_path):
     return Surroundings(tmp_path, {}, "linux", lambda host, port: False)
@@ -125,6 +136,37 @@ def test_a_gamepad_needs_its_package(empty, installed):
     found = entry("gamepad").look(there)
     assert found.state == ("ready" if installed else "present")
     assert ("palpate[gamepad]" in found.remedy) is not installed
+
+
+@pytest.mark.parametrize(
+    ("environment", "configuration", "place"),
+    [
+        ({}, "", "/var/run/spnav.sock"),
+        ({"SPNAV_SOCKET": "/home/me/puck.sock"}, "", "/home/me/puck.sock"),
+        ({}, "socket = /run/puck\n", "/run/puck"),
+    ],
+)
+def test_a_puck_is_found_by_the_socket_of_its_driver(empty, environment, configuration, place):
+    touch(empty.root, "/etc/spnavrc").write_text(configuration, encoding="utf-8")
+    there = replace(empty, environment=environment, listens=lambda path: path == empty.root / place[1:])
+    found = entry("spacemouse").look(there)
+    assert (found.state, found.remedy, found.device) == ("ready", "", "spacemouse")
+    assert place in found.detail
+
+
+def test_a_puck_without_its_driver_says_what_to_install(empty):
+    touch(empty.root, "/proc/bus/input/devices").write_text(PUCK, encoding="utf-8")
+    found = entry("spacemouse").look(empty)
+    assert found.state == "absent"
+    assert found.detail == "no driver answers; plugged in: 3Dconnexion SpaceNavigator"
+    assert "apt install spacenavd" in found.remedy
+    assert "SPNAV_SOCKET" in found.remedy
+    assert "none" in entry("gamepad").look(empty).detail, "though the kernel gives it a joystick's handler"
+
+
+def test_a_socket_that_nothing_listens_at_is_no_driver(empty):
+    touch(empty.root, "/var/run/spnav.sock")
+    assert entry("spacemouse").look(empty).state == "absent"
 
 
 def test_what_is_driven_is_ready_by_its_name(empty, monkeypatch):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import struct
 import subprocess
 import sys
+from pathlib import Path
 
 import evdev_double
 import numpy as np
@@ -22,6 +24,7 @@ from evdev_double import (
     SOUTH,
     STICK,
     TRIGGER,
+    AbsInfo,
     Pad,
     X,
     Y,
@@ -30,9 +33,13 @@ from evdev_double import (
 
 from palpate.errors import DeviceError, DeviceLostError, UsageError
 from palpate.runtime.devices import device_named
-from palpate.runtime.devices.gamepad import DeadZone, GamepadDevice, GamepadSettings
+from palpate.runtime.devices.gamepad import GamepadDevice, GamepadSettings
+from palpate.runtime.devices.steering import DeadZone
 from system_programs import require_package, require_program
 
+PADS = json.loads((Path(__file__).parents[1] / "data/devices/gamepads.json").read_text(encoding="utf-8"))[
+    "pads"
+]
 TICK = 1e-3
 REST = {
     "rtol": 0.0,
@@ -89,6 +96,33 @@ def test_sticks_are_right_up_and_towards_the_user(pad):
         np.testing.assert_allclose(hand(device), place, **REST)
         pad.move(code, 128)
         np.testing.assert_allclose(hand(device), 0.0, **REST)
+
+
+@pytest.mark.parametrize("known", PADS, ids=lambda known: known["name"])
+def test_pads_as_the_kernel_describes_them(monkeypatch, known):
+    """Ranges and codes of each driver of the kernel, and its events, bring the hand where the stick points."""
+    axes = {int(code): AbsInfo(*numbers) for code, numbers in known["axes"].items()}
+    pad = Pad(axes, keys=known["keys"])
+    pad.name = known["name"]
+    monkeypatch.setitem(sys.modules, "evdev", evdev_double.module(pad))
+    device, now = GamepadDevice(), 0.0
+    assert device.name == known["name"]
+    assert not hand(device).any()
+    for frame in known["frames"]:
+        now += 0.3
+        pad.send(*frame["events"])
+        np.testing.assert_allclose(
+            hand(device, start=now), RADIUS * np.array(frame["place"]), atol=0.01 * RADIUS
+        )
+    pad.send((KEY, SOUTH, 1), (KEY, EAST, 1))
+    sample = device.read(now + 0.3)
+    assert (sample.buttons, sample.stop) == (1, True)
+    device.close()
+    if GAS in axes or {RX, RZ} <= axes.keys():
+        GamepadDevice(GamepadSettings(depth="triggers")).close()
+    else:
+        with pytest.raises(DeviceError, match="depth=stick"):
+            GamepadDevice(GamepadSettings(depth="triggers"))
 
 
 def test_a_hand_stays_in_the_workspace_and_keeps_its_direction(pad):

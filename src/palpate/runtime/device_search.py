@@ -1,8 +1,9 @@
 """A search for haptic devices on this machine: by the names of files and ports, without loading or opening any.
 
-Each kind of device is an entry of `HARDWARE`: the vendor's library, the port of a local service, or the kernel's list
-of gamepads. An entry says where it looks and what to do when nothing is there. Whether this version drives what is
-found is asked of the table in `palpate.runtime.devices`: an entry whose `device` is in it can be used by that name.
+Each kind of device is an entry of `HARDWARE`: the vendor's library, the port or socket of a local service, or the
+kernel's list of gamepads. An entry says where it looks and what to do when nothing is there. Whether this version
+drives what is found is asked of the table in `palpate.runtime.devices`: an entry whose `device` is in it can be used
+by that name.
 """
 
 from __future__ import annotations
@@ -21,12 +22,14 @@ from palpate.errors import DeviceError
 from palpate.runtime.device_doubles import DOUBLES
 from palpate.runtime.devices import device_names, device_traits
 from palpate.runtime.devices.profiles import limits_in_words
+from palpate.runtime.devices.spacemouse import CONFIGURATION, INSTALL, SOCKET, VARIABLE, sockets
 
 __all__ = [
     "HARDWARE",
     "Finding",
     "GamepadSearch",
     "LibrarySearch",
+    "PuckSearch",
     "ServiceSearch",
     "Surroundings",
     "load_library",
@@ -41,6 +44,15 @@ def _port_answers(host: str, port: int) -> bool:
         with socket.create_connection((host, port), _ANSWER):
             return True
     except OSError:
+        return False
+
+
+def _socket_answers(path: Path) -> bool:
+    try:
+        with socket.socket(socket.AF_UNIX) as connection:
+            connection.connect(str(path))
+            return True
+    except (AttributeError, OSError):  # a system without such sockets, or nothing that listens
         return False
 
 
@@ -64,6 +76,8 @@ class Surroundings:
         Returns whether something listens on a host's port.
     installed : callable
         Returns whether a package of Python is there, by its name.
+    listens : callable
+        Returns whether something listens at a Unix socket.
     """
 
     root: Path = Path("/")
@@ -71,12 +85,20 @@ class Surroundings:
     platform: str = sys.platform
     answers: Callable[[str, int], bool] = _port_answers
     installed: Callable[[str], bool] = _is_installed
+    listens: Callable[[Path], bool] = _socket_answers
 
     def place(self, path: str) -> Path:
         """Return where an absolute path lies below the root."""
         if self.root == Path("/"):
             return Path(path)
         return self.root / path.lstrip("/")
+
+    def text(self, path: str) -> str:
+        """Return the text of a file at an absolute path; empty where it can't be read."""
+        try:
+            return self.place(path).read_text(encoding="utf-8", errors="replace")
+        except OSError:
+            return ""
 
 
 @dataclass(frozen=True)
@@ -322,16 +344,52 @@ class GamepadSearch:
 
     def _pads(self, surroundings: Surroundings) -> Iterator[tuple[str, str]]:
         """Yield name and event file of each gamepad."""
-        try:
-            text = surroundings.place(self.listing).read_text(encoding="utf-8", errors="replace")
-        except OSError:
-            return
-        for block in text.split("\n\n"):
-            lines = {line[:1]: line[3:] for line in block.splitlines() if line[:1] in "NH"}
-            handlers = lines.get("H", "").partition("=")[2].split()
-            if any(handler.startswith("js") for handler in handlers):
+        for name, handlers in _inputs(surroundings, self.listing):
+            if any(handler.startswith("js") for handler in handlers) and not _is_puck(name):
                 event = next((h for h in handlers if h.startswith("event")), "")
-                yield lines.get("N", "").partition("=")[2].strip('"'), f"/dev/input/{event}"
+                yield name, f"/dev/input/{event}"
+
+
+@dataclass(frozen=True)
+class PuckSearch:
+    """3Dconnexion pucks by the socket of their driver, spacenavd; of one without it the kernel's list tells."""
+
+    name: str = "3Dconnexion SpaceMouse, SpaceNavigator (spacenavd)"
+    device: str = "spacemouse"
+    listing: str = "/proc/bus/input/devices"
+
+    def look(self, surroundings: Surroundings) -> Finding:
+        """Return the finding on this machine; a connection is made and closed at once, and nothing is sent."""
+        paths = sockets(surroundings.environment, surroundings.text(CONFIGURATION))
+        heard = [path for path in paths if surroundings.listens(surroundings.place(path))]
+        pucks = sorted({name for name, _ in _inputs(surroundings, self.listing) if _is_puck(name)})
+        state, driven = _state(bool(heard), self.device)
+        details = [f"the driver answers at {heard[0]}" if heard else "no driver answers"]
+        details += [f"plugged in: {', '.join(pucks)}"] if pucks else []
+        looked_in = (f"${VARIABLE}", f"socket = in {CONFIGURATION}", SOCKET)
+        return Finding(
+            self.name,
+            "service",
+            state,
+            "; ".join(details),
+            ("the socket of spacenavd",),
+            looked_in,
+            _advice(state, driven, INSTALL),
+            driven,
+        )
+
+
+def _inputs(surroundings: Surroundings, listing: str) -> Iterator[tuple[str, list[str]]]:
+    """Yield name and handlers of each entry of the Linux kernel's list of input devices."""
+    for block in surroundings.text(listing).split("\n\n"):
+        lines = {line[:1]: line[3:] for line in block.splitlines() if line[:1] in "NH"}
+        yield lines.get("N", "").partition("=")[2].strip('"'), lines.get("H", "").partition("=")[2].split()
+
+
+def _is_puck(name: str) -> bool:
+    """Return whether an input device is a puck: its maker has mice and keyboards, too."""
+    words = name.lower()
+    return "3dconnexion" in words and not any(other in words for other in ("cadmouse", "keyboard", "numpad"))
 
 
 HARDWARE: tuple[_Search, ...] = (
@@ -376,6 +434,7 @@ HARDWARE: tuple[_Search, ...] = (
         "an arm: palpate devices simulate crtk.",
     ),
     GamepadSearch(),
+    PuckSearch(),
 )
 
 

@@ -15,6 +15,7 @@ from palpate.runtime.devices.openhaptics import OpenHapticsDevice
 from palpate.runtime.devices.page import PageDevice
 from palpate.runtime.devices.recorded import RecordedHand
 from palpate.runtime.devices.simulated import SimulatedHand
+from palpate.runtime.devices.spacemouse import SpaceMouseDevice
 from palpate.runtime.devices.stroke import StrokeDevice
 from palpate.runtime.shared_state import Block
 
@@ -36,6 +37,7 @@ _KINDS: dict[str, _Kind] = {
     "forcedimension": ForceDimensionDevice,
     "openhaptics": OpenHapticsDevice,
     "gamepad": GamepadDevice,
+    "spacemouse": SpaceMouseDevice,
     "crtk": CrtkDevice,
 }
 

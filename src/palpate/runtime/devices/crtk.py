@@ -5,6 +5,12 @@ Below the arm's namespace the driver subscribes to ``measured_cp``, ``operating_
 axes of the arm's base, and says so by ``body/set_cf_orientation_absolute``. ROS 1 and ROS 2 spell types in two ways;
 where the bridge doesn't know one, the other is tried, once.
 
+An arm of a da Vinci Research Kit goes limp with the first wrench. So it is asked to bear its own weight before that, by
+``use_gravity_compensation``, and a master's wrist, passive from then on, to hold its orientation, by
+``lock_orientation``. Both are asked for again and again while it is opened, since a subscriber may hear a new publisher
+late, and after each stop, since an arm that was stopped or restarted has forgotten them; other arms don't listen
+there. The console's pedals are read, too; see `crtk_pedals`.
+
 The bridge takes milliseconds, so the delay is measured and the loop softens bodies that are too stiff for it. Opening
 measures the round trip of short messages through the bridge: half of it is the way of a position, half that of a
 force. In the loop the time of a sample comes from the stamp of its header: the smallest difference ever seen between
@@ -14,7 +20,8 @@ than the last is a duplicate or late, and no fresh sample.
 One wrench is sent for each fresh position, the zero force at once, and either again after 50 ms. Only the thread that
 calls `read` and `write` is used.
 
-References: *Collaborative Robotics Toolkit (CRTK) API*; *rosbridge v2.0 protocol specification*.
+References: *Collaborative Robotics Toolkit (CRTK) API*; *rosbridge v2.0 protocol specification*; *dVRK documentation*,
+API of arms and of the system; dvrk_python, mtm.py and dvrk_mtm_test.py.
 """
 
 from __future__ import annotations
@@ -23,139 +30,43 @@ import json
 import math
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
 
-from palpate.errors import DeviceError, DeviceStopError, UsageError
+from palpate.errors import DeviceError, DeviceStopError
+from palpate.runtime.devices.crtk_settings import (
+    LARGEST_FORCE,
+    LARGEST_RADIUS,
+    LONGEST_DELAY,
+    TYPES,
+    CrtkSettings,
+    axes_in_words,
+)
 from palpate.runtime.devices.device import Sample, Traits, settings_from
 from palpate.runtime.devices.websocket_channel import WebsocketChannel
 from palpate.runtime.shared_state import Block
-from palpate.runtime.workspace import Axes
 
-__all__ = ["STATES", "CrtkDevice", "CrtkSettings", "axes_in_words"]
+__all__ = ["STATES", "CrtkDevice"]
 
 STATES = {"DISABLED": "its motors are off", "PAUSED": "it is paused", "FAULT": "it has a fault"}
-_WRENCHES = ("body/servo_cf", "servo_cf")
-_TYPES = {
-    "measured_cp": "geometry_msgs/PoseStamped",
-    "measured_cv": "geometry_msgs/TwistStamped",
-    "operating_state": "crtk_msgs/OperatingState",
-    "state_command": "crtk_msgs/StringStamped",
-    "body/set_cf_orientation_absolute": "std_msgs/Bool",
-    "palpate_echo": "std_msgs/String",
-    "servo_cf": "geometry_msgs/WrenchStamped",
-    "body/servo_cf": "geometry_msgs/WrenchStamped",
-}
 _RECEIVED = ("measured_cp", "measured_cv", "operating_state")
 _ABSOLUTE, _ECHO = "body/set_cf_orientation_absolute", "palpate_echo"
+_GRAVITY, _LOCK, _UNLOCK, _LOCKED = (
+    "use_gravity_compensation",
+    "lock_orientation",
+    "unlock_orientation",
+    "orientation_locked",
+)
 _ECHOES = 20  # messages, of whose round trips the median counts
 _RESOLUTION = 6e-5  # m: none is published, the coarsest of all devices is taken
 _FIRST, _FASTEST, _REACH = 50, 1.0, 0.3  # poses that are checked and thrown away, m/s, m from the first one
+_ASKS = 5  # times that a limp arm is asked to hold its wrist
 _AGAIN = 0.05  # s after which a force is sent again
 _DRIFT = 2e-4  # by which two clocks may part: four times what a bad crystal does
 _DAMPING = 0.5  # N·s/m, assumed
-_LONGEST_DELAY = 0.02  # s
-
-
-@dataclass(frozen=True)
-class CrtkSettings:
-    """Settings of the connection.
-
-    Attributes
-    ----------
-    url : str
-        Address of the ROS bridge.
-    arm : str
-        Namespace of the arm, such as MTMR; empty for none.
-    wrench : {"body/servo_cf", "servo_cf"}
-        Topic of the force.
-    types : {"auto", "ros1", "ros2"}
-        Spelling of types: ``geometry_msgs/PoseStamped`` or ``geometry_msgs/msg/PoseStamped``; "auto" tries both.
-    axes : str
-        Where right, up and towards the user lie in the axes of the arm's base, such as -y+z-x.
-    origin : {"here", "base"}
-        Centre of the workspace: where the handle is while it is opened, or the arm's own origin.
-    radius : float
-        Workspace, m.
-    force : float
-        Largest force, N.
-    delay : float
-        Round trip through the bridge, s; negative measures it.
-    state : float
-        0 does without the arm's operating state.
-    enable, home : float
-        1 lets the driver enable an arm, and home it: it moves by itself.
-    wait : float
-        Longest wait of a tick for a position, s.
-    search : float
-        Time to wait for the arm while opening, s.
-    """
-
-    url: str = "ws://localhost:9090"
-    arm: str = ""
-    wrench: str = "body/servo_cf"
-    types: str = "auto"
-    axes: str = "-y+z-x"
-    origin: str = "here"
-    radius: float = 0.05
-    force: float = 3.0
-    delay: float = -1.0
-    state: float = 1.0
-    enable: float = 0.0
-    home: float = 0.0
-    wait: float = 0.0
-    search: float = 2.0
-
-    def __post_init__(self) -> None:
-        words = (
-            self.types in {"auto", "ros1", "ros2"}
-            and self.origin in {"here", "base"}
-            and self.wrench in _WRENCHES
-        )
-        if not words:
-            raise UsageError(
-                "An option of crtk has a word that is not known.",
-                fix=f"types is auto, ros1 or ros2; origin is here or base; wrench is {' or '.join(_WRENCHES)}.",
-            )
-        switches = all(value in {0.0, 1.0} for value in (self.state, self.enable, self.home))
-        if not (
-            switches
-            and 0.0 < self.radius <= CrtkDevice.traits.radius
-            and 0.0 < self.force <= CrtkDevice.traits.max_force
-            and self.delay <= _LONGEST_DELAY
-            and 0.0 <= self.wait <= 1.0
-            and 0.0 < self.search <= 60.0
-        ):
-            raise UsageError(
-                "An option of crtk is out of range.",
-                why=f"radius is at most {CrtkDevice.traits.radius:g} m, force {CrtkDevice.traits.max_force:g} N, delay "
-                f"{_LONGEST_DELAY:g} s, wait 1 s, search 60 s; state, enable and home are 0 or 1.",
-                fix="For example crtk:ws://localhost:9090,arm=MTMR,radius=0.05,force=3.",
-            )
-        axes_in_words(self.axes)
-
-
-def axes_in_words(text: str) -> Axes:
-    """Return the rotation of three signed letters: where right, up and towards the user lie in the arm's axes.
-
-    Raises
-    ------
-    UsageError
-        If they are no rotation.
-    """
-    rows = np.zeros((3, 3))
-    good = len(text) == 6 and all(text[k] in "+-" and text[k + 1] in "xyz" for k in (0, 2, 4))
-    for k in range(3 if good else 0):
-        rows[k, "xyz".index(text[2 * k + 1])] = 1.0 if text[2 * k] == "+" else -1.0
-    if not (good and np.isclose(np.linalg.det(rows), 1.0)):
-        raise UsageError(
-            f"The axes {text!r} are no rotation.",
-            fix="Write right, up and towards you in the arm's axes, such as -y+z-x; they must be right-handed.",
-        )
-    (a, b, c), (d, e, f), (g, h, i) = rows.tolist()
-    return (a, b, c), (d, e, f), (g, h, i)
+_ROUNDING = 0.01  # of the size of an orientation
 
 
 class CrtkDevice:
@@ -175,14 +86,17 @@ class CrtkDevice:
         Wrenches sent.
     operating : str
         State that the arm reports.
+    locked : bool or None
+        Whether the arm says that it holds its orientation; None where it says nothing.
     """
 
     traits: ClassVar[Traits] = Traits(
-        0.15,
-        12.0,
+        LARGEST_RADIUS,
+        LARGEST_FORCE,
         _DAMPING,
         "before it is opened: the most that its options allow; damping: none is published, 0.5 N·s/m is assumed",
         axes=((0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (-1.0, 0.0, 0.0)),
+        buttons=CrtkSettings().console_pedals().buttons,
     )
 
     def __init__(self, settings: CrtkSettings | None = None) -> None:
@@ -190,6 +104,9 @@ class CrtkDevice:
         self.sample = Sample()
         self.repeated = self.published = 0
         self.operating, self.round_trip = "", 0.0
+        self.locked: bool | None = None
+        self._asks, self._orientation = 0, dict[str, float]()
+        self._pedals = s.console_pedals()
         self._homed, self._busy, self._complaint = True, False, ""
         self._closed, self._fresh = False, False
         self._now, self._sent, self._sent_at = -math.inf, 0.0, -math.inf
@@ -209,9 +126,9 @@ class CrtkDevice:
             self._advertise()
             self._make_ready()
             self._measure_round_trip()
-            self._check_start()
+            self._take_over()
         except BaseException:
-            self._channel.close()
+            self.close()
             raise
         self.traits = Traits(  # type: ignore[misc]  # a device's word goes before that of its kind
             s.radius,
@@ -222,8 +139,16 @@ class CrtkDevice:
             resolution=_RESOLUTION,
             axes=axes_in_words(s.axes),
             reach=_REACH,
+            buttons=self._pedals.buttons,
             name=self.name,
         )
+
+    @classmethod
+    def traits_of(cls, options: Mapping[str, str]) -> Traits:
+        """Return the traits: with the buttons that the pedals of the options are."""
+        names = ("pedals", "clutch", "dead_man", "hold")
+        pedals = CrtkSettings(**{name: options[name] for name in names if name in options}).console_pedals()  # type: ignore[arg-type]
+        return replace(cls.traits, buttons=pedals.buttons)
 
     @classmethod
     def open(cls, commands: Block, options: Mapping[str, str]) -> CrtkDevice:
@@ -246,6 +171,7 @@ class CrtkDevice:
             words, self._complaint = self._complaint, ""
             raise DeviceError("The ROS bridge complains.", why=words, fix="See its log.")
         self._check_state()
+        self._pedals.press(self.sample)
         np.subtract(self._place, self._origin, out=self.sample.position)
         return self.sample
 
@@ -258,22 +184,36 @@ class CrtkDevice:
             raise DeviceError("A force that is not a finite number was kept from the CRTK arm.")
         stops = norm == 0.0 and self._sent > 0.0
         if self._fresh or stops or self._now - self._sent_at >= _AGAIN:
+            if self._asks:
+                self._asks -= 1
+                self._ask_for_axes_and_weight()
             self._publish_force(x, y, z)
+            if self._asks:
+                self._ask_for_wrist(self._orientation)
             self._fresh, self._sent, self._sent_at = False, norm, self._now
 
     @property
     def note(self) -> str:
-        """Words on positions that were passed over; empty for none."""
-        return f"{self.repeated} positions were late or doubled" if self.repeated else ""
+        """Words on positions that were passed over, and on a wrist that is not held; empty for none."""
+        words = [f"{self.repeated} positions were late or doubled"] if self.repeated else []
+        if self._settings.lock and self.locked is False:
+            words.append("its wrist does not hold its orientation")
+        return "; ".join(words)
 
     def close(self) -> None:
-        """Publish zero force twice, since ROS may lose one, and let go."""
+        """Publish zero force twice, since ROS may lose one, free the wrist, and let go.
+
+        The arm goes on bearing its own weight. One that was not taken over gets no wrench: it would go limp by it.
+        """
         if self._closed:
             return
         self._closed = True
         try:
-            self._publish_force(0.0, 0.0, 0.0)
-            self._publish_force(0.0, 0.0, 0.0)
+            if self.published:
+                self._publish_force(0.0, 0.0, 0.0)
+                self._publish_force(0.0, 0.0, 0.0)
+                if self._settings.lock:
+                    self._send(op="publish", topic=self._prefix + _UNLOCK, msg={})
             for topic in _RECEIVED:
                 self._send(op="unsubscribe", topic=self._prefix + topic)
             self._send(op="unadvertise", topic=self._wrench)
@@ -313,6 +253,10 @@ class CrtkDevice:
             self._busy = bool(message.get("is_busy", False))
         elif topic == self._twist:
             self._velocity = _vector((message.get("twist") or {}).get("linear"))
+        elif topic in self._pedals.topics:
+            self._pedals.take(str(topic), message)
+        elif topic == self._prefix + _LOCKED:
+            self.locked = bool(message.get("data"))
         elif topic == self._echo:
             self._echoes.append(int(message.get("data") or -1))
 
@@ -331,12 +275,15 @@ class CrtkDevice:
         else:
             taken = self._now - self._one_way
         self.sample.time = max(self.sample.time, taken)
-        self._place[:] = _vector((message.get("pose") or {}).get("position"))
+        pose = message.get("pose") or {}
+        self._place[:] = _vector(pose.get("position"))
+        self._orientation = pose.get("orientation") or {}
         self._fresh = True
 
     def _check_state(self) -> None:
         self.sample.holding = self._settings.state == 0.0 or (self.operating == "ENABLED" and self._homed)
         if not self.sample.holding:
+            self._asks, self.locked = _ASKS, None
             raise DeviceStopError(f"{self.name} {self._state_in_words()}.", fix="Free it in its own program.")
 
     def _state_in_words(self) -> str:
@@ -361,7 +308,7 @@ class CrtkDevice:
             self._take(self._channel.receive(left))
 
     def _type(self, topic: str, types: str) -> str:
-        name = _TYPES[topic]
+        name = TYPES[topic]
         return name if types == "ros1" else name.replace("/", "/msg/")
 
     def _subscribe(self) -> str:
@@ -395,15 +342,27 @@ class CrtkDevice:
         )
 
     def _advertise(self) -> None:
-        for topic in (self._settings.wrench, _ABSOLUTE, "state_command", _ECHO):
+        for topic in (self._settings.wrench, _ABSOLUTE, "state_command", _ECHO, _GRAVITY, _LOCK, _UNLOCK):
             self._send(
                 op="advertise",
                 topic=self._prefix + topic,
                 type=self._type(topic, self.types),
-                latch=topic == _ABSOLUTE,
+                latch=topic in {_ABSOLUTE, _GRAVITY},
                 queue_size=1,
             )
         self._send(op="subscribe", topic=self._echo, type=self._type(_ECHO, self.types), throttle_rate=0)
+        heard = dict.fromkeys(self._pedals.topics, "pedal")
+        if self._settings.lock:
+            heard[self._prefix + _LOCKED] = _LOCKED
+        for topic, kind in heard.items():
+            # every message of a pedal counts: none may push another out of a queue
+            self._send(
+                op="subscribe",
+                id=self._asked,
+                topic=topic,
+                type=self._type(kind, self.types),
+                throttle_rate=0,
+            )
 
     def _make_ready(self) -> None:
         """Wait for an arm that is enabled and homed; ask for either where the settings say so."""
@@ -440,7 +399,7 @@ class CrtkDevice:
         s, trips = self._settings, []
         for k in range(_ECHOES):
             # repeated: a subscriber may hear a new publisher late
-            self._send(op="publish", topic=self._prefix + _ABSOLUTE, msg={"data": True})
+            self._ask_for_axes_and_weight()
             if s.delay >= 0.0:
                 continue
             sent = time.monotonic()
@@ -458,24 +417,54 @@ class CrtkDevice:
         self._send(op="unsubscribe", topic=self._echo)
         self._send(op="unadvertise", topic=self._echo)
         self.round_trip = s.delay if s.delay >= 0.0 else sorted(trips)[len(trips) // 2]
-        if self.round_trip > _LONGEST_DELAY:
+        if self.round_trip > LONGEST_DELAY:
             raise DeviceError(
                 f"The way through the ROS bridge and back takes {1e3 * self.round_trip:.0f} ms.",
-                why=f"With a delay of more than {1e3 * _LONGEST_DELAY:g} ms no force is sent to a hand.",
+                why=f"With a delay of more than {1e3 * LONGEST_DELAY:g} ms no force is sent to a hand.",
                 fix="Run the bridge on this machine or by cable, with nothing else on it.",
             )
         self._one_way = 0.5 * self.round_trip
 
-    def _check_start(self) -> None:
-        """Throw the first positions away once they look right; the last one is the centre, if that was asked for."""
+    def _take_over(self) -> None:
+        """Make the arm limp at no force, while its first positions are checked and thrown away.
+
+        The last one is the centre, if that was asked for.
+        """
         first: np.ndarray | None = None
-        seen = 0
+        held, seen = dict[str, float](), 0
         for _ in self._until(self._settings.search):
             if self._fresh:
                 self._fresh, seen = False, seen + 1
-                first = self._place.copy() if first is None else first
+                if first is None:
+                    first, held = self._place.copy(), self._orientation
+                if seen % (_FIRST // _ASKS) == 1:
+                    self._publish_force(0.0, 0.0, 0.0)
+                    self._ask_for_wrist(held)
             if seen >= _FIRST:
                 break
+        self._check_start(first, seen)
+        self._send(op="unsubscribe", topic=self._twist)
+        if self._settings.origin == "here":
+            self._origin[:] = self._place
+        self._now = -math.inf  # from here on the loop's clock counts
+
+    def _ask_for_axes_and_weight(self) -> None:
+        for topic in (_ABSOLUTE, _GRAVITY) if self._settings.gravity else (_ABSOLUTE,):
+            self._send(op="publish", topic=self._prefix + topic, msg={"data": True})
+
+    def _ask_for_wrist(self, orientation: Mapping[str, float]) -> None:
+        """Ask for this orientation of the wrist; a place without one has no wrist to hold."""
+        size = math.hypot(*(float(orientation.get(axis) or 0.0) for axis in "xyzw"))
+        if self._settings.lock and not self.locked and abs(size - 1.0) < _ROUNDING:
+            self._send(op="publish", topic=self._prefix + _LOCK, msg=dict(orientation))
+
+    def _check_start(self, first: np.ndarray | None, seen: int) -> None:
+        if self._complaint:
+            raise DeviceError(
+                "The ROS bridge complains.",
+                why=self._complaint,
+                fix="See its log. Without pedals: crtk:pedals=; without a wrist that is held: crtk:lock=0.",
+            )
         if seen < _FIRST or first is None:
             raise DeviceError(
                 f"{self.name} sent {seen} positions within {self._settings.search:g} s.",
@@ -488,10 +477,6 @@ class CrtkDevice:
                 why=f"A start is slower than {_FASTEST:g} m/s and within {_REACH:g} m.",
                 fix="Hold it still while it is opened.",
             )
-        self._send(op="unsubscribe", topic=self._twist)
-        if self._settings.origin == "here":
-            self._origin[:] = self._place
-        self._now = -math.inf  # from here on the loop's clock counts
 
 
 def _vector(value: Any) -> list[float]:

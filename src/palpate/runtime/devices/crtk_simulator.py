@@ -1,15 +1,21 @@
 """A double of an arm that speaks CRTK behind a ROS bridge, with a simulated hand, for trials and tests without ROS.
 
 It answers the bridge's operations subscribe, unsubscribe, advertise, unadvertise and publish, in the types of ROS 1 or
-ROS 2, and passes on what is published. The arm has x away from the user, y left, z up, and a tip that is turned by a
-quarter about z: a wrench that is not said to be in the base's axes pushes in another direction. It has the faults of
-such a chain too; see `CrtkFaults`.
+ROS 2, and passes on what is published. The arm has x away from the user, y left, z up, and behaves as the documentation
+of the da Vinci Research Kit says of a master. Its first wrench makes it limp. Then it sinks by its weight, unless it
+was asked to bear that, and its wrist swings about z, unless its orientation was locked after the wrench. The wrist
+begins turned by a quarter: a wrench that is not said to be in the base's axes pushes in another direction. Pedals and
+the lock are topics that a late subscriber hears, too. It has the faults of such a chain; see `CrtkFaults`.
+
+References: *dVRK documentation*, API of arms: body/servo_cf, use_gravity_compensation, lock_orientation; API of the
+system: foot pedals.
 """
 
 from __future__ import annotations
 
 import asyncio
 import json
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -26,7 +32,7 @@ if TYPE_CHECKING:
 
 __all__ = ["CrtkFaults", "CrtkSimulator", "CrtkSimulatorSettings"]
 
-_TIP = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+_WRIST, _SWING, _SWINGS = 0.5 * math.pi, 0.5, 0.7  # rad, rad, Hz
 _STATES = {"enable": "ENABLED", "disable": "DISABLED", "pause": "PAUSED", "resume": "ENABLED"}
 
 
@@ -46,11 +52,14 @@ class CrtkSimulatorSettings(HandSettings):
         Positions per second, Hz.
     ros : {1, 2}
         Version of ROS, and so the spelling of types and stamps.
+    weight : float
+        Of the limp arm, N.
     silence : float
         Time without a wrench after which the force lapses, s; CRTK doesn't promise that it ever does.
     """
 
     silence: float = 1e9
+    weight: float = 2.0
     port: int = 9090
     host: str = "127.0.0.1"
     arm: str = "arm"
@@ -132,6 +141,14 @@ class CrtkSimulator(ServiceDouble):
         Topics that are advertised to the bridge, with their types.
     absolute : bool
         Whether wrenches are in the axes of the base.
+    limp : bool
+        Whether a wrench has come, after which nothing but wrenches moves the arm.
+    gravity : bool
+        Whether the arm bears its own weight.
+    locked : dict or None
+        Orientation that the wrist holds; None where it swings.
+    received : dict of str to dict
+        Latest message of each topic that was published.
     """
 
     def __init__(
@@ -144,6 +161,10 @@ class CrtkSimulator(ServiceDouble):
         self.faults = CrtkFaults()
         self.state, self.homed, self.busy = "ENABLED", True, False
         self.port, self.wrenches, self.absolute = 0, 0, False
+        self.limp, self.gravity = False, False
+        self.locked: dict[str, float] | None = None
+        self.received: dict[str, dict[str, Any]] = {}
+        self._latched: dict[str, str] = {}
         self.stamp: dict[str, int] = {}
         self.topics: dict[str, str] = {}
         self._hand = MovedMass(self.settings)
@@ -154,10 +175,21 @@ class CrtkSimulator(ServiceDouble):
         self._streaming = asyncio.Event()
         self._streaming.set()
         self._prefix = f"/{self.settings.arm}/" if self.settings.arm else "/"
+        self._latch(self._prefix + "orientation_locked", {"data": False})
 
     def force(self) -> np.ndarray:
-        """Return the force (3,) on the hand, N, in the axes of the arm's base."""
+        """Return the force (3,) on the hand, N, in the axes of the arm's base; its weight is in it."""
         return self._hand.force.copy()
+
+    def publish(self, topic: str, message: dict[str, Any]) -> None:
+        """Send a message of a topic to all that have subscribed to it."""
+        self._do(self._send(topic, json.dumps({"op": "publish", "topic": topic, "msg": message})))
+
+    def press(self, pedal: str, value: int) -> None:
+        """Let go a pedal of the console (0), press it (1) or tap it (2); its topic needs no leading slash."""
+        topic = f"/{pedal.strip('/')}"
+        message = {"header": self._header(self.clock()), "axes": [], "buttons": [value]}
+        self._do(self._send(topic, self._latch(topic, message)))
 
     def stream(self, on: bool) -> None:
         """Send positions by themselves, or wait for `step`."""
@@ -249,6 +281,8 @@ class CrtkSimulator(ServiceDouble):
             await connection.send(json.dumps(status))
         elif operation == "subscribe":
             topics.add(topic)
+            if topic in self._latched:
+                await connection.send(self._latched[topic])
         elif operation == "unsubscribe":
             topics.discard(topic)
         elif operation == "advertise":
@@ -260,7 +294,15 @@ class CrtkSimulator(ServiceDouble):
 
     async def _take(self, topic: str, message: dict[str, Any]) -> None:
         name = topic.removeprefix(self._prefix)
-        if name == "body/set_cf_orientation_absolute":
+        self.received[topic] = message
+        if name == "use_gravity_compensation":
+            self.gravity = bool(message["data"])
+        elif name in {"lock_orientation", "unlock_orientation"}:
+            if self.limp:
+                self.locked = dict(message) if name == "lock_orientation" else None
+            locked = self._prefix + "orientation_locked"
+            await self._send(locked, self._latch(locked, {"data": self.locked is not None}))
+        elif name == "body/set_cf_orientation_absolute":
             self.absolute = bool(message["data"])
         elif name == "state_command":
             wish = message["string"]
@@ -278,7 +320,15 @@ class CrtkSimulator(ServiceDouble):
         now = self.clock()
         self._hand.advance(now)
         if self.state == "ENABLED" and self.homed:
-            self._hand.force[:] = _TIP @ force if turned else force
+            turn = self._orientation(now)
+            angle = 2.0 * math.atan2(turn["z"], turn["w"])
+            tip = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+            self.limp = True
+            self._hand.force[:] = force
+            if turned:
+                self._hand.force[:2] = tip @ force[:2]
+            if not self.gravity:
+                self._hand.force[2] -= self.settings.weight
             self._hand.commanded = now
         with self._arrived:
             self.wrenches += 1
@@ -290,10 +340,11 @@ class CrtkSimulator(ServiceDouble):
         self._hand.advance(now)
         if self.state != "ENABLED" or not self.homed:
             self._hand.force[:] = 0.0
+            self.limp, self.locked = False, None  # in silence, as the real one does
         if faults.complaint:
             words, faults.complaint = faults.complaint, ""
             await self._send("", json.dumps({"op": "status", "level": "error", "msg": words}))
-        header = {"frame_id": "base", "stamp": self._stamp(0.0 if faults.stampless else now)}
+        header = self._header(0.0 if faults.stampless else now)
         if not faults.stateless:
             state = {"state": self.state, "is_homed": self.homed, "is_busy": self.busy}
             await self._publish("operating_state", {"header": header, **state})
@@ -303,7 +354,8 @@ class CrtkSimulator(ServiceDouble):
         place = self._hand.position + np.array([0.0, 0.0, self._run_up])
         if faults.position is not None:
             place = np.array(faults.position)
-        await self._publish_pose({"header": header, "pose": {"position": _xyz(place)}})
+        pose = {"position": _xyz(place), "orientation": self._orientation(now)}
+        await self._publish_pose({"header": header, "pose": pose})
 
     async def _publish_pose(self, message: dict[str, Any]) -> None:
         faults, topic = self.faults, self._prefix + "measured_cp"
@@ -335,6 +387,23 @@ class CrtkSimulator(ServiceDouble):
                     await client.send(text)
                 except ConnectionClosed:
                     self._subscribed.pop(client, None)
+
+    def _orientation(self, now: float) -> dict[str, float]:
+        """Return the wrist's quaternion: as it was locked, or swinging about z where the arm is limp."""
+        if self.locked is not None:
+            return self.locked
+        angle = _WRIST + (_SWING * math.sin(2.0 * math.pi * _SWINGS * now) if self.limp else 0.0)
+        return {"x": 0.0, "y": 0.0, "z": math.sin(0.5 * angle), "w": math.cos(0.5 * angle)}
+
+    def _latch(self, topic: str, message: dict[str, Any]) -> str:
+        """Keep a message for those who subscribe later; return its text."""
+        self._latched[topic] = json.dumps({"op": "publish", "topic": topic, "msg": message})
+        return self._latched[topic]
+
+    def _header(self, now: float) -> dict[str, Any]:
+        return {"stamp": self._stamp(now), "frame_id": "base"} | (
+            {"seq": 0} if self.settings.ros == 1 else {}
+        )
 
     def _stamp(self, now: float) -> dict[str, int]:
         seconds, rest = divmod(round(1e9 * now), 10**9)

@@ -2,8 +2,7 @@
 
 The left stick is the hand in the plane that faces the user, the right stick or the triggers move it away and back.
 Either the stick's place is the hand's place, so that a stick that is let go takes the hand back to the centre, or it
-is the hand's velocity. Sticks rest beside their zero: a dead zone takes that away, and what is left of the range is
-stretched, so that nothing jumps at its edge. A low pass of 20 ms hides the stick's steps.
+is the hand's velocity. The left stick's dead zone is round, so that it keeps directions; see `steering`.
 
 Rumble is one number for each of two motors and no force: the weak motor runs with the size of the force, the strong
 one with its rate of change. An effect lasts 100 ms and is renewed every 50 ms, so that it ends by itself when the loop
@@ -25,9 +24,10 @@ import numpy as np
 
 from palpate.errors import DeviceError, DeviceLostError, UsageError
 from palpate.runtime.devices.device import Sample, Traits, settings_from
+from palpate.runtime.devices.steering import DeadZone, SteeredHand
 from palpate.runtime.shared_state import Block
 
-__all__ = ["DeadZone", "GamepadDevice", "GamepadSettings"]
+__all__ = ["GamepadDevice", "GamepadSettings"]
 
 _SYN, _KEY, _ABS, _FF = 0, 1, 3, 0x15
 _DROPPED, _REPORT = 3, 0  # of _SYN: events were lost; a set of events is complete
@@ -35,7 +35,6 @@ _X, _Y, _Z, _RX, _RY, _RZ, _GAS, _BRAKE = 0, 1, 2, 3, 4, 5, 9, 10
 _SOUTH, _EAST, _START, _LEFT_STICK = 0x130, 0x131, 0x13B, 0x13D
 _RUMBLE, _FULL = 0x50, 0xFFFF
 
-_SMOOTHING, _LONGEST_STEP = 0.020, 0.050  # s
 _MOST_EVENTS = 256  # in one tick: more than any pad sends
 _RENEWED, _LASTING = 0.050, 100  # s between rumble effects, ms that each lasts
 _RISE = 0.1  # s from zero to full force that make the strong motor run at full
@@ -85,43 +84,6 @@ class GamepadSettings:
             )
 
 
-class DeadZone:
-    """One axis of a pad: its range, brought to −1 … 1 or 0 … 1, and a zone around rest that counts as rest.
-
-    Parameters
-    ----------
-    lowest, highest : float
-        Of the range that the kernel states.
-    flat : float
-        Half the zone around rest that the kernel states, in the same units.
-    dead : float
-        The smallest dead zone, as a share of the way.
-    one_sided : bool
-        A trigger, which rests at its lowest value.
-    """
-
-    def __init__(
-        self, lowest: float, highest: float, flat: float, dead: float, *, one_sided: bool = False
-    ) -> None:
-        span = max(highest - lowest, 1.0)
-        self._rest = lowest if one_sided else (lowest + highest) / 2.0
-        self._way = span if one_sided else span / 2.0
-        self.dead = min(max(dead, flat / self._way), 0.9)
-
-    def share(self, value: float) -> float:
-        """Return where a raw value lies, −1 … 1, without the dead zone."""
-        return min(1.0, max(-1.0, (value - self._rest) / self._way))
-
-    def outside(self, size: float) -> float:
-        """Return how far a share's size, 0 … 1, is out of the dead zone, 0 … 1."""
-        return min(1.0, max(0.0, size - self.dead) / (1.0 - self.dead))
-
-    def __call__(self, value: float) -> float:
-        """Return a raw value as −1 … 1, continuous, 0 in the dead zone."""
-        share = self.share(value)
-        return math.copysign(self.outside(abs(share)), share)
-
-
 class GamepadDevice:
     """One gamepad.
 
@@ -149,7 +111,8 @@ class GamepadDevice:
         self._raw: dict[int, float] = {}
         self._pressed: set[int] = set()
         self._dropped, self._closed, self._last = False, False, math.nan
-        self._target, self._step = np.zeros(3), np.zeros(3)
+        by_speed = s.mapping == "speed"
+        self._hand = SteeredHand(self.sample.position, self.traits.radius, s.speed if by_speed else 0.0)
         try:
             self._lay_out()
         except BaseException:
@@ -180,11 +143,9 @@ class GamepadDevice:
             self._take_events()
         except OSError as error:
             raise DeviceLostError(f"The gamepad {self.name} is no longer there.", why=str(error)) from error
-        elapsed = now - self._last
         self._last = now
-        sample = self.sample
-        self._move(min(elapsed, _LONGEST_STEP) if elapsed > 0.0 else 0.0)
-        pressed = self._pressed
+        sample, pressed = self.sample, self._pressed
+        self._move(now)
         holds = _SOUTH in pressed
         by_button = self._settings.hold == "button"
         sample.holding = holds or not by_button
@@ -273,31 +234,18 @@ class GamepadDevice:
             elif event.type == _KEY:
                 (self._pressed.add if event.value else self._pressed.discard)(event.code)
 
-    def _move(self, elapsed: float) -> None:
-        """Move the hand on by `elapsed` s towards, or as fast as, the sticks say."""
-        axes, raw, target, step = self._axes, self._raw, self._target, self._step
+    def _move(self, now: float) -> None:
+        """Move the hand on to `now`, s, towards, or as fast as, the sticks say."""
+        axes, raw = self._axes, self._raw
         right, down = axes[_X].share(raw[_X]), axes[_Y].share(raw[_Y])
         size = math.hypot(right, down)
-        stretch = axes[_X].outside(size) / size if size > 0.0 else 0.0  # a round dead zone keeps directions
+        stretch = axes[_X].outside(size) / size if size > 0.0 else 0.0
         if self._settings.depth == "triggers":
             back = axes[self._back](raw[self._back]) - axes[self._away](raw[self._away])
         else:
             back = axes[self._depth](raw[self._depth])
-        radius, speed = self.traits.radius, self._settings.speed * elapsed
-        step[0], step[1], step[2] = stretch * right, -stretch * down, back
-        if self._settings.mapping == "position":
-            np.multiply(step, radius, out=target)
-        else:
-            step *= speed
-            target += step
-            if _LEFT_STICK in self._pressed:
-                target[:] = 0.0
-        if (far := math.hypot(*target.tolist())) > radius:
-            target *= radius / far
-        position = self.sample.position
-        np.subtract(target, position, out=step)
-        step *= -math.expm1(-elapsed / _SMOOTHING)
-        position += step
+        centred = self._settings.mapping == "speed" and _LEFT_STICK in self._pressed
+        self._hand.move(stretch * right, -stretch * down, back, now, centred=centred)
 
     def _shake(self, strong: float, weak: float) -> None:
         """Run the motors for a tenth of a second, 0 … 1 of full each."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import select
 import socket
+import time
 from collections.abc import Sequence
 from urllib.parse import urlsplit
 
@@ -16,7 +17,7 @@ from palpate.errors import DeviceError, DeviceLostError, UsageError
 
 __all__ = ["WebsocketChannel"]
 
-_OPENING = 2.0  # s
+_OPENING, _GOODBYE = 2.0, 0.2  # s
 _CHUNK = 65536  # bytes
 _MOST_CHUNKS = 16  # at a time: a service that sends without end is not waited for
 _REMEDY = "Check that it runs, and start again."
@@ -139,10 +140,19 @@ class WebsocketChannel:
         return messages
 
     def close(self) -> None:
-        """Say goodbye and close; harmless when repeated."""
+        """Say goodbye, wait briefly until the other end has read all that was sent, and close; harmless when repeated.
+
+        A socket that is closed with unread messages in it resets the connection, and what was sent last, a zero force,
+        may be lost with it.
+        """
         try:
             self._protocol.send_close()
             self._flush()
+            self._socket.shutdown(socket.SHUT_WR)
+            end = time.monotonic() + _GOODBYE
+            while (left := end - time.monotonic()) > 0.0:
+                if not select.select(self._poll, (), (), left)[0] or not self._socket.recv(_CHUNK):
+                    break
         except Exception:  # noqa: BLE001 - whoever is gone needs no goodbye
             pass
         self._socket.close()

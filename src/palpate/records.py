@@ -1,4 +1,4 @@
-"""Frozen tables with quantities that may carry units: the base of all parts of a study."""
+"""Records that people write as text, in a study or a mapping, and the numbers and quantities in them."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaH
 from pydantic_core import CoreSchema, core_schema
 
 from palpate.errors import UsageError
-from palpate.units import to_si
+from palpate.units import parse_quantity
 
 __all__ = [
+    "Count",
     "Densities",
     "Metres",
     "Newtons",
+    "Number",
     "PadStiffness",
     "Pair",
     "Pascals",
@@ -36,7 +38,7 @@ class Unit:
     Attributes
     ----------
     name : str
-        SI unit, such as "m".
+        SI unit, such as "m"; "" for a pure number.
     """
 
     name: str
@@ -44,27 +46,46 @@ class Unit:
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_before_validator_function(partial(in_si, unit=self.name), handler(source))
 
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, _: GetJsonSchemaHandler) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        if not self.name:
+            return handler(schema)
         text = f"a number in {self.name}, or a quantity with its unit, such as '1 {self.name}'"
         return {"anyOf": [{"type": "number"}, {"type": "string"}], "description": text}
 
 
-def in_si(value: Any, unit: str) -> float:
-    """Return a quantity of a study file as a number in this unit.
+class _Whole:
+    """Annotation of an int field that takes no text: Pydantic by itself reads "1_0" as 10, and true as 1."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(_whole, handler(source))
+
+
+def _whole(value: Any) -> Any:
+    if isinstance(value, (bool, str)):
+        shown = repr(value) if isinstance(value, str) else str(value).lower()
+        raise ValueError(f"{shown} is no whole number; write it with digits alone, without quotes")  # noqa: TRY004
+    return value
+
+
+def in_si(value: Any, unit: str | None) -> float:
+    """Return a quantity of a record as a number in this unit; None: a text of any dimension, in SI base units.
 
     Raises
     ------
     ValueError
         If it is not a quantity, or has another dimension. Pydantic collects these errors.
     """
-    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-        raise ValueError(f"{value!r} is not a quantity in {unit}")  # noqa: TRY004 - pydantic collects ValueError
     try:
-        return to_si(value, unit)
+        return parse_quantity(value, unit)
     except UsageError as error:
-        raise ValueError(str(error).replace("\n", " ")) from error
+        bare = f" A number without quotes is in {unit}." if error.what.endswith("has no unit.") else ""
+        raise ValueError(str(error).replace("\n", " ") + bare) from error
 
 
+Count = Annotated[int, _Whole()]
+Number = Annotated[float, Unit("")]
 Metres = Annotated[float, Unit("m")]
 SquareMetres = Annotated[float, Unit("m^2")]
 QuarticMetres = Annotated[float, Unit("m^4")]

@@ -87,7 +87,8 @@ def _is_other_form(item: Any, items: Sequence[tuple[_Place, Any]]) -> bool:
 
 def _place(location: tuple[int | str, ...], model: type[BaseModel]) -> _Place:
     """Return where a mistake is; Pydantic's location names the tags of unions, too, which are no keys."""
-    keys, fields, forms, tagged = list[str](), tuple[FieldInfo, ...](), (model,), False
+    keys, fields, tagged = list[str](), tuple[FieldInfo, ...](), False
+    forms: tuple[Any, ...] = (model,)
     for key in location:
         if tagged:  # the kind of a union
             forms, tagged = tuple(f for f in forms if f.model_fields["kind"].default == key), False

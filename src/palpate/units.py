@@ -12,7 +12,6 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 
@@ -133,9 +132,10 @@ def _as_float(value: Fraction, text: str) -> float:
     return float(value)
 
 
-def _finite(value: Any, unit: str) -> float:
-    if isinstance(value, numbers.Real) and not isinstance(value, bool) and math.isfinite(value):
-        return float(value)
+def _finite(value: object, unit: str) -> float:
+    number = math.nan if isinstance(value, bool) else value
+    if isinstance(number, numbers.Real) and abs(number) <= sys.float_info.max:
+        return float(number)
     raise UsageError(
         f"{value!r} is no finite number{f' in {unit}' if unit else ''}.",
         fix=f'Write a number, or a text with its unit, such as "10 {usual_unit(unit)}".' if unit else "",

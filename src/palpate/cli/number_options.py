@@ -12,11 +12,8 @@ import typer
 
 from palpate.errors import UsageError
 from palpate.number_text import whole_number
-from palpate.units import parse_quantity
 
 __all__ = ["count_option", "number_option"]
-
-_SIGNS = {"ge": "≥", "le": "≤"}
 
 
 def number_option(
@@ -35,7 +32,13 @@ def number_option(
     help : str
         Text of the help.
     """
-    return _option(name, lambda text: parse_quantity(text, unit, name, bare=True), unit, (least, most), help)
+
+    def read(text: str) -> float:
+        from palpate.units import parse_quantity  # imports NumPy, which the help needs not
+
+        return parse_quantity(text, unit, name, bare=True)
+
+    return _option(name, read, "NUMBER", unit, (least, most), help)
 
 
 def count_option(name: str, *, least: int | None = None, most: int | None = None, help: str) -> Any:
@@ -47,28 +50,28 @@ def count_option(name: str, *, least: int | None = None, most: int | None = None
         except UsageError as error:
             raise UsageError(f"{name}: {error.what}", why=error.why, fix=error.fix) from error
 
-    return _option(name, read, "", (least, most), help)
+    return _option(name, read, "COUNT", "", (least, most), help)
 
 
 def _option(
     name: str,
     read: Callable[[str], float],
+    kind: str,
     unit: str,
     ends: tuple[float | None, float | None],
     help: str,
 ) -> Any:
-    limits = {bound: end for bound, end in zip(_SIGNS, ends, strict=True) if end is not None}
-    allowed = ", ".join(f"{_SIGNS[bound]} {end:g}" for bound, end in limits.items())
+    least, most = ends
+    limits = [f"{sign} {end:g}" for sign, end in (("≥", least), ("≤", most)) if end is not None]
 
     def parse(text: Any) -> Any:
         value = read(text) if isinstance(text, str) else text  # older Typers hand over the default, too
-        if value is None or limits.get("ge", value) <= value <= limits.get("le", value):
+        if value is None or ((least is None or value >= least) and (most is None or value <= most)):
             return value
         raise UsageError(
-            f"{name}: {text} is out of range.",
-            why=f"Allowed is {allowed} {unit}".rstrip() + ".",
-            fix="Change it.",
+            f"{name}: {text} is out of range.", fix=f"Give {' and '.join(limits)} {unit}".rstrip() + "."
         )
 
-    kind = "COUNT" if read.__name__ == "read" else "NUMBER"
-    return typer.Option(name, parser=parse, metavar=f"{kind} ({allowed})" if allowed else kind, help=help)
+    return typer.Option(
+        name, parser=parse, metavar=f"{kind} ({', '.join(limits)})" if limits else kind, help=help
+    )

@@ -103,6 +103,7 @@ def test_a_text_gives_the_number_that_it_says(text, unit, value):
         ("5 MM", '\'MM\' may mean "Mm" or "mm"'),
         ("5 N m/kg m", "not clear"),
         ("5 (mm", "There is no unit"),
+        ("5 %%", "in % once"),
         ("5 mm" + "m" * 100, "too many characters"),
         ("9" * 5000 + " mm", "5003 characters"),
         ("1e400 m", "too large"),

@@ -132,6 +132,8 @@ def _pieces(text: str) -> Iterator[str]:
     """Yield names with their powers, and marks, as Pint writes them; refuse all else, and a product below a slash."""
     if len(text) > _LONGEST:
         raise UsageError(f"'{text[:20]}…' has too many characters for a unit.")
+    if text.count("%") > 1:
+        raise UsageError(f"{text!r} is no unit: a share is in % once.")
     place, below, operand = (
         0,
         [False],

@@ -6,6 +6,7 @@ file may say ``"110 GPa"``, and `parse_quantity` turns it into 1.1e11.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import numbers
 import sys
@@ -133,9 +134,10 @@ def _as_float(value: Fraction, text: str) -> float:
 
 
 def _finite(value: object, unit: str) -> float:
-    number = math.nan if isinstance(value, bool) else value
-    if isinstance(number, numbers.Real) and abs(number) <= sys.float_info.max:
-        return float(number)
+    if not isinstance(value, bool) and isinstance(value, numbers.Real):
+        with contextlib.suppress(OverflowError):  # of a whole number with 400 digits
+            if math.isfinite(number := float(value)):
+                return number
     raise UsageError(
         f"{value!r} is no finite number{f' in {unit}' if unit else ''}.",
         fix=f'Write a number, or a text with its unit, such as "10 {usual_unit(unit)}".' if unit else "",

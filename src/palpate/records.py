@@ -98,7 +98,19 @@ Pair = tuple[Metres, Metres]
 Triple = tuple[Metres, Metres, Metres]
 
 
+_BOUNDS = {"ge": "minimum", "gt": "exclusiveMinimum", "le": "maximum", "lt": "exclusiveMaximum"}
+
+
+def _name_bounds(schema: dict[str, Any]) -> None:
+    """Give the bounds of numbers that may be left out their names in JSON Schema: Pydantic writes "ge" for these."""
+    for key in schema.get("properties", {}).values():
+        for form in key.get("anyOf", ()):
+            form |= {_BOUNDS[name]: form.pop(name) for name in list(form) if name in _BOUNDS}
+
+
 class Record(BaseModel):
     """Base of all parts of a study: frozen, and unknown keys are errors."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", allow_inf_nan=False, json_schema_extra=_name_bounds
+    )

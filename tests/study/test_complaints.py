@@ -12,6 +12,7 @@ from pydantic import BaseModel, ValidationError
 from palpate.dataset.readers.mapping import ImportMapping, read_mapping
 from palpate.errors import UsageError
 from palpate.record_complaints import complaints
+from palpate.study import read_study
 from palpate.study.stage_records import SECTIONS
 from palpate.study.study import Study
 
@@ -159,3 +160,9 @@ def test_a_mapping_is_complained_of_in_the_same_words():
     ):
         assert words in told
     assert "joinn: there is no such key; did you mean 'join'?" in told
+
+
+def test_a_decimal_comma_without_quotes_is_named(tmp_path):
+    (tmp_path / "study.toml").write_text("[body.material]\npoisson = 0,45\n", encoding="utf-8")
+    with pytest.raises(UsageError, match=r"decimal point: 0\.45, not 0,45"):
+        read_study(tmp_path / "study.toml")

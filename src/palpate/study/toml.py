@@ -68,9 +68,9 @@ def read_study(path: str | os.PathLike[str]) -> Study:
             fix="A study is a text file: write one with `palpate init`.",
         ) from error
     except tomllib.TOMLDecodeError as error:
-        twice = "overwrite" in str(error)
-        fix = "A key or a table stands there twice: keep one." if twice else "Correct that line."
-        raise StudyError(f"{path} is not valid TOML.", why=f"{error}.", fix=fix) from error
+        raise StudyError(
+            f"{path} is not valid TOML.", why=f"{error}.", fix=_way_to_toml(error, path)
+        ) from error
     try:
         return Study.model_validate(_beside(path.parent, _from_first_version(content)))
     except ValidationError as error:
@@ -80,6 +80,17 @@ def read_study(path: str | os.PathLike[str]) -> Study:
             fix=f"`palpate init {_example_of(content)} --print` shows every key with its meaning; "
             "`palpate schema` is for editors.",
         ) from error
+
+
+def _way_to_toml(error: tomllib.TOMLDecodeError, path: Path) -> str:
+    """Return what makes TOML of a file that is none."""
+    if "overwrite" in str(error):
+        return "A key or a table stands there twice: keep one."
+    line = re.search(r"at line ([0-9]+)", str(error))
+    text = path.read_text(encoding="utf-8").split("\n")[int(line[1]) - 1] if line else ""
+    if re.search(r"= *[-+]?[0-9]+,[0-9]+ *(#|$)", text.strip()):
+        return "A number without quotes has a decimal point: 0.45, not 0,45."
+    return "Correct that line."
 
 
 def _from_first_version(content: dict[str, Any]) -> dict[str, Any]:
